@@ -24,43 +24,11 @@
 namespace forereach {
 namespace {
 
-Abstentions FromDecision(const std::string& path, const std::string& config_path) {
-  const nlohmann::json json = ParseJson(ReadWhole(path, kLargestJsonFile));
-  Abstentions read;
-  read.tasks.push_back(
-      std::make_shared<const Config>(LoadConfig(config_path.empty() ? TaskOf(path, json) : config_path)));
-  const Config& task = *read.tasks.front();
-  if (IsCertificate(path, json)) {
-    read.certified = 1;
-    return read;
-  }
-  const JsonField document(path, json), steps = document["inputs"]["controls"], set = document["inputs"]["initial_set"];
-  const auto n = static_cast<std::size_t>(task.problem->model->num_states());
-  const auto m = static_cast<std::size_t>(task.problem->model->num_inputs());
-  RecordedAbstention& abstention = read.all.emplace_back();
-  abstention.name = path;
-  abstention.message = document["message"].Text();
-  abstention.task = &task;
-  for (const std::int16_t outcome :
-       {decision_t::ABSTAIN_FALSIFIED, decision_t::ABSTAIN_DOMAIN, decision_t::ABSTAIN_SAFETY})
-    if (document["outcome"].Text() == OutcomeName(outcome)) abstention.outcome = outcome;
-  Case& judged = abstention.judged;
-  judged.problem = task.problem;
-  judged.controls.resize(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(steps.Count()));
-  for (std::size_t t = 0; t < steps.Count(); ++t)
-    judged.controls.col(static_cast<Eigen::Index>(t)) = steps[t].Numbers(m);
-  judged.schedule = ScheduleFromZero(task, static_cast<int>(steps.Count()));
-  const Eigen::VectorXd lower = set["lower"].Numbers(n), upper = set["upper"].Numbers(n);
-  if (!(lower.array() <= upper.array()).all()) set.Fail("a lower bound is above its upper one");
-  judged.initial_set = Zonotope::Enclose(Box(lower, upper));
-  judged.obstacles = task.obstacles;
-  return read;
-}
-
 // Collects what was not certified. Problems with learned transitions are made at the end, when all of them are known.
 class AbstentionReader final : public TimelineUser {
  public:
-  explicit AbstentionReader(const BusOptions& channels) : channels_(channels) {}
+  AbstentionReader(const BusOptions& channels, std::function<bool(const std::string&)> wanted)
+      : channels_(channels), wanted_(std::move(wanted)) {}
 
   void OnEvent(const LogEvent& event) override {
     if (event.channel == channels_.candidate) ++waiting_;
@@ -81,8 +49,10 @@ class AbstentionReader final : public TimelineUser {
       ++certified_;
       return;
     }
+    if (wanted_ && !wanted_(recorded.event)) return;
     RecordedAbstention& abstention = all_.emplace_back();
     bases_.push_back(recorded.basis);
+    abstention.event = recorded.event;
     abstention.name = recorded.event + ", plan " + std::to_string(decision.plan_id) + " of " + GetText(decision.source);
     abstention.message = GetText(decision.message);
     abstention.outcome = decision.outcome;
@@ -130,8 +100,7 @@ class AbstentionReader final : public TimelineUser {
     judged.progress_steps = candidate->progress_steps;
   }
 
-  // Adds what was collected.
-  void Finish(const Timeline& timeline, Abstentions& all) {
+  void Finish(const Timeline& timeline, Abstentions& read) {
     std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
     for (std::size_t i = 0; i < all_.size(); ++i) {
       const Basis& basis = bases_[i];
@@ -143,16 +112,16 @@ class AbstentionReader final : public TimelineUser {
                                   .subspan(basis.learned_begin, basis.learned_end - basis.learned_begin));
       all_[i].judged.problem = problem;
     }
-    std::ranges::move(all_, std::back_inserter(all.all));
-    all.certified += certified_;
-    all.passed_over.undecodable += timeline.passed_over().undecodable;
-    all.passed_over.not_authentic += timeline.passed_over().not_authentic;
+    read.all = std::move(all_);
+    read.certified = certified_;
+    read.passed_over = timeline.passed_over();
   }
 
  private:
   using Message = std::pair<std::vector<std::uint8_t>, std::int64_t>;
 
   const BusOptions channels_;
+  const std::function<bool(const std::string&)> wanted_;
   std::size_t waiting_ = 0;
   std::shared_ptr<const Message> last_obstacles_;
   std::vector<RecordedAbstention> all_;
@@ -160,44 +129,52 @@ class AbstentionReader final : public TimelineUser {
   std::int64_t certified_ = 0;
 };
 
-// Adds what a run has. Runs of the same task share it.
-void AddRun(const std::vector<std::string>& logs, std::vector<Config> tasks, bool names_files, Abstentions& all) {
-  std::vector<const Config*> pointers;
-  for (Config& task : tasks) {
-    auto known = std::ranges::find_if(all.tasks, [&](const auto& each) { return each->grounds == task.grounds; });
-    if (known == all.tasks.end()) {
-      all.tasks.push_back(std::make_shared<const Config>(std::move(task)));
-      known = std::prev(all.tasks.end());
-    }
-    pointers.push_back(known->get());
-  }
-  AbstentionReader reader(pointers.front()->bus);
-  Timeline timeline(pointers, reader);
-  timeline.Read(logs, names_files);
-  reader.Finish(timeline, all);
-}
-
 }  // namespace
 
-Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key,
-                            unsigned jobs) {
-  if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
-  NamedRuns named = RunsNamedBy(files, jobs);
-  const RunTasks tasks(config, key, named.is_many);
-  Abstentions all;
-  for (const RunLogs& run : named.runs) try {
-      if (named.is_many && (run.logs.empty() || Survey(run.logs, LogOrder::kAny).decisions == 0)) continue;
-      const std::size_t before = all.all.size();
-      AddRun(run.logs, tasks.Of(run.logs), named.is_many || run.logs.size() > 1, all);
-      for (std::size_t i = before; named.is_many && i < all.all.size(); ++i)
-        all.all[i].name = run.robot + ": " + all.all[i].name;
-    } catch (const BadInput& error) {
-      if (!named.is_many) throw;
-      named.missing.emplace_back(error.what());
-    }
-  all.missing = std::move(named.missing);
-  if (all.tasks.empty()) throw ConfigError(files[0] + ": " + (all.missing.empty() ? "no decisions" : all.missing[0]));
-  return all;
+Abstentions AbstentionOf(const std::string& path, const std::string& config_path) {
+  const nlohmann::json json = ParseJson(ReadWhole(path, kLargestJsonFile));
+  Abstentions read;
+  read.tasks.push_back(
+      std::make_shared<const Config>(LoadConfig(config_path.empty() ? TaskOf(path, json) : config_path)));
+  const Config& task = *read.tasks.front();
+  if (IsCertificate(path, json)) {
+    read.certified = 1;
+    return read;
+  }
+  const JsonField document(path, json), steps = document["inputs"]["controls"], set = document["inputs"]["initial_set"];
+  const auto n = static_cast<std::size_t>(task.problem->model->num_states());
+  const auto m = static_cast<std::size_t>(task.problem->model->num_inputs());
+  RecordedAbstention& abstention = read.all.emplace_back();
+  abstention.name = path;
+  abstention.message = document["message"].Text();
+  abstention.task = &task;
+  for (const std::int16_t outcome :
+       {decision_t::ABSTAIN_FALSIFIED, decision_t::ABSTAIN_DOMAIN, decision_t::ABSTAIN_SAFETY})
+    if (document["outcome"].Text() == OutcomeName(outcome)) abstention.outcome = outcome;
+  Case& judged = abstention.judged;
+  judged.problem = task.problem;
+  judged.controls.resize(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(steps.Count()));
+  for (std::size_t t = 0; t < steps.Count(); ++t)
+    judged.controls.col(static_cast<Eigen::Index>(t)) = steps[t].Numbers(m);
+  judged.schedule = ScheduleFromZero(task, static_cast<int>(steps.Count()));
+  const Eigen::VectorXd lower = set["lower"].Numbers(n), upper = set["upper"].Numbers(n);
+  if (!(lower.array() <= upper.array()).all()) set.Fail("a lower bound is above its upper one");
+  judged.initial_set = Zonotope::Enclose(Box(lower, upper));
+  judged.obstacles = task.obstacles;
+  return read;
+}
+
+Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files,
+                            const std::function<bool(const std::string& event)>& wanted) {
+  Abstentions read;
+  std::vector<const Config*> pointers;
+  for (Config& task : tasks.Of(run.logs))
+    pointers.push_back(read.tasks.emplace_back(std::make_shared<const Config>(std::move(task))).get());
+  AbstentionReader reader(pointers.front()->bus, wanted);
+  Timeline timeline(pointers, reader);
+  timeline.Read(run.logs, names_files);
+  reader.Finish(timeline, read);
+  return read;
 }
 
 }  // namespace forereach

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -11,12 +12,15 @@
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "records/log_tasks.h"
 #include "records/log_trust.h"
+#include "records/run_logs.h"
 
 namespace forereach {
 
 struct RecordedAbstention {
   std::string name;                     ///< Identifies it to people.
+  std::string event;                    ///< Its decision's, RecordedDecision::event; empty for a document.
   std::string message;                  ///< The recorded sentence.
   std::int16_t outcome = 0, cause = 0;  ///< As in decision_t.
   const Config* task = nullptr;
@@ -31,19 +35,23 @@ struct RecordedAbstention {
   candidate_plan_t candidate{};  ///< Zeros likewise.
 };
 
+/** Those of one run. */
 struct Abstentions {
   std::vector<std::shared_ptr<const Config>> tasks;
   std::vector<RecordedAbstention> all;  ///< Abstentions and rejections, in the order of the log.
   std::int64_t certified = 0;
   PassedOver passed_over{};
-  std::vector<std::string> missing{};  ///< Logs and runs that could not be read, with the reason.
 };
 
-/** Reads a decision's document, or the runs that the files name (RunsNamedBy), with the robot's name in the name of
-each abstention if there are several.
-@param config the task file; empty: the one that the document names, or that the logger kept next to the logs.
-@throws BadInput as ReadAllCertificates does; ConfigError with file and field for a document that is no decision. */
-[[nodiscard]] Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config,
-                                          const LogKey& key, unsigned jobs);
+/** The one, or the certificate, of a decision's document.
+@param config the task file; empty: the one that the document names.
+@throws ConfigError with file and field for what is no decision. */
+[[nodiscard]] Abstentions AbstentionOf(const std::string& document, const std::string& config);
+
+/** Those of a run's logs.
+@param names_files whether events are named with their log. @param wanted says of an event's name whether it is to be
+read; null for all of them. @throws BadInput for logs that cannot be read, or without their task. */
+[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files,
+                                          const std::function<bool(const std::string& event)>& wanted = nullptr);
 
 }  // namespace forereach

@@ -1,26 +1,20 @@
 #include <algorithm>
 #include <iostream>
 #include <map>
-#include <optional>
 #include <set>
-#include <thread>
 
 #include <nlohmann/json.hpp>
 
-#include "advise/advice.h"
-#include "certifier/certify/explain.h"
-#include "certifier/numerics/parallel.h"
-#include "certifier/numerics/text.h"
 #include "certifier/task/json_text.h"
-#include "cli/abstentions.h"
+#include "cli/abstention_advice.h"
 #include "cli/commands.h"
-#include "cli/gate_advice.h"
+#include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
-#include "cli/progress.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
-#include "planner_bridge/motion.h"
+#include "records/decision_record.h"
+#include "records/log_survey.h"
 
 namespace forereach {
 namespace {
@@ -30,65 +24,42 @@ struct Options {
   std::string config;
   LogKey key;
   bool json = false;
-  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+  EachRunOptions each_run;
 };
 
+// Of one decision, or of runs: their logs, abstentions and advice.
 struct Advised {
-  std::vector<Advice> advices;
-  std::optional<Remedy> remedy;
-  std::string missing;
+  NamedRuns named;
+  std::vector<Abstentions> runs;
+  std::vector<std::vector<AbstentionAdvice>> advice;
 
-  [[nodiscard]] bool turned() const {
-    return std::ranges::any_of(advices, &Advice::turns) || (remedy && remedy->turns);
+  // Calls visit(abstention, its advice) for all, in their order.
+  template <class Visit>
+  void ForEach(const Visit& visit) const {
+    for (std::size_t run = 0; run < runs.size(); ++run)
+      for (std::size_t i = 0; i < advice[run].size(); ++i) visit(runs[run].all[i], advice[run][i]);
   }
 };
 
-// Those of the task's planner; none if the task does not say how its robot brakes.
-BrakingTails TailsOf(const Config& task) {
-  std::shared_ptr<const RobotMotion> motion;
-  try {
-    motion = MakeMotion(task, Braking::kPlanned);
-  } catch (const ConfigError&) {
-    return {};
-  }
-  return [motion, steps = task.planner.tail_steps](const Eigen::VectorXd& state) {
-    std::vector<Eigen::MatrixXd> tails;
-    Eigen::MatrixXd controls;
-    for (int tail = 0; tail < motion->num_tails(); ++tail)
-      if (motion->Brake({state.data(), ToSize(state.size())}, tail, steps, controls)) tails.push_back(controls);
-    return tails;
-  };
-}
-
-Advised AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
-  if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
-  if (!abstention.judged.problem) return {{}, RemedyFor(abstention), {}};
-  try {
-    const Certifier certifier(abstention.judged.problem);
-    const Case& judged = abstention.judged;
-    Advised advised{Advise(judged, certifier, {.tails = tails}), {}, {}};
-    Tube tube;
-    const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
-    if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
-      advised.missing = "judged again by what is recorded: " + Explain(again, *judged.problem, judged.plan(), tube);
-    return advised;
-  } catch (const std::invalid_argument& error) {
-    return {{}, {}, std::string("it cannot be judged again: ") + error.what()};
-  }
-}
-
-// The places under the problem of the task's last abstention, which knows most.
-std::vector<std::pair<std::string, int>> PlacesOf(const Abstentions& read, const std::vector<Advised>& advised) {
-  std::vector<std::pair<std::string, int>> lines;
-  for (const auto& task : read.tasks) {
+// The places under the problem of a task's last abstention, which knows most.
+std::vector<std::pair<std::string, int>> PlacesOf(const Advised& all) {
+  struct OfTask {
+    const Config* task;
     std::vector<Case> cases;
     std::vector<Eigen::VectorXd> places;
-    for (std::size_t i = 0; i < read.all.size(); ++i) {
-      if (read.all[i].task != task.get() || advised[i].advices.empty()) continue;
-      cases.push_back(read.all[i].judged);
-      for (const Advice& advice : advised[i].advices)
-        if (advice.change == Change::kObservation) places.push_back(advice.place);
-    }
+  };
+  std::vector<OfTask> tasks;
+  all.ForEach([&](const RecordedAbstention& abstention, const AbstentionAdvice& advice) {
+    if (advice.advices.empty()) return;
+    auto of_task =
+        std::ranges::find_if(tasks, [&](const OfTask& each) { return each.task->grounds == abstention.task->grounds; });
+    if (of_task == tasks.end()) of_task = tasks.insert(tasks.end(), OfTask{abstention.task, {}, {}});
+    of_task->cases.push_back(abstention.judged);
+    for (const Advice& each : advice.advices)
+      if (each.change == Change::kObservation) of_task->places.push_back(each.place);
+  });
+  std::vector<std::pair<std::string, int>> lines;
+  for (auto& [task, cases, places] : tasks) {
     if (places.empty() || cases.size() < 2) continue;
     for (Case& each : cases) each.problem = cases.back().problem;
     for (const Place& place : RankPlaces(cases, places)) {
@@ -100,99 +71,108 @@ std::vector<std::pair<std::string, int>> PlacesOf(const Abstentions& read, const
   return lines;
 }
 
-void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised) {
-  for (std::size_t i = 0; i < read.all.size(); ++i) {
-    const RecordedAbstention& abstention = read.all[i];
-    const auto& [advices, remedy, missing] = advised[i];
-    if (advices.empty() && !remedy && missing.empty()) continue;
-    std::cout << Printable(abstention.name) << "\n  " << Printable(abstention.message) << "\n";
-    if (!missing.empty()) std::cout << "  " << Printable(missing) << "\n";
-    if (remedy)
-      std::cout << (remedy->turns ? "  it would be judged\n    " : "  it might be judged\n    ") << remedy->what
-                << "\n";
-    bool is_first = true;
-    for (const Advice& advice : advices) {
-      if (!advice.turns) continue;
-      std::cout << (is_first ? "  it would be certified\n" : "") << "    " << Printable(advice.what) << "\n";
-      is_first = false;
-    }
-    is_first = true;
-    for (const Advice& advice : advices) {
-      if (advice.turns) continue;
-      std::cout << (is_first ? "  not enough alone\n" : "") << "    " << Printable(advice.what) << ": then it is \""
-                << Printable(advice.then) << "\"\n";
-      is_first = false;
-    }
+void PrintForPeople(const RecordedAbstention& abstention, const AbstentionAdvice& advice) {
+  const std::vector<AdviceGroup> groups = GroupsOf(advice);
+  if (groups.empty() && advice.missing.empty()) return;
+  std::cout << Printable(abstention.name) << "\n  " << Printable(abstention.message) << "\n";
+  if (!advice.missing.empty()) std::cout << "  " << Printable(advice.missing) << "\n";
+  for (const AdviceGroup& group : groups) {
+    std::cout << "  " << group.heading << "\n";
+    for (const std::string& clause : group.clauses) std::cout << "    " << Printable(clause) << "\n";
   }
-  const auto turned = std::ranges::count_if(advised, &Advised::turned);
-  std::map<std::string, int> by_change;
-  for (const Advised& each : advised) {
-    std::set<Change> kinds;
-    for (const Advice& advice : each.advices)
-      if (advice.turns) kinds.insert(advice.change);
-    for (const Change change : kinds) ++by_change[Name(change)];
+}
+
+struct Totals {
+  std::size_t abstentions = 0, turned = 0;
+  std::int64_t certified = 0;
+  PassedOver passed_over{};
+  std::map<std::string, int> by_change;  // abstentions that it turns
+};
+
+Totals TotalsOf(const Advised& all) {
+  Totals totals;
+  for (const Abstentions& run : all.runs) {
+    totals.certified += run.certified;
+    totals.passed_over += run.passed_over;
   }
-  for (const std::string& missing : read.missing) std::cout << Printable(missing) << "\n";
-  std::cout << "advise: " << read.all.size() << " abstentions and rejections, " << turned
-            << " have a change that turns them, verified by certifying again; " << read.certified << " were certified"
-            << DescribePassedOver(read.passed_over) << "\n";
-  for (const auto& [change, count] : by_change) std::cout << "  " << change << ": " << count << "\n";
-  const auto places = PlacesOf(read, advised);
+  all.ForEach([&](const RecordedAbstention&, const AbstentionAdvice& advice) {
+    ++totals.abstentions;
+    totals.turned += advice.turned() ? 1 : 0;
+    std::set<std::string> changes;
+    for (const Advice& each : advice.advices)
+      if (each.turns) changes.insert(Name(each.change));
+    for (const std::string& change : changes) ++totals.by_change[change];
+  });
+  return totals;
+}
+
+void PrintForPeople(const Advised& all, const Totals& totals) {
+  all.ForEach(
+      [](const RecordedAbstention& abstention, const AbstentionAdvice& advice) { PrintForPeople(abstention, advice); });
+  for (const std::string& missing : all.named.missing) std::cout << Printable(missing) << "\n";
+  std::cout << "advise: " << totals.abstentions << " abstentions and rejections, " << totals.turned
+            << " have a change that turns them, verified by certifying again; " << totals.certified << " were certified"
+            << DescribePassedOver(totals.passed_over) << "\n";
+  for (const auto& [change, count] : totals.by_change) std::cout << "  " << change << ": " << count << "\n";
+  const auto places = PlacesOf(all);
   if (!places.empty()) std::cout << "where one more observation would turn most of them\n";
   for (std::size_t i = 0; i < std::min<std::size_t>(places.size(), 10); ++i)
     std::cout << "  " << places[i].second << ": " << places[i].first << "\n";
   std::cout << std::flush;
 }
 
-nlohmann::json ToJson(const Advice& advice) {
-  nlohmann::json document{
-      {"change", Name(advice.change)}, {"what", advice.what}, {"amount", advice.amount}, {"turns", advice.turns}};
-  if (advice.row >= 0) document["row"] = advice.row, document["column"] = advice.column;
-  if (advice.place.size() > 0) document["place"] = std::vector(advice.place.begin(), advice.place.end());
-  if (!advice.turns) document["then"] = advice.then;
-  return document;
-}
-
-void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
-  nlohmann::json all = nlohmann::json::array();
-  for (std::size_t i = 0; i < read.all.size(); ++i) {
-    nlohmann::json advices = nlohmann::json::array();
-    for (const Advice& advice : advised[i].advices) advices.push_back(ToJson(advice));
-    nlohmann::json entry{{"name", read.all[i].name},
-                         {"outcome", OutcomeName(read.all[i].outcome)},
-                         {"message", read.all[i].message},
-                         {"advice", advices}};
-    if (!advised[i].missing.empty()) entry["missing"] = advised[i].missing;
-    if (const auto& remedy = advised[i].remedy) {
-      entry["remedy"] = {{"what", remedy->what}, {"turns", remedy->turns}};
-      if (!remedy->key.empty()) entry["remedy"].update({{"key", remedy->key}, {"value", remedy->value}});
-    }
-    all.push_back(std::move(entry));
-  }
-  nlohmann::json places = nlohmann::json::array();
-  for (const auto& [place, turned] : PlacesOf(read, advised)) places.push_back({{"place", place}, {"turned", turned}});
-  std::cout << JsonText({{"abstentions", all},
-                         {"certified", read.certified},
+void PrintJson(const Advised& all, const Totals& totals) {
+  nlohmann::json abstentions = nlohmann::json::array(), places = nlohmann::json::array();
+  all.ForEach([&](const RecordedAbstention& abstention, const AbstentionAdvice& advice) {
+    nlohmann::json entry = advice;
+    entry.update(
+        {{"name", abstention.name}, {"outcome", OutcomeName(abstention.outcome)}, {"message", abstention.message}});
+    abstentions.push_back(std::move(entry));
+  });
+  for (const auto& [place, turned] : PlacesOf(all)) places.push_back({{"place", place}, {"turned", turned}});
+  std::cout << JsonText({{"abstentions", abstentions},
+                         {"certified", totals.certified},
                          {"places", places},
-                         {"missing", read.missing},
-                         {"passed_over", ToJson(read.passed_over)}})
+                         {"missing", all.named.missing},
+                         {"passed_over", ToJson(totals.passed_over)}})
             << std::endl;
 }
 
+// Every run is read anew, since places are ranked over all of them; what takes long, the advice, may be kept.
+Advised AdviseRuns(const Options& options) {
+  Advised all{RunsNamedBy(options.files, options.each_run.jobs), {}, {}};
+  NamedRuns& named = all.named;
+  const RunTasks tasks(options.config, options.key, named.is_many);
+  const auto finished = ResultsOf(options.each_run, "advise", options.config, options.key);
+  std::vector<std::string> keys(named.runs.size());
+  auto read = ForEachRun<Abstentions>(named, options.each_run, "read", [&](const RunLogs& run, RunWork&) {
+    if (named.is_many && (run.logs.empty() || Survey(run.logs, LogOrder::kAny).decisions == 0)) return Abstentions{};
+    if (finished) keys[static_cast<std::size_t>(&run - named.runs.data())] = finished->KeyOf(run);
+    Abstentions of_run = ReadAbstentions(run, tasks, named.is_many || run.logs.size() > 1);
+    for (RecordedAbstention& each : of_run.all)
+      if (named.is_many) each.name = run.robot + ": " + each.name;
+    return of_run;
+  });
+  for (auto& of_run : read) all.runs.push_back(of_run ? std::move(*of_run) : Abstentions{});
+  if (std::ranges::all_of(all.runs, [](const Abstentions& run) { return run.tasks.empty(); }))
+    throw ConfigError(options.files[0] + ": " + (named.missing.empty() ? "no decisions" : named.missing[0]));
+  all.advice = AdviseAll(all.runs, options.each_run.jobs, finished.get(), keys);
+  return all;
+}
+
+Advised AdviseDecision(const Options& options) {
+  Advised all;
+  all.runs.push_back(AbstentionOf(options.files[0], options.config));
+  all.advice = AdviseAll(all.runs, options.each_run.jobs);
+  return all;
+}
+
 int RunAdvise(const Options& options) {
-  const Abstentions read = ReadAbstentions(options.files, options.config, options.key, options.jobs);
-  std::vector<Advised> advised(read.all.size());
-  std::map<const Config*, BrakingTails> tails;
-  for (const auto& task : read.tasks) tails[task.get()] = TailsOf(*task);
-  {
-    Progress progress("abstentions examined", read.all.size());
-    ForEachInParallel(read.all.size(), options.jobs, [&](std::size_t i, std::size_t) {
-      advised[i] = AdviceFor(read.all[i], tails.at(read.all[i].task));
-      progress.Advance();
-    });
-  }
-  options.json ? PrintJson(read, advised) : PrintForPeople(read, advised);
-  return read.missing.empty() && std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
+  const bool is_document = options.files.size() == 1 && KindOf(options.files[0]) == FileKind::kJson;
+  const Advised all = is_document ? AdviseDecision(options) : AdviseRuns(options);
+  const Totals totals = TotalsOf(all);
+  options.json ? PrintJson(all, totals) : PrintForPeople(all, totals);
+  return all.named.missing.empty() && totals.turned == totals.abstentions ? 0 : 1;
 }
 
 }  // namespace
@@ -211,16 +191,17 @@ Command AdviseCommand() {
           "decision.json\n"
           "  forereach advise decision.json\n"
           "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
-          "  forereach advise run/log",
+          "  forereach advise run/log\n"
+          "  forereach advise season --resume season.advice",
       .options =
           {Required(
                {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                 "The abstentions: a decision (the output of certify --json), or logs, databases and directories, as in "
                 "forereach replay"}),
            {"--config", &options->config, "FILE", kTaskOfRecords},
-           JobsOption(options->jobs),
            JsonFlag(options->json)},
       .run = [options] { return RunAdvise(*options); }};
+  options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

@@ -40,8 +40,7 @@ struct EachRunOptions {
 /** What the work on one run is given. */
 class RunWork final {
  public:
-  RunWork(unsigned most, Progress& progress, const FinishedRuns* finished, std::string key)
-      : threads(most), progress_(progress), finished_(finished), key_(std::move(key)) {}
+  RunWork(unsigned most, Progress& progress) : threads(most), progress_(progress) {}
 
   /** Tells that these bytes of its logs were read. Not necessary. */
   void Read(std::int64_t bytes) {
@@ -51,7 +50,12 @@ class RunWork final {
   void Finish(std::size_t units) {
     if (units > told_) progress_.Advance(units - told_);
   }
-  /** The path of a file of its result. @pre FinishedRuns are not null. */
+  /** Its result is kept. */
+  void KeepIn(const FinishedRuns& finished, std::string key) {
+    finished_ = &finished;
+    key_ = std::move(key);
+  }
+  /** The path of a file of its result. @pre It is kept. */
   [[nodiscard]] std::string NewFile(const std::string& name) {
     files_.push_back(finished_->PathOf(key_, name));
     return files_.back();
@@ -65,8 +69,8 @@ class RunWork final {
 
  private:
   Progress& progress_;
-  const FinishedRuns* const finished_;
-  const std::string key_;
+  const FinishedRuns* finished_ = nullptr;
+  std::string key_;
   std::int64_t pending_ = 0;
   std::size_t told_ = 0;
   std::vector<std::string> files_;
@@ -75,12 +79,11 @@ class RunWork final {
 /** Calls one(run, work) for each run, on `options.jobs` threads in all, and returns the results in the order of the
 runs. A run that cannot be read has none: its reason is added to `named.missing` if several runs were named, and is
 thrown otherwise. An error of the output ends everything.
-@tparam Result has to_json and from_json (nlohmann). @tparam One Result(const RunLogs&, RunWork&).
-@param done what is done with the logs, for the progress bar: "replayed". @param finished may be null.
-@throws BadInput. */
+@tparam One Result(const RunLogs&, RunWork&).
+@param done what is done with the logs, for the progress bar: "replayed". @throws BadInput. */
 template <class Result, class One>
 std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOptions& options, const std::string& done,
-                                              const FinishedRuns* finished, const One& one) {
+                                              const One& one) {
   const std::size_t count = named.runs.size();
   std::vector<std::optional<Result>> results(count);
   std::vector<std::string> reasons(count);
@@ -89,17 +92,8 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
   for (const RunLogs& run : named.runs) units += RunWork::UnitsOf(run);
   Progress progress("MB of logs " + done, units);
   const auto make = [&](const RunLogs& run) -> Result {
-    const std::string key = finished ? finished->KeyOf(run) : "";
-    RunWork work(threads, progress, finished, key);
-    if (finished)
-      if (const auto kept = finished->Find(key)) try {
-          Result result = kept->template get<Result>();
-          work.Finish(RunWork::UnitsOf(run));
-          return result;
-        } catch (const nlohmann::json::exception&) {  // not what this program writes
-        }
+    RunWork work(threads, progress);
     Result result = one(run, work);
-    if (finished) finished->Keep(key, result, work.files());
     work.Finish(RunWork::UnitsOf(run));
     return result;
   };
@@ -119,6 +113,25 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
   for (std::string& reason : reasons)
     if (!reason.empty()) named.missing.push_back(std::move(reason));
   return results;
+}
+
+/** The same. Results are kept, and those that were kept are not made again.
+@tparam Result has to_json and from_json (nlohmann). @param finished null to keep none. */
+template <class Result, class One>
+std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOptions& options, const std::string& done,
+                                              const FinishedRuns* finished, const One& one) {
+  return ForEachRun<Result>(named, options, done, [&](const RunLogs& run, RunWork& work) -> Result {
+    if (!finished) return one(run, work);
+    const std::string key = finished->KeyOf(run);
+    if (const auto kept = finished->Find(key)) try {
+        return kept->template get<Result>();
+      } catch (const nlohmann::json::exception&) {  // not what this program writes
+      }
+    work.KeepIn(*finished, key);
+    Result result = one(run, work);
+    finished->Keep(key, result, work.files());
+    return result;
+  });
 }
 
 /** The results of finished runs of one command, or null without --resume.

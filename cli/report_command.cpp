@@ -1,8 +1,10 @@
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <optional>
 
 #include "certifier/task/config_error.h"
+#include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/key_options.h"
@@ -24,7 +26,41 @@ struct Options {
   bool force = false;
 };
 
-// Rows of finished runs are kept; the drawings, of which there is a bounded number, are made anew.
+constexpr std::size_t kMostAdvised = 300;
+
+// The advice on the last decisions that are no certificates. Without a log or its task, there is none.
+void AddAdvice(NamedRuns& read, const Options& options, const PageTasks& tasks, PageRun& page) {
+  const auto chosen = ChooseAdvised(page, kMostAdvised);
+  std::map<std::string, std::size_t> row_of;
+  const auto key_of = [](std::size_t run, const std::string& event) { return std::to_string(run) + ": " + event; };
+  for (std::size_t run = 0; run < chosen.size(); ++run)
+    for (const std::size_t row : chosen[run]) row_of.emplace(key_of(run, EventName(page.decisions[row].event)), row);
+  const RunLogs* const first = read.runs.data();
+  auto found = ForEachRun<Abstentions>(read, options.each_run, "searched", [&](const RunLogs& logs, RunWork&) {
+    const auto run = static_cast<std::size_t>(&logs - first);
+    if (chosen[run].empty() || logs.logs.empty()) return Abstentions{};
+    try {
+      return ReadAbstentions(logs, tasks.of_run, true,
+                             [&](const std::string& event) { return row_of.contains(key_of(run, event)); });
+    } catch (const BadInput&) {  // noted when the rows were read
+      return Abstentions{};
+    }
+  });
+  std::vector<Abstentions> runs(found.size());
+  for (std::size_t run = 0; run < found.size(); ++run)
+    if (found[run]) runs[run] = std::move(*found[run]);
+  const auto advised = AdviseAll(runs, options.each_run.jobs);
+  for (std::size_t run = 0; run < runs.size(); ++run)
+    for (std::size_t i = 0; i < advised[run].size(); ++i) {
+      PageAdvice& advice = page.advice.emplace_back();
+      advice.decision = row_of.at(key_of(run, runs[run].all[i].event));
+      advice.missing = advised[run][i].missing;
+      for (AdviceGroup& group : GroupsOf(advised[run][i]))
+        advice.groups.push_back({std::move(group.heading), std::move(group.clauses)});
+    }
+}
+
+// Rows of finished runs are kept; the drawings and the advice, of which there is a bounded number, are made anew.
 PageRun GatherRuns(const Options& options) {
   const ReportOptions& report = options.report;
   NamedRuns named = RunsNamedBy(report.logs, options.each_run.jobs);
@@ -50,6 +86,7 @@ PageRun GatherRuns(const Options& options) {
   });
   for (auto& drawings : drawn)
     if (drawings) AddDetails(page, std::move(*drawings), numbers);
+  AddAdvice(read, options, tasks, page);
   AddMissing(page, {{}, read.missing, true});
   return page;
 }

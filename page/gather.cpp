@@ -30,10 +30,6 @@ using Logs = std::vector<std::string>;
 
 std::string FileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
-std::string EventName(const LogReference& event) {
-  return event.log_file + " event " + std::to_string(event.event_number);
-}
-
 // As a shell takes it for one word.
 std::string Quoted(const std::string& text) {
   const bool is_plain = !text.empty() && text.find_first_not_of(
@@ -107,10 +103,30 @@ void LeaveOut(PageDetail& detail) {
 
 using Wanted = std::map<std::string, std::size_t>;  // by the name of a decision's event: its place
 
-bool IsJudged(const DecisionRow& row) {
+bool IsCertified(const DecisionRow& row) { return row.outcome == OutcomeName(decision_t::CERTIFIED); }
+
+bool IsJudgedAbstention(const DecisionRow& row) {
   return row.outcome == OutcomeName(decision_t::ABSTAIN_FALSIFIED) ||
          row.outcome == OutcomeName(decision_t::ABSTAIN_DOMAIN) ||
          row.outcome == OutcomeName(decision_t::ABSTAIN_SAFETY);
+}
+
+// Of each part the places of the last decisions by time that are wanted, `most` of the page.
+template <class IsWanted>
+std::vector<std::vector<std::size_t>> LastDecisions(const PageRun& page, std::size_t most, const IsWanted& is_wanted) {
+  std::vector<std::size_t> part_of, places(page.decisions.size());
+  for (std::size_t k = 0; k < page.parts.size(); ++k) part_of.insert(part_of.end(), page.parts[k].decisions, k);
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  if (page.parts.size() > 1)
+    std::ranges::stable_sort(places, {}, [&](std::size_t i) { return page.decisions[i].utime; });
+  std::vector<std::vector<std::size_t>> chosen(page.parts.size());
+  std::size_t count = 0;
+  for (const std::size_t i : places | std::views::reverse)
+    if (count < most && is_wanted(page.decisions[i])) {
+      chosen[part_of.at(i)].push_back(i);
+      ++count;
+    }
+  return chosen;
 }
 
 // Certifies the wanted candidates of logs again.
@@ -326,20 +342,18 @@ void AddRows(PageRun& page, PageRun&& run) {
 }
 
 std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds) {
-  std::vector<std::size_t> part_of, places(page.decisions.size());
-  for (std::size_t k = 0; k < page.parts.size(); ++k) part_of.insert(part_of.end(), page.parts[k].decisions, k);
-  std::iota(places.begin(), places.end(), std::size_t{0});
-  if (page.parts.size() > 1)
-    std::ranges::stable_sort(places, {}, [&](std::size_t i) { return page.decisions[i].utime; });
-  std::vector<std::vector<std::size_t>> chosen(page.parts.size());
-  std::size_t certified = 0, abstained = 0;
-  for (const std::size_t i : places | std::views::reverse) {
-    const DecisionRow& row = page.decisions[i];
-    const bool is_certified = row.outcome == OutcomeName(decision_t::CERTIFIED);
-    if (is_certified ? certified++ < bounds.certified : IsJudged(row) && abstained++ < bounds.abstained)
-      chosen[part_of.at(i)].push_back(i);
-  }
+  auto chosen = LastDecisions(page, bounds.certified, IsCertified);
+  const auto abstained = LastDecisions(page, bounds.abstained, IsJudgedAbstention);
+  for (std::size_t k = 0; k < chosen.size(); ++k) std::ranges::copy(abstained[k], std::back_inserter(chosen[k]));
   return chosen;
+}
+
+std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::size_t most) {
+  return LastDecisions(page, most, [](const DecisionRow& row) { return !IsCertified(row); });
+}
+
+std::string EventName(const LogReference& event) {
+  return event.log_file + " event " + std::to_string(event.event_number);
 }
 
 PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,

@@ -46,6 +46,12 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers);
 /** The decisions whose tubes a page has: of each part their places, the last ones by time. */
 [[nodiscard]] std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds);
 
+/** The last decisions by time that are no certificates, likewise. @param most how many of the whole page. */
+[[nodiscard]] std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::size_t most);
+
+/** Names the event of a decision as a Timeline does that names files. */
+[[nodiscard]] std::string EventName(const LogReference& event);
+
 /** All of it for the runs that `inputs` name (RunsNamedBy), one after the other. Tubes are of candidates that this
 program decides again as the record has it.
 @param bounds of the drawings; zeros for none.

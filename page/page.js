@@ -587,7 +587,8 @@ const loadDrawings = async (raw) => {
     ofRow.set(detail.row, detail);
   }
   const valuesOf = ({parts, corners, points}) => ({parts: parts.values, corners: corners.values, points: points.values});
-  return {ofRow, sets: texts.obstacle_sets, tubes: valuesOf(tubes), bodies: valuesOf(bodies)};
+  const adviceOf = new Map(texts.advice.map((advice) => [advice.row, advice]));
+  return {ofRow, adviceOf, sets: texts.obstacle_sets, tubes: valuesOf(tubes), bodies: valuesOf(bodies)};
 };
 const bodiesOf = (drawings, detail) =>
   unitsOf(drawings.bodies, {units: detail.body_units, grid: detail.body_grid, at: detail.body_at});
@@ -609,6 +610,21 @@ const showEnvelope = (detail, task) => {
   const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, \u00b1${number(detail.nearest_distance[k] ?? NaN, 3)} by its distance` : '');
   fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual', 'nearest observation'],
     lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k]), nearest(k)]));
+};
+
+const showAdvice = (run, i, advise) => {
+  const advice = run.drawings.adviceOf.get(i), box = byId('advice');
+  box.hidden = nameAt(run.decisions.outcome, i) === 'certified';
+  const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}`;
+  const parts = (advice?.groups ?? []).flatMap(([heading, clauses]) => {
+    const list = make('ul');
+    list.append(...clauses.map((clause) => make('li', clause)));
+    return [make('p', sentence(heading)), list];
+  });
+  if (advice?.missing) parts.unshift(make('p', sentence(advice.missing)));
+  if (!advice) parts.push(make('p', advise ? `This page has the advice on the last decisions only. It is printed by: ${advise}` : 'Its log was not read.'));
+  else if (parts.length === 0) parts.push(make('p', 'No change of one kind would have turned it.'));
+  byId('advice-lines').replaceChildren(...parts);
 };
 
 const showDetail = (run, i) => {
@@ -638,6 +654,7 @@ const showDetail = (run, i) => {
   showEnvelope(detail, task);
   const replay = run.raw.runs[d.run.values[i]]?.replays?.[nameAt(d.log, i)];
   byId('command').textContent = replay ? `${replay} --plan-digest ${digest}` : 'Its log was not read.';
+  showAdvice(run, i, replay?.replace(/^forereach replay/, 'forereach advise'));
   fillList('digests', [['candidate', digest], ['task', config], ...['model', 'declaration', 'observations', 'obstacles'].map((name) => [name, nameAt(d[name], i)])]);
   byId('stage').hidden = byId('step').closest('.steer').hidden = byId('legend').hidden = !hasDrawing;
   byId('missing').textContent = hasDrawing ? '' : `No drawing: ${detail ? detail.missing || 'it has no tube' :
@@ -741,6 +758,7 @@ const start = async () => {
   byId('filters').addEventListener('reset', () => setTimeout(show, 0));
   byId('notes').replaceChildren(...[
     `${counted(run.drawings.ofRow.size)} decisions have their tube on this page, or the reason why they have none: the last certified ones and the last abstentions.`,
+    `${counted(run.drawings.adviceOf.size)} have what would have helped them: the last that were not certified.`,
     'Outlines are drawn to within half a percent of their size; the certificate is about the exact sets.',
     ...(before ? ['The figures before pass the same filters, except the time.'] : []),
     ...[data.run, data.before].filter((side) => side?.damaged_places).map((side) => `${side.name}: the logs are damaged in ${counted(side.damaged_places)} places.`),

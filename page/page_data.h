@@ -61,6 +61,17 @@ struct PageDetail {
   std::vector<PageState> executed;
 };
 
+/** What would have turned a decision that is no certificate (docs/advise.md). */
+struct PageAdvice {
+  struct Group {
+    std::string heading;
+    std::vector<std::string> clauses;
+  };
+  std::size_t decision = 0;  ///< Index in PageRun::decisions.
+  std::string missing;       ///< Why there is none; empty if there is some.
+  std::vector<Group> groups;
+};
+
 /** The rows of one run among several. */
 struct PagePart {
   std::string robot;  ///< As in RunLogs.
@@ -81,6 +92,7 @@ struct PageRun {
   std::vector<PageTask> tasks;
   std::vector<std::vector<Obstacle>> obstacle_sets;
   std::vector<PageDetail> details;
+  std::vector<PageAdvice> advice;
   std::vector<PagePart> parts;  ///< The rows of each run, one behind the other.
   LogDamage damage;
   std::vector<std::string> notes;  ///< What is not on the page, as sentences.

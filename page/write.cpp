@@ -182,12 +182,21 @@ Json SketchesJson(const std::vector<PageDetail>& details, Sketch PageDetail::*sk
           {"points", Joined(details, sketch, &Sketch::points)}};
 }
 
+Json ToJson(const PageAdvice& advice) {
+  Json groups = Json::array();
+  for (const PageAdvice::Group& group : advice.groups)
+    groups.push_back({Printable(group.heading), TextsJson(group.clauses)});
+  return {{"row", advice.decision}, {"missing", Printable(advice.missing)}, {"groups", std::move(groups)}};
+}
+
 Json DrawingsJson(const PageRun& run) {
   Json details = Json::array();
   for (const PageDetail& detail : run.details) details.push_back(ToJson(detail));
   Json sets = Json::array();
   for (const std::vector<Obstacle>& set : run.obstacle_sets) sets.push_back(ToJson(set));
-  const Json texts{{"details", std::move(details)}, {"obstacle_sets", std::move(sets)}};
+  Json advice = Json::array();
+  for (const PageAdvice& each : run.advice) advice.push_back(ToJson(each));
+  const Json texts{{"details", std::move(details)}, {"obstacle_sets", std::move(sets)}, {"advice", std::move(advice)}};
   return {{"texts", {{"type", "json"}, {"data", Packed(JsonText(texts))}}},
           {"tubes", SketchesJson(run.details, &PageDetail::sketch)},
           {"bodies", SketchesJson(run.details, &PageDetail::bodies)}};

@@ -137,6 +137,29 @@ TEST_F(AdviseTest, ADatabaseAndADirectoryAreReadAsTheirLogs) {
   EXPECT_EQ(Forereach("advise " + empty + " 2>&1").code, 2) << "no logs";
 }
 
+// A run whose result is gone or damaged is searched anew.
+TEST_F(AdviseTest, GoesOnAfterAnInterruption) {
+  for (const char* robot : {"a", "b"}) {
+    std::filesystem::create_directories(scratch_ / ("night/" + std::string(robot)));
+    std::filesystem::copy_file(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog",
+                               scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
+  }
+  const std::string command = "advise '" + (scratch_ / "night") + "' --config tests/data/course.yaml ";
+  const std::string resume = command + "--resume '" + (scratch_ / "kept") + "' ";
+  const std::string whole = Forereach(command + "--json 2>&1").text;
+  EXPECT_EQ(nlohmann::json::parse(whole)["abstentions"].size(), 94u);
+  EXPECT_EQ(Forereach(resume + "--json --jobs 1 2>&1").text, whole);
+  std::vector<std::filesystem::path> kept;
+  for (const auto& file : std::filesystem::directory_iterator(scratch_ / "kept")) kept.push_back(file.path());
+  ASSERT_EQ(kept.size(), 2u);
+  std::filesystem::remove(kept[0]);
+  std::string text = Read(kept[1]);
+  const auto at = text.find("if it passed farther away");
+  ASSERT_NE(at, std::string::npos);
+  scratch_.Write("kept/" + kept[1].filename().string(), text.replace(at, 2, "IF"));
+  EXPECT_EQ(Forereach(resume + "--json 2>&1").text, whole);
+}
+
 TEST_F(AdviseTest, NamesTheQueueAndTheSilenceThatWouldHaveHeld) {
   Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
   config.gate.obstacles = ObstaclesSource::kBus;

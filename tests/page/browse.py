@@ -72,6 +72,7 @@ def use_course(browser, path):
     equal(browser.run("[...document.querySelectorAll('#figures .value')].slice(0, 2).map(e => e.textContent)"),
           [str(certified), "100.0 %"], "figures follow the filter")
     equal(set(column(browser, 3)), {"certified"}, "rows follow the filter")
+    equal(browser.run("document.getElementById('advice').hidden"), True, "a certificate needs no advice")
     check("certified" in browser.run("document.getElementById('trend').getAttribute('aria-label')"), "charts follow the filter")
     reset(browser)
     equal(shown(browser), total, "all are shown again")
@@ -101,6 +102,9 @@ def use_course(browser, path):
     first = text(browser, "#sentence")
     browser.key("ArrowDown", 40)
     check(text(browser, "#sentence") != first, "an arrow chooses the next decision")
+    check(not browser.run("document.getElementById('advice').hidden"), "an abstention has advice")
+    check("It would be certified" in text(browser, "#advice"), "what would have helped: " + text(browser, "#advice"))
+    check(browser.run("document.querySelectorAll('#advice li').length") > 1, "every change has its line")
     browser.key("Enter", 13)
     equal(browser.run("document.activeElement.id"), "step", "Enter goes to the slider")
     binding = browser.run("Number(document.getElementById('step').value)")

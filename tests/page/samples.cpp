@@ -99,6 +99,7 @@ PageRun Hostile() {
   detail.decision = 5;
   detail.missing = evil;
   run.details.push_back(detail);
+  run.advice = {{4, "", {{evil, {evil, ""}}}}, {5, evil, {}}, {6, "", {}}};
   return run;
 }
 

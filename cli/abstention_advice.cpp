@@ -1,0 +1,160 @@
+#include "cli/abstention_advice.h"
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "certifier/certify/explain.h"
+#include "certifier/numerics/parallel.h"
+#include "certifier/task/config_error.h"
+#include "cli/progress.h"
+#include "planner_bridge/motion.h"
+
+namespace forereach {
+
+void to_json(nlohmann::json& json, const Advice& advice) {
+  json = {{"change", Name(advice.change)}, {"what", advice.what}, {"amount", advice.amount}, {"turns", advice.turns}};
+  if (advice.row >= 0) json["row"] = advice.row, json["column"] = advice.column;
+  if (advice.place.size() > 0) json["place"] = std::vector(advice.place.begin(), advice.place.end());
+  if (!advice.turns) json["then"] = advice.then;
+}
+
+void from_json(const nlohmann::json& json, Advice& advice) {
+  int change = 0;
+  while (change < static_cast<int>(Change::kOutlier) && json.at("change") != Name(static_cast<Change>(change)))
+    ++change;
+  advice.change = static_cast<Change>(change);
+  json.at("what").get_to(advice.what);
+  json.at("amount").get_to(advice.amount);
+  json.at("turns").get_to(advice.turns);
+  advice.row = json.value("row", -1);
+  advice.column = json.value("column", -1);
+  const auto place = json.value("place", std::vector<double>());
+  advice.place = Eigen::Map<const Eigen::VectorXd>(place.data(), static_cast<Eigen::Index>(place.size()));
+  advice.then = json.value("then", std::string());
+}
+
+void to_json(nlohmann::json& json, const Remedy& remedy) {
+  json = {{"what", remedy.what}, {"turns", remedy.turns}};
+  if (!remedy.key.empty()) json.update({{"key", remedy.key}, {"value", remedy.value}});
+}
+
+void from_json(const nlohmann::json& json, Remedy& remedy) {
+  json.at("what").get_to(remedy.what);
+  json.at("turns").get_to(remedy.turns);
+  remedy.key = json.value("key", std::string());
+  remedy.value = json.value("value", 0.0);
+}
+
+void to_json(nlohmann::json& json, const AbstentionAdvice& advice) {
+  json = {{"advice", advice.advices}};
+  if (!advice.missing.empty()) json["missing"] = advice.missing;
+  if (advice.remedy) json["remedy"] = *advice.remedy;
+}
+
+void from_json(const nlohmann::json& json, AbstentionAdvice& advice) {
+  json.at("advice").get_to(advice.advices);
+  advice.missing = json.value("missing", std::string());
+  if (json.contains("remedy")) advice.remedy = json.at("remedy").get<Remedy>();
+}
+
+namespace {
+
+// Those of the task's planner; none if the task does not say how its robot brakes.
+BrakingTails TailsOf(const Config& task) {
+  std::shared_ptr<const RobotMotion> motion;
+  try {
+    motion = MakeMotion(task, Braking::kPlanned);
+  } catch (const ConfigError&) {
+    return {};
+  }
+  return [motion, steps = task.planner.tail_steps](const Eigen::VectorXd& state) {
+    std::vector<Eigen::MatrixXd> tails;
+    Eigen::MatrixXd controls;
+    for (int tail = 0; tail < motion->num_tails(); ++tail)
+      if (motion->Brake({state.data(), ToSize(state.size())}, tail, steps, controls)) tails.push_back(controls);
+    return tails;
+  };
+}
+
+AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
+  if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
+  if (!abstention.judged.problem) return {{}, RemedyFor(abstention), {}};
+  try {
+    const Certifier certifier(abstention.judged.problem);
+    const Case& judged = abstention.judged;
+    AbstentionAdvice advice{Advise(judged, certifier, {.tails = tails}), {}, {}};
+    Tube tube;
+    const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
+    if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
+      advice.missing = "judged again by what is recorded: " + Explain(again, *judged.problem, judged.plan(), tube);
+    return advice;
+  } catch (const std::invalid_argument& error) {
+    return {{}, {}, std::string("it cannot be judged again: ") + error.what()};
+  }
+}
+
+// What was kept of a run, unless it does not fit.
+bool TakeKept(const FinishedRuns& finished, const std::string& key, std::size_t count,
+              std::vector<AbstentionAdvice>& advice) {
+  const auto kept = finished.Find(key);
+  if (!kept) return false;
+  try {
+    advice = kept->get<std::vector<AbstentionAdvice>>();
+  } catch (const nlohmann::json::exception&) {  // not what this program writes
+    return false;
+  }
+  return advice.size() == count;
+}
+
+}  // namespace
+
+bool AbstentionAdvice::turned() const {
+  return std::ranges::any_of(advices, &Advice::turns) || (remedy && remedy->turns);
+}
+
+std::vector<AdviceGroup> GroupsOf(const AbstentionAdvice& advice) {
+  AdviceGroup enough{"it would be certified", {}}, not_enough{"not enough alone", {}};
+  for (const Advice& each : advice.advices)
+    if (each.turns)
+      enough.clauses.push_back(each.what);
+    else
+      not_enough.clauses.push_back(each.what + ": then it is \"" + each.then + "\"");
+  std::vector<AdviceGroup> groups;
+  if (const auto& remedy = advice.remedy)
+    groups.push_back({remedy->turns ? "it would be judged" : "it might be judged", {remedy->what}});
+  for (AdviceGroup* group : {&enough, &not_enough})
+    if (!group->clauses.empty()) groups.push_back(std::move(*group));
+  return groups;
+}
+
+std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
+                                                     const FinishedRuns* finished,
+                                                     const std::vector<std::string>& keys) {
+  std::vector<std::vector<AbstentionAdvice>> advised(runs.size());
+  std::vector<std::atomic<std::size_t>> left(runs.size());
+  std::vector<std::pair<std::size_t, std::size_t>> work;  // run, abstention
+  std::map<const Config*, BrakingTails> tails;
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    const std::size_t count = runs[run].all.size();
+    if (finished && TakeKept(*finished, keys[run], count, advised[run])) continue;
+    advised[run].assign(count, {});
+    left[run] = count;
+    for (std::size_t i = 0; i < count; ++i) work.emplace_back(run, i);
+    for (const auto& task : runs[run].tasks) tails[task.get()] = TailsOf(*task);
+  }
+  Progress progress("abstentions examined", work.size());
+  ForEachInParallel(work.size(), jobs, [&](std::size_t k, std::size_t) {
+    const auto [run, i] = work[k];
+    const RecordedAbstention& abstention = runs[run].all[i];
+    advised[run][i] = AdviceFor(abstention, tails.at(abstention.task));
+    if (--left[run] == 0 && finished) finished->Keep(keys[run], advised[run], {});
+    progress.Advance();
+  });
+  return advised;
+}
+
+}  // namespace forereach
