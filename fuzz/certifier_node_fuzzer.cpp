@@ -3,48 +3,14 @@
 // A withdrawal names a plan that was certified, with fewer controls than the withdrawals of it before, unless it
 // repeats the last one; or a plan that the robot says it executes. An advice is on a plan that was just abstained on.
 #include <cmath>
-#include <cstdlib>
 #include <map>
-#include <new>
 #include <utility>
-
-#include <sanitizer/allocator_interface.h>
-#include <sanitizer/asan_interface.h>
 
 #include "bus/log.h"
 #include "certifier/process/certifier_node.h"
 #include "fuzz/candidates.h"
 #include "fuzz/small_bus.h"
 #include "lcmtypes/seal.h"
-
-// A node's tube is 2 MB; that fresh memory is given to each was half of the time. It gets the one before's, and who
-// touches that in between is found all the same. (Nothing else is both aligned and that large.)
-namespace {
-void* kept = nullptr;
-std::size_t kept_size = 0;
-constexpr std::size_t kWorthKeeping = 1 << 20;
-}  // namespace
-
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  if (kept && size == kept_size) {
-    __asan_unpoison_memory_region(kept, size);
-    return std::exchange(kept, nullptr);
-  }
-  void* fresh = std::aligned_alloc(static_cast<std::size_t>(alignment), size);
-  if (!fresh) throw std::bad_alloc();
-  return fresh;
-}
-
-void operator delete(void* block, std::align_val_t) noexcept {
-  const std::size_t size = __sanitizer_get_allocated_size(block);
-  if (kept || size < kWorthKeeping) return std::free(block);
-  __asan_poison_memory_region(block, size);
-  kept = block;
-  kept_size = size;
-}
-void operator delete(void* block, std::size_t, std::align_val_t alignment) noexcept {
-  operator delete(block, alignment);
-}
 
 namespace forereach {
 namespace {

@@ -454,7 +454,9 @@ void Describe(const candidate_plan_t& m, Bytes bytes, MessageSummary& summary) {
   summary.plan = DigestOf(bytes);
   summary.is_of_plan = true;
 }
-void Describe(const decision_t& m, Bytes, MessageSummary& summary) {
+template <class Answer>
+requires(std::same_as<Answer, decision_t> || std::same_as<Answer, advice_t>) void Describe(const Answer& m, Bytes,
+                                                                                           MessageSummary& summary) {
   summary.plan_id = m.plan_id;
   summary.what = OutcomeName(m.outcome);
   summary.plan = GetDigest(m.plan_digest);

@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
@@ -104,6 +105,18 @@ TEST(MessageJson, NumbersThatAreNotFiniteAreLeftOut) {
   EXPECT_FALSE(object.contains("threshold"));
   EXPECT_EQ(object["outcome"], 1);
   EXPECT_EQ(object["outcome_name"], "certified");
+}
+
+TEST(MessageJson, AnAdviceIsOfTheCandidateThatItIsAbout) {
+  advice_t advice{};
+  advice.plan_id = 7;
+  advice.outcome = decision_t::ABSTAIN_SAFETY;
+  advice.plan_digest[31] = 9;
+  const auto summary = Summarize(Encode(advice));
+  ASSERT_TRUE(summary && summary->is_of_plan);
+  EXPECT_EQ(summary->plan_id, 7);
+  EXPECT_EQ(summary->what, "abstain_safety");
+  EXPECT_EQ(summary->plan, GetDigest(advice.plan_digest));
 }
 
 TEST(MessageJson, OtherBytesAreNoMessage) {
