@@ -14,7 +14,7 @@ constexpr const char* kColors[] = {"green",  "blue",      "sky",       "orange",
                                    "purple", "'#222222'", "'#8b5a2b'", "'#a0a000'"};
 
 // What completes no tube has a place of its own beyond a coverage of 1, each method beside the others.
-constexpr double kFirstPlaceOfNone = 1.09, kPlaceOfNone = 0.035;
+constexpr double kEndOfCoverage = 1.05, kFirstPlaceOfNone = 1.09, kPlaceOfNone = 0.035;
 // Ends of both axes.
 constexpr double kLeft = -0.04, kRight = 1.24, kBottom = -0.06, kTop = 1.12;
 
@@ -57,7 +57,9 @@ class Panel final {
 
   [[nodiscard]] std::string Script() const {
     std::string data = data_, text = series_text_;
-    const std::vector<PixelBox> boxes = PlaceLabels(Frame(), marks_, lines_, labels_, kClearance);
+    std::vector<PixelBox> lines = lines_;
+    lines.push_back({PixelX(kEndOfCoverage) - kHalfLine, kFloor, PixelX(kEndOfCoverage) + kHalfLine, kCeiling});
+    const std::vector<PixelBox> boxes = PlaceLabels(Frame(), marks_, lines, labels_, kClearance);
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       const PixelBox& box = boxes[i];
       const std::string block = "p" + std::to_string(index_) + "l" + std::to_string(i);
@@ -164,7 +166,7 @@ Plot MethodsPlot(const std::vector<MethodMarks>& methods) {
           "set arrow from 1.05, graph 0 to 1.05, graph 1 nohead dt 2 lc rgb grey\n"
           "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\nunset key\n" +
           bicycle.Script() + "unset ylabel\n" + papers.Script() +
-          "set key at screen 0.5, 0.13 center top horizontal maxcols 5 width 2\n" + point_mass.Script() +
+          "set key at screen 0.5, 0.12 center top vertical maxrows 2 width 2\n" + point_mass.Script() +
           "unset multiplot\n"};
 }
 
