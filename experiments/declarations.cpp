@@ -229,7 +229,7 @@ Table BoxTable(Reading reading, const Scope& scope, const Results& results) {
   if (is_grid)
     table.about +=
         " These parameters were found among the 63 sets of the six by the paper's three slack ratios, so the ratios "
-        "are fitted; the plans' figures were not looked at. Understeer and time step enter the derivatives by their "
+        "are fitted; the plans' figures had no part in it. Understeer and time step enter the derivatives by their "
         "product alone, friction and gravity too, so one may stand for the other.";
   const std::string why = "which parameters the paper's boxes hold, and how it bounds over them, is not in its text";
   const Eigen::MatrixXd& nominal = BoundOverBox(reading, 0);

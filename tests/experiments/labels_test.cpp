@@ -70,7 +70,7 @@ TEST(Labels, GoOutOfALinesWay) {
 }
 
 TEST(Labels, WithoutRoomAreAnError) {
-  const std::vector<Label> labels{{10, 10, "25"}, {10, 10, "100"}};
+  const std::vector<Label> labels{{1, 10, "25"}, {1, 10, "100"}};
   EXPECT_THAT(
       [&] {
         (void)PlaceLabels({0, 0, 20, 20}, {}, {}, labels, 1);
