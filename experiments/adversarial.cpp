@@ -133,19 +133,22 @@ plot $profile using 1:7 with lines lw 2 lc rgb '#222222' title 'lambda = 32', \
 Plot SlopePlot(const Scope& scope) {
   const double deployed = PointMassSystem().deployed.maxCoeff();
   std::string lines;
-  for (const double lambda : LambdasOf(scope))
-    lines += DataLine(
-        {lambda, deployed * TruePart(lambda), deployed * EstimatedPart(scope, lambda).mean.value_or(0), deployed});
+  for (const double lambda : LambdasOf(scope)) {
+    const Estimate estimate = EstimatedPart(scope, lambda);
+    lines += DataLine({lambda, deployed * TruePart(lambda), deployed * estimate.mean.value_or(0), deployed,
+                       deployed * estimate.deviation});
+  }
   return {"adversarial-slopes",
-          "Adversarial family: the true slope exceeds every declared bound, while the data and the estimates from them "
-          "stay the same.",
+          "Adversarial family: the true slope grows with lambda, past any bound once declared, while the data and the "
+          "estimates from them "
+          "stay the same. Estimate: mean and one standard deviation over the seeds.",
           720, 400, DataBlock("slope", lines) + R"(set logscale xy; set xrange [1:32]; set yrange [1e-4:10]
 set format y '10^{%T}'; set xtics (1, 2, 4, 8, 16, 32)
 set xlabel 'lambda, no unit'; set ylabel 'largest slope of r_v by v, (m/s)/(m/s)'
 set key outside top center horizontal
 plot $slope using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb red title 'true', \
   '' using 1:4 with lines dt 2 lw 2 lc rgb grey title 'deployed for lambda = 1', \
-  '' using 1:3 with linespoints pt 5 ps 0.6 lw 2 lc rgb blue title 'estimate from data below the knee'
+  '' using 1:3:5 with yerrorlines pt 5 ps 0.6 lw 2 lc rgb blue title 'estimate from data below the knee'
 )"};
 }
 

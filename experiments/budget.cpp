@@ -176,8 +176,7 @@ std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
       if (&method == &CpSlsMethods().front()) AddRowsOf(observations, pooled, budget.rows);
       meaningful += pooled.meaningful;
     }
-    plug_ins.rows.push_back(
-        {method.name + ": budgets below one", {Mark::kOurs, Paper("budget.nonvacuous")}, Exactly(meaningful), 0, kWhy});
+    plug_ins.rows.push_back({method.name + ": budgets below one", {}, Exactly(meaningful), 0, ""});
     plug_ins.rows.push_back({method.name + ": median total at the largest N", {}, Median(pooled.total), 2, ""});
   }
   return {budget, plug_ins, CapTable(scope, results), OutcomeTable(scope, results)};

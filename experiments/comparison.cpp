@@ -1,11 +1,13 @@
 // ForeReach compared with the other methods: coverage without data near the plan, recall with data.
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "experiments/experiment.h"
+#include "experiments/methods_plot.h"
 #include "experiments/sides.h"
 
 namespace forereach::experiments {
@@ -47,6 +49,11 @@ std::string WhatIsOurs(const Method& method) {
 Mark MarkOf(const Method& method) {
   const bool is_chosen = method.name == "Regional calibration" || method.name == "Plug-in Gaussian";
   return is_chosen ? Mark::kFitted : Mark::kOurs;
+}
+
+// At N = 25 no cell has a bound of its own, and the paper's figures are the global ones, too.
+bool IsGlobalByAnotherName(const Method& method, int observations) {
+  return method.name == "Regional calibration" && observations == 25;
 }
 
 Point OurPoint(const Scope& scope, const Results& results, const Cell& cell) {
@@ -97,8 +104,7 @@ std::string Sides(const Scope& scope, const Results& results) {
       bands, sizeof bands,
       "Unsound: coverage below %g. Uninformative: recall at most %g. Reproduced: on the paper's side, and coverage "
       "and recall both within %g of the paper's. These are words for measured figures, as in the paper: only "
-      "ForeReach, "
-      "Alanwar Alg. 6 and the scalar envelope are sound by a theorem, if the declaration holds. ",
+      "ForeReach, Alanwar Alg. 6 and the scalar envelope are sound by a theorem, if the declaration holds. ",
       1 - kSideBand, kSideBand, kPointBand);
   return bands + ("Of the " + std::to_string(all) + " points of the paper " + std::to_string(reproduced)) +
          " are reproduced. In brackets coverage and recall:\n" + lines;
@@ -118,8 +124,8 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
       const Cell cell = With(method, PaperCell(BicycleSystem(), observations, 0, 0));
       const std::string n = std::to_string(observations), where = method.name + ", N = " + n + ": ";
       const auto row = [&](const char* what, const Reference& reference, Group group, Statistic statistic) {
-        bicycle.rows.push_back(
-            {where + what, reference, OverSeeds(scope, results, cell, group, statistic), 4, WhatIsOurs(method)});
+        bicycle.rows.push_back({where + what, reference, OverSeeds(scope, results, cell, group, statistic), 4,
+                                WhatIsOurs(method), IsGlobalByAnotherName(method, observations)});
       };
       row("B coverage", {MarkOf(method), PaperOf(method, observations, "B", "coverage")}, Group::kB, Coverage);
       row("C recall", {is_fore_reach ? Mark::kFitted : MarkOf(method), PaperOf(method, observations, "C", "recall")},
@@ -143,84 +149,30 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
   return {bicycle, point_mass};
 }
 
-// "x dx y dy" of a point in the picture; what completes no tube has a place of its own, beyond 1.
-constexpr double kFirstPlaceOfNone = 1.09, kPlaceOfNone = 0.035;
-
-std::string PointLine(int observations, const Estimate& coverage, const Estimate& recall, std::size_t none) {
-  const double place = kFirstPlaceOfNone + kPlaceOfNone * static_cast<double>(none);
-  return DataLine({static_cast<double>(observations), coverage.mean.value_or(place), coverage.deviation,
-                   recall.mean.value_or(NAN), recall.deviation});
-}
-
-Estimate AsEstimate(const std::optional<PaperValue>& value) {
-  if (!value) return {};
-  return {value->value, std::max(value->deviation, 0.0), 1};
-}
+Estimate AsEstimate(const PaperValue& value) { return {value.value, std::max(value.deviation, 0.0), 1}; }
 
 std::vector<Plot> Plots(const Scope& scope, const Results& results) {
-  static constexpr const char* kColors[] = {"green",  "blue",      "sky",       "orange",   "red",
-                                            "purple", "'#222222'", "'#8b5a2b'", "'#a0a000'"};
-  std::string data, bicycle, point_mass;
-  std::size_t none = 0;
-  for (std::size_t m = 0; m < Methods().size(); ++m) {
-    const Method& method = Methods()[m];
-    const auto at = [&](const Cell& cell, Group group, Statistic statistic) {
-      return OverSeeds(scope, results, With(method, cell), group, statistic);
+  std::vector<MethodMarks> all;
+  for (const Method& method : Methods()) {
+    const auto ours = [&](const Cell& cell, int observations) {
+      return MethodMark{observations, OverSeeds(scope, results, With(method, cell), Group::kB, Coverage),
+                        OverSeeds(scope, results, With(method, cell), Group::kC, Recall)};
     };
-    std::string ours, papers;
-    bool completes = true;
+    MethodMarks marks{method.name, {}, {}, {}, {}};
     for (const int observations : Sizes(scope)) {
-      const Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
-      const Estimate coverage = at(cell, Group::kB, Coverage);
-      completes = completes && coverage.mean;
-      ours += PointLine(observations, coverage, at(cell, Group::kC, Recall), none);
-      if (const auto paper = PaperOf(method, observations, "B", "coverage"))
-        papers +=
-            PointLine(observations, AsEstimate(paper), AsEstimate(PaperOf(method, observations, "C", "recall")), 0);
+      marks.bicycle.push_back(ours(PaperCell(BicycleSystem(), observations, 0, 0), observations));
+      const auto coverage = PaperOf(method, observations, "B", "coverage"),
+                 recall = PaperOf(method, observations, "C", "recall");
+      if (coverage && recall)
+        marks.papers_bicycle.push_back({observations, AsEstimate(*coverage), AsEstimate(*recall)});
     }
-    const Cell cell = PaperCell(PointMassSystem(), 100, 0, 0);
-    const std::string own = PointLine(100, at(cell, Group::kB, Coverage), at(cell, Group::kC, Recall), none);
-    none += !completes;
-    const std::string name = std::string(1, 'm').append(std::to_string(m)), color = kColors[m % std::size(kColors)];
-    data += DataBlock(name, ours) + DataBlock(name + "p", own);
-    const std::string mark = m == 0 ? "pt 3 ps 1.4" : "pt 7 ps 0.8";
-    const auto series = [&](const std::string& block, bool titled) {
-      return "$" + block + " using 2:4:3:5 with xyerrorbars " + mark + " lw 1 lc rgb " + color +
-             (titled ? " title \"" + method.name + "\"" : " notitle") + ", ";
-    };
-    bicycle +=
-        series(name, false) + "'' using ($2 <= 1 ? $2 : 1/0):4 with lines lw 1 lc rgb " + color +
-        " notitle, '' using 2:4:($2 <= 1 || $4 > 0.02 ? sprintf('%d', $1) : '') with labels left offset 0.6,0.5 font "
-        "',9' textcolor rgb " +
-        color + " notitle, ";
-    point_mass += series(name + "p", true);
-    if (papers.empty()) continue;
-    data += DataBlock(name + "paper", papers);
-    bicycle += "$" + name + "paper using 2:4:3:5 with xyerrorbars pt 6 ps 1.1 lw 0.7 dt 3 lc rgb " + color +
-               " notitle, '' using 2:4 with lines lw 0.7 dt 3 lc rgb " + color + " notitle, ";
+    marks.point_mass = {ours(PaperCell(PointMassSystem(), 100, 0, 0), 100)};
+    if (&method == &Methods().front())
+      marks.papers_point_mass = {
+          {100, AsEstimate(Paper("point_mass.B.coverage")), AsEstimate(Paper("point_mass.C.recall"))}};
+    all.push_back(std::move(marks));
   }
-  const std::string paper_name = "fore_reach_paper";
-  data += DataBlock(paper_name, PointLine(100, AsEstimate(Paper("point_mass.B.coverage")),
-                                          AsEstimate(Paper("point_mass.C.recall")), 0));
-  return {
-      {"methods",
-       "Coverage of complete tubes in group B, which has no data, against recall in group C, which has. Filled: ours, "
-       "with one standard deviation over the seeds and, for the bicycle, N = 25, 100, 400 beside the mark. Hollow and "
-       "dotted: the paper's; of the point mass it prints both figures for ForeReach only. A method that completes no "
-       "tube "
-       "in B has no coverage and stands in the strip on the right, side by side with the others.",
-       1240, 560,
-       data +
-           "set multiplot layout 1,2\nset xrange [-0.04:1.24]; set yrange [-0.04:1.08]\n"
-           "set xtics ('0' 0, '0.2' 0.2, '0.4' 0.4, '0.6' 0.6, '0.8' 0.8, '1' 1, 'none' 1.14)\n"
-           "set arrow from 1.05, graph 0 to 1.05, graph 1 nohead dt 2 lc rgb grey\n"
-           "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
-           "set lmargin at screen 0.055; set rmargin at screen 0.40; set title 'Bicycle'\nunset key\nplot " +
-           bicycle +
-           "1/0 notitle\nset lmargin at screen 0.46; set rmargin at screen 0.79; set title 'Point mass, N = 100'\n"
-           "set key at screen 0.998, 0.9 right top\nplot " +
-           point_mass + "$" + paper_name +
-           " using 2:4 with points pt 6 ps 1.4 lc rgb green title 'the paper (hollow, dotted)'\nunset multiplot\n"}};
+  return {MethodsPlot(all)};
 }
 
 }  // namespace

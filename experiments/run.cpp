@@ -58,17 +58,23 @@ Nothing in the certifier was fitted: none of its constants was chosen for a figu
 
 Beside the mark is a word. *Same*: ours, rounded, has the paper's digits. *Near*: it has not, both spreads over seeds
 are known, and the means differ by at most twice the standard error of their difference. *Off*: neither, or there is no
-plan to measure ours on; then the last column says why. Were the true means equal, some 6 % of the rows with both
-spreads would be off by chance. Rows by mark and word:
+plan to measure ours on; then the last column says why. Were the true means equal, 6 to 8 % of the rows with
+both spreads would be off by chance. Rows by mark and word:
 
 )" + CountInMarkdown(tables) +
          R"(
-A row's word says nothing of its table. Below each table a joint test takes its rows together: the sum of the squared
-differences over their squared standard errors, held against a chi-square law, and a sign test of the rows on either
-side of the paper. Both take the rows as independent. They are not: the rows of a table share seeds, plans and, as those
-of a smaller N are the first of a larger, observations; and some follow from others, as the recall of learned plans is
-1.5 times their certificate rate. So a small p is a warning, not a measure, and nothing corrects for the number of
-tables.
+A row's word says nothing of its table. Below each table its rows are tested together, three times:
+- The sum of the squared differences over their squared standard errors, held against a chi-square law. It takes the rows
+  as independent, and the spreads as known, though they are those of ten seeds.
+- The least p of a row by Welch's test, times the number of rows (Bonferroni). It holds however the rows depend on each
+  other, and for spreads of ten seeds.
+- A sign test of the rows on either side of the paper, whether they have a spread or not. It takes the rows as
+  independent.
+
+Rows of a table are not independent: they share seeds, plans and, as those of a smaller N are the first of a larger,
+observations. So a small p of the first or the last is a warning, not a measure. Rows that other rows of their table
+decide are left out. The first two take a mean over seeds as normal, which it is not near 0 and 1. Fitted rows are in:
+that they agree confirms nothing, that they do not is worth knowing. Nothing corrects for the number of tables.
 
 ## Words
 A plan is *target-safe* if no rollout from its initial set, corners included, touches the obstacle. *Recall* is the part

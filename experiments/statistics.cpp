@@ -43,6 +43,8 @@ double ChiSquareTail(double x, int degrees) {
   return std::min(tail, 1.0);
 }
 
+double StudentTail(double x, int degrees) { return std::clamp(1 - StudentWithin(x, degrees), 0.0, 1.0); }
+
 double SignTest(int below, int above) {
   const int all = below + above;
   double tail = 0;

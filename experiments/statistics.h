@@ -7,6 +7,8 @@ namespace forereach::experiments {
 
 /** The probability that a chi-square variable with this many degrees of freedom is at least x; 1 with none. */
 [[nodiscard]] double ChiSquareTail(double x, int degrees);
+/** Two-sided: the probability that |t| of Student's law is at least x. @pre x >= 0, degrees >= 1 */
+[[nodiscard]] double StudentTail(double x, int degrees);
 /** Two-sided: the probability of a split at least as uneven, were each side as likely; 1 with nothing to split. */
 [[nodiscard]] double SignTest(int below, int above);
 

@@ -46,13 +46,32 @@ std::string Difference(const Row& row) {
   return paper && row.ours.mean ? Signed(*row.ours.mean - paper->value, paper->decimals) : "";
 }
 
-// Of the difference of means; none where a spread is not known.
-std::optional<double> StandardError(const Row& row) {
-  constexpr double kPaperSeeds = 10;
+constexpr int kPaperSeeds = 10;
+
+// Squared standard errors of the two means; none where a spread is not known.
+struct Errors {
+  double paper, ours;
+};
+std::optional<Errors> ErrorsOf(const Row& row) {
   const std::optional<PaperValue>& paper = row.paper.value();
   if (!paper || paper->deviation < 0 || row.ours.seeds < 2) return std::nullopt;
-  return std::sqrt(paper->deviation * paper->deviation / kPaperSeeds +
-                   row.ours.deviation * row.ours.deviation / row.ours.seeds);
+  return Errors{paper->deviation * paper->deviation / kPaperSeeds,
+                row.ours.deviation * row.ours.deviation / row.ours.seeds};
+}
+
+// Of the difference of means.
+std::optional<double> StandardError(const Row& row) {
+  const std::optional<Errors> errors = ErrorsOf(row);
+  return errors ? std::optional(std::sqrt(errors->paper + errors->ours)) : std::nullopt;
+}
+
+// Welch's test of one row, degrees of freedom rounded down. @pre the standard error is not zero
+double WelchP(const Row& row, double difference) {
+  const Errors errors = *ErrorsOf(row);
+  const double sum = errors.paper + errors.ours;
+  const double degrees =
+      sum * sum / (errors.paper * errors.paper / (kPaperSeeds - 1) + errors.ours * errors.ours / (row.ours.seeds - 1));
+  return StudentTail(std::abs(difference) / std::sqrt(sum), static_cast<int>(degrees));
 }
 
 std::string Probability(double p) {
@@ -67,11 +86,13 @@ std::string InWords(const JointTest& test) {
   if (test.rows + test.below + test.above == 0) return text + "nothing to test.";
   if (test.rows > 0)
     text += "chi-square " + Fixed(test.chi_square, 2) + " over the " + Count(test.rows, "row") +
-            " with a standard error, " + Probability(test.p) + "; ";
+            " with a standard error, " + Probability(test.p) + "; the least of one row times their number, " +
+            Probability(test.p_of_least) + "; ";
   else
     text += "no row has a standard error, since the paper prints no spread or neither varies; ";
-  return text + Count(test.below, "row") + " below the paper, " + std::to_string(test.above) + " above, sign test " +
-         Probability(test.p_of_signs) + ".";
+  text += Count(test.below, "row") + " below the paper, " + std::to_string(test.above) + " above, sign test " +
+          Probability(test.p_of_signs);
+  return test.left_out > 0 ? text + ". Left out: " + Count(test.left_out, "row") + " that others decide." : text + ".";
 }
 
 std::string Quoted(const std::string& text) {
@@ -150,13 +171,19 @@ JointTest TestJointly(const Table& table) {
   JointTest test;
   for (const Row& row : table.rows) {
     if (!row.paper.value() || !row.ours.mean) continue;
+    if (row.follows) {
+      ++test.left_out;
+      continue;
+    }
     const double difference = *row.ours.mean - row.paper.value()->value;
     if (WordOf(row) != Word::kSame) ++(difference < 0 ? test.below : test.above);
     const double error = StandardError(row).value_or(0);
     if (error == 0) continue;
     ++test.rows;
     test.chi_square += difference * difference / (error * error);
+    test.p_of_least = std::min(test.p_of_least, WelchP(row, difference));
   }
+  test.p_of_least = std::min(1.0, test.p_of_least * std::max(test.rows, 1));
   test.p = ChiSquareTail(test.chi_square, test.rows);
   test.p_of_signs = SignTest(test.below, test.above);
   return test;

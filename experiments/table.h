@@ -62,8 +62,9 @@ struct Row {
   std::string what;
   Reference paper;
   Estimate ours;
-  int decimals = 3;    ///< Where the paper has none
-  std::string reason;  ///< Why it may differ; without one, that the scenario bounds are ours
+  int decimals = 3;      ///< Where the paper has none
+  std::string reason;    ///< Why it may differ; without one, that the scenario bounds are ours
+  bool follows = false;  ///< From other rows of its table, ours and the paper's both: joint tests leave it out
 };
 
 /** How near ours is to the paper's. */
@@ -84,14 +85,17 @@ struct Table {
   std::vector<Row> rows;
 };
 
-/** All rows of a table against the paper at once, as though they were independent, which rows that share seeds and
-observations are not. */
+/** All rows of a table against the paper at once, but those that follow from others. The chi-square and the sign test
+are as though rows were independent, which rows that share seeds and observations are not; p_of_least holds however they
+depend on each other. */
 struct JointTest {
   int rows = 0;              ///< With a standard error: both spreads known, and not both zero
   double chi_square = 0;     ///< Of their differences, in standard errors
   double p = 1;              ///< Of one as large, with `rows` degrees of freedom
+  double p_of_least = 1;     ///< The least p of a row by Welch's test, times the number of rows (Bonferroni)
   int below = 0, above = 0;  ///< Rows that lie below the paper's digits, and above, whether they have an error or not
   double p_of_signs = 1;     ///< Of a split as uneven, either way, were both equally likely
+  int left_out = 0;          ///< Rows with a figure of the paper that follow from others
 };
 [[nodiscard]] JointTest TestJointly(const Table& table);
 

@@ -12,7 +12,7 @@ to be for the tubes to contain the target. */
 
 namespace forereach::experiments {
 
-/** A system with noiseless data from below the knee, the largest N, seed 0, and a declared L. */
+/** A system with noiseless data from below the knee, the largest N, seed 0, and a declared L. Refers to the system. */
 struct Undeclared {
   const System& system;
   Eigen::MatrixXd lipschitz;
@@ -40,6 +40,11 @@ struct ContainmentFactor {
 /** By bisection, from 2^-6 to 2^10; none if it is outside. A larger factor never makes an envelope narrower, but a tube
 that leaves the domain earlier has less to contain. */
 [[nodiscard]] std::optional<ContainmentFactor> FactorForContainment(const Undeclared& task, const Scenario& scenario);
+
+/** A member of the adversarial family, whose data from below the knee reach up to it. */
+[[nodiscard]] System NextToTheKnee(double lambda);
+/** A plan that starts below the knee and is driven through it along x; its obstacle is another plan's. */
+[[nodiscard]] Scenario ThroughTheKnee(const System& system, int index);
 
 /** A plan of group C with the obstacle in the target's way at a step. */
 [[nodiscard]] Scenario InTheWay(const System& system, int index, int step);

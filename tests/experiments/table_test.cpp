@@ -75,20 +75,40 @@ TEST(JointTest, TakesRowsThatAreNearOneByOneAsFarTogether) {
   EXPECT_EQ(test.rows, 10);
   EXPECT_NEAR(test.chi_square, 9 * 1.8 * 1.8, 1e-9);
   EXPECT_NEAR(test.p, 0.0011738, 1e-7);
+  EXPECT_NEAR(test.p_of_least, 10 * 0.0886443, 1e-5);  // t = 1.8 with 18 degrees of freedom
   EXPECT_EQ(test.below, 9);
   EXPECT_EQ(test.above, 1);
   EXPECT_NEAR(test.p_of_signs, 22.0 / 1024, 1e-12);
   EXPECT_THAT(ToMarkdown(table),
               HasSubstr("All rows together: chi-square 29.16 over the 10 rows with a standard error, "
-                        "p = 0.0012; 9 rows below the paper, 1 above, sign test p = 0.0215."));
+                        "p = 0.0012; the least of one row times their number, p = 0.8864; 9 rows below the paper, 1 "
+                        "above, sign test p = 0.0215."));
+}
+
+TEST(JointTest, LeavesOutWhatOtherRowsDecide) {
+  Table table{"T", "About.", {}};
+  for (int i = 0; i < 9; ++i) table.rows.push_back(RowOf(kWithSeeds, {0.4, 0.1, 10}));
+  const JointTest all = TestJointly(table);
+  for (std::size_t i = 1; i < table.rows.size(); ++i) table.rows[i].follows = true;
+  const JointTest one = TestJointly(table);
+  EXPECT_EQ(all.rows, 9);
+  EXPECT_EQ(all.left_out, 0);
+  EXPECT_EQ(one.rows, 1);
+  EXPECT_EQ(one.left_out, 8);
+  EXPECT_EQ(one.below, 1);
+  EXPECT_NEAR(one.chi_square, all.chi_square / 9, 1e-12);
+  EXPECT_NEAR(one.p_of_least, all.p_of_least / 9, 1e-12);
+  EXPECT_EQ(one.p_of_signs, 1);
+  EXPECT_THAT(ToMarkdown(table), HasSubstr(". Left out: 8 rows that others decide.\n"));
 }
 
 TEST(JointTest, NoProbabilityIsPrintedAsZero) {
   Table table{"T", "About.", {}};
   for (int i = 0; i < 20; ++i) table.rows.push_back(RowOf(kWithSeeds, {0.9, 0.001, 10}));
   const std::string text = ToMarkdown(table);
-  EXPECT_THAT(text, HasSubstr("with a standard error, p < 0.0001; 0 rows below the paper, 20 above, "
-                              "sign test p < 0.0001."));
+  EXPECT_THAT(text,
+              HasSubstr("with a standard error, p < 0.0001; the least of one row times their number, p < 0.0001"));
+  EXPECT_THAT(text, HasSubstr("sign test p < 0.0001."));
 }
 
 TEST(Statistics, AreThoseOfTheTables) {
@@ -97,6 +117,9 @@ TEST(Statistics, AreThoseOfTheTables) {
   EXPECT_NEAR(ChiSquareTail(18.307038, 10), 0.05, 1e-7);
   EXPECT_NEAR(ChiSquareTail(24.995790, 15), 0.05, 1e-7);
   EXPECT_EQ(ChiSquareTail(0, 4), 1);
+  EXPECT_EQ(StudentTail(0, 3), 1);
+  EXPECT_NEAR(StudentTail(2.262157, 9), 0.05, 1e-7);
+  EXPECT_NEAR(StudentTail(3, 5), 0.0300992, 1e-7);
   EXPECT_EQ(SignTest(0, 0), 1);
   EXPECT_EQ(SignTest(3, 3), 1);
   EXPECT_NEAR(SignTest(0, 6), 2.0 / 64, 1e-12);

@@ -58,6 +58,23 @@ TEST(Undeclared, TheDeployedMatrixContainsTheTarget) {
   }
 }
 
+TEST(Undeclared, AKeptDeclarationCertifiesWhatIsFalseAndIsNotContradicted) {
+  const System system = NextToTheKnee(64);
+  const Undeclared kept{system, PointMassSystem().deployed}, valid{system, system.deployed};
+  Scenario scenario = ThroughTheKnee(system, 0);
+  int certificates = 0;
+  for (int step = 1; step <= system.horizon; ++step) {
+    constexpr double kRadius = 0.1;
+    scenario.obstacle = PlaceBeside(system, scenario.center, scenario.controls, step, 0.9 * kRadius, kRadius);
+    EXPECT_FALSE(Rollouts(system, scenario, 40).StayClearOf(scenario.obstacle));
+    certificates += kept.Certify(scenario).decision.outcome == Outcome::kCertified;
+    EXPECT_NE(valid.Certify(scenario).decision.outcome, Outcome::kCertified);
+  }
+  EXPECT_GT(certificates, 0);
+  EXPECT_FALSE(kept.IsContradicted());
+  EXPECT_FALSE(kept.Contains(scenario, 1));
+}
+
 TEST(Undeclared, NoiseIsDeclaredAndBounded) {
   // Were the noise larger than what is declared, two observations of the flat residual would contradict it.
   const Undeclared task{BicycleSystem(), BicycleSystem().deployed / 100};
