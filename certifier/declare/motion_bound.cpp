@@ -20,6 +20,8 @@ namespace {
 using Arguments = std::vector<Interval>;  // z = (x, u)
 using Quantity = std::function<RangeWithSlopes(const Flow::Derivatives&)>;
 
+double WidthOf(const Interval& range) { return range.upper - range.lower; }
+
 std::optional<Interval> Intersection(const Interval& a, const Interval& b) {
   const Interval both(std::max(a.lower, b.lower), std::min(a.upper, b.upper));
   return both.lower <= both.upper ? std::optional(both) : std::nullopt;
@@ -104,7 +106,7 @@ class Search {
         const ExpansionPoint expansion = ExpandForUpperBound(box[i], range.gradient[i]);
         point[i] = expansion.point;
         excess = AddUp(excess, expansion.excess);
-        score = range.gradient[i].Magnitude() * (box[i].upper - box[i].lower);
+        score = range.gradient[i].Magnitude() * WidthOf(box[i]);
       }
       if (score > most && CanBeCut(box[i])) {
         most = score;
@@ -142,8 +144,8 @@ class Search {
   }
 
   [[nodiscard]] double Share(const Arguments& box, std::size_t i) const {
-    const double whole = root_[i].upper - root_[i].lower;
-    return whole > 0 ? (box[i].upper - box[i].lower) / whole : 0;
+    const double whole = WidthOf(root_[i]);
+    return whole > 0 ? WidthOf(box[i]) / whole : 0;
   }
 
   // Halves the box of the largest bound. False if that is not possible.
@@ -238,8 +240,8 @@ Arguments RequiredRangesOver(const SampledMotion& motion, Derivative derivative,
 std::optional<Arguments> ReachableIn(const SampledMotion& motion, const Arguments& start, double period,
                                      Arguments& end) {
   constexpr int kRounds = 30;
-  constexpr double kWider = 1.05;
-  Arguments box = start;
+  constexpr double kWider = 1.05, kDiverges = 30;
+  Arguments box = start, moved_first;
   for (int round = 0; round < kRounds; ++round) {
     const auto rates = RangesOver(motion, First, box);
     if (!rates) return std::nullopt;
@@ -247,6 +249,8 @@ std::optional<Arguments> ReachableIn(const SampledMotion& motion, const Argument
     Arguments wider = box;
     for (std::size_t k = 0; k < rates->size(); ++k) {
       const Interval moved = Interval(0, period) * (*rates)[k], after = start[k] + moved;
+      if (round == 0) moved_first.push_back(moved);
+      if (WidthOf(moved) > kDiverges * WidthOf(moved_first[k])) return std::nullopt;
       is_inside = is_inside && box[k].lower <= after.lower && after.upper <= box[k].upper;
       wider[k] = Join(box[k], start[k] + Interval(kWider) * moved);
     }
@@ -292,7 +296,7 @@ bool CutDown(Interval& range, const Interval& to) {
 // Whether a box shrank by more than a hundredth in some argument.
 bool IsMuchSmaller(const Arguments& box, const Arguments& before) {
   for (std::size_t k = 0; k < box.size(); ++k)
-    if (box[k].upper - box[k].lower < 0.99 * (before[k].upper - before[k].lower)) return true;
+    if (WidthOf(box[k]) < 0.99 * WidthOf(before[k])) return true;
   return false;
 }
 
