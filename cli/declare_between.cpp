@@ -12,6 +12,7 @@
 #include "certifier/declare/motion_bound.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
+#include "certifier/safety/clearance.h"
 #include "certifier/task/config.h"
 #include "certifier/task/json_text.h"
 #include "certifier/task/step_time.h"
@@ -40,15 +41,22 @@ struct Proposal {
   double seconds = 0;
 };
 
+// The map to the robot's frame; zero if no part of the body stands there, so that nothing has to be said of it.
+Eigen::MatrixXd FrameOf(const Problem& problem) {
+  return HasFrame(problem.body) ? problem.projection
+                                : Eigen::MatrixXd::Zero(problem.projection.rows(), problem.projection.cols());
+}
+
 std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& acceleration,
                         const MotionBound& turn_rate, const MotionBound& turn_acceleration) {
   const Problem& problem = *config.problem;
   const std::vector<std::string>& states = problem.model->state_names();
+  const Eigen::MatrixXd frame = FrameOf(problem);
   std::vector<Row> rows;
   for (std::size_t i = 0; i < acceleration.size(); ++i) {
     std::string name;
     for (std::size_t k = 0; k < states.size(); ++k) {
-      const double weight = problem.projection(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+      const double weight = frame(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
       if (weight != 0) name += (name.empty() ? "" : " + ") + (weight == 1 ? "" : ToText(weight) + " ") + states[k];
     }
     if (!name.empty()) name += "''";
@@ -71,9 +79,10 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
                       " in continuous time are not known; use --from positions");
   Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
+  const Eigen::MatrixXd frame = FrameOf(problem);
   const auto begin = std::chrono::steady_clock::now();
-  const MotionBounds bounds = BoundMotion(
-      {*flow, problem.domain, LongestPeriod(config), problem.projection, problem.body.heading, rest}, search);
+  const MotionBounds bounds =
+      BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading, rest}, search);
   Proposal proposal;
   proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
@@ -91,7 +100,7 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
 Proposal FromPositions(const Config& config) {
   const Problem& problem = *config.problem;
   const MeasuredMotion measured =
-      MeasureMotion(*problem.model, problem.transitions, problem.projection, problem.body, config.period);
+      MeasureMotion(*problem.model, problem.transitions, FrameOf(problem), problem.body, config.period);
   if (measured.triples == 0)
     throw ConfigError(
         config.path +

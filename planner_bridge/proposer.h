@@ -31,7 +31,7 @@ struct PlanRequest {
   Schedule schedule{};  ///< Of the plan: it is where moving obstacles are at each step.
   /** Distance to keep from the bounds of each limit of the task, in its unit, or empty for none; less if the start is
   nearer to them. */
-  std::vector<double> limit_margin;
+  std::vector<double> limit_margin = {};
   /** More for single obstacles, by their index; those beyond its end have none. From step 0 on: less if the start is
   nearer. */
   std::vector<ObstacleClearance> obstacle_clearance = {};

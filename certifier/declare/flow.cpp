@@ -20,6 +20,30 @@ std::vector<ExpressionText> Joined(std::span<const ExpressionText> first, std::s
   return all;
 }
 
+// Adds to the values of the rates f and of the places g the derivatives of these along the flow: sum over l of dg/dx_l
+// f_l.
+void DifferentiateAlongTheFlow(ProgramDraft& program) {
+  program.Differentiate();
+  const Program view = program.View();
+  const auto states = ToSize(view.states);
+  std::vector<int> values(view.value.begin(), view.value.end());
+  const std::vector<Program::First> jacobian(view.jacobian.begin(), view.jacobian.end());  // the program grows
+  std::vector<Symbol> along(values.size() - states, Symbol::Constant(program, 0));
+  for (const Program::First& entry : jacobian) {
+    if (ToSize(entry.row) < states || entry.column >= view.states) continue;
+    Symbol& sum = along[ToSize(entry.row) - states];
+    const Symbol slope(&program, entry.node), rate(&program, values[ToSize(entry.column)]);
+    sum = sum + slope * rate;
+  }
+  for (const Symbol& sum : along) values.push_back(sum.node());
+  program.SetValues(values);
+}
+
+// The derivative along the flow. What may be undefined has none.
+RangeWithSlopes SlopeOf(const Jet& jet) {
+  return {jet.value.IsFinite() ? jet.slope : Interval::Entire(), jet.curvature};
+}
+
 }  // namespace
 
 Flow::Flow(const ExpressionNames& names, std::span<const ExpressionText> rates, std::span<const ExpressionText> places)
@@ -31,9 +55,11 @@ Flow::Flow(const ExpressionNames& names, std::span<const ExpressionText> rates, 
   if (program.variables > Jet::kMaxArguments)
     throw std::invalid_argument(std::to_string(program.variables) + " states and inputs, at most " +
                                 std::to_string(Jet::kMaxArguments) + " are possible");
-  needed_.resize(program.nodes.size());
-  for (const int value : program.value) needed_[ToSize(value)] = 1;
-  MarkOperands(program.nodes, needed_);
+  if (num_places_ > 0) DifferentiateAlongTheFlow(program_);
+  const Program whole = program_.View();
+  needed_.resize(whole.nodes.size());
+  for (const int value : whole.value) needed_[ToSize(value)] = 1;
+  MarkOperands(whole.nodes, needed_);
   for (const auto& [name, lower, upper] : names.parameters) parameters_.emplace_back(Interval(lower, upper));
 }
 
@@ -59,11 +85,13 @@ void Flow::Enclose(std::span<const Interval> z, Derivatives& out) const {
   const std::vector<Jet> change = Evaluate(arguments);
   for (std::size_t k = 0; k < states; ++k) {
     out.first[k] = {rate[k].value, rate[k].gradient};
-    out.second[k] = {change[k].slope, change[k].curvature};
+    out.second[k] = SlopeOf(change[k]);
   }
-  out.places.assign(num_places_, Interval(0));
-  for (std::size_t i = 0; i < num_places_; ++i)
-    for (std::size_t l = 0; l < states; ++l) out.places[i] += change[states + i].curvature[l] * rate[l].value;
+  out.places.clear();
+  for (std::size_t i = states; i < states + num_places_; ++i) {
+    out.places.push_back(SlopeOf(change[num_places_ + i]));
+    if (!change[i].value.IsFinite()) out.places.back().value = Interval::Entire();
+  }
 }
 
 std::unique_ptr<Flow> MakeFlow(const NominalModel& model, std::span<const ExpressionText> places) {

@@ -25,12 +25,13 @@ class Flow final {
   /** For each state k: x_k' = f_k(x, u), and x_k'' = sum over l of df_k/dx_l f_l while u is constant. */
   struct Derivatives {
     std::array<RangeWithSlopes, kMaxStates> first, second;
-    std::vector<Interval> places;  ///< g'' of each place: the derivative along the flow of that of g.
+    std::vector<RangeWithSlopes> places;  ///< g'' of each place: the derivative along the flow of that of g.
   };
 
   /** @param rates f, one expression for each state. @param places functions g of the state that are looked at, too.
   @throws ExpressionError, std::invalid_argument as MakeProgram (text_program.h), and std::invalid_argument unless there
-  is one rate for each state, and if there are more than Jet::kMaxArguments states and inputs. */
+  is one rate for each state, if there are more than Jet::kMaxArguments states and inputs, and if there are places and
+  an expression has no derivatives. */
   Flow(const ExpressionNames& names, std::span<const ExpressionText> rates,
        std::span<const ExpressionText> places = {});
 
@@ -41,7 +42,7 @@ class Flow final {
   void Enclose(std::span<const Interval> z, Derivatives& out) const;
 
  private:
-  // The rates, then the places.
+  // The rates, the places, and the first derivatives of the places.
   [[nodiscard]] std::vector<Jet> Evaluate(std::span<const Jet> z) const;
 
   ProgramDraft program_;

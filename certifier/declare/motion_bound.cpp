@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/declare/mean_value.h"
 #include "certifier/numerics/arithmetic.h"
 #include "certifier/safety/clearance.h"
 
@@ -19,12 +20,164 @@ namespace {
 using Arguments = std::vector<Interval>;  // z = (x, u)
 using Quantity = std::function<RangeWithSlopes(const Flow::Derivatives&)>;
 
+double WidthOf(const Interval& range) { return range.upper - range.lower; }
+
 std::optional<Interval> Intersection(const Interval& a, const Interval& b) {
   const Interval both(std::max(a.lower, b.lower), std::min(a.upper, b.upper));
   return both.lower <= both.upper ? std::optional(both) : std::nullopt;
 }
 
-// ---- Where a motion is between two samples.
+// ---- The largest value of a quantity over a box, by branch and bound.
+
+class Search {
+ public:
+  // Values up to `least` are of no interest.
+  Search(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least)
+      : flow_(flow), quantity_(std::move(quantity)), options_(options) {
+    found_.lower = least;
+  }
+
+  MotionBound Run(const Arguments& region) {
+    root_ = region;
+    Push(region);
+    while (true) {
+      found_.upper = pieces_.top().bound;
+      if (IsEnough(found_.upper) || !Cut()) break;
+    }
+    found_.reached = IsEnough(found_.upper);
+    return found_;
+  }
+
+ private:
+  struct Piece {
+    double bound;
+    std::size_t number, cut;
+    Arguments box;
+
+    // Of infinite bounds the newest goes first: it is cut down to a box that has none, or to finite ones.
+    bool operator<(const Piece& other) const {
+      return bound != other.bound ? bound < other.bound : number < other.number;
+    }
+  };
+
+  [[nodiscard]] bool IsEnough(double bound) const {
+    return bound <= AddDown(found_.lower, MulDown(options_.gap, std::abs(found_.lower)));
+  }
+
+  RangeWithSlopes Evaluate(const Arguments& box) {
+    ++found_.boxes;
+    flow_.Enclose(box, derivatives_);
+    return quantity_(derivatives_);
+  }
+
+  // Adds a box, after every argument in which the quantity is monotone is set to its better end.
+  void Push(Arguments box) {
+    RangeWithSlopes range = Evaluate(box);
+    while (range.value.IsFinite() && MoveToBetterEnds(range, box)) range = Evaluate(box);
+    std::size_t cut = 0;
+    const double bound = BoundOver(range, box, cut);
+    pieces_.push({bound, pieces_pushed_++, cut, std::move(box)});
+  }
+
+  // Whether there was any.
+  static bool MoveToBetterEnds(const RangeWithSlopes& range, Arguments& box) {
+    bool moved = false;
+    for (std::size_t i = 0; i < box.size(); ++i) {
+      const Interval& slope = range.gradient[i];
+      if (!(box[i].lower < box[i].upper) || (slope.lower < 0 && slope.upper > 0)) continue;
+      box[i] = slope.lower >= 0 ? box[i].upper : box[i].lower;
+      moved = true;
+    }
+    return moved;
+  }
+
+  // The lesser of the natural enclosure and the mean-value form, which is expanded around a point that may raise the
+  // lower bound. `cut` becomes the argument that costs most.
+  double BoundOver(const RangeWithSlopes& range, const Arguments& box, std::size_t& cut) {
+    const bool expands =
+        range.value.IsFinite() && std::ranges::all_of(std::span(range.gradient).first(box.size()),
+                                                      [](const Interval& slope) { return slope.IsFinite(); });
+    Arguments point = box;
+    double excess = 0, most = -1;
+    for (std::size_t i = 0; i < box.size(); ++i) {
+      double score = Share(box, i);
+      point[i] = box[i].Middle();
+      if (expands && box[i].lower < box[i].upper) {
+        const ExpansionPoint expansion = ExpandForUpperBound(box[i], range.gradient[i]);
+        point[i] = expansion.point;
+        excess = AddUp(excess, expansion.excess);
+        score = range.gradient[i].Magnitude() * WidthOf(box[i]);
+      }
+      if (score > most && CanBeCut(box[i])) {
+        most = score;
+        cut = i;
+      }
+    }
+    const Interval there = Evaluate(point).value;
+    if (there.IsFinite()) found_.lower = std::max(found_.lower, there.lower);
+    if (!range.value.IsFinite()) {
+      cut = CutOfPole(box, cut);
+      return kInfinity;
+    }
+    return expands && there.IsFinite() ? std::min(range.value.upper, AddUp(there.upper, excess)) : range.value.upper;
+  }
+
+  // The argument that matters where there is no finite enclosure: one without whose width there is one, if there is
+  // such.
+  std::size_t CutOfPole(const Arguments& box, std::size_t otherwise) {
+    std::size_t best = otherwise;
+    double widest = 0;
+    for (std::size_t i = 0; i < box.size(); ++i) {
+      if (!(Share(box, i) > widest) || !CanBeCut(box[i])) continue;
+      Arguments without = box;
+      without[i] = box[i].Middle();
+      if (!Evaluate(without).value.IsFinite()) continue;
+      best = i;
+      widest = Share(box, i);
+    }
+    return best;
+  }
+
+  static bool CanBeCut(const Interval& range) {
+    const double middle = range.Middle();
+    return range.lower < middle && middle < range.upper;
+  }
+
+  [[nodiscard]] double Share(const Arguments& box, std::size_t i) const {
+    const double whole = WidthOf(root_[i]);
+    return whole > 0 ? WidthOf(box[i]) / whole : 0;
+  }
+
+  // Halves the box of the largest bound. False if that is not possible.
+  bool Cut() {
+    if (found_.boxes >= options_.max_boxes) return false;
+    Arguments box = pieces_.top().box;
+    Interval& range = box[pieces_.top().cut];
+    if (!CanBeCut(range)) return false;
+    pieces_.pop();
+    const Interval above(range.Middle(), range.upper);
+    range.upper = above.lower;
+    Push(box);
+    range = above;
+    Push(std::move(box));
+    return true;
+  }
+
+  const Flow& flow_;
+  Quantity quantity_;
+  const SlopeBoundOptions options_;
+  Arguments root_;
+  Flow::Derivatives derivatives_;
+  std::priority_queue<Piece> pieces_;
+  std::size_t pieces_pushed_ = 0;
+  MotionBound found_;
+};
+
+RangeWithSlopes Negated(RangeWithSlopes range) {
+  range.value = -range.value;
+  for (Interval& slope : range.gradient) slope = -slope;
+  return range;
+}
 
 Arguments BoxOf(const Domain& domain) {
   Arguments box;
@@ -39,149 +192,147 @@ Arguments BoxOf(const Domain& domain) {
       "from the domain within one step; narrow `domain`");
 }
 
-Flow::Derivatives DerivativesOver(const SampledMotion& motion, const Arguments& box) {
-  Flow::Derivatives derivatives;
-  motion.flow.Enclose(box, derivatives);
-  for (int k = 0; k < motion.domain.state.dim(); ++k)
-    if (!derivatives.first[ToSize(k)].value.IsFinite() || !derivatives.second[ToSize(k)].value.IsFinite())
-      FailWithoutBound();
-  return derivatives;
+// ---- Where a motion is between two samples.
+
+// The range of a quantity over a box. Where the equations have no finite enclosure over the whole of it, as if a
+// denominator were zero, they may have one over its pieces.
+Interval RangeOver(const SampledMotion& motion, const Quantity& quantity, const Arguments& box) {
+  const auto largest = [&](const Quantity& side) {
+    double upper = kInfinity;
+    for (const std::size_t boxes : {300, 20'000})  // it need not be tight
+      if (upper == kInfinity)
+        upper = Search(motion.flow, side, {.gap = 0.1, .max_boxes = boxes}, -kInfinity).Run(box).upper;
+    return upper;
+  };
+  return {-largest([&](const Flow::Derivatives& d) { return Negated(quantity(d)); }), largest(quantity)};
 }
 
-// B with Z + [0, period] f(B) in B, so no motion that begins in Z leaves B within a period (Picard).
-Arguments Reachable(const SampledMotion& motion, const Arguments& start) {
-  constexpr int kRounds = 100;
-  constexpr double kWider = 1.05;
-  Arguments box = start;
-  const Interval period(0, motion.period);
-  for (int round = 0; round < kRounds; ++round) {
-    const Flow::Derivatives derivatives = DerivativesOver(motion, box);
-    bool is_inside = true;
-    Arguments wider = box;
-    for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
-      const Interval moved = period * derivatives.first[k].value, after = start[k] + moved;
-      is_inside = is_inside && box[k].lower <= after.lower && after.upper <= box[k].upper;
-      wider[k] = Join(box[k], start[k] + Interval(kWider) * moved);
-    }
-    if (is_inside) return box;
-    box = wider;
+Quantity First(std::size_t k) {
+  return [k](const Flow::Derivatives& d) { return d.first[k]; };
+}
+Quantity Second(std::size_t k) {
+  return [k](const Flow::Derivatives& d) { return d.second[k]; };
+}
+
+// The range of x' or x'' of each state over a box. Nothing if one has none.
+using Derivative = Quantity (*)(std::size_t);
+std::optional<Arguments> RangesOver(const SampledMotion& motion, Derivative derivative, const Arguments& box) {
+  Flow::Derivatives whole;
+  motion.flow.Enclose(box, whole);
+  Arguments ranges;
+  for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
+    const Quantity quantity = derivative(k);
+    Interval range = quantity(whole).value;
+    if (!range.IsFinite()) range = RangeOver(motion, quantity, box);
+    if (!range.IsFinite()) return std::nullopt;
+    ranges.push_back(range);
   }
+  return ranges;
+}
+
+Arguments RequiredRangesOver(const SampledMotion& motion, Derivative derivative, const Arguments& box) {
+  if (auto ranges = RangesOver(motion, derivative, box)) return std::move(*ranges);
   FailWithoutBound();
 }
 
-// Between two samples in the domain. `reachable` holds all of it.
-Arguments BetweenSamples(const SampledMotion& motion, const Arguments& start, const Arguments& reachable) {
-  constexpr int kRounds = 3;
-  const Interval eighth = Interval(motion.period) * Interval(motion.period) / Interval(8);
-  Arguments box = reachable;
+// B with Z + [0, period] f(B) in B, so no motion that begins in Z leaves B within a period (Picard). `end` becomes a
+// box in which it is after the period.
+std::optional<Arguments> ReachableIn(const SampledMotion& motion, const Arguments& start, double period,
+                                     Arguments& end) {
+  constexpr int kRounds = 30;
+  constexpr double kWider = 1.05, kDiverges = 30;
+  Arguments box = start, moved_first;
   for (int round = 0; round < kRounds; ++round) {
-    const Flow::Derivatives derivatives = DerivativesOver(motion, box);
-    for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
-      const double away = (eighth * Interval(derivatives.second[k].value.Magnitude())).upper;
-      if (const auto both = Intersection(box[k], start[k] + Interval(-away, away))) box[k] = *both;
+    const auto rates = RangesOver(motion, First, box);
+    if (!rates) return std::nullopt;
+    bool is_inside = true;
+    Arguments wider = box;
+    for (std::size_t k = 0; k < rates->size(); ++k) {
+      const Interval moved = Interval(0, period) * (*rates)[k], after = start[k] + moved;
+      if (round == 0) moved_first.push_back(moved);
+      if (WidthOf(moved) > kDiverges * WidthOf(moved_first[k])) return std::nullopt;
+      is_inside = is_inside && box[k].lower <= after.lower && after.upper <= box[k].upper;
+      wider[k] = Join(box[k], start[k] + Interval(kWider) * moved);
     }
+    if (is_inside) {
+      end = start;
+      for (std::size_t k = 0; k < rates->size(); ++k) end[k] = start[k] + Interval(period) * (*rates)[k];
+      return box;
+    }
+    box = wider;
+  }
+  return std::nullopt;
+}
+
+// The same, in halves of the period if there is no such box for the whole.
+std::optional<Arguments> ReachableInParts(const SampledMotion& motion, const Arguments& start, double period,
+                                          int halvings, Arguments& end) {
+  if (auto box = ReachableIn(motion, start, period, end)) return box;
+  if (halvings == 0) return std::nullopt;
+  Arguments middle;
+  const auto first = ReachableInParts(motion, start, period / 2, halvings - 1, middle);
+  if (!first) return std::nullopt;
+  auto second = ReachableInParts(motion, middle, period / 2, halvings - 1, end);
+  if (!second) return std::nullopt;
+  std::ranges::transform(*first, *second, second->begin(), Join);
+  return second;
+}
+
+// A box that no motion from Z leaves within a period.
+Arguments Reachable(const SampledMotion& motion, const Arguments& start) {
+  constexpr int kHalvings = 5;
+  Arguments end;
+  if (auto box = ReachableInParts(motion, start, motion.period, kHalvings, end)) return std::move(*box);
+  FailWithoutBound();
+}
+
+// Cuts a range down to what it has in common with another one. False if that is nothing.
+bool CutDown(Interval& range, const Interval& to) {
+  const auto both = Intersection(range, to);
+  if (both) range = *both;
+  return both.has_value();
+}
+
+// Whether a box shrank by more than a hundredth in some argument.
+bool IsMuchSmaller(const Arguments& box, const Arguments& before) {
+  for (std::size_t k = 0; k < box.size(); ++k)
+    if (WidthOf(box[k]) < 0.99 * WidthOf(before[k])) return true;
+  return false;
+}
+
+// From one sample in `start` to the next in `end`, at most a period later: the motion is near the chord, a bounded way
+// on from `start`, and a bounded way back from `end`. `box` holds all of it. Nothing if there is no such motion.
+std::optional<Arguments> BetweenSamples(const SampledMotion& motion, const Arguments& start, const Arguments& end,
+                                        Arguments box) {
+  constexpr int kRounds = 12;
+  const Interval period(0, motion.period);
+  const Interval eighth = Interval(motion.period) * Interval(motion.period) / Interval(8);
+  for (int round = 0; round < kRounds; ++round) {
+    const Arguments first = RequiredRangesOver(motion, First, box), second = RequiredRangesOver(motion, Second, box);
+    const Arguments before = box;
+    for (std::size_t k = 0; k < first.size(); ++k) {
+      const double away = (eighth * Interval(second[k].Magnitude())).upper;
+      const Interval moved = period * first[k];
+      if (!CutDown(box[k], Join(start[k], end[k]) + Interval(-away, away)) || !CutDown(box[k], start[k] + moved) ||
+          !CutDown(box[k], end[k] - moved))
+        return std::nullopt;
+    }
+    if (!IsMuchSmaller(box, before)) break;
   }
   return box;
 }
 
-// In a plan's last step. Nothing if no such step ends at rest.
-std::optional<Arguments> LastStep(const SampledMotion& motion, const Arguments& reachable) {
-  const Flow::Derivatives derivatives = DerivativesOver(motion, reachable);
-  Arguments box = reachable;
+// Where the last step of a plan ends. Nothing if none that begins in the domain ends at rest.
+std::optional<Arguments> EndsOfLastStep(const SampledMotion& motion, const Arguments& reachable) {
+  Arguments end = reachable;
   for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
     const double rest = motion.rest[static_cast<Eigen::Index>(k)];
-    if (!(rest < kInfinity)) continue;
-    const auto both =
-        Intersection(box[k], Interval(-rest, rest) - Interval(0, motion.period) * derivatives.first[k].value);
-    if (!both) return std::nullopt;
-    box[k] = *both;
+    if (!CutDown(end[k], Interval(-rest, rest))) return std::nullopt;
   }
-  return box;
+  return end;
 }
 
-// ---- The largest value of a quantity over a box, by branch and bound.
-
-class Search {
- public:
-  // Values up to `least` are of no interest.
-  Search(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least)
-      : flow_(flow), quantity_(std::move(quantity)), options_(options) {
-    found_.lower = least;
-  }
-
-  MotionBound Run(const Arguments& region) {
-    Push(region);
-    while (!pieces_.empty()) {
-      found_.upper = pieces_.top().bound;
-      if (found_.upper <= (1 + options_.gap) * found_.lower || !Cut()) break;
-    }
-    found_.upper = std::max(found_.upper, 0.0);
-    found_.reached = found_.upper <= (1 + options_.gap) * found_.lower;
-    return found_;
-  }
-
- private:
-  struct Piece {
-    double bound;
-    Arguments box;
-    bool operator<(const Piece& other) const { return bound < other.bound; }
-  };
-
-  RangeWithSlopes Evaluate(const Arguments& box) {
-    ++found_.boxes;
-    flow_.Enclose(box, derivatives_);
-    return quantity_(derivatives_);
-  }
-
-  // Adds a box, after every argument in which the quantity is monotone is set to its better end.
-  void Push(Arguments box) {
-    RangeWithSlopes range = Evaluate(box);
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (std::size_t i = 0; i < box.size(); ++i) {
-        const Interval& slope = range.gradient[i];
-        if (!(box[i].lower < box[i].upper) || (slope.lower < 0 && slope.upper > 0)) continue;
-        box[i] = slope.lower >= 0 ? box[i].upper : box[i].lower;
-        changed = true;
-      }
-      if (changed) range = Evaluate(box);
-    }
-    if (!range.value.IsFinite()) range.value.upper = kInfinity;
-    Arguments middle = box;
-    for (Interval& argument : middle) argument = argument.Middle();
-    found_.lower = std::max(found_.lower, Evaluate(middle).value.lower);
-    pieces_.push({range.value.upper, std::move(box)});
-  }
-
-  // Halves the box of the largest bound. False if that is not possible.
-  bool Cut() {
-    if (found_.boxes >= options_.max_boxes) return false;
-    Arguments box = pieces_.top().box;
-    const auto widest = std::ranges::max_element(box, {}, [](const Interval& x) { return x.upper - x.lower; });
-    const double middle = widest->Middle();
-    if (!(widest->lower < middle && middle < widest->upper)) return false;
-    pieces_.pop();
-    const double upper = widest->upper;
-    widest->upper = middle;
-    Push(box);
-    *widest = {middle, upper};
-    Push(std::move(box));
-    return true;
-  }
-
-  const Flow& flow_;
-  Quantity quantity_;
-  const SlopeBoundOptions options_;
-  Flow::Derivatives derivatives_;
-  std::priority_queue<Piece> pieces_;
-  MotionBound found_;
-};
-
-RangeWithSlopes Negated(RangeWithSlopes range) {
-  range.value = -range.value;
-  for (Interval& slope : range.gradient) slope = -slope;
-  return range;
-}
+// ---- Bounds.
 
 // The largest magnitude of any of the quantities.
 MotionBound BoundMagnitude(const Flow& flow, const std::vector<Quantity>& quantities,
@@ -217,13 +368,8 @@ Quantity AccelerationAlong(const Eigen::VectorXd& row) {
   };
 }
 
-// A coordinate of a place. Nothing is known of its slopes.
 Quantity AccelerationOfPlace(std::size_t i) {
-  return [i](const Flow::Derivatives& derivatives) {
-    RangeWithSlopes range{derivatives.places[i], {}};
-    range.gradient.fill(Interval(-kInfinity, kInfinity));
-    return range;
-  };
+  return [i](const Flow::Derivatives& d) { return d.places[i]; };
 }
 
 // ---- Recorded motion.
@@ -290,8 +436,11 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
     throw std::invalid_argument("motion: projection, rest or heading are not those of " + std::to_string(n) +
                                 " states");
   const Arguments start = BoxOf(motion.domain), reachable = Reachable(motion, start);
-  std::vector<Arguments> regions{BetweenSamples(motion, start, reachable)};
-  if (auto last = LastStep(motion, reachable)) regions.push_back(std::move(*last));
+  std::vector<Arguments> regions;
+  for (const auto& end : {std::optional(start), EndsOfLastStep(motion, reachable)}) {
+    const auto box = end ? BetweenSamples(motion, start, *end, reachable) : std::nullopt;
+    if (box) regions.push_back(*box);
+  }
   MotionBounds bounds;
   const auto p = ToSize(motion.projection.rows());
   for (std::size_t k = 0; k < p; ++k) {
@@ -301,10 +450,8 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   }
   if (motion.heading < 0) return bounds;
   const auto heading = ToSize(motion.heading);
-  bounds.turn_rate =
-      BoundMagnitude(motion.flow, {[&](const Flow::Derivatives& d) { return d.first[heading]; }}, regions, options);
-  bounds.turn_acceleration =
-      BoundMagnitude(motion.flow, {[&](const Flow::Derivatives& d) { return d.second[heading]; }}, regions, options);
+  bounds.turn_rate = BoundMagnitude(motion.flow, {First(heading)}, regions, options);
+  bounds.turn_acceleration = BoundMagnitude(motion.flow, {Second(heading)}, regions, options);
   return bounds;
 }
 

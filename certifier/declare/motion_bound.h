@@ -44,9 +44,11 @@ struct SampledMotion {
 /** Bounds for every motion that is in the domain at its samples. A plan's last sample is not tested against the domain;
 there the bounds hold for every motion that begins in the domain and ends at rest.
 
-Between two samples in the domain a state x_k lies within period^2 / 8 sup |x_k''| of the domain's box. In the last step
-it lies in the box B with Z + [0, period] f(B) in B, where Z is the domain's box, and, counted back from the end, in
-[-rest_k, rest_k] - [0, period] f_k(B).
+Let Z be the domain's box, and E the box of the second sample: Z, or in the last step what is reached and at rest. No
+motion leaves a box B with Z + [0, period] f(B) in B within a period; without such a B for the whole period it is that
+of its halves, one after the other. B is cut down to what lies within period^2 / 8 sup |x_k''| of the chords from Z to
+E, in Z + [0, period] f(B), and in E - [0, period] f(B), as long as that helps. Where f or x'' has no finite enclosure
+over a box, it is enclosed over pieces.
 @throws std::runtime_error if there is no such B or no finite bound, for example over a pole of the tangent.
 @throws std::invalid_argument if a size is wrong. Cost: at most options.max_boxes evaluations for each bound. */
 [[nodiscard]] MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options = {});

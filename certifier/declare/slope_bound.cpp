@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/declare/mean_value.h"
 #include "certifier/numerics/arithmetic.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -223,8 +224,6 @@ class Search {
     return moved;
   }
 
-  // Expanded around the point for which the bound is least: with slopes in [-l, u] over a width w the excess l u w /
-  // (l + u).
   double MeanValueBound(std::span<const Interval> rises, double sign, const Arguments& rest, bool inside) {
     std::vector<double> point = Middle(rest);
     double excess = 0;
@@ -232,12 +231,9 @@ class Search {
       const Interval& range = rest[ToSize(active_[i])];
       if (!(range.lower < range.upper)) continue;
       const Interval rise = sign > 0 ? rises[i] : -rises[i];
-      double& w = point[ToSize(active_[i])];
-      const double share = rise.upper / (rise.upper - rise.lower);
-      const double best = range.lower + share * (range.upper - range.lower);
-      w = range.Contains(best) ? best : range.Middle();  // the sum may overflow
-      const double cost = std::max(MulUp(rise.upper, SubUp(range.upper, w)), MulUp(-rise.lower, SubUp(w, range.lower)));
-      excess = AddUp(excess, cost);
+      const ExpansionPoint expansion = ExpandForUpperBound(range, rise);
+      point[ToSize(active_[i])] = expansion.point;
+      excess = AddUp(excess, expansion.excess);
       Prefer(active_[i], Product(rise.Magnitude(), Width(range)), rest, cut_, cut_score_);
     }
     return AddUp(At(point, inside, sign).upper, excess);

@@ -74,12 +74,6 @@ class StagedModel::Stages final {
     if (!HasStages(integrator)) throw std::invalid_argument("a model with stages needs the integrator midpoint or rk4");
     Mark();
     for (int l = 0; l < rates_.variables; ++l) all_columns_.push_back(l);
-    for (const Program::First& entry : rates_.jacobian)
-      if (entry.column < rates_.states && std::ranges::find(bent_, entry.column) == bent_.end())
-        bent_.push_back(entry.column);
-    std::ranges::sort(bent_);
-    for (int i = 0; i < static_cast<int>(bent_.size()); ++i)
-      for (int l = i / 4 * 4; l < static_cast<int>(bent_.size()); l += 4) blocks_.push_back({i, l});
     second_.assign(rates_.hessian.begin(), rates_.hessian.end());
     std::ranges::stable_sort(second_, {}, [](const Program::Second& e) { return std::pair(e.row, e.column); });
     for (int e = 0; e < static_cast<int>(second_.size()); ++e) {
@@ -213,6 +207,10 @@ class StagedModel::Stages final {
         for (std::size_t i = 0; i < n; ++i) sum_bent[j][i] |= rate_bent[j][i];
       }
     }
+    std::uint32_t bent = 0;
+    for (const Rows& rows : sum_bent)
+      for (std::size_t i = 0; i < n; ++i) bent |= rows[i] | (rows[i] != 0 ? 1u << i : 0);
+    ChooseColumns(bent);
     const auto place_of = [&](int l) { return static_cast<int>(std::ranges::find(bent_, l) - bent_.begin()); };
     for (std::size_t k = 0; k < n; ++k)
       for (short l = 0; l < rates_.variables; ++l) {
@@ -227,6 +225,14 @@ class StagedModel::Stages final {
           places_.push_back(ToSize(block - blocks_.begin()) * kLaneCount + ToSize(column % 4));
         }
       }
+  }
+
+  // Second derivatives by other columns than these bits are zero at every stage.
+  void ChooseColumns(std::uint32_t bent) {
+    for (int l = 0; l < rates_.states; ++l)
+      if ((bent >> l & 1) != 0) bent_.push_back(l);
+    for (int i = 0; i < static_cast<int>(bent_.size()); ++i)
+      for (int l = i / 4 * 4; l < static_cast<int>(bent_.size()); l += 4) blocks_.push_back({i, l});
   }
 
   static Interval Range(double center, double radius) { return {SubDown(center, radius), AddUp(center, radius)}; }
@@ -392,7 +398,7 @@ class StagedModel::Stages final {
   std::vector<StageEvaluation> evaluations_;
   double dt_;
   std::vector<unsigned char> values_needed_, first_needed_, all_needed_;
-  std::vector<int> all_columns_, bent_;  // bent_: the states on which the rates depend
+  std::vector<int> all_columns_, bent_;  // bent_: the states by which the successor has second derivatives
   std::vector<Block> blocks_;
   // Two variables with a second derivative of some rate, and the entries [first, last) of second_ that have it.
   struct Pair {

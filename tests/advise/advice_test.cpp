@@ -180,7 +180,9 @@ std::optional<Tried> TryJudged(Random& random) {
       ExpectOnly(advice.change, abstained, after);
       std::string sentence;
       if (Fresh(after, &sentence).outcome == Outcome::kCertified) continue;
-      if (turns) EXPECT_EQ(advice.then, sentence);
+      if (turns) {
+        EXPECT_EQ(advice.then, sentence);
+      }
       turns = false;
     }
     EXPECT_EQ(advice.turns, turns);

@@ -105,7 +105,9 @@ TEST_F(InitTest, AModelOfTheLibraryComesWithTheLawsThatDriveIt) {
     for (std::size_t i = 0; i < task.laws.definitions.size(); ++i)
       EXPECT_EQ(task.laws.definitions[i].value.text, drive.laws.definitions[i].value.text);
     ASSERT_EQ(task.laws.speed.has_value(), drive.laws.speed.has_value());
-    if (task.laws.speed) EXPECT_EQ(task.laws.speed->text, drive.laws.speed->text);
+    if (task.laws.speed) {
+      EXPECT_EQ(task.laws.speed->text, drive.laws.speed->text);
+    }
     ASSERT_TRUE(task.laws.at_rest && drive.laws.at_rest);
     ASSERT_EQ(task.laws.at_rest->size(), drive.laws.at_rest->size());
     for (std::size_t i = 0; i < task.laws.at_rest->size(); ++i) {

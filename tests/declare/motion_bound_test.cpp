@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "certifier/declare/mean_value.h"
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/text_model.h"
@@ -234,6 +235,151 @@ TEST(MotionBound, HoldsForAllParameters) {
       BoundMotion({flow, domain, 0.1, projection, -1, NoRest(2)}, {.max_boxes = 100}).acceleration.at(0);
   EXPECT_GE(bound.upper, 10);
   EXPECT_LE(bound.upper, 10 * (1 + 1e-12));
+}
+
+// The arm of config/models/two_link_arm.yaml. Over its whole domain, natural intervals do not exclude that the
+// determinant of its mass matrix is zero.
+class TwoLinkArm : public testing::Test {
+ protected:
+  using Point = std::array<double, 6>;
+
+  static std::shared_ptr<const NominalModel> Model() {
+    return MakeTextModel(TextModel({{"q1", "w1"},
+                                    {"q2", "w2"},
+                                    {"w1", "(load1/3 - m12*load2)/determinant"},
+                                    {"w2", "(m11*load2 - m12*load1)/determinant"}},
+                                   {"torque1", "torque2"}, {{"dt", kPeriod, kPeriod}},
+                                   {{"m11", "5/3 + cos(q2)"},
+                                    {"m12", "1/3 + cos(q2)/2"},
+                                    {"load1", "torque1 + sin(q2)/2*w2*(2*w1 + w2)"},
+                                    {"load2", "torque2 - sin(q2)/2*w1^2"},
+                                    {"determinant", "m11/3 - m12^2"}},
+                                   ModelText::Integrator::kRk4));
+  }
+  static Domain DomainOfTheArm(double q1, double q2) {
+    Domain domain;
+    domain.state = Box(Eigen::Vector4d(-q1, -q2, -1.2, -1.2), Eigen::Vector4d(q1, q2, 1.2, 1.2));
+    domain.input = Box(Eigen::Vector2d(-8, -4), Eigen::Vector2d(8, 4));
+    return domain;
+  }
+  static Point Rate(const Point& z) {
+    const double c = std::cos(z[1]), s = std::sin(z[1]), m11 = 5.0 / 3 + c, m12 = 1.0 / 3 + c / 2;
+    const double load1 = z[4] + s / 2 * z[3] * (2 * z[2] + z[3]), load2 = z[5] - s / 2 * z[2] * z[2];
+    const double determinant = 4.0 / 9 - c * c / 4;
+    return {z[2], z[3], (load1 / 3 - m12 * load2) / determinant, (m11 * load2 - m12 * load1) / determinant};
+  }
+  /** The end of the second link, and its acceleration. */
+  static std::array<double, 2> AccelerationOfTheHand(const Point& z, const Point& rate) {
+    const double a = z[0] + z[1], w = z[2] + z[3], alpha = rate[2] + rate[3];
+    return {-std::sin(z[0]) * rate[2] - std::cos(z[0]) * z[2] * z[2] - std::sin(a) * alpha - std::cos(a) * w * w,
+            std::cos(z[0]) * rate[2] - std::sin(z[0]) * z[2] * z[2] + std::cos(a) * alpha - std::sin(a) * w * w};
+  }
+  static constexpr double kPeriod = 0.05;
+  static constexpr double kRest = 0.15;
+
+  /** The largest of what a motion has, of those from the domain that last at most a period and end in it or at rest. */
+  template <class Seen>
+  static std::array<double, 2> Largest(const Domain& domain, Seen seen, std::mt19937& random) {
+    std::array<double, 2> largest{};
+    for (int motion = 0; motion < 20'000; ++motion) {
+      Point z{};
+      for (std::size_t k = 0; k < 6; ++k) {
+        const Box& box = k < 4 ? domain.state : domain.input;
+        const auto i = static_cast<Eigen::Index>(k < 4 ? k : k - 4);
+        // Often an end, or the middle: there are the largest values.
+        const double at = std::uniform_real_distribution(-0.4, 1.4)(random);
+        z[k] = k == 1 && motion % 2 == 0
+                   ? 0
+                   : box.lower()[i] + std::clamp(at, 0.0, 1.0) * (box.upper()[i] - box.lower()[i]);
+      }
+      const double h = kPeriod / 20 * std::pow(std::uniform_real_distribution(0.0, 1.0)(random), 3);
+      std::array<double, 2> has{};
+      for (int i = 0; i <= 20; ++i) {
+        const auto now = seen(z, Rate(z));
+        for (std::size_t k = 0; k < 2; ++k) has[k] = std::max(has[k], std::abs(now[k]));
+        const auto moved = [&](double step, const Point& rate) {
+          Point to = z;
+          for (std::size_t k = 0; k < 4; ++k) to[k] += step * rate[k];
+          return to;
+        };
+        const Point k1 = Rate(z), k2 = Rate(moved(h / 2, k1)), k3 = Rate(moved(h / 2, k2)), k4 = Rate(moved(h, k3));
+        if (i < 20)
+          for (std::size_t k = 0; k < 4; ++k) z[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
+      }
+      const bool is_inside = domain.state.Contains(Eigen::Map<const Eigen::VectorXd>(z.data(), 4));
+      if (!is_inside && (std::abs(z[2]) > kRest || std::abs(z[3]) > kRest)) continue;
+      for (std::size_t k = 0; k < 2; ++k) largest[k] = std::max(largest[k], has[k]);
+    }
+    return largest;
+  }
+  static Eigen::VectorXd Rest() { return Eigen::Vector4d(kInfinite, kInfinite, kRest, kRest); }
+
+  const unsigned seed_ = std::random_device{}();
+  std::mt19937 random_{seed_};
+};
+
+TEST_F(TwoLinkArm, ItsBoundIsThatOfTheMotionsItHas) {
+  SCOPED_TRACE("seed " + std::to_string(seed_));
+  const auto flow = MakeFlow(*Model());
+  const Domain domain = DomainOfTheArm(1, 2.5);
+  Flow::Derivatives whole;
+  flow->Enclose(domain.Ranges(), whole);
+  ASSERT_FALSE(whole.first[3].value.IsFinite()) << "its equations have no enclosure in one piece";
+  const MotionBounds bounds =
+      BoundMotion({*flow, domain, kPeriod, Eigen::MatrixXd::Identity(2, 4), -1, Rest()}, {.gap = 0.01});
+  const auto largest = Largest(
+      domain,
+      [](const Point&, const Point& rate) {
+        return std::array{rate[2], rate[3]};
+      },
+      random_);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_TRUE(bounds.acceleration[k].reached);
+    EXPECT_GE(bounds.acceleration[k].upper, largest[k]);
+    EXPECT_LE(bounds.acceleration[k].upper, 1.1 * largest[k]);
+  }
+}
+
+TEST_F(TwoLinkArm, TheBoundOfItsHandIsThatOfTheMotionsItHas) {
+  SCOPED_TRACE("seed " + std::to_string(seed_));
+  const Body body{-1, {BodyPart{{}, 0, {{{"cos(q1) + cos(q1 + q2)", 1, 1}, {"sin(q1) + sin(q1 + q2)", 1, 1}}}}}};
+  const auto flow = MakeFlow(*Model(), body.Coordinates());
+  const Domain domain = DomainOfTheArm(0.2, 2);
+  const MotionBounds bounds =
+      BoundMotion({*flow, domain, kPeriod, Eigen::MatrixXd::Zero(2, 4), -1, Rest()}, {.gap = 0.1});
+  const auto largest = Largest(domain, AccelerationOfTheHand, random_);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_TRUE(bounds.acceleration[k].reached) << bounds.acceleration[k].boxes;
+    EXPECT_GE(bounds.acceleration[k].upper, largest[k]);
+    EXPECT_LE(bounds.acceleration[k].upper, 1.4 * largest[k]);
+  }
+}
+
+// Its denominator is at least 1/4 + c, which natural intervals do not see.
+TEST(MotionBound, ThereIsOneIffTheDenominatorHasNoZero) {
+  const auto bound = [](double c) {
+    const Flow flow({{"x", "v"}, {"u"}, {{"c", c, c}}, {}}, std::vector<ExpressionText>{{"v"}, {"u/(x^2 + x + c)"}});
+    const Domain domain = DomainOf(Eigen::Vector2d(-2, -1), Eigen::Vector2d(2, 1), Eigen::VectorXd::Constant(1, 3));
+    return BoundMotion({flow, domain, 0.01, Eigen::MatrixXd{{1, 0}}, -1, NoRest(2)}, {.gap = 0.01}).acceleration.at(0);
+  };
+  const MotionBound one = bound(0.75);  // u / (1/2 + (x + 1/2)^2)
+  EXPECT_TRUE(one.reached);
+  EXPECT_GE(one.upper, 6);
+  EXPECT_LE(one.upper, 6.1);
+  EXPECT_THROW((void)bound(0.25), std::runtime_error);
+  EXPECT_THROW((void)bound(0.2), std::runtime_error);
+}
+
+// The mean-value form bounds by what it expands: nothing in the range has more.
+TEST(MeanValue, NoPointHasMoreThanTheExpansion) {
+  for (const Interval rise : {Interval(-1, 3), Interval(-3, 1), Interval(-2, 2), Interval(-1e300, 1e300)}) {
+    const Interval range(-1, 7);
+    const ExpansionPoint at = ExpandForUpperBound(range, rise);
+    EXPECT_TRUE(range.Contains(at.point));
+    for (const double x : {range.lower, at.point, range.upper})
+      EXPECT_GE(at.excess, std::max(rise.lower * (x - at.point), rise.upper * (x - at.point)));
+    EXPECT_LE(at.excess, 8.01 * rise.Magnitude());
+  }
 }
 
 // A position and a heading, which may turn by 0.2 rad more than the model says.

@@ -86,7 +86,7 @@ TEST(Summary, CountsAWithdrawalOnceHoweverOftenItIsAnswered) {
     event.step = step;
     writer.Append(1'000'000, "EXECUTION_EVENT", Encode(event));
   };
-  for (const std::int16_t step : {5, 5, 3, 3}) answer(7, execution_event_t::WITHDRAWN, step);
+  for (const std::int16_t step : std::vector<std::int16_t>{5, 5, 3, 3}) answer(7, execution_event_t::WITHDRAWN, step);
   answer(7, execution_event_t::EMERGENCY_STOP, 3);
   for (const std::int64_t plan : {8, 7, 8, 7}) answer(plan, execution_event_t::WITHDRAWN, 3);  // repeated in turn
   ASSERT_TRUE(writer.Flush());
