@@ -101,10 +101,12 @@ void ExpectOnly(Change change, const Case& before, const Case& after) {
     EXPECT_EQ(after.controls, before.controls.leftCols(after.controls.cols()));
   }
   EXPECT_EQ(after.initial_set.CenterVector(), before.initial_set.CenterVector());
-  if (change != Change::kInitialSet)
+  if (change != Change::kInitialSet) {
     EXPECT_EQ(after.initial_set.GeneratorMatrix(), before.initial_set.GeneratorMatrix());
-  if (change != Change::kSlopes && change != Change::kLargerSlopes)
+  }
+  if (change != Change::kSlopes && change != Change::kLargerSlopes) {
     EXPECT_EQ(is.declaration.lipschitz, was.declaration.lipschitz);
+  }
   EXPECT_EQ(is.declaration.noise_bound == was.declaration.noise_bound, change != Change::kNoise);
   EXPECT_EQ(is.transitions.size() - was.transitions.size(), change == Change::kObservation ? 1
                                                             : change == Change::kOutlier   ? -1

@@ -213,6 +213,10 @@ certifier: {method: centred, zonotope_order: 5}
     EXPECT_GT(entry["upper"], 4) << "w^2 is reached";
     EXPECT_LT(entry["upper"], 5.5) << "sqrt(w^4 + u^2), a step later, is 4.33";
   }
+  // A pose that only says what the planner's goal is in, so of which nothing has to be said.
+  const std::string posed = Replaced(Read(task_), "body: {parts", "body: {pose: [q, w], parts");
+  std::ofstream(task_) << posed;
+  EXPECT_EQ(Json::parse(Declare("--between --max-boxes 2000 --json").text)["entries"], document["entries"]);
 }
 
 TEST_F(DeclareTest, BetweenExcludesWhatBelongsToTheResidual) {
@@ -278,7 +282,7 @@ TEST_F(DeclareTest, ATextIsBoundedAndItsCoverIsConfirmed) {
   EXPECT_EQ(document["residual"]["parameters"]["c"], Json::parse("[0.1, 0.2]"));
   EXPECT_EQ(Check().code, 0) << Check().text;
   EXPECT_THAT(Check().text, HasSubstr("check: confirmed: 2 bounds of the residual"));
-  Tamper([](Json& document) { document["entries"][1]["bound"] = document["entries"][1]["cover"] = 0.499; });
+  Tamper([](Json& file) { file["entries"][1]["bound"] = file["entries"][1]["cover"] = 0.499; });
   Reseal();
   ExpectRefuted("a by jerk: a box's bound is");
   for (const char* other : {"c*v*v", "c*v*abs(a)"}) {
