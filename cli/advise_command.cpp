@@ -47,7 +47,7 @@ struct Advised {
 BrakingTails TailsOf(const Config& task) {
   std::shared_ptr<const RobotMotion> motion;
   try {
-    motion = MakeMotion(task, Braking::kPlanned);
+    motion = std::make_shared<RobotMotion>(task, Braking::kPlanned);
   } catch (const ConfigError&) {
     return {};
   }
