@@ -74,7 +74,8 @@ void RobotMotion::Pursue(std::span<const double> x, const DesiredMotion& desired
   Control(*hints_, {z.data(), x.size() + kDesired}, u);
 }
 
-// Without hints between the one that was drawn and the one that stops the robot, which keeps upright one that would fall.
+// Without hints between the one that was drawn and the one that stops the robot, which keeps upright one that would
+// fall.
 void RobotMotion::Explore(std::span<const double> x, double share, std::span<double> u) const {
   if (has_hints()) return;
   std::array<double, kMaxInputs> base;
