@@ -86,7 +86,8 @@ class MemoryBus final : public InboxBus {
     std::deque<Sent> sent;
     {
       std::unique_lock lock(mutex_);
-      has_sent_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !sent_.empty(); });
+      if (timeout_ms > 0)
+        has_sent_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !sent_.empty(); });
       sent.swap(sent_);
     }
     for (; !sent.empty(); sent.pop_front()) inbox_.Put(sent.front().channel, sent.front().bytes, clock_());

@@ -77,8 +77,9 @@ int Inbox::HandOut(int timeout_ms) {
   std::size_t bytes = 0;
   {
     std::unique_lock lock(mutex_);
-    arrived_.wait_for(lock, std::chrono::milliseconds(timeout_ms),
-                      [this] { return !admitted_.messages.empty() || !refused_.messages.empty(); });
+    if (timeout_ms > 0)  // a wait of no time costs a switch of threads
+      arrived_.wait_for(lock, std::chrono::milliseconds(timeout_ms),
+                        [this] { return !admitted_.messages.empty() || !refused_.messages.empty(); });
     admitted.swap(admitted_.messages);
     refused.swap(refused_.messages);
     bytes = std::exchange(admitted_.bytes, 0) + std::exchange(refused_.bytes, 0);

@@ -67,7 +67,7 @@ namespace {
 BrakingTails TailsOf(const Config& task) {
   std::shared_ptr<const RobotMotion> motion;
   try {
-    motion = MakeMotion(task, Braking::kPlanned);
+    motion = std::make_shared<const RobotMotion>(task, Braking::kPlanned);
   } catch (const ConfigError&) {
     return {};
   }

@@ -1,10 +1,11 @@
-/** Driving and braking of a nominal model: what planning needs in addition to its equations. A task file says it by
-laws (planner.stop and the keys beside it); for a compiled model without them there is an implementation in motion.cpp.
-*/
+/** Driving and braking of a nominal model: what planning needs in addition to its equations. The laws of the task say
+it (planner.stop and the keys beside it). */
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -19,59 +20,62 @@ struct DesiredMotion {
   double climb = 0;    ///< m/s, along the third safety coordinate.
 };
 
-class RobotMotion {
+/** Planned: tails and hints of a plan. Hardest: braking as hard as the robot can, after a withdrawal. */
+enum class Braking { kPlanned, kHardest };
+
+class RobotMotion final {
  public:
-  virtual ~RobotMotion() = default;
+  /** @throws ConfigError if the task has no planner.stop, or does not say what being at rest or standing is. */
+  RobotMotion(const Config& config, Braking braking);
 
   /** Duration of one step, s. */
-  [[nodiscard]] virtual double dt() const = 0;
+  [[nodiscard]] double dt() const { return dt_; }
 
-  /** Speed in state x, m/s. It may be negative in reverse, which plans then do not use. */
-  [[nodiscard]] virtual double Speed(std::span<const double> x) const = 0;
+  /** Speed in state x, m/s: planner.speed, or else along the way of one step. It may be negative in reverse, which
+  plans then do not use. */
+  [[nodiscard]] double Speed(std::span<const double> x) const;
 
-  [[nodiscard]] virtual bool IsAtRest(std::span<const double> x) const = 0;
+  [[nodiscard]] bool IsAtRest(std::span<const double> x) const;
 
   /** Sets u to a control under which the robot goes on as it does, as far as it can. */
-  virtual void Coast(std::span<const double> x, std::span<double> u) const = 0;
+  void Coast(std::span<const double> x, std::span<double> u) const;
 
   /** Whether there is a Pursue. */
-  [[nodiscard]] virtual bool has_hints() const = 0;
+  [[nodiscard]] bool has_hints() const { return hints_.has_value(); }
 
   /** Sets u to a control for one step that steers x towards this motion, within the input domain. It is a hint for the
   search. @pre has_hints(). */
-  virtual void Pursue(std::span<const double> x, const DesiredMotion& desired, std::span<double> u) const = 0;
+  void Pursue(std::span<const double> x, const DesiredMotion& desired, std::span<double> u) const;
 
-  /** Changes u, a control drawn at random from the input domain, into one that the search may try in x.
-  @param share drawn from [0, 1]. */
-  virtual void Explore(std::span<const double> x, const DesiredMotion& desired, double share,
-                       std::span<double> u) const = 0;
+  /** Changes u, a control drawn at random from the input domain, into one that the search may try in x. With hints it
+  stays as it is: the search tries it for what no hint says. @param share drawn from [0, 1]. */
+  void Explore(std::span<const double> x, double share, std::span<double> u) const;
 
   /** Sets x to the state in which the robot's hold mode leaves it: at rest at its position. */
-  virtual void Hold(std::span<double> x) const = 0;
+  void Hold(std::span<double> x) const;
 
-  /** The number of braking tails. Tail 0 is the simplest; try it first. */
-  [[nodiscard]] virtual int num_tails() const = 0;
+  /** The number of ways to brake. Way 0 is the first of the task; try it first. */
+  [[nodiscard]] int num_tails() const { return static_cast<int>(stops_.size()); }
 
   /** Computes controls that bring the nominal model from x to rest. They lie within the input domain; the caller checks
   the states.
   @param tail 0 .. num_tails() - 1. @param controls is set, one column for each step.
   @return false, with `controls` unspecified, if this takes more than max_steps. */
-  [[nodiscard]] virtual bool Brake(std::span<const double> x, int tail, int max_steps,
-                                   Eigen::MatrixXd& controls) const = 0;
+  [[nodiscard]] bool Brake(std::span<const double> x, int tail, int max_steps, Eigen::MatrixXd& controls) const;
 
-  /** The number of ways to stop after a withdrawal. */
-  [[nodiscard]] virtual int num_stops() const = 0;
+ private:
+  [[nodiscard]] std::size_t inputs() const;
+  [[nodiscard]] bool Rests(std::span<const double> x) const;
+  [[nodiscard]] double Clipped(std::size_t k, double value) const;
+  void Control(const TextFunction& law, std::span<const double> z, std::span<double> u) const;
+  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const;
 
-  /** The same as Brake, in one of the ways to stop, 0 .. num_stops() - 1. */
-  [[nodiscard]] virtual bool Stop(std::span<const double> x, int way, int max_steps,
-                                  Eigen::MatrixXd& controls) const = 0;
+  std::shared_ptr<const Problem> problem_;
+  double dt_;
+  std::vector<int> held_;
+  std::vector<RestBound> at_rest_;
+  std::vector<TextFunction> stops_;
+  std::optional<TextFunction> hints_, speed_;
 };
-
-/** Planned: tails and hints of a plan. Hardest: braking as hard as the robot can, after a withdrawal. */
-enum class Braking { kPlanned, kHardest };
-
-/** The motion of a task: by its laws if it has planner.stop, otherwise that of its compiled model.
-@throws ConfigError if there is neither, or if the laws lack planner.at_rest or robot.hold. */
-[[nodiscard]] std::unique_ptr<RobotMotion> MakeMotion(const Config& config, Braking braking);
 
 }  // namespace forereach

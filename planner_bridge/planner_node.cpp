@@ -38,7 +38,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       half_width_(HalfWidth(config)),
       residual_(config.problem),
       proposer_(MakeProposer(config)),
-      hardest_(MakeMotion(config, Braking::kHardest)),
+      hardest_(config, Braking::kHardest),
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
@@ -207,7 +207,7 @@ void PlannerNode::EndRound(bool certified) {
 void PlannerNode::SearchOnce(std::int64_t now_us) {
   const std::int64_t takes_us =
       round_->stops ? Microseconds(config_.gate.decision_budget_ms) : Microseconds(config_.planner.time_limit_ms);
-  const int most = round_->stops ? hardest_->num_stops() : config_.planner.candidates;
+  const int most = round_->stops ? hardest_.num_tails() : config_.planner.candidates;
   if (round_->searches == most || now_us + takes_us >= round_->start_utime) return EndRound(false);
   ++round_->searches;
   ++searches_;
@@ -228,7 +228,7 @@ std::optional<Proposal> PlannerNode::Propose() {
   if (!round_->stops) return proposer_->Propose(RequestOf(*round_));
   Proposal proposal;
   const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
-  if (!hardest_->Stop(state, round_->searches - 1, kMaxSteps, proposal.controls) || proposal.controls.cols() == 0)
+  if (!hardest_.Brake(state, round_->searches - 1, kMaxSteps, proposal.controls) || proposal.controls.cols() == 0)
     return std::nullopt;
   return proposal;
 }

@@ -116,7 +116,7 @@ class PlannerNode final : public Node {
   const Eigen::VectorXd half_width_;  // of X_0
   const ResidualEstimate residual_;
   const std::unique_ptr<Proposer> proposer_;
-  const std::unique_ptr<RobotMotion> hardest_;  // braking as hard as the domain allows
+  const RobotMotion hardest_;  // the ways to stop after a withdrawal
 
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/numerics/size.h"
 #include "planner_bridge/reference.h"
 
 namespace forereach {
@@ -15,16 +15,25 @@ namespace {
 
 constexpr Eigen::Index kTheta = 2, kV = 3, kA = 4, kDelta = 5;
 
+const std::vector<std::string> kCarStates{"x", "y", "theta", "v", "a", "delta"};
+
+// 0 without such a parameter.
+double WheelbaseOf(const NominalModel& model) {
+  const auto found = std::ranges::find(model.parameter_names(), "wheelbase");
+  return found == model.parameter_names().end() ? 0
+                                                : model.parameters()[ToSize(found - model.parameter_names().begin())];
+}
+
 void Require(bool holds, const std::string& what) {
   if (!holds) throw std::invalid_argument("planner.policy: " + what);
 }
 
-void RequireFits(const Problem& problem, const PlannerOptions& options, const Policy& policy) {
+Policy Fitting(const Problem& problem, const PlannerOptions& options, Policy policy) {
   RequireGoalAndSteps(problem, options);
   const std::string model = problem.model->description();
   Require(policy.model == model, "is for the model " + policy.model + ", the task's is " + model);
-  const NamedModel* const named = FindNamed(*problem.model);
-  Require(named != nullptr && named->layout == Layout::kCar, "there are policies for compiled models of cars only");
+  Require(problem.model->state_names() == kCarStates && WheelbaseOf(*problem.model) > 0,
+          "there are policies for cars only: states x, y, theta, v, a, delta, and a parameter wheelbase");
   Require(problem.projection == Eigen::MatrixXd::Identity(2, problem.model->num_states()),
           "a policy goes to a point (x, y), task.projection has to be [x, y]");
   Require(policy.num_features() == kFeatures,
@@ -33,6 +42,7 @@ void RequireFits(const Problem& problem, const PlannerOptions& options, const Po
   Require(options.progress_steps <= policy.num_steps(), "its blocks have " + std::to_string(policy.num_steps()) +
                                                             " steps, planner.progress_steps is " +
                                                             std::to_string(options.progress_steps));
+  return policy;
 }
 
 }  // namespace
@@ -41,12 +51,10 @@ PolicyProposer::PolicyProposer(const Config& config, Policy policy)
     : problem_(config.problem),
       limits_(*problem_->model, problem_->limits),
       options_(config.planner),
-      policy_(std::move(policy)) {
-  RequireFits(*problem_, options_, policy_);
-  motion_ = MakeMotion(config, Braking::kPlanned);
-  wheelbase_ = problem_->model->parameters()[1];
-  duration_ = policy_.num_steps() * motion_->dt();
-}
+      policy_(Fitting(*problem_, options_, std::move(policy))),
+      motion_(config, Braking::kPlanned),
+      wheelbase_(WheelbaseOf(*problem_->model)),
+      duration_(policy_.num_steps() * motion_.dt()) {}
 
 // The angle of the arc from the robot's pose through the goal; then the fan.
 double PolicyProposer::Steering(const Eigen::VectorXd& state, double most, int attempt) const {
@@ -83,7 +91,7 @@ std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
 
   const Eigen::VectorXd end = Rollout(model, request.state, progress).rightCols<1>();
   Eigen::MatrixXd tail;
-  if (!motion_->Brake({end.data(), static_cast<std::size_t>(end.size())}, 0, options_.tail_steps, tail))
+  if (!motion_.Brake({end.data(), static_cast<std::size_t>(end.size())}, 0, options_.tail_steps, tail))
     return std::nullopt;
   Proposal proposal{Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), options_.progress_steps, {}};
   proposal.controls << progress, tail;

@@ -21,13 +21,13 @@ class PolicyProposer final : public Proposer {
  public:
   static constexpr int kFan = 9;
 
-  /** @throws std::invalid_argument unless the policy belongs to the problem's model, the model is a bicycle with x and
-  y as safety coordinates, and the policy has 12 features and progress_steps steps; also if the goal or the steps are
-  invalid. ConfigError as MakeMotion. */
+  /** @throws std::invalid_argument unless the policy belongs to the problem's model, the model has the states and the
+  wheelbase of a bicycle with x and y as safety coordinates, and the policy has 12 features and progress_steps steps;
+  also if the goal or the steps are invalid. ConfigError as RobotMotion. */
   PolicyProposer(const Config& config, Policy policy);
 
   void SetObstacles(std::vector<Obstacle>) override {}
-  [[nodiscard]] const RobotMotion& motion() const override { return *motion_; }
+  [[nodiscard]] const RobotMotion& motion() const override { return motion_; }
   /** One candidate. Nothing after 1 + kFan attempts, if no braking tail of at most tail_steps ends the plan, if the
   candidate exceeds a limit, or if one of its numbers is not finite. Clearance, margins and seed of the request are
   ignored. */
@@ -43,7 +43,7 @@ class PolicyProposer final : public Proposer {
   LimitValues limits_;
   PlannerOptions options_;
   Policy policy_;
-  std::unique_ptr<RobotMotion> motion_;
+  RobotMotion motion_;
   double wheelbase_, duration_;  // m; s of a block
 };
 

@@ -210,17 +210,16 @@ class Planner final : public Proposer {
       : problem_(config.problem),
         options_(config.planner),
         make_algorithm_(AlgorithmNamed(options_.algorithm)),
-        motion_(MakeMotion(config, Braking::kPlanned)),
+        motion_(config, Braking::kPlanned),
         places_(*problem_->model, problem_->projection, problem_->body),
         limits_(*problem_->model, problem_->limits),
         region_(ProjectedRegion(*problem_)),
         goal_(Eigen::Map<const Eigen::VectorXd>(options_.goal.data(), std::ssize(options_.goal))),
         obstacles_(config.obstacles) {
-    RequireGoalAndSteps(*problem_, options_);
     ompl::msg::noOutputHandler();
   }
 
-  [[nodiscard]] const RobotMotion& motion() const override { return *motion_; }
+  [[nodiscard]] const RobotMotion& motion() const override { return motion_; }
   void SetObstacles(std::vector<Obstacle> obstacles) override {
     obstacles_ = std::move(obstacles);
     fields_.clear();
@@ -256,7 +255,7 @@ class Planner final : public Proposer {
   std::shared_ptr<const Problem> problem_;
   PlannerOptions options_;
   MakeAlgorithm make_algorithm_;
-  std::unique_ptr<RobotMotion> motion_;
+  RobotMotion motion_;
   BodyPlaces places_;
   LimitValues limits_;
   const bool inputs_are_limited_ = limits_.SomeUseInputs();
@@ -305,9 +304,9 @@ class Planner::Search {
     limit_margin_ = LimitMargin(request);
     start_distance_ = field.DistanceToGo(Position(x));
     gain_ = IdealGain();
-    top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
-    least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
-    at_rest_ = planner.motion_->IsAtRest(x);
+    top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_.Speed(x));
+    least_speed_ = std::min(-kReverse, planner.motion_.Speed(x));
+    at_rest_ = planner.motion_.IsAtRest(x);
     start_valid_ = Allowed(x, 0);
   }
 
@@ -392,7 +391,7 @@ class Planner::Search {
   [[nodiscard]] bool Allowed(std::span<const double> x, int t) const {
     const Eigen::Map<const Eigen::ArrayXd> state(x.data(), start_.size());
     if (!((lower_.array() <= state).all() && (state <= upper_.array()).all())) return false;
-    const double speed = planner_.motion_->Speed(x);
+    const double speed = planner_.motion_.Speed(x);
     if (!(least_speed_ <= speed && speed <= top_speed_) || !KeepsLimitsOfStates(x)) return false;
     return Clear(Sweep(BodyAt(x), t));
   }
@@ -445,7 +444,7 @@ class Planner::Search {
   // What the motion does of its own accord in one step.
   void Coast(std::span<const double> x, std::span<double> next) const {
     std::array<double, kMaxInputs> u;
-    planner_.motion_->Coast(x, {u.data(), m_});
+    planner_.motion_.Coast(x, {u.data(), m_});
     Step(x, u.data(), next);
   }
 
@@ -458,8 +457,8 @@ class Planner::Search {
 
   // The distance that driving straight at the goal would gain, with acceleration up to the desired speed.
   [[nodiscard]] double IdealGain() const {
-    const double dt = planner_.motion_->dt();
-    double speed = planner_.motion_->Speed({start_.data(), n_}), gain = 0;
+    const double dt = planner_.motion_.dt();
+    double speed = planner_.motion_.Speed({start_.data(), n_}), gain = 0;
     for (int t = 0; t < planner_.options_.progress_steps; ++t) {
       gain += dt * std::min(speed, SpeedAt(start_distance_ - gain));
       speed += dt * planner_.options_.braking;
@@ -483,7 +482,7 @@ class Planner::Search {
   }
 
   [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
-    const RobotMotion& motion = *planner_.motion_;
+    const RobotMotion& motion = planner_.motion_;
     for (int shape = 0; shape < motion.num_tails(); ++shape)
       if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
     return false;
@@ -536,7 +535,7 @@ class Planner::Search {
     bounds.high[n_ + 1] = start_distance_;
     states->setBounds(bounds);
     const double cell = std::max(gain_ / planner_.options_.progress_steps,
-                                 kLeastCell * planner_.options_.cruise_speed * planner_.motion_->dt());
+                                 kLeastCell * planner_.options_.cruise_speed * planner_.motion_.dt());
     states->registerDefaultProjection(
         std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
 
@@ -548,18 +547,18 @@ class Planner::Search {
     controls->setBounds(control_bounds);
     controls->setControlSamplerAllocator([this](const oc::ControlSpace* space) {
       HintedSampler::Hint hint;
-      if (planner_.motion_->has_hints())
+      if (planner_.motion_.has_hints())
         hint = [this](const double* s, double turn, double slower, double* u) {
-          planner_.motion_->Pursue(StateOf(s), DesiredIn(s, turn, slower), {u, m_});
+          planner_.motion_.Pursue(StateOf(s), DesiredIn(s, turn, slower), {u, m_});
         };
       return std::make_shared<HintedSampler>(space, std::move(hint), [this](const double* s, double share, double* u) {
-        planner_.motion_->Explore(StateOf(s), DesiredIn(s, 0, 0), share, {u, m_});
+        planner_.motion_.Explore(StateOf(s), share, {u, m_});
       });
     });
 
     auto setup = std::make_unique<oc::SimpleSetup>(controls);
     const auto& space = setup->getSpaceInformation();
-    space->setPropagationStepSize(planner_.motion_->dt());
+    space->setPropagationStepSize(planner_.motion_.dt());
     space->setMinMaxControlDuration(1, kLongestHold);
     setup->setStatePropagator([this](const ob::State* from, const oc::Control* u, double, ob::State* to) {
       static_cast<void>(Propagate(Values(from), Values(u), Values(to)));
@@ -624,6 +623,9 @@ std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
 
 }  // namespace
 
-std::unique_ptr<Proposer> MakeOmplProposer(const Config& config) { return std::make_unique<Planner>(config); }
+std::unique_ptr<Proposer> MakeOmplProposer(const Config& config) {
+  RequireGoalAndSteps(*config.problem, config.planner);
+  return std::make_unique<Planner>(config);
+}
 
 }  // namespace forereach

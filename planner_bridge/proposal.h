@@ -21,7 +21,7 @@ inline constexpr int kStepsPerMs = 400;  ///< Work of a search, see MakeOmplProp
 model steps for each millisecond of options.time_limit_ms. The search counts work instead of reading a clock, so the
 result depends only on request, options and obstacles. A navigation field is computed once for each set of obstacles and
 clearance, in about 10 ms. Only one thread of the process may call Propose, because OMPL's seed is global.
-@throws ConfigError as MakeMotion, std::invalid_argument for an unknown algorithm, or an invalid goal or horizon. */
+@throws ConfigError as RobotMotion, std::invalid_argument for an unknown algorithm, or an invalid goal or horizon. */
 [[nodiscard]] std::unique_ptr<Proposer> MakeOmplProposer(const Config& config);
 
 }  // namespace forereach

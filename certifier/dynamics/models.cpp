@@ -58,7 +58,6 @@ const std::vector<NamedModel>& NamedModels() {
        .next = {"x + dt*(v*cos(theta))", "y + dt*(v*sin(theta))", "theta + dt/wheelbase*(v*tan(delta))", "v + dt*a",
                 "a + dt*jerk", "delta + dt*steer_rate"},
        .rates = {"v*cos(theta)", "v*sin(theta)", "v*tan(delta)/wheelbase", "a", "jerk", "steer_rate"},
-       .layout = Layout::kCar,
        .make =
            [](std::span<const double> parameters, std::vector<int> angles) {
              return MakeKinematicBicycle(parameters[0], parameters[1], std::move(angles));
@@ -69,7 +68,6 @@ const std::vector<NamedModel>& NamedModels() {
        .standing = {"vx", "vy"},
        .next = {"px + dt*vx + dt*dt/2*ax", "py + dt*vy + dt*dt/2*ay", "vx + dt*ax", "vy + dt*ay"},
        .rates = {"vx", "vy", "ax", "ay"},
-       .layout = Layout::kPlane,
        .make =
            [](std::span<const double> parameters, std::vector<int> angles) {
              if (!angles.empty()) throw std::invalid_argument("no state of point_mass is an angle");

@@ -24,12 +24,6 @@ angles, by their indices, ascending: none, or theta.
 /** The step of a model in s: its parameter dt, which every model of a task has. 0 if it has none. */
 [[nodiscard]] double StepOf(const NominalModel& model);
 
-/** What the states and inputs of a named model are, for a planner that drives it without laws of its task. */
-enum class Layout {
-  kCar,   ///< x, y, heading, speed, acceleration, steering angle; jerk, steering rate.
-  kPlane  ///< Place and velocity in the plane; acceleration.
-};
-
 /** A model that a task file names. The lists are of text, for task files, the declaration and the verifier; the bits of
 a certificate are those of the equations that `make` compiles in. */
 struct NamedModel {
@@ -43,7 +37,6 @@ struct NamedModel {
   std::vector<std::string_view> states;
   std::vector<std::string_view> standing;     ///< The states that are zero while the robot stands.
   std::vector<std::string_view> next, rates;  ///< Of each state an expression: after a step, and in continuous time.
-  Layout layout;
   /** @param parameters dt, then the others. @param angles by their indices, ascending.
   @throws std::invalid_argument as the functions above. */
   std::shared_ptr<const NominalModel> (*make)(std::span<const double> parameters, std::vector<int> angles);

@@ -70,7 +70,7 @@ std::vector<Key> LawKeys() {
       WaysToStop("planner.stop", &Laws::stop,
                  "How the robot brakes: a braking tail is what the nominal model does under this law, up to "
                  "planner.at_rest. One expression for each input, of states, parameters and definitions. The planner "
-                 "requires it with a model as text. [docs/planner.md](../docs/planner.md) has examples.",
+                 "requires it. [docs/planner.md](../docs/planner.md) has examples.",
                  "Several ways to stop. A plan ends with the first whose tail is allowed."),
       std::back_inserter(keys));
   std::ranges::move(WaysToStop("planner.emergency_stop", &Laws::emergency_stop,

@@ -198,9 +198,8 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates,
                       "The largest number of candidates for one start."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
-      planner.Number(
-          "braking", "m/s^2", kPositive, &PlannerOptions::braking,
-          "What the search expects of the robot's acceleration and deceleration. A compiled model brakes at it."),
+      planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
+                     "What the search expects of the robot's acceleration and deceleration."),
       planner.Number("time_limit_ms", "ms", UpTo(kHourMs), &PlannerOptions::time_limit_ms,
                      "The time limit of one query of the planner."),
       planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed,

@@ -49,117 +49,117 @@ Eigen::VectorXd Successor(const NominalModel& model, const Eigen::VectorXd& x, c
 
 TEST(Laws, ATailEndsAtRestInsideTheInputDomain) {
   const Config config = Unicycle();
-  const auto motion = MakeMotion(config, Braking::kPlanned);
+  const RobotMotion motion(config, Braking::kPlanned);
   std::mt19937 random(1);
   SCOPED_TRACE("seed 1");
   for (int i = 0; i < 200; ++i) {
     std::uniform_real_distribution<double> one(-1, 1);
     Eigen::VectorXd x = Vec({0, 0, 3 * one(random), 2 * one(random), 2 * one(random)});
     Eigen::MatrixXd controls;
-    ASSERT_TRUE(motion->Brake(Span(x), 0, 100, controls));
+    ASSERT_TRUE(motion.Brake(Span(x), 0, 100, controls));
     for (int t = 0; t < controls.cols(); ++t) {
-      EXPECT_FALSE(motion->IsAtRest(Span(x))) << "a tail is not longer than it has to be";
+      EXPECT_FALSE(motion.IsAtRest(Span(x))) << "a tail is not longer than it has to be";
       EXPECT_TRUE(config.problem->domain.input.Contains(controls.col(t)));
       x = Successor(*config.problem->model, x, controls.col(t));
     }
-    EXPECT_TRUE(motion->IsAtRest(Span(x)));
+    EXPECT_TRUE(motion.IsAtRest(Span(x)));
     EXPECT_NEAR(x(3), 0, 1e-9) << "the law is exact";
     EXPECT_NEAR(x(4), 0, 1e-9);
   }
 }
 
 TEST(Laws, ATailHasAsManyStepsAsItMayOrIsRefused) {
-  const auto motion = MakeMotion(Unicycle(), Braking::kPlanned);
+  const RobotMotion motion(Unicycle(), Braking::kPlanned);
   const Eigen::VectorXd x = Vec({0, 0, 0, 1, 0});  // by 0.1 m/s in each step
   Eigen::MatrixXd controls;
-  EXPECT_TRUE(motion->Brake(Span(x), 0, 10, controls));
+  EXPECT_TRUE(motion.Brake(Span(x), 0, 10, controls));
   EXPECT_EQ(controls.cols(), 10);
-  EXPECT_FALSE(motion->Brake(Span(x), 0, 9, controls));
-  EXPECT_TRUE(motion->Brake(Span(Vec({1, 1, 1, 1e-3, -1e-3})), 0, 0, controls));
+  EXPECT_FALSE(motion.Brake(Span(x), 0, 9, controls));
+  EXPECT_TRUE(motion.Brake(Span(Vec({1, 1, 1, 1e-3, -1e-3})), 0, 0, controls));
   EXPECT_EQ(controls.cols(), 0);
-  EXPECT_FALSE(motion->Brake(Span(Vec({1, 1, 1, 1.001e-3, 0})), 0, 0, controls));
+  EXPECT_FALSE(motion.Brake(Span(Vec({1, 1, 1, 1.001e-3, 0})), 0, 0, controls));
 }
 
 TEST(Laws, ALawWithoutAValueGivesNoTail) {
   Config config = Unicycle();
   config.laws.stop = {{{"sqrt(v - 0.5) - 1"}, {"0"}}};
   Eigen::MatrixXd controls;
-  EXPECT_FALSE(MakeMotion(config, Braking::kPlanned)->Brake(Span(Vec({0, 0, 0, 1, 0})), 0, 100, controls));
+  EXPECT_FALSE(RobotMotion(config, Braking::kPlanned).Brake(Span(Vec({0, 0, 0, 1, 0})), 0, 100, controls));
 }
 
 TEST(Laws, WithoutARestATailIsAsLongAsItMayBe) {
   Config config = Unicycle();
   config.laws.at_rest.emplace();
-  const auto motion = MakeMotion(config, Braking::kPlanned);
+  const RobotMotion motion(config, Braking::kPlanned);
   Eigen::MatrixXd controls;
-  EXPECT_TRUE(motion->Brake(Span(Vec({0, 0, 0, 0, 0})), 0, 17, controls));
+  EXPECT_TRUE(motion.Brake(Span(Vec({0, 0, 0, 0, 0})), 0, 17, controls));
   EXPECT_EQ(controls.cols(), 17);
-  EXPECT_FALSE(motion->IsAtRest(Span(Vec({0, 0, 0, 0, 0}))));
+  EXPECT_FALSE(motion.IsAtRest(Span(Vec({0, 0, 0, 0, 0}))));
 }
 
 TEST(Laws, EachWayToStopIsATail) {
   Config config = Unicycle();
   config.laws.stop.push_back({{"-v/dt"}, {"(0.5*v - omega)/dt"}});
   config.laws.emergency_stop = {{{"-v/dt"}, {"0"}}};
-  const auto planned = MakeMotion(config, Braking::kPlanned), hardest = MakeMotion(config, Braking::kHardest);
-  EXPECT_EQ(planned->num_tails(), 2);
-  EXPECT_EQ(hardest->num_stops(), 1);
+  const RobotMotion planned(config, Braking::kPlanned), hardest(config, Braking::kHardest);
+  EXPECT_EQ(planned.num_tails(), 2);
+  EXPECT_EQ(hardest.num_tails(), 1);
   Eigen::MatrixXd controls;
-  ASSERT_TRUE(planned->Brake(Span(Vec({0, 0, 0, 1, 0})), 1, 30, controls));
+  ASSERT_TRUE(planned.Brake(Span(Vec({0, 0, 0, 1, 0})), 1, 30, controls));
   EXPECT_EQ(controls(1, 0), 3) << "clipped from 5";
-  ASSERT_TRUE(hardest->Stop(Span(Vec({0, 0, 0, 1, 0})), 0, 30, controls));
+  ASSERT_TRUE(hardest.Brake(Span(Vec({0, 0, 0, 1, 0})), 0, 30, controls));
   EXPECT_TRUE(controls.row(1).isZero(0));
 }
 
 TEST(Laws, HintsKnowWhatTheSearchWants) {
   Config config = Unicycle();
-  EXPECT_FALSE(MakeMotion(config, Braking::kPlanned)->has_hints());
+  EXPECT_FALSE(RobotMotion(config, Braking::kPlanned).has_hints());
   config.laws.definitions = {{"turn", {"desired_heading - theta"}}, {"late", {"twice*gain"}}};
   config.laws.hints = {{"desired_speed - late"}, {"turn - desired_climb"}};
-  const auto motion = MakeMotion(config, Braking::kPlanned);
-  ASSERT_TRUE(motion->has_hints());
+  const RobotMotion motion(config, Braking::kPlanned);
+  ASSERT_TRUE(motion.has_hints());
   Eigen::VectorXd u(2);
-  motion->Pursue(Span(Vec({0, 0, 0.5, 0.4, 0})), {1.5, 1.2, 0.25}, {u.data(), 2});
+  motion.Pursue(Span(Vec({0, 0, 0.5, 0.4, 0})), {1.5, 1.2, 0.25}, {u.data(), 2});
   EXPECT_NEAR(u(0), 0.4, 1e-15) << "with the middle of gain";
   EXPECT_NEAR(u(1), 0.75, 1e-15);
-  motion->Pursue(Span(Vec({0, 0, 0.5, 0.4, 0})), {10, 1.4, 0}, {u.data(), 2});
+  motion.Pursue(Span(Vec({0, 0, 0.5, 0.4, 0})), {10, 1.4, 0}, {u.data(), 2});
   EXPECT_EQ(u, Vec({0.5, 3})) << "clipped";
 }
 
 TEST(Laws, SpeedIsThatOfTheWayAndHoldingLeavesThePlace) {
-  const auto motion = MakeMotion(Unicycle(), Braking::kPlanned);
-  EXPECT_NEAR(motion->Speed(Span(Vec({3, 1, 0.7, 1.25, 1}))), 1.25, 1e-12);
-  EXPECT_NEAR(motion->Speed(Span(Vec({3, 1, 0.7, -0.1, 1}))), 0.1, 1e-12);
-  EXPECT_EQ(motion->dt(), 0.1);
+  const RobotMotion motion(Unicycle(), Braking::kPlanned);
+  EXPECT_NEAR(motion.Speed(Span(Vec({3, 1, 0.7, 1.25, 1}))), 1.25, 1e-12);
+  EXPECT_NEAR(motion.Speed(Span(Vec({3, 1, 0.7, -0.1, 1}))), 0.1, 1e-12);
+  EXPECT_EQ(motion.dt(), 0.1);
   Eigen::VectorXd x = Vec({1, 2, 3, 0.5, 0.25});
-  motion->Hold({x.data(), 5});
+  motion.Hold({x.data(), 5});
   EXPECT_EQ(x, Vec({1, 2, 3, 0, 0}));
 }
 
 TEST(Laws, AControlToTryLiesBetweenTheLawsAndAnyOther) {
-  const auto motion = MakeMotion(Unicycle(), Braking::kPlanned);
+  const RobotMotion motion(Unicycle(), Braking::kPlanned);
   const Eigen::VectorXd x = Vec({0, 0, 0, 0.05, 0});  // the law: -0.5, 0
   Eigen::VectorXd u = Vec({0.5, -3});
-  motion->Explore(Span(x), {}, 0, {u.data(), 2});
+  motion.Explore(Span(x), 0, {u.data(), 2});
   EXPECT_TRUE(u.isApprox(Vec({-0.5, 0})));
   u = Vec({0.5, -3});
-  motion->Explore(Span(x), {}, 1, {u.data(), 2});
+  motion.Explore(Span(x), 1, {u.data(), 2});
   EXPECT_TRUE(u.isApprox(Vec({0.5, -3})));
 }
 
-TEST(Laws, AControlToTryLiesBetweenTheHintAndAnyOther) {
+TEST(Laws, WithHintsAnyControlIsTried) {
   Config config = Unicycle();
   config.laws.hints = {{"desired_speed - v"}, {"desired_heading - theta"}};
-  const auto motion = MakeMotion(config, Braking::kPlanned);
+  const RobotMotion motion(config, Braking::kPlanned);
   Eigen::VectorXd u = Vec({-1, 3});
-  motion->Explore(Span(Vec({0, 0, 0.5, 0.2, 0})), {1, 0.4, 0}, 0.5, {u.data(), 2});
-  EXPECT_TRUE(u.isApprox(Vec({-0.4, 1.75})));
+  motion.Explore(Span(Vec({0, 0, 0.5, 0.2, 0})), 0.5, {u.data(), 2});
+  EXPECT_EQ(u, Vec({-1, 3}));
 }
 
 TEST(Laws, SpeedIsWhatTheTaskSays) {
   Config config = Unicycle();
   config.laws.speed = ExpressionText{"v + 0*twice"};
-  EXPECT_EQ(MakeMotion(config, Braking::kPlanned)->Speed(Span(Vec({3, 1, 0.7, -0.125, 1}))), -0.125);
+  EXPECT_EQ(RobotMotion(config, Braking::kPlanned).Speed(Span(Vec({3, 1, 0.7, -0.125, 1}))), -0.125);
 }
 
 TEST(Laws, WhatALawMayNotUseIsAnError) {
@@ -191,7 +191,7 @@ TEST(Laws, WhatIsMissingIsNamed) {
     Config config = Unicycle();
     spoil(config);
     try {
-      static_cast<void>(MakeMotion(config, Braking::kPlanned));
+      static_cast<void>(RobotMotion(config, Braking::kPlanned));
     } catch (const ConfigError& error) {
       return error.what();
     }

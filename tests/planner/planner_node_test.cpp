@@ -695,12 +695,12 @@ TEST_F(WithdrawnPlanTest, OtherWaysToStopFollowAnAbstention) {
   Execute(3);
   Withdraw(6);
   Run(1);
-  for (std::size_t count = 2; count <= 7; ++count) {
+  for (std::size_t count = 2; count <= 5; ++count) {
     ASSERT_EQ(candidates_.size(), count);
     AbstainS();
     Run(1);
   }
-  EXPECT_EQ(candidates_.size(), 7u) << "there are six ways";
+  EXPECT_EQ(candidates_.size(), 5u) << "there are four ways";
   std::set<std::vector<double>> steering;
   for (std::size_t i = 1; i < candidates_.size(); ++i) {
     auto& rates = candidates_[i].control;

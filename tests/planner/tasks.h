@@ -1,11 +1,13 @@
-/** Two small tasks for the planner's tests, made without files. */
+/** Two small tasks for the planner's tests. Their laws are those of the tasks that drive these models. */
 #pragma once
 
 #include <initializer_list>
 #include <memory>
+#include <string>
 
 #include "certifier/dynamics/models.h"
 #include "certifier/task/config.h"
+#include "tests/paths.h"
 
 namespace forereach {
 
@@ -13,7 +15,12 @@ inline Eigen::VectorXd Vec(std::initializer_list<double> values) {
   return Eigen::Map<const Eigen::VectorXd>(values.begin(), static_cast<Eigen::Index>(values.size()));
 }
 
+inline Laws LawsOf(const std::string& drive) {
+  return LoadConfig(FOREREACH_SOURCE_DIR "/config/drive/" + drive + ".yaml", TransitionsFile::kIgnore).laws;
+}
+
 inline Config Bicycle() {
+  static const Laws laws = LawsOf("kinematic_bicycle");
   auto problem = std::make_shared<Problem>();
   problem->model = MakeKinematicBicycle(0.1, 2.5);
   problem->domain.state = Box(Vec({-10, -15, -3, -0.5, -3, -0.48}), Vec({80, 15, 3, 12, 3, 0.48}));
@@ -26,6 +33,7 @@ inline Config Bicycle() {
   problem->projection = Eigen::MatrixXd::Identity(2, 6);
   Config config;
   config.path = "bicycle";
+  config.laws = laws;
   config.says_between = true;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({25, 1}), 3), Obstacle::Circle(Vec({45, -4}), 3)};
@@ -39,6 +47,7 @@ inline Config Bicycle() {
 }
 
 inline Config PointMass() {
+  static const Laws laws = LawsOf("point_mass");
   auto problem = std::make_shared<Problem>();
   problem->model = MakePointMass(0.15);
   problem->domain.state = Box(Vec({-20, -20, -5.4, -5.4}), Vec({20, 20, 5.4, 5.4}));
@@ -50,6 +59,7 @@ inline Config PointMass() {
   problem->projection = Eigen::MatrixXd::Identity(2, 4);
   Config config;
   config.path = "point_mass";
+  config.laws = laws;
   config.says_between = true;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({5, 0.3}), 1.5)};

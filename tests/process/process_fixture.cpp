@@ -56,6 +56,9 @@ planner:
   progress_steps: 6
   tail_steps: 16
   lead_steps: 4
+  stop: {ax: -vx/dt, ay: -vy/dt}
+  hints: {ax: (desired_speed*cos(desired_heading) - vx)/0.4, ay: (desired_speed*sin(desired_heading) - vy)/0.4}
+  at_rest: {vx: 0.001, vy: 0.001}
 robot:
   start: [0, 0, 0, 0]
   step_period_ms: 100
