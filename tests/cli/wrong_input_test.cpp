@@ -1,6 +1,7 @@
 // Which task a log was recorded with, and inputs that are no log or none of this task: a sentence and exit 2.
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <set>
 #include <string>
 #include <utility>
@@ -180,10 +181,10 @@ TEST_F(KeptTaskTest, OfSeveralVersionsOfTheTransitionsTheLogNamesTheRightOne) {
 
 TEST_F(KeptTaskTest, ATaskWithAKeyAsksForIt) {
   const ScratchDirectory own;
-  const std::string keys = own / "keys", gate = "gate: {obstacles: task}\n";
+  const std::string keys = own / "keys", data = kSource + "/tests/data/";
   ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
-  fs::copy(kSource + "/tests/data/course_transitions.csv", own / "course_transitions.csv");
-  const std::string task = own.Write("task.yaml", Read(kCourse) + gate + "bus: {key: keys}\n");
+  const std::string field = std::regex_replace(Read(data + "field.yaml"), std::regex(R"(\.\./\.\./)"), data + "../../");
+  const std::string task = own.Write("task.yaml", field + "bus: {key: keys}\n");
   const Output run = Forereach("run --config " + task + " --directory " + (own / "log") + " 2>&1");
   ASSERT_EQ(run.code, 0) << run.text;
   const std::string log = own / "log/" + LogDirectory(own / "log").Logs().front();
