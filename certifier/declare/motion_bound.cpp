@@ -250,7 +250,8 @@ std::optional<Arguments> ReachableIn(const SampledMotion& motion, const Argument
     for (std::size_t k = 0; k < rates->size(); ++k) {
       const Interval moved = Interval(0, period) * (*rates)[k], after = start[k] + moved;
       if (round == 0) moved_first.push_back(moved);
-      if (WidthOf(moved) > kDiverges * WidthOf(moved_first[k])) return std::nullopt;
+      const double first_way = WidthOf(moved_first[k]);  // zero where nothing moves yet
+      if (first_way > 0 && WidthOf(moved) > kDiverges * first_way) return std::nullopt;
       is_inside = is_inside && box[k].lower <= after.lower && after.upper <= box[k].upper;
       wider[k] = Join(box[k], start[k] + Interval(kWider) * moved);
     }

@@ -57,6 +57,15 @@ TEST(MotionBound, OfAPointMassIsItsLargestControl) {
   EXPECT_EQ(bounds.turn_rate.upper, 0);
 }
 
+// Then no place moves at first, only after the speed has.
+TEST(MotionBound, OfAMotionThatBeginsAtRest) {
+  const auto model = MakePointMass(0.15);
+  const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, 0, 0), Eigen::Vector4d(9, 9, 0, 0), Eigen::Vector2d(2, 0.5));
+  const MotionBounds bounds = Bound(*model, domain, 0.15, -1, NoRest(4));
+  EXPECT_EQ(bounds.acceleration.at(0).upper, 2);
+  EXPECT_EQ(bounds.acceleration.at(1).upper, 0.5);
+}
+
 // The acceleration is a along the heading and v^2 tan(delta) / wheelbase across it, so its largest component in any
 // fixed direction has the length of both. A bit is added to v for the motion between two samples, and nothing to a and
 // delta, which move in straight lines.
