@@ -97,17 +97,15 @@ AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTa
   }
 }
 
-// What was kept of a run, unless it does not fit.
-bool TakeKept(const FinishedRuns& finished, const std::string& key, std::size_t count,
-              std::vector<AbstentionAdvice>& advice) {
-  const auto kept = finished.Find(key);
-  if (!kept) return false;
-  try {
-    advice = kept->get<std::vector<AbstentionAdvice>>();
-  } catch (const nlohmann::json::exception&) {  // not what this program writes
-    return false;
-  }
-  return advice.size() == count;
+// Whether what was kept is of these abstentions. Places are used as they are.
+bool Fits(const std::vector<AbstentionAdvice>& kept, const std::vector<RecordedAbstention>& all) {
+  return std::ranges::equal(kept, all, [](const AbstentionAdvice& advice, const RecordedAbstention& abstention) {
+    const auto& problem = abstention.judged.problem;
+    if (!problem) return advice.advices.empty();
+    return std::ranges::all_of(advice.advices, [&](const Advice& each) {
+      return each.place.size() == 0 || (each.place.size() == problem->transitions.z.cols() && each.place.allFinite());
+    });
+  });
 }
 
 }  // namespace
@@ -140,7 +138,11 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
   std::map<const Config*, BrakingTails> tails;
   for (std::size_t run = 0; run < runs.size(); ++run) {
     const std::size_t count = runs[run].all.size();
-    if (finished && TakeKept(*finished, keys[run], count, advised[run])) continue;
+    if (finished)
+      if (auto kept = finished->FindAs<std::vector<AbstentionAdvice>>(keys[run]); kept && Fits(*kept, runs[run].all)) {
+        advised[run] = std::move(*kept);
+        continue;
+      }
     advised[run].assign(count, {});
     left[run] = count;
     for (std::size_t i = 0; i < count; ++i) work.emplace_back(run, i);

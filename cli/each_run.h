@@ -123,10 +123,7 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
   return ForEachRun<Result>(named, options, done, [&](const RunLogs& run, RunWork& work) -> Result {
     if (!finished) return one(run, work);
     const std::string key = finished->KeyOf(run);
-    if (const auto kept = finished->Find(key)) try {
-        return kept->template get<Result>();
-      } catch (const nlohmann::json::exception&) {  // not what this program writes
-      }
+    if (auto kept = finished->FindAs<Result>(key)) return std::move(*kept);
     work.KeepIn(*finished, key);
     Result result = one(run, work);
     finished->Keep(key, result, work.files());

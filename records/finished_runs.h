@@ -10,7 +10,7 @@ again. A file appears whole or not at all, and a damaged one counts as none. The
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 
 #include "records/run_logs.h"
 
@@ -32,6 +32,17 @@ class FinishedRuns final {
 
   /** The result that was kept last under this key, if there is one and its files are still there. */
   [[nodiscard]] std::optional<nlohmann::json> Find(const std::string& key) const;
+  /** The same as a Result (nlohmann's from_json); nothing if it is not what this program writes. */
+  template <class Result>
+  [[nodiscard]] std::optional<Result> FindAs(const std::string& key) const {
+    const auto kept = Find(key);
+    if (!kept) return std::nullopt;
+    try {
+      return kept->template get<Result>();
+    } catch (const nlohmann::json::exception&) {
+      return std::nullopt;
+    }
+  }
   /** Keeps a result. Any number of threads may keep, each another key.
   @param files paths that belong to it, of PathOf; they are written before. @throws OutputError. */
   void Keep(const std::string& key, const nlohmann::json& result, const std::vector<std::string>& files) const;

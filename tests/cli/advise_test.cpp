@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/gate.h"
+#include "cli/abstention_advice.h"
 #include "cli/gate_advice.h"
 #include "forereach/obstacles_t.hpp"
 #include "lcmtypes/names.h"
@@ -158,6 +159,35 @@ TEST_F(AdviseTest, GoesOnAfterAnInterruption) {
   ASSERT_NE(at, std::string::npos);
   scratch_.Write("kept/" + kept[1].filename().string(), text.replace(at, 2, "IF"));
   EXPECT_EQ(Forereach(resume + "--json 2>&1").text, whole);
+}
+
+TEST_F(AdviseTest, KeptAdviceThatDoesNotFitIsSearchedAnew) {
+  const std::string log = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+  const RunTasks tasks(FOREREACH_SOURCE_DIR "/tests/data/course.yaml", {}, false);
+  int left = 2;
+  std::vector<Abstentions> runs(1);
+  runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false, [&](const std::string&) { return left-- > 0; });
+  ASSERT_EQ(runs[0].all.size(), 2u);
+  const auto whole = AdviseAll(runs, 1);
+  const FinishedRuns finished(scratch_ / "kept", "a test");
+  const std::string key(64, '7');
+  const auto advised_after = [&](const nlohmann::json& kept) {
+    finished.Keep(key, kept, {});
+    return nlohmann::json(AdviseAll(runs, 1, &finished, {key}));
+  };
+  const nlohmann::json fitting = whole.at(0);
+  EXPECT_EQ(advised_after(fitting).at(0), fitting);
+  const nlohmann::json advice = {{"change", "observation"}, {"what", "w"}, {"amount", 1}, {"turns", true}};
+  const auto with_place = [&](const nlohmann::json& place) {
+    nlohmann::json forged = fitting;
+    forged[0]["advice"] = {advice};
+    forged[0]["advice"][0]["place"] = place;
+    return forged;
+  };
+  EXPECT_EQ(advised_after(with_place({0, 0, 0, 0, 0, 0, 0, 0})).at(0)[0]["advice"][0]["what"], "w") << "it would fit";
+  for (const nlohmann::json& place : {nlohmann::json{1}, nlohmann::json{1, 2, 3, 4, 5, 6, 7, 8, 9}})
+    EXPECT_EQ(advised_after(with_place(place)).at(0), fitting) << place;
+  EXPECT_EQ(advised_after(nlohmann::json::array({fitting[0]})).at(0), fitting) << "one is missing";
 }
 
 TEST_F(AdviseTest, NamesTheQueueAndTheSilenceThatWouldHaveHeld) {
