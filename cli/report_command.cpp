@@ -31,17 +31,16 @@ constexpr std::size_t kMostAdvised = 300;
 // The advice on the last decisions that are no certificates. Without a log or its task, there is none.
 void AddAdvice(NamedRuns& read, const Options& options, const PageTasks& tasks, PageRun& page) {
   const auto chosen = ChooseAdvised(page, kMostAdvised);
-  std::map<std::string, std::size_t> row_of;
-  const auto key_of = [](std::size_t run, const std::string& event) { return std::to_string(run) + ": " + event; };
+  std::vector<std::map<std::string, std::size_t>> row_of(chosen.size());  // of each run, by the event's name
   for (std::size_t run = 0; run < chosen.size(); ++run)
-    for (const std::size_t row : chosen[run]) row_of.emplace(key_of(run, EventName(page.decisions[row].event)), row);
+    for (const std::size_t row : chosen[run]) row_of[run].emplace(EventName(page.decisions[row].event), row);
   const RunLogs* const first = read.runs.data();
   auto found = ForEachRun<Abstentions>(read, options.each_run, "searched", [&](const RunLogs& logs, RunWork&) {
     const auto run = static_cast<std::size_t>(&logs - first);
     if (chosen[run].empty() || logs.logs.empty()) return Abstentions{};
     try {
       return ReadAbstentions(logs, tasks.of_run, true,
-                             [&](const std::string& event) { return row_of.contains(key_of(run, event)); });
+                             [&](const std::string& event) { return row_of[run].contains(event); });
     } catch (const BadInput&) {  // noted when the rows were read
       return Abstentions{};
     }
@@ -53,7 +52,7 @@ void AddAdvice(NamedRuns& read, const Options& options, const PageTasks& tasks, 
   for (std::size_t run = 0; run < runs.size(); ++run)
     for (std::size_t i = 0; i < advised[run].size(); ++i) {
       PageAdvice& advice = page.advice.emplace_back();
-      advice.decision = row_of.at(key_of(run, runs[run].all[i].event));
+      advice.decision = row_of[run].at(runs[run].all[i].event);
       advice.missing = advised[run][i].missing;
       for (AdviceGroup& group : GroupsOf(advised[run][i]))
         advice.groups.push_back({std::move(group.heading), std::move(group.clauses)});

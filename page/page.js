@@ -622,7 +622,7 @@ const showAdvice = (run, i, advise) => {
     return [make('p', sentence(heading)), list];
   });
   if (advice?.missing) parts.unshift(make('p', sentence(advice.missing)));
-  if (!advice) parts.push(make('p', advise ? `This page has the advice on the last decisions only. It is printed by: ${advise}` : 'Its log was not read.'));
+  if (!advice) parts.push(make('p', advise ? `This page has advice on the last decisions only. This command prints the advice on all: ${advise}` : 'Its log was not read.'));
   else if (parts.length === 0) parts.push(make('p', 'No change of one kind would have turned it.'));
   byId('advice-lines').replaceChildren(...parts);
 };
