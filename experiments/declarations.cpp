@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/observations.h"
 #include "experiments/equations_slopes.h"

@@ -1,4 +1,5 @@
-/** The slopes of a residual that is compiled: a template over the scalar type (certifier/dynamics/residuals.h). */
+/** The slopes of a residual that is compiled: a template over the scalar type (certifier/dynamics/models/residuals.h).
+ */
 #pragma once
 
 #include <array>

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "certifier/residual/observations.h"
 #include "certifier/sets/zonogon.h"
 #include "experiments/evaluate.h"

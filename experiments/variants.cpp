@@ -12,9 +12,9 @@
 
 #include "certifier/declare/slope_bound.h"
 #include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/point_mass.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/kinematic_bicycle.h"
+#include "certifier/dynamics/models/point_mass.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "certifier/numerics/text.h"
 #include "experiments/norm_ratio.h"
 

@@ -1,6 +1,6 @@
 // Transitions and plans: any bytes are finite numbers of the right shape, which come back to the last bit once written,
 // or refused with a ConfigError.
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"

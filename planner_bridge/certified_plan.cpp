@@ -41,6 +41,7 @@ class PlanSearch final {
       PlanRequest request{start, lessons_.clearance(), lessons_.DomainMargin(half_width_, config_.problem->projection),
                           seed_++, attempt};
       request.limit_margin = lessons_.limit_margin();
+      request.may_follow_hints = attempt == 0;
       request.schedule = schedule_;
       request.schedule.start_us += found_.progress_steps * schedule_.step_us;
       const std::optional<Proposal> part = proposer_.Propose(request);

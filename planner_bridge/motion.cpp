@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/numerics/size.h"
 
 namespace forereach {

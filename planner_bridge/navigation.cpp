@@ -98,6 +98,7 @@ double NavigationField::Solve(int index, double slowness) const {
 }
 
 double NavigationField::DistanceToGo(const Eigen::VectorXd& y) const {
+  if (!y.allFinite()) return kInfinity;
   if (columns_ == 0) return (y - goal_).norm();
   const double u = std::clamp((y(0) - origin_(0)) / cell_, 0.0, columns_ - 1.0);
   const double v = std::clamp((y(1) - origin_(1)) / cell_, 0.0, rows_ - 1.0);

@@ -197,10 +197,12 @@ void PlannerNode::BeginStop(int valid_steps, std::int64_t now_us) {
 
 void PlannerNode::EndRound(bool certified) {
   if (round_->awaited_plan >= 0) ++unanswered_;
-  if (certified)
+  if (certified) {
     waiting_start_ = round_->start_utime;
-  else
+  } else {
     ++fruitless_rounds_;
+    refused_center_ = round_->center;
+  }
   round_.reset();
 }
 
@@ -242,7 +244,8 @@ PlanRequest PlannerNode::RequestOf(const Round& round) const {
           round.searches - 1,
           {round.start_utime, period_us_, Microseconds(config_.gate.max_clock_error_ms.value_or(0))},
           round.lessons.limit_margin(),
-          round.lessons.obstacle_clearance()};
+          round.lessons.obstacle_clearance(),
+          round.searches == 1 && !(refused_center_ && *refused_center_ == round.center)};
 }
 
 candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {

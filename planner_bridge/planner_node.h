@@ -5,8 +5,8 @@ the state that the executing plan will have reached by then. A round begins whil
 start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
 start. A round sends one candidate at a time and waits for its decision:
  - certified: the round ends, the plan waits for its start;
- - abstention S: the next candidate keeps more distance, by clearance_step from obstacles or from the limit of the task
-   by what the tube may reach beyond it (lessons.h);
+ - abstention S: the next candidate keeps more distance than the searches before it, by clearance_step from obstacles or
+   from the limit of the task by what the tube may reach beyond it (lessons.h);
  - abstention D: the next candidate keeps further inside the domain's bounds (a policy's candidate follows another
    reference instead, policy_proposer.h);
  - abstention F: the round ends, because no candidate can be certified;
@@ -16,10 +16,11 @@ a result, half as far;
  - rejected: the next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has
    latched a fault;
  - abstained, no time: the next candidate.
-A round ends without a certificate after `candidates` searches, or when too little time is left until its start; the
-next state begins another round. With gate.obstacles bus, no round begins before the obstacles are known, and a round
-ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a time. After the robot
-has reached the goal, or has reported FINISHED, no round begins.
+The first candidate of a round may be what the task's hints do (proposal.h), but not for a start that the last round
+found no certificate for. A round ends without a certificate after `candidates` searches, or when too little time is
+left until its start; the next state begins another round. With gate.obstacles bus, no round begins before the obstacles
+are known, and a round ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a
+time. After the robot has reached the goal, or has reported FINISHED, no round begins.
 
 If the executing plan is withdrawn, the round ends, and a stopping round begins at once, unless a certified plan takes
 over while the plan still stands. Its candidates start at the first boundary for which a decision is in time, and not
@@ -119,6 +120,7 @@ class PlannerNode final : public Node {
   const RobotMotion hardest_;  // the ways to stop after a withdrawal
 
   std::optional<Round> round_;
+  std::optional<Eigen::VectorXd> refused_center_;   // of the last round without a certificate
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
   std::optional<std::int64_t> waiting_start_;       // start of a certified plan that has not begun yet
   std::int64_t waiting_plan_ = -1;                  // its plan_id

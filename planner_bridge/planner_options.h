@@ -20,7 +20,7 @@ struct PlannerOptions {
   int candidates = 12;          ///< The largest number of candidates for one start.
   double cruise_speed = 8;      ///< m/s
   double braking = 2.5;         ///< m/s^2
-  double time_limit_ms = 15;    ///< Of one OMPL query.
+  double time_limit_ms = 15;    ///< Of one OMPL query, as work: see MakeOmplProposer.
   int seed = 1;
   std::vector<double> initial_half_width;  ///< Half-widths of each candidate's X0, one for each state.
 };

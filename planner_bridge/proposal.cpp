@@ -268,17 +268,19 @@ class Planner final : public Proposer {
   std::map<double, NavigationField> fields_;  // by clearance
 };
 
-/** One request: what is allowed, what counts as progress, and the work done so far. */
+/** One request: what is allowed, what counts as progress, and the work done so far. `more` is added to every distance
+to keep on the way. */
 class Planner::Search {
  public:
-  Search(const Planner& planner, const PlanRequest& request, const NavigationField& field)
+  Search(const Planner& planner, const PlanRequest& request, const NavigationField& field, double more = 0)
       : planner_(planner),
         field_(field),
         model_(*planner.problem_->model),
         n_(static_cast<std::size_t>(model_.num_states())),
         m_(static_cast<std::size_t>(model_.num_inputs())),
         start_(request.state),
-        schedule_(request.schedule) {
+        schedule_(request.schedule),
+        more_(more) {
     const Box& box = planner.problem_->domain.state;
     const Eigen::VectorXd margin =
         request.domain_margin.size() == 0 ? Eigen::VectorXd::Zero(start_.size()) : request.domain_margin;
@@ -319,7 +321,27 @@ class Planner::Search {
     std::int64_t rounds = 0;  // bounds a search that propagates nothing
     setup->solve(ob::PlannerTerminationCondition([&] { return work_ >= most || ++rounds > allowance; }));
     if (!setup->getProblemDefinition()->hasExactSolution()) return std::nullopt;
-    return Assemble(setup->getSolutionPath(), ambition);
+    oc::PathControl& path = setup->getSolutionPath();
+    path.interpolate();
+    Eigen::MatrixXd progress(static_cast<Eigen::Index>(m_), static_cast<Eigen::Index>(path.getControlCount()));
+    for (Eigen::Index t = 0; t < progress.cols(); ++t)
+      std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, progress.col(t).data());
+    return Assemble(progress, StateOf(Values(path.getStates().back())), ambition);
+  }
+
+  /** What the hints themselves do, without a search. @pre the robot has hints. */
+  [[nodiscard]] std::optional<Proposal> FollowHints() const {
+    Eigen::MatrixXd progress(static_cast<Eigen::Index>(m_), planner_.options_.progress_steps);
+    std::vector<double> s(start_.begin(), start_.end());
+    s.insert(s.end(), {0, start_distance_});
+    for (int t = 0; t < progress.cols(); ++t) {
+      double* u = progress.col(t).data();
+      planner_.motion_.Pursue(StateOf(s.data()), DesiredIn(s.data(), 0, 0), {u, m_});
+      if (!Propagate(s.data(), u, s.data()) || !Allowed(StateOf(s.data()), t + 1)) return std::nullopt;
+    }
+    for (const Ambition& ambition : kAmbitions)
+      if (!ambition.at_rest && Meets(s.data(), ambition)) return Assemble(progress, StateOf(s.data()), ambition);
+    return std::nullopt;
   }
 
  private:
@@ -334,20 +356,13 @@ class Planner::Search {
       const double* s = Values(state);
       const double missing = std::max(search_.Shortfall(s, ambition_), 0.0);
       const double steps = search_.planner_.options_.progress_steps - search_.StepsOf(s);
-      const bool satisfied = missing == 0 && steps == 0 && EndsWell(s);
+      const bool satisfied = steps == 0 && search_.Meets(s, ambition_);
       // Metres and steps alike: only their order matters. OMPL takes a state at distance zero for a solution.
       if (distance != nullptr) *distance = satisfied ? 0 : missing + steps + 1;
       return satisfied;
     }
 
    private:
-    bool EndsWell(const double* s) const {
-      const bool arrives = search_.BestOf(s) <= kShareOfRadius * search_.planner_.options_.goal_radius;
-      Eigen::MatrixXd tail;
-      return (arrives || search_.HeadsWell(search_.StateOf(s), ambition_.heading)) &&
-             search_.FindTail(search_.StateOf(s), ambition_, tail);
-    }
-
     const Search& search_;
     const Ambition ambition_;
   };
@@ -399,7 +414,7 @@ class Planner::Search {
   [[nodiscard]] bool Clear(const Sweep& sweep) const {
     for (std::size_t o = 0; o < clearances_.size(); ++o) {
       const double own = sweep.first() >= own_[o].first_step ? own_[o].clearance : 0;
-      if (!sweep.Keeps(std::max(clearances_[o], own), planner_.obstacles_[o], schedule_)) return false;
+      if (!sweep.Keeps(std::max(clearances_[o], own) + more_, planner_.obstacles_[o], schedule_)) return false;
     }
     return true;
   }
@@ -470,6 +485,14 @@ class Planner::Search {
   [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const {
     const double near_enough = kShareOfRadius * planner_.options_.goal_radius;
     return BestOf(s) - std::max(start_distance_ - ambition.share * gain_, near_enough);
+  }
+
+  // Whether a state at the end of the progress part is what the ambition asks for.
+  [[nodiscard]] bool Meets(const double* s, const Ambition& ambition) const {
+    const bool arrives = BestOf(s) <= kShareOfRadius * planner_.options_.goal_radius;
+    Eigen::MatrixXd tail;
+    return Shortfall(s, ambition) <= 0 && (arrives || HeadsWell(StateOf(s), ambition.heading)) &&
+           FindTail(StateOf(s), ambition, tail);
   }
 
   // Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
@@ -577,16 +600,14 @@ class Planner::Search {
     return setup;
   }
 
-  [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path, const Ambition& ambition) const {
-    path.interpolate();
-    const auto progress = static_cast<Eigen::Index>(path.getControlCount());
+  // @pre the progress part ends in `end`.
+  [[nodiscard]] std::optional<Proposal> Assemble(const Eigen::MatrixXd& progress, std::span<const double> end,
+                                                 const Ambition& ambition) const {
     Eigen::MatrixXd tail;
-    if (!FindTail(StateOf(Values(path.getStates().back())), ambition, tail)) return std::nullopt;
+    if (!FindTail(end, ambition, tail)) return std::nullopt;
     Proposal proposal{
-        Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()), static_cast<int>(progress), {}};
-    for (Eigen::Index t = 0; t < progress; ++t)
-      std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, proposal.controls.col(t).data());
-    proposal.controls.rightCols(tail.cols()) = tail;
+        Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), static_cast<int>(progress.cols()), {}};
+    proposal.controls << progress, tail;
     proposal.states = Rollout(model_, start_, proposal.controls);
     return proposal;
   }
@@ -597,6 +618,7 @@ class Planner::Search {
   const std::size_t n_, m_;
   const Eigen::VectorXd start_;
   const Schedule schedule_;
+  const double more_;
   Eigen::VectorXd lower_, upper_;
   std::vector<double> clearances_;      // to each obstacle
   std::vector<ObstacleClearance> own_;  // likewise, where it is more
@@ -609,8 +631,13 @@ class Planner::Search {
 
 std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   if (request.state.size() != problem_->model->num_states() || !request.state.allFinite()) return std::nullopt;
-  Search search(*this, request, Field(request.clearance));
+  const NavigationField& field = Field(request.clearance);
+  Search search(*this, request, field);
   if (!search.StartIsValid()) return std::nullopt;
+  if (request.may_follow_hints && motion_.has_hints()) {
+    const Search roomy(*this, request, field, kRoomOfHints * options_.clearance_step);
+    if (std::optional<Proposal> proposal = roomy.FollowHints()) return proposal;
+  }
   // OMPL calls a second seed an error because generators that exist keep theirs. None does: each search makes its own.
   ompl::RNG::setSeed(std::max<std::uint32_t>(request.seed, 1));
   const auto allowance = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs / kAmbitions.size());

@@ -35,6 +35,9 @@ struct PlanRequest {
   /** More for single obstacles, by their index; those beyond its end have none. From step 0 on: less if the start is
   nearer. */
   std::vector<ObstacleClearance> obstacle_clearance = {};
+  /** Whether the candidate may be what the task's hints do, whatever the seed is: once for each start, since the same
+  request would give it again. */
+  bool may_follow_hints = false;
 };
 
 struct Proposal {

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/numerics/size.h"
 #include "verifier/equations.h"
 #include "verifier/expressions.h"

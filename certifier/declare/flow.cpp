@@ -4,7 +4,7 @@
 #include <string>
 
 #include "certifier/dynamics/evaluate.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 

@@ -1,5 +1,5 @@
 /** A nominal model from one definition of its equations. To add a model, write a struct like KinematicBicycle
-(kinematic_bicycle.h) and construct EquationsModel<YourModel>.
+(models/kinematic_bicycle.h) and construct EquationsModel<YourModel>.
 
 `Equations` has
 - kStates, kInputs: n <= kMaxStates and m <= kMaxInputs;

@@ -448,7 +448,7 @@ struct FixedProgram {
   }
 };
 
-/** The draft of a model's equations, a struct like KinematicBicycle (kinematic_bicycle.h). */
+/** The draft of a model's equations, a struct like KinematicBicycle (models/kinematic_bicycle.h). */
 template <class Equations>
 [[nodiscard]] constexpr ProgramDraft DraftOf() {
   constexpr int kVariables = Equations::kStates + Equations::kInputs;

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/stages.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/elementary.h"

@@ -80,12 +80,14 @@ std::vector<Key> LawKeys() {
   std::ranges::move(
       std::vector<Key>{
           Map("planner.hints",
-              "A good control for driving in a direction, which the search tries more often than others. One "
-              "expression "
-              "for each input, of what planner.stop may use, and of `desired_heading` (rad, the direction of travel in "
-              "the plane of the first two safety coordinates; 0 or pi if there is one), `desired_speed` (m/s, in this "
-              "plane) and `desired_climb` (m/s, along the third safety coordinate). Without it the search finds "
-              "controls by chance.",
+              "A good control for driving in a direction. Where there is room a plan follows them "
+              "(planner.clearance_step), and a search tries them more often than others. One expression for each "
+              "input, "
+              "of what planner.stop may use, and of `desired_heading` (rad, the direction of travel in the plane of "
+              "the "
+              "first two safety coordinates; 0 or pi if there is one), `desired_speed` (m/s, in this plane) and "
+              "`desired_climb` (m/s, along the third safety coordinate). Without it the search finds controls by "
+              "chance.",
               [](const Document& file, const std::string& key, TaskDraft& draft) {
                 draft.config.laws.hints = ReadLaw(file, key, draft);
               }),

@@ -10,7 +10,7 @@
 
 #include "certifier/dynamics/compiled_models.h"
 #include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/config_error.h"

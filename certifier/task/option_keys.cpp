@@ -3,7 +3,7 @@
 #include <iterator>
 #include <set>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
@@ -187,8 +187,10 @@ std::vector<Key> PlannerKeys() {
                      "Within this distance the goal is reached."),
       planner.Number("clearance", "m", kNotNegative, &PlannerOptions::clearance,
                      "Obstacles are grown by this for planning."),
-      planner.Number("clearance_step", "m", kNotNegative, &PlannerOptions::clearance_step,
-                     "Added to it after each abstention S of one planning round."),
+      planner.Number(
+          "clearance_step", "m", kNotNegative, &PlannerOptions::clearance_step,
+          "Added to it after each abstention S of one planning round. A plan that follows the hints keeps eight times "
+          "this more."),
       planner.Integer("progress_steps", Between(1, kMaxSteps), &PlannerOptions::progress_steps,
                       "Controls before the braking tail."),
       planner.Integer("tail_steps", Between(0, kMaxSteps), &PlannerOptions::tail_steps,
@@ -201,7 +203,9 @@ std::vector<Key> PlannerKeys() {
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
                      "What the search expects of the robot's acceleration and deceleration."),
       planner.Number("time_limit_ms", "ms", UpTo(kHourMs), &PlannerOptions::time_limit_ms,
-                     "The time limit of one query of the planner."),
+                     "The time limit of one query of the planner, counted in steps of the model, 400 a millisecond. A "
+                     "query with a "
+                     "model that takes longer for a step takes longer."),
       planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed,
                       "The seed of the planner's random numbers."),
       Optional(planner.Vector("initial_half_width", "of the state", kNotNegative, Size::kStates,

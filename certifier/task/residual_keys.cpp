@@ -2,7 +2,7 @@
 #include <iterator>
 
 #include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/named_residuals.h"
+#include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/task/key_rows.h"
 

@@ -41,7 +41,7 @@ Infinite where a kink is met. Cost: for each level the jets of the cells that ma
 /** r0 = 0 for a model of these sizes. */
 [[nodiscard]] SmoothResidual ZeroResidual(int num_states, int num_variables);
 
-/** A residual of dynamics/residuals.h over the box. */
+/** A residual of dynamics/models/residuals.h over the box. */
 template <class Residual>
 SmoothResidual Describe(const Residual& residual, std::span<const Interval> box, int halvings = 14) {
   const auto exact = residual.parameters();

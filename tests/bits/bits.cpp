@@ -10,7 +10,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "own_model.h"
 
 using namespace forereach;

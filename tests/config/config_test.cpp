@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/named_residuals.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/named_residuals.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "certifier/task/schema.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"

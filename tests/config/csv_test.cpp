@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config.h"
 #include "tests/config/task_files.h"
 

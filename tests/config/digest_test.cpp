@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/named_residuals.h"
+#include "certifier/dynamics/models/named_models.h"
+#include "certifier/dynamics/models/named_residuals.h"
 
 namespace forereach {
 

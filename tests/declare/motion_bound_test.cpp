@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 
 #include "certifier/declare/mean_value.h"
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/kinematic_bicycle.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/text_models.h"
 

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "experiments/equations_slopes.h"
 #include "tests/declare/families.h"
 

@@ -10,7 +10,7 @@ outside the input domain. */
 #include <string_view>
 #include <vector>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "lcmtypes/codec.h"

@@ -45,9 +45,8 @@ std::string CodeOf(const std::string& text) {
 // The product's, by file.
 std::map<std::string, std::string> Sources() {
   std::map<std::string, std::string> sources;
-  for (const char* folder :
-       {"bus", "certifier", "cli", "lcmtypes", "logger", "planner_bridge", "records", "robot", "verifier"}) {
-    if (!fs::exists(kRoot / folder)) continue;
+  for (const char* folder : {"advise", "bus", "certifier", "cli", "command_line", "identify", "lcmtypes", "live",
+                             "logger", "page", "planner_bridge", "records", "robot", "verifier"}) {
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension == ".h" || extension == ".cpp" || extension == ".lcm")
@@ -98,6 +97,17 @@ void ExpectListed(const std::string& title, const std::vector<std::string>& kind
 
 TEST(Extensions, TheFilesOfANominalModel) {
   ExpectListed("A nominal model", {R"(\w*PointMass\b|"point_mass")", R"(\w*KinematicBicycle\b|"kinematic_bicycle")"});
+}
+
+TEST(Extensions, NothingElseKnowsAModelByName) {
+  const std::regex names(R"(PointMass|point_mass|KinematicBicycle|kinematic_bicycle)");
+  int found = 0;
+  for (const auto& [file, text] : Sources()) {
+    if (!std::regex_search(text, names)) continue;
+    ++found;
+    EXPECT_TRUE(file.starts_with("certifier/dynamics/models/")) << file;
+  }
+  EXPECT_GE(found, 4);
 }
 
 TEST(Extensions, TheFilesOfAnObstacleKind) {

@@ -2,7 +2,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/explain.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 
 int main() {
   using namespace forereach;

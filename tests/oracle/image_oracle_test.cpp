@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/rounding.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/models/kinematic_bicycle.h"
+#include "certifier/dynamics/models/named_models.h"
+#include "certifier/dynamics/models/point_mass.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/lipschitz_envelope.h"
 #include "certifier/residual/observations.h"

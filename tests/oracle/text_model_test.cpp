@@ -8,7 +8,7 @@
 
 #include "certifier/declare/flow.h"
 #include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"

@@ -2,7 +2,7 @@
 // doubles show.
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/observations.h"
 #include "tests/oracle/exact.h"

@@ -170,6 +170,50 @@ TEST_F(PlannerNodeTest, SendsOneCandidateAndWaitsForItsDecision) {
   EXPECT_EQ(candidates_[1].start_utime, candidates_[0].start_utime);
 }
 
+// What the hints do is the same each time: a start that it was refused for gets a search.
+TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
+  Config config = Bicycle();
+  config.planner.candidates = 1;
+  const auto controls = [](const candidate_plan_t& plan) {
+    return std::vector<double>(&plan.control[0][0], &plan.control[0][0] + kMaxSteps * kMaxInputs);
+  };
+  std::vector<std::vector<double>> first, later;
+  for (const int seed : {1, 2}) {
+    config.planner.seed = seed;
+    candidates_.clear();
+    Start(config);
+    robot_state_t state = Standing();
+    Say(state);
+    Run(3);
+    ASSERT_EQ(candidates_.size(), 1u);
+    first.push_back(controls(candidates_.back()));
+    for (std::size_t round = 2; round <= 3; ++round) {
+      AbstainS();
+      Run(3);
+      state.utime = now_;
+      ++state.sequence;
+      Say(state);
+      Run(3);
+      ASSERT_EQ(candidates_.size(), round);
+      later.push_back(controls(candidates_.back()));
+    }
+    Certify();
+    now_ += 10 * kPeriod;
+    state = Standing();
+    state.sequence = 9;
+    state.state[0] = 0.5;
+    Say(state);
+    Run(3);
+    ASSERT_EQ(candidates_.size(), 4u);
+    first.push_back(controls(candidates_.back()));
+  }
+  EXPECT_EQ(first[0], first[2]) << "the hints, whatever the seed is";
+  EXPECT_EQ(first[1], first[3]) << "and again from another start";
+  EXPECT_NE(first[0], later[0]);
+  EXPECT_NE(later[0], later[1]);
+  EXPECT_NE(later[0], later[2]);
+}
+
 TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
   config_.planner.lead_steps = 20;  // time for all of them
   config_.planner.clearance_step = 0.5;

@@ -23,6 +23,11 @@ PlanRequest From(const Eigen::VectorXd& state, std::uint32_t seed, double cleara
   return request;
 }
 
+PlanRequest WithHints(PlanRequest request) {
+  request.may_follow_hints = true;
+  return request;
+}
+
 // All that a proposal promises.
 void ExpectSound(const Config& config, const PlanRequest& request, const Proposal& proposal) {
   const Problem& problem = *config.problem;
@@ -117,6 +122,81 @@ TEST(Planner, TheSameRequestGivesTheSameProposalWhateverWasAskedBefore) {
   const auto different = planner->Propose(From(request.state, 12));
   ASSERT_TRUE(different);
   EXPECT_TRUE(first->controls.cols() != different->controls.cols() || first->controls != different->controls);
+}
+
+bool AreEqual(const Proposal& one, const Proposal& other) {
+  return one.controls.cols() == other.controls.cols() && one.controls == other.controls;
+}
+
+TEST(Planner, DoesWhatTheHintsDoWhereThereIsRoom) {
+  const Config config = Bicycle();
+  const auto planner = PlannerOf(config);
+  const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 1);
+  const auto proposal = planner->Propose(WithHints(request));
+  ASSERT_TRUE(proposal);
+  EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
+  PlanRequest wider = request;
+  wider.clearance += kRoomOfHints * config.planner.clearance_step;
+  ExpectSound(config, wider, *proposal);
+  EXPECT_GT(proposal->states(0, proposal->progress_steps), 4.5) << "straight on";
+  EXPECT_LT(proposal->states.row(1).head(proposal->progress_steps).cwiseAbs().maxCoeff(), 0.5);
+  const auto another = planner->Propose(WithHints(From(request.state, 2))), searched = planner->Propose(request);
+  ASSERT_TRUE(another && searched);
+  EXPECT_TRUE(AreEqual(*another, *proposal)) << "no seed has a part in it";
+  EXPECT_FALSE(AreEqual(*searched, *proposal));
+}
+
+// The robot drives by the first obstacle at a distance of 3.2 m.
+TEST(Planner, SearchesWhereTheHintsHaveLessRoom) {
+  const Config config = Bicycle();
+  const auto planner = PlannerOf(config);
+  const Eigen::VectorXd beside = Vec({25, -5.2, 0, 2, 0, 0});
+  ASSERT_NEAR(ApproximateDistance(config.obstacles[0], beside.head(2)), 3.2, 1e-9);
+  const auto searches = [&](double clearance) {
+    const PlanRequest request = From(beside, 1, clearance);
+    const auto searched = planner->Propose(request), proposed = planner->Propose(WithHints(request));
+    EXPECT_TRUE(searched && proposed) << clearance;
+    return searched && proposed && AreEqual(*searched, *proposed);
+  };
+  const double least = 3.2 - kRoomOfHints * config.planner.clearance_step;
+  EXPECT_FALSE(searches(least - 0.2));
+  EXPECT_TRUE(searches(least + 0.01));
+}
+
+TEST(Planner, SearchesWhereHintsAreOfNoUse) {
+  Config config = PointMass();
+  config.obstacles.clear();
+  const std::vector<ExpressionText> hints = config.laws.hints;
+  const std::vector<ExpressionText> still{{"0", 1, 1}, {"0", 1, 1}},
+      undefined{{"desired_speed*vx/hypot(vx, vy)", 1, 1}, {"0", 1, 1}};
+  for (const auto& of_no_use : {std::vector<ExpressionText>{}, still, undefined}) {
+    config.laws.hints = of_no_use;
+    config.planner.time_limit_ms = 100;
+    const auto planner = PlannerOf(config);
+    const PlanRequest request = From(Vec({0, 0, 0, 0}), 1);
+    const auto searched = planner->Propose(request), proposed = planner->Propose(WithHints(request));
+    ASSERT_TRUE(searched && proposed);
+    EXPECT_TRUE(AreEqual(*searched, *proposed));
+    EXPECT_GT(proposed->states(0, proposed->progress_steps), 0);
+  }
+  config.laws.hints = hints;
+  const PlanRequest request = From(Vec({0, 0, 0, 0}), 1);
+  const auto searched = PlannerOf(config)->Propose(request), proposed = PlannerOf(config)->Propose(WithHints(request));
+  ASSERT_TRUE(searched && proposed);
+  EXPECT_FALSE(AreEqual(*searched, *proposed)) << "otherwise the above shows nothing";
+}
+
+TEST(Planner, TheHintsKeepMarginsToo) {
+  const Config config = Bicycle();
+  PlanRequest request = WithHints(From(Vec({0, 3, 0, 7, 0, 0}), 1));
+  const auto planner = PlannerOf(config);
+  const auto free = planner->Propose(request);
+  ASSERT_TRUE(free);
+  request.domain_margin = Vec({0, 0, 0, 0, 0.2, 0.48 - free->states.row(5).cwiseAbs().maxCoeff() + 1e-6});
+  request.seed = 4;
+  const auto proposal = planner->Propose(request);
+  ASSERT_TRUE(proposal);
+  EXPECT_LT(proposal->states.row(5).cwiseAbs().maxCoeff(), free->states.row(5).cwiseAbs().maxCoeff());
 }
 
 TEST(Planner, KeepsTheMarginFromTheDomain) {

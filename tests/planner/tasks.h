@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config.h"
 #include "tests/paths.h"
 

@@ -19,7 +19,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/named_residuals.h"
+#include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/gate/obstacle_message.h"
 #include "robot/sim_node.h"
 #include "tests/gate/small_task.h"

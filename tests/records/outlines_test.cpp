@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 
 namespace forereach {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"

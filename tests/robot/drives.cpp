@@ -12,6 +12,7 @@
 #include "bus/log.h"
 #include "bus/process.h"
 #include "cli/lockstep.h"
+#include "cli/progress.h"
 #include "command_line/command_line.h"
 
 namespace forereach {
@@ -74,10 +75,14 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
   const auto begin = std::chrono::steady_clock::now();
   Drives all;
   std::string bad;
-  for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
-    const Drives drive = Drive(config, seed);
-    if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), drive.Text());
-    all += drive;
+  {
+    Progress progress(name + " drives", static_cast<std::size_t>(options.seeds));
+    for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
+      const Drives drive = Drive(config, seed);
+      if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), drive.Text());
+      all += drive;
+      progress.Advance();
+    }
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", name, all.Text(), seconds.count()) << bad << std::flush;

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/authentic_bus.h"
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/named_residuals.h"
+#include "certifier/dynamics/models/named_models.h"
+#include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/residual/observations.h"
@@ -268,7 +268,8 @@ TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
 // A model as text has names of its own, so the task says what is zero while the robot stands.
 TEST(RobotSim, OfATextStandsByRobotHold) {
   Config config = PointMassTask();
-  ModelText text{.name = "text"};
+  ModelText text;
+  text.name = "text";
   for (const char* state : {"px", "py", "vx", "vy"}) text.states.push_back({state, ""});
   for (const char* input : {"ax", "ay"}) text.inputs.push_back({input, ""});
   text.parameters = {{"dt", 0.25, 0.25}};

@@ -11,9 +11,9 @@
 #include <gtest/gtest.h>
 #include <mpfr.h>
 
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/named_residuals.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/named_models.h"
+#include "certifier/dynamics/models/named_residuals.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/residual/consistency.h"
 #include "tests/text_models.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FOREREACH_SANITIZED 1  // the sanitizers own malloc

@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/numerics/size.h"
 #include "tests/oracle/random.h"

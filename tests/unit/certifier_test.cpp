@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "certifier/certify/explain.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"

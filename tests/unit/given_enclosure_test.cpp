@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 
 namespace forereach {
 namespace {

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 
 namespace forereach {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/explain.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/text_models.h"
 

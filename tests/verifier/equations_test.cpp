@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "verifier/equations.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 #include "experiments/chunks/demonstrations.h"
 
 namespace forereach::experiments {

@@ -5,8 +5,8 @@ from their true residuals. */
 #include <memory>
 #include <vector>
 
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/models/named_models.h"
+#include "certifier/dynamics/models/residuals.h"
 #include "certifier/reach/propagator.h"
 #include "experiments/methods/method.h"
 #include "tests/oracle/random.h"

@@ -1,4 +1,4 @@
-#include "certifier/dynamics/named_residuals.h"
+#include "certifier/dynamics/models/named_residuals.h"
 
 #include <algorithm>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/models/named_models.h"
 
 #include <algorithm>
 #include <iterator>
@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/models/kinematic_bicycle.h"
+#include "certifier/dynamics/models/point_mass.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 

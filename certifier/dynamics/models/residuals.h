@@ -10,8 +10,8 @@ A type without comparison overloads SmoothGate and Softplus (saturation.h). */
 #include <cstddef>
 #include <span>
 
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/models/kinematic_bicycle.h"
+#include "certifier/dynamics/models/point_mass.h"
 #include "certifier/dynamics/saturation.h"
 #include "certifier/numerics/compilation.h"
 
