@@ -157,9 +157,10 @@ void RegisterTextModels() {
     })->Unit(benchmark::kMicrosecond);
   };
   add("bicycle_compiled", [] { return CachedTask(Scenario::kBicycle, 400); });
-  add("bicycle_text", [] { return MakeBicycleTextTask(Integrator::kNone, 400); });
-  add("bicycle_midpoint", [] { return MakeBicycleTextTask(Integrator::kMidpoint, 400); });
-  add("bicycle_rk4", [] { return MakeBicycleTextTask(Integrator::kRk4, 400); });
+  add("bicycle_text", [] { return MakeBicycleTextTask(BicycleText(Integrator::kNone), 400); });
+  add("bicycle_midpoint", [] { return MakeBicycleTextTask(BicycleText(Integrator::kMidpoint), 400); });
+  add("bicycle_midpoint_next", [] { return MakeBicycleTextTask(BicycleMidpointText(), 400); });
+  add("bicycle_rk4", [] { return MakeBicycleTextTask(BicycleText(Integrator::kRk4), 400); });
   add("quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); });
 }
 

@@ -250,6 +250,7 @@ class Report:
             ("bicycle_compiled", "bicycle, compiled"),
             ("bicycle_text", "bicycle, text"),
             ("bicycle_midpoint", "bicycle, text, midpoint"),
+            ("bicycle_midpoint_next", "bicycle, text, midpoint written out in `next`"),
             ("bicycle_rk4", "bicycle, text, Runge-Kutta"),
             ("quadrotor_rk4_20_steps", "quadrotor, text, Runge-Kutta, 20 steps"),
         ):

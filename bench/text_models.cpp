@@ -47,11 +47,28 @@ ModelText BicycleText(Integrator integrator) {
                 {{"dt", 0.1}, {"wheelbase", 2.5}}, integrator == Integrator::kNone ? next : rate, integrator);
 }
 
-Task MakeBicycleTextTask(Integrator integrator, int observations) {
+ModelText BicycleMidpointText() {
+  ModelText text = BicycleText(Integrator::kNone);
+  for (const auto& [name, value] : {std::pair{"v_half", "v + dt/2 * a"},
+                                    {"theta_half", "theta + dt/2 * (v * tan(delta) / wheelbase)"},
+                                    {"a_half", "a + dt/2 * jerk"},
+                                    {"delta_half", "delta + dt/2 * steer_rate"}})
+    text.definitions.push_back({name, {value}});
+  text.equations = {{"x + dt * (v_half * cos(theta_half))"},
+                    {"y + dt * (v_half * sin(theta_half))"},
+                    {"theta + dt * (v_half * tan(delta_half) / wheelbase)"},
+                    {"v + dt * a_half"},
+                    {"a + dt * jerk"},
+                    {"delta + dt * steer_rate"}};
+  return text;
+}
+
+Task MakeBicycleTextTask(const ModelText& text, int observations) {
   Task task = CachedTask(Scenario::kBicycle, observations);
   Problem problem = *task.problem;
-  problem.model = MakeTextModel(BicycleText(integrator));
-  if (integrator != Integrator::kNone)  // other successors: those of this model and the same residual, which is zero
+  problem.model = MakeTextModel(text);
+  if (text !=
+      BicycleText(Integrator::kNone))  // other successors: those of this model and the same residual, which is zero
     for (Eigen::Index i = 0; i < problem.transitions.z.rows(); ++i) {
       const Eigen::VectorXd z = problem.transitions.z.row(i);
       const std::vector<double> next = Successor(*problem.model, z), before = Successor(*task.problem->model, z);

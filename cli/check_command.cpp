@@ -115,9 +115,9 @@ int Check(const Options& options) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
   const TaskCheck check = CheckTask(options.check);
-  if (!files.empty() && !check.is_planar)
-    throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
-  for (const std::string& file : files) DrawPicture(check.picture, file);
+  const bool has_picture = !files.empty() && check.is_planar;
+  for (const std::string& file : files)
+    if (has_picture) DrawPicture(check.picture, file);
   if (options.json) {
     std::cout << JsonText(ToJson(check)) << std::endl;
   } else {
@@ -125,9 +125,12 @@ int Check(const Options& options) {
     PrintData(check, out);
     PrintTube(check, options, out);
     PrintFindings(check, out);
-    for (const std::string& file : files) out << "picture: " << file << "\n";
+    for (const std::string& file : files)
+      if (has_picture) out << "picture: " << file << "\n";
     std::cout << out.str() << std::flush;
   }
+  if (!files.empty() && !has_picture)
+    throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
   return check.HasFindings() ? 1 : 0;
 }
 
@@ -147,7 +150,7 @@ Command CheckCommand() {
               "A tube that ends after the planner's progress_steps is a remark, unless --plan is given.\n\n"
               "What it cannot tell: whether the declaration is true.\n\n"
               "Example:\n  forereach check config/bicycle.yaml --picture check.svg",
-          .options = {Required({"TASK", &options->check.config, "FILE", "Task file (YAML)"}),
+          .options = {TaskOption(options->check.config),
                       {"--plan", &options->check.plan, "FILE.csv",
                        "The plan for the tube; by default the inputs closest to zero"},
                       {"--steps", &options->check.steps, "",

@@ -24,6 +24,10 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] inline Option ConfigOption(std::string& path, const char* help = "Task file (YAML)") {
   return Required({"--config", &path, "FILE", help});
 }
+/** The same for a command on one task, which may also stand alone: `forereach check TASK`. */
+[[nodiscard]] inline Option TaskOption(std::string& path, const char* help = "Task file (YAML)") {
+  return Required({"TASK,--config", &path, "FILE", help});
+}
 [[nodiscard]] inline Option JsonFlag(bool& json, const char* help = "One JSON document on standard output") {
   return {"--json", &json, "", help};
 }

@@ -318,7 +318,7 @@ Command DeclareCommand() {
           "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha\n"
           "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha "
           "--hold-out --picture trade_off",
-      .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
+      .options = {TaskOption(options->config, "Task file (YAML) with a section `residual`"),
                   {"--gap", &options->search.gap, "",
                    "Stop when no bound exceeds the largest slope found by more than this fraction",
                    NumberRange{1e-12, 1e3}},

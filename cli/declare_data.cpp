@@ -53,6 +53,29 @@ void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostre
   if (proposal.declaration.lipschitz.maxCoeff() == 0) out << "  no slopes are needed\n";
 }
 
+void PrintLoneSlopes(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+  const std::vector<std::string> names = model.variable_names();
+  int flat = 0;
+  bool has_slopes = false;
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k)
+    for (std::size_t l = 0; l < names.size(); ++l) {
+      const LoneSlope& lone = proposal.rows[k].lone[l];
+      if (lone.pairs > 0 && !(lone.slope > 0)) ++flat;
+      if (!(lone.slope > 0)) continue;
+      if (!has_slopes)
+        out << "\n  " << std::left << std::setw(12) << "row" << std::setw(12) << "column" << std::setw(12) << "alone"
+            << std::setw(12) << "pairs"
+            << "the largest in\n";
+      has_slopes = true;
+      out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
+          << RoundedDown(lone.slope, kDigits) << std::setw(12) << lone.pairs << "lines " << LineOf(lone.first)
+          << " and " << LineOf(lone.second) << "\n";
+    }
+  if (flat > 0)
+    out << (has_slopes ? "  " : "\n  ") << "In " << flat << (has_slopes ? " further" : "")
+        << (flat == 1 ? " entry" : " entries") << ", pairs that differ in one column alone show no slope.\n";
+}
+
 void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
   out << "\n  " << std::left << std::setw(12) << "row" << std::setw(12) << "noise_bound" << std::setw(12)
       << "  repeated" << std::setw(12) << "  deviation" << std::setw(12) << "  Strongin"
@@ -84,6 +107,9 @@ void PrintMeaning(const Proposal& proposal, const NominalModel& model, const Dat
   out << "\nsmallest: the slopes with the least sum, each weighed by its column's standard deviation, that no two "
          "transitions\n  contradict. Every smaller sum is contradicted; the lines are a pair that needs the slope.\n"
          "at least: no smaller slope is possible there, if the row's other slopes are at most the proposed ones.\n"
+         "alone: the largest slope of two transitions that differ in this column and by at most a fifth of that, in "
+         "standard\n  deviations, in each other one, after taking off noise_bound and disturbance. No bound: other "
+         "columns have a part in it.\n"
          "proposed: "
       << ToText(command.factor)
       << " times the smallest (--factor). No two transitions contradict it.\n"
@@ -114,6 +140,7 @@ Json ToJson(const Proposal& proposal, const Config& config, const DataCommand& c
                 {"factor", command.factor},
                 {"yaml", "declaration:\n" + DeclarationYaml(proposal.declaration, model)},
                 {"entries", Json::array()},
+                {"alone", Json::array()},
                 {"rows", Json::array()},
                 {"never_varied", Json::array()},
                 {"digests", {{"config", ToHex(config.grounds.config)}, {"model", ToHex(config.grounds.model)}}}};
@@ -130,6 +157,13 @@ Json ToJson(const Proposal& proposal, const Config& config, const DataCommand& c
                                 {"knuth_chou", row.knuth_chou}});
     for (std::size_t l = 0; l < names.size(); ++l) {
       const auto column = static_cast<Eigen::Index>(l);
+      const LoneSlope& lone = row.lone[l];
+      document["alone"].push_back(
+          {{"row", names[k]},
+           {"column", names[l]},
+           {"pairs", lone.pairs},
+           {"slope", lone.slope},
+           {"lines", lone.slope > 0 ? Json({LineOf(lone.first), LineOf(lone.second)}) : Json()}});
       if (!(proposal.declaration.lipschitz(at, column) > 0)) continue;
       Json entry{{"row", names[k]},
                  {"column", names[l]},
@@ -163,6 +197,7 @@ int DeclareFromData(const DataCommand& command) {
     std::ostringstream text;
     text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
     PrintSlopes(proposal, *problem.model, text);
+    PrintLoneSlopes(proposal, *problem.model, text);
     PrintErrors(proposal, *problem.model, text);
     PrintMeaning(proposal, *problem.model, command, text);
     std::cout << text.str() << "\ndeclaration:\n"

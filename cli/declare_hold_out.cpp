@@ -16,6 +16,7 @@
 #include "cli/progress.h"
 #include "identify/binomial.h"
 #include "identify/hold_out.h"
+#include "lcmtypes/angle.h"
 #include "records/chart.h"
 #include "records/decision_json.h"
 
@@ -82,20 +83,19 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
   }
   std::vector<int> inside(plans.size(), 0);
   std::vector<double> widths(plans.size(), kInfinity);
-  const auto decisions = CertifyAll(certifier, plans, initial_sets, config.obstacles, jobs,
-                                    [&](std::size_t i, const Decision&, const Tube& tube) {
-                                      for (int t = 1; t <= tube.length(); ++t) {
-                                        bool in = true;
-                                        for (int k = 0; k < problem->model->num_states(); ++k) {
-                                          const Interval hull = tube.hull(t, k);
-                                          const double x = commands[i].states(k, t), error = declaration.noise_bound[k];
-                                          in &= hull.lower - error <= x && x <= hull.upper + error;
-                                        }
-                                        inside[i] += in;
-                                      }
-                                      if (tube.length() == steps)
-                                        widths[i] = PositionHalfWidth(tube, steps, problem->projection);
-                                    });
+  const auto decisions = CertifyAll(
+      certifier, plans, initial_sets, config.obstacles, jobs, [&](std::size_t i, const Decision&, const Tube& tube) {
+        for (int t = 1; t <= tube.length(); ++t) {
+          bool in = true;
+          for (int k = 0; k < problem->model->num_states(); ++k) {
+            const Interval hull = tube.hull(t, k);
+            const double x = commands[i].states(k, t), error = declaration.noise_bound[k];
+            in &= LiesWithin(x, hull.lower - error, hull.upper + error, problem->model->IsAngle(k));
+          }
+          inside[i] += in;
+        }
+        if (tube.length() == steps) widths[i] = PositionHalfWidth(tube, steps, problem->projection);
+      });
   trial.windows = static_cast<int>(plans.size());
   trial.certified = static_cast<int>(std::ranges::count(decisions, Outcome::kCertified, &Decision::outcome));
   trial.states = trial.windows * steps;
@@ -146,7 +146,9 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
       << " % confidence, at most so many of all further blocks contain a contradiction (Clopper & Pearson), if\n"
          "  blocks are independent and alike: the same robot, driven alike, in the same places. Within a block they "
          "need not be.\n"
-         "  It is no bound for other roads, other days, or a plan that goes where nobody has driven.\n"
+         "  It is no bound for other roads, other days, or a plan that goes where nobody has driven. It is of one row, "
+         "for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor of slopes "
+         "learned from all data.\n"
          "certified, inside, half-width: the recorded commands of held-out stretches as plans, from task.initial_set's "
          "half-widths\n  about the recorded state, among the task's obstacles; recorded states that lie in their "
          "slice, "

@@ -65,9 +65,11 @@ Command ExportModelCommand() {
           "text, so\n"
           "the task file stays as it is, and all other processes and commands go by it. It refuses a task with other\n"
           "equations than those that it was built with; parameters and dt may differ.\n"
-          "Exported are equations of the next state (`next`), and rates with `integrator: euler`.\n\n"
+          "Exported are equations of the next state (`next`), and rates with `integrator: euler`. A step of midpoint\n"
+          "or rk4 can be written out in `next`; docs/expressions.md, \"At full speed\", has an example and what it "
+          "gains.\n\n"
           "Example:\n  forereach export-model config/bicycle_text.yaml --out robot_model.h",
-      .options = {Required({"TASK", &options->config, "FILE", "Task file (YAML)"}),
+      .options = {TaskOption(options->config),
                   {"-o,--out", &options->out, "FILE.h", "The header"},
                   {"--name", &options->name, "WORD", "Of the struct; by default the model's name"},
                   {"--force", &options->force, "", "Overwrite the header if it exists"}},

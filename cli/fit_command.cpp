@@ -13,6 +13,7 @@
 #include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
+#include "command_line/nearest.h"
 #include "identify/fit.h"
 #include "records/scatter.h"
 
@@ -50,6 +51,12 @@ std::string Short(double value) {
   return text.str();
 }
 
+std::string DeviationText(const FittedParameter& parameter) {
+  if (std::isfinite(parameter.deviation)) return Short(parameter.deviation);
+  return parameter.together.empty() ? "not determined: it has no effect on these transitions"
+                                    : "not determined, only together with " + Joined(parameter.together);
+}
+
 std::string Yaml(const Fit& fit) {
   std::string text;
   for (const FittedParameter& parameter : fit.parameters)
@@ -68,7 +75,8 @@ Json ToJson(const Fit& fit, const NominalModel& model) {
         {{"name", each.name},
          {"before", each.before},
          {"after", each.after},
-         {"deviation", std::isfinite(each.deviation) ? Json(each.deviation) : Json(nullptr)}});
+         {"deviation", std::isfinite(each.deviation) ? Json(each.deviation) : Json(nullptr)},
+         {"undetermined_with", each.together}});
   for (Eigen::Index k = 0; k < fit.after.cols(); ++k)
     document["states"].push_back({{"name", model.state_names()[ToSize(k)]},
                                   {"rms_before", RootMeanSquare(fit.before, k)},
@@ -87,8 +95,7 @@ void PrintForPeople(const Fit& fit, const Config& config) {
       << "standard error\n";
   for (const FittedParameter& each : fit.parameters)
     out << "  " << std::setw(18) << each.name << std::setw(13) << Short(each.before) << std::setw(13)
-        << Short(each.after)
-        << (std::isfinite(each.deviation) ? Short(each.deviation) : "not determined by these transitions") << "\n";
+        << Short(each.after) << DeviationText(each) << "\n";
   out << "\n  " << std::setw(18) << "one-step error" << std::setw(13) << "rms before" << std::setw(13) << "rms after"
       << std::setw(16) << "largest before"
       << "largest after\n";
@@ -143,7 +150,7 @@ Command FitCommand() {
               "Copy the last line into the task file: `model.parameters`. Then declare the residual that is left; "
               "see docs/data.md.\n\n"
               "Example:\n  forereach fit --config my_robot.yaml --parameters gain,drag --picture errors",
-          .options = {ConfigOption(options->config, "Task file (YAML) with a model as text, and transitions"),
+          .options = {TaskOption(options->config, "Task file (YAML) with a model as text, and transitions"),
                       {"--parameters", &options->names, "NAMES",
                        "Those to fit, with commas between; by default all but dt"},
                       {"--picture", &options->picture, "NAME",

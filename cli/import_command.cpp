@@ -178,6 +178,10 @@ Json ToJson(const Source& source, const std::vector<std::string>& columns) {
   for (std::size_t cause = 0; cause < source.log.dropped.size(); ++cause)
     if (source.log.dropped[cause].count > 0)
       document["dropped"][ToWord(static_cast<Dropped>(cause))] = ToJson(source.log.dropped[cause]);
+  if (source.log.At(Dropped::kGap).count > 0) {
+    document["dropped"]["gap"]["median_distance_s"] = source.log.median_gap;
+    document["dropped"]["gap"]["largest_distance_s"] = source.log.largest_gap;
+  }
   for (std::size_t j = 0; j < columns.size(); ++j)
     if (source.table.not_a_number[j].count > 0)
       document["not_a_number"][columns[j]] = ToJson(source.table.not_a_number[j]);
@@ -192,7 +196,15 @@ std::string Line(const Finding& finding, const std::string& what) {
   return text.str() + "\n";
 }
 
-void PrintForPeople(const Source& source, const std::vector<std::string>& columns) {
+std::string Milliseconds(double seconds) { return RoundedUp(seconds * 1000, 3) + " ms"; }
+
+// How far the nearest stamps are, for the starts that have none near enough.
+void PrintGaps(const ImportedLog& log, const Options& options) {
+  std::cout << "             the nearest is " << Milliseconds(log.median_gap) << " from t + dt in the median, "
+            << Milliseconds(log.largest_gap) << " at most; --tolerance-ms is " << ToText(options.tolerance_ms) << "\n";
+}
+
+void PrintForPeople(const Source& source, const std::vector<std::string>& columns, const Options& options) {
   const auto& [table, log] = source;
   std::cout << table.path << ": " << log.transitions.size() << " transitions from " << table.values.rows() << " rows";
   if (log.typical_spacing > 0) std::cout << ", typically " << RoundedUp(log.typical_spacing) << " s apart";
@@ -204,7 +216,10 @@ void PrintForPeople(const Source& source, const std::vector<std::string>& column
       std::cout << Line({finding.count, finding.first_line, "'" + finding.first + "'"},
                         "fields of '" + columns[j] + "' that are no number");
   for (std::size_t cause = 0; cause < log.dropped.size(); ++cause)
-    if (log.dropped[cause].count > 0) std::cout << Line(log.dropped[cause], Explain(static_cast<Dropped>(cause)));
+    if (log.dropped[cause].count > 0) {
+      std::cout << Line(log.dropped[cause], Explain(static_cast<Dropped>(cause)));
+      if (static_cast<Dropped>(cause) == Dropped::kGap) PrintGaps(log, options);
+    }
 }
 
 // "x 0.0012, y 0.001", of those that are not zero; empty if all are.
@@ -237,9 +252,21 @@ void PrintErrors(const std::vector<Source>& sources, const Options& options, con
                  "include it.\n";
 }
 
-int RunImport(const Options& options) {
-  if (options.time.empty() == !options.rate)
-    throw ConfigError("give either --time, the column of the stamps, or --rate, the rows in a second");
+// Without --time and --rate, a column of this name has the stamps.
+void FindTime(Options& options) {
+  constexpr const char* kUsual = "time";
+  const bool has_time = !options.time.empty(), has_rate = options.rate.has_value();
+  if (has_time != has_rate) return;
+  std::vector<std::string> columns;
+  if (!has_time) columns = LogColumns(options.logs.front(), FormatOf(options));
+  if (std::ranges::find(columns, kUsual) == columns.end())
+    throw ConfigError("give either --time, the column of the stamps, or --rate, the rows in a second" +
+                      (columns.empty() ? "" : "; the columns are " + Joined(columns)));
+  options.time = kUsual;
+}
+
+int RunImport(Options options) {
+  FindTime(options);
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const NominalModel& model = *config.problem->model;
   const std::vector<std::string> columns = ColumnsOf(options, model);
@@ -267,7 +294,7 @@ int RunImport(const Options& options) {
     for (const Source& source : sources) document["logs"].push_back(ToJson(source, columns));
     std::cout << JsonText(document) << std::endl;
   } else {
-    for (const Source& source : sources) PrintForPeople(source, columns);
+    for (const Source& source : sources) PrintForPeople(source, columns, options);
     PrintErrors(sources, options, model);
     std::cout << "import: " << all.size() << " transitions of " << ToText(config.period) << " s"
               << (all.size() > 0 ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
@@ -304,7 +331,8 @@ Command ImportCommand() {
       .options = {ConfigOption(options->config,
                                "Task file (YAML): its model, dt and domain; its transitions are not read"),
                   Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
-                  {"--time", &options->time, "COLUMN", "The column of the stamps"},
+                  {"--time", &options->time, "COLUMN",
+                   "The column of the stamps; by default `time`, if there is such a column and no --rate"},
                   {"--time-unit", &options->time_unit, "UNIT", "Unit of the stamps: s, ms, us, ns, min, h"},
                   {"--rate", &options->rate, "", "There are no stamps: so many rows are recorded in a second",
                    NumberRange{1e-6, 1e9}},

@@ -95,22 +95,41 @@ std::string LawLines(const std::string& file) {
   return laws;
 }
 
-// Those of the task drive/NAME.yaml in the directory that has models/NAME.yaml, if it is a task of this model file.
-std::optional<KnownLaws> LawsFor(const std::string& model_file) {
+// The task drive/NAME.yaml in the directory that has models/NAME.yaml, if it is a task of this model file.
+std::optional<Config> DriveOf(const std::string& model_file) {
   const fs::path path(model_file);
   const fs::path drive = path.parent_path() / ".." / "drive" / path.filename();
   if (!fs::exists(drive) || !fs::equivalent(FilesNamedBy(drive).model, path)) return std::nullopt;
-  const Config config = LoadConfig(drive, TransitionsFile::kIgnore);
+  return LoadConfig(drive, TransitionsFile::kIgnore);
+}
+
+std::optional<KnownLaws> LawsOf(const Config& config) {
   if (config.laws.stop.empty()) return std::nullopt;
   KnownLaws laws;
-  laws.task = drive.lexically_normal().string();
-  laws.lines = LawLines(ReadWhole(drive, kLargestTaskFile));
+  laws.task = fs::path(config.path).lexically_normal().string();
+  laws.lines = LawLines(ReadWhole(config.path, kLargestTaskFile));
   laws.has_at_rest = ("\n" + laws.lines).find("\n  at_rest:") != std::string::npos;
   const std::vector<std::string>& states = config.problem->model->state_names();
   for (const RestBound& bound : config.problem->rest)
     laws.rest.emplace_back(states[ToSize(bound.coordinate)], bound.tolerance);
   for (const int k : HeldStates(config)) laws.held.push_back(states[ToSize(k)]);
   return laws;
+}
+
+// What is never zero in the task that drives the model is not zero in the new one: the model may have no bound there,
+// as tyres and wings have none at a standstill.
+void KeepFromZero(const Config& drive, TaskTemplate& task) {
+  const auto keep = [](const Box& box, std::vector<TemplateVariable>& variables, const auto& use) {
+    for (std::size_t l = 0; l < variables.size(); ++l) {
+      const auto k = static_cast<Eigen::Index>(l);
+      if (box.lower()[k] <= 0 && 0 <= box.upper()[k]) continue;
+      variables[l].lower = box.lower()[k], variables[l].upper = box.upper()[k];
+      use(l);
+    }
+  };
+  const Domain& domain = drive.problem->domain;
+  keep(domain.state, task.states, [&](std::size_t l) { task.center[l] = drive.robot.start[l]; });
+  keep(domain.input, task.inputs, [](std::size_t) {});
 }
 
 TaskTemplate FromModel(const Options& options) {
@@ -145,7 +164,10 @@ TaskTemplate FromModel(const Options& options) {
     for (const std::string& angle : text.angles) task.model += (&angle == text.angles.data() ? "" : ", ") + angle;
     task.model += "]\n";
   }
-  task.laws = LawsFor(path);
+  if (const std::optional<Config> drive = DriveOf(path)) {
+    task.laws = LawsOf(*drive);
+    KeepFromZero(*drive, task);
+  }
   task.transitions = fs::path(options.out).stem().string() + "_steps.csv";
   task.command = "forereach init --model " + options.model;
   return task;
@@ -268,7 +290,9 @@ Command InitCommand() {
       .footer =
           "With --model, states, inputs, parameters and units are those of a file in config/models, and the ranges "
           "are\n"
-          "placeholders; the laws by which it stops and is steered are those of its task in config/drive.\n"
+          "placeholders; the laws by which it stops and is steered are those of its task in config/drive, and so is "
+          "the\n"
+          "range of what is never zero there, as the speed of an aeroplane.\n"
           "With --transitions, a column x with a column x_next is a state, the others are inputs, and "
           "the\n"
           "domain is the range of the data, a tenth wider at each end.\n"

@@ -1,5 +1,6 @@
 #include "cli/lockstep.h"
 
+#include <iostream>
 #include <utility>
 
 #include "bus/bus_options.h"
@@ -18,14 +19,14 @@ Config OnOneBus(Config config) {
 
 }  // namespace
 
-Lockstep::Lockstep(Config config, const Config& world, std::int64_t now_us)
+Lockstep::Lockstep(Config config, const Config& world, std::int64_t now_us, Plant plant)
     : config_(OnOneBus(std::move(config))),
       now_us_(now_us),
       clock_([this] { return now_us_; }),
       bus_(OpenBusOfAllRoles(config_.bus, clock_)),
       certifier_(config_, *bus_, {clock_, clock_}),
       planner_(config_, *bus_),
-      robot_(config_, *bus_),
+      robot_(config_, *bus_, std::cout, std::move(plant)),
       perception_(ObstacleSender::PeriodUs(config_.gate)) {
   if (config_.gate.obstacles != ObstaclesSource::kBus) return;
   RequireSendable(world);
@@ -38,7 +39,8 @@ void Lockstep::Run(Node* last) {
   std::vector<Node*> nodes{&robot_, &planner_, &certifier_};
   if (last != nullptr) nodes.push_back(last);
   const auto end = now_us_ + static_cast<std::int64_t>((config_.robot.time_limit_s + 60) * 1e6);
-  for (; !robot_.done() && now_us_ < end; now_us_ += kClockStepUs) {
+  const auto is_done = [&] { return robot_.done() || (last != nullptr && last->done()); };
+  for (; !is_done() && now_us_ < end; now_us_ += kClockStepUs) {
     Perceive();
     for (Node* node : nodes) {
       node->Tick(now_us_);

@@ -18,8 +18,9 @@ namespace forereach {
 class Lockstep final {
  public:
   /** @param world a task whose obstacles are sent on OBSTACLES if `config` has gate.obstacles: bus. @param now_us the
-  time at which the run begins. @throws ConfigError as the nodes do, or if the obstacles cannot be sent. */
-  Lockstep(Config config, const Config& world, std::int64_t now_us);
+  time at which the run begins. @param plant what moves the robot; empty: the task's target. @throws ConfigError as the
+  nodes do, or if the obstacles cannot be sent. */
+  Lockstep(Config config, const Config& world, std::int64_t now_us, Plant plant = {});
 
   /** With the keys of all roles. */
   [[nodiscard]] const Config& config() const { return config_; }
@@ -27,8 +28,8 @@ class Lockstep final {
   [[nodiscard]] const PlannerNode& planner() const { return planner_; }
   [[nodiscard]] const RobotSimNode& robot() const { return robot_; }
 
-  /** Drives until the robot is done, or a minute after its time limit. @param last takes its turn after the three
-  nodes; null for none. */
+  /** Drives until the robot or `last` is done, or a minute after its time limit. @param last takes its turn after the
+  three nodes; null for none. */
   void Run(Node* last = nullptr);
   /** Stops the three nodes, which print their summaries on standard output. */
   void Stop();

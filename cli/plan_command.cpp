@@ -82,7 +82,7 @@ Command PlanCommand() {
               "certified\n"
               "and ends in a stop. It is the longest plan towards the goal that could be certified.\n\n"
               "Example:\n  forereach plan --config config/demo.yaml --out plan.csv",
-          .options = {ConfigOption(options->config),
+          .options = {TaskOption(options->config),
                       Required({"--out", &options->out, "FILE.csv", "The file for the controls"}),
                       {"--seed", &options->seed, "", "Equal seeds give equal plans",
                        NumberRange{0, std::numeric_limits<std::uint32_t>::max()}}},

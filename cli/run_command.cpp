@@ -34,7 +34,7 @@ Command RunCommand() {
       .name = kRun.name,
       .purpose = kRun.purpose,
       .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
-      .options = {ConfigOption(options->config),
+      .options = {TaskOption(options->config),
                   {"--directory", &options->directory, "DIR", "The logger's directory"},
                   {"--obstacles", &options->obstacles, "FILE",
                    "Task file whose obstacles are sent on OBSTACLES, as `forereach obstacles` does, if the task has "

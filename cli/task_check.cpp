@@ -14,11 +14,13 @@
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
+#include "certifier/residual/no_nominal_value.h"
 #include "certifier/residual/observations.h"
 #include "certifier/safety/clearance.h"
 #include "certifier/task/config.h"
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
+#include "planner_bridge/motion.h"
 #include "records/decision_json.h"
 #include "records/outlines.h"
 
@@ -69,6 +71,8 @@ class Examination final {
     if (result_.transitions > 0) ExamineData();
     if (problem_.transitions.size() > 0) ExamineTube();
     ExamineGoal();
+    ExamineRobotStart();
+    ExamineStops();
     ExamineSteps();
     Draw();
     std::ranges::stable_partition(result_.findings, [](const Finding& finding) { return !finding.is_remark; });
@@ -158,8 +162,13 @@ class Examination final {
     try {
       const Observations observations = Observe(model_, problem_.transitions);
       ExamineDeclaration(observations);
-    } catch (const std::invalid_argument& error) {
-      Add("transitions", error.what(), "the model has no finite bound there: take such states out of the domain");
+    } catch (const AmbiguousAngle& error) {
+      Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
+          "the angle's unit has to be rad; a row of another unit, a lost step or a wrong model shows like this");
+      problem_.transitions = {};
+    } catch (const NoNominalValue& error) {
+      Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.text(),
+          "take such states out of the domain and the data, or change the model's equations or parameters");
       problem_.transitions = {};
     }
   }
@@ -276,7 +285,7 @@ class Examination final {
     RemarkOnSlack();
     Tube tube;
     const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
-    result_.tube = Explain(decision, certifier->problem());
+    result_.tube = Explain(decision, certifier->problem(), plan, tube);
     for (int t = 0; t <= tube.length(); ++t) {
       const Zonotope& slice = tube.slice(t);
       std::vector<double>& widths = result_.half_widths.emplace_back();
@@ -379,7 +388,7 @@ class Examination final {
     const Decision decision = certifier.Certify(plan, initial_set, {}, tube);
     if (decision.cause == Cause::kLimit)
       Add("task.limits[" + std::to_string(decision.coordinate) + "]",
-          "the tube of " + PlanName() + ": " + Explain(decision, *problem),
+          "the tube of " + PlanName() + ": " + Explain(decision, *problem, plan, tube),
           "change the start or the plan, raise the bound, or make the tube narrower",
           decision.step >= StepsThatCount());
   }
@@ -421,7 +430,70 @@ class Examination final {
     }
   }
 
-  // ---- Goal, and the length of a step.
+  // ---- Goal, start, brakes, and the length of a step.
+
+  void ExamineRobotStart() {
+    const std::vector<double>& start = config_.robot.start;
+    if (start.empty()) return;
+    for (std::size_t k = 0; k < start.size(); ++k)
+      if (!model_.IsAngle(static_cast<int>(k)) && !(Lower(k) <= start[k] && start[k] <= Upper(k)))
+        Add("robot.start",
+            result_.states[k] + " begins at " + ToText(start[k]) + ", and the domain is [" + ToText(Lower(k)) + ", " +
+                ToText(Upper(k)) + "]: no plan is found from there",
+            "begin in the domain, or widen it, if the declaration holds there");
+    const BodyPlaces places(model_, problem_.projection, problem_.body);
+    const std::vector<BodyPart> parts = places.At({start.data(), start.size()});
+    for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
+      const Obstacle& obstacle = config_.obstacles[i];
+      const auto touches = [&](const BodyPart& part) { return !(ApproximateDistance(obstacle, part) > 0); };
+      if (!obstacle.motion() && std::ranges::any_of(parts, touches))
+        Add("robot.start", "the robot touches task.obstacles[" + std::to_string(i) + "] there",
+            "begin where the robot is clear, or move the obstacle");
+    }
+  }
+
+  // Whether the robot stops from some state at least in which it does not rest, near or far from task.initial_set.
+  void ExamineStops() {
+    if (config_.laws.stop.empty() || config_.planner.source != "ompl") return;
+    const int most = config_.planner.tail_steps;
+    std::optional<RobotMotion> motion;
+    try {
+      motion.emplace(config_, Braking::kPlanned);
+    } catch (const ConfigError& error) {
+      Remark("planner.stop", std::string("no planner starts with this task: ") + error.what(), "correct it");
+      return;
+    }
+    std::mt19937_64 random(1);
+    Eigen::MatrixXd tail;
+    const Eigen::VectorXd center = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;
+    int samples = 0;
+    for (int sample = 1; sample <= kSamples; ++sample) {
+      std::array<double, kMaxVariables> z = StateAndInput(random, false);
+      for (int k = 0; k < model_.num_states(); ++k)
+        z[ToSize(k)] = center[k] + (z[ToSize(k)] - center[k]) * sample / kSamples;
+      const std::span<const double> x(z.data(), ToSize(model_.num_states()));
+      if (!problem_.domain.Contains({z.data(), ToSize(model_.num_variables())}) || motion->IsAtRest(x)) continue;
+      ++samples;
+      for (int way = 0; way < motion->num_tails(); ++way)
+        if (motion->Brake(x, way, most, tail)) return;
+    }
+    if (samples > 0)
+      Add("planner.stop",
+          "from none of " + std::to_string(samples) + " states in the domain it brings the robot to rest within " +
+              Count(most, "step") + " (planner.tail_steps): no plan is found from a robot that moves",
+          "look whether the law has a value there; brake harder, allow more steps, or raise planner.at_rest");
+  }
+
+  // At random in the domain's ranges, or in a corner.
+  [[nodiscard]] std::array<double, kMaxVariables> StateAndInput(std::mt19937_64& random, bool in_corner) const {
+    std::uniform_real_distribution<double> uniform(0, 1);
+    std::array<double, kMaxVariables> z{};
+    for (std::size_t l = 0; l < ToSize(model_.num_variables()); ++l) {
+      const double at = in_corner ? std::round(uniform(random)) : uniform(random);
+      z[l] = Lower(l) + at * (Upper(l) - Lower(l));
+    }
+    return z;
+  }
 
   void ExamineGoal() {
     const std::vector<double>& goal = config_.planner.goal;
@@ -445,24 +517,23 @@ class Examination final {
   }
 
   // The longest way of the robot's frame in one nominal step, of those tried; a lower bound.
+  // By any point of the body.
   [[nodiscard]] double LongestStep() const {
+    const BodyPlaces places(model_, problem_.projection, problem_.body);
     std::mt19937_64 random(1);
-    std::uniform_real_distribution<double> uniform(0, 1);
     const auto n = ToSize(model_.num_states()), all = ToSize(model_.num_variables());
     double longest = 0;
     for (int sample = 0; sample < kSamples; ++sample) {
-      std::array<double, kMaxVariables> z{};
+      const std::array<double, kMaxVariables> z = StateAndInput(random, sample % 2 == 1);
       std::array<double, kMaxStates> next{};
-      for (std::size_t l = 0; l < all; ++l) {
-        const double at = sample % 2 == 0 ? uniform(random) : std::round(uniform(random));  // inside, and corners
-        z[l] = Lower(l) + at * (Upper(l) - Lower(l));
-      }
       if (!problem_.domain.Contains({z.data(), all})) continue;
       model_.Evaluate({z.data(), all}, {next.data(), n});
-      const Eigen::VectorXd way =
-          problem_.projection * (Eigen::Map<const Eigen::VectorXd>(next.data(), model_.num_states()) -
-                                 Eigen::Map<const Eigen::VectorXd>(z.data(), model_.num_states()));
-      if (const double length = way.norm(); length > longest && std::isfinite(length)) longest = length;
+      const std::vector<BodyPart> before = places.At({z.data(), n}), after = places.At({next.data(), n});
+      for (std::size_t part = 0; part < before.size(); ++part)
+        for (std::size_t point = 0; point < before[part].points.size(); ++point) {
+          const double length = (after[part].points[point] - before[part].points[point]).norm();
+          if (length > longest && std::isfinite(length)) longest = length;
+        }
     }
     return longest;
   }
@@ -474,9 +545,12 @@ class Examination final {
   }
 
   // The least extent along an axis of the largest part.
+  // A part at expressions is as thick as its radius at least.
   [[nodiscard]] double BodyThickness() const {
     double thickness = 0;
     for (const BodyPart& part : problem_.body.parts) {
+      thickness = std::max(thickness, 2 * part.radius);
+      if (!part.places.empty()) continue;
       Eigen::Vector3d lower = part.points.front(), upper = lower;
       for (const Eigen::Vector3d& point : part.points) lower = lower.cwiseMin(point), upper = upper.cwiseMax(point);
       thickness = std::max(thickness, LeastExtent(lower, upper) + 2 * part.radius);

@@ -10,6 +10,7 @@
 #include "command_line/command_line.h"
 #include "experiments/chunks/training.h"
 #include "experiments/drift/drift.h"
+#include "experiments/drift/drive.h"
 #include "experiments/plans.h"
 #include "experiments/real/real.h"
 #include "experiments/run.h"
@@ -31,6 +32,7 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-experiments train                  the policy of `chunks` and of config/policy.yaml, taught anew
   forereach-experiments real --data ../dart    declarations from a real car's logs, judged by others: docs/real-car.md
   forereach-experiments drift                  a published car of nine states: docs/higher-order-car.md
+  forereach-experiments drift --drive          the same car driven to goals, certified
 
 Exit: 0 done, 2 bad usage or a file that cannot be used.)";
 
@@ -53,7 +55,7 @@ void Train(const std::string& file, unsigned threads) {
 int main(int argc, char** argv) {
   using namespace forereach;
   RunOptions options;
-  bool quick = false;
+  bool quick = false, drives = false;
   std::optional<int> seeds;
   options.threads = std::max(1u, std::thread::hardware_concurrency());
   std::string directory, report;
@@ -95,7 +97,10 @@ int main(int argc, char** argv) {
        .options = {{"--data", &data, "FOLDER", "the drives: every CSV file of the recorder"},
                    {"--other", &others, "FILE.csv", "a drive to judge by only; may be repeated"}}});
   program.commands.push_back(
-      {.name = "drift", .purpose = "what has to be declared for CommonRoad's single-track drift model, and its worth"});
+      {.name = "drift",
+       .purpose = "what has to be declared for CommonRoad's single-track drift model, and its worth",
+       .options = {{"--drive", &drives, "",
+                    "instead, drive it to goals: planner, certifier, guard and simulated robot; 20 seeds"}}});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())
@@ -119,7 +124,11 @@ int main(int argc, char** argv) {
       plans.directory = options.directory;
       RunPlans(plans, std::cout);
     } else if (name == "drift") {
-      RunDrift({options.directory, quick, command}, std::cout);
+      if (drives)
+        RunDriftDrives({options.directory, seeds.value_or(quick ? kQuickSeeds : 20), quick, command + " --drive"},
+                       std::cout);
+      else
+        RunDrift({options.directory, quick, command}, std::cout);
     } else {
       RunExperiments(options, std::cout);
     }

@@ -1,13 +1,23 @@
 // Transitions and plans: any bytes are finite numbers of the right shape, which come back to the last bit once written,
 // or refused with a ConfigError.
-#include "certifier/dynamics/models/named_models.h"
+#include "certifier/dynamics/text_model.h"
 #include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"
 
+static forereach::ModelText Text() {
+  forereach::ModelText text;
+  text.name = "any";
+  text.states = {{"px", "m"}, {"py", "m"}, {"vx", "m/s"}, {"vy", "m/s"}};  // as in the corpus
+  text.inputs = {{"ax", "m/s^2"}, {"ay", "m/s^2"}};
+  text.parameters = {{"dt", 0.15, 0.15}};
+  text.equations = {{"px"}, {"py"}, {"vx"}, {"vy"}};
+  return text;
+}
+
 bool forereach::Try(Bytes data) {
   static MemoryFile file;
-  static const auto model = MakePointMass(0.15);
+  static const auto model = MakeTextModel(Text());
   const std::string& path = file.Write(data);
   if (Transitions read; IsTaken([&] { read = LoadTransitions(path, *model); })) {
     Require(read.size() >= 1 && read.z.cols() == 6 && read.x_next.cols() == 4 && read.z.allFinite() &&

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <stdexcept>
 
-#include <Eigen/LU>
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <unsupported/Eigen/NonLinearOptimization>
 #include <unsupported/Eigen/NumericalDiff>
 
@@ -19,7 +20,11 @@ namespace forereach {
 namespace {
 
 constexpr int kMostEvaluations = 2000;
-constexpr double kDifference = 1e-12;  // the square of the relative step of a difference
+constexpr double kDifference = 1e-12;              // the square of the relative step of a difference
+constexpr double kStep = 1e-6, kLeastStep = 1e-9;  // of the differences at the solution, over a parameter or its unit
+constexpr double kScaleUnits = 16;                 // units in the last place of x+: no error counts as less
+constexpr double kDependence = 1e-8;               // columns that depend on each other up to this much are dependent
+constexpr double kShare = 1e-4;                    // of a parameter in an undetermined direction: less is rounding
 
 // x+ - f0(z) of all transitions, N-by-n; of an angle without whole turns.
 Eigen::MatrixXd ErrorsOf(const ModelText& text, const Transitions& transitions) {
@@ -49,8 +54,10 @@ class Problem {
     const Eigen::MatrixXd errors = ErrorsOf(text, transitions);
     if (!errors.allFinite()) throw std::invalid_argument("the model has no finite value at some transition");
     scales_ = (errors.colwise().squaredNorm() / static_cast<double>(errors.rows())).cwiseSqrt();
+    scales_ = scales_.cwiseMax(kScaleUnits * RoundingOf(transitions));
     for (double& scale : scales_)
       if (!(scale > 0)) scale = 1;
+    rounding_ = RoundingOf(transitions).cwiseQuotient(scales_);
     for (const std::size_t p : free_)
       units_.push_back(text.parameters[p].lower == 0 ? 1 : std::abs(text.parameters[p].lower));
   }
@@ -85,23 +92,92 @@ class Problem {
   }
   [[nodiscard]] double unit(std::size_t c) const { return units_[c]; }
 
+  // The scaled errors by the parameters at x: central differences, and how far rounding may move each column.
+  struct Derivatives {
+    Eigen::MatrixXd columns;
+    Eigen::RowVectorXd noise;
+  };
+  [[nodiscard]] Derivatives DerivativesAt(const Eigen::VectorXd& x) const {
+    Derivatives found{Eigen::MatrixXd(values(), inputs()), Eigen::RowVectorXd::Zero(inputs())};
+    const auto rows = static_cast<Eigen::Index>(transitions_.x_next.rows());
+    Eigen::VectorXd above(values()), below(values());
+    for (Eigen::Index c = 0; c < x.size(); ++c) {
+      const double step = std::max(kStep * std::abs(x[c]), kLeastStep);
+      Eigen::VectorXd moved = x;
+      moved[c] = x[c] + step;
+      (void)(*this)(moved, above);
+      moved[c] = x[c] - step;
+      (void)(*this)(moved, below);
+      found.columns.col(c) = (above - below) / (2 * step);
+      for (Eigen::Index k = 0; k < rounding_.size(); ++k) {
+        const auto touched = (found.columns.col(c).segment(k * rows, rows).array() != 0).count();
+        const double each = rounding_[k] / step;
+        found.noise[c] += each * each * static_cast<double>(touched);
+      }
+    }
+    found.noise = found.noise.cwiseSqrt();
+    return found;
+  }
+
  private:
+  // About a unit in the last place of each state's largest value.
+  static Eigen::RowVectorXd RoundingOf(const Transitions& transitions) {
+    return std::numeric_limits<double>::epsilon() * transitions.x_next.cwiseAbs().colwise().maxCoeff();
+  }
+
   ModelText text_;  // parameters have one value each
   const Transitions& transitions_;
   std::vector<std::size_t> free_;
   std::vector<double> units_;
   Eigen::RowVectorXd scales_;
+  Eigen::RowVectorXd rounding_;  // of an error over its scale
 };
 
-// The standard errors of x from the Jacobian at the solution.
-Eigen::VectorXd DeviationsOf(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& values) {
-  const Eigen::Index count = jacobian.cols();
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(jacobian);
-  qr.setThreshold(1e-8);
-  if (qr.rank() < count) return Eigen::VectorXd::Constant(count, kInfinity);
-  const Eigen::MatrixXd inverse = (jacobian.transpose() * jacobian).inverse();
-  const double freedom = std::max<double>(1, static_cast<double>(jacobian.rows() - count));
-  return (inverse.diagonal() * values.squaredNorm() / freedom).cwiseSqrt();
+// What the derivatives at the solution say of the parameters.
+struct Determined {
+  Eigen::VectorXd deviations;    // standard errors, infinite if not determined
+  Eigen::MatrixXd undetermined;  // the projector onto the directions that the errors do not depend on
+};
+
+// The columns are scaled to length 1. A direction v is undetermined if the errors change along it by no more than
+// rounding does: a parameter is undetermined if such a direction has a share of it.
+Determined Determine(const Problem::Derivatives& derivatives, const Eigen::VectorXd& values) {
+  const Eigen::Index count = derivatives.columns.cols(), rows = derivatives.columns.rows();
+  const Eigen::RowVectorXd norms = derivatives.columns.colwise().norm();
+  Eigen::MatrixXd scaled = derivatives.columns;
+  Eigen::VectorXd noise(count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    if (norms[c] > 0) scaled.col(c) /= norms[c];
+    noise[c] = norms[c] > 0 ? derivatives.noise[c] / norms[c] : 1;
+  }
+  const Eigen::MatrixXd triangle =
+      Eigen::HouseholderQR<Eigen::MatrixXd>(scaled).matrixQR().topRows(count).triangularView<Eigen::Upper>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
+  Determined found{Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::VectorXd direction = svd.matrixV().col(i);
+    const double length = svd.singularValues()[i];
+    if (length <= std::max(kDependence, 2 * direction.cwiseProduct(noise).norm()))
+      found.undetermined += direction * direction.transpose();
+    else
+      found.deviations += (direction / length).cwiseAbs2();
+  }
+  const double freedom = std::max<double>(1, static_cast<double>(rows - count));
+  const double deviation = std::sqrt(values.squaredNorm() / freedom);
+  for (Eigen::Index c = 0; c < count; ++c)
+    found.deviations[c] =
+        found.undetermined(c, c) > kShare * kShare ? kInfinity : std::sqrt(found.deviations[c]) * deviation / norms[c];
+  return found;
+}
+
+// The other parameters of which only a combination with this one is determined.
+std::vector<std::string> TogetherWith(Eigen::Index c, const Determined& determined,
+                                      const std::vector<std::string>& names) {
+  std::vector<std::string> others;
+  if (std::isfinite(determined.deviations[c])) return others;
+  for (Eigen::Index other = 0; other < determined.undetermined.cols(); ++other)
+    if (other != c && std::abs(determined.undetermined(c, other)) > kShare) others.push_back(names[ToSize(other)]);
+  return others;
 }
 
 // The places of the named parameters in the text.
@@ -144,15 +220,13 @@ Fit FitParameters(const ModelText& text, const Transitions& transitions, const s
   fit.evaluations = static_cast<int>(solver.nfev + 2 * std::ssize(names) * solver.njev);
   fit.before = problem.Errors(problem.Start());
   fit.after = problem.Errors(x);
-  Eigen::MatrixXd jacobian(problem.values(), problem.inputs());
   Eigen::VectorXd values;
   (void)problem(x, values);
-  (void)differences.df(x, jacobian);
-  const Eigen::VectorXd deviations = DeviationsOf(jacobian, values);
+  const Determined determined = Determine(problem.DerivativesAt(x), values);
   for (std::size_t c = 0; c < places.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(c);
-    fit.parameters.push_back(
-        {names[c], middle.parameters[places[c]].lower, x[at] * problem.unit(c), deviations[at] * problem.unit(c)});
+    fit.parameters.push_back({names[c], middle.parameters[places[c]].lower, x[at] * problem.unit(c),
+                              determined.deviations[at] * problem.unit(c), TogetherWith(at, determined, names)});
   }
   return fit;
 }

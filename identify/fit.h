@@ -2,8 +2,9 @@
 
 For parameters p, the one-step error of transition i in coordinate k is e_ik(p) = x_ik+ - f0_k(z_i; p). The fit
 minimises sum over i and k of (e_ik(p) / c_k)^2, where c_k is the root mean square of e_ik at the start, so that states
-of different units count alike. The solver is Levenberg & Marquardt's, MINPACK's in Eigen, with differences for
-derivatives. A better nominal model leaves a smaller residual; nothing about the residual is proven by it. */
+of different units count alike, and at least 16 units in the last place of the largest x_ik+, so that the rounding of a
+state that the model has exactly does not. The solver is Levenberg & Marquardt's, MINPACK's in Eigen, with differences
+for derivatives. A better nominal model leaves a smaller residual; nothing about the residual is proven by it. */
 #pragma once
 
 #include <string>
@@ -20,8 +21,12 @@ struct FittedParameter {
   std::string name;
   double before = 0, after = 0;
   /** The standard error, if the errors were independent and alike; infinite if the transitions do not determine the
-  parameter together with the others. */
+  parameter: at the solution, it can change without a change of the errors beyond their rounding, alone or together with
+  others. */
   double deviation = 0;
+  /** The fitted parameters of which the transitions only determine combinations with this one. Empty if it is
+  determined, or has no effect at all. */
+  std::vector<std::string> together;
 };
 
 struct Fit {

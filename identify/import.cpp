@@ -24,6 +24,14 @@ struct Sample {
   bool begins_piece;  // no transition spans the boundary before it
 };
 
+// The middle one, of an even number the larger; 0 if there is none.
+double MedianOf(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 class Importer {
  public:
   Importer(const LogTable& table, const Problem& problem, const ImportOptions& options)
@@ -49,6 +57,8 @@ class Importer {
     const Eigen::Map<const RowMajor> rows(numbers_.data(), count, 2 * n_ + m_);
     log_.transitions = {rows.leftCols(n_ + m_), rows.rightCols(n_)};
     log_.samples = static_cast<int>(samples_.size());
+    log_.median_gap = MedianOf(gaps_);
+    log_.largest_gap = gaps_.empty() ? 0 : *std::ranges::max_element(gaps_);
     return std::move(log_);
   }
 
@@ -119,10 +129,7 @@ class Importer {
     std::vector<double> spacings;
     for (std::size_t i = 1; i < samples_.size(); ++i)
       if (!samples_[i].begins_piece) spacings.push_back(static_cast<double>(samples_[i].time - samples_[i - 1].time));
-    if (spacings.empty()) return;
-    const auto middle = spacings.begin() + std::ssize(spacings) / 2;
-    std::nth_element(spacings.begin(), middle, spacings.end());
-    log_.typical_spacing = *middle;
+    log_.typical_spacing = MedianOf(spacings);
     if (log_.typical_spacing > options_.period + options_.tolerance)
       throw ConfigError(table_.path + ": its rows are typically " + ToText(log_.typical_spacing) +
                         " s apart, and a step of the task is " + ToText(options_.period) +
@@ -148,6 +155,7 @@ class Importer {
     const bool ends = j == samples_.size() || samples_[j].begins_piece;
     if (ends || (j > i + 1 && offset(j - 1) < offset(j))) --j;
     if (j > i && offset(j) <= options_.tolerance) return j;
+    if (!ends) gaps_.push_back(static_cast<double>(offset(j)));
     Drop(ends ? Dropped::kEnd : Dropped::kGap, samples_[i].row);
     return 0;
   }
@@ -247,6 +255,7 @@ class Importer {
   const Eigen::Index first_column_, n_, m_;
   std::vector<Sample> samples_;
   std::vector<double> numbers_;  // row by row
+  std::vector<double> gaps_;     // from t + dt to the nearest stamp, of the starts without one near
   ImportedLog log_;
 };
 

@@ -71,7 +71,9 @@ struct ImportedLog {
   int samples = 0;
   double typical_spacing = 0;  ///< Median of the stamps' differences, s; 0 if there is none.
   std::vector<Finding> dropped = std::vector<Finding>(static_cast<std::size_t>(Dropped::kCount));
-  double largest_offset = 0;        ///< max |t_j - t_i - dt|, s
+  double largest_offset = 0;  ///< max |t_j - t_i - dt|, s
+  double median_gap = 0;      ///< Median of |t_j - t_i - dt| over the starts dropped for kGap, s; 0 if there is none.
+  double largest_gap = 0;     ///< Their largest.
   Eigen::VectorXd largest_rate;     ///< max |x_j - x_i| / dt for each state
   Eigen::VectorXd input_deviation;  ///< max |true input - u| over the rows of a step, for each input
 

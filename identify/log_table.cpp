@@ -92,19 +92,31 @@ class Reader {
   }
 
   LogTable Read() {
-    for (std::string line; lines_.Next(line);) {
+    ReadLines([] { return true; });
+    using RowMajor = decltype(table_.values);
+    table_.values = Eigen::Map<const RowMajor>(numbers_.data(), std::ssize(table_.lines), std::ssize(wanted_));
+    return std::move(table_);
+  }
+
+  std::vector<std::string> ReadColumns() {
+    if (!format_.header.empty()) return format_.header;
+    ReadLines([this] { return num_fields_ == 0; });
+    return parser_->fields();
+  }
+
+ private:
+  // Reads on while `goes_on()`. Fails at the end of the file without a header or inside a quoted field.
+  template <class Condition>
+  void ReadLines(const Condition& goes_on) {
+    for (std::string line; goes_on() && lines_.Next(line);) {
       if (lines_.line() == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
       if (IsRow(line)) Take(line);
     }
     if (parser_ && !parser_->is_complete()) Fail(first_line_, "a quoted field begins in this row and does not end");
     if (num_fields_ == 0)
       throw ConfigError(table_.path + ":1: no line that names the columns; give their names if the file has none");
-    using RowMajor = decltype(table_.values);
-    table_.values = Eigen::Map<const RowMajor>(numbers_.data(), std::ssize(table_.lines), std::ssize(wanted_));
-    return std::move(table_);
   }
 
- private:
   [[noreturn]] void Fail(int line, const std::string& what) const {
     throw ConfigError(table_.path + ":" + std::to_string(line) + ": " + what);
   }
@@ -207,6 +219,11 @@ void Finding::Add(int line, const std::string& what) {
 
 LogTable ReadLog(const std::string& path, const std::vector<std::string>& wanted, const LogFormat& format) {
   return Reader(path, wanted, format).Read();
+}
+
+std::vector<std::string> LogColumns(const std::string& path, const LogFormat& format) {
+  const std::vector<std::string> none;
+  return Reader(path, none, format).ReadColumns();
 }
 
 }  // namespace forereach

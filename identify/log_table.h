@@ -50,4 +50,8 @@ all, or ends inside a quoted field; the delimiter is not clear. */
 [[nodiscard]] LogTable ReadLog(const std::string& path, const std::vector<std::string>& wanted,
                                const LogFormat& format);
 
+/** The names of a log's columns. @throws ConfigError as ReadLog does for what stands before the first row of numbers.
+ */
+[[nodiscard]] std::vector<std::string> LogColumns(const std::string& path, const LogFormat& format);
+
 }  // namespace forereach

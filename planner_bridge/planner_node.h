@@ -24,8 +24,8 @@ time. After the robot has reached the goal, or has reported FINISHED, no round b
 
 If the executing plan is withdrawn, the round ends, and a stopping round begins at once, unless a certified plan takes
 over while the plan still stands. Its candidates start at the first boundary for which a decision is in time, and not
-after what stands. They have no progress part: they brake as hard as the domain allows, first with the steering held,
-then in the other ways to stop (RobotMotion::Stop). Obstacles do not select them; the certifier does. If a plan that
+after what stands. They have no progress part: they brake by planner.emergency_stop, in each of its ways in turn
+(RobotMotion::Brake). Obstacles do not select them; the certifier does. If a plan that
 waits for its start is withdrawn, or no stop is certified, the next state begins another round.
 
 Some messages are counted and ignored: those that do not decode, that contain a number that is not finite, or that are

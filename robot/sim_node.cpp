@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -74,6 +75,12 @@ Brake BrakeOf(const Config& config) {
   return Brake(std::move(declines));
 }
 
+Plant TargetOf(const Config& config) {
+  return [target = std::shared_ptr<const Target>(MakeTarget(config))](auto x, auto u, auto next) {
+    target->Step(x, u, next);
+  };
+}
+
 Config WithKeysOfRobot(Config config) {
   config.bus = WithKeys(std::move(config.bus), Role::kRobot);
   return config;
@@ -87,11 +94,11 @@ void RequireSize(const Config& config, const char* key, std::size_t size, std::i
 
 }  // namespace
 
-RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
+RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Plant plant)
     : config_(WithKeysOfRobot(config)),
       sender_(bus),
       out_(out),
-      target_(MakeTarget(config)),
+      plant_(plant ? std::move(plant) : TargetOf(config)),
       places_(*config.problem->model, config.problem->projection, config.problem->body),
       limits_(*config.problem->model, config.problem->limits),
       disturbance_(config.problem->declaration, config.robot),
@@ -146,7 +153,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const bool moves = !control.empty() || is_stopping_;
   if (!control.empty()) {
     is_stopping_ = false;
-    target_->Step(state_, control, state_);
+    plant_(state_, control, state_);
     disturbance_.Add(state_);
   } else if (is_stopping_) {
     BrakeUntil(utime);
@@ -178,7 +185,7 @@ void RobotSimNode::BrakeUntil(std::int64_t utime) {
   const std::vector<double> before = state_;
   const Box& inputs = config_.problem->domain.input;
   const Eigen::VectorXd idle = inputs.lower().cwiseMax(0).cwiseMin(inputs.upper());
-  target_->Step(before, {idle.data(), ToSize(idle.size())}, state_);
+  plant_(before, {idle.data(), ToSize(idle.size())}, state_);
   disturbance_.Add(state_);
   const double share = static_cast<double>(utime - brakes_since_utime_) / static_cast<double>(period_us_);
   brake_.Apply(before, std::clamp(share, 0.0, 1.0), state_);

@@ -1,17 +1,18 @@
-/** The simulated robot: a Target that executes certified plans under the Supervisor, one step at a time.
+/** The simulated robot: a Plant that executes certified plans under the Supervisor, one step at a time.
 
 Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
- 1. The target takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
+ 1. The plant takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
     turned into [-pi, pi], and the supervisor finishes the step.
  2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h),
     LIMIT_EXCEEDED for every limit of the task that does not hold at this boundary or, if it uses an input, with the
     control of the step that has ended, and GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
  3. The supervisor starts the pending plan, continues the current one, or holds; then it reports (supervisor.h).
 
-While the robot holds, the states of robot.hold are zero: by default v and a of the bicycle, vx and vy of the point
-mass. Every other coordinate keeps its value, and no control, residual or disturbance acts until the next plan starts.
+While the robot holds, the states of robot.hold are zero: by default those of task.rest, or those at which a compiled
+model stands. Every other coordinate keeps its value, and no control, residual or disturbance acts until the next plan
+starts.
 It comes to rest as robot.emergency_stop says, at the end of a plan and in an emergency: the states that are named there
-fall at exactly their rates, and the others of robot.hold are zero at once. Until all are zero the target moves on with
+fall at exactly their rates, and the others of robot.hold are zero at once. Until all are zero the plant moves on with
 inputs of zero, or the nearest to it in the domain, and is disturbed. Of the step in which the stop begins only the part
 after that counts. Without robot.emergency_stop it stands at once, at any speed.
 
@@ -49,8 +50,9 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   static constexpr int kFinishedBoundaries = 5;
 
   /** @param bus must outlive the node and must not call it after its end. @param out receives the summary at Stop.
+  @param plant what moves the robot; empty: the task's target (MakeTarget).
   @throws ConfigError if robot.start, planner.goal or the residual do not fit the model. */
-  RobotSimNode(const Config& config, Bus& bus, std::ostream& out = std::cout);
+  RobotSimNode(const Config& config, Bus& bus, std::ostream& out = std::cout, Plant plant = {});
 
   /** Handles every boundary up to `now_us`, microseconds since the Unix epoch. After a late call, each boundary keeps
   its own time. */
@@ -91,7 +93,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   const Config config_;
   Sender sender_;
   std::ostream& out_;
-  const std::unique_ptr<Target> target_;
+  const Plant plant_;
   const BodyPlaces places_;
   const LimitValues limits_;
   Disturbance disturbance_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -24,6 +25,11 @@ class Target {
   /** Sets `next` to x+. @param x n entries. @param u m entries. @param next n entries; it may be x itself. */
   virtual void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const = 0;
 };
+
+/** What moves a simulated robot: sets `next` to the state that is measured one period after x, under u. It may keep
+what is not measured, so it is called once for each step, in their order. @param x what it set last, give or take a
+disturbance, a brake and whole turns of an angle. @param next n entries; it may be x itself. */
+using Plant = std::function<void(std::span<const double> x, std::span<const double> u, std::span<double> next)>;
 
 /** The target of a task: its nominal model with the residual of its robot, both for the middles of their parameters.
 @throws ConfigError if the residual is for other states or inputs than the model's, or is wrong. */

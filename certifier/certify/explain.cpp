@@ -108,8 +108,10 @@ std::string ExplainUnbounded(const Decision& decision, const NominalModel& model
   if (!found) return "";
   std::string states;
   for (const int k : found->states) states += (states.empty() ? "" : ", ") + VariableName(model, k);
-  return ": " + found->operation + " at line " + std::to_string(found->line) + ", column " +
-         std::to_string(found->column) + " of the model has a kink or a pole there; its argument" +
+  const std::string place = model.text() == nullptr ? " of its equations"
+                                                    : " at line " + std::to_string(found->line) + ", column " +
+                                                          std::to_string(found->column) + " of the model";
+  return ": " + found->operation + place + " has a kink or a pole there; its argument" +
          (states.empty() ? "" : ", a function of " + states + ",") + " may be anywhere in [" +
          RoundedDown(found->argument.lower) + ", " + RoundedUp(found->argument.upper) + "]";
 }

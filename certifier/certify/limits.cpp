@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "certifier/dynamics/angles.h"
+#include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_enclosure.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -44,9 +45,11 @@ std::optional<TextEnclosure> FunctionsOf(const Problem& problem) {
   TextEnclosure functions(NamesOf(model), expressions);
   for (std::size_t i = 0; i < problem.limits.size(); ++i)
     for (const int angle : model.angles())
-      Require(IsSameAfterTurn(functions.program(), static_cast<int>(i), angle),
-              problem.limits[i].name + " is not seen to be the same after a turn of the angle " +
-                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+      if (!IsSameAfterTurn(functions.program(), static_cast<int>(i), angle))
+        throw ExpressionError(expressions[i].line, expressions[i].column,
+                              "limits: " + problem.limits[i].name +
+                                  " is not seen to be the same after a turn of the angle " +
+                                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
   return functions;
 }
 

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <functional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "certifier/dynamics/angles.h"
+#include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 
@@ -320,9 +320,10 @@ Placement PlacementOf(const Problem& problem) {
     for (std::size_t i = 0; i < all.size(); ++i)
       for (const int angle : model.angles())
         if (!IsSameAfterTurn(program.View(), static_cast<int>(i), angle))
-          throw std::invalid_argument(
+          throw ExpressionError(
+              all[i].line, all[i].column,
               "body: the place " + all[i].text + " is not seen to be the same after a turn of the angle " +
-              model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
   }
   return {problem.projection, problem.body, problem.between, problem.model->num_states(),
           problem.body.HasPlaces() ? NamesOf(*problem.model) : ExpressionNames{}};

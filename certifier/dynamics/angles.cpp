@@ -75,10 +75,10 @@ void RequireAngles(const Program& program, const std::vector<int>& angles, const
     const std::vector<Winding> windings = Windings(program, angle);
     for (std::size_t k = 0; k < states.size(); ++k)
       if (windings[ToSize(program.value[k])] != (!of_rates && ToSize(angle) == k ? 1.0 : 0.0))
-        throw std::invalid_argument("angles: " + states[ToSize(angle)] + ": the equation of " + states[k] +
-                                    " is not seen to be the same after a turn of it by 2 pi; an angle may stand in "
-                                    "sin, cos and tan" +
-                                    (of_rates ? "" : ", and as a term of its own equation"));
+        throw TurnError(static_cast<int>(k), "angles: " + states[ToSize(angle)] + ": the equation of " + states[k] +
+                                                 " is not seen to be the same after a turn of it by 2 pi; an angle may "
+                                                 "stand in sin, cos and tan" +
+                                                 (of_rates ? "" : ", and as a term of its own equation"));
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -27,13 +28,25 @@ unit vector of the variable; nothing where these rules find none:
 /** Whether Windings proves that a value of the program is the same after a turn of an angle. */
 [[nodiscard]] bool IsSameAfterTurn(const Program& program, int value, int angle);
 
+/** An equation for which there is no proof that it does not tell how often an angle has turned. */
+class TurnError final : public std::invalid_argument {
+ public:
+  TurnError(int equation, const std::string& what) : std::invalid_argument(what), equation_(equation) {}
+
+  /** Its index, that of its state. */
+  [[nodiscard]] int equation() const { return equation_; }
+
+ private:
+  int equation_;
+};
+
 /** Proves by Windings that a model's equations do not tell how often an angle has turned: for every angle a,
 
     f0(z + 2 pi e_a) = f0(z) + 2 pi e_a    of the next state, or    f(z + 2 pi e_a) = f(z)    of rates.
 
 @param program the values are x+, or x' if `of_rates`. @param angles indices of states. @param states their names.
-@throws std::invalid_argument if an index is not that of a state, is there twice, or has no proof; the message names the
-angle and the equation. */
+@throws std::invalid_argument if an index is not that of a state or is there twice.
+@throws TurnError if there is no proof; the message names the angle and the equation. */
 void RequireAngles(const Program& program, const std::vector<int>& angles, const std::vector<std::string>& states,
                    bool of_rates);
 

@@ -21,8 +21,8 @@ inline constexpr int kMostCompiled = 2048;
 program is that of MakeTextModel(text), operation by operation.
 @param text next states, or rates with the Euler step. @param name of the struct, as a word of letters, digits and
 underscores: differential_drive gives the struct DifferentialDrive. @param origin a line for its comment.
-@throws ExportError for midpoint and rk4, whose stages a text evaluates otherwise; for a parameter that is a range; for
-an operation on numbers alone; for a program above kMostCompiled.
+@throws ExportError for midpoint and rk4, and for a parameter that is a range, because machine code gains little there
+(docs/decisions.md); for an operation on numbers alone; for a program above kMostCompiled.
 @throws ExpressionError, std::invalid_argument as MakeTextModel does. */
 [[nodiscard]] std::string EquationsHeader(const ModelText& text, const std::string& name, const std::string& origin);
 

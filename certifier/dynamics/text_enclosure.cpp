@@ -23,6 +23,7 @@ Interval Around(double half_width) { return {-half_width, half_width}; }
 
 TextEnclosure::TextEnclosure(const ExpressionNames& names, std::span<const ExpressionText> expressions) {
   ProgramDraft draft = MakeProgram(names, expressions);
+  RequireDerivatives(names, expressions);
   draft.Differentiate();
   program_ = std::make_shared<const ProgramDraft>(std::move(draft));
   const Program program = program_->View();

@@ -28,7 +28,7 @@ struct AffineEnclosure {
 
 class TextEnclosure final {
  public:
-  /** @throws as MakeProgram; std::invalid_argument also for an expression that has no derivatives. */
+  /** @throws as MakeProgram and RequireDerivatives; std::invalid_argument also if there are too many derivatives. */
   TextEnclosure(const ExpressionNames& names, std::span<const ExpressionText> expressions);
 
   /** The values, in the order of the expressions, and their derivatives. */

@@ -62,6 +62,9 @@ std::vector<int> AnglesOf(const ModelText& text, const Program& program) {
   std::ranges::sort(angles);
   try {
     RequireAngles(program, angles, NamesIn(text.states), HasStages(text.integrator));
+  } catch (const TurnError& error) {
+    const ExpressionText& equation = text.equations[ToSize(error.equation())];
+    throw ExpressionError(equation.line, equation.column, error.what());
   } catch (const std::invalid_argument& error) {
     Refuse(text, error.what());
   }
@@ -81,6 +84,7 @@ std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
   const ExpressionNames names{NamesIn(text.states), NamesIn(text.inputs), text.parameters, text.definitions};
   const auto program = std::make_shared<ProgramDraft>(MakeProgram(names, text.equations));
   if (text.integrator == ModelText::Integrator::kEuler) AddEulerStep(text, *program);
+  RequireDerivatives(names, text.equations);
   program->Differentiate();
 
   // No compiled model has such a name: what is known of those by their names is not known of this one.

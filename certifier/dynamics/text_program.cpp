@@ -25,12 +25,29 @@ class Known final {
     if (!names_.Add(name)) throw std::invalid_argument("the name " + name + " is used twice");
     values_.push_back(value);
   }
-  [[nodiscard]] Symbol ValueOf(const ExpressionText& expression, ProgramDraft& program) const {
-    return Evaluate<Symbol>(ParseExpression(expression, names_), values_,
-                            [&](double number) { return Symbol::Constant(program, number); });
+  // What is wrong with a definition is said with its place.
+  void Define(const ModelText::Definition& definition, ProgramDraft& program) {
+    const auto& [name, text] = definition;
+    const Symbol value = ValueOf(text, program);
+    AtPlaceOf(text, [&] { Add(name, value); });
+  }
+  [[nodiscard]] Symbol ValueOf(const ExpressionText& text, ProgramDraft& program) const {
+    const Expression expression = ParseExpression(text, names_);
+    Symbol value;
+    AtPlaceOf(text, [&] {
+      value = Evaluate<Symbol>(expression, values_, [&](double number) { return Symbol::Constant(program, number); });
+    });
+    return value;
   }
 
  private:
+  template <class Action>
+  static void AtPlaceOf(const ExpressionText& text, const Action& act) try {
+    act();
+  } catch (const std::invalid_argument& error) {
+    throw ExpressionError(text.line, text.column, error.what());
+  }
+
   NameList names_;
   std::vector<Symbol> values_;
 };
@@ -67,11 +84,34 @@ ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const Expressio
                                   "] is no finite range");
     known.Add(name, Symbol::Parameter(program, parameter++));
   }
-  for (const auto& [name, value] : names.definitions) known.Add(name, known.ValueOf(value, program));
+  for (const ModelText::Definition& definition : names.definitions) known.Define(definition, program);
   std::vector<int> values;
   for (const ExpressionText& expression : expressions) values.push_back(known.ValueOf(expression, program).node());
   program.SetValues(values);
   return program;
+}
+
+void RequireDerivatives(const ExpressionNames& names, std::span<const ExpressionText> expressions) {
+  NameList known;
+  for (const auto* variables : {&names.states, &names.inputs})
+    for (const std::string& name : *variables) static_cast<void>(known.Add(name));
+  for (const ModelText::Parameter& parameter : names.parameters) static_cast<void>(known.Add(parameter.name));
+  const std::size_t given = known.all().size();
+  for (const ModelText::Definition& definition : names.definitions) static_cast<void>(known.Add(definition.name));
+  std::vector<bool> is_used(names.definitions.size());
+  const auto require = [&](const ExpressionText& text) {
+    for (const Expression::Node& node : ParseExpression(text, known).nodes) {
+      if (node.kind == Expression::Kind::kName && ToSize(node.a) >= given) is_used[ToSize(node.a) - given] = true;
+      if (node.kind != Expression::Kind::kCall) continue;
+      if (node.function == Function::kSoftplus || node.function == Function::kSmoothGate)
+        throw ExpressionError(node.line, node.column,
+                              "softplus and smooth_gate are for residuals and the planner's laws: the model, limits "
+                              "and places need derivatives");
+    }
+  };
+  for (const ExpressionText& expression : expressions) require(expression);
+  for (std::size_t i = names.definitions.size(); i-- > 0;)  // each uses only those before it
+    if (is_used[i]) require(names.definitions[i].value);
 }
 
 TextFunction::TextFunction(const ExpressionNames& names, std::span<const ExpressionText> expressions)

@@ -18,10 +18,16 @@ namespace forereach {
 
 /** The program whose value k is expressions[k], without derivatives. Its variables are the states, then the inputs; its
 parameters have the order of the names.
-@throws ExpressionError (expression.h) if an expression or definition is wrong.
-@throws std::invalid_argument if there are too many states, inputs or operations, if a name is used twice or belongs to
-the language, or if the range of a parameter is empty or not finite. */
+@throws ExpressionError (expression.h) if an expression or definition is wrong, if the operations up to it are too many,
+or if the name of a definition is used twice or belongs to the language.
+@throws std::invalid_argument if there are too many states or inputs, if another name is used twice or belongs to the
+language, or if the range of a parameter is empty or not finite. */
 [[nodiscard]] ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const ExpressionText> expressions);
+
+/** @throws ExpressionError at a call of softplus or smooth_gate on which an expression depends, itself or through
+definitions: they have derivatives in residuals only, where `forereach declare` bounds them, and Differentiate needs
+those of everything else. @pre MakeProgram takes these expressions. */
+void RequireDerivatives(const ExpressionNames& names, std::span<const ExpressionText> expressions);
 
 /** The same as a function of z = (x, u), for planning, simulation and display, not for bounds. */
 class TextFunction final {

@@ -108,14 +108,15 @@ Value Evaluate(const Expression& expression, std::span<const Value> names) {
 }
 
 // The equations over a box of variables.
-std::vector<Value> Equations(const NominalModel& model, std::span<const Interval> box) {
-  const ModelText& text = *model.text();
+std::vector<Value> Equations(const ModelText& text, const NominalModel& model, std::span<const Interval> box) {
   NameList names(model.variable_names());
   std::vector<Value> values;
   for (int l = 0; l < model.num_variables(); ++l)
     values.push_back({box[ToSize(l)], l < model.num_states() ? std::uint32_t{1} << l : 0, {}});
-  for (const std::string& name : model.parameter_names()) static_cast<void>(names.Add(name));
-  for (const Interval& range : model.parameter_ranges()) values.push_back({range, 0, {}});
+  for (const auto& [name, lower, upper] : text.parameters) {
+    values.push_back({Interval(lower, upper), 0, {}});
+    static_cast<void>(names.Add(name));
+  }
   for (const auto& [name, value] : text.definitions) {
     values.push_back(Evaluate(ParseExpression(value, names), values));
     static_cast<void>(names.Add(name));
@@ -135,13 +136,14 @@ std::optional<Unbounded> CauseIn(const std::vector<Value>& equations, int state)
 }  // namespace
 
 std::optional<Unbounded> FindUnbounded(const NominalModel& model, std::span<const Interval> box, int state) {
-  if (model.text() == nullptr || state < 0 || state >= model.num_states()) return std::nullopt;
+  const std::optional<ModelText> text = TextOf(model);
+  if (!text || state < 0 || state >= model.num_states()) return std::nullopt;
   std::vector<Interval> argument(box.begin(), box.end());
   std::vector<Value> rates;
-  for (const StageEvaluation& evaluation : EvaluationsOf(model.text()->integrator)) {
+  for (const StageEvaluation& evaluation : EvaluationsOf(text->integrator)) {
     for (std::size_t k = 0; k < rates.size(); ++k)
       argument[k] = box[k] + evaluation.before.Of<Interval>(StepOf(model)) * rates[k].range;
-    rates = Equations(model, argument);
+    rates = Equations(*text, model, argument);
     if (const auto cause = CauseIn(rates, state)) return cause;
   }
   return std::nullopt;

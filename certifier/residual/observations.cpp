@@ -8,6 +8,7 @@
 #include "certifier/dynamics/angles.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
+#include "certifier/residual/no_nominal_value.h"
 
 namespace forereach {
 namespace {
@@ -59,7 +60,7 @@ Observations Observe(const NominalModel& model, const Transitions& transitions) 
       const bool is_angle = model.IsAngle(k);
       const Interval& value = nominal.value[ToSize(k)];
       const Interval residual = is_angle ? ResidualOfAngle(x_next, value) : ResidualOf(x_next, UlpOf(x_next), value);
-      if (!residual.IsFinite()) Refuse(i, "the nominal model has no finite value there");
+      if (!residual.IsFinite()) throw NoNominalValue(i, model.state_names()[ToSize(k)]);
       if (is_angle && !IsWithinAQuarterTurn(residual)) RefuseAngle(i, model.state_names()[ToSize(k)], residual);
       observations.lower(i, k) = residual.lower;
       observations.upper(i, k) = residual.upper;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/dynamics/expression.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
@@ -53,7 +54,8 @@ std::optional<TextEnclosure> ExpressionsOf(const Body& body, const ExpressionNam
   const std::vector<ExpressionText> all = body.Coordinates();
   TextEnclosure expressions(names, all);
   for (int i = 0; i < expressions.num_values(); ++i)
-    Require(!expressions.UsesInput(i), "body: the place " + all[ToSize(i)].text + " uses an input");
+    if (const auto& [text, line, column] = all[ToSize(i)]; expressions.UsesInput(i))
+      throw ExpressionError(line, column, "body: the place " + text + " uses an input");
   return expressions;
 }
 
@@ -184,13 +186,15 @@ void Placement::EncloseHull(const Sample& sample, Hull& hull) const noexcept {
   }
 }
 
-// A place without a finite second order is the box of the ranges; without these it is everything. The margin of its
-// slack is above the rounding of sums over the states and of sums over the generators.
+// A place without a finite second order is the box of the ranges; where a coordinate has none, there may be no place at
+// all, and it is everything. The margin of its slack is above the rounding of sums over the states and of sums over the
+// generators.
 void Placement::OverSlice(Sample& sample, std::size_t i) const noexcept {
   Sample::Point& over = sample.points[i];
   over.slope = {};
   over.size = 0;
   for (std::size_t k = 0; k < kMaxSafetyDim; ++k) over.offset[k] = over.spread[k] = 0;
+  bool is_bounded = true;
   for (std::size_t k = 0; k < ToSize(dim()); ++k) {
     AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear) + k];
     if (!linear.offset.IsFinite()) {
@@ -198,12 +202,14 @@ void Placement::OverSlice(Sample& sample, std::size_t i) const noexcept {
       linear.offset = linear.range;
     }
     const bool is_finite = linear.offset.IsFinite();
+    is_bounded &= is_finite;
     over.offset[k] = is_finite ? linear.offset.Middle() : 0;
     over.spread[k] = is_finite ? AddUp(bulge_[k], linear.offset.DistanceUpper(over.offset[k])) : kInfinity;
     double size = std::abs(over.offset[k]) + over.spread[k];
     for (std::size_t l = 0; l < sample.half_width.size(); ++l) size += std::abs(linear.slope[l]) * sample.half_width[l];
     over.size = std::max(over.size, size);
   }
+  if (!is_bounded) std::fill_n(over.spread.begin(), dim(), kInfinity);
 }
 
 void Placement::Observe(const Zonotope& slice, std::span<const double> half_width, Sample& sample) const noexcept {

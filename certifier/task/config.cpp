@@ -9,6 +9,7 @@
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
+#include "certifier/residual/no_nominal_value.h"
 #include "certifier/residual/observations.h"
 #include "certifier/task/csv.h"
 #include "certifier/task/document.h"
@@ -26,7 +27,8 @@ std::vector<std::string> TransitionColumns(const NominalModel& model) {
 }
 
 Transitions ReadTransitions(const std::string& path, const NominalModel& model, const std::string& named_by) {
-  const Eigen::MatrixXd rows = ReadCsv(path, TransitionColumns(model), named_by);
+  const Eigen::MatrixXd rows = ReadCsv(path, TransitionColumns(model), named_by,
+                                       "; `forereach import` makes transitions of a log with other columns");
   if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
   return {rows.leftCols(model.num_variables()), rows.rightCols(model.num_states())};
 }
@@ -67,11 +69,15 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
   }
 }
 
-// Where the turns of an angle cannot be told, the transition says nothing, and something is wrong with it.
-void RequireTurnsAreClear(const std::string& path, const Transitions& transitions, const NominalModel& model) try {
-  if (!model.angles().empty()) static_cast<void>(Observe(model, transitions));
+// Where the nominal model has no value, or the turns of an angle cannot be told, the transition says nothing, and
+// something is wrong with it.
+void RequireObservable(const std::string& path, const Transitions& transitions, const NominalModel& model) try {
+  static_cast<void>(Observe(model, transitions));
 } catch (const AmbiguousAngle& error) {
   throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.what());
+} catch (const NoNominalValue& error) {
+  throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.text() +
+                    "; change the model's equations or parameters, or take the state out of the domain and the data");
 }
 
 void ReadKeys(Document& file, TaskDraft& draft) {
@@ -112,7 +118,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   if (transitions == TransitionsFile::kRead) {
     problem.transitions = ReadTransitions(transitions_path, model, file.Place("transitions"));
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
-    RequireTurnsAreClear(transitions_path, problem.transitions, model);
+    RequireObservable(transitions_path, problem.transitions, model);
   }
   config.path = path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);

@@ -35,40 +35,58 @@ void Split(std::string_view line, std::vector<std::string_view>& fields) {
   fields.push_back(Trim(line));
 }
 
+// Fails if the header's fields are separated by something else.
+void RequireCommas(const std::string& path, const std::vector<std::string_view>& fields) {
+  if (fields.size() > 1) return;
+  for (const char other : {';', '\t'})
+    if (fields[0].find(other) != std::string_view::npos)
+      FailAt(path, 1,
+             std::string("the columns are separated by ") + (other == ';' ? "semicolons" : "tabs") +
+                 ", not by commas; `forereach import` makes transitions of such a file");
+}
+
 // For each field of the header, the column it is of.
 std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<std::string_view>& fields,
-                                     const std::vector<std::string>& columns) {
+                                     const std::vector<std::string>& columns, const std::string& advice) {
+  RequireCommas(path, fields);
   std::vector<Eigen::Index> order;
   for (const std::string_view field : fields) {
     const auto column = std::find(columns.begin(), columns.end(), field);
     if (column == columns.end())
-      FailAt(path, 1, "unknown column '" + std::string(field) + "'; the columns are " + Joined(columns));
+      FailAt(path, 1, "unknown column '" + std::string(field) + "'; the columns are " + Joined(columns) + advice);
     const Eigen::Index index = column - columns.begin();
     if (std::find(order.begin(), order.end(), index) != order.end()) FailAt(path, 1, *column + ": duplicate column");
     order.push_back(index);
   }
   for (std::size_t j = 0; j < columns.size(); ++j)
     if (std::find(order.begin(), order.end(), static_cast<Eigen::Index>(j)) == order.end())
-      FailAt(path, 1, columns[j] + ": the column is missing");
+      FailAt(path, 1, columns[j] + ": the column is missing" + advice);
   return order;
 }
 
 class Reader {
  public:
-  Reader(const std::string& path, const std::vector<std::string>& columns) : path_(path), columns_(columns) {}
+  Reader(const std::string& path, const std::vector<std::string>& columns, const std::string& advice)
+      : path_(path), columns_(columns), advice_(advice) {}
 
   Eigen::MatrixXd Read(LineReader in) {
     std::vector<Eigen::Index> order;
     std::vector<std::string_view> fields;
     int rows = -1;  // without the header
+    int blank = 0;  // the first of the blank lines that may end the file
     for (std::string text; in.Next(text);) {
       const int line = in.line();
+      if (line > 1 && Trim(text).empty()) {
+        blank = blank == 0 ? line : blank;
+        continue;
+      }
+      if (blank > 0) FailAt(path_, blank, "a blank line; only the end of the file may have some");
       ++rows;
       std::string_view content = text;
       if (line == 1 && content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
       Split(content, fields);
       if (line == 1) {
-        order = ReadHeader(path_, fields, columns_);
+        order = ReadHeader(path_, fields, columns_, advice_);
       } else {
         AddRow(line, fields, order);
       }
@@ -97,6 +115,7 @@ class Reader {
 
   const std::string& path_;
   const std::vector<std::string>& columns_;
+  const std::string& advice_;
   std::vector<double> numbers_;  // row by row
 };
 
@@ -109,6 +128,7 @@ std::vector<std::string> CsvColumns(const std::string& path) {
   if (content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
   std::vector<std::string_view> fields;
   Split(content, fields);
+  RequireCommas(path, fields);
   std::vector<std::string> columns(fields.begin(), fields.end());
   for (const std::string& column : columns) {
     if (column.empty()) FailAt(path, 1, "a column has no name");
@@ -117,8 +137,9 @@ std::vector<std::string> CsvColumns(const std::string& path) {
   return columns;
 }
 
-Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns, const std::string& named_by) {
-  return Reader(path, columns).Read(LineReader(path, named_by));
+Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns, const std::string& named_by,
+                        const std::string& advice) {
+  return Reader(path, columns, advice).Read(LineReader(path, named_by));
 }
 
 void WriteCsv(const std::string& path, const std::vector<std::string>& columns, const Eigen::MatrixXd& rows) {

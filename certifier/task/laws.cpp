@@ -19,15 +19,16 @@ std::vector<std::string> Given(const ExpressionNames& names) {
   return given;
 }
 
-// @throws ExpressionError if a definition uses a name that nobody knows, std::invalid_argument if it has the name of
-// something else.
+// @throws ExpressionError if a definition uses a name that nobody knows, or has the name of something else.
 void CheckDefinitions(const NominalModel& model, const Laws& laws) {
   const ExpressionNames names = NamesOf(model);
   NameList known(Given(names));
   for (const std::string& name : Desired()) static_cast<void>(known.Add(name));
   for (const ModelText::Definition& definition : names.definitions) static_cast<void>(known.Add(definition.name));
   for (const ModelText::Definition& definition : laws.definitions) {
-    if (known.Find(definition.name) >= 0) throw std::invalid_argument("the name " + definition.name + " is used twice");
+    if (known.Find(definition.name) >= 0)
+      throw ExpressionError(definition.value.line, definition.value.column,
+                            "the name " + definition.name + " is used twice");
     static_cast<void>(ParseExpression(definition.value, known));
     static_cast<void>(known.Add(definition.name));
   }

@@ -13,16 +13,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The directories of config/ beside the running program: of <prefix>/bin and <prefix>/libexec/forereach.
+// The directories of config/ beside the running program: of <prefix>/bin and <prefix>/libexec/forereach. At most one of
+// them exists.
 std::vector<fs::path> InstalledDirectories() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
   std::vector<fs::path> directories;
   for (const char* up : {"..", "../.."})
-    if (fs::path directory = (program / up / "share/forereach/config").lexically_normal();
-        fs::is_directory(directory, error))
-      directories.push_back(std::move(directory));
+    directories.push_back((program / up / "share/forereach/config").lexically_normal());
   return directories;
+}
+
+std::string PlaceOf(const fs::path& directory) {
+  std::error_code error;
+  if (directory.empty()) return ".";
+  return directory.string() + (fs::is_directory(directory, error) ? "" : " (which does not exist)");
 }
 
 // The model files beside a path that does not exist, named as it is.
@@ -46,8 +51,7 @@ std::string FindModelFile(const std::string& task, const std::string& name, cons
   }
   std::ranges::sort(neighbours);
   std::string where;
-  for (const fs::path& directory : directories)
-    where += (where.empty() ? "" : " nor in ") + (directory.empty() ? std::string(".") : directory.string());
+  for (const fs::path& directory : directories) where += (where.empty() ? "" : " nor in ") + PlaceOf(directory);
   throw ConfigError(named_by + name + " is not in " + where +
                     (neighbours.empty() ? "" : "; " + Suggestion(name, neighbours)));
 }

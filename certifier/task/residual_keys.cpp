@@ -1,9 +1,11 @@
 // The rows of residuals: `residual`, which `forereach declare` bounds, and `robot.residual`.
 #include <iterator>
 
+#include "certifier/dynamics/angles.h"
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/dynamics/text_program.h"
+#include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -71,16 +73,30 @@ ResidualText ReadText(const Document& file, const std::string& path) {
   return text;
 }
 
+// A robot is the same after a turn, so what it does beyond the model is.
+// @throws ExpressionError
+void RequireSameAfterTurns(const NominalModel& model, const ParametricResidual& residual, const Program& program) {
+  for (std::size_t k = 0; k < residual.values.size(); ++k)
+    for (const int angle : model.angles())
+      if (!IsSameAfterTurn(program, static_cast<int>(k), angle))
+        throw ExpressionError(residual.values[k].line, residual.values[k].column,
+                              "the residual of " + model.state_names()[k] +
+                                  " is not seen to be the same after a turn of the angle " +
+                                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+}
+
 // The residual at `path`. Its expressions are parsed here for the first time.
 ParametricResidual ReadResidual(const Document& file, const std::string& path, const NominalModel& model) {
   const bool is_named = Has(file, path, "name");
   const ResidualText text = ReadText(file, path);
   try {
     const ParametricResidual residual = ResidualOf(model, text);
-    (void)MakeProgram(residual.names, residual.values);
+    const ProgramDraft program = MakeProgram(residual.names, residual.values);
+    RequireSameAfterTurns(model, residual, program.View());
     return residual;
   } catch (const ExpressionError& error) {
     if (!is_named) FailAt(file.path(), error);
+    if (error.word().empty()) file.Fail(path + ".name", error.what());
     file.Fail(path + ".name", text.name + " uses " + error.word() + ", which " + model.name() + " does not have");
   } catch (const std::invalid_argument& error) {
     file.Fail(is_named ? path + ".name" : path, error.what());

@@ -16,9 +16,9 @@ static std::int64_t Now() {
 }
 static Bytes BytesOf(const ReceiveBuffer* m) { return {static_cast<const std::uint8_t*>(m->data), m->data_size}; }
 
-class PointMass final : public Supervisor::Robot {
+class Robot final : public Supervisor::Robot {
  public:
-  explicit PointMass(lcm::LCM& lcm) : lcm_(lcm) {}
+  explicit Robot(lcm::LCM& lcm) : lcm_(lcm) {}
   std::span<const double> state() const override { return x_; }                                   // your sensors
   void Hold() override { x_[2] = x_[3] = 0; }                                                     // your brakes
   int StepsToRest(std::span<const double>, std::span<const double>) const override { return 0; }  // their time
@@ -40,7 +40,7 @@ class PointMass final : public Supervisor::Robot {
 
 int main(int argc, char** argv) {
   lcm::LCM lcm(argc > 1 ? argv[1] : "udpm://239.255.76.67:7667?ttl=0");
-  PointMass robot(lcm);
+  Robot robot(lcm);
   Supervisor supervisor({.guard = {.num_states = 4, .num_inputs = 2, .step_us = 150'000}}, robot);
   using Handler = void (*)(const ReceiveBuffer*, const std::string&, Supervisor*);
   const Handler certified = [](auto* m, auto&, auto* to) { to->OnCertified(BytesOf(m), Now()); };

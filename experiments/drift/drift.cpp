@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <ostream>
 
 #include "certifier/dynamics/text_model.h"
 #include "certifier/residual/observations.h"
 #include "certifier/task/model_file.h"
+#include "experiments/drift/markdown.h"
 #include "experiments/random.h"
 #include "experiments/run_directory.h"
 #include "identify/smallest_row.h"
@@ -22,13 +22,6 @@ constexpr double kFar = 1000, kSpin = 0.4;      // m and rad; rad of slip angle
 constexpr double kSteering = 0.4;               // rad/s
 constexpr double kBrake = -4, kThrottle = 2.5;  // m/s^2
 constexpr double kWheelbase = 8.461 * 0.3048;   // m, of the driver
-
-std::string Text(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-std::string Percent(int part, int whole) { return whole > 0 ? Text("%.2f", 100.0 * part / whole) : "none"; }
 
 int StepsIn(double dt) { return static_cast<int>(std::lround(dt / kDriftStep)); }
 
@@ -90,22 +83,6 @@ double LateralIn(const std::vector<Drive>& drives) {
 
 // ---- tables
 
-using Cells = std::vector<std::string>;
-
-std::string Markdown(const Cells& head, const std::vector<Cells>& rows) {
-  const auto line = [](const Cells& cells) {
-    std::string text = "|";
-    for (const std::string& cell : cells) text.append(" ").append(cell).append(" |");
-    return text + "\n";
-  };
-  std::string text = "\n";
-  text += line(head) + "|";
-  for (std::size_t i = 0; i < head.size(); ++i) text += "---|";
-  text += "\n";
-  for (const Cells& row : rows) text += line(row);
-  return text;
-}
-
 const Cells kOutcome{"windows",
                      "complete, %",
                      "inside, %",
@@ -143,9 +120,9 @@ std::string Where(const Eigen::RowVectorXd& z) {
 // ---- the study
 
 constexpr std::uint64_t kLearnSeed = 1, kJudgeSeed = 2;
-constexpr double kDt = 0.05, kOrdinary = 3;  // s, m/s^2
-constexpr int kShort = 5, kLong = 10;        // steps of a window
-constexpr double kSlip = 0.02;               // of a wheel: what braking at 4 m/s^2 needs
+constexpr double kDt = kOrdinaryStep, kOrdinary = 3;  // s, m/s^2
+constexpr int kShort = 5, kLong = 10;                 // steps of a window
+constexpr double kSlip = 0.02;                        // of a wheel: what braking at 4 m/s^2 needs
 
 struct Study {
   bool quick;
@@ -322,6 +299,11 @@ Problem SingleTrackProblem(double dt) {
                          Eigen::VectorXd::Zero(kStates)};
   problem.projection = Eigen::MatrixXd::Identity(2, kStates);
   return problem;
+}
+
+Learned OrdinaryDeclaration(double factor) {
+  const Study study{false};
+  return WithDisturbanceTimes(Learn(AsItIs(study.Make(kOrdinary, kLearnSeed)), {.quantile = 1}), factor);
 }
 
 void RunDrift(const DriftOptions& options, std::ostream& out) {

@@ -34,6 +34,13 @@ struct DrivesOptions {
 /** config/models/single_track.yaml at this dt, with the domain of all that the experiment drives. */
 [[nodiscard]] Problem SingleTrackProblem(double dt);
 
+/** Of the drives that are learned from, s. */
+inline constexpr double kOrdinaryStep = 0.05;
+
+/** What is learned from ten drives of 20 s with at most 3 m/s^2 sideways: L is zero, and w is `factor` times the
+largest one-step error. */
+[[nodiscard]] Learned OrdinaryDeclaration(double factor);
+
 struct DriftOptions {
   std::filesystem::path directory;  ///< Of results
   bool quick = false;               ///< Fewer drives, fewer rows in the tables

@@ -261,6 +261,17 @@ TEST(BadInput, UsageExitsWithTwo) {
     EXPECT_EQ(Forereach(std::string(arguments) + " >/dev/null 2>&1").code, 2) << arguments;
 }
 
+// Bad input of the file itself, so it was taken as the task.
+TEST(BadInput, OneTaskStandsWithItsOptionOrAlone) {
+  for (const char* command : {"fit", "declare", "check", "export-model", "run", "plan --out x.csv"})
+    for (const char* before : {" ", " --config "}) {
+      const Output output = Forereach(std::string(command) + before + "none.yaml 2>&1 >/dev/null");
+      EXPECT_EQ(output.code, 2) << command << before;
+      EXPECT_THAT(output.text, HasSubstr("none.yaml: cannot be read")) << command << before;
+    }
+  EXPECT_THAT(Forereach("fit a.yaml --config b.yaml 2>&1").text, HasSubstr("--config: At Most 1 required"));
+}
+
 TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
   const struct {
     const char *arguments, *sentence;

@@ -1,6 +1,7 @@
 // `forereach declare --from-data` and `--hold-out`: what they propose goes into a task file, and what they say is true.
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <random>
 #include <sstream>
 
@@ -64,6 +65,13 @@ TEST_F(DeclareDataTest, ItsLinesGoIntoATaskFileThatNoTransitionContradicts) {
   EXPECT_LE(entry["at_least"], entry["smallest"].get<double>() * (1 + 1e-6));
   EXPECT_NEAR(entry["proposed"], 1.5 * entry["smallest"].get<double>(), 1e-6);
   EXPECT_EQ(document["never_varied"], Json({"py", "vy", "ay"}));
+  ASSERT_EQ(document["alone"].size(), 24u) << "every entry";
+  const Json& lone = document["alone"][2 * 6 + 2];
+  EXPECT_EQ(lone["row"], "vx");
+  EXPECT_EQ(lone["column"], "vx");
+  EXPECT_EQ(lone["pairs"], 200 * 199 / 2) << "no other column counts with --by vx";
+  EXPECT_GT(lone["slope"], 0);
+  EXPECT_LE(lone["slope"], 0.0201);
 }
 
 TEST_F(DeclareDataTest, SaysWhatIsNotProven) {
@@ -99,6 +107,42 @@ TEST_F(DeclareDataTest, HoldOutCountsAndDraws) {
   EXPECT_NEAR(document["factors"][6]["block_rate_at_most"], 1 - std::pow(0.05, 0.25), 1e-6);
   for (const char* ending : {".svg", ".png"}) EXPECT_GT(std::filesystem::file_size(picture + ending), 1000u);
   EXPECT_THAT(Read(picture + ".svg"), HasSubstr("<svg"));
+}
+
+// A robot that turns on and on, as its heading is logged: as it grows, or wrapped at pi.
+TEST_F(DeclareDataTest, AWrappedAngleLiesInItsSliceLikeOneThatGrows) {
+  const auto share = [&](bool wrapped) {
+    const auto logged = [&](double t) { return wrapped ? std::remainder(t, 2 * std::numbers::pi) : t; };
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    std::ostringstream rows;
+    rows.precision(17);
+    rows << "x,y,t,omega,x_next,y_next,t_next\n";
+    double x = 0, y = 0, t = 0;
+    for (int i = 0; i < 200; ++i) {
+      const double omega = 3 + 0.5 * uniform(random), next_x = x + 0.1 * std::cos(t), next_y = y + 0.1 * std::sin(t),
+                   next_t = t + 0.1 * omega + 0.001 * uniform(random);
+      rows << x << "," << y << "," << logged(t) << "," << omega << "," << next_x << "," << next_y << ","
+           << logged(next_t) << "\n";
+      x = next_x, y = next_y, t = next_t;
+    }
+    scratch_.Write("steps.csv", rows.str());
+    scratch_.Write("task.yaml",
+                   "model:\n  states: {x: m, y: m, t: rad}\n  inputs: {omega: rad/s}\n  parameters: {dt: 0.1}\n"
+                   "  next: {x: x + dt*cos(t), y: y + dt*sin(t), t: t + dt*omega}\n  angles: [t]\n"
+                   "domain:\n  state: {lower: [-9, -9, -90], upper: [9, 9, 90]}\n"
+                   "  input: {lower: [-5], upper: [5]}\n"
+                   "declaration: {lipschitz: {}, noise_bound: [1e-9, 1e-9, 0.002]}\ntransitions: steps.csv\n"
+                   "task:\n  initial_set: {center: [0, 0, 0], half_width: [0.001, 0.001, 0.001]}\n"
+                   "  projection: [x, y]\n  obstacles: []\n  between: samples\n");
+    const Json document = Json::parse(Declare("--by omega --hold-out --blocks 4 --steps 20 --json").text);
+    const Json& row = document["factors"][0];
+    EXPECT_GT(row["states"], 0);
+    return row["states_inside"].get<double>() / row["states"].get<double>();
+  };
+  const double grows = share(false);
+  EXPECT_GT(grows, 0.9);
+  EXPECT_EQ(share(true), grows);
 }
 
 TEST_F(DeclareDataTest, BadInputIsExitTwo) {

@@ -54,6 +54,19 @@ TEST_F(FitCommandTest, ItsLineGoesIntoATaskFile) {
   EXPECT_EQ(document["states"][1]["rms_before"], 0);
 }
 
+TEST_F(FitCommandTest, NamesWhatIsNotDetermined) {
+  const std::string task = Read(task_);
+  scratch_.Write("task.yaml",
+                 Replaced(Replaced(task, "decay: 1,", "decay: 1, more: 1, idle: 3,"), "x: decay*x", "x: decay*more*x"));
+  const Output output = Forereach("fit " + task_ + " 2>&1");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("not determined, only together with more\n"));
+  EXPECT_THAT(output.text, HasSubstr("not determined: it has no effect on these transitions\n"));
+  const Json document = Json::parse(Fit("--json").text);
+  EXPECT_EQ(document["parameters"][1]["undetermined_with"], Json({"decay"}));
+  EXPECT_TRUE(document["parameters"][3]["deviation"].is_number()) << "of gain";
+}
+
 TEST_F(FitCommandTest, BadInputIsExitTwo) {
   for (const auto& [options, words] :
        std::vector<std::pair<std::string, const char*>>{{"--parameters mass", "the model has no parameter 'mass'"},

@@ -45,6 +45,29 @@ TEST_F(ImportCommandTest, ItsTransitionsAreReadWithTheTask) {
   EXPECT_EQ(transitions.x_next(1, 2), 1);
 }
 
+TEST_F(ImportCommandTest, AColumnOfTimeNeedsNoOption) {
+  scratch_.Write("log.csv", "px,py,vx,vy,ax,ay,time\n0,0,1,0,0,0,0\n0.15,0,1,0,0,0,0.15\n");
+  EXPECT_EQ(Import(log_).code, 0) << Import(log_).text;
+  EXPECT_THAT(Import("--rate 5 " + log_).text, HasSubstr("a step of the task is")) << "--rate takes no stamps";
+  scratch_.Write("log.csv", "0,0,1,0,0,0,0\n0.15,0,1,0,0,0,0.15\n");
+  EXPECT_EQ(Import("--header px,py,vx,vy,ax,ay,time " + log_).code, 0);
+}
+
+TEST_F(ImportCommandTest, SaysHowFarTheNearestStampsAre) {
+  std::string rows = "time,px,py,vx,vy,ax,ay\n";
+  for (const char* stamp : {"0", "0.079", "0.146", "0.225", "0.3"}) rows += std::string(stamp) + ",0,0,0,0,0,0\n";
+  scratch_.Write("log.csv", rows);
+  const Output output = Import(log_);
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("3  starts without a stamp near t + dt; first in line 2\n             the nearest "
+                                     "is 4"));
+  EXPECT_THAT(output.text, HasSubstr("at most; --tolerance-ms is 0.001\n"));
+  const Json gap = Json::parse(Import("--json " + log_).text)["logs"][0]["dropped"]["gap"];
+  EXPECT_NEAR(gap["median_distance_s"], 0.004, 1e-9);
+  EXPECT_NEAR(gap["largest_distance_s"], 0.004, 1e-9);
+  EXPECT_EQ(Import("--tolerance-ms 4.01 " + log_).code, 0);
+}
+
 TEST_F(ImportCommandTest, JsonHasEveryCause) {
   scratch_.Write("log.csv", Read(log_) + "450;1\n\n# end\n600;1;0;nan;0;0;0\n750;1;0;0;0;0;0\n900;1;0;0;0;0;9\n");
   const Json document = Json::parse(Import(columns_ + "--json " + log_).text);

@@ -1,4 +1,5 @@
 // `forereach init` and `forereach check`: a task to begin with, and what keeps one from certifying plans.
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -8,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "certifier/dynamics/unbounded.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/config.h"
 #include "cli/task_template.h"
@@ -118,6 +120,26 @@ TEST_F(InitTest, AModelOfTheLibraryComesWithTheLawsThatDriveIt) {
     for (const auto& [state, rate] : task.robot.emergency_stop) EXPECT_EQ(rate, 1) << state;
     EXPECT_EQ(task.problem->rest.size(), drive.problem->rest.size());
     EXPECT_EQ(task.problem->model->angles(), drive.problem->model->angles());
+  }
+}
+
+// A task begins where its model has bounds: a car with tyres and an aeroplane do not stand.
+TEST_F(InitTest, ATaskOfTheLibraryBeginsWhereItsModelHasBounds) {
+  for (const auto& entry : fs::directory_iterator(kSource + "/config/models")) {
+    const std::string name = entry.path().stem().string();
+    SCOPED_TRACE(name);
+    ASSERT_EQ(Init("--force --model " + name).code, 0);
+    const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
+    const Domain& domain = config.problem->domain;
+    std::vector<Interval> box;
+    for (Eigen::Index k = 0; k < config.initial_set.dim(); ++k) {
+      box.emplace_back(config.initial_set.lower()[k], config.initial_set.upper()[k]);
+      EXPECT_TRUE(domain.state.lower()[k] <= box.back().lower && box.back().upper <= domain.state.upper()[k]) << k;
+    }
+    for (Eigen::Index k = 0; k < domain.input.dim(); ++k)
+      box.emplace_back(std::clamp(0.0, domain.input.lower()[k], domain.input.upper()[k]));
+    for (int k = 0; k < config.problem->model->num_states(); ++k)
+      EXPECT_FALSE(FindUnbounded(*config.problem->model, box, k)) << k;
   }
 }
 
@@ -313,6 +335,26 @@ TEST_F(CheckTest, DataOutsideTheDomainAreAllNamed) {
   EXPECT_THAT(Check().text, HasSubstr("domain.balls[0]: 1 transition outside, the first in " + steps + ":3\n"));
 }
 
+// The first row is outside the domain, so that rows and lines differ by more than the header.
+TEST_F(CheckTest, TransitionsThatNothingCanBeObservedOfAreNamedByTheirLine) {
+  const auto check = [&](const std::string& model, const std::string& rows) {
+    scratch_.Write("task.yaml", TaskFor("model:\n  states: {x: m, y: m, t: rad}\n  inputs: {u: m}\n"
+                                        "  parameters: {dt: 0.1}\n" +
+                                            model,
+                                        3, 1, "x, y"));
+    scratch_.Write("steps.csv", "x,y,t,u,x_next,y_next,t_next\n" + rows);
+    return Forereach("check " + (scratch_ / "task.yaml") + " 2>&1");
+  };
+  const std::string rows = "7,0,0,0,0,0,0\n0.5,0,0,0,0.5,0,0\n0,0,0,0,0,0,2\n";
+  const Output angle = check("  next: {x: x, y: y, t: t}\n  angles: [t]\n", rows);
+  EXPECT_EQ(angle.code, 1);
+  EXPECT_THAT(angle.text, AllOf(HasSubstr("steps.csv:4: "), HasSubstr("t is 2 rad away"), HasSubstr("has to be rad")));
+  const Output value = check("  next: {x: log(x), y: y, t: t}\n", rows);
+  EXPECT_EQ(value.code, 1);
+  EXPECT_THAT(value.text, AllOf(HasSubstr("steps.csv:4: x: the nominal model has no finite value there\n"),
+                                HasSubstr("take such states out of the domain")));
+}
+
 // Observation errors of 2 sigma and 0.05 m/s times 1 m/s: the residuals of vx may differ by 0.12. They differ by d.
 TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
   const auto with = [&](const std::string& next) {
@@ -372,6 +414,46 @@ TEST_F(CheckTest, ObstaclesThinnerThanAStep) {
   WriteTask("  between: samples\n", "  between: {acceleration: [5, 5]}\n");
   scratch_.Write("task.yaml", Replaced(Read(task_), "radius: 0.8", "radius: 0.1"));
   EXPECT_EQ(Check().code, 0);
+}
+
+// The hand, 0.6 m from the first joint or so, moves with 1.2 + 1.6 rad/s; a post of 1 cm is thinner than that.
+TEST_F(CheckTest, BodiesAtExpressionsMoveToo) {
+  std::string task = Read(scratch_ / "drive/reaching_arm.yaml");
+  const auto line = task.find("  between:");
+  task.replace(line, task.find('\n', line) - line, "  between: samples");
+  const Output thick = Forereach("check " + scratch_.Write("drive/thick.yaml", task) + " 2>&1");
+  EXPECT_EQ(thick.code, 0) << thick.text;
+  const auto obstacles = task.find("  obstacles:");
+  task.replace(obstacles, task.find("\n\n", obstacles) - obstacles,
+               "  obstacles: [{circle: {center: [1, 1], radius: 0.005}}]");
+  const Output thin = Forereach("check " + scratch_.Write("drive/thin.yaml", task) + " 2>&1");
+  EXPECT_EQ(thin.code, 1) << thin.text;
+  EXPECT_THAT(thin.text, HasSubstr("task.between: the robot moves by up to 0."));
+}
+
+TEST_F(CheckTest, TheRobotsStart) {
+  const auto with = [&](const std::string& start) {
+    WriteTask("  between: samples\n", "  between: samples\nrobot: {start: " + start + "}\n");
+    return Check();
+  };
+  EXPECT_EQ(with("[20, 0, 0, -5.4]").code, 0) << with("[20, 0, 0, -5.4]").text;
+  EXPECT_THAT(with("[20.1, 0, 0, 0]").text,
+              HasSubstr(task_ + ":20: robot.start: px begins at 20.1, and the domain is [-20, 20]"));
+  EXPECT_EQ(with("[20.1, 0, 0, 0]").code, 1);
+  EXPECT_EQ(with("[3.81, 2, 0, 0]").code, 0);
+  EXPECT_THAT(with("[3.79, 2, 0, 0]").text, HasSubstr("robot.start: the robot touches task.obstacles[0] there"));
+}
+
+TEST_F(CheckTest, ALawThatStopsTheRobotFromNowhere) {
+  const auto with = [&](const std::string& ax) {
+    WriteTask("  between: samples\n", "  between: samples\nplanner: {at_rest: {vx: 0.1, vy: 0.1}, stop: {ax: " + ax +
+                                          ", ay: -vy}}\nrobot: {hold: [vx, vy]}\n");
+    return Check();
+  };
+  EXPECT_EQ(with("-vx").code, 0) << with("-vx").text;
+  const Output output = with("sqrt(-1 - vx^2)");
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr(task_ + ":20: planner.stop: from none of"));
 }
 
 TEST_F(CheckTest, Goals) {
@@ -435,6 +517,14 @@ TEST_F(CheckTest, DrawsWhatItSaw) {
   WriteTask();
   EXPECT_EQ(Check("--picture " + (scratch_ / "a.svg")).code, 0);
   EXPECT_THAT(Read(scratch_ / "a.svg"), HasSubstr("<svg"));
+}
+
+TEST_F(CheckTest, SaysWhatItFoundWhereThereIsNoPicture) {
+  const Output output =
+      Forereach("check config/drive/quadrotor.yaml --picture " + (scratch_ / "a.svg") + " 2>&1 >" + (scratch_ / "out"));
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("there is no picture"));
+  EXPECT_EQ(Read(scratch_ / "out"), Forereach("check config/drive/quadrotor.yaml").text);
 }
 
 }  // namespace

@@ -49,7 +49,15 @@ TEST_F(CsvTest, ErrorsNameLineColumnAndValue) {
   EXPECT_EQ(Error("a,b\n1,0x2\n"), "t.csv:2: b: '0x2' is not a number");
   EXPECT_EQ(Error("a,b\n1\n"), "t.csv:2: 1 fields, the header has 2");
   EXPECT_EQ(Error("a,b\n1,2,3\n"), "t.csv:2: 3 fields, the header has 2");
-  EXPECT_EQ(Error("a,b\n\n1,2\n"), "t.csv:2: 1 fields, the header has 2");
+  EXPECT_EQ(Error("a,b\n\n1,2\n"), "t.csv:2: a blank line; only the end of the file may have some");
+  EXPECT_EQ(Error("a,b\n1,2\n \n\n1,2\n"), "t.csv:3: a blank line; only the end of the file may have some");
+}
+
+TEST_F(CsvTest, BlankLinesMayEndTheFile) {
+  for (const char* text : {"a,b\n1,2\n\n", "a,b\n1,2\n\n\n", "a,b\r\n1,2\r\n\r\n", "a,b\n1,2\n \t"})
+    EXPECT_EQ(ReadCsv(files_.Write("t.csv", text), {"a", "b"}), (Eigen::MatrixXd(1, 2) << 1, 2).finished()) << text;
+  EXPECT_EQ(ReadCsv(files_.Write("t.csv", "a\n1\n\n"), {"a"}).rows(), 1);
+  EXPECT_EQ(ReadCsv(files_.Write("t.csv", "a,b\n\n"), {"a", "b"}).rows(), 0);
 }
 
 TEST_F(CsvTest, ErrorsInTheHeader) {
@@ -58,6 +66,18 @@ TEST_F(CsvTest, ErrorsInTheHeader) {
   EXPECT_EQ(Error("b\n"), "t.csv:1: a: the column is missing");
   EXPECT_EQ(Error(""), "t.csv:1: the file is empty; it has to begin with the header a, b");
   EXPECT_EQ(Error("1,2\n"), "t.csv:1: unknown column '1'; the columns are a, b");
+  EXPECT_EQ(Error("a;b\n1;2\n"),
+            "t.csv:1: the columns are separated by semicolons, not by commas; `forereach import` makes transitions of "
+            "such a file");
+  EXPECT_THAT(Error("a\tb\n"), HasSubstr("separated by tabs"));
+  EXPECT_THAT([&] { (void)CsvColumns(files_.Write("t.csv", "a;b\n")); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("separated by semicolons")));
+}
+
+TEST_F(CsvTest, OtherColumnsOfTransitionsNameTheImport) {
+  EXPECT_THAT([&] { (void)LoadTransitions(files_.Write("t.csv", "t,px\n"), *MakePointMass(0.1)); },
+              testing::ThrowsMessage<ConfigError>(
+                  HasSubstr("vy_next; `forereach import` makes transitions of a log with other columns")));
 }
 
 TEST_F(CsvTest, MissingFileAndDirectory) {

@@ -143,7 +143,7 @@ TEST_F(ErrorTest, BodiesAtExpressions) {
   EXPECT_EQ(error("{parts: [{disc: {place: [px, v_x], radius: 0}}]}"),
             "task.yaml:17:38: v_x is not a name that is known here; did you mean vx?");
   EXPECT_EQ(error("{parts: [{disc: {place: [px, ax], radius: 0}}]}"),
-            "task.yaml:14: task: body: the place ax uses an input");
+            "task.yaml:17:38: body: the place ax uses an input");
   EXPECT_EQ(error("{parts: [{disc: {radius: 0}}]}"), "task.yaml:17: task.body.parts[0].disc: missing: at or place");
   EXPECT_EQ(
       error("{parts: [{hull: {points: [[1, 0]], places: [[px, py]]}}]}"),
@@ -175,7 +175,8 @@ TEST_F(ErrorTest, Limits) {
   EXPECT_EQ(error("[{name: a, that: ax + v_x, at_most: 1}]"),
             "task.yaml:17:33: v_x is not a name that is known here; did you mean vx?");
   EXPECT_EQ(error("[{name: a, that: \"softplus(ax, 1)\", at_most: 1}]"),
-            "task.yaml:14: task: softplus and smooth_gate are for residuals: a nominal model needs derivatives");
+            "task.yaml:17:29: softplus and smooth_gate are for residuals and the planner's laws: the model, limits and "
+            "places need derivatives");
   EXPECT_THAT(error("[{name: " + std::string(49, 'a') + ", that: ax, at_most: 1}]"),
               StartsWith("task.yaml:14: task: limits: limit 0: its name has 49 bytes, must be 1 to 48"));
 }
@@ -290,11 +291,18 @@ TEST_F(ErrorTest, ResidualsAsText) {
   EXPECT_EQ(with("add: {vx: dt}, parameters: {dt: 1}"), "task.yaml:20: residual: the name dt is used twice");
   EXPECT_EQ(with("add: {vx: sin}, parameters: {sin: 1}"),
             "task.yaml:20: residual: the name sin belongs to the language");
-  EXPECT_EQ(with("add: {vx: vx}, let: {vy: vx}"), "task.yaml:20: residual: the name vy is used twice");
+  EXPECT_EQ(with("add: {vx: vx}, let: {vy: vx}"), "task.yaml:20:37: the name vy is used twice");
+  EXPECT_EQ(with("add: {vx: \"softplus(vx, 0.1)\"}"), "");
   EXPECT_EQ(with("add: {vx: b}, let: {a: b, b: vx}"),
             "task.yaml:20:35: b is not a name that is known here; known here: px, py, vx, vy, ax, ay, dt, pi");
   EXPECT_EQ(ErrorAfter("robot: {residual: {add: {vx: c}, parameters: {c: [1, 2]}}}\n"),
             "task.yaml:20: robot.residual.parameters.c: a list is not a number; write a number in (-inf, inf)");
+}
+
+TEST_F(ErrorTest, DefinitionsOfThePlannerHaveNamesOfTheirOwn) {
+  EXPECT_EQ(ErrorAfter("planner: {let: {speed: vx}, stop: {ax: -speed, ay: -vy}}\n"), "");
+  EXPECT_EQ(ErrorAfter("planner: {let: {vx: 1}, stop: {ax: -vx, ay: -vy}}\n"),
+            "task.yaml:20:21: the name vx is used twice");
 }
 
 TEST_F(ErrorTest, Disturbances) {
@@ -526,8 +534,9 @@ TEST_F(ErrorTest, TransitionsThatCannotBeRead) {
             "task.yaml:12: transitions: none.csv: cannot be read: No such file or directory");
   EXPECT_EQ(files_.Error(kTask, "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n"),
             "steps.csv:2: no transitions; at least one is needed");
-  EXPECT_EQ(files_.Error(kTask, "px,py,vx,vy,ax,ay,px_next,py_next,vx_next\n"),
-            "steps.csv:1: vy_next: the column is missing");
+  EXPECT_EQ(
+      files_.Error(kTask, "px,py,vx,vy,ax,ay,px_next,py_next,vx_next\n"),
+      "steps.csv:1: vy_next: the column is missing; `forereach import` makes transitions of a log with other columns");
   EXPECT_EQ(files_.Error(kTask, std::string(kTransitions) + "0,0,0,0,0,0,0,0,nan,0\n"),
             "steps.csv:4: vx_next: 'nan' is not a finite number");
 }

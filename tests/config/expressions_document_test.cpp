@@ -1,4 +1,5 @@
 // docs/expressions.md is true: its models load, its expressions have their values, its errors are what is said.
+#include <array>
 #include <fstream>
 #include <regex>
 #include <sstream>
@@ -6,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "certifier/dynamics/equations_header.h"
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/program.h"
 #include "certifier/numerics/limits.h"
@@ -94,7 +96,7 @@ TEST(ExpressionsDocument, ModelsLoad) {
   const struct {
     std::size_t states, inputs;
     const char* projection;
-  } sizes[] = {{5, 2, "x, y"}, {2, 1, "angle"}, {5, 2, "x, y"}, {4, 2, "x, y"}};
+  } sizes[] = {{5, 2, "x, y"}, {2, 1, "angle"}, {5, 2, "x, y"}, {5, 2, "x, y"}, {4, 2, "x, y"}};
   const ScratchDirectory directory;
   std::size_t count = 0;
   std::string first;
@@ -120,6 +122,35 @@ TEST(ExpressionsDocument, ModelsLoad) {
     EXPECT_EQ(config.problem->model->num_states(), static_cast<int>(states));
   }
   EXPECT_EQ(count, std::size(sizes));
+}
+
+// The step that is written out is the library's, and can be exported.
+TEST(ExpressionsDocument, AStepThatIsWrittenOutIsTheIntegrators) {
+  const std::string document = Document(), open = "```yaml\n";
+  const std::size_t begin = document.find(open, document.find("**A faster Runge-Kutta step.**"));
+  ASSERT_NE(begin, std::string::npos);
+  const std::size_t end = document.find("```", begin + open.size());
+  const ScratchDirectory directory;
+  const auto model_of = [&](const std::string& model) {
+    const std::string path = directory.Write("task.yaml", TaskFor(model, 5, 2, "x, y"));
+    return LoadConfig(path, TransitionsFile::kIgnore).problem->model;
+  };
+  const auto whole = model_of(document.substr(begin + open.size(), end - begin - open.size())),
+             staged = model_of("model: {file: " FOREREACH_SOURCE_DIR "/config/models/unicycle.yaml}\n");
+  EXPECT_EQ(whole->state_names(), staged->state_names());
+  EXPECT_EQ(whole->input_names(), staged->input_names());
+  EXPECT_EQ(whole->angles(), staged->angles());
+  EXPECT_THAT(whole->parameters(), testing::ElementsAreArray(staged->parameters()));
+  for (int i = 0; i < 50; ++i) {
+    const std::vector<double> z{0.1 * i,        1 - 0.2 * i,  0.3 * i - 7, 0.5 - 0.03 * i,
+                                1.5 - 0.06 * i, 1 - 0.05 * i, 0.1 * i};
+    std::array<long double, 5> one, other;
+    whole->EvaluateWide(z, one);
+    staged->EvaluateWide(z, other);
+    for (std::size_t k = 0; k < one.size(); ++k) EXPECT_NEAR(static_cast<double>(one[k] - other[k]), 0, 1e-16);
+  }
+  EXPECT_THAT(EquationsHeader(*whole->text(), "robot", ""), testing::HasSubstr("struct Robot {"));
+  EXPECT_THROW(static_cast<void>(EquationsHeader(*staged->text(), "robot", "")), ExportError);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::MatchesRegex;
 using testing::StartsWith;
 
 // In the place of the first line of the good task. Errors are asserted by line and column.
@@ -145,6 +146,16 @@ TEST_F(ModelTextTest, PlacesAreRightHoweverYamlWritesAText) {
             "task.yaml:11:14: dtt is not a name that is known here; did you mean dt?");
   EXPECT_EQ(error("    vx: 0\n"), "");
   EXPECT_EQ(error("    vx: |\n      vx\n        + dt*(\n        ax)\n"), "");
+}
+
+// Definitions that only a residual uses need no derivatives.
+TEST_F(ModelTextTest, FunctionsForResidualsAreRefusedWithTheirPlace) {
+  const std::string soft = "    soft: vx + softplus(vx, 0.1)\n    half: dt*dt/2\n";
+  const std::string model = Replaced(kModel, "    half: dt*dt/2\n", soft);
+  EXPECT_EQ(files_.Error(model + WithoutModel() + "residual: {add: {vx: 0.01*soft}}\n"), "");
+  EXPECT_EQ(Error(Replaced(model, "half: dt*dt/2\n", "half: dt*dt/2 + 0*soft\n")),
+            "task.yaml:6:16: softplus and smooth_gate are for residuals and the planner's laws: the model, limits and "
+            "places need derivatives");
 }
 
 TEST_F(ModelTextTest, ACommaInsideBracesEndsAnExpression) {
@@ -309,8 +320,10 @@ TEST_F(ModelFileTest, ItsBytesBelongToTheTask) {
 
 TEST_F(ModelFileTest, ErrorsNameTheFileThatIsWrong) {
   const std::string path = files_.directory() / "", directory = path.substr(0, path.size() - 1);
-  EXPECT_EQ(Error("model: {file: drg.yaml}\n"),
-            "task.yaml:1: model.file: drg.yaml is not in " + directory + "; did you mean drag.yaml?");
+  EXPECT_THAT(
+      Error("model: {file: drg.yaml}\n"),
+      AllOf(StartsWith("task.yaml:1: model.file: drg.yaml is not in " + directory + " nor in /"),
+            HasSubstr("/share/forereach/config (which does not exist)"), HasSubstr("; did you mean drag.yaml?")));
   files_.directory().Write("drag.yaml", Replaced(kModel, "vx + dt*(ax", "vx + dt*(axx"));
   EXPECT_EQ(Error("model: {file: drag.yaml}\n"),
             "drag.yaml:11:18: axx is not a name that is known here; did you mean ax?");
@@ -366,7 +379,8 @@ TEST_F(AnglesTest, AreStatesThatTheEquationsDoNotTellApart) {
   EXPECT_EQ(Error(Turning("  angles: [thetta]\n")),
             "task.yaml:6: model.angles[0]: thetta is not a coordinate; did you mean theta?");
   EXPECT_THAT(Error(Turning("  angles: [v]\n")),
-              HasSubstr("angles: v: the equation of x is not seen to be the same after a turn of it by 2 pi"));
+              StartsWith("task.yaml:5:13: angles: v: the equation of x is not seen to be the same after a turn of it "
+                         "by 2 pi"));
   EXPECT_THAT(Error(Turning("  angles: [omega]\n")), HasSubstr("model.angles[0]: omega is not a coordinate"));
 }
 
@@ -382,8 +396,37 @@ TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
     return Turning("  angles: [theta]\n") + "  limits: [{name: wall, that: " + that + ", at_most: 2}]\n";
   };
   EXPECT_EQ(Error(with("v*cos(theta)")), "");
-  EXPECT_THAT(Error(with("x + theta")), HasSubstr("limits: wall is not seen to be the same after a turn of the angle "
-                                                  "theta by 2 pi: write it with sin, cos or tan of it"));
+  EXPECT_EQ(
+      Error(with("x + theta")),
+      "task.yaml:17:31: limits: wall is not seen to be the same after a turn of the angle theta by 2 pi: write it "
+      "with sin, cos or tan of it");
+}
+
+// The line of the file, not the row from 0.
+TEST(NoNominalValue, NamesFileLineAndState) {
+  const TaskFiles files;
+  const std::string steps = "x,u,x_next\n0.5,0,0\n0,0,0\n";
+  for (const char* next : {"x + log(x)", "x + 1/x", "sqrt(x - 0.1)"})
+    EXPECT_THAT(files.Error(TaskFor("model: {states: {x: m}, inputs: {u: m}, parameters: {dt: 0.1}, next: {x: " +
+                                        std::string(next) + "}}\n",
+                                    1, 1, "x"),
+                            steps),
+                StartsWith("steps.csv:3: x: the nominal model has no finite value there; "))
+        << next;
+}
+
+// The simulated robot reports its angles wrapped, so another residual would jump.
+TEST_F(AnglesTest, AResidualIsTheSameAfterATurn) {
+  for (const std::string before : {"residual: {", "robot: {residual: {"}) {
+    const auto with = [&](const std::string& value) {
+      return Turning("  angles: [theta]\n") + before + "add: {v: " + value + "}}" + (before[1] == 'o' ? "}" : "") +
+             "\n";
+    };
+    EXPECT_EQ(Error(with("0.1*sin(theta)")), "");
+    EXPECT_THAT(Error(with("0.1*theta")),
+                MatchesRegex("task.yaml:17:[0-9]+: the residual of v is not seen to be the same after a turn of the "
+                             "angle theta by 2 pi: write it with sin, cos or tan of it"));
+  }
 }
 
 TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
@@ -392,10 +435,9 @@ TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
                     "  body: {parts: [{disc: {place: [x, \"" + place + "\"], radius: 0.1}}]}\n");
   };
   EXPECT_EQ(Error(with("y + sin(theta)")), "");
-  EXPECT_EQ(
-      Error(with("y + theta")),
-      "task.yaml:13: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
-      "2 pi: write it with sin, cos or tan of it");
+  EXPECT_EQ(Error(with("y + theta")),
+            "task.yaml:14:38: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
+            "2 pi: write it with sin, cos or tan of it");
 }
 
 TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {

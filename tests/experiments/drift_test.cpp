@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "experiments/drift/drive.h"
 #include "tests/scratch.h"
 
 namespace forereach::experiments {
@@ -79,6 +80,37 @@ TEST(DriftExperiment, TheSmallFormWritesItsTables) {
                             "## Up to the limit of the tyres", "## Against dt"})
     EXPECT_THAT(out.str(), HasSubstr(title));
   EXPECT_THAT(out.str(), HasSubstr("| largest | 0 | 10 |"));
+}
+
+TEST(DriftCar, KeepsTheSpeedsOfItsWheels) {
+  DriftCar car(0.05);
+  Eigen::VectorXd measured = Rolling(12).head(7);
+  DriftState whole = Rolling(12);
+  for (const DriftInput& input : {DriftInput(0.3, 2), DriftInput(-0.1, -4), DriftInput(0, -4)}) {
+    const std::vector<double> x(measured.begin(), measured.end());
+    car.Step(x, {input.data(), 2}, {measured.data(), 7});
+    whole = Drift(whole, input, 0.05, 100);
+    EXPECT_LT((measured - whole.head(7)).cwiseAbs().maxCoeff(), 1e-12);
+  }
+  EXPECT_GT(car.most().acceleration[0], 3);
+  EXPECT_LT(car.most().acceleration[0], 5);
+  EXPECT_GT(car.most().turn_rate, 0.01);
+}
+
+TEST(DriftDrive, ReachesItsGoalInsideItsSlices) {
+  const ScratchDirectory scratch;
+  SilenceLog();
+  const std::string task = WriteDriveTask(scratch.path(), 1.5);
+  for (const int seed : {1, 2}) {
+    SCOPED_TRACE(seed);
+    const DriftDrives driven = DriveOnDrift(task, seed);
+    EXPECT_TRUE(driven.counts.good());
+    EXPECT_EQ(driven.counts.stops, 0);
+    EXPECT_GT(driven.counts.steps, 300);
+    EXPECT_GT(driven.counts.certified, 20);
+    EXPECT_EQ(driven.faulted, 0);
+    EXPECT_EQ(driven.beyond_between, 0);
+  }
 }
 
 }  // namespace

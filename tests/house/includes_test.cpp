@@ -114,9 +114,9 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
   Refuse("bench/bad.cpp", "\"logger/x.h\"", "bench may not include logger");
   Refuse("experiments/bad.cpp", "\"robot/x.h\"", "experiments may not include robot");
   Refuse("experiments/bad.cpp", "\"cli/commands.h\"",
-         "experiments may include certifier, identify, policies and cli/progress.h only");
+         "experiments may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
   Refuse("experiments/bad.cpp", "\"planner_bridge/proposal.h\"",
-         "experiments may include certifier, identify, policies and cli/progress.h only");
+         "experiments may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
   Refuse("certifier/gate/bad.cpp", "\"experiments/x.h\"", "certifier may not include experiments");
   Refuse("logger/bad.cpp", "\"tests/records/logs.h\"", "logger may not include tests");
   ExpectRefused();

@@ -10,6 +10,7 @@
 #include "certifier/residual/consistency.h"
 #include "identify/binomial.h"
 #include "identify/hold_out.h"
+#include "identify/lone_slopes.h"
 #include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
 #include "tests/identify/seed.h"
@@ -51,6 +52,25 @@ struct World {
   Observations observations;
   Declaration declaration;
 };
+
+// r = 2 z0 in four corners of a rectangle and a point close to one of them, with eps = 0.25.
+TEST(LoneSlopes, AreOfPairsThatDifferInOneColumnAlone) {
+  Observations observations;
+  observations.z = Eigen::MatrixXd(5, 3);
+  observations.z << 0, 0, 7, 4, 0, 7, 0, 4, 7, 4, 4, 7, 0.2, 4, 7;
+  observations.lower = observations.upper = 2 * observations.z.col(0);
+  const Declaration declaration{Eigen::MatrixXd::Zero(1, 3), Eigen::VectorXd::Constant(1, 0.25)};
+  const auto found = FindLoneSlopes(declaration, observations, 0, {0, 1, 2});
+  ASSERT_EQ(found.size(), 3u);
+  EXPECT_EQ(found[0].pairs, 4) << "0 1, 2 3, 2 4, 3 4";
+  EXPECT_DOUBLE_EQ(found[0].slope, 7.5 / 4);
+  EXPECT_EQ(found[0].first, 0);
+  EXPECT_EQ(found[0].second, 1);
+  EXPECT_EQ(found[1].pairs, 3) << "0 2, 1 3, and 0 4 which differ a little in column 0";
+  EXPECT_EQ(found[1].slope, 0) << "2 * 0.2 is within twice eps";
+  EXPECT_EQ(found[2].pairs, 0) << "it never varies";
+  EXPECT_EQ(FindLoneSlopes(declaration, observations, 0, {1})[0].pairs, 0);
+}
 
 TEST(SmallestRow, IsConsistentAndNeverWeighsMoreThanTheTruth) {
   const unsigned first = SeedOf(1);

@@ -80,6 +80,59 @@ TEST(Fit, LeavesTheOthersAndSaysWhatIsNotDetermined) {
   const Fit with = FitParameters(Pendulum(0.8, 0), data, {"damping", "unused"});
   EXPECT_EQ(with.parameters[1].deviation, kInfinity);
   EXPECT_EQ(with.parameters[1].after, 1);
+  EXPECT_TRUE(with.parameters[1].together.empty()) << "it has no effect";
+  EXPECT_NEAR(with.parameters[0].deviation, one.parameters[0].deviation, 0.01 * one.parameters[0].deviation);
+}
+
+// x+ = a b x + c u, y+ = y + d: of a and b only the product is determined, and e cancels.
+ModelText Products() {
+  ModelText text;
+  text.name = "products";
+  text.states = {{"x", "m"}, {"y", "m"}};
+  text.inputs = {{"u", "m"}};
+  text.parameters = {{"dt", 0.1, 0.1}, {"a", 0.9, 0.9}, {"c", 1, 1}, {"b", 1, 1}, {"d", 0, 0}, {"e", 2, 2}};
+  text.equations = {{"a*b*x + c*u", 1, 1}, {"y + d + e - e", 2, 1}};
+  text.integrator = ModelText::Integrator::kNone;
+  return text;
+}
+
+TEST(Fit, NamesThoseThatAreUndeterminedTogether) {
+  std::mt19937 random(SeedOf(5));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  Transitions data{Eigen::MatrixXd(200, 3), Eigen::MatrixXd(200, 2)};
+  for (Eigen::Index i = 0; i < 200; ++i) {
+    const double x = uniform(random), y = uniform(random), u = uniform(random), error = 0.01 * uniform(random);
+    data.z.row(i) << x, y, u;
+    data.x_next.row(i) << 0.5 * x + 0.3 * u + error, y + 0.2 + error;
+  }
+  const Fit fit = FitParameters(Products(), data, {"a", "c", "b", "d", "e"});
+  EXPECT_NEAR(fit.parameters[0].after * fit.parameters[2].after, 0.5, 0.01);
+  EXPECT_THAT(fit.parameters[0].together, testing::ElementsAre("b"));
+  EXPECT_THAT(fit.parameters[2].together, testing::ElementsAre("a"));
+  for (const std::size_t undetermined : {0, 2, 4}) EXPECT_EQ(fit.parameters[undetermined].deviation, kInfinity);
+  for (const std::size_t determined : {1, 3}) {
+    EXPECT_LT(fit.parameters[determined].deviation, 0.01);
+    EXPECT_GT(fit.parameters[determined].deviation, 1e-5);
+    EXPECT_TRUE(fit.parameters[determined].together.empty());
+  }
+}
+
+// The model has x exactly, up to rounding. That weighs nothing, and d is found from y.
+TEST(Fit, TheRoundingOfAnExactStateWeighsNothing) {
+  std::mt19937 random(SeedOf(6));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  ModelText text = Products();
+  text.equations[0] = {"x + 0.1*u/3 + d*1e-16*u", 1, 1};
+  Transitions data{Eigen::MatrixXd(200, 3), Eigen::MatrixXd(200, 2)};
+  for (Eigen::Index i = 0; i < 200; ++i) {
+    const double x = uniform(random), y = uniform(random), u = uniform(random);
+    data.z.row(i) << x, y, u;
+    data.x_next.row(i) << x + 0.1 / 3 * u, y + 0.2 + 0.01 * uniform(random);
+  }
+  const Fit fit = FitParameters(text, data, {"d"});
+  EXPECT_TRUE(fit.converged);
+  EXPECT_NEAR(fit.parameters[0].after, 0.2, 0.01);
+  EXPECT_LT(fit.parameters[0].deviation, 0.01);
 }
 
 TEST(Fit, RefusesWhatItCannotFit) {

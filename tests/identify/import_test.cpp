@@ -83,7 +83,10 @@ TEST_F(ImportTest, AStampMayBeOffByTheToleranceAndNotByMore) {
   EXPECT_EQ(From({{0}, {0.1 - 0.0078}}).transitions.size(), 1);
   EXPECT_EQ(From({{0}, {0.05}, {0.1 + 0.00782}}).transitions.size(), 0);
   EXPECT_EQ(Again().At(Dropped::kGap).count, 1);
+  EXPECT_DOUBLE_EQ(Again().median_gap, 0.00782);
   EXPECT_EQ(From({{0}, {0.05}, {0.1 - 0.00782}, {0.3}}).At(Dropped::kGap).count, 3);
+  EXPECT_NEAR(Again().median_gap, 0.05 + 0.00782, 1e-12) << "from 0.05 to the stamp before 0.15";
+  EXPECT_NEAR(Again().largest_gap, 0.1 + 0.00782, 1e-12) << "from 0.1 - 0.00782 to 0.3";
 }
 
 TEST_F(ImportTest, OfTwoStampsTheNearerOneCounts) {

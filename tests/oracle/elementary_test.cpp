@@ -365,5 +365,52 @@ TEST(SmoothGateRanges, ContainTheExactValues) {
   EXPECT_EQ(SmoothGateRanges(Interval::Entire()).value, Interval::Entire());
 }
 
+// t log(1 + exp(x / t)) and its first and second derivatives, at points of the box. With s = exp(-|u|), u = x / t, all
+// are sums and products of numbers of one sign: nothing cancels.
+TEST(SoftplusRanges, ContainTheExactValues) {
+  Random random(13);
+  SCOPED_TRACE(random.trace());
+  const auto any_of = [&](const Interval& range) {
+    const int which = random.Below(3);
+    return which == 0   ? range.lower
+           : which == 1 ? range.upper
+                        : std::min(range.upper, random.Uniform(range.lower, range.upper));
+  };
+  const auto any_width = [&](double most) { return random.Below(3) == 0 ? 0 : random.Uniform(0, most); };
+  const Real zero(0.0), one(1.0);
+  for (int i = 0; i < 50'000; ++i) {
+    const double least_x = random.Uniform(-5, 5), least_t = std::pow(10, random.Uniform(-3, 1));
+    const Interval xs(least_x, least_x + any_width(3)), ts(least_t, least_t + any_width(least_t));
+    const SoftplusRanges ranges(xs, ts);
+    const double x = any_of(xs), t = any_of(ts);
+    const Real u = Real(x) / Real(t), size = x > 0 ? u : zero - u, s = exp(zero - size), more = one + s;
+    const Real slope = s / (more * more) / Real(t);
+    ASSERT_TRUE(Inside(Real(t) * ((x > 0 ? u : zero) + log1p(s)), ranges.value)) << x << " " << t;
+    ASSERT_TRUE(Inside((x > 0 ? one : s) / more, ranges.by_x)) << x << " " << t;
+    ASSERT_TRUE(Inside(log1p(s) + size * s / more, ranges.by_temperature)) << x << " " << t;
+    ASSERT_TRUE(Inside(slope, ranges.by_xx)) << x << " " << t;
+    ASSERT_TRUE(Inside(zero - u * slope, ranges.by_xt)) << x << " " << t;
+    ASSERT_TRUE(Inside(u * u * slope, ranges.by_tt)) << x << " " << t;
+  }
+}
+
+TEST(SoftplusRanges, AreTightAtAPoint) {
+  for (const double x : {-3.0, -0.1, 0.0, 0.1, 3.0}) {
+    const SoftplusRanges ranges(x, 0.5);
+    for (const Interval& range :
+         {ranges.value, ranges.by_x, ranges.by_temperature, ranges.by_xx, ranges.by_xt, ranges.by_tt})
+      EXPECT_LE(range.upper - range.lower, 1e-14 * range.Magnitude()) << x;
+  }
+}
+
+TEST(SoftplusRanges, HaveNoBoundWhereTheTemperatureMayBeZero) {
+  for (const Interval& temperature :
+       {Interval(0), Interval(0, 1), Interval(-2, -1), Interval(kNan), Interval::Entire()}) {
+    const SoftplusRanges ranges(Interval(0, 1), temperature);
+    for (const Interval& range : {ranges.value, ranges.by_xx, ranges.by_xt, ranges.by_tt})
+      EXPECT_EQ(range, Interval::Entire());
+  }
+}
+
 }  // namespace
 }  // namespace forereach

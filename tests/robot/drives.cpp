@@ -7,10 +7,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "bus/log.h"
 #include "bus/process.h"
+#include "cli/drive_counts.h"
 #include "cli/lockstep.h"
 #include "cli/progress.h"
 #include "command_line/command_line.h"
@@ -24,68 +24,41 @@ struct Options {
   bool advice = false;
 };
 
-/** What became of one drive, or of several. */
-struct Drives {
-  std::int64_t count = 0, goals = 0, contacts = 0, limits = 0, steps = 0, outside = 0, emergency_stops = 0,
-               proposed = 0, certified = 0, searches = 0, rounds = 0, lost_rounds = 0;
-
-  [[nodiscard]] bool good() const { return goals == count && contacts == 0 && limits == 0 && outside == 0; }
-  Drives& operator+=(const Drives& other) {
-    for (const auto member : {&Drives::count, &Drives::goals, &Drives::contacts, &Drives::limits, &Drives::steps,
-                              &Drives::outside, &Drives::emergency_stops, &Drives::proposed, &Drives::certified,
-                              &Drives::searches, &Drives::rounds, &Drives::lost_rounds})
-      this->*member += other.*member;
-    return *this;
-  }
-  [[nodiscard]] std::string Text() const {
-    const double share = proposed > 0 ? 100.0 * static_cast<double>(certified) / static_cast<double>(proposed) : 0;
-    return fmt::format("{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}",
-                       goals, count, contacts, limits, outside, steps, emergency_stops, certified, proposed, share,
-                       searches, lost_rounds, rounds);
-  }
-};
+std::string TextOf(const DriveCounts& all) {
+  const double share =
+      all.proposed > 0 ? 100.0 * static_cast<double>(all.certified) / static_cast<double>(all.proposed) : 0;
+  return fmt::format("{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}",
+                     all.goals, all.drives, all.contacts, all.limits, all.outside, all.steps, all.emergency_stops,
+                     all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
+}
 
 // Even seeds have an adversary, odd ones a disturbance at random, both within what the task declares.
-Drives Drive(Config config, int seed) {
+DriveCounts Drive(Config config, int seed) {
   constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
   config.planner.seed = seed;
   config.robot.disturbance_seed = seed;
   if (config.problem->declaration.IsDisturbed()) config.robot.disturbance = seed % 2 == 0 ? "adversarial" : "random";
   Lockstep lockstep(config, config, kStartUs);
   lockstep.Run();
-  const auto robot = nlohmann::json::parse(lockstep.robot().Summary());
-  const auto planner = nlohmann::json::parse(lockstep.planner().Summary());
-  const auto of = [](const nlohmann::json& summary, const char* key) { return summary.at(key).get<std::int64_t>(); };
-  Drives drive{.count = 1, .goals = robot.at("goal_reached").get<bool>() ? 1 : 0};
-  drive.contacts = of(robot, "contacts");
-  drive.limits = of(robot, "limits_exceeded");
-  drive.steps = of(robot, "steps_executed");
-  drive.outside = drive.steps - of(robot, "steps_inside_slice");
-  drive.emergency_stops = of(robot, "emergency_stops");
-  drive.proposed = of(planner, "proposed");
-  drive.certified = of(planner, "certified");
-  drive.searches = drive.proposed + of(planner, "searches_without_result");
-  drive.rounds = of(planner, "rounds");
-  drive.lost_rounds = of(planner, "rounds_without_certificate");
-  return drive;
+  return CountsOf(lockstep);
 }
 
 // One row: the task with each seed. False if one of them was not good.
 bool DriveAll(const std::string& name, const Config& config, const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
-  Drives all;
+  DriveCounts all;
   std::string bad;
   {
     Progress progress(name + " drives", static_cast<std::size_t>(options.seeds));
     for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
-      const Drives drive = Drive(config, seed);
-      if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), drive.Text());
+      const DriveCounts drive = Drive(config, seed);
+      if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), TextOf(drive));
       all += drive;
       progress.Advance();
     }
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-  std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", name, all.Text(), seconds.count()) << bad << std::flush;
+  std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", name, TextOf(all), seconds.count()) << bad << std::flush;
   return all.good();
 }
 

@@ -105,7 +105,8 @@ certified_plan_v2_t Plan(const Config& config, std::int64_t id, int start, const
 // The node on a bus and a clock of its own, and everything it says.
 class Rig {
  public:
-  explicit Rig(Config config) : config_(std::move(config)), node_(config_, *bus_, summary_) {
+  explicit Rig(Config config, Plant plant = {})
+      : config_(std::move(config)), node_(config_, *bus_, summary_, std::move(plant)) {
     Record(config_.bus.robot_state, states);
     Record(config_.bus.event, events);
     Record(config_.bus.transition, transitions);
@@ -266,6 +267,23 @@ TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
 }
 
 // A model as text has names of its own, so the task says what is zero while the robot stands.
+TEST(RobotSim, APlantMovesItInPlaceOfTheTarget) {
+  const Config config = PointMassTask();
+  std::vector<std::vector<double>> from;
+  double hidden = 0;
+  Rig rig(config, [&](std::span<const double> x, std::span<const double> u, std::span<double> next) {
+    from.emplace_back(x.begin(), x.end());
+    hidden += u[0];
+    std::copy(x.begin(), x.end(), next.begin());
+    next[0] += 0.01;
+    next[2] = hidden;
+  });
+  rig.Send(Plan(config, 5, 1, kOrigin));
+  rig.RunTo(3);
+  EXPECT_THAT(from, ElementsAre(kOrigin, ElementsAre(0.01, 0, 1, 0)));
+  EXPECT_EQ(rig.StateAt(3), (std::vector<double>{0.02, 0, 2, 0}));
+}
+
 TEST(RobotSim, OfATextStandsByRobotHold) {
   Config config = PointMassTask();
   ModelText text;

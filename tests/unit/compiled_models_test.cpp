@@ -128,8 +128,10 @@ TEST(EquationsHeader, WhatGainsNothingIsRefused) {
     change(text);
     return text;
   };
-  ExpectRefused(with([](ModelText& text) { text.integrator = ModelText::Integrator::kRk4; }), "midpoint and rk4");
-  ExpectRefused(with([](ModelText& text) { text.integrator = ModelText::Integrator::kMidpoint; }), "midpoint and rk4");
+  ExpectRefused(with([](ModelText& text) { text.integrator = ModelText::Integrator::kRk4; }),
+                "midpoint and rk4 are bounded stage by stage");
+  ExpectRefused(with([](ModelText& text) { text.integrator = ModelText::Integrator::kMidpoint; }),
+                "written out in `next`");
   ExpectRefused(with([](ModelText& text) { text.parameters[0].upper = 1.6; }), "model.parameters.k: is a range");
   ExpectRefused(with([](ModelText& text) {
                   text.definitions[1].value = {"1/2", 7, 5};

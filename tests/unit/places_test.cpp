@@ -115,14 +115,18 @@ TEST_F(Places, WithoutASecondOrderAreInTheirRange) {
   EXPECT_FALSE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.25 - kHair)));
 }
 
-TEST_F(Places, WithoutABoundTouchEverythingAlongThere) {
-  for (const char* x : {"1/q1", "log(q1)", "tan(q1 + pi/2)"}) {
+// There may be no place at all, so its other coordinate proves nothing.
+TEST_F(Places, WithoutABoundTouchEverything) {
+  for (const char* x : {"1/q1", "log(q1)", "tan(q1 + pi/2)", "log(q1 - 10)", "sqrt(q1)", "asin(q1 + 1)", "q1^0.5"}) {
     problem_.body.parts = {At({{x, "q2"}}, 0)};
     Stand(0, 0, 0.25);
     const Decision d = Judge(Circle(1e6, 0.5, 1));
     EXPECT_EQ(d.outcome, Outcome::kSafety) << x;
     EXPECT_EQ(d.cause, Cause::kObstacle) << x;
-    EXPECT_TRUE(IsClear(Circle(0, 1.5, 1))) << "its other coordinate is bounded";
+    EXPECT_FALSE(IsClear(Circle(0, 1.5, 1))) << x;
+    EXPECT_FALSE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 1e6))) << x;
+    problem_.body.parts = {At({{"q1", "q2"}, {x, "q2"}}, 0)};
+    EXPECT_FALSE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 1e6))) << x << ", a hull with it";
   }
 }
 

@@ -68,8 +68,15 @@ TEST(FindUnbounded, NoneWhereEverythingIsBounded) {
   EXPECT_FALSE(Find(Of("x + abs(v)*sin(w)/w + sqrt(2 + x) + atan2(v, w)"), {1, 2}));
   EXPECT_FALSE(Find(Of("x + abs(u) + abs(p)"), {-1, 1})) << "what depends on no state has no derivative by one";
   EXPECT_FALSE(Find(Of("x", Integrator::kNone, {{"unused", "1/v"}}), {-1, 1}));
-  EXPECT_FALSE(FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-9, 9)), 2));
+  EXPECT_FALSE(FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-1, 1)), 2));
   EXPECT_FALSE(Find(Of("1/v"), {-1, 1}, 0, -1));
+}
+
+TEST(FindUnbounded, InCompiledEquationsToo) {
+  const auto found = FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-9, 9)), 2);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->operation, "tan");
+  EXPECT_EQ(found->states, std::vector<int>{5});
 }
 
 TEST(FindUnbounded, APoleInAnInputOrAParameterCounts) {
