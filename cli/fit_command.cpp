@@ -115,15 +115,17 @@ void PrintForPeople(const Fit& fit, const Config& config) {
 
 int RunFit(const Options& options) {
   const auto pictures = options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
-  const Config config = LoadConfig(options.config);
+  // The model may have no value at some transition, as long as its parameters are not fitted.
+  const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const Problem& problem = *config.problem;
   const ModelText* text = problem.model->text();
   if (!text)
     throw ConfigError(config.path + ": model: " + problem.model->name() +
                       " is compiled; only the parameters of a model as text can be fitted");
+  const Transitions transitions = LoadTransitions(FilesNamedBy(options.config).transitions, *problem.model);
   Fit fit;
   try {
-    fit = FitParameters(*text, problem.transitions, NamesOf(options.names, *text));
+    fit = FitParameters(*text, transitions, NamesOf(options.names, *text));
   } catch (const std::invalid_argument& error) {
     throw ConfigError(config.path + ": " + error.what());
   }
@@ -133,7 +135,7 @@ int RunFit(const Options& options) {
     PrintForPeople(fit, config);
   for (const std::string& file : pictures)
     DrawScatter({"Errors of one step against each coordinate", "before", "after", problem.model->variable_names(),
-                 problem.model->state_names(), problem.transitions.z, fit.before, fit.after},
+                 problem.model->state_names(), transitions.z, fit.before, fit.after},
                 file);
   return fit.converged ? 0 : 1;
 }

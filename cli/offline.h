@@ -49,7 +49,10 @@ inline constexpr OfflineCommand kCheckLog{
     "Check a logger's directory for consistency: exit 0 if the event of every row of the database is unchanged in its "
     "log and no log is damaged or unknown to the database, otherwise 1; logs deleted for the quota are not errors"};
 inline constexpr OfflineCommand kRun{
-    "run", "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock"};
+    "run",
+    "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock: exit 0 if "
+    "the "
+    "robot reaches its goal, touches nothing, and keeps its limits and slices, otherwise 1"};
 
 inline constexpr OfflineCommand kOfflineCommands[] = {kInit,   kImport, kCheck,  kFit,    kExportModel, kPlan, kDeclare,
                                                       kVerify, kReplay, kAdvise, kReport, kCheckLog,    kRun};

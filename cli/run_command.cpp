@@ -2,6 +2,7 @@
 
 #include "bus/process.h"
 #include "cli/commands.h"
+#include "cli/drive_counts.h"
 #include "cli/lockstep.h"
 #include "cli/offline.h"
 #include "logger/logger_node.h"
@@ -23,7 +24,17 @@ int Run(const Options& options) {
   lockstep.Run(&logger);
   lockstep.Stop();
   logger.Stop();
-  return 0;
+  const DriveCounts counts = CountsOf(lockstep);
+  if (counts.goals == 0)
+    std::cerr << "forereach: " << options.config << ": the robot did not reach planner.goal; `forereach check "
+              << options.config << "` says what may keep it, and `forereach report` what happened\n";
+  const auto say = [&](std::int64_t count, const char* what) {
+    if (count > 0) std::cerr << "forereach: " << options.config << ": the robot " << what << " (" << count << ")\n";
+  };
+  say(counts.contacts, "touched obstacles");
+  say(counts.limits, "exceeded task.limits");
+  say(counts.outside, "left its certified slices: the declaration is false");
+  return counts.good() ? 0 : 1;
 }
 
 }  // namespace

@@ -452,19 +452,22 @@ class Examination final {
     }
   }
 
-  // Whether the robot stops from some state at least in which it does not rest, near or far from task.initial_set.
   void ExamineStops() {
     if (config_.laws.stop.empty() || config_.planner.source != "ompl") return;
-    const int most = config_.planner.tail_steps;
-    std::optional<RobotMotion> motion;
     try {
-      motion.emplace(config_, Braking::kPlanned);
+      ExamineStop(RobotMotion(config_, Braking::kPlanned), "planner.stop", config_.planner.tail_steps,
+                  " (planner.tail_steps): no plan is found from a robot that moves");
+      if (!config_.laws.emergency_stop.empty())
+        ExamineStop(RobotMotion(config_, Braking::kHardest), "planner.emergency_stop", kMaxSteps,
+                    ": no stop is found for a robot whose plan is withdrawn");
     } catch (const ConfigError& error) {
       Remark("planner.stop", std::string("no planner starts with this task: ") + error.what(), "correct it");
-      return;
     }
+  }
+
+  // Whether the robot stops from some state at least in which it does not rest, near or far from task.initial_set.
+  void ExamineStop(const RobotMotion& motion, const char* key, int most, const char* consequence) {
     std::mt19937_64 random(1);
-    Eigen::MatrixXd tail;
     const Eigen::VectorXd center = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;
     int samples = 0;
     for (int sample = 1; sample <= kSamples; ++sample) {
@@ -472,16 +475,37 @@ class Examination final {
       for (int k = 0; k < model_.num_states(); ++k)
         z[ToSize(k)] = center[k] + (z[ToSize(k)] - center[k]) * sample / kSamples;
       const std::span<const double> x(z.data(), ToSize(model_.num_states()));
-      if (!problem_.domain.Contains({z.data(), ToSize(model_.num_variables())}) || motion->IsAtRest(x)) continue;
+      if (!problem_.domain.Contains({z.data(), ToSize(model_.num_variables())}) || motion.IsAtRest(x)) continue;
       ++samples;
-      for (int way = 0; way < motion->num_tails(); ++way)
-        if (motion->Brake(x, way, most, tail)) return;
+      if (Stops(motion, x, most)) return;
     }
     if (samples > 0)
-      Add("planner.stop",
-          "from none of " + std::to_string(samples) + " states in the domain it brings the robot to rest within " +
-              Count(most, "step") + " (planner.tail_steps): no plan is found from a robot that moves",
-          "look whether the law has a value there; brake harder, allow more steps, or raise planner.at_rest");
+      Add(key,
+          "from none of " + std::to_string(samples) +
+              " states in the domain it brings the robot to rest inside the domain within " + Count(most, "step") +
+              consequence,
+          "look whether the law has a value there and rest is in the domain; brake harder, allow more steps, or raise "
+          "planner.at_rest");
+  }
+
+  [[nodiscard]] bool Stops(const RobotMotion& motion, std::span<const double> x, int most) const {
+    Eigen::MatrixXd tail;
+    const auto n = x.size();
+    for (int way = 0; way < motion.num_tails(); ++way) {
+      if (!motion.Brake(x, way, most, tail)) continue;
+      bool is_inside = true;
+      std::array<double, kMaxVariables> z{};
+      std::array<double, kMaxStates> next{};
+      std::ranges::copy(x, z.begin());
+      for (Eigen::Index t = 0; t < tail.cols() && is_inside; ++t) {
+        std::copy_n(tail.col(t).data(), tail.rows(), z.begin() + static_cast<std::ptrdiff_t>(n));
+        model_.Evaluate({z.data(), ToSize(model_.num_variables())}, {next.data(), n});
+        std::copy_n(next.begin(), n, z.begin());
+        is_inside = problem_.domain.Contains({z.data(), ToSize(model_.num_variables())});
+      }
+      if (is_inside) return true;
+    }
+    return false;
   }
 
   // At random in the domain's ranges, or in a corner.
@@ -516,8 +540,7 @@ class Examination final {
         Add("planner.goal", "task.obstacles[" + std::to_string(i) + "] covers the goal", "move one of them");
   }
 
-  // The longest way of the robot's frame in one nominal step, of those tried; a lower bound.
-  // By any point of the body.
+  // The longest way of a point of the body in one nominal step, of those tried; a lower bound.
   [[nodiscard]] double LongestStep() const {
     const BodyPlaces places(model_, problem_.projection, problem_.body);
     std::mt19937_64 random(1);
@@ -544,8 +567,7 @@ class Examination final {
     return extent;
   }
 
-  // The least extent along an axis of the largest part.
-  // A part at expressions is as thick as its radius at least.
+  // The least extent along an axis of the largest part; of a part at expressions, its diameter.
   [[nodiscard]] double BodyThickness() const {
     double thickness = 0;
     for (const BodyPart& part : problem_.body.parts) {

@@ -20,11 +20,11 @@ namespace forereach {
 namespace {
 
 constexpr int kMostEvaluations = 2000;
-constexpr double kDifference = 1e-12;              // the square of the relative step of a difference
-constexpr double kStep = 1e-6, kLeastStep = 1e-9;  // of the differences at the solution, over a parameter or its unit
-constexpr double kScaleUnits = 16;                 // units in the last place of x+: no error counts as less
-constexpr double kDependence = 1e-8;               // columns that depend on each other up to this much are dependent
-constexpr double kShare = 1e-4;                    // of a parameter in an undetermined direction: less is rounding
+constexpr double kDifference = 1e-12;  // the square of the relative step of a difference
+constexpr double kStep = 6e-6;         // of central differences: the cube root of a rounding
+constexpr double kScaleUnits = 16;     // units in the last place of x+: no error counts as less
+constexpr double kDependence = 1e-8;   // columns that depend on each other up to this much are dependent
+constexpr double kShare = 1e-4;        // of a parameter in an undetermined direction: less is rounding
 
 // x+ - f0(z) of all transitions, N-by-n; of an angle without whole turns.
 Eigen::MatrixXd ErrorsOf(const ModelText& text, const Transitions& transitions) {
@@ -102,13 +102,11 @@ class Problem {
     const auto rows = static_cast<Eigen::Index>(transitions_.x_next.rows());
     Eigen::VectorXd above(values()), below(values());
     for (Eigen::Index c = 0; c < x.size(); ++c) {
-      const double step = std::max(kStep * std::abs(x[c]), kLeastStep);
-      Eigen::VectorXd moved = x;
-      moved[c] = x[c] + step;
-      (void)(*this)(moved, above);
-      moved[c] = x[c] - step;
-      (void)(*this)(moved, below);
-      found.columns.col(c) = (above - below) / (2 * step);
+      const double step = kStep * std::max(std::abs(x[c]), 1.0);
+      const bool has_above = Scaled(x, c, step, above), has_below = Scaled(x, c, -step, below);
+      if (!has_above) static_cast<void>(Scaled(x, c, 0, above));
+      if (!has_below) static_cast<void>(Scaled(x, c, 0, below));
+      found.columns.col(c) = (above - below) / (has_above && has_below ? 2 * step : step);
       for (Eigen::Index k = 0; k < rounding_.size(); ++k) {
         const auto touched = (found.columns.col(c).segment(k * rows, rows).array() != 0).count();
         const double each = rounding_[k] / step;
@@ -120,6 +118,13 @@ class Problem {
   }
 
  private:
+  // The scaled errors where one parameter is moved. False if the model has no value there.
+  bool Scaled(Eigen::VectorXd x, Eigen::Index c, double by, Eigen::VectorXd& values) const {
+    x[c] += by;
+    (*this)(x, values);
+    return Errors(x).allFinite();
+  }
+
   // About a unit in the last place of each state's largest value.
   static Eigen::RowVectorXd RoundingOf(const Transitions& transitions) {
     return std::numeric_limits<double>::epsilon() * transitions.x_next.cwiseAbs().colwise().maxCoeff();

@@ -122,8 +122,9 @@ bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
           state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps);
 }
 
-// Simulates from the measured state through the controls that will be applied before the start. An angle gets the turns
-// that bring it nearest to the middle of the domain.
+// Simulates from the measured state through the controls that will be applied before the start. A plan that starts
+// where the executing one ends takes over before the robot holds still. An angle gets the turns that bring it nearest
+// to the middle of the domain.
 std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state, std::int64_t lead_steps) const {
   const std::size_t n = static_cast<std::size_t>(state.num_states);
   Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
@@ -135,7 +136,7 @@ std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& st
     std::copy_n(plan->control[step], plan->num_inputs, std::copy_n(x.data(), n, z.begin()));
     residual_.Predict({z.data(), n + static_cast<std::size_t>(plan->num_inputs)}, {x.data(), n});
   }
-  if (!executing || start >= plan->num_steps) proposer_->motion().Hold({x.data(), n});
+  if (!executing || start > plan->num_steps) proposer_->motion().Hold({x.data(), n});
   for (const int k : config_.problem->model->angles()) {  // room to turn either way
     const Box& domain = config_.problem->domain.state;
     const double middle = domain.lower()[k] / 2 + domain.upper()[k] / 2;

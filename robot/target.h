@@ -27,7 +27,8 @@ class Target {
 };
 
 /** What moves a simulated robot: sets `next` to the state that is measured one period after x, under u. It may keep
-what is not measured, so it is called once for each step, in their order. @param x what it set last, give or take a
+what is not measured, so it is called once for each step, in their order; between two of them the robot may have stood
+or been braked, and x tells. A task's residual is the target's, not a plant's. @param x what it set last, give or take a
 disturbance, a brake and whole turns of an angle. @param next n entries; it may be x itself. */
 using Plant = std::function<void(std::span<const double> x, std::span<const double> u, std::span<double> next)>;
 

@@ -1,6 +1,7 @@
 #include "certifier/dynamics/text_enclosure.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 #include "certifier/dynamics/evaluate.h"
@@ -23,8 +24,12 @@ Interval Around(double half_width) { return {-half_width, half_width}; }
 
 TextEnclosure::TextEnclosure(const ExpressionNames& names, std::span<const ExpressionText> expressions) {
   ProgramDraft draft = MakeProgram(names, expressions);
-  RequireDerivatives(names, expressions);
-  draft.Differentiate();
+  try {
+    draft.Differentiate();
+  } catch (const std::invalid_argument&) {
+    RequireDerivatives(names, expressions);  // says where there is none
+    throw;
+  }
   program_ = std::make_shared<const ProgramDraft>(std::move(draft));
   const Program program = program_->View();
   over_box_ = MarksOf(program, program.value);

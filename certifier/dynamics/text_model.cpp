@@ -84,8 +84,12 @@ std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
   const ExpressionNames names{NamesIn(text.states), NamesIn(text.inputs), text.parameters, text.definitions};
   const auto program = std::make_shared<ProgramDraft>(MakeProgram(names, text.equations));
   if (text.integrator == ModelText::Integrator::kEuler) AddEulerStep(text, *program);
-  RequireDerivatives(names, text.equations);
-  program->Differentiate();
+  try {
+    program->Differentiate();
+  } catch (const std::invalid_argument&) {
+    RequireDerivatives(names, text.equations);  // says where there is none
+    throw;
+  }
 
   // No compiled model has such a name: what is known of those by their names is not known of this one.
   ModelNames all{text.name + " (text)",

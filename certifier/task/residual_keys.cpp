@@ -1,5 +1,6 @@
 // The rows of residuals: `residual`, which `forereach declare` bounds, and `robot.residual`.
 #include <iterator>
+#include <numbers>
 
 #include "certifier/dynamics/angles.h"
 #include "certifier/dynamics/expression.h"
@@ -73,12 +74,16 @@ ResidualText ReadText(const Document& file, const std::string& path) {
   return text;
 }
 
-// A robot is the same after a turn, so what it does beyond the model is.
-// @throws ExpressionError
-void RequireSameAfterTurns(const NominalModel& model, const ParametricResidual& residual, const Program& program) {
+// The simulated robot turns its angles into [-pi, pi]; where a domain goes beyond, the residual has to be the same
+// after a turn. @throws ExpressionError
+void RequireSameAfterTurns(const NominalModel& model, const Box& states, const ParametricResidual& residual,
+                           const Program& program) {
+  const auto turns = [&](int k) {
+    return !(-std::numbers::pi <= states.lower()[k] && states.upper()[k] <= std::numbers::pi);
+  };
   for (std::size_t k = 0; k < residual.values.size(); ++k)
     for (const int angle : model.angles())
-      if (!IsSameAfterTurn(program, static_cast<int>(k), angle))
+      if (turns(angle) && !IsSameAfterTurn(program, static_cast<int>(k), angle))
         throw ExpressionError(residual.values[k].line, residual.values[k].column,
                               "the residual of " + model.state_names()[k] +
                                   " is not seen to be the same after a turn of the angle " +
@@ -86,13 +91,14 @@ void RequireSameAfterTurns(const NominalModel& model, const ParametricResidual& 
 }
 
 // The residual at `path`. Its expressions are parsed here for the first time.
-ParametricResidual ReadResidual(const Document& file, const std::string& path, const NominalModel& model) {
+ParametricResidual ReadResidual(const Document& file, const std::string& path, const Problem& problem) {
+  const NominalModel& model = *problem.model;
   const bool is_named = Has(file, path, "name");
   const ResidualText text = ReadText(file, path);
   try {
     const ParametricResidual residual = ResidualOf(model, text);
     const ProgramDraft program = MakeProgram(residual.names, residual.values);
-    RequireSameAfterTurns(model, residual, program.View());
+    RequireSameAfterTurns(model, problem.domain.state, residual, program.View());
     return residual;
   } catch (const ExpressionError& error) {
     if (!is_named) FailAt(file.path(), error);
@@ -144,7 +150,7 @@ std::vector<Key> ResidualKeys() {
           "The residual's equations, as text or by name, with intervals for its parameters. `forereach declare` "
           "derives the declaration from them. The certifier does not use this key.",
           [](const Document& file, const std::string& path, TaskDraft& draft) {
-            draft.config.residual = ReadResidual(file, path, *draft.problem.model);
+            draft.config.residual = ReadResidual(file, path, draft.problem);
           }));
   return keys;
 }
@@ -159,7 +165,7 @@ std::vector<Key> RobotResidualKeys() {
                             "The difference between the real robot and the nominal model, as text or by name.",
                             [](const Document& file, const std::string& path, TaskDraft& draft) {
                               if (Has(file, path, "name") && file.Text(path + ".name") == kNone) return;
-                              draft.config.robot_residual = ReadResidual(file, path, *draft.problem.model);
+                              draft.config.robot_residual = ReadResidual(file, path, draft.problem);
                             }),
                         kNone)});
   return keys;

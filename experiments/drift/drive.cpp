@@ -122,7 +122,7 @@ Cells Row(const std::string& name, const DriftDrives& all) {
 
 void DriftCar::Step(std::span<const double> x, std::span<const double> u, std::span<double> next) {
   const Eigen::Map<const Eigen::VectorXd> measured(x.data(), std::ssize(x));
-  if (!has_begun_) state_ = Rolling(x[kSpeed], x[kDelta]);
+  if (!has_begun_ || x[kSpeed] != state_[kSpeed]) state_ = Rolling(x[kSpeed], x[kDelta]);  // or it was braked
   has_begun_ = true;
   state_.head(measured.size()) = measured;
   const DriftInput input(u[0], u[1]);
@@ -196,7 +196,7 @@ void RunDriftDrives(const DriftDriveOptions& options, std::ostream& out) {
       "# The closed loop on CommonRoad's single-track drift model\n\nMade by `" + options.command + "`.\n" +
       Markdown({"w", "goals", "contacts", "limits exceeded", "steps outside their slices", "certified", "certified, %",
                 "abstained", "searches without a candidate", "rounds without a certificate", "ended by a stop",
-                "drives with a contradiction or fault", "drives beyond between"},
+                "drives with a candidate refused for a contradiction or fault", "drives beyond between"},
                rows) +
       "\nThe largest in any drive: acceleration " + List(most.most.acceleration) + " m/s^2, turn rate " +
       Text("%.2f rad/s", most.most.turn_rate) + ", turn acceleration " +

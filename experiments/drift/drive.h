@@ -37,7 +37,7 @@ class DriftCar final {
 struct DriftDrives {
   DriveCounts counts;
   std::int64_t beyond_between = 0;  ///< Drives that moved beyond task.between between two samples
-  std::int64_t faulted = 0;  ///< Drives in which a step contradicted the declaration or another fault was latched
+  std::int64_t faulted = 0;         ///< Drives with a candidate that was refused for a contradiction or a latched fault
   Between most{Eigen::Vector2d::Zero(), 0, 0, 0};
   double most_lateral = 0;  ///< |v omega|, m/s^2
 };

@@ -57,7 +57,8 @@ class KeptTaskTest : public testing::Test {
     for (const char* name : {"one", "two"}) {
       scratch_->Write(std::string("tasks_of_mine/") + name + ".yaml", text + "# " + name + "\n");
       const Output run = Forereach("run --config " + TaskOf(name) + " --directory " + (*scratch_ / "log") + " 2>&1");
-      ASSERT_EQ(run.code, 0) << run.text;
+      ASSERT_EQ(run.code, 1) << run.text;
+      ASSERT_THAT(run.text, HasSubstr("the robot did not reach planner.goal")) << "in 2 s";
     }
     logs_ = new std::vector<std::string>;
     for (const std::string& log : LogDirectory(*scratch_ / "log").Logs()) logs_->push_back(*scratch_ / "log/" + log);

@@ -415,15 +415,20 @@ TEST(NoNominalValue, NamesFileLineAndState) {
         << next;
 }
 
-// The simulated robot reports its angles wrapped, so another residual would jump.
+// The simulated robot wraps its angles, so another residual would jump, unless the domain is within a turn.
 TEST_F(AnglesTest, AResidualIsTheSameAfterATurn) {
   for (const std::string before : {"residual: {", "robot: {residual: {"}) {
     const auto with = [&](const std::string& value) {
       return Turning("  angles: [theta]\n") + before + "add: {v: " + value + "}}" + (before[1] == 'o' ? "}" : "") +
              "\n";
     };
-    EXPECT_EQ(Error(with("0.1*sin(theta)")), "");
-    EXPECT_THAT(Error(with("0.1*theta")),
+    EXPECT_EQ(Error(with("0.1*theta")), "");
+    const auto beyond = [&](const std::string& value, const char* most) {
+      return Replaced(with(value), "upper: [1, 1, 1, 1]", std::string("upper: [1, 1, ") + most + ", 1]");
+    };
+    EXPECT_EQ(Error(beyond("0.1*theta", "3.14")), "");
+    EXPECT_EQ(Error(beyond("0.1*sin(theta)", "3.15")), "");
+    EXPECT_THAT(Error(beyond("0.1*theta", "3.15")),
                 MatchesRegex("task.yaml:17:[0-9]+: the residual of v is not seen to be the same after a turn of the "
                              "angle theta by 2 pi: write it with sin, cos or tan of it"));
   }

@@ -117,6 +117,40 @@ TEST(Fit, NamesThoseThatAreUndeterminedTogether) {
   }
 }
 
+// Positions of a map's grid are millions of metres.
+TEST(Fit, LargeValuesLeaveAParameterDetermined) {
+  ModelText text = Products();
+  text.equations[0] = {"x + dt*u*(1 + d)", 1, 1};
+  Transitions data{Eigen::MatrixXd(200, 3), Eigen::MatrixXd(200, 2)};
+  for (Eigen::Index i = 0; i < 200; ++i) {
+    const double x = 5e6 + static_cast<double>(i), u = 1 + 0.01 * static_cast<double>(i);
+    data.z.row(i) << x, 0, u;
+    data.x_next.row(i) << x + 0.1 * u * 1.002, 0;
+  }
+  text.equations[1] = {"y", 2, 1};
+  const Fit fit = FitParameters(text, data, {"d"});
+  EXPECT_NEAR(fit.parameters[0].after, 0.002, 1e-6);
+  EXPECT_LT(fit.parameters[0].deviation, 1e-6);
+}
+
+// Below its solution the model has no value, so its derivative there is from one side.
+TEST(Fit, AtTheEdgeOfTheModelsDomainItTakesOneSide) {
+  ModelText text = Products();
+  text.parameters[4] = {"d", 0, 0};
+  text.equations = {{"x + u*d + 0*sqrt(d)", 1, 1}, {"y", 2, 1}};
+  std::mt19937 random(SeedOf(7));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  Transitions data{Eigen::MatrixXd(100, 3), Eigen::MatrixXd(100, 2)};
+  for (Eigen::Index i = 0; i < 100; ++i) {
+    const double x = uniform(random), u = uniform(random);
+    data.z.row(i) << x, 0, u;
+    data.x_next.row(i) << x - 0.05 * u + (i % 2 == 0 ? 0.1 : -0.1), 0;
+  }
+  const Fit fit = FitParameters(text, data, {"d"});
+  EXPECT_EQ(fit.parameters[0].after, 0);
+  EXPECT_NEAR(fit.parameters[0].deviation, 0.0175, 0.005) << "0.1 / (10 * 0.577)";
+}
+
 // The model has x exactly, up to rounding. That weighs nothing, and d is found from y.
 TEST(Fit, TheRoundingOfAnExactStateWeighsNothing) {
   std::mt19937 random(SeedOf(6));
