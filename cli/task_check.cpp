@@ -30,6 +30,7 @@ namespace {
 constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
 constexpr int kSamples = 2000;                 // of the domain, for the length of a step
 constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
+constexpr double kShareBeyond = 0.05;          // of the data's range
 
 std::string Up(double x) { return RoundedUp(x, 4); }
 std::string Down(double x) { return RoundedDown(x, 4); }
@@ -412,7 +413,7 @@ class Examination final {
     for (std::size_t l = 0; l < result_.coordinates.size(); ++l) {
       const TaskCheck::Coordinate& coordinate = result_.coordinates[l];
       if (!coordinate.matters) continue;
-      const double slack = 0.05 * (coordinate.largest - coordinate.least);
+      const double slack = kShareBeyond * (coordinate.largest - coordinate.least);
       double farthest = 0;
       int step = 0;
       for (int t = 0; t < tube.length(); ++t) {
@@ -533,11 +534,24 @@ class Examination final {
             names_[k] + ": " + ToText(goal[ToSize(r)]) + " is outside [" + ToText(Lower(k)) + ", " + ToText(Upper(k)) +
                 "] of the domain: no certified plan gets there",
             "move the goal, or widen the domain, if the declaration holds there");
+      RemarkOnData(k, goal[ToSize(r)]);
     }
     for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
       if (!config_.obstacles[i].motion() &&
           -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
         Add("planner.goal", "task.obstacles[" + std::to_string(i) + "] covers the goal", "move one of them");
+  }
+
+  // Of a state of the goal on which the residual depends.
+  void RemarkOnData(std::size_t k, double goal) {
+    if (k >= result_.coordinates.size() || !result_.coordinates[k].matters) return;
+    const TaskCheck::Coordinate& coordinate = result_.coordinates[k];
+    const double away = std::max(coordinate.least - goal, goal - coordinate.largest);
+    if (away > kShareBeyond * (coordinate.largest - coordinate.least))
+      Remark("planner.goal",
+             coordinate.name + ": " + ToText(goal) + " is " + Up(away) + " beyond the data, which lie in [" +
+                 Down(coordinate.least) + ", " + Up(coordinate.largest) + "]: the further, the wider the tube",
+             "record steps on the way there");
   }
 
   // The longest way of a point of the body in one nominal step, of those tried; a lower bound.

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** A transition at whose location f0 has no finite enclosure, as log(0) or 1/0. */

@@ -468,6 +468,15 @@ TEST_F(CheckTest, Goals) {
   EXPECT_EQ(with("[3.31, 2]").code, 0);
 }
 
+// Where the error depends on the place, data are needed on the way to the goal: here px is at most 1 in them.
+TEST_F(CheckTest, GoalsBeyondTheData) {
+  WriteTask("  between: samples\n", "  between: samples\nplanner: {goal: [8, 0], goal_radius: 0.5}\n");
+  EXPECT_THAT(Check().text, Not(HasSubstr("planner.goal: remark")));
+  scratch_.Write("task.yaml", Replaced(Read(task_), "lipschitz:\n", "lipschitz:\n    px: {px: 0.001}\n"));
+  EXPECT_THAT(Check().text, HasSubstr("planner.goal: remark: px: 8 is 7 beyond the data, which lie in [0, 1]"));
+  EXPECT_EQ(Check().code, 0) << Check().text;
+}
+
 TEST_F(CheckTest, Rest) {
   const auto with = [&](const std::string& bound) {
     WriteTask("  between: samples\n", "  between: samples\n  rest: {vx: " + bound + "}\n");
