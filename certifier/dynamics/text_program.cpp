@@ -27,9 +27,8 @@ class Known final {
   }
   // What is wrong with a definition is said with its place.
   void Define(const ModelText::Definition& definition, ProgramDraft& program) {
-    const auto& [name, text] = definition;
-    const Symbol value = ValueOf(text, program);
-    AtPlaceOf(text, [&] { Add(name, value); });
+    const Symbol value = ValueOf(definition.value, program);
+    AtPlaceOf(definition.value, [&] { Add(definition.name, value); });
   }
   [[nodiscard]] Symbol ValueOf(const ExpressionText& text, ProgramDraft& program) const {
     const Expression expression = ParseExpression(text, names_);
