@@ -112,12 +112,11 @@ Json ToJson(const TaskCheck& check) {
 }
 
 int Check(const Options& options) {
-  const std::vector<std::string> files =
-      options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
+  std::vector<std::string> files = options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
   const TaskCheck check = CheckTask(options.check);
-  const bool has_picture = !files.empty() && check.is_planar;
-  for (const std::string& file : files)
-    if (has_picture) DrawPicture(check.picture, file);
+  const bool lacks_picture = !files.empty() && !check.is_planar;
+  if (lacks_picture) files.clear();
+  for (const std::string& file : files) DrawPicture(check.picture, file);
   if (options.json) {
     std::cout << JsonText(ToJson(check)) << std::endl;
   } else {
@@ -125,12 +124,10 @@ int Check(const Options& options) {
     PrintData(check, out);
     PrintTube(check, options, out);
     PrintFindings(check, out);
-    for (const std::string& file : files)
-      if (has_picture) out << "picture: " << file << "\n";
+    for (const std::string& file : files) out << "picture: " << file << "\n";
     std::cout << out.str() << std::flush;
   }
-  if (!files.empty() && !has_picture)
-    throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
+  if (lacks_picture) throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
   return check.HasFindings() ? 1 : 0;
 }
 

@@ -13,6 +13,7 @@
 #include "certifier/task/json_text.h"
 #include "cli/declare_by.h"
 #include "cli/progress.h"
+#include "identify/lone_slopes.h"
 
 namespace forereach {
 namespace {
@@ -53,13 +54,16 @@ void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostre
   if (proposal.declaration.lipschitz.maxCoeff() == 0) out << "  no slopes are needed\n";
 }
 
-void PrintLoneSlopes(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+// Of each row, each column.
+using LoneSlopes = std::vector<std::vector<LoneSlope>>;
+
+void PrintLoneSlopes(const LoneSlopes& rows, const NominalModel& model, std::ostream& out) {
   const std::vector<std::string> names = model.variable_names();
   int flat = 0;
   bool has_slopes = false;
-  for (std::size_t k = 0; k < proposal.rows.size(); ++k)
+  for (std::size_t k = 0; k < rows.size(); ++k)
     for (std::size_t l = 0; l < names.size(); ++l) {
-      const LoneSlope& lone = proposal.rows[k].lone[l];
+      const LoneSlope& lone = rows[k][l];
       if (lone.pairs > 0 && !(lone.slope > 0)) ++flat;
       if (!(lone.slope > 0)) continue;
       if (!has_slopes)
@@ -132,7 +136,7 @@ void PrintMeaning(const Proposal& proposal, const NominalModel& model, const Dat
 
 // ---- for programs
 
-Json ToJson(const Proposal& proposal, const Config& config, const DataCommand& command) {
+Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Config& config, const DataCommand& command) {
   const NominalModel& model = *config.problem->model;
   const std::vector<std::string> names = model.variable_names();
   Json document{{"proven", false},
@@ -157,7 +161,7 @@ Json ToJson(const Proposal& proposal, const Config& config, const DataCommand& c
                                 {"knuth_chou", row.knuth_chou}});
     for (std::size_t l = 0; l < names.size(); ++l) {
       const auto column = static_cast<Eigen::Index>(l);
-      const LoneSlope& lone = row.lone[l];
+      const LoneSlope& lone = lone_slopes[k][l];
       document["alone"].push_back(
           {{"row", names[k]},
            {"column", names[l]},
@@ -188,16 +192,20 @@ int DeclareFromData(const DataCommand& command) {
   const ProposalOptions options{command.factor, command.estimate_noise, ColumnsBy(command.by, *problem.model),
                                 [&] { progress->Advance(); }};
   try {
-    const Proposal proposal = Propose(problem.declaration, Observe(*problem.model, problem.transitions), options);
+    const Observations observations = Observe(*problem.model, problem.transitions);
+    const Proposal proposal = Propose(problem.declaration, observations, options);
     progress.reset();
+    LoneSlopes lone_slopes;
+    for (int k = 0; k < problem.model->num_states(); ++k)
+      lone_slopes.push_back(FindLoneSlopes(proposal.declaration, observations, k, options.columns[ToSize(k)]));
     if (command.json) {
-      std::cout << JsonText(ToJson(proposal, config, command)) << std::endl;
+      std::cout << JsonText(ToJson(proposal, lone_slopes, config, command)) << std::endl;
       return 0;
     }
     std::ostringstream text;
     text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
     PrintSlopes(proposal, *problem.model, text);
-    PrintLoneSlopes(proposal, *problem.model, text);
+    PrintLoneSlopes(lone_slopes, *problem.model, text);
     PrintErrors(proposal, *problem.model, text);
     PrintMeaning(proposal, *problem.model, command, text);
     std::cout << text.str() << "\ndeclaration:\n"

@@ -21,6 +21,7 @@
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
 #include "planner_bridge/motion.h"
+#include "planner_bridge/reference.h"
 #include "records/decision_json.h"
 #include "records/outlines.h"
 
@@ -413,22 +414,30 @@ class Examination final {
     for (std::size_t l = 0; l < result_.coordinates.size(); ++l) {
       const TaskCheck::Coordinate& coordinate = result_.coordinates[l];
       if (!coordinate.matters) continue;
-      const double slack = kShareBeyond * (coordinate.largest - coordinate.least);
-      double farthest = 0;
+      double farthest = 0, place = coordinate.least;
       int step = 0;
       for (int t = 0; t < tube.length(); ++t) {
         const double value =
             l < ToSize(model_.num_states()) ? tube.slice(t).center(static_cast<int>(l)) : controls_(IndexIn(l), t);
-        const double away = std::max(coordinate.least - value, value - coordinate.largest);
-        if (away > farthest) farthest = away, step = t;
+        if (const double away = Beyond(coordinate, value); away > farthest) farthest = away, place = value, step = t;
       }
-      if (farthest > slack)
-        Remark("transitions",
-               coordinate.name + ": at step " + std::to_string(step) + " " + PlanName() + " is " + Up(farthest) +
-                   " beyond the data, which lie in [" + Down(coordinate.least) + ", " + Up(coordinate.largest) +
-                   "]: the further, the wider the tube",
-               "record steps there");
+      RemarkOnData(coordinate, place, "transitions", "at step " + std::to_string(step) + " " + PlanName(),
+                   "record steps there");
     }
+  }
+
+  [[nodiscard]] static double Beyond(const TaskCheck::Coordinate& data, double value) {
+    return std::max(data.least - value, value - data.largest);
+  }
+
+  // If `value` of a coordinate on which the residual depends is beyond its data.
+  void RemarkOnData(const TaskCheck::Coordinate& data, double value, const std::string& key, const std::string& what,
+                    const char* advice) {
+    if (!data.matters || !(Beyond(data, value) > kShareBeyond * (data.largest - data.least))) return;
+    Remark(key,
+           data.name + ": " + what + " is " + Up(Beyond(data, value)) + " beyond the data, which lie in [" +
+               Down(data.least) + ", " + Up(data.largest) + "]: the further, the wider the tube",
+           advice);
   }
 
   // ---- Goal, start, brakes, and the length of a step.
@@ -491,18 +500,14 @@ class Examination final {
 
   [[nodiscard]] bool Stops(const RobotMotion& motion, std::span<const double> x, int most) const {
     Eigen::MatrixXd tail;
-    const auto n = x.size();
     for (int way = 0; way < motion.num_tails(); ++way) {
       if (!motion.Brake(x, way, most, tail)) continue;
+      const Eigen::MatrixXd states = Rollout(model_, Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x)), tail);
       bool is_inside = true;
-      std::array<double, kMaxVariables> z{};
-      std::array<double, kMaxStates> next{};
-      std::ranges::copy(x, z.begin());
-      for (Eigen::Index t = 0; t < tail.cols() && is_inside; ++t) {
-        std::copy_n(tail.col(t).data(), tail.rows(), z.begin() + static_cast<std::ptrdiff_t>(n));
-        model_.Evaluate({z.data(), ToSize(model_.num_variables())}, {next.data(), n});
-        std::copy_n(next.begin(), n, z.begin());
-        is_inside = problem_.domain.Contains({z.data(), ToSize(model_.num_variables())});
+      for (Eigen::Index t = 0; t < tail.cols(); ++t) {
+        Eigen::VectorXd z(model_.num_variables());
+        z << states.col(t + 1), tail.col(t);
+        is_inside = is_inside && problem_.domain.Contains({z.data(), ToSize(z.size())});
       }
       if (is_inside) return true;
     }
@@ -534,24 +539,14 @@ class Examination final {
             names_[k] + ": " + ToText(goal[ToSize(r)]) + " is outside [" + ToText(Lower(k)) + ", " + ToText(Upper(k)) +
                 "] of the domain: no certified plan gets there",
             "move the goal, or widen the domain, if the declaration holds there");
-      RemarkOnData(k, goal[ToSize(r)]);
+      if (k < result_.coordinates.size())  // none without data
+        RemarkOnData(result_.coordinates[k], goal[ToSize(r)], "planner.goal", ToText(goal[ToSize(r)]),
+                     "record steps on the way there");
     }
     for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
       if (!config_.obstacles[i].motion() &&
           -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
         Add("planner.goal", "task.obstacles[" + std::to_string(i) + "] covers the goal", "move one of them");
-  }
-
-  // Of a state of the goal on which the residual depends.
-  void RemarkOnData(std::size_t k, double goal) {
-    if (k >= result_.coordinates.size() || !result_.coordinates[k].matters) return;
-    const TaskCheck::Coordinate& coordinate = result_.coordinates[k];
-    const double away = std::max(coordinate.least - goal, goal - coordinate.largest);
-    if (away > kShareBeyond * (coordinate.largest - coordinate.least))
-      Remark("planner.goal",
-             coordinate.name + ": " + ToText(goal) + " is " + Up(away) + " beyond the data, which lie in [" +
-                 Down(coordinate.least) + ", " + Up(coordinate.largest) + "]: the further, the wider the tube",
-             "record steps on the way there");
   }
 
   // The longest way of a point of the body in one nominal step, of those tried; a lower bound.

@@ -67,9 +67,7 @@ class Problem {
 
   // Parameters without a finite value are far from every solution: the solver then takes a shorter step.
   int operator()(const Eigen::VectorXd& x, Eigen::VectorXd& values) const {
-    Eigen::MatrixXd errors = Errors(x);
-    errors.array().rowwise() /= scales_.array();
-    values = errors.reshaped();
+    static_cast<void>(Scaled(x, values));
     for (double& value : values)
       if (!std::isfinite(value)) value = 1e10;
     return 0;
@@ -103,9 +101,10 @@ class Problem {
     Eigen::VectorXd above(values()), below(values());
     for (Eigen::Index c = 0; c < x.size(); ++c) {
       const double step = kStep * std::max(std::abs(x[c]), 1.0);
-      const bool has_above = Scaled(x, c, step, above), has_below = Scaled(x, c, -step, below);
-      if (!has_above) static_cast<void>(Scaled(x, c, 0, above));
-      if (!has_below) static_cast<void>(Scaled(x, c, 0, below));
+      const Eigen::VectorXd by = step * Eigen::VectorXd::Unit(x.size(), c);
+      const bool has_above = Scaled(x + by, above), has_below = Scaled(x - by, below);
+      if (!has_above) static_cast<void>(Scaled(x, above));
+      if (!has_below) static_cast<void>(Scaled(x, below));
       found.columns.col(c) = (above - below) / (has_above && has_below ? 2 * step : step);
       for (Eigen::Index k = 0; k < rounding_.size(); ++k) {
         const auto touched = (found.columns.col(c).segment(k * rows, rows).array() != 0).count();
@@ -118,11 +117,12 @@ class Problem {
   }
 
  private:
-  // The scaled errors where one parameter is moved. False if the model has no value there.
-  bool Scaled(Eigen::VectorXd x, Eigen::Index c, double by, Eigen::VectorXd& values) const {
-    x[c] += by;
-    (*this)(x, values);
-    return Errors(x).allFinite();
+  // The scaled errors. False if the model has no value at some transition.
+  bool Scaled(const Eigen::VectorXd& x, Eigen::VectorXd& values) const {
+    Eigen::MatrixXd errors = Errors(x);
+    errors.array().rowwise() /= scales_.array();
+    values = errors.reshaped();
+    return values.allFinite();
   }
 
   // About a unit in the last place of each state's largest value.

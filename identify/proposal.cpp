@@ -64,7 +64,6 @@ Proposal Propose(const Declaration& declaration, const Observations& observation
     ProposedRow& row = proposal.rows[ToSize(k)];
     row.strongin = strongin[ToSize(k)];
     row.knuth_chou = knuth_chou[ToSize(k)];
-    row.lone = FindLoneSlopes(proposed, observations, k, options.columns[ToSize(k)]);
     row.least = Eigen::RowVectorXd::Zero(scales.size());
     for (int l = 0; l < scales.size(); ++l)
       if (proposed.lipschitz(k, l) > 0) row.least[l] = FindSmallestEntry(proposed, observations, k, l).slopes[l];

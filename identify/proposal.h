@@ -6,7 +6,6 @@ declaration and cannot establish one. */
 #include <stdexcept>
 #include <vector>
 
-#include "identify/lone_slopes.h"
 #include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
 
@@ -24,8 +23,7 @@ struct ProposalOptions {
 struct ProposedRow {
   SmallestRow smallest;  ///< With the proposed sigma.
   NoiseFloor noise;
-  Eigen::RowVectorXd least;     ///< FindSmallestEntry of each column with a slope, the others as proposed.
-  std::vector<LoneSlope> lone;  ///< Of each column, with the proposed sigma.
+  Eigen::RowVectorXd least;  ///< FindSmallestEntry of each column with a slope, the others as proposed.
   /** What other estimators (slopes.h) say of the row's size, as factors of `smallest`; 0 for a row without slopes. */
   double strongin = 0, knuth_chou = 0;
 };

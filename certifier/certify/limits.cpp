@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "certifier/dynamics/angles.h"
-#include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_enclosure.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -44,12 +43,8 @@ std::optional<TextEnclosure> FunctionsOf(const Problem& problem) {
   const NominalModel& model = *problem.model;
   TextEnclosure functions(NamesOf(model), expressions);
   for (std::size_t i = 0; i < problem.limits.size(); ++i)
-    for (const int angle : model.angles())
-      if (!IsSameAfterTurn(functions.program(), static_cast<int>(i), angle))
-        throw ExpressionError(expressions[i].line, expressions[i].column,
-                              "limits: " + problem.limits[i].name +
-                                  " is not seen to be the same after a turn of the angle " +
-                                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+    RequireSameAfterTurns(functions.program(), static_cast<int>(i), expressions[i], "limits: " + problem.limits[i].name,
+                          model.angles(), model.state_names());
   return functions;
 }
 

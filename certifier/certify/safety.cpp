@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "certifier/dynamics/angles.h"
-#include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 
@@ -318,12 +317,8 @@ Placement PlacementOf(const Problem& problem) {
     const std::vector<ExpressionText> all = problem.body.Coordinates();
     const ProgramDraft program = MakeProgram(NamesOf(model), all);
     for (std::size_t i = 0; i < all.size(); ++i)
-      for (const int angle : model.angles())
-        if (!IsSameAfterTurn(program.View(), static_cast<int>(i), angle))
-          throw ExpressionError(
-              all[i].line, all[i].column,
-              "body: the place " + all[i].text + " is not seen to be the same after a turn of the angle " +
-                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+      RequireSameAfterTurns(program.View(), static_cast<int>(i), all[i], "body: the place " + all[i].text,
+                            model.angles(), model.state_names());
   }
   return {problem.projection, problem.body, problem.between, problem.model->num_states(),
           problem.body.HasPlaces() ? NamesOf(*problem.model) : ExpressionNames{}};

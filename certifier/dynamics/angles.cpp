@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "certifier/dynamics/expression.h"
 #include "certifier/numerics/size.h"
 
 namespace forereach {
@@ -63,6 +64,15 @@ std::vector<Winding> Windings(const Program& program, int variable) {
 
 bool IsSameAfterTurn(const Program& program, int value, int angle) {
   return Windings(program, angle)[ToSize(program.value[ToSize(value)])] == 0.0;
+}
+
+void RequireSameAfterTurns(const Program& program, int value, const ExpressionText& text, const std::string& what,
+                           const std::vector<int>& angles, const std::vector<std::string>& states) {
+  for (const int angle : angles)
+    if (!IsSameAfterTurn(program, value, angle))
+      throw ExpressionError(text.line, text.column,
+                            what + " is not seen to be the same after a turn of the angle " + states[ToSize(angle)] +
+                                " by 2 pi: write it with sin, cos or tan of it");
 }
 
 void RequireAngles(const Program& program, const std::vector<int>& angles, const std::vector<std::string>& states,

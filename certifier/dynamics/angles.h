@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "certifier/dynamics/model_text.h"
 #include "certifier/dynamics/program.h"
 #include "certifier/numerics/interval.h"
 
@@ -27,6 +28,12 @@ unit vector of the variable; nothing where these rules find none:
 
 /** Whether Windings proves that a value of the program is the same after a turn of an angle. */
 [[nodiscard]] bool IsSameAfterTurn(const Program& program, int value, int angle);
+
+/** Requires that a value of the program is the same after a turn of each angle. @param text of the value. @param what
+it is, for the message. @param angles indices of states. @param states their names.
+@throws ExpressionError (expression.h) at the text's place. */
+void RequireSameAfterTurns(const Program& program, int value, const ExpressionText& text, const std::string& what,
+                           const std::vector<int>& angles, const std::vector<std::string>& states);
 
 /** An equation for which there is no proof that it does not tell how often an angle has turned. */
 class TurnError final : public std::invalid_argument {

@@ -6,7 +6,6 @@
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/dynamics/text_program.h"
-#include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -76,18 +75,15 @@ ResidualText ReadText(const Document& file, const std::string& path) {
 
 // The simulated robot turns its angles into [-pi, pi]; where a domain goes beyond, the residual has to be the same
 // after a turn. @throws ExpressionError
-void RequireSameAfterTurns(const NominalModel& model, const Box& states, const ParametricResidual& residual,
-                           const Program& program) {
-  const auto turns = [&](int k) {
-    return !(-std::numbers::pi <= states.lower()[k] && states.upper()[k] <= std::numbers::pi);
-  };
+void RequireNoJump(const NominalModel& model, const Box& states, const ParametricResidual& residual,
+                   const Program& program) {
+  std::vector<int> turning;
+  for (const int angle : model.angles())
+    if (!(-std::numbers::pi <= states.lower()[angle] && states.upper()[angle] <= std::numbers::pi))
+      turning.push_back(angle);
   for (std::size_t k = 0; k < residual.values.size(); ++k)
-    for (const int angle : model.angles())
-      if (turns(angle) && !IsSameAfterTurn(program, static_cast<int>(k), angle))
-        throw ExpressionError(residual.values[k].line, residual.values[k].column,
-                              "the residual of " + model.state_names()[k] +
-                                  " is not seen to be the same after a turn of the angle " +
-                                  model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+    RequireSameAfterTurns(program, static_cast<int>(k), residual.values[k], "the residual of " + model.state_names()[k],
+                          turning, model.state_names());
 }
 
 // The residual at `path`. Its expressions are parsed here for the first time.
@@ -98,7 +94,7 @@ ParametricResidual ReadResidual(const Document& file, const std::string& path, c
   try {
     const ParametricResidual residual = ResidualOf(model, text);
     const ProgramDraft program = MakeProgram(residual.names, residual.values);
-    RequireSameAfterTurns(model, problem.domain.state, residual, program.View());
+    RequireNoJump(model, problem.domain.state, residual, program.View());
     return residual;
   } catch (const ExpressionError& error) {
     if (!is_named) FailAt(file.path(), error);
