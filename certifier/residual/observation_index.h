@@ -27,6 +27,10 @@ namespace forereach {
 class ObservationIndex final {
  public:
   static constexpr std::uint32_t kNone = 0xffffffff;
+  /** A child that is missing, or taken already, has a bound at or below this. TagLanes changes the last bits of bounds,
+  so none is compared with -kMaxDouble itself. A child that exists has a higher bound: callers search only where no sum
+  exceeds 2^960. */
+  static constexpr double kMissing = -0x1p1023;
   /** Levels of nodes over 2^32 entries. */
   static constexpr int kMaxHeight = 10;
   static constexpr std::size_t kLeafBlocks = 4;

@@ -159,8 +159,9 @@ struct PairSearch::Kernel {
              ++b)
           BestOther(point, own, b, side, self, best);
       }
+      if (best.value >= own) return best;  // no other value changes what this says of the point
       double next;
-      while (!((next = MaxLane(bounds[ToSize(level)])) >= best.value) || next == -kMaxDouble)
+      while (!((next = MaxLane(bounds[ToSize(level)])) >= best.value && next > ObservationIndex::kMissing))
         if (++level > top) return best;
       const auto at = ToSize(level);
       bounds[at] = Replace(bounds[at], next, -kMaxDouble);

@@ -52,9 +52,10 @@ void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o
     for (double& ceiling : entries.ceilings) ceiling = -ceiling;
     return TakeConstant(gains, entries.ceilings, range);
   }
-  const ObservationIndex index(entries);
   const double margin = MarginUpper(row, entries, o);
-  const PairSearch search(index, std::isfinite(margin) ? margin : 0);
+  if (!std::isfinite(margin)) return;  // values this large say nothing: any choice is sound
+  const ObservationIndex index(entries);
+  const PairSearch search(index, margin);
   for (std::size_t b = 0; b < index.num_blocks();
        ++b)  // in the order of the index, whose neighbours need the same leaves
     for (std::size_t lane = 0; lane < kPackSize; ++lane) {
@@ -86,7 +87,7 @@ std::vector<int> OneRound(const Gains& gains, std::size_t most) {
   std::vector<int> kept;
   std::size_t left = order.size();
   for (const std::uint32_t i : order) {
-    const bool goes = !needed[i] && (gains.gain[i] == 0 || left > most);
+    const bool goes = left > 1 && !needed[i] && (gains.gain[i] == 0 || left > most);
     if (!goes) {
       kept.push_back(static_cast<int>(i));
       continue;

@@ -39,7 +39,7 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
   } else {
     for (Pack left = TagLanes(Max(optimistic, Fill(-kMaxDouble)));;) {
       const double next = MaxLane(left);
-      if (!(next > best)) return best;
+      if (!(next > Max(best, ObservationIndex::kMissing))) return best;
       const std::size_t lane = TaggedLane(next);
       left = Replace(left, next, -kMaxDouble);
       best = Max(best, values.at(lane) - metric.Refine(block, lane, budget.patterns, budget.capped));
@@ -127,7 +127,7 @@ class Descent {
       --leaves_;
     }
     double next;
-    while (!((next = MaxLane(levels_[ToSize(level_)].bounds)) > best_))
+    while (!((next = MaxLane(levels_[ToSize(level_)].bounds)) > Max(best_, ObservationIndex::kMissing)))
       if (++level_ > index_.height()) return false;
     budget.capped |= leaves_ == 0;
     if (leaves_ == 0) return false;

@@ -458,6 +458,75 @@ TEST(MostUseful, KeepsEveryBoundWhileAllThatAttainTheEnvelopeHaveRoom) {
   }
 }
 
+// As a robot that stands still records it.
+Observations SameRows(int count, int columns) {
+  return {Eigen::MatrixXd::Constant(count, columns, 0.1), Eigen::MatrixXd::Constant(count, 1, 0.001),
+          Eigen::MatrixXd::Constant(count, 1, 0.001)};
+}
+
+TEST(MostUseful, KeepsOnlyTheFirstOfEqualRows) {
+  EXPECT_TRUE(MostUseful({Eigen::MatrixXd::Ones(1, 2), Eigen::VectorXd::Zero(1)}, SameRows(0, 2), 1).empty());
+  for (const int columns : {1, 2, 3, 4, 14})  // in the metrics of one to three columns, and of more
+    for (const int count : {1, 2, 3, 7, 8, 9, 31, 32, 33, 255, 256, 257, 1000}) {
+      const Declaration declaration{Eigen::MatrixXd::Constant(1, columns, 0.1), Eigen::VectorXd::Zero(1)};
+      for (const std::size_t most : {std::size_t{1}, ToSize(std::max(1, count - 1))})
+        EXPECT_EQ(MostUseful(declaration, SameRows(count, columns), most), std::vector<int>{0})
+            << count << " rows, at most " << most << ", " << columns << " columns";
+    }
+}
+
+TEST(MostUseful, KeepsOnlyTheFirstOfRowsThatDifferWhereLHasNoColumn) {
+  Random random(811);
+  SCOPED_TRACE(random.trace());
+  Declaration declaration{Eigen::MatrixXd::Zero(1, 3), Eigen::VectorXd::Zero(1)};
+  declaration.lipschitz(0, 1) = 0.1;
+  Observations o = SameRows(500, 3);
+  o.z.col(0) = random.Vector(500);
+  o.z.col(2) = random.Vector(500);
+  EXPECT_EQ(MostUseful(declaration, o, 10), std::vector<int>{0});
+}
+
+TEST(MostUseful, KeepsTheFirstOfEachKindOfRow) {
+  Random random(812);
+  SCOPED_TRACE(random.trace());
+  const Declaration declaration{Eigen::MatrixXd::Constant(1, 2, 1), Eigen::VectorXd::Zero(1)};
+  for (int trial = 0; trial < 50; ++trial) {
+    const int kinds = random.Integer(1, 40);
+    Observations o = SameRows(random.Integer(kinds + 1, 400), 2);
+    std::vector<int> first(ToSize(kinds), -1), expected;
+    for (int i = 0; i < o.size(); ++i) {
+      const int kind = i < kinds ? i : random.Below(kinds);
+      o.z(i, 0) = kind;  // far enough apart that each attains the envelope
+      if (first[ToSize(kind)] < 0) expected.push_back(first[ToSize(kind)] = i);
+    }
+    EXPECT_EQ(MostUseful(declaration, o, ToSize(kinds)), expected);
+  }
+}
+
+TEST(MostUseful, KeepsSomethingOfValuesNearOverflow) {
+  const Declaration declaration{Eigen::MatrixXd::Constant(1, 2, 1), Eigen::VectorXd::Zero(1)};
+  Random random(813);
+  SCOPED_TRACE(random.trace());
+  Observations o = SameRows(100, 2);
+  o.lower = random.Matrix(100, 1, 1e308);
+  o.upper = o.lower;
+  EXPECT_EQ(MostUseful(declaration, o, 7).size(), 1u);  // no bound is finite, so none is lost
+}
+
+TEST(ObservationStore, BoundsAsOneRowDoesWhenTheSameRowIsRepeated) {
+  Random random(814);
+  SCOPED_TRACE(random.trace());
+  const Sample row = Observe(random);
+  for (const int count : {1, 2, 9, 10, 11, 100}) {  // below, at and above the budget
+    const std::vector<Sample> rows(ToSize(count), row);
+    const ObservationStore one = StoreOf(rows, Options(32, 10)), other = StoreOf(rows, Options(32, 10));
+    EXPECT_EQ(one.snapshot().size(), count <= 10 ? ToSize(count) : 1u);
+    EXPECT_FALSE(one.snapshot().violation());
+    ExpectSame(one.snapshot(), other.snapshot(), random, 0);
+    ExpectSame(one.snapshot(), StoreOf({row}, Options(32, 10)).snapshot(), random, 0);
+  }
+}
+
 TEST(MostUseful, DropsTheLeastGainFirst) {
   // Far apart on a line, all but two that stand close together: either may go, not both.
   Declaration declaration{Eigen::MatrixXd::Constant(1, 1, 1), Eigen::VectorXd::Zero(1)};
