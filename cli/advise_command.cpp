@@ -19,7 +19,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct AdviseArguments {
   std::vector<std::string> files;
   std::string config;
   LogKey key;
@@ -139,7 +139,7 @@ void PrintJson(const Advised& all, const Totals& totals) {
 }
 
 // Every run is read anew, since places are ranked over all of them; what takes long, the advice, may be kept.
-Advised AdviseRuns(const Options& options) {
+Advised AdviseRuns(const AdviseArguments& options) {
   Advised all{RunsNamedBy(options.files, options.each_run.jobs), {}, {}};
   NamedRuns& named = all.named;
   const RunTasks tasks(options.config, options.key, named.is_many);
@@ -160,14 +160,14 @@ Advised AdviseRuns(const Options& options) {
   return all;
 }
 
-Advised AdviseDecision(const Options& options) {
+Advised AdviseDecision(const AdviseArguments& options) {
   Advised all;
   all.runs.push_back(AbstentionOf(options.files[0], options.config));
   all.advice = AdviseAll(all.runs, options.each_run.jobs);
   return all;
 }
 
-int RunAdvise(const Options& options) {
+int RunAdvise(const AdviseArguments& options) {
   const bool is_document = options.files.size() == 1 && KindOf(options.files[0]) == FileKind::kJson;
   const Advised all = is_document ? AdviseDecision(options) : AdviseRuns(options);
   const Totals totals = TotalsOf(all);
@@ -178,7 +178,7 @@ int RunAdvise(const Options& options) {
 }  // namespace
 
 Command AdviseCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<AdviseArguments>();
   Command command{
       .name = kAdvise.name,
       .purpose = kAdvise.purpose,

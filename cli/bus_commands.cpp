@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kPatienceMs = 3000;
 
-struct Options {
+struct CommandArguments {
   std::string config;
   BusArguments bus;
   bool json = false;
@@ -35,7 +35,7 @@ struct Options {
 // certifier has signed.
 class CertifierConnection final {
  public:
-  explicit CertifierConnection(const Options& options)
+  explicit CertifierConnection(const CommandArguments& options)
       : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
     options.bus.Override(channels_);
     channels_ = WithKeys(std::move(channels_), Role::kOperator);
@@ -106,7 +106,7 @@ int NoCertifierAnswers(const BusOptions& bus) {
   return 1;
 }
 
-int ShowStatus(const Options& options) {
+int ShowStatus(const CommandArguments& options) {
   CertifierConnection certifier(options);
   const auto status = certifier.Await();
   if (!status) return NoCertifierAnswers(certifier.channels());
@@ -115,7 +115,7 @@ int ShowStatus(const Options& options) {
 }
 
 // Sends a command, and shows the heartbeat that answers it.
-int Send(const Options& options, std::int16_t kind) {
+int Send(const CommandArguments& options, std::int16_t kind) {
   CertifierConnection certifier(options);
   const auto before = certifier.Await();
   if (!before) return NoCertifierAnswers(certifier.channels());
@@ -144,8 +144,9 @@ int Send(const Options& options, std::int16_t kind) {
   return done ? 0 : 1;
 }
 
-Command BusCommand(const std::string& name, const std::string& purpose, const std::function<int(const Options&)>& run) {
-  const auto options = std::make_shared<Options>();
+Command BusCommand(const std::string& name, const std::string& purpose,
+                   const std::function<int(const CommandArguments&)>& run) {
+  const auto options = std::make_shared<CommandArguments>();
   Command command{.name = name,
                   .purpose = purpose,
                   .footer = "Example:\n  forereach " + name + " --config config/demo.yaml",
@@ -164,19 +165,19 @@ Command StatusCommand() {
 
 Command ResetCommand() {
   return BusCommand("reset", "Clear the latched fault of the certifier and the robot",
-                    [](const Options& options) { return Send(options, command_t::RESET); });
+                    [](const CommandArguments& options) { return Send(options, command_t::RESET); });
 }
 
 Command ReloadCommand() {
   return BusCommand("reload", "Make the certifier read its task file again, completely or not at all",
-                    [](const Options& options) { return Send(options, command_t::RELOAD); });
+                    [](const CommandArguments& options) { return Send(options, command_t::RELOAD); });
 }
 
 Command KeygenCommand() {
-  struct Options {
+  struct KeygenArguments {
     std::string robot, directory;
   };
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<KeygenArguments>();
   return {.name = "keygen",
           .purpose = "Make the keys of one robot: a directory with one key file for each role",
           .footer =

@@ -12,7 +12,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct CertifyArguments {
   std::string config, plan;
   bool json = false;
 };
@@ -50,7 +50,7 @@ void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& t
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }
 
-int Certify(const Options& options) {
+int Certify(const CertifyArguments& options) {
   const Config config = LoadConfig(options.config);
   RequireForCertifying(config);
   const Certifier certifier(config.problem);
@@ -82,7 +82,7 @@ int Certify(const Options& options) {
 }  // namespace
 
 Command CertifyCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CertifyArguments>();
   return {
       .name = "certify",
       .purpose = "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input",

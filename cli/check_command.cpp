@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Options {
+struct CheckArguments {
   TaskCheckOptions check;
   std::string picture;
   bool json = false;
@@ -63,7 +63,7 @@ void PrintData(const TaskCheck& check, std::ostream& out) {
   if (!undeclared.empty()) out << "declaration: nothing is declared for " << undeclared << "\n";
 }
 
-void PrintTube(const TaskCheck& check, const Options& options, std::ostream& out) {
+void PrintTube(const TaskCheck& check, const CheckArguments& options, std::ostream& out) {
   if (check.half_widths.empty()) return;
   out << "tube without obstacles, " << check.planned_steps << " steps of "
       << (options.check.plan.empty() ? "the inputs closest to zero" : options.check.plan)
@@ -111,7 +111,7 @@ Json ToJson(const TaskCheck& check) {
           {"good", !check.HasFindings()}};
 }
 
-int Check(const Options& options) {
+int Check(const CheckArguments& options) {
   std::vector<std::string> files = options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
   const TaskCheck check = CheckTask(options.check);
   const bool lacks_picture = !files.empty() && !check.is_planar;
@@ -134,7 +134,7 @@ int Check(const Options& options) {
 }  // namespace
 
 Command CheckCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CheckArguments>();
   return {.name = kCheck.name,
           .purpose = kCheck.purpose,
           .footer =

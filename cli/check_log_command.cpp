@@ -11,12 +11,12 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct CheckLogArguments {
   std::string directory;
   bool json = false;
 };
 
-int RunCheckLog(const Options& options) {
+int RunCheckLog(const CheckLogArguments& options) {
   const std::vector<LogCheck> checks = CheckLogs(options.directory);
   std::cout << (options.json ? JsonText(ToJson(checks)) + "\n" : ToText(checks)) << std::flush;
   return std::ranges::all_of(checks, &LogCheck::whole_log) ? 0 : 1;
@@ -25,7 +25,7 @@ int RunCheckLog(const Options& options) {
 }  // namespace
 
 Command CheckLogCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CheckLogArguments>();
   return {.name = kCheckLog.name,
           .purpose = kCheckLog.purpose,
           .footer = "Example:\n  forereach check-log run/log",

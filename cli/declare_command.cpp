@@ -25,7 +25,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Options {
+struct DeclareArguments {
   std::string config, cover, check;
   std::string from = "equations";
   bool json = false, between = false, from_data = false;
@@ -54,7 +54,7 @@ Config LoadWithResidual(const std::string& path) {
 
 constexpr std::size_t kSteps = 100;  // of the progress bar, for each derivative
 
-std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
+std::vector<SlopeBound> BoundAll(const Config& config, const DeclareArguments& options) {
   const TextSlopes slopes(*config.residual);
   const std::vector<Interval> parameters = ParameterRanges(*config.residual);
   std::vector<SlopeBound> bounds;
@@ -200,7 +200,7 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
             << Yaml(bounds, names) << std::endl;
 }
 
-int Declare(const Options& options) {
+int Declare(const DeclareArguments& options) {
   const Config config = LoadWithResidual(options.config);
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<SlopeBound> bounds = BoundAll(config, options);
@@ -263,7 +263,7 @@ std::vector<Finding> CheckClaims(const CoverFile& file, const Config& config, co
   return findings;
 }
 
-int CheckCover(const Options& options) {
+int CheckCover(const DeclareArguments& options) {
   const Config config = LoadWithResidual(options.config);
   const CoverFile file = LoadCover(options.check, config);
   const verifier::CoverChecker checker(config.problem->domain, *config.residual);
@@ -292,7 +292,7 @@ int CheckCover(const Options& options) {
 }  // namespace
 
 Command DeclareCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DeclareArguments>();
   return {
       .name = kDeclare.name,
       .purpose = kDeclare.purpose,

@@ -187,12 +187,12 @@ int Diagnose(const BusOptions& bus, bool json) {
 }  // namespace
 
 Command DoctorCommand() {
-  struct Options {
+  struct DoctorArguments {
     std::string config;
     BusArguments bus;
     bool json = false;
   };
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DoctorArguments>();
   Command command{.name = "doctor",
                   .purpose = "Check the bus (route, buffers, a round trip), and print what to do",
                   .options = {{"--config", &options->config, "FILE", "A task file, to check its bus and its keys"},

@@ -21,7 +21,9 @@ DriveCounts CountsOf(const Lockstep& lockstep) {
   const auto robot = nlohmann::json::parse(lockstep.robot().Summary());
   const auto planner = nlohmann::json::parse(lockstep.planner().Summary());
   const auto of = [](const nlohmann::json& summary, const char* key) { return summary.at(key).get<std::int64_t>(); };
-  DriveCounts counts{.drives = 1, .goals = robot.at("goal_reached").get<bool>() ? 1 : 0};
+  DriveCounts counts;
+  counts.drives = 1;
+  counts.goals = robot.at("goal_reached").get<bool>() ? 1 : 0;
   counts.contacts = of(robot, "contacts");
   counts.limits = of(robot, "limits_exceeded");
   counts.steps = of(robot, "steps_executed");

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportArguments {
   std::vector<std::string> inputs;
   std::string format, output;
   ExportOptions what;
@@ -37,7 +37,7 @@ std::string PlainStem(const std::string& path) {
 }
 
 // The names of what is written, beside each other: a file of each run, or those of all runs together.
-std::vector<std::string> NamesOf(const Options& options, const NamedRuns& named) {
+std::vector<std::string> NamesOf(const ExportArguments& options, const NamedRuns& named) {
   if (options.what.format == ExportFormat::kCsv) return ExportFiles(options.what.format);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < named.runs.size(); ++i) {
@@ -49,11 +49,11 @@ std::vector<std::string> NamesOf(const Options& options, const NamedRuns& named)
 }
 
 // For csv, and for npz and mcap of several runs.
-bool IsDirectory(const Options& options, const NamedRuns& named) {
+bool IsDirectory(const ExportArguments& options, const NamedRuns& named) {
   return options.what.format == ExportFormat::kCsv || (!options.is_table() && named.is_many);
 }
 
-void RequireNoOutput(const Options& options, const NamedRuns& named) {
+void RequireNoOutput(const ExportArguments& options, const NamedRuns& named) {
   std::error_code error;
   if (!IsDirectory(options, named) || !fs::is_directory(options.output, error) || fs::is_symlink(options.output, error))
     return RequireNewFile(options.output, false);
@@ -61,7 +61,7 @@ void RequireNoOutput(const Options& options, const NamedRuns& named) {
     throw OutputError(options.output + ": the directory is not empty, and is not changed; choose another name");
 }
 
-void WriteTable(const Options& options, const std::vector<std::optional<ExportResult>>& results, std::size_t k,
+void WriteTable(const ExportArguments& options, const std::vector<std::optional<ExportResult>>& results, std::size_t k,
                 const std::string& path) {
   std::vector<std::string> parts;
   for (const auto& result : results)
@@ -69,7 +69,8 @@ void WriteTable(const Options& options, const std::vector<std::optional<ExportRe
   JoinTables(options.what.format, parts, path);
 }
 
-void Write(const Options& options, const NamedRuns& named, const std::vector<std::optional<ExportResult>>& results) {
+void Write(const ExportArguments& options, const NamedRuns& named,
+           const std::vector<std::optional<ExportResult>>& results) {
   if (!IsDirectory(options, named)) {
     if (options.is_table()) return WriteTable(options, results, 0, options.output);
     return GiveName(results.front()->files.front(), options.output);
@@ -90,7 +91,7 @@ void Write(const Options& options, const NamedRuns& named, const std::vector<std
   if (error) throw OutputError(options.output + ": cannot be written: " + error.message());
 }
 
-void Describe(const Options& options, const ExportResult& result, const NamedRuns& named) {
+void Describe(const ExportArguments& options, const ExportResult& result, const NamedRuns& named) {
   for (const std::string& missing : named.missing) std::cerr << "forereach: " << Printable(missing) << std::endl;
   if (result.damage.places > 0)
     std::cerr << "forereach: damaged in " << result.damage.places << " places, " << result.damage.bytes
@@ -113,7 +114,7 @@ void Describe(const Options& options, const ExportResult& result, const NamedRun
   std::cout << DescribePassedOver(result.passed_over) << "; written to " << options.output << std::endl;
 }
 
-int RunExport(Options options) {
+int RunExport(ExportArguments options) {
   options.what.format =
       static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) - kExportFormats.begin());
   if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
@@ -143,7 +144,7 @@ int RunExport(Options options) {
 }  // namespace
 
 Command ExportCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExportArguments>();
   Command command{
       .name = kExport.name,
       .purpose = kExport.purpose,

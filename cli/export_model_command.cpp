@@ -14,7 +14,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct ExportModelArguments {
   std::string config, name;
   std::string out = "robot_model.h";
   bool force = false;
@@ -27,7 +27,7 @@ std::string WordOf(const std::string& name) {
   return word;
 }
 
-int ExportModel(const Options& options) {
+int ExportModel(const ExportModelArguments& options) {
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const ModelText* text = config.problem->model->text();
   if (text == nullptr)
@@ -54,7 +54,7 @@ int ExportModel(const Options& options) {
 }  // namespace
 
 Command ExportModelCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExportModelArguments>();
   return {
       .name = kExportModel.name,
       .purpose = kExportModel.purpose,

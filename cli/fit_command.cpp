@@ -24,7 +24,7 @@ using Json = nlohmann::json;
 
 constexpr int kDigits = 6;
 
-struct Options {
+struct FitArguments {
   std::string config, names, picture;
   bool json = false;
 };
@@ -113,7 +113,7 @@ void PrintForPeople(const Fit& fit, const Config& config) {
       << Yaml(fit) << std::endl;
 }
 
-int RunFit(const Options& options) {
+int RunFit(const FitArguments& options) {
   const auto pictures = options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
   // The model may have no value at some transition, as long as its parameters are not fitted.
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
@@ -143,7 +143,7 @@ int RunFit(const Options& options) {
 }  // namespace
 
 Command FitCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<FitArguments>();
   return {.name = kFit.name,
           .purpose = kFit.purpose,
           .footer =

@@ -26,7 +26,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Options {
+struct ImportArguments {
   std::string config, out, time, time_unit = "s", delimiter = "auto", comment = "#", header;
   std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
   std::optional<double> rate, from, until;
@@ -72,7 +72,7 @@ std::string UnitOf(const NominalModel& model, std::size_t variable) {
 
 // ---- what is asked
 
-LogFormat FormatOf(const Options& options) {
+LogFormat FormatOf(const ImportArguments& options) {
   LogFormat format{.delimiter = {}, .comment = options.comment, .header = Names(options.header)};
   if (options.delimiter != "auto")
     format.delimiter = options.delimiter == "comma" ? ',' : options.delimiter == "semicolon" ? ';' : '\t';
@@ -80,7 +80,7 @@ LogFormat FormatOf(const Options& options) {
 }
 
 // The columns: the stamp, the states, the inputs. A variable without an option has the column of its name.
-std::vector<std::string> ColumnsOf(const Options& options, const NominalModel& model) {
+std::vector<std::string> ColumnsOf(const ImportArguments& options, const NominalModel& model) {
   std::vector<std::string> columns;
   if (!options.rate) columns.push_back(options.time);
   const auto take = [&](const char* option, const auto& texts, const std::vector<std::string>& names) {
@@ -95,7 +95,7 @@ std::vector<std::string> ColumnsOf(const Options& options, const NominalModel& m
   return columns;
 }
 
-std::vector<long double> FactorsOf(const Options& options, const NominalModel& model) {
+std::vector<long double> FactorsOf(const ImportArguments& options, const NominalModel& model) {
   const std::vector<std::string> names = model.variable_names();
   const auto given = Assignments("unit", options.units, names);
   std::vector<long double> factors(names.size(), 1);
@@ -111,7 +111,7 @@ std::vector<long double> FactorsOf(const Options& options, const NominalModel& m
   return factors;
 }
 
-Eigen::VectorXd InputTolerances(const Options& options, const NominalModel& model) {
+Eigen::VectorXd InputTolerances(const ImportArguments& options, const NominalModel& model) {
   const std::vector<std::string>& names = model.input_names();
   Eigen::VectorXd tolerances = Eigen::VectorXd::Zero(model.num_inputs());
   for (const auto& [name, text] : Assignments("input-tolerance", options.input_tolerances, names)) {
@@ -122,7 +122,7 @@ Eigen::VectorXd InputTolerances(const Options& options, const NominalModel& mode
   return tolerances;
 }
 
-ImportOptions ImportOptionsOf(const Options& options, const Config& config) {
+ImportOptions ImportOptionsOf(const ImportArguments& options, const Config& config) {
   const NominalModel& model = *config.problem->model;
   ImportOptions import;
   import.period = config.period;
@@ -199,12 +199,12 @@ std::string Line(const Finding& finding, const std::string& what) {
 std::string Milliseconds(double seconds) { return RoundedUp(seconds * 1000, 3) + " ms"; }
 
 // How far the nearest stamps are, for the starts that have none near enough.
-void PrintGaps(const ImportedLog& log, const Options& options) {
+void PrintGaps(const ImportedLog& log, const ImportArguments& options) {
   std::cout << "             the nearest is " << Milliseconds(log.median_gap) << " from t + dt in the median, "
             << Milliseconds(log.largest_gap) << " at most; --tolerance-ms is " << ToText(options.tolerance_ms) << "\n";
 }
 
-void PrintForPeople(const Source& source, const std::vector<std::string>& columns, const Options& options) {
+void PrintForPeople(const Source& source, const std::vector<std::string>& columns, const ImportArguments& options) {
   const auto& [table, log] = source;
   std::cout << table.path << ": " << log.transitions.size() << " transitions from " << table.values.rows() << " rows";
   if (log.typical_spacing > 0) std::cout << ", typically " << RoundedUp(log.typical_spacing) << " s apart";
@@ -232,7 +232,7 @@ std::string Listed(const std::vector<std::string>& names, const Eigen::VectorXd&
 }
 
 // What the transitions cannot know, from the largest of all logs.
-void PrintErrors(const std::vector<Source>& sources, const Options& options, const NominalModel& model) {
+void PrintErrors(const std::vector<Source>& sources, const ImportArguments& options, const NominalModel& model) {
   double offset = 0;
   Eigen::VectorXd rate = Eigen::VectorXd::Zero(model.num_states()), input = Eigen::VectorXd::Zero(model.num_inputs());
   for (const Source& source : sources) {
@@ -253,7 +253,7 @@ void PrintErrors(const std::vector<Source>& sources, const Options& options, con
 }
 
 // Without --time and --rate, a column of this name has the stamps.
-void FindTime(Options& options) {
+void FindTime(ImportArguments& options) {
   constexpr const char* kUsual = "time";
   const bool has_time = !options.time.empty(), has_rate = options.rate.has_value();
   if (has_time != has_rate) return;
@@ -265,7 +265,7 @@ void FindTime(Options& options) {
   options.time = kUsual;
 }
 
-int RunImport(Options options) {
+int RunImport(ImportArguments options) {
   FindTime(options);
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const NominalModel& model = *config.problem->model;
@@ -311,7 +311,7 @@ std::string UnitNames() {
 }  // namespace
 
 Command ImportCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ImportArguments>();
   return {
       .name = kImport.name,
       .purpose = kImport.purpose,

@@ -40,7 +40,7 @@ void RequireOneLine(const char* option, const std::string& path) {
                       "can name");
 }
 
-struct Options {
+struct InitArguments {
   std::string model, transitions, out;
   std::optional<double> dt;
   bool force = false;
@@ -132,7 +132,7 @@ void KeepFromZero(const Config& drive, TaskTemplate& task) {
   keep(domain.input, task.inputs, [](std::size_t) {});
 }
 
-TaskTemplate FromModel(const Options& options) {
+TaskTemplate FromModel(const InitArguments& options) {
   const std::string name = options.model.ends_with(".yaml") ? options.model : "models/" + options.model + ".yaml";
   const std::string path = FindModelFile(options.out, name, "--model: ");
   const ModelText text = LoadModelFile(path);
@@ -214,7 +214,7 @@ Header ReadHeader(const std::string& path) {
   return header;
 }
 
-TaskTemplate FromTransitions(const Options& options) {
+TaskTemplate FromTransitions(const InitArguments& options) {
   if (!options.dt)
     throw ConfigError(
         "--transitions: needs --dt, the time from one sample of the data to the next in s: the file does not "
@@ -263,7 +263,7 @@ TaskTemplate FromTransitions(const Options& options) {
   return task;
 }
 
-int Init(const Options& options) {
+int Init(const InitArguments& options) {
   if (options.model.empty() == options.transitions.empty())
     throw ConfigError(
         "init: needs one of --model, a model of the library, and --transitions, a file of recorded steps");
@@ -283,7 +283,7 @@ int Init(const Options& options) {
 }  // namespace
 
 Command InitCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<InitArguments>();
   return {
       .name = kInit.name,
       .purpose = kInit.purpose,

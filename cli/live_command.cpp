@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kUsualPort = 8080;
 
-struct Options {
+struct LiveArguments {
   std::string config;
   BusArguments bus;
   std::optional<int> port;
@@ -56,7 +56,7 @@ std::unique_ptr<WebServer> Serve(const Watcher& watcher, std::optional<int> port
   }
 }
 
-int RunLive(const Options& options) {
+int RunLive(const LiveArguments& options) {
   const auto load = [&options] {
     Config task = LoadConfig(options.config);
     options.bus.Override(task.bus);
@@ -82,7 +82,7 @@ int RunLive(const Options& options) {
 }  // namespace
 
 Command LiveCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<LiveArguments>();
   return {.name = kLive.name,
           .purpose = kLive.purpose,
           .footer =

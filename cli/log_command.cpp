@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kPlacesShown = 20;
 
-struct Options {
+struct LogArguments {
   std::string action, output;
   std::vector<std::string> logs;
   LogSelection selection;
@@ -58,7 +58,7 @@ int Finish(const LogEditResult& result, const std::string& what, std::ostream& o
   return result.damage.places == 0 && result.cut_ends == 0 ? 0 : 1;
 }
 
-int List(const Options& options) {
+int List(const LogArguments& options) {
   LogUser user;
   DamageReport report;
   user.on_damage = [&](const DamagedPlace& place) { report(place); };
@@ -97,7 +97,7 @@ int List(const Options& options) {
   return Finish(result, "log: ", options.json ? std::cerr : std::cout);
 }
 
-int Write(const Options& options) {
+int Write(const LogArguments& options) {
   DamageReport report;
   const LogEditResult result = WriteLog(options.logs, options.selection,
                                         options.action == "merge" ? LogSequence::kByTime : LogSequence::kAsNamed,
@@ -105,7 +105,7 @@ int Write(const Options& options) {
   return Finish(result, "log: wrote " + options.output + ": ", std::cout);
 }
 
-int RunLog(Options options) {
+int RunLog(LogArguments options) {
   const bool writes = options.action != "list";
   if (writes == options.output.empty())
     throw LogError(writes ? "log " + options.action + ": name the new log with --out FILE"
@@ -125,7 +125,7 @@ std::vector<std::string> OutcomeNames() {
 }  // namespace
 
 Command LogCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<LogArguments>();
   return {
       .name = kLog.name,
       .purpose = kLog.purpose,

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kMaxPeriodMs = 3.6e6;
 
-struct Options {
+struct ObstaclesArguments {
   std::string config;
   BusArguments bus;
   std::optional<double> period_ms;
@@ -60,7 +60,7 @@ class ObstaclesNode final : public Node {
   bool warned_ = false;
 };
 
-int Send(const Options& options) {
+int Send(const ObstaclesArguments& options) {
   Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   RequireSendable(config);
   options.bus.Override(config.bus);
@@ -83,7 +83,7 @@ int Send(const Options& options) {
 }  // namespace
 
 Command ObstaclesCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ObstaclesArguments>();
   Command command{
       .name = "obstacles",
       .purpose =

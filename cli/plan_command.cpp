@@ -14,7 +14,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct PlanArguments {
   std::string config, out;
   std::uint32_t seed = 1;
 };
@@ -35,7 +35,7 @@ std::string PositionText(const Eigen::VectorXd& position) {
   return text.str() + ")";
 }
 
-int ReportFailure(const Options& options, const Config& config, const CertifiedPlan& plan) {
+int ReportFailure(const PlanArguments& options, const Config& config, const CertifiedPlan& plan) {
   std::cerr << "forereach plan: no certified plan from task.initial_set with seed " << options.seed << ": ";
   if (plan.candidates == 0)
     std::cerr << "none of " << config.planner.candidates
@@ -48,7 +48,7 @@ int ReportFailure(const Options& options, const Config& config, const CertifiedP
   return 1;
 }
 
-int MakePlan(const Options& options) {
+int MakePlan(const PlanArguments& options) {
   const Config config = LoadConfig(options.config);
   RequireForCertifying(config);
   const auto proposer = MakeProposer(config);
@@ -74,7 +74,7 @@ int MakePlan(const Options& options) {
 }  // namespace
 
 Command PlanCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlanArguments>();
   return {.name = kPlan.name,
           .purpose = kPlan.purpose,
           .footer =

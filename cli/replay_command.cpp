@@ -22,7 +22,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct ReplayArguments {
   std::vector<std::string> logs;
   std::string config, plan_digest;
   LogKey key;
@@ -37,7 +37,7 @@ bool HasPlans(const RunLogs& run) {
   return survey.candidates > 0 || survey.decisions > 0 || !survey.configs.empty();
 }
 
-Config OtherTask(const Options& options) {
+Config OtherTask(const ReplayArguments& options) {
   std::vector<Config> task;
   task.push_back(LoadConfig(options.config));
   options.key.Override(task, options.config);
@@ -86,7 +86,7 @@ void PrintForPeople(const ReplayResult& result, const NamedRuns& named) {
   std::cout << DescribePassedOver(result.passed_over) << std::endl;
 }
 
-int RunReplay(const Options& options) {
+int RunReplay(const ReplayArguments& options) {
   NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
   const std::optional<Config> other = options.other_task ? std::optional(OtherTask(options)) : std::nullopt;
   const RunTasks own(other ? "" : options.config, options.key, named.is_many);
@@ -214,7 +214,7 @@ void PrintJson(const Comparison& compared, const ByRobot& robots, const NamedRun
             << std::endl;
 }
 
-int RunCompare(const Options& options) {
+int RunCompare(const ReplayArguments& options) {
   NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
   const Config task = OtherTask(options);
   const auto finished = ResultsOf(options.each_run, "compare", options.config, options.key);
@@ -239,7 +239,7 @@ int RunCompare(const Options& options) {
 }  // namespace
 
 Command ReplayCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReplayArguments>();
   Command command{
       .name = kReplay.name,
       .purpose = kReplay.purpose,

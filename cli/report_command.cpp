@@ -19,7 +19,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct ReportArguments {
   ReportOptions report;
   EachRunOptions each_run;
   std::string out, before;
@@ -29,7 +29,7 @@ struct Options {
 constexpr std::size_t kMostAdvised = 300;
 
 // The advice on the last decisions that are no certificates. Without a log or its task, there is none.
-void AddAdvice(NamedRuns& read, const Options& options, const PageTasks& tasks, PageRun& page) {
+void AddAdvice(NamedRuns& read, const ReportArguments& options, const PageTasks& tasks, PageRun& page) {
   const auto chosen = ChooseAdvised(page, kMostAdvised);
   std::vector<std::map<std::string, std::size_t>> row_of(chosen.size());  // of each run, by the event's name
   for (std::size_t run = 0; run < chosen.size(); ++run)
@@ -60,7 +60,7 @@ void AddAdvice(NamedRuns& read, const Options& options, const PageTasks& tasks, 
 }
 
 // Rows of finished runs are kept; the drawings and the advice, of which there is a bounded number, are made anew.
-PageRun GatherRuns(const Options& options) {
+PageRun GatherRuns(const ReportArguments& options) {
   const ReportOptions& report = options.report;
   NamedRuns named = RunsNamedBy(report.logs, options.each_run.jobs);
   const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
@@ -90,7 +90,7 @@ PageRun GatherRuns(const Options& options) {
   return page;
 }
 
-int WritePage(const Options& options) {
+int WritePage(const ReportArguments& options) {
   RequireNewFile(options.out, options.force);  // before the logs are read
   const ReportOptions& report = options.report;
   const PageRun run = GatherRuns(options);
@@ -108,7 +108,7 @@ int WritePage(const Options& options) {
 }  // namespace
 
 Command ReportCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReportArguments>();
   ReportOptions& report = options->report;
   Command command{
       .name = kReport.name,

@@ -10,11 +10,11 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct RunArguments {
   std::string config, directory, key, obstacles;
 };
 
-int Run(const Options& options) {
+int Run(const RunArguments& options) {
   Config config = LoadConfig(options.config);
   if (!options.directory.empty()) config.logger.directory = options.directory;
   if (!options.key.empty()) config.bus.key = options.key;
@@ -40,7 +40,7 @@ int Run(const Options& options) {
 }  // namespace
 
 Command RunCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RunArguments>();
   return {
       .name = kRun.name,
       .purpose = kRun.purpose,

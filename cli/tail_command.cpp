@@ -24,7 +24,7 @@
 namespace forereach {
 namespace {
 
-struct Options {
+struct TailArguments {
   std::string config;
   BusArguments bus;
   std::int64_t count = 0;
@@ -108,7 +108,7 @@ class Tail final : public Node {
   std::map<std::string, std::int64_t> by_outcome_;
 };
 
-int RunTail(const Options& options) {
+int RunTail(const TailArguments& options) {
   BusOptions channels;
   if (!options.config.empty()) channels = LoadConfig(options.config, TransitionsFile::kIgnore).bus;
   options.bus.Override(channels);
@@ -125,7 +125,7 @@ int RunTail(const Options& options) {
 }  // namespace
 
 Command TailCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<TailArguments>();
   Command command{
       .name = "tail",
       .purpose = "Print each decision of the certifier as it comes, with running counts, until Ctrl-C; it only listens",

@@ -25,7 +25,7 @@ namespace {
 using verifier::Status;
 using verifier::Verdict;
 
-struct Options {
+struct VerifyArguments {
   std::vector<std::string> files;
   std::string config;
   LogKey key;
@@ -193,7 +193,7 @@ bool IsDocument(const std::vector<std::string>& files) {
   return kind != FileKind::kDirectory && kind != FileKind::kDatabase && kind != FileKind::kEventLog;
 }
 
-int Verify(const Options& options) {
+int Verify(const VerifyArguments& options) {
   NamedRuns named;
   Verified sum;
   if (IsDocument(options.files)) {
@@ -215,7 +215,7 @@ int Verify(const Options& options) {
 }  // namespace
 
 Command VerifyCommand() {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VerifyArguments>();
   Command command{
       .name = kVerify.name,
       .purpose = kVerify.purpose,

@@ -15,6 +15,13 @@ if(CCACHE)  # it keeps what was compiled with a precompiled header too, and find
     CCACHE_IGNOREOPTIONS=--param=* CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
 endif()
 
+# The files of a target are compiled together, some at a time: their headers are parsed once. So names in anonymous
+# namespaces are unique in a target. With the option off each file is compiled by itself.
+set(CMAKE_UNITY_BUILD ${FOREREACH_UNITY})
+if(NOT DEFINED CMAKE_UNITY_BUILD_BATCH_SIZE)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
+endif()
+
 # Precompiled headers, of g++ alone: clang's do not survive a cache. They hold no header of ours.
 if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON)
@@ -30,6 +37,7 @@ target_compile_options(forereach_options INTERFACE
   $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:Clang>:-Wno-psabi;-Wno-bitwise-instead-of-logical>>  # lanes, and tests without a branch
   # g++ collects its garbage less often: the same code in less time, with up to 0.5 GB for each job.
   $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>>
+  $<BUILD_INTERFACE:$<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${FOREREACH_UNITY}>>:-Wno-subobject-linkage>>  # it takes each file of several for a header
   -ffp-contract=off -fno-fast-math)
 if(FOREREACH_WERROR)
   target_compile_options(forereach_options INTERFACE $<BUILD_INTERFACE:-Werror>)

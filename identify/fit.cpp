@@ -41,7 +41,7 @@ Eigen::MatrixXd ErrorsOf(const ModelText& text, const Transitions& transitions) 
 }
 
 // What the solver minimises: the scaled errors as a function of the parameters, each divided by its unit.
-class Problem {
+class Residuals {
  public:
   using Scalar = double;
   using InputType = Eigen::VectorXd;
@@ -49,7 +49,7 @@ class Problem {
   using JacobianType = Eigen::MatrixXd;
   enum { InputsAtCompileTime = Eigen::Dynamic, ValuesAtCompileTime = Eigen::Dynamic };
 
-  Problem(const ModelText& text, const Transitions& transitions, std::vector<std::size_t> free)
+  Residuals(const ModelText& text, const Transitions& transitions, std::vector<std::size_t> free)
       : text_(text), transitions_(transitions), free_(std::move(free)) {
     const Eigen::MatrixXd errors = ErrorsOf(text, transitions);
     if (!errors.allFinite()) throw std::invalid_argument("the model has no finite value at some transition");
@@ -146,7 +146,7 @@ struct Determined {
 
 // The columns are scaled to length 1. A direction v is undetermined if the errors change along it by no more than
 // rounding does: a parameter is undetermined if such a direction has a share of it.
-Determined Determine(const Problem::Derivatives& derivatives, const Eigen::VectorXd& values) {
+Determined Determine(const Residuals::Derivatives& derivatives, const Eigen::VectorXd& values) {
   const Eigen::Index count = derivatives.columns.cols(), rows = derivatives.columns.rows();
   const Eigen::RowVectorXd norms = derivatives.columns.colwise().norm();
   Eigen::MatrixXd scaled = derivatives.columns;
@@ -211,9 +211,9 @@ Fit FitParameters(const ModelText& text, const Transitions& transitions, const s
   ModelText middle = text;
   for (ModelText::Parameter& parameter : middle.parameters)
     parameter.lower = parameter.upper = parameter.lower + (parameter.upper - parameter.lower) / 2;
-  const Problem problem(middle, transitions, places);
-  Eigen::NumericalDiff<Problem, Eigen::Central> differences(problem, kDifference);
-  Eigen::LevenbergMarquardt<Eigen::NumericalDiff<Problem, Eigen::Central>> solver(differences);
+  const Residuals problem(middle, transitions, places);
+  Eigen::NumericalDiff<Residuals, Eigen::Central> differences(problem, kDifference);
+  Eigen::LevenbergMarquardt<Eigen::NumericalDiff<Residuals, Eigen::Central>> solver(differences);
   solver.parameters.maxfev = kMostEvaluations;
   solver.parameters.xtol = solver.parameters.ftol = 1e-12;
   Eigen::VectorXd x = problem.Start();

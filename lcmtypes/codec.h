@@ -30,6 +30,7 @@ using Digest = std::array<std::uint8_t, 32>;
 [[nodiscard]] Digest ChainedDigest(const Digest& before, Bytes bytes);
 /** Lower-case hexadecimal, 64 characters. */
 [[nodiscard]] std::string ToHex(const Digest& digest);
+inline constexpr std::size_t kHexDigits = 64;  ///< of a digest
 
 /** The bytes of an integer in big-endian order, as in messages, logs and signatures. */
 template <std::integral Integer>

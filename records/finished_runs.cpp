@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kHexDigits = 64, kNameDigits = 32;
+constexpr std::size_t kNameDigits = 32;
 
 // Of a file of any size.
 std::string DigestOfFile(const std::string& path) {

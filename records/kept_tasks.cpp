@@ -22,7 +22,6 @@ namespace fs = std::filesystem;
 constexpr const char *kTasks = "tasks", *kTask = "task.yaml", *kModel = "model.yaml";
 constexpr std::string_view kTransitions = "transitions-", kTransitionsEnding = ".csv", kPolicy = "policy-";
 constexpr std::int64_t kLargestFile = 256 * kMegabyte;
-constexpr std::size_t kHexDigits = 64;
 
 bool IsDigest(std::string_view text) {
   return text.size() == kHexDigits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;

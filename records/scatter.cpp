@@ -12,7 +12,8 @@
 namespace forereach {
 namespace {
 
-constexpr double kPanelWidth = 210, kPanelHeight = 130, kGap = 16, kLeft = 100, kTop = 70, kBottom = 40;  // pixels
+constexpr double kPanelWidth = 210, kPanelHeight = 130, kGap = 16, kScatterLeft = 100, kScatterTop = 70,
+                 kScatterBottom = 40;  // pixels
 constexpr Eigen::Index kMostDots = 2000;
 
 class ScatterPainter {
@@ -45,8 +46,8 @@ class ScatterPainter {
   }
 
   void PaintPanel(Eigen::Index k, Eigen::Index l) {
-    const double left = kLeft + static_cast<double>(l) * (kPanelWidth + kGap),
-                 top = kTop + static_cast<double>(k) * (kPanelHeight + kGap);
+    const double left = kScatterLeft + static_cast<double>(l) * (kPanelWidth + kGap),
+                 top = kScatterTop + static_cast<double>(k) * (kPanelHeight + kGap);
     const double least = scatter_.x.col(l).minCoeff(), range = scatter_.x.col(l).maxCoeff() - least;
     const double most =
         std::max(scatter_.y_first.col(k).cwiseAbs().maxCoeff(), scatter_.y_second.col(k).cwiseAbs().maxCoeff());
@@ -94,8 +95,9 @@ void Require(const Scatter& scatter) {
 
 void DrawScatter(const Scatter& scatter, const std::string& path) {
   Require(scatter);
-  const double width = kLeft + static_cast<double>(scatter.x.cols()) * (kPanelWidth + kGap),
-               height = kTop + static_cast<double>(scatter.y_first.cols()) * (kPanelHeight + kGap) + kBottom;
+  const double width = kScatterLeft + static_cast<double>(scatter.x.cols()) * (kPanelWidth + kGap),
+               height =
+                   kScatterTop + static_cast<double>(scatter.y_first.cols()) * (kPanelHeight + kGap) + kScatterBottom;
   DrawFile(path, static_cast<int>(width), static_cast<int>(height),
            [&](cairo_t* cairo) { ScatterPainter(cairo, scatter).Paint(); });
 }

@@ -23,9 +23,9 @@ int AxisOf(const Column& column, int dim, const IsZero& is_zero) {
   return axis;
 }
 
-class Search {
+class ContainmentSearch {
  public:
-  Search(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators)
+  ContainmentSearch(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators)
       : inner_(inner),
         center_(center),
         generators_(generators),
@@ -183,7 +183,7 @@ class Search {
 }  // namespace
 
 Containment IsInside(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators) {
-  return Search(inner, center, generators).Run();
+  return ContainmentSearch(inner, center, generators).Run();
 }
 
 }  // namespace forereach::verifier

@@ -11,13 +11,12 @@
 namespace forereach::verifier {
 namespace {
 
-constexpr int kBits = 128;
+constexpr int kCoverBits = 128;
 // A leaf's bound may take finer boxes here than it took there: at most so many halvings.
 constexpr int kMostCuts = 24;
 
 using Box = std::vector<Real>;
 
-bool IsPoint(const Real& range) { return CertainlyAtMost(range.upper(), range.lower()); }
 Real Width(const Real& range) { return range.upper() - range.lower(); }
 
 std::string Text(const Real& x) { return x.text(); }
@@ -208,7 +207,7 @@ CoverVerdict CoverChecker::Check(const SlopeClaim& claim, const std::function<vo
     return {Answer::kNo, "a claim on a derivative that is zero"};
   if (!std::isfinite(claim.bound)) return {Answer::kNo, "the declared bound is not finite"};
   if (claim.cover.nodes.empty()) return {Answer::kNo, "a part of the domain is missing"};
-  const Precision precision(kBits);
+  const Precision precision(kCoverBits);
   Box whole;
   for (const forereach::Box* part : {&domain_.state, &domain_.input})
     for (Eigen::Index l = 0; l < part->dim(); ++l) whole.push_back(Real::FromTo(part->lower()[l], part->upper()[l]));

@@ -15,7 +15,7 @@ void Define(const std::string& name, int place, Names& names) {
   if (!names.try_emplace(name, place).second) throw ExpressionError("the name " + name + " has two meanings");
 }
 
-Real Between(const Real& end) { return Real::FromTo(-end, end); }
+Real PlusMinus(const Real& end) { return Real::FromTo(-end, end); }
 
 // number = point + rest, and rest times factor goes to the bend.
 void Split(const Real& number, const Real& factor, Real& point, Real& bend) {
@@ -80,7 +80,7 @@ std::vector<Enclosed> Functions::Over(const Slice& slice, std::span<const Real> 
   std::vector<Real> center = slice.center, half_width, box;
   for (std::size_t l = 0; l < n; ++l) {
     half_width.push_back(slice.HalfWidth(static_cast<int>(l)));
-    box.push_back(center[l] + Between(half_width[l]));
+    box.push_back(center[l] + PlusMinus(half_width[l]));
   }
   for (std::vector<Real>* z : {&center, &box}) z->insert(z->end(), input.begin(), input.end());
   const auto jets = [&](std::span<const Real> z, Order order) {
@@ -93,14 +93,14 @@ std::vector<Enclosed> Functions::Over(const Slice& slice, std::span<const Real> 
     Split(at_center[k].value, 1.0, function.value, function.bend);
     for (const auto& [l, slope] : at_center[k].first) {
       const Real& r = half_width[ToSize(l)];
-      if (!r.IsZero()) Split(slope, Between(r), function.slope[ToSize(l)], function.bend);
+      if (!r.IsZero()) Split(slope, PlusMinus(r), function.slope[ToSize(l)], function.bend);
     }
     for (const auto& [key, second] : over_box[k].second) {
       const std::size_t i = ToSize(key / JetArithmetic::kStride), l = ToSize(key % JetArithmetic::kStride);
       if (half_width[i].IsZero() || half_width[l].IsZero()) continue;
       const Real product = half_width[i] * half_width[l];
       if (second.IsFinite())
-        function.bend += second * (i == l ? Real::FromTo(Real(), Real(0.5) * product) : Between(product));
+        function.bend += second * (i == l ? Real::FromTo(Real(), Real(0.5) * product) : PlusMinus(product));
       else
         function.bend = Real::Everything();
     }
@@ -117,7 +117,7 @@ Bounds RangeOver(const Slice& slice, const Enclosed& function) {
       if (!column[l].IsZero() && !function.slope[l].IsZero()) along += function.slope[l] * column[l];
     spread += abs(along);
   }
-  const Real reached = function.value + function.bend + Between(spread.upper());
+  const Real reached = function.value + function.bend + PlusMinus(spread.upper());
   return {max(reached.lower(), function.range.lower()), min(reached.upper(), function.range.upper())};
 }
 

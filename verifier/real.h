@@ -112,4 +112,7 @@ class Real final {
   mpfi_t value_;
 };
 
+/** Whether it holds one number. */
+[[nodiscard]] inline bool IsPoint(const Real& range) { return CertainlyAtMost(range.upper(), range.lower()); }
+
 }  // namespace forereach::verifier

@@ -81,9 +81,9 @@ RealVector AffineMinimum(const std::vector<RealVector>& points) {
 
 // The dual bound along directions, the best of which leads to the point of {core - sweep} nearest to the origin. The
 // sweep is taken without its radius and without the smallest of its balls: these are distances to be kept.
-class Search {
+class SeparationSearch {
  public:
-  Search(const Sweep& sweep, const Obstacle& obstacle, double clearance, const Passage& passage)
+  SeparationSearch(const Sweep& sweep, const Obstacle& obstacle, double clearance, const Passage& passage)
       : sweep_(sweep),
         obstacle_(obstacle),
         clearance_(clearance),
@@ -308,7 +308,7 @@ class Search {
 }  // namespace
 
 Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best, const Passage& passage) {
-  Search search(sweep, obstacle, clearance, passage);
+  SeparationSearch search(sweep, obstacle, clearance, passage);
   const bool proven = search.Run();
   best = search.best() ? *search.best() : Real(-std::numeric_limits<double>::infinity());
   if (proven) return Answer::kYes;

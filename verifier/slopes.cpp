@@ -10,8 +10,6 @@
 namespace forereach::verifier {
 namespace {
 
-bool IsPoint(const Real& range) { return CertainlyAtMost(range.upper(), range.lower()); }
-
 // The entry with a key; null: none.
 const Real* Find(const Sparse& entries, int key) {
   const auto found = std::ranges::lower_bound(entries, key, {}, &std::pair<int, Real>::first);

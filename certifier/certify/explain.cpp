@@ -19,19 +19,19 @@ std::string VariableName(const NominalModel& model, int index) {
 }
 
 std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
-  using Kind = DomainExit::Kind;
+  using Exit = DomainExit::Kind;
   // What is reached, away from the bound; the bound itself, towards it.
-  const bool below = exit.kind == Kind::kLower;
+  const bool below = exit.kind == Exit::kLower;
   const std::string value = below ? RoundedDown(exit.value) : RoundedUp(exit.value);
   const std::string bound = below ? RoundedUp(exit.bound) : RoundedDown(exit.bound);
   switch (exit.kind) {
-    case Kind::kLower: return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
-    case Kind::kUpper: return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
-    case Kind::kInequality:
+    case Exit::kLower: return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
+    case Exit::kUpper: return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
+    case Exit::kInequality:
       return "inequality " + std::to_string(exit.index) + " reaches " + value + ", above its bound " + bound;
-    case Kind::kBall:
+    case Exit::kBall:
       return "ball " + std::to_string(exit.index) + ": distance reaches " + value + ", above its radius " + bound;
-    case Kind::kNone: break;
+    case Exit::kNone: break;
   }
   return "no constraint of the domain is violated";
 }

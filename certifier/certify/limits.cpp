@@ -8,22 +8,19 @@
 
 #include "certifier/dynamics/angles.h"
 #include "certifier/dynamics/text_enclosure.h"
+#include "certifier/numerics/require.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
 namespace {
 
-void Require(bool good, const std::string& what) {
-  if (!good) throw std::invalid_argument("limits: " + what);
-}
-
 const std::vector<Limit>& Validated(const std::vector<Limit>& limits) {
   Require(limits.size() <= kMaxLimits,
-          std::to_string(limits.size()) + " limits, must be at most " + std::to_string(kMaxLimits));
+          "limits: " + std::to_string(limits.size()) + " limits, must be at most " + std::to_string(kMaxLimits));
   for (std::size_t i = 0; i < limits.size(); ++i) {
     const auto& [name, that, at_least, at_most] = limits[i];
-    const std::string which = "limit " + std::to_string(i) + ": ";
+    const std::string which = "limits: limit " + std::to_string(i) + ": ";
     Require(!name.empty() && name.size() <= kMaxLimitName &&
                 std::ranges::all_of(name, [](char c) { return ' ' <= c && c <= '~'; }),
             which + "its name has " + std::to_string(name.size()) + " bytes, must be 1 to " +

@@ -11,9 +11,9 @@ namespace {
 constexpr double kLeastDepth = 1e-6;  // m, where the search begins
 constexpr double kFarthest = 1e6;     // of these, where it ends
 
-class Search final {
+class WayClearSearch final {
  public:
-  Search(const Certifier& certifier, const Plan& plan, Tube& tube, const SearchEffort& effort)
+  WayClearSearch(const Certifier& certifier, const Plan& plan, Tube& tube, const SearchEffort& effort)
       : certifier_(certifier), plan_(plan), tube_(tube), effort_(effort) {}
 
   // The first step at which the obstacle may be touched, if there is one.
@@ -67,7 +67,7 @@ class Search final {
 std::optional<std::vector<GivingWay>> FindWayClear(const Certifier& certifier, const Plan& plan,
                                                    std::span<const Obstacle> obstacles, Tube& tube,
                                                    const SearchEffort& effort) {
-  Search search(certifier, plan, tube, effort);
+  WayClearSearch search(certifier, plan, tube, effort);
   std::vector<GivingWay> ways;
   for (std::size_t o = 0; o < obstacles.size(); ++o) {
     if (!search.GoesOn()) return std::nullopt;

@@ -29,10 +29,10 @@ std::optional<Interval> Intersection(const Interval& a, const Interval& b) {
 
 // ---- The largest value of a quantity over a box, by branch and bound.
 
-class Search {
+class MotionSearch {
  public:
   // Values up to `least` are of no interest.
-  Search(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least)
+  MotionSearch(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least)
       : flow_(flow), quantity_(std::move(quantity)), options_(options) {
     found_.lower = least;
   }
@@ -201,7 +201,7 @@ Interval RangeOver(const SampledMotion& motion, const Quantity& quantity, const 
     double upper = kInfinity;
     for (const std::size_t boxes : {300, 20'000})  // it need not be tight
       if (upper == kInfinity)
-        upper = Search(motion.flow, side, {.gap = 0.1, .max_boxes = boxes}, -kInfinity).Run(box).upper;
+        upper = MotionSearch(motion.flow, side, {.gap = 0.1, .max_boxes = boxes}, -kInfinity).Run(box).upper;
     return upper;
   };
   return {-largest([&](const Flow::Derivatives& d) { return Negated(quantity(d)); }), largest(quantity)};
@@ -275,7 +275,8 @@ std::optional<Arguments> ReachableInParts(const SampledMotion& motion, const Arg
   if (!first) return std::nullopt;
   auto second = ReachableInParts(motion, middle, period / 2, halvings - 1, end);
   if (!second) return std::nullopt;
-  std::ranges::transform(*first, *second, second->begin(), Join);
+  std::ranges::transform(*first, *second, second->begin(),
+                         [](const Interval& a, const Interval& b) { return Join(a, b); });
   return second;
 }
 
@@ -343,7 +344,7 @@ MotionBound BoundMagnitude(const Flow& flow, const std::vector<Quantity>& quanti
     for (const Arguments& region : regions) {
       for (const bool negated : {false, true}) {
         const auto side = [&](const Flow::Derivatives& d) { return negated ? Negated(quantity(d)) : quantity(d); };
-        const MotionBound one = Search(flow, side, options, all.lower).Run(region);
+        const MotionBound one = MotionSearch(flow, side, options, all.lower).Run(region);
         all.upper = std::max(all.upper, one.upper);
         all.lower = std::max(all.lower, one.lower);
         all.boxes += one.boxes;

@@ -9,6 +9,7 @@
 
 #include "certifier/declare/mean_value.h"
 #include "certifier/numerics/arithmetic.h"
+#include "certifier/numerics/require.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
@@ -87,22 +88,22 @@ double Product(double a, double b) {
   return a > 0 && b > 0 ? std::clamp(a * b, std::numeric_limits<double>::denorm_min(), kMaxDouble) : 0;
 }
 
-struct Part {
+struct SlopePart {
   double bound;
   int node, cut;
   Arguments box;
 
   // Of infinite bounds the newest part goes first: it is cut down to a box that shows where, or to finite ones.
-  bool operator<(const Part& other) const {
+  bool operator<(const SlopePart& other) const {
     if (bound != other.bound) return bound < other.bound;
     return bound < kInfinity ? node > other.node : node < other.node;
   }
 };
 
-class Search {
+class SlopeSearch {
  public:
-  Search(const ResidualSlopes& slopes, const Domain& domain, std::span<const Interval> parameters, int row, int column,
-         const SlopeBoundOptions& options)
+  SlopeSearch(const ResidualSlopes& slopes, const Domain& domain, std::span<const Interval> parameters, int row,
+              int column, const SlopeBoundOptions& options)
       : slopes_(slopes), domain_(domain), options_(options), root_(domain.Ranges()) {
     result_.row = row;
     result_.column = column;
@@ -127,7 +128,7 @@ class Search {
     Add(0, kInfinity, root_);
     while (!parts_.empty() && parts_.top().bound > Enough() && parts_.top().cut >= 0 &&
            result_.boxes < options_.max_boxes) {
-      const Part part = parts_.top();
+      const SlopePart part = parts_.top();
       parts_.pop();
       Bisect(part);
       if (progress && result_.boxes % kBetweenReports < 2) progress(Closed(part.bound));
@@ -152,7 +153,7 @@ class Search {
     return closed_ = closed > closed_ ? std::min(closed, 1.0) : closed_;
   }
 
-  void Bisect(const Part& part) {
+  void Bisect(const SlopePart& part) {
     const std::size_t argument = ToSize(part.cut);
     const double at = part.box[argument].Middle();
     std::vector<Cover::Node>& nodes = result_.cover.nodes;
@@ -303,16 +304,12 @@ class Search {
   Arguments root_;
   std::vector<int> active_;
   std::vector<bool> constrained_;  // by an inequality or a ball
-  std::priority_queue<Part> parts_;
+  std::priority_queue<SlopePart> parts_;
   SlopeBound result_;
   int cut_ = -1;  // of the box that is being bounded
   double cut_score_ = 0;
   double first_gap_ = 0, closed_ = 0;
 };
-
-void Require(bool good, const std::string& what) {
-  if (!good) throw std::invalid_argument("slope bound: " + what);
-}
 
 }  // namespace
 
@@ -326,13 +323,14 @@ SlopeBound BoundSlope(const ResidualSlopes& slopes, const Domain& domain, std::s
   RequireExactArithmetic();
   domain.Validate(slopes.num_states(), slopes.num_variables() - slopes.num_states());
   const auto count = ToSize(slopes.num_arguments() - slopes.num_variables());
-  Require(parameters.size() == count,
-          std::to_string(parameters.size()) + " parameter ranges for " + std::to_string(count) + " parameters");
-  Require(0 <= row && row < slopes.num_states(), "no row " + std::to_string(row));
-  Require(0 <= column && column < slopes.num_variables(), "no column " + std::to_string(column));
-  Require(options.gap > 0 && options.gap < kInfinity, "gap " + ToText(options.gap) + " is outside (0, inf)");
-  Require(options.max_boxes > 0, "max_boxes is 0");
-  return Search(slopes, domain, parameters, row, column, options).Run(progress);
+  Require(parameters.size() == count, "slope bound: " + std::to_string(parameters.size()) + " parameter ranges for " +
+                                          std::to_string(count) + " parameters");
+  Require(0 <= row && row < slopes.num_states(), "slope bound: no row " + std::to_string(row));
+  Require(0 <= column && column < slopes.num_variables(), "slope bound: no column " + std::to_string(column));
+  Require(options.gap > 0 && options.gap < kInfinity,
+          "slope bound: gap " + ToText(options.gap) + " is outside (0, inf)");
+  Require(options.max_boxes > 0, "slope bound: max_boxes is 0");
+  return SlopeSearch(slopes, domain, parameters, row, column, options).Run(progress);
 }
 
 }  // namespace forereach

@@ -14,11 +14,11 @@ using Winding = std::optional<double>;
 bool IsWhole(double x) { return x == std::floor(x) && std::isfinite(x); }
 
 // Nothing where the result is not a double.
-Winding Sum(double a, double b) {
+Winding SumOfWindings(double a, double b) {
   const double sum = a + b;
   return sum - a == b && sum - b == a ? Winding(sum) : std::nullopt;
 }
-Winding Product(double a, double b) {
+Winding ProductOfWindings(double a, double b) {
   const double product = a * b;
   return std::fma(a, b, -product) == 0 && std::abs(product) > 0x1p-500 ? Winding(product) : std::nullopt;
 }
@@ -31,12 +31,12 @@ Winding Quotient(double a, double b) {
 Winding WindingOf(const Program& program, const Operation& n, double a, double b) {
   const auto constant = [&](int node) { return program.node(node).op == Op::kConstant; };
   switch (n.op) {
-    case Op::kAdd: return Sum(a, b);
-    case Op::kSubtract: return Sum(a, -b);
+    case Op::kAdd: return SumOfWindings(a, b);
+    case Op::kSubtract: return SumOfWindings(a, -b);
     case Op::kNegate: return -a;
     case Op::kMultiply:
-      if (constant(n.a)) return Product(program.node(n.a).constant, b);
-      return constant(n.b) ? Product(a, program.node(n.b).constant) : std::nullopt;
+      if (constant(n.a)) return ProductOfWindings(program.node(n.a).constant, b);
+      return constant(n.b) ? ProductOfWindings(a, program.node(n.b).constant) : std::nullopt;
     case Op::kDivide: return constant(n.b) ? Quotient(a, program.node(n.b).constant) : std::nullopt;
     case Op::kSin:
     case Op::kCos: return IsWhole(a) ? Winding(0) : std::nullopt;

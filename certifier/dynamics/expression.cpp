@@ -6,6 +6,8 @@
 #include <optional>
 #include <system_error>
 
+#include "certifier/numerics/text.h"
+
 namespace forereach {
 namespace {
 
@@ -29,10 +31,8 @@ constexpr NamedFunction kFunctions[] = {{"sin", Function::kSin, 1},
                                         {"hypot", Function::kHypot, 2},
                                         {"softplus", Function::kSoftplus, 2},
                                         {"smooth_gate", Function::kSmoothGate, 1}};
-constexpr std::string_view kPi = "pi";
+constexpr std::string_view kPiName = "pi";
 
-// Independent of the locale.
-bool IsDigit(char c) { return '0' <= c && c <= '9'; }
 bool IsLetter(char c) { return ('a' <= c && c <= 'z') || ('A' <= c && c <= 'Z') || c == '_'; }
 bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
@@ -237,14 +237,14 @@ class Parser final {
       return false;
     }
     if (function != nullptr) Fail(token.place, Shown(token) + " is a function; expected ( behind it");
-    if (token.text == kPi) {
+    if (token.text == kPiName) {
       Emit({.kind = Kind::kNumber, .number = std::numbers::pi}, token.place);
       return true;
     }
     const int found = names_.Find(token.text);
     if (found < 0) {
       std::vector<std::string> known = names_.all();
-      known.emplace_back(kPi);
+      known.emplace_back(kPiName);
       throw ExpressionError(token.place.line, token.place.column, Shown(token) + " is not a name that is known here",
                             std::string(token.text), std::move(known));
     }
@@ -253,7 +253,7 @@ class Parser final {
   }
 
   [[noreturn]] void FailAsFunction(const Token& token) const {
-    if (token.text == kPi || names_.Find(token.text) >= 0)
+    if (token.text == kPiName || names_.Find(token.text) >= 0)
       Fail(token.place, Shown(token) + " is not a function; write * for a product: " + Shown(token) + "*(");
     throw ExpressionError(token.place.line, token.place.column, Shown(token) + " is not a function",
                           std::string(token.text), FunctionNames());
@@ -400,7 +400,7 @@ bool IsName(std::string_view text) {
          std::ranges::all_of(text, [](char c) { return IsLetter(c) || IsDigit(c); });
 }
 
-bool IsReserved(std::string_view name) { return name == kPi || FindFunction(name) != nullptr; }
+bool IsReserved(std::string_view name) { return name == kPiName || FindFunction(name) != nullptr; }
 
 bool NameList::Add(const std::string& name) {
   const bool is_new = places_.emplace(name, static_cast<int>(names_.size())).second;

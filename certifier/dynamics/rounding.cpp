@@ -11,10 +11,10 @@
 namespace forereach {
 namespace {
 
-constexpr double kHalfUlp = kUnitRoundoff, kTiny = 0x1p-1070;
+constexpr double kHalfUlp = kUnitRoundoff, kSubnormal = 0x1p-1070;
 
 // One rounding of a result of this size, twice over: the size is that of the exact value.
-double Rounding(double size) { return AddUp(MulUp(size, 2 * kHalfUlp), kTiny); }
+double Rounding(double size) { return AddUp(MulUp(size, 2 * kHalfUlp), kSubnormal); }
 
 double FiniteOrInfinity(double error) { return error < kInfinity ? error : kInfinity; }
 

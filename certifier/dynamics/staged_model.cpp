@@ -30,7 +30,7 @@ struct Number {
 
 // Above the relative error of a sum of all products for one entry: 24 variables and 136 pairs of them, two roundings
 // each. And what is added for underflow; its products are far from subnormal, which processors multiply slowly.
-constexpr double kOfSum = 0x1p-44, kTiny = 0x1p-400;
+constexpr double kOfSum = 0x1p-44, kUnderflow = 0x1p-400;
 
 // Entry by entry, to + factor * row, for `count` entries. Row sums of radii are finished by Finish.
 FOREREACH_INLINE void AddTimes(const Number& factor, const double* center, const double* radius, std::size_t count,
@@ -48,7 +48,7 @@ FOREREACH_INLINE void AddTimes(const Number& factor, const double* center, const
 // Covers the rounding of the radii themselves.
 FOREREACH_INLINE void Finish(std::size_t count, double* radius) {
   for (std::size_t i = 0; i < count; i += kLaneCount)
-    StoreLanes(LoadLanes(radius + i) * AllLanes(1 + 2 * kOfSum) + AllLanes(kTiny), radius + i);
+    StoreLanes(LoadLanes(radius + i) * AllLanes(1 + 2 * kOfSum) + AllLanes(kUnderflow), radius + i);
 }
 
 // Products of three numbers below this, and sums of all of them, do not overflow; a NaN fails the comparison.
@@ -366,7 +366,7 @@ class StagedModel::Stages final {
       add(a, b);
       if (a != b) add(b, a);
       StoreLanes(center, &forward.product[k * kLaneCount]);
-      StoreLanes(spread * AllLanes(1 + 2 * kOfSum) + AllLanes(kTiny), &forward.product_radius[k * kLaneCount]);
+      StoreLanes(spread * AllLanes(1 + 2 * kOfSum) + AllLanes(kUnderflow), &forward.product_radius[k * kLaneCount]);
     }
   }
 

@@ -7,6 +7,9 @@
 
 namespace forereach {
 
+/** Whether it is a decimal digit, whatever the locale. */
+[[nodiscard]] constexpr bool IsDigit(char c) { return '0' <= c && c <= '9'; }
+
 /** The shortest decimal that reads back as the same double. */
 [[nodiscard]] std::string ToText(double value);
 

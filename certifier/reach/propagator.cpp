@@ -10,7 +10,7 @@ namespace forereach {
 namespace {
 
 // Above the rounding of the few dozen operations that make up a slack.
-constexpr double kRelative = 0x1p-43, kTiny = 0x1p-1050;
+constexpr double kRelative = 0x1p-43, kSmallest = 0x1p-1050;
 
 // The plain expansion is used where its error, in the units of the state, is negligible everywhere in the domain.
 constexpr double kLargestError = 1e-6;
@@ -113,7 +113,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
         const Lanes half = (upper - lower) * AllLanes(0.5) + disturbed;
         const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
         const Lanes added = Abs(lower) + Abs(upper) + Abs(moved) + disturbed;
-        const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kTiny);
+        const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kSmallest);
         Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
                        (added > AllLanes(0) ? rounding : AllLanes(0))) *
                       AllLanes(1 + kRelative);

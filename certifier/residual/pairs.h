@@ -44,8 +44,8 @@ class PairSearch final {
 
   /** The entry j other than `self` with the largest v_j - d(point, j), where v is the floor for side 0 and the negated
   ceiling for side 1; or any entry for which that is not below the point's own v. An entry that equals the point and has
-  an id above `self` is skipped, so that of two equal entries only the later is dominated by the other. Without any other
-  entry: kNone. @pre the margin is finite. */
+  an id above `self` is skipped, so that of two equal entries only the later is dominated by the other. Without any
+  other entry: kNone. @pre the margin is finite. */
   struct Other {
     double value = -kInfinity;
     std::uint32_t id = ObservationIndex::kNone;

@@ -5,14 +5,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/require.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
 namespace {
-
-void Require(bool good, const std::string& what) {
-  if (!good) throw std::invalid_argument(what);
-}
 
 Eigen::Vector3d Padded(const Eigen::VectorXd& point) {
   Eigen::Vector3d padded = Eigen::Vector3d::Zero();

@@ -8,15 +8,12 @@
 #include <string>
 
 #include "certifier/dynamics/expression.h"
+#include "certifier/numerics/require.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
 namespace {
-
-void Require(bool good, const std::string& what) {
-  if (!good) throw std::invalid_argument(what);
-}
 
 void RequireSize(double size, const std::string& what) {
   Require(size >= 0 && size < kInfinity, what + " " + ToText(size) + " is negative or not finite");
@@ -76,10 +73,10 @@ double LengthUpper(double x, double y, double z = 0) {
   return SqrtUp((sqr(Interval(x)) + sqr(Interval(y)) + sqr(Interval(z))).upper);
 }
 
-// Every number below is computed in plain arithmetic and has an error below kMargin times the size of what it is
+// Every number below is computed in plain arithmetic and has an error below kPlaceMargin times the size of what it is
 // computed from: a sum of at most kMaxStates + 4 terms, each with a few roundings, and a sine and a cosine within a
 // unit of their last place (interval.h) where the heading is at most kLargestHeading.
-constexpr double kMargin = 0x1p-45, kTiny = std::numeric_limits<double>::min(), kLargestHeading = 0x1p20;
+constexpr double kPlaceMargin = 0x1p-45, kLeastNormal = std::numeric_limits<double>::min(), kLargestHeading = 0x1p20;
 
 }  // namespace
 
@@ -241,13 +238,13 @@ double Placement::Slack(const Sample& sample, std::size_t i, std::size_t k) cons
   const Sample::Point& point = sample.points[i];
   if (points_[i].linear >= 0) {
     const AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear) + k];
-    double slack = RoundingError(kMargin, point.size) + kTiny;
+    double slack = RoundingError(kPlaceMargin, point.size) + kLeastNormal;
     for (std::size_t l = 0; l < sample.half_width.size(); ++l)
       slack += std::abs(linear.slope[l]) * sample.slice->slack(static_cast<int>(l));
     return slack;
   }
   const double turned = point.slope[k] == 0 ? 0 : std::abs(point.slope[k]) * sample.slice->slack(heading_);
-  return sample.slack[k] + turned + RoundingError(kMargin, sample.size[k] + point.size) + kTiny;
+  return sample.slack[k] + turned + RoundingError(kPlaceMargin, sample.size[k] + point.size) + kLeastNormal;
 }
 
 double Placement::SupportUpper(const Sample& sample, const Part& part, const Eigen::Vector3d& d,
@@ -278,7 +275,7 @@ double Placement::SupportAtExpressions(const Sample& sample, int i, const Eigen:
       sum += AllLanes(weight[ToSize(l)]) * LoadLanes(slice.padded_row(l).data() + j);
     spread += Abs(sum);
   }
-  return support + Sum(spread) + RoundingError(kMargin, size) + kTiny;
+  return support + Sum(spread) + RoundingError(kPlaceMargin, size) + kLeastNormal;
 }
 
 void Placement::EncloseAtExpressions(const Sample& sample, std::size_t i, Zonotope& place) const noexcept {
@@ -354,7 +351,7 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
     const std::size_t columns = slice.padded_size();
     const double spread = count == 3 ? Spread(terms.data(), 3, columns)  // what turns in the plane: unrolled
                                      : Spread(terms.data(), count, columns);
-    support += spread + (turn + RoundingError(kMargin, size + turn)) + kTiny;
+    support += spread + (turn + RoundingError(kPlaceMargin, size + turn)) + kLeastNormal;
     if (!(support <= largest)) largest = support;
     if (std::isnan(support)) break;
   }

@@ -14,6 +14,7 @@
 
 #include "certifier/dynamics/expression.h"
 #include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
 #include "certifier/task/config_error.h"
 #include "certifier/task/draft.h"
 #include "certifier/task/files.h"
@@ -124,8 +125,6 @@ std::string Without(std::string token, std::string_view letters) {
   std::erase_if(token, [&](char c) { return letters.find(c) != std::string_view::npos; });
   return token;
 }
-
-bool IsDigit(char c) { return '0' <= c && c <= '9'; }
 
 // The number that a token begins with, without its unit.
 std::string Leading(const std::string& token) { return token.substr(0, token.find_last_of("0123456789.") + 1); }

@@ -25,7 +25,7 @@ std::string KindOf(mode_t mode) {
   return "is not a regular file";
 }
 
-std::string Size(std::int64_t bytes) {
+std::string SizeText(std::int64_t bytes) {
   return bytes % kMegabyte == 0 ? std::to_string(bytes / kMegabyte) + " MiB" : std::to_string(bytes) + " bytes";
 }
 
@@ -57,7 +57,7 @@ std::size_t InputFile::Read(char* to, std::size_t most) {
 void InputFile::Fail(const std::string& what) const { throw ConfigError(named_by_ + path_ + ": " + what); }
 
 void InputFile::RequireAtMost(std::int64_t bytes) const {
-  if (bytes > most_bytes_) Fail("is larger than " + Size(most_bytes_) + ", the most that is read of such a file");
+  if (bytes > most_bytes_) Fail("is larger than " + SizeText(most_bytes_) + ", the most that is read of such a file");
 }
 
 std::string ReadWhole(const std::string& path, std::int64_t most_bytes, const std::string& named_by) {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <string>
 
+#include "certifier/numerics/text.h"
+
 namespace forereach {
 namespace {
-
-bool IsDigit(char c) { return '0' <= c && c <= '9'; }
 
 bool SpellsNonFinite(std::string_view token) {
   std::string word(token.substr(std::min(token.find_first_not_of("+-."), token.size())));
