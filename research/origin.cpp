@@ -49,7 +49,7 @@ Origin OriginOf(const std::string& command, unsigned threads) {
   std::string commit = Git("rev-parse HEAD");
   if (commit.empty())
     commit = "unknown";
-  else if (!Git("status --porcelain --untracked-files=no -- ':!docs'").empty())
+  else if (!Git("status --porcelain --untracked-files=no -- ':!docs' ':!research/*.md' ':!research/figures'").empty())
     commit += ", with changes";
   std::string committed = Git("log -1 --date=format-local:'%Y-%m-%d %H:%M' --format=%cd");
   return {command, commit, committed, Now(), Compiler(), Processor(), threads};

@@ -304,7 +304,7 @@ std::string Read(const fs::path& path) {
 }
 
 Output Command(const std::string& arguments) {
-  return Shell(FOREREACH_RESEARCH_PROGRAM " real " + arguments + " 2>&1");
+  return Shell(FOREREACH_BINARY_DIR "/research/forereach-research real " + arguments + " 2>&1");
 }
 
 TEST_F(RealTest, TheCommandWritesTablesAndATaskThatOthersRead) {

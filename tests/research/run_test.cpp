@@ -339,7 +339,9 @@ TEST_F(RunTest, PlansAreWrittenOneByOneWithTheColumnsOfTheDocuments) {
   }
 }
 
-Output Command(const std::string& arguments) { return Shell(FOREREACH_RESEARCH_PROGRAM " " + arguments + " 2>&1"); }
+Output Command(const std::string& arguments) {
+  return Shell(FOREREACH_BINARY_DIR "/research/forereach-research " + arguments + " 2>&1");
+}
 
 TEST_F(RunTest, TheCommandTeachesRunsAndRefuses) {
   const Output help = Command("--help");
