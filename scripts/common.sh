@@ -65,6 +65,6 @@ build() {
 }
 
 # For a build of the programs alone.
-programs_only=(-DFOREREACH_TESTS=OFF -DFOREREACH_EXPERIMENTS=OFF)
+programs_only=(-DFOREREACH_TESTS=OFF)
 
 bus_is_ready() { "$root/scripts/ready-bus" --check; }

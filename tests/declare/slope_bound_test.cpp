@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models/residuals.h"
-#include "experiments/equations_slopes.h"
+#include "research/equations_slopes.h"
 #include "tests/declare/families.h"
 
 namespace forereach {

@@ -112,12 +112,12 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
   Refuse("robot/bad.cpp", "\"planner_bridge/x.h\"", "robot may not include planner_bridge");
   Refuse("records/bad.cpp", "\"logger/x.h\"", "records may not include logger");
   Refuse("bench/bad.cpp", "\"logger/x.h\"", "bench may not include logger");
-  Refuse("experiments/bad.cpp", "\"robot/x.h\"", "experiments may not include robot");
-  Refuse("experiments/bad.cpp", "\"cli/commands.h\"",
-         "experiments may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
-  Refuse("experiments/bad.cpp", "\"planner_bridge/proposal.h\"",
-         "experiments may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
-  Refuse("certifier/gate/bad.cpp", "\"experiments/x.h\"", "certifier may not include experiments");
+  Refuse("research/bad.cpp", "\"robot/x.h\"", "research may not include robot");
+  Refuse("research/bad.cpp", "\"cli/commands.h\"",
+         "research may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
+  Refuse("research/bad.cpp", "\"planner_bridge/proposal.h\"",
+         "research may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
+  Refuse("certifier/gate/bad.cpp", "\"research/x.h\"", "certifier may not include research");
   Refuse("logger/bad.cpp", "\"tests/records/logs.h\"", "logger may not include tests");
   ExpectRefused();
 }

@@ -1,0 +1,118 @@
+/** What a declaration that was learned from one part of a car's logs is worth on another part. */
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "certifier/certify/problem.h"
+#include "identify/fit.h"
+#include "research/real/recording.h"
+
+namespace forereach::research {
+
+/** car.yaml */
+extern const char* const kModelFile;
+
+/** The model of car.yaml with the domain in which a car drives: at 1 m/s or more, under power. Place and heading are
+free.
+@param most_change of the steering command from one step to the next; 2 is from end to end.
+@throws ConfigError if the file cannot be read. */
+[[nodiscard]] Problem DrivingProblem(double most_change = 2);
+
+/** A part of a drive: transitions begin <= i < end. */
+struct Stretch {
+  const Drive* drive = nullptr;
+  int begin = 0, end = 0;
+};
+
+/** The transitions of a drive in blocks of 10 s, the first, third, ... or the others; those that go across the end of a
+block are in none. */
+[[nodiscard]] std::vector<Stretch> Blocks(const Drive& drive, bool odd);
+[[nodiscard]] std::vector<Stretch> Whole(const Drive& drive);
+
+/** The model with the parameters that fit the transitions of the stretches best. */
+struct Fitted {
+  Problem driving;  ///< What was fitted, with the fitted model
+  Transitions transitions;
+  Fit fit;
+  Eigen::VectorXd state_error;  ///< Of a measured state: three standard errors, the largest of the drives.
+  std::vector<int> felt;        ///< Columns of z on which the residual depends; the domain has ranges of these.
+};
+
+/** @param driving DrivingProblem, to whose domain the transitions are cut. @param most from so many transitions only,
+evenly chosen; 0: from all.
+@throws std::invalid_argument if there are too few transitions. Cost: about a second for 700 transitions. */
+[[nodiscard]] Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most = 0);
+
+/** The same with the model as it is. */
+[[nodiscard]] Fitted Unfitted(const Problem& driving, const std::vector<Stretch>& stretches, std::vector<int> felt);
+
+/** What the model leaves of each transition, N-by-n. */
+[[nodiscard]] Eigen::MatrixXd ErrorsOf(const NominalModel& model, const Transitions& transitions);
+
+struct LearnOptions {
+  double quantile = 0.99;  ///< Of |one-step error|, for each state: sigma + w, where that is more than sigma.
+  /** Whether transitions with larger errors stay, and slopes explain them: L is then the smallest that no two
+  transitions contradict. Otherwise they are left out, and L is zero. */
+  bool slopes = false;
+  /** The domain's ranges are those of these; empty: of those that the model was fitted to. */
+  std::vector<Stretch> domain_of = {};
+};
+
+struct Learned {
+  std::shared_ptr<const Problem> problem;  ///< Fitted model, domain, declaration and the transitions that were kept.
+  int transitions = 0, left_out = 0;
+  Eigen::VectorXd state_error;  ///< Fitted::state_error
+  bool explained = true;        ///< Whether slopes were found, or none were asked for.
+};
+
+/** Disturbance and slopes from what the fitted model leaves of its transitions. The domain's ranges of the states are
+widened by a tenth, since a tube needs room. Cost: some seconds for slopes. */
+[[nodiscard]] Learned Learn(const Fitted& fitted, const LearnOptions& options);
+/** The same with `factor` times the slopes. */
+[[nodiscard]] Learned WithSlopesTimes(const Learned& learned, double factor);
+
+/** Half-widths of corridors about a recorded path, m. */
+inline constexpr double kCorridors[] = {0.1, 0.15, 0.2, 0.3};
+
+/** The recorded commands of one window as a plan, and what became of it. */
+struct WindowResult {
+  Eigen::Matrix2Xd path;                ///< The recorded places, one more than steps.
+  Eigen::Matrix2Xd center, half_width;  ///< Of the tube's slices that there are.
+  int inside = 0;                       ///< Recorded states that lie in their slices, give or take state_error.
+  bool complete = false;                ///< Otherwise the tube leaves the domain.
+  std::vector<bool> certified;          ///< In each of kCorridors.
+};
+
+struct Judgement {
+  int steps = 0;        ///< Of a window
+  int transitions = 0;  ///< In the learned domain; the windows are made of these.
+  int outside_domain = 0;
+  int contradicting = 0;  ///< Transitions that contradict one that was learned from.
+  int beyond = 0;         ///< Transitions with a one-step error above sigma + w in some state.
+  std::vector<WindowResult> windows;
+
+  /** Adds what another learner was judged by. */
+  void Add(const Judgement& other);
+
+  /** Slices of all tubes but the initial sets, and the recorded states that lie in them. */
+  [[nodiscard]] int slices() const;
+  [[nodiscard]] int inside() const;
+  [[nodiscard]] int complete() const;
+  [[nodiscard]] int certified(std::size_t corridor) const;
+  /** The median over the windows of the position's half-width in the last slice, the larger of x and y; infinite where
+  there is no last slice. None without windows. */
+  [[nodiscard]] std::optional<double> HalfWidth() const;
+  /** The largest of those that are finite. */
+  [[nodiscard]] std::optional<double> LargestHalfWidth() const;
+  /** The median of the distances that the car covered in a window. */
+  [[nodiscard]] std::optional<double> Distance() const;
+};
+
+/** Judges by stretches that were not learned from. Windows do not overlap and start from the measured state, give or
+take state_error. Cost: about a millisecond a window. */
+[[nodiscard]] Judgement Judge(const Learned& learned, const std::vector<Stretch>& stretches, int steps);
+
+}  // namespace forereach::research
