@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kDigits = 6;
+constexpr int kMotionDigits = 6;
 
 // Neither the equations nor a second difference say how a disturbance acts between two samples.
 constexpr const char* kDisturbed =
@@ -30,13 +30,13 @@ constexpr const char* kDisturbed =
     "add the largest acceleration that the disturbance causes between two samples.";
 
 // One number of task.between.
-struct Row {
+struct MotionRow {
   std::string key, name, unit;
   MotionBound bound;
 };
 
-struct Proposal {
-  std::vector<Row> rows;
+struct MotionProposal {
+  std::vector<MotionRow> rows;
   std::string source, remark;
   double seconds = 0;
 };
@@ -47,12 +47,12 @@ Eigen::MatrixXd FrameOf(const Problem& problem) {
                                 : Eigen::MatrixXd::Zero(problem.projection.rows(), problem.projection.cols());
 }
 
-std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& acceleration,
+std::vector<MotionRow> RowsOf(const Config& config, const std::vector<MotionBound>& acceleration,
                         const MotionBound& turn_rate, const MotionBound& turn_acceleration) {
   const Problem& problem = *config.problem;
   const std::vector<std::string>& states = problem.model->state_names();
   const Eigen::MatrixXd frame = FrameOf(problem);
-  std::vector<Row> rows;
+  std::vector<MotionRow> rows;
   for (std::size_t i = 0; i < acceleration.size(); ++i) {
     std::string name;
     for (std::size_t k = 0; k < states.size(); ++k) {
@@ -70,7 +70,7 @@ std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& ac
   return rows;
 }
 
-Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
+MotionProposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   const Problem& problem = *config.problem;
   const std::vector<ExpressionText> places = problem.body.Coordinates();
   const auto flow = MakeFlow(*problem.model, places);
@@ -83,7 +83,7 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   const auto begin = std::chrono::steady_clock::now();
   const MotionBounds bounds =
       BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading, rest}, search);
-  Proposal proposal;
+  MotionProposal proposal;
   proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
   proposal.source = "equations";
@@ -97,7 +97,7 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   return proposal;
 }
 
-Proposal FromPositions(const Config& config) {
+MotionProposal FromPositions(const Config& config) {
   const Problem& problem = *config.problem;
   const MeasuredMotion measured =
       MeasureMotion(*problem.model, problem.transitions, FrameOf(problem), problem.body, config.period);
@@ -109,7 +109,7 @@ Proposal FromPositions(const Config& config) {
   const auto found = [](double value) { return MotionBound{value, value, 0, true}; };
   std::vector<MotionBound> acceleration;
   for (const double value : measured.acceleration) acceleration.push_back(found(value));
-  Proposal proposal;
+  MotionProposal proposal;
   proposal.rows = RowsOf(config, acceleration, found(measured.turn_rate), found(measured.turn_acceleration));
   proposal.source = "positions";
   proposal.remark = "Largest second differences in " + std::to_string(measured.triples) +
@@ -118,10 +118,10 @@ Proposal FromPositions(const Config& config) {
   return proposal;
 }
 
-std::string Yaml(const std::vector<Row>& rows) {
+std::string Yaml(const std::vector<MotionRow>& rows) {
   std::string acceleration, others;
-  for (const Row& row : rows) {
-    const std::string value = RoundedUp(row.bound.upper, kDigits);
+  for (const MotionRow& row : rows) {
+    const std::string value = RoundedUp(row.bound.upper, kMotionDigits);
     if (row.key == "acceleration")
       acceleration += (acceleration.empty() ? "" : ", ") + value;
     else
@@ -130,11 +130,11 @@ std::string Yaml(const std::vector<Row>& rows) {
   return "between: {acceleration: [" + acceleration + "]" + others + "}";
 }
 
-bool AllReached(const std::vector<Row>& rows) {
-  return std::ranges::all_of(rows, [](const Row& row) { return row.bound.reached; });
+bool AllReached(const std::vector<MotionRow>& rows) {
+  return std::ranges::all_of(rows, [](const MotionRow& row) { return row.bound.reached; });
 }
 
-Json ToJson(const Proposal& proposal, const Config& config) {
+Json ToJson(const MotionProposal& proposal, const Config& config) {
   Json document{{"source", proposal.source},
                 {"proven", proposal.source == "equations"},
                 {"reached", AllReached(proposal.rows)},
@@ -142,7 +142,7 @@ Json ToJson(const Proposal& proposal, const Config& config) {
                 {"seconds", proposal.seconds},
                 {"entries", Json::array()},
                 {"digests", {{"config", ToHex(config.grounds.config)}, {"model", ToHex(config.grounds.model)}}}};
-  for (const Row& row : proposal.rows)
+  for (const MotionRow& row : proposal.rows)
     document["entries"].push_back({{"key", row.key},
                                    {"name", row.name},
                                    {"unit", row.unit},
@@ -153,18 +153,18 @@ Json ToJson(const Proposal& proposal, const Config& config) {
   return document;
 }
 
-void PrintForPeople(const Proposal& proposal, const Config& config) {
+void PrintForPeople(const MotionProposal& proposal, const Config& config) {
   const bool proven = proposal.source == "equations";
   std::ostringstream text;
-  text << std::left << "declare: motion between two samples, at most " << RoundedUp(LongestPeriod(config), kDigits)
+  text << std::left << "declare: motion between two samples, at most " << RoundedUp(LongestPeriod(config), kMotionDigits)
        << " s apart, from the " << (proven ? "equations of " + config.problem->model->name() : "logged positions")
        << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
-  for (const Row& row : proposal.rows) {
+  for (const MotionRow& row : proposal.rows) {
     text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)
-         << (proven ? RoundedUp(row.bound.upper, kDigits) : RoundedDown(row.bound.lower, kDigits)) << std::setw(8)
+         << (proven ? RoundedUp(row.bound.upper, kMotionDigits) : RoundedDown(row.bound.lower, kMotionDigits)) << std::setw(8)
          << row.unit;
     if (proven)
-      text << "  largest found " << RoundedDown(row.bound.lower, kDigits) << ", " << row.bound.boxes << " boxes";
+      text << "  largest found " << RoundedDown(row.bound.lower, kMotionDigits) << ", " << row.bound.boxes << " boxes";
     text << "\n";
   }
   std::cout << text.str() << proposal.remark << (config.problem->declaration.IsDisturbed() ? kDisturbed : "")
@@ -176,7 +176,7 @@ void PrintForPeople(const Proposal& proposal, const Config& config) {
 int DeclareBetween(const BetweenCommand& command) {
   const Config config =
       LoadConfig(command.config, command.from_positions ? TransitionsFile::kRead : TransitionsFile::kIgnore);
-  const Proposal proposal = command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
+  const MotionProposal proposal = command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
   if (command.json)
     std::cout << JsonText(ToJson(proposal, config)) << std::endl;
   else

@@ -74,7 +74,7 @@ std::vector<SlopeBound> BoundAll(const Config& config, const DeclareArguments& o
   return bounds;
 }
 
-constexpr int kDigits = 10;  // of a bound
+constexpr int kBoundDigits = 10;  // of a bound
 
 // The arguments that the slopes of a row depend on and that are not parameters with one value.
 std::vector<std::size_t> FreeArguments(const ResidualSlopes& slopes, const Config& config, int row) {
@@ -100,8 +100,8 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
     if (!bound.unbounded.empty()) {
       std::string box;
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))
-        box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kDigits) + ", " +
-               RoundedUp(bound.unbounded[i].upper, kDigits) + "]";
+        box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) + ", " +
+               RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
       throw std::runtime_error(
           "no finite bound for the slope of " + NameOf(bound, names) + ": " + config.residual->name +
           " has none over " + box + ", found after " + std::to_string(bound.boxes) +
@@ -121,7 +121,7 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
     const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
     if (!same_row) text += (i > 0 ? "}, " : "") + names[static_cast<std::size_t>(bounds[i].row)] + ": {";
     text += (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " +
-            RoundedUp(bounds[i].upper, kDigits);
+            RoundedUp(bounds[i].upper, kBoundDigits);
   }
   return text + (bounds.empty() ? "}" : "}}");
 }
@@ -189,7 +189,7 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
        << " at\n";
   for (const SlopeBound& bound : bounds) {
     text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
-         << RoundedUp(bound.upper, kDigits) << std::setw(18) << RoundedDown(bound.lower, kDigits) << std::setw(10)
+         << RoundedUp(bound.upper, kBoundDigits) << std::setw(18) << RoundedDown(bound.lower, kBoundDigits) << std::setw(10)
          << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
     if (!bound.point.empty())
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))

@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kDigits = 4;  // of a number in the table
+constexpr int kTableDigits = 4;  // of a number in the table
 
 // A line of the transitions' file: its header is line 1.
 int LineOf(int observation) { return observation + 2; }
@@ -45,8 +45,8 @@ void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostre
       if (!(proposed > 0)) continue;
       const ProposedRow& found = proposal.rows[k];
       out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
-          << RoundedUp(found.smallest.slopes[column], kDigits) << std::setw(12)
-          << RoundedDown(found.least[column], kDigits) << std::setw(12) << ToText(proposed);
+          << RoundedUp(found.smallest.slopes[column], kTableDigits) << std::setw(12)
+          << RoundedDown(found.least[column], kTableDigits) << std::setw(12) << ToText(proposed);
       if (const auto& reason = found.smallest.reasons[l])
         out << "lines " << LineOf(reason->first) << " and " << LineOf(reason->second);
       out << "\n";
@@ -72,7 +72,7 @@ void PrintLoneSlopes(const LoneSlopes& rows, const NominalModel& model, std::ost
             << "the largest in\n";
       has_slopes = true;
       out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
-          << RoundedDown(lone.slope, kDigits) << std::setw(12) << lone.pairs << "lines " << LineOf(lone.first)
+          << RoundedDown(lone.slope, kTableDigits) << std::setw(12) << lone.pairs << "lines " << LineOf(lone.first)
           << " and " << LineOf(lone.second) << "\n";
     }
   if (flat > 0)
@@ -88,8 +88,8 @@ void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostre
     const ProposedRow& row = proposal.rows[k];
     const double sigma = proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)];
     out << "  " << std::setw(12) << model.state_names()[k] << std::setw(12) << ToText(sigma) << "  " << std::setw(10)
-        << RoundedDown(row.noise.repeated, kDigits) << "  " << std::setw(10)
-        << RoundedDown(row.noise.deviation, kDigits);
+        << RoundedDown(row.noise.repeated, kTableDigits) << "  " << std::setw(10)
+        << RoundedDown(row.noise.deviation, kTableDigits);
     if (row.strongin > 0)
       out << "  " << std::setw(10) << "x " + RoundedUp(row.strongin, 3) << "  x " << RoundedUp(row.knuth_chou, 3);
     out << "\n";

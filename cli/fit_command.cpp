@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kDigits = 6;
+constexpr int kFitDigits = 6;
 
 struct FitArguments {
   std::string config, names, picture;
@@ -46,7 +46,7 @@ double RootMeanSquare(const Eigen::MatrixXd& errors, Eigen::Index k) {
 
 std::string Short(double value) {
   std::ostringstream text;
-  text.precision(kDigits);
+  text.precision(kFitDigits);
   text << value;
   return text.str();
 }

@@ -127,8 +127,8 @@ std::vector<std::string> OutcomeNames() {
 Command LogCommand() {
   const auto options = std::make_shared<LogArguments>();
   return {
-      .name = kLog.name,
-      .purpose = kLog.purpose,
+      .name = kLogEdit.name,
+      .purpose = kLogEdit.purpose,
       .footer =
           "list    a line for each event: time (UTC), number, channel, type, plan, and its outcome, kind or cause\n"
           "filter  the chosen events, in the order of the logs named, into a new log\n"

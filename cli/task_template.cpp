@@ -51,7 +51,7 @@ std::vector<std::string> Velocities(const std::vector<TemplateVariable>& states)
   return names;
 }
 
-std::string Domain(const TaskTemplate& task) {
+std::string DomainKey(const TaskTemplate& task) {
   const bool from_data = std::ranges::all_of(task.states, &TemplateVariable::from_data);
   std::string text =
       "# The domain: where the model and the declaration hold. A plan that may leave it is not certified, and every "
@@ -71,7 +71,7 @@ std::string Domain(const TaskTemplate& task) {
   return text;
 }
 
-std::string Declaration(const TaskTemplate& task) {
+std::string DeclarationKey(const TaskTemplate& task) {
   std::vector<std::string> columns;
   for (const auto* variables : {&task.states, &task.inputs})
     for (const TemplateVariable& variable : *variables) columns.push_back(variable.name);
@@ -155,19 +155,19 @@ std::string PlaceAt(double share, const TaskTemplate& task, const std::vector<st
 // Towards the upper corner of the domain, of a fortieth of its width.
 std::string ExampleObstacle(const TaskTemplate& task, const std::vector<std::string>& positions) {
   constexpr double kShare = 0.0125;
-  constexpr int kDigits = 3;
+  constexpr int kTemplateDigits = 3;
   std::vector<std::string> center, lower, upper;
   for (const std::string& name : positions) {
     const auto state = std::ranges::find(task.states, name, &TemplateVariable::name);
     const double width = state->upper - state->lower, middle = state->lower + 0.8 * width;
-    center.push_back(RoundedDown(middle, kDigits));
-    lower.push_back(RoundedDown(middle - kShare * width, kDigits));
-    upper.push_back(RoundedUp(middle + kShare * width, kDigits));
+    center.push_back(RoundedDown(middle, kTemplateDigits));
+    lower.push_back(RoundedDown(middle - kShare * width, kTemplateDigits));
+    upper.push_back(RoundedUp(middle + kShare * width, kTemplateDigits));
   }
   const auto first = std::ranges::find(task.states, positions.front(), &TemplateVariable::name);
   if (positions.size() == 2)
     return "circle: {center: " + List(center) +
-           ", radius: " + RoundedUp(kShare * (first->upper - first->lower), kDigits) + "}";
+           ", radius: " + RoundedUp(kShare * (first->upper - first->lower), kTemplateDigits) + "}";
   return "box: {lower: " + List(lower) + ", upper: " + List(upper) + "}";
 }
 
@@ -303,13 +303,13 @@ std::vector<std::string> PositionStates(const std::vector<TemplateVariable>& sta
 }
 
 TemplateVariable RangeAround(const std::string& name, double least, double largest) {
-  constexpr int kDigits = 3;
+  constexpr int kTemplateDigits = 3;
   const double more = largest > least ? (largest - least) / 10 : 0.1;
   const auto number = [](const std::string& text) { return std::strtod(text.c_str(), nullptr); };
   // The nearest decimal, unless the data are outside it.
   const double near_lower = number(Rounded(least - more)), near_upper = number(Rounded(largest + more));
-  const double lower = near_lower <= least ? near_lower : number(RoundedDown(least - more, kDigits));
-  const double upper = near_upper >= largest ? near_upper : number(RoundedUp(largest + more, kDigits));
+  const double lower = near_lower <= least ? near_lower : number(RoundedDown(least - more, kTemplateDigits));
+  const double upper = near_upper >= largest ? near_upper : number(RoundedUp(largest + more, kTemplateDigits));
   return {name, "", std::max(lower, -kLargest), std::min(upper, kLargest), true};
 }
 
@@ -333,7 +333,7 @@ std::string TaskText(const TaskTemplate& task) {
          "\n"
          "# say what is still missing.\n"
          "\n" +
-         task.model + "\n" + Domain(task) + "\n" + Declaration(task) + "\n" + TransitionsKey(task) + "\n" +
+         task.model + "\n" + DomainKey(task) + "\n" + DeclarationKey(task) + "\n" + TransitionsKey(task) + "\n" +
          TaskKey(task, positions) + "\n" + Processes(task, positions);
 }
 

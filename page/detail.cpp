@@ -38,7 +38,7 @@ void AddNearest(const Problem& problem, const JudgedCandidate& judged, const Tub
   for (Eigen::Index k = 0; k < center.size(); ++k) {
     const Eigen::VectorXd weights = problem.declaration.lipschitz.row(k);
     Eigen::Index nearest = -1;
-    double distance = kUnknown;
+    double distance = kNoNumber;
     if (known.size() > 0 && !weights.isZero(0)) distance = (apart * weights).minCoeff(&nearest);
     detail.nearest.push_back(static_cast<int>(nearest));
     detail.nearest_distance.push_back(distance);

@@ -175,7 +175,7 @@ class Database::Statement final {
   void ReadNext(std::int64_t& value) { value = sqlite3_column_int64(statement_, column_++); }
   void ReadNext(int& value) { value = sqlite3_column_int(statement_, column_++); }
   void ReadNext(double& value) {
-    value = IsNull() ? kUnknown : sqlite3_column_double(statement_, column_);
+    value = IsNull() ? kNoNumber : sqlite3_column_double(statement_, column_);
     ++column_;
   }
   void ReadNext(std::string& value) {
@@ -189,7 +189,7 @@ class Database::Statement final {
     std::string text;
     ReadNext(text);
     value.clear();
-    for (const auto& entry : ParseJson(text)) value.push_back(entry.is_null() ? kUnknown : entry.get<double>());
+    for (const auto& entry : ParseJson(text)) value.push_back(entry.is_null() ? kNoNumber : entry.get<double>());
   }
   void ReadNext(std::optional<std::int64_t>& value) {
     value = IsNull() ? std::nullopt : std::optional(sqlite3_column_int64(statement_, column_));

@@ -155,7 +155,7 @@ std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
 
 double Interpreter::LatencyUs(const Digest& plan, std::int64_t utime) {
   const std::optional<std::int64_t> received = candidates_.Take(plan);
-  return received ? static_cast<double>(utime - *received) : kUnknown;
+  return received ? static_cast<double>(utime - *received) : kNoNumber;
 }
 
 }  // namespace forereach

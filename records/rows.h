@@ -13,7 +13,7 @@
 
 namespace forereach {
 
-inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 /** The event of the log from which a row was made. File and number together are unique in each table. */
 struct LogReference {
@@ -28,9 +28,9 @@ struct DecisionRow {
   std::int64_t utime = 0, candidate_utime = 0, sequence = 0, plan_id = 0;
   std::string source, outcome, cause, message;
   int step = -1, coordinate = -1, obstacle = -1, first_observation = -1, second_observation = -1;
-  double margin = kUnknown, threshold = kUnknown, elapsed_us = kUnknown;
+  double margin = kNoNumber, threshold = kUnknown, elapsed_us = kUnknown;
   /** The time between the receipts of candidate and decision at the logger. Unknown if the log lacks the candidate. */
-  double latency_us = kUnknown;
+  double latency_us = kNoNumber;
   std::string plan_digest;
   std::array<std::string, kGrounds.size()> grounds;  ///< In the order of kGrounds.
 };
@@ -42,7 +42,7 @@ struct EventRow {
   std::string kind, message;
   int step = -1, coordinate = -1;
   std::vector<double> state;
-  double value = kUnknown;
+  double value = kNoNumber;
 };
 
 /** A gap in a stream: missing messages, or a restart of their sender. */

@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kRepeated = 256;  // answers to withdrawals that may be repeated at one time
 
 double NearestRank(std::vector<double>& values, double fraction) {
-  if (values.empty()) return kUnknown;
+  if (values.empty()) return kNoNumber;
   const auto rank = static_cast<std::ptrdiff_t>(std::ceil(fraction * static_cast<double>(values.size()))) - 1;
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return values[static_cast<std::size_t>(rank)];
