@@ -15,6 +15,7 @@
 #include "identify/smallest_row.h"
 #include "tests/identify/seed.h"
 #include "tests/oracle/exact.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -200,9 +201,6 @@ class HoldOutTest : public testing::Test {
   // The point mass from rest, with a residual of vx that falls with vx and noise.
   HoldOutTest() : random_(seed_) {
     SCOPED_TRACE("seed " + std::to_string(seed_));
-    problem_.model = MakePointMass(0.1);
-    problem_.domain.state = Box(Eigen::Vector4d(-99, -99, -9, -9), Eigen::Vector4d(99, 99, 9, 9));
-    problem_.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
     Transitions& data = problem_.transitions;
     data.z = Eigen::MatrixXd::Zero(120, 6);
     data.x_next = Eigen::MatrixXd::Zero(120, 4);
@@ -234,7 +232,7 @@ class HoldOutTest : public testing::Test {
 
   const unsigned seed_ = SeedOf(1);
   std::mt19937 random_;
-  Problem problem_;
+  Problem problem_ = WorldOf(MakePointMass(0.1), Within({99, 99, 9, 9}), Within({1, 1}));
   Declaration declaration_;
 };
 

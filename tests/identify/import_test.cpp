@@ -11,6 +11,7 @@
 #include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config_error.h"
 #include "tests/identify/seed.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -28,9 +29,6 @@ struct Row {
 class ImportTest : public testing::Test {
  protected:
   ImportTest() {
-    problem_.model = MakePointMass(0.1);
-    problem_.domain.state = Box(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3));
-    problem_.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
     options_.period = 0.1;
     options_.tolerance = 1e-9;
     options_.factors.assign(6, 1);
@@ -53,7 +51,7 @@ class ImportTest : public testing::Test {
   }
   ImportedLog Again() { return Import(table_, problem_, options_); }
 
-  Problem problem_;
+  Problem problem_ = WorldOf(MakePointMass(0.1), Within({9, 9, 3, 3}), Within({1, 1}));
   ImportOptions options_;
   LogTable table_;
 };

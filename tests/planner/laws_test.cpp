@@ -8,6 +8,7 @@
 #include "certifier/dynamics/text_model.h"
 #include "planner_bridge/motion.h"
 #include "tests/planner/tasks.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -28,12 +29,9 @@ Config Unicycle() {
       {"x + dt*v*cos(theta)"}, {"y + dt*v*sin(theta)"}, {"theta + dt*omega"}, {"v + change"}, {"omega + dt*alpha"}};
   Config config;
   config.path = "unicycle";
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakeTextModel(text);
-  problem->domain.state = Box(Vec({-10, -10, -4, -0.1, -2}), Vec({10, 10, 4, 2, 2}));
-  problem->domain.input = Box(Vec({-1, -3}), Vec({0.5, 3}));
-  problem->projection = Eigen::MatrixXd::Identity(2, 5);
-  config.problem = problem;
+  config.problem = std::make_shared<const Problem>(WorldOf(MakeTextModel(text),
+                                                           Box(Vec({-10, -10, -4, -0.1, -2}), Vec({10, 10, 4, 2, 2})),
+                                                           Box(Vec({-1, -3}), Vec({0.5, 3}))));
   config.laws.stop = {{{"-v/dt"}, {"-omega/dt"}}};
   config.laws.at_rest = std::vector<RestBound>{{3, 1e-3}, {4, 1e-3}};
   config.robot.hold = std::vector<std::string>{"v", "omega"};

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -18,9 +19,7 @@ constexpr std::int64_t kT0 = 1'700'000'000'000'000;
 
 // A bicycle with P = (x, y), so that both coordinates and the heading can bulge.
 Problem Bicycle() {
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.2, 2.5);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  Problem problem = WorldOf(MakeKinematicBicycle(0.2, 2.5), Within({40, 40, 3, 25, 3, 0.48}), Within({20, 2}));
   problem.between = Between{Vector2d(0, 4), 0, 0, 0.2};
   return problem;
 }

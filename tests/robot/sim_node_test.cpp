@@ -26,6 +26,7 @@
 #include "tests/keys.h"
 #include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -55,18 +56,18 @@ std::int64_t BoundaryTime(int j) { return kT0 + j * kPeriod; }
 Config PointMassTask() {
   Config config;
   config.path = "task.yaml";
-  Problem problem;
-  problem.model = MakePointMass(0.15);
-  problem.projection = Eigen::MatrixXd::Identity(2, 4);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(4, -1e3), Eigen::VectorXd::Constant(4, 1e3));
-  problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
-  config.problem = std::make_shared<const Problem>(problem);
+  config.problem =
+      std::make_shared<const Problem>(WorldOf(MakePointMass(0.15), Within({1e3, 1e3, 1e3, 1e3}), Within({1e3, 1e3})));
   config.grounds.config = DigestOf("config");
   config.grounds.model = DigestOf("model");
   config.planner.goal = {100, 0};
   config.robot.start = {0, 0, 0, 0};
   config.robot.step_period_ms = 40;
   return config;
+}
+
+Problem LargeBicycle(std::shared_ptr<const NominalModel> model) {
+  return WorldOf(std::move(model), Within({1e3, 1e3, 1e3, 1e3, 1e3, 1e3}), Within({1e3, 1e3}));
 }
 
 // Forward for half of the steps, then back to rest: the second half is the tail. X0 = `state` +- 0.1, slices anything.
@@ -783,11 +784,7 @@ TEST(RobotSim, WhatExpiredWhileItWasHeldUpIsNotStarted) {
 
 TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   Config config = PointMassTask();
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.1, 2.5);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -1e3), Eigen::VectorXd::Constant(6, 1e3));
-  problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
+  const Problem problem = LargeBicycle(MakeKinematicBicycle(0.1, 2.5));
   config.problem = std::make_shared<const Problem>(problem);
   config.robot.start = {0, 0, 0, 20, 1, 0.3};
   config.robot_residual = ResidualOf(*problem.model, ResidualNamed("heading_saturation"));
@@ -867,10 +864,7 @@ TEST(RobotSim, AConfigThatDoesNotFitTheModelIsAnError) {
 // A bicycle that turns left from a heading just below pi.
 Config TurningTask() {
   Config config = PointMassTask();
-  Problem problem = *config.problem;
-  problem.model = MakeKinematicBicycle(0.1, 2, {2});
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -1e3), Eigen::VectorXd::Constant(6, 1e3));
+  Problem problem = LargeBicycle(MakeKinematicBicycle(0.1, 2, {2}));
   problem.body.heading = 2;
   problem.between = Between{Eigen::Vector2d(1, 1), 0.7, 1, 0.1};
   config.problem = std::make_shared<const Problem>(problem);

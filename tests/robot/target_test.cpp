@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 #include <mpfr.h>
 
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/dynamics/models/residuals.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/residual/consistency.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -101,29 +101,17 @@ Reals PointMassTarget(const std::vector<double>& z) {
   return next;
 }
 
-Config Task(std::shared_ptr<const NominalModel> model, std::vector<double> bound, const ResidualText& residual) {
+Config Task(const Problem& problem, const ResidualText& residual) {
   Config config;
   config.path = "task.yaml";
-  Problem problem;
-  const auto n = static_cast<std::size_t>(model->num_states());
-  const auto box = [&bound](std::size_t begin, std::size_t end) {
-    const auto size = static_cast<Eigen::Index>(end - begin);
-    const Eigen::VectorXd upper = Eigen::Map<Eigen::VectorXd>(bound.data() + begin, size);
-    return Box(-upper, upper);
-  };
-  problem.domain.state = box(0, n);
-  problem.domain.input = box(n, bound.size());
-  config.robot_residual = ResidualOf(*model, residual);
-  problem.model = std::move(model);
-  config.problem = std::make_shared<const Problem>(std::move(problem));
+  config.robot_residual = ResidualOf(*problem.model, residual);
+  config.problem = std::make_shared<const Problem>(problem);
   return config;
 }
 
-Config Bicycle() {
-  return Task(MakeKinematicBicycle(0.1, 2.5), {40, 40, 3, 25, 3, 0.48, 20, 2}, ResidualNamed("heading_saturation"));
-}
+Config Bicycle() { return Task(PaperBicycle(), ResidualNamed("heading_saturation")); }
 
-Config PointMassTask() { return Task(MakePointMass(0.15), {20, 20, 5.4, 5.4, 2, 2}, ResidualNamed("velocity_knee")); }
+Config PointMassTask() { return Task(PaperPointMass(5.4, 2), ResidualNamed("velocity_knee")); }
 
 std::vector<double> Step(const Target& target, const std::vector<double>& z, std::size_t n) {
   std::vector<double> next(n);
@@ -187,7 +175,7 @@ TEST(Target, OfTextsIsRoundedOnce) {
     next[1] = next[1] - dt * Real(0.3) * Real(z[1]) * Abs(Real(z[1]));
     return next;
   };
-  ExpectOneRounding(Task(MakeTextModel(text), {3, 5, 2}, friction), reference, 3);
+  ExpectOneRounding(Task(WorldOf(MakeTextModel(text), Within({3, 5}), Within({2})), friction), reference, 3);
 }
 
 // The bits of the compiled equations of model and residual, in the same order of operations.

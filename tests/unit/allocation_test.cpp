@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FOREREACH_SANITIZED 1  // the sanitizers own malloc
@@ -51,21 +51,15 @@ namespace forereach {
 namespace {
 
 Problem BicycleProblem() {
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.1, 2.5);
-  const Eigen::VectorXd reach = (Eigen::VectorXd(6) << 40, 40, 3, 25, 3, 0.48).finished();
-  problem.domain.state = Box(-reach, reach);
-  problem.domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
+  Problem problem = PaperBicycle();
   problem.domain.balls.push_back({{0, 1}, Eigen::Vector2d::Zero(), 39});
   problem.domain.inequalities.push_back({Eigen::VectorXd::Unit(8, 3), 20});
-  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
   problem.declaration.lipschitz(2, 3) = 0.02;
   problem.declaration.lipschitz(2, 5) = 0.6;
   problem.transitions.z = Eigen::MatrixXd::Zero(200, 8);
   problem.transitions.z.col(3) = Eigen::VectorXd::LinSpaced(200, 5, 15);
   problem.transitions.x_next = problem.transitions.z.leftCols(6);
   problem.transitions.x_next.col(0) += 0.1 * problem.transitions.z.col(3);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
   return problem;
 }
 

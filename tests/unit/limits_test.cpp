@@ -10,9 +10,9 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/explain.h"
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -27,17 +27,6 @@ Limit AtLeast(const std::string& that, double bound) { return {.name = "it", .th
 // A point mass in steps of 0.5 s without a residual: whole numbers stay exact. vx is 0.5 to 1.5 at all samples.
 class Limits : public testing::Test {
  protected:
-  static Problem PointMassProblem() {
-    Problem problem;
-    problem.model = MakePointMass(0.5);
-    problem.domain.state = Box(Eigen::Vector4d(-100, -100, -4, -4), Eigen::Vector4d(100, 100, 4, 4));
-    problem.domain.input = Box(Eigen::Vector2d(-2, -2), Eigen::Vector2d(2, 2));
-    problem.declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
-    problem.transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
-    problem.projection = Eigen::MatrixXd::Identity(2, 4);
-    return problem;
-  }
-
   Decision Judge(const std::vector<Limit>& limits, const std::vector<Obstacle>& obstacles = {}) {
     problem_.limits = limits;
     certifier_.emplace(std::make_shared<Problem>(problem_));
@@ -47,7 +36,7 @@ class Limits : public testing::Test {
   bool IsKept(const Limit& limit) { return Judge({limit}).outcome == Outcome::kCertified; }
   Plan plan() const { return {controls_.data(), 2, static_cast<int>(controls_.cols()), 2}; }
 
-  Problem problem_ = PointMassProblem();
+  Problem problem_ = PointMassInHalves();
   Zonotope start_ = Zonotope::FromBox(Eigen::Vector4d(0, 0, 1, 0), Eigen::Vector4d(0, 0, 0.5, 0));
   Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(2, 4);
   std::optional<Certifier> certifier_;

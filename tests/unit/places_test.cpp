@@ -12,6 +12,7 @@
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -33,14 +34,11 @@ BodyPart At(const std::vector<std::vector<std::string>>& places, double radius) 
 class Places : public testing::Test {
  protected:
   Places() {
-    problem_.model = MakeTextModel(TextModel({{"q1", "q1 + dt*u1"}, {"q2", "q2 + dt*u2"}}, {"u1", "u2"},
-                                             {{"dt", 0.5, 0.5}, {"length", 2, 2}},
-                                             {{"x", "length*cos(q1)"}, {"y", "length*sin(q1)"}}));
-    problem_.domain.state = Box(Eigen::Vector2d(-7, -7), Eigen::Vector2d(7, 7));
-    problem_.domain.input = Box(Eigen::Vector2d(-7, -7), Eigen::Vector2d(7, 7));
-    problem_.declaration = {Eigen::MatrixXd::Zero(2, 4), Eigen::VectorXd::Zero(2)};
-    problem_.transitions = {Eigen::MatrixXd::Zero(1, 4), Eigen::MatrixXd::Zero(1, 2)};
-    problem_.projection = Eigen::MatrixXd::Zero(2, 2);
+    problem_ = WorldOf(MakeTextModel(TextModel({{"q1", "q1 + dt*u1"}, {"q2", "q2 + dt*u2"}}, {"u1", "u2"},
+                                               {{"dt", 0.5, 0.5}, {"length", 2, 2}},
+                                               {{"x", "length*cos(q1)"}, {"y", "length*sin(q1)"}})),
+                       Within({7, 7}), Within({7, 7}));
+    problem_.projection.setZero();
     problem_.body.parts = {At({{"0", "0"}, {"x", "y"}}, 0.25),
                            At({{"x", "y"}, {"x + cos(q1 + q2)", "y + sin(q1 + q2)"}}, 0.125)};
   }

@@ -13,6 +13,7 @@
 #include "certifier/sets/zonotope.h"
 #include "tests/oracle/random.h"
 #include "tests/oracle/reduce_order.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -21,12 +22,6 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
-
-Eigen::VectorXd Vec(std::initializer_list<double> entries) {
-  Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
-  std::copy(entries.begin(), entries.end(), vector.begin());
-  return vector;
-}
 
 TEST(Box, IsClosed) {
   const Box box(Vec({-1, 2}), Vec({1, 2}));

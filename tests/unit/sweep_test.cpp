@@ -9,6 +9,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -17,27 +18,10 @@ using Eigen::Vector3d;
 
 constexpr double kHair = 1e-9;  // above the rounding of a few steps, metres
 
-Eigen::VectorXd Vec(std::initializer_list<double> entries) {
-  Eigen::VectorXd vector(std::ssize(entries));
-  std::copy(entries.begin(), entries.end(), vector.data());
-  return vector;
+Problem PointMassProblem() { return PointMassInHalves(8); }
+Problem BicycleProblem() {
+  return WorldOf(MakeKinematicBicycle(0.5, 2.5), Within({40, 40, 3.2, 25, 3, 1}), Within({20, 2}));
 }
-
-Problem Bare(std::shared_ptr<const NominalModel> model, const Eigen::VectorXd& state, const Eigen::VectorXd& input) {
-  Problem problem;
-  const int n = model->num_states(), variables = model->num_variables();
-  problem.model = std::move(model);
-  problem.domain.state = Box(-state, state);
-  problem.domain.input = Box(-input, input);
-  problem.declaration = {Eigen::MatrixXd::Zero(n, variables), Eigen::VectorXd::Zero(n)};
-  problem.projection = Eigen::MatrixXd::Identity(2, n);
-  problem.transitions = {Eigen::MatrixXd::Zero(1, variables), Eigen::MatrixXd::Zero(1, n)};
-  return problem;
-}
-
-// One step of 0.5 s: whole numbers stay exact. The residual is zero.
-Problem PointMassProblem() { return Bare(MakePointMass(0.5), Vec({100, 100, 8, 8}), Vec({2, 2})); }
-Problem BicycleProblem() { return Bare(MakeKinematicBicycle(0.5, 2.5), Vec({40, 40, 3.2, 25, 3, 1}), Vec({20, 2})); }
 
 Between Curving(double x, double y) {
   Between between;

@@ -11,6 +11,7 @@
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/record.h"
+#include "tests/worlds.h"
 
 namespace forereach::verifier {
 namespace {
@@ -18,20 +19,11 @@ namespace {
 using Integrator = ModelText::Integrator;
 
 std::shared_ptr<Problem> ProblemOf(const ModelText& text, double reach) {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakeTextModel(text);
-  const int n = problem->model->num_states(), m = problem->model->num_inputs();
-  const Eigen::VectorXd state = Eigen::VectorXd::Constant(n, reach), input = Eigen::VectorXd::Constant(m, 10);
-  problem->domain.state = Box(-state, state);
-  problem->domain.input = Box(-input, input);
-  problem->declaration = {Eigen::MatrixXd::Zero(n, n + m), Eigen::VectorXd::Zero(n)};
+  const auto model = MakeTextModel(text);
+  auto problem = std::make_shared<Problem>(WorldOf(model, Within(Eigen::VectorXd::Constant(model->num_states(), reach)),
+                                                   Within(Eigen::VectorXd::Constant(model->num_inputs(), 10))));
   problem->declaration.lipschitz.diagonal().setConstant(0.002);
-  problem->projection = Eigen::MatrixXd::Identity(2, n);
   problem->zonotope_order = 3;
-  problem->transitions = {Eigen::MatrixXd::Zero(1, n + m), Eigen::MatrixXd::Zero(1, n)};
-  std::vector<double> next(static_cast<std::size_t>(n));
-  problem->model->Evaluate(std::vector<double>(static_cast<std::size_t>(n + m)), next);
-  for (int k = 0; k < n; ++k) problem->transitions.x_next(0, k) = next[static_cast<std::size_t>(k)];
   problem->declaration.noise_bound.setConstant(1e-6);
   return problem;
 }

@@ -11,6 +11,7 @@
 #include "tests/oracle/random.h"
 #include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"
+#include "tests/worlds.h"
 #include "verifier/containment.h"
 #include "verifier/equations.h"
 #include "verifier/tube.h"
@@ -42,15 +43,8 @@ TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), On
 TEST(SplitRemainder, HoldsAllOverTheSlice) {
   Random random(51);
   SCOPED_TRACE(random.trace());
-  const auto problem = std::make_shared<Problem>();
-  problem->model = MakeKinematicBicycle(0.1, 2.5);
-  Eigen::VectorXd reach(6);
-  reach << 1e3, 1e3, 20, 100, 10, 1.5;
-  problem->domain.state = Box(-reach, reach);
-  problem->domain.input = Box(Eigen::Vector2d(-10, -1), Eigen::Vector2d(10, 1));
-  problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
-  problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
-  problem->projection = Eigen::MatrixXd::Identity(2, 6);
+  const auto problem = std::make_shared<Problem>(
+      WorldOf(MakeKinematicBicycle(0.1, 2.5), Within({1e3, 1e3, 20, 100, 10, 1.5}), Within({10, 1})));
   const auto equations = EquationsOf(*problem->model);
   constexpr int kTheta = 2, kV = 3, kDelta = 5;
   for (int trial = 0; trial < 300; ++trial) {
@@ -305,12 +299,8 @@ TEST(HandMade, AContradictionOfRoundingSizeWidensTheSlice) {
 
 // A bicycle at v = 1 with theta within 1/4, for one step.
 std::pair<std::shared_ptr<Problem>, Certificate> Turning() {
-  auto problem = Halves();
-  problem->model = MakeKinematicBicycle(0.5, 1);
-  problem->domain.state = Box(Eigen::VectorXd::Constant(6, -1.5), Eigen::VectorXd::Constant(6, 1.5));
-  problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
-  problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
-  problem->projection = Eigen::MatrixXd::Identity(2, 6);
+  auto problem = std::make_shared<Problem>(
+      WorldOf(MakeKinematicBicycle(0.5, 1), Within({1.5, 1.5, 1.5, 1.5, 1.5, 1.5}), Within({2, 2})));
   Certificate certificate;
   certificate.initial_set = {{}, {}, Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6)};
   certificate.initial_set.center[3] = 1;
@@ -394,13 +384,7 @@ TEST(HandMade, WithoutRecordedSlicesSafetyIsDerived) {
 class Tampered : public testing::Test {
  protected:
   Tampered() {
-    problem_ = std::make_shared<Problem>();
-    problem_->model = MakeKinematicBicycle(0.1, 2.5);
-    Eigen::VectorXd reach(6);
-    reach << 40, 40, 3.1, 25, 3, 0.48;
-    problem_->domain.state = Box(-reach, reach);
-    problem_->domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
-    problem_->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+    problem_ = std::make_shared<Problem>(PaperBicycle(3.1));
     problem_->declaration.lipschitz(2, 3) = 0.018;
     problem_->method = forereach::Method::kPaper;
     problem_->declaration.lipschitz(2, 5) = 0.61;
@@ -413,7 +397,6 @@ class Tampered : public testing::Test {
       problem_->transitions.z.row(i) = z;
       problem_->transitions.x_next.row(i) = next;
     }
-    problem_->projection = Eigen::MatrixXd::Identity(2, 6);
     const Certifier certifier(problem_);
     Eigen::VectorXd center = Eigen::VectorXd::Zero(6), half(6);
     center[3] = 10;
