@@ -102,7 +102,7 @@ TEST(SmallestRow, IsConsistentAndNeverWeighsMoreThanTheTruth) {
   }
 }
 
-TEST(SmallestRow, OfOneEntryIsALowerBoundIfTheOthersAreBounds) {
+TEST(SmallestRow, ASingleEntryIsNeverAboveTheTruthIfTheOthersAreTrue) {
   const unsigned first = SeedOf(1);
   for (unsigned trial = 0; trial < 40; ++trial) {
     SCOPED_TRACE("seed " + std::to_string(first + trial));
@@ -119,7 +119,7 @@ TEST(SmallestRow, OfOneEntryIsALowerBoundIfTheOthersAreBounds) {
   }
 }
 
-TEST(SmallestRow, ByHand) {
+TEST(SmallestRow, IsTheOneWorkedOutByHand) {
   Observations observations{(Eigen::MatrixXd(3, 2) << 0, 0, 2, 0, 0, 5).finished(),
                             (Eigen::MatrixXd(3, 1) << 0, 1, -2).finished(),
                             (Eigen::MatrixXd(3, 1) << 0, 1, -2).finished()};
@@ -185,7 +185,7 @@ TEST(ProbabilityUpper, IsClopperAndPearsonsInRationals) {
 
 // ---- hold-out
 
-TEST(Split, AlternatesAndLosesNothing) {
+TEST(Split, AlternatesBlocksAndCoversEveryTransition) {
   const Split split = SplitByTime(10, 4);
   std::vector<int> ends;
   for (const auto& block : split.learn) ends.insert(ends.end(), {block.begin, block.end});
@@ -255,7 +255,7 @@ TEST_F(HoldOutTest, CountsEachFreshTransitionThatContradictsALearnedOne) {
   EXPECT_GT(CountContradictions(problem_, declaration_, SplitByTime(120, 8)).contradicting, 0);
 }
 
-TEST_F(HoldOutTest, WindowsAreChainsInJudgingBlocks) {
+TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   const Split split = SplitByTime(120, 4);  // judges by 30..60 and 90..120
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 10).size(), 6u);
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 30).size(), 2u);

@@ -80,14 +80,14 @@ TEST_F(Cancelling, DataContradictEachOtherAndDoublesDoNotShowIt) {
   }
 }
 
-TEST_F(Cancelling, TheCertificateIsConfirmedAllTheSame) {
+TEST_F(Cancelling, ACertificateOfSuchDataIsConfirmed) {
   Certify();
   const verifier::Verdict verdict = Verify();
   EXPECT_EQ(verdict.status, verifier::Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
 }
 
 // Steps that cancel, off by up to 2^-62 of their terms; sets from points to wide ones.
-TEST_F(Cancelling, RandomCertificatesAreConfirmed) {
+TEST_F(Cancelling, RandomCertificatesOfSuchDataAreConfirmed) {
   Random random(1);
   SCOPED_TRACE(random.trace());
   int contradicting = 0;

@@ -37,7 +37,7 @@ Problem Car() {
   return problem;
 }
 
-TEST(Outlines, AStandingBodyIsItsParts) {
+TEST(Outlines, ABodyAtAStateIsDrawnPartByPart) {
   const Problem car = Car();
   const Eigen::VectorXd x{{10, 20, M_PI / 2, 0, 0, 0}};
   const auto parts = BodyAt(car, x);

@@ -133,7 +133,7 @@ TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {
   EXPECT_TRUE(drawn.picture.abstained.empty());
 }
 
-TEST_F(LogPictureTest, WantsAPlane) {
+TEST_F(LogPictureTest, RefusesATaskThatIsNotPlanar) {
   Config config = PointMassConfig();
   auto line = std::make_shared<Problem>(*config.problem);
   line->projection = Eigen::MatrixXd::Identity(1, 4);

@@ -49,7 +49,7 @@ TEST(Contacts, AreMetAtTheFullBulgeOnEitherSide) {
   }
 }
 
-TEST(Contacts, KeepTheSamples) {
+TEST(Contacts, AreFoundAtASampleWhateverTheBound) {
   Problem problem = Bicycle();
   problem.between->acceleration = Vector2d(40, 40);
   EXPECT_THAT(Contacts(problem, Post(2.4, 0.05 - kLittle)), SizeIs(1));
@@ -112,7 +112,7 @@ TEST(Contacts, OfPartsAtExpressionsAreMetOnTheirOwnWay) {
   EXPECT_THAT(Contacts(problem, Post(0, 0), from, to), IsEmpty()) << "the frame is no part of this body";
 }
 
-TEST(Contacts, InASampleAreThoseOfTheWholeBody) {
+TEST(Contacts, AtASampleCoverTheWholeBody) {
   Problem problem = Bicycle();
   problem.body = {.heading = 2, .parts = {{{{2, 1, 0}, {2, -1, 0}, {-1, -1, 0}, {-1, 1, 0}}, 0}}};
   const std::vector<Obstacle> obstacles{Post(2 + 0.05 + kLittle, 0), Post(2 + 0.05 - kLittle, 0), Post(9, 9)};

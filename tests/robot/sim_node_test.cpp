@@ -268,7 +268,7 @@ TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
 }
 
 // A model as text has names of its own, so the task says what is zero while the robot stands.
-TEST(RobotSim, APlantMovesItInPlaceOfTheTarget) {
+TEST(RobotSim, AGivenPlantReplacesTheTarget) {
   const Config config = PointMassTask();
   std::vector<std::vector<double>> from;
   double hidden = 0;
@@ -285,7 +285,7 @@ TEST(RobotSim, APlantMovesItInPlaceOfTheTarget) {
   EXPECT_EQ(rig.StateAt(3), (std::vector<double>{0.02, 0, 2, 0}));
 }
 
-TEST(RobotSim, OfATextStandsByRobotHold) {
+TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
   Config config = PointMassTask();
   ModelText text;
   text.name = "text";
@@ -392,7 +392,7 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
 }
 
 // It begins while the certifier has a fault latched, and hears of the reset first.
-TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
+TEST(RobotSim, IgnoresAFaultFromBeforeTheLastReset) {
   const Config config = PointMassTask();
   Rig rig(config);
   const auto send = [&](const std::string& channel, const auto& message) {
@@ -426,7 +426,7 @@ TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
 }
 
-TEST(RobotSim, WhoHaltsLateIsResetBySomethingLaterStill) {
+TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
@@ -638,7 +638,7 @@ TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
   EXPECT_NEAR(summary["distance_to_goal"].get<double>(), 0.01, 1e-9);
 }
 
-TEST(RobotSim, TheGoalRadiusItselfCounts) {
+TEST(RobotSim, TakesADistanceEqualToTheGoalRadiusAsReached) {
   for (const bool inside : {true, false}) {
     Config config = PointMassTask();
     config.planner.goal = {3, 4};
@@ -710,7 +710,7 @@ TEST(RobotSim, ReportsLimitsThatDoNotHoldAtABoundaryOrWithItsControl) {
   EXPECT_EQ(rig.Summary()["contacts"], 0);
 }
 
-TEST(RobotSim, JudgesPartsAtExpressions) {
+TEST(RobotSim, ReportsContactOfPartsAtExpressions) {
   Config config = PointMassTask();
   Problem problem = *config.problem;
   problem.body.parts = {BodyPart{{}, 0.25, {{{"px + 1"}, {"py"}}}}};
@@ -772,7 +772,7 @@ TEST(RobotSim, ALateTickGivesTheSameRun) {
   }
 }
 
-TEST(RobotSim, WhatExpiredWhileItWasHeldUpIsNotStarted) {
+TEST(RobotSim, DoesNotStartAPlanThatExpiredWhileItWasHeldUp) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);

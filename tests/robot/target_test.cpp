@@ -158,7 +158,7 @@ TEST(Target, BicycleIsRoundedOnce) { ExpectOneRounding(Bicycle(), BicycleTarget,
 TEST(Target, PointMassIsRoundedOnce) { ExpectOneRounding(PointMassTask(), PointMassTarget, 2); }
 
 // Rates with stages, and a residual with definitions and a kink.
-TEST(Target, OfTextsIsRoundedOnce) {
+TEST(Target, TextModelIsRoundedOnce) {
   const ModelText text = TextModel({{"angle", "rate"}, {"rate", "torque - 9.81*sin(angle)"}}, {"torque"},
                                    {{"dt", 0.05, 0.05}}, {}, ModelText::Integrator::kRk4);
   const ResidualText friction{
@@ -210,7 +210,7 @@ TEST(Target, WithoutResidualItIsTheNominalModel) {
   }
 }
 
-TEST(Target, StepsInPlace) {
+TEST(Target, StepsWithInputAndOutputInOneArray) {
   const std::unique_ptr<Target> target = MakeTarget(Bicycle());
   const std::vector<double> z{1, 2, 0.3, 20, 0.5, 0.3, 1, -0.5};
   std::vector<double> x(z.begin(), z.begin() + 6);
@@ -344,7 +344,7 @@ TEST(MakeTransitionsTest, SamplesLieInTheNarrowedDomainAndAreThoseOfTheSeed) {
 
 // The generator and its mapping to numbers are fixed by the standard and by this project, not by the library:
 // the first output of mt19937_64 seeded with 5489 is 14514284786278117030.
-TEST(MakeTransitionsTest, TheFirstSampleIsKnown) {
+TEST(MakeTransitionsTest, TheFirstSampleOfASeedIsTheSpecifiedOne) {
   const Config config = PointMassTask();
   const Transitions made = MakeTransitions(*MakeTarget(config), *config.problem, 5489, 1);
   const double fraction = static_cast<double>(14514284786278117030ull >> 11) * 0x1p-53;

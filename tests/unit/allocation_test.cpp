@@ -85,7 +85,7 @@ class Allocation : public testing::Test {
   Tube tube_;
 };
 
-TEST_F(Allocation, IsCounted) {
+TEST_F(Allocation, TheCounterSeesAllocations) {
   const long before = allocations;
   std::vector<double> block(100);
   Eigen::VectorXd vector(static_cast<Eigen::Index>(block.size()));
@@ -95,7 +95,7 @@ TEST_F(Allocation, IsCounted) {
   EXPECT_GE(allocations - before, 2) << "a counter that counts nothing proves nothing";
 }
 
-TEST_F(Allocation, CertifyDoesNone) {
+TEST_F(Allocation, CertifyAllocatesNothing) {
   std::vector<Obstacle> obstacles{
       Obstacle::Circle(Eigen::Vector2d(10, 8), 1), Obstacle::AxisBox(Eigen::Vector2d(5, 6), Eigen::Vector2d(7, 9)),
       Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 9),
@@ -106,7 +106,7 @@ TEST_F(Allocation, CertifyDoesNone) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
-TEST_F(Allocation, LimitsAndPlacesAtExpressionsDoNone) {
+TEST_F(Allocation, CertifyAllocatesNothingForLimitsAndPlacesAtExpressions) {
   Problem problem = BicycleProblem();
   problem.limits = {{.name = "lateral acceleration", .that = {"v^2*tan(delta)/wheelbase", 1, 1}, .at_most = 4}};
   problem.body.parts = {{{}, 0.5, {{{"x + cos(theta)", 1, 1}, {"y + sin(theta)", 1, 1}}}}};

@@ -107,7 +107,7 @@ TEST(Certificate, WithoutObstaclesHasNoMargin) {
   EXPECT_EQ(d.margin, kInfinity);
 }
 
-TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
+TEST(AbstainSafety, NamesTheStepAtTheStartTheMiddleAndTheEnd) {
   for (const int step : {0, 3, 6}) {
     Judge judge(PointMassInHalves());
     const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(6),
@@ -125,7 +125,7 @@ TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
   }
 }
 
-TEST(AbstainSafety, WhereTheStartTouchesAnObstacle) {
+TEST(AbstainSafety, AbstainsWhereTheStartTouchesAnObstacle) {
   Judge judge(PointMassInHalves());
   const Zonotope start = Zonotope::FromBox(Vec({0, 0, 2, 0}), Vec({1, 1, 0, 0}));
   const auto at = [&](double left) {
@@ -208,7 +208,7 @@ TEST(AbstainDomain, ComesBeforeSafety) {
   EXPECT_EQ(d.obstacle, -1);
 }
 
-TEST(AbstainDomain, ThePoleOfTheSteeringHasItsOwnCause) {
+TEST(AbstainDomain, NamesThePoleOfTheSteeringAsItsCause) {
   Judge judge(BicycleProblem());
   const Decision d = judge(Zonotope::FromBox(Vec({0, 0, 0, 5, 0, 1.5}), Vec({0, 0, 0, 0, 0, 0.1})), Coast(2), {});
   EXPECT_EQ(d.outcome, Outcome::kDomain);
@@ -402,7 +402,7 @@ Eigen::Vector3d ReferenceWidths(Method method) {
   return {width(0), width(1), width(2)};
 }
 
-TEST(ReferenceTube, HasTheKnownWidths) {
+TEST(ReferenceTube, HasTheWidthsOfThePaper) {
   EXPECT_TRUE(ReferenceWidths(Method::kPaper).isApprox(Eigen::Vector3d(0.8492, 1.1410, 0.1117), 1e-4));
 }
 
@@ -485,7 +485,7 @@ void ExpectRefused(Spoil spoil, const std::string& part) {
   ExpectRefused(problem, part);
 }
 
-TEST(Certifier, NamesThePartThatDoesNotFit) {
+TEST(Certifier, RefusesAProblemAndNamesThePartThatDoesNotFit) {
   EXPECT_THROW(Certifier(nullptr), std::invalid_argument);
   ExpectRefused([](Problem& p) { p.model = nullptr; }, "model");
   ExpectRefused([](Problem& p) { p.domain.state = Box(); }, "domain: state box");
@@ -528,7 +528,7 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(largest)));
 }
 
-TEST(Certifier, AProjectionKnowsNoAngle) {
+TEST(Certifier, RefusesAProjectionThatDependsOnAnAngle) {
   Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Within({9, 9, 9, 9, 1, 1}), Within({1, 1}));
   AddNominalTransition(problem, Eigen::VectorXd::Zero(8));
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(problem)));
@@ -538,7 +538,7 @@ TEST(Certifier, AProjectionKnowsNoAngle) {
                   Eq("projection: depends on theta, which is an angle: how often it has turned is not known")));
 }
 
-TEST(Certifier, ABodysPlacesAreTheSameAfterATurn) {
+TEST(Certifier, RefusesPlacesOfABodyThatChangeWithATurn) {
   Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Within({9, 9, 9, 9, 1, 1}), Within({1, 1}));
   AddNominalTransition(problem, Eigen::VectorXd::Zero(8));
   problem.body.parts = {BodyPart{.radius = 0.1, .places = {{{"x + cos(theta)"}, {"y + sin(theta)"}}}}};
@@ -609,7 +609,7 @@ TEST(Certifier, SpatialAndLinearProjectionsAreJudged) {
   EXPECT_EQ(d.step, 3);
 }
 
-TEST(Decision, WithoutAnswerIsNoCertificate) {
+TEST(Decision, ADefaultDecisionIsNoCertificate) {
   EXPECT_EQ(Decision{}.outcome, Outcome::kNone);
   EXPECT_NE(Outcome{}, Outcome::kCertified);
   EXPECT_EQ(Explain(Decision{}, PointMassInHalves()), "no decision");

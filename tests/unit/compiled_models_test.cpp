@@ -57,7 +57,7 @@ TEST(EquationsHeader, IsTheOneThatIsCompiledHere) {
 }
 
 // A unit is any text, and what a task says does not become code.
-TEST(EquationsHeader, UnitsAndOriginEndNoComment) {
+TEST(EquationsHeader, HostileUnitsAndOriginsCannotEndAComment) {
   ModelText text = EveryOperation();
   text.states[0].unit = "m**//\n#error */";
   text.inputs[0].unit = "/*m/*/s";
@@ -102,7 +102,7 @@ TEST(HaveSameValues, TellsProgramsApart) {
   EXPECT_FALSE(HaveSameValues(EquationsModel<ExportedOperations>::kProgram, MakeTextModel(swapped)->program()));
 }
 
-TEST(StructNameTest, IsAWordOfItsOwn) {
+TEST(StructNameTest, IsAValidNameThatIsNotTaken) {
   EXPECT_EQ(StructName("differential_drive"), "DifferentialDrive");
   EXPECT_EQ(StructName("robot"), "Robot");
   EXPECT_EQ(StructName("3_wheels"), "Model3Wheels");
@@ -123,7 +123,7 @@ void ExpectRefused(const ModelText& text, const std::string& why) {
   }
 }
 
-TEST(EquationsHeader, WhatGainsNothingIsRefused) {
+TEST(EquationsHeader, RefusesAModelThatGainsNothingByCompiling) {
   const auto with = [](const auto& change) {
     ModelText text = EveryOperation();
     change(text);

@@ -76,7 +76,7 @@ TEST_F(LearnTest, ALearnedStepMayHaveBeenDisturbedAsAnyOther) {
   }
 }
 
-TEST_F(LearnTest, SaysWhatOneSaysThatKnewAllFromTheBeginning) {
+TEST_F(LearnTest, AnswersAsACertifierThatHadAllDataFromTheStart) {
   Problem all = problem_;
   std::vector<Eigen::VectorXd> points;
   for (int i = 0; i < kBase + kLearned; ++i) {
@@ -105,7 +105,7 @@ TEST_F(LearnTest, SaysWhatOneSaysThatKnewAllFromTheBeginning) {
   }
 }
 
-TEST_F(LearnTest, TheWholeDomainCountsNotItsBoxAlone) {
+TEST_F(LearnTest, RefusesATransitionInsideTheBoxAndOutsideTheDomain) {
   Add(problem_, Draw(), Next(Draw()));
   problem_.transitions.x_next.row(0) = Next(problem_.transitions.z.row(0).transpose()).transpose();
   Certifier certifier(std::make_shared<Problem>(problem_));
@@ -123,7 +123,7 @@ TEST_F(LearnTest, TheWholeDomainCountsNotItsBoxAlone) {
   EXPECT_EQ(certifier.num_observations(), 2u);
 }
 
-TEST_F(LearnTest, WhereTheNominalModelHasNoFiniteValueNothingIsLearned) {
+TEST_F(LearnTest, LearnsNothingWhereTheNominalModelHasNoFiniteValue) {
   constexpr double kHuge = 1.5e308;
   const Problem problem = WorldOf(MakePointMass(10), Within({kHuge, kHuge, kHuge, kHuge}), Within({1, 1}));
   Certifier certifier(std::make_shared<Problem>(problem));

@@ -73,7 +73,7 @@ TEST_F(Limits, AreClosedToTheLastBit) {
 }
 
 // 1 + 2 d + d^2 for |d| <= 0.5: the second order gives the upper end, the range the lower one.
-TEST_F(Limits, OfACurvedFunction) {
+TEST_F(Limits, OfACurvedFunctionHoldUpToItsRange) {
   EXPECT_TRUE(IsKept(AtMost("vx^2", 2.25 + 1e-12)));
   EXPECT_FALSE(IsKept(AtMost("vx^2", 2.25 - 1e-12)));
   EXPECT_TRUE(IsKept(AtLeast("vx^2", 0.25 - 1e-12)));
@@ -83,13 +83,13 @@ TEST_F(Limits, OfACurvedFunction) {
 }
 
 // px = t vx / 2 in every slice: the box knows nothing of it.
-TEST_F(Limits, KnowHowStatesAreCorrelated) {
+TEST_F(Limits, UseTheCorrelationOfStates) {
   EXPECT_TRUE(IsKept(AtMost("px - 2*vx", 1e-12)));
   EXPECT_FALSE(IsKept(AtMost("px - 2*vx", -1e-12)));
   EXPECT_TRUE(IsKept(AtLeast("px - 2*vx", -3 - 1e-12))) << "at the start";
 }
 
-TEST_F(Limits, OfAFunctionWithAKink) {
+TEST_F(Limits, OfAFunctionWithAKinkHoldUpToItsRange) {
   EXPECT_TRUE(IsKept(AtMost("abs(vx - 1)", 0.5 + 1e-12)));
   EXPECT_FALSE(IsKept(AtMost("abs(vx - 1)", 0.5 - 1e-12)));
   EXPECT_TRUE(IsKept(AtLeast("abs(vx - 1)", 0)));
@@ -141,7 +141,7 @@ TEST_F(Limits, TheFirstFailureIsNamed) {
   EXPECT_EQ(Judge({AtMost("px", 2.5), AtMost("px", 1)}, {}).coordinate, 1);
 }
 
-TEST_F(Limits, OfWhatIsLeftOfAPlan) {
+TEST_F(Limits, OnTheRestOfAPlanCountFromItsFirstStep) {
   controls_.row(0).setConstant(-2);  // 1 m/s, 0, -1, -2
   const std::vector<Limit> limits{AtMost("vx", 0.6)};
   EXPECT_EQ(Judge(limits).step, 0);
@@ -168,7 +168,7 @@ TEST_F(Limits, ACertificateSaysWhenTheyHold) {
                              testing::EndsWith("from obstacle 0; within its limits at the sample instants")));
 }
 
-TEST_F(Limits, ThatAreNoneAreRefused) {
+TEST_F(Limits, AreRefusedIfTheyAreMalformed) {
   const auto refused = [&](const Limit& limit, const std::string& why) {
     EXPECT_THAT([&] { Judge({AtMost("vx", 9), limit}); }, ThrowsMessage<std::invalid_argument>(HasSubstr(why)));
   };

@@ -138,7 +138,7 @@ TEST_P(TextCertificates, OfWrappedHeadingsAreConfirmed) {
 }
 
 // An envelope that is narrower than wrapped data allow by less than the unit of an angle.
-TEST(AngleCertificates, TheUnitOfAnAngleCounts) {
+TEST(AngleCertificates, AnEnvelopeNarrowerThanTheUnitOfAnAngleIsRefuted) {
   ModelText text =
       TextModel({{"x", "x + dt*cos(q)"}, {"y", "y + dt*sin(q)"}, {"q", "q + dt*u"}}, {"u"}, {{"dt", 0.5, 0.5}});
   text.angles = {"q"};
@@ -187,7 +187,7 @@ class PointAtAKink : public testing::TestWithParam<std::tuple<const char*, forer
   forereach::Tube tube_;
 };
 
-TEST_P(PointAtAKink, IsConfirmed) {
+TEST_P(PointAtAKink, ACertificateOfAPointAtAKinkIsConfirmed) {
   ASSERT_EQ(certifier_.Certify(plan_, Initial(0, 0), {}, tube_).outcome, Outcome::kCertified);
   const Certificate certificate = CertificateOf(certifier_, plan_, Initial(0, 0), {}, tube_);
   const Verdict verdict = judge_.Verify(certificate);
@@ -197,7 +197,7 @@ TEST_P(PointAtAKink, IsConfirmed) {
   EXPECT_EQ(judge_.Verify(smaller).status, Status::kRefuted);
 }
 
-TEST_P(PointAtAKink, IsNotIfItIsNoPoint) {
+TEST_P(PointAtAKink, ASetAroundAKinkIsNotConfirmed) {
   ASSERT_EQ(certifier_.Certify(plan_, Initial(0, 0), {}, tube_).outcome, Outcome::kCertified);
   Certificate certificate = CertificateOf(certifier_, plan_, Initial(0, 0), {}, tube_);
   for (const double half_width : {0x1p-1074, 0x1p-60, 1e-3}) {
@@ -212,7 +212,7 @@ TEST_P(PointAtAKink, IsNotIfItIsNoPoint) {
 }
 
 // The kink comes in the second step, where the residual has made a box of the point.
-TEST_P(PointAtAKink, IsNotInTheNextStep) {
+TEST_P(PointAtAKink, AKinkInTheSecondStepIsNotConfirmed) {
   const Zonotope initial = Initial(-0.5, 0);
   const Decision decision = certifier_.Certify(plan_, initial, {}, tube_);
   EXPECT_EQ(decision.outcome, Outcome::kDomain);

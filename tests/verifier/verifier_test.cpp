@@ -203,7 +203,7 @@ TEST(HandMade, TouchingIsNotClear) {
   ExpectRefuted(Judge(Halves(), certificate), 0, "clear of obstacle 1");
 }
 
-TEST(HandMade, ClearanceIsADistance) {
+TEST(HandMade, AClearanceAboveTheDistanceIsRefuted) {
   Certificate certificate = OneStep();
   certificate.obstacles = {Obstacle::Circle(Eigen::Vector2d(4, 5), 2)};
   certificate.slices[0].clearance = {3};
@@ -217,7 +217,7 @@ TEST(HandMade, ClearanceIsADistance) {
   ExpectRefuted(Judge(Halves(), certificate), 0, "claims to be clear");
 }
 
-TEST(HandMade, EnvelopeAndRadius) {
+TEST(HandMade, EnvelopeRemainderAndRadiusAreDecidedToTheLastBit) {
   Certificate certificate = OneStep();
   certificate.slices[0].envelope_lower = Eigen::Vector4d::Constant(-kTiny);
   certificate.slices[0].envelope_upper = Eigen::Vector4d::Constant(kTiny);
@@ -416,9 +416,9 @@ class Tampered : public testing::Test {
   Certificate certificate_;
 };
 
-TEST_F(Tampered, Untouched) { ExpectConfirmed(Verdict_()); }
+TEST_F(Tampered, TheUnchangedCertificateIsConfirmed) { ExpectConfirmed(Verdict_()); }
 
-TEST_F(Tampered, MovedObstacle) {
+TEST_F(Tampered, AMovedObstacleIsRefuted) {
   certificate_.obstacles = {Obstacle::Circle(Eigen::Vector2d(9, 3 - 0x1p-30), 1)};  // the clearances are now too large
   EXPECT_EQ(Verdict_().status, Status::kRefuted);
   for (RecordedSlice& slice : certificate_.slices) slice.clearance.clear();
@@ -427,46 +427,46 @@ TEST_F(Tampered, MovedObstacle) {
   EXPECT_THAT(Verdict_().failure.what, HasSubstr("clear of obstacle 0"));
 }
 
-TEST_F(Tampered, ShrunkenSlice) {
+TEST_F(Tampered, AShrunkenSliceIsRefuted) {
   certificate_.slices[4].half_width[0] *= 1 - 0x1p-40;
   ExpectRefuted(Verdict_(), 4, "hull");
 }
 
-TEST_F(Tampered, DroppedGenerator) {
+TEST_F(Tampered, ADroppedGeneratorIsRefuted) {
   Eigen::MatrixXd& generators = certificate_.slices[6].generators;
   generators = generators.rightCols(generators.cols() - 1).eval();
   ExpectRefuted(Verdict_(), 6, "the hull of the recorded generators");
 }
 
-TEST_F(Tampered, ChangedSigma) {
+TEST_F(Tampered, AChangedSigmaIsRefuted) {
   problem_->declaration.noise_bound[2] = 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
-TEST_F(Tampered, ChangedDisturbance) {
+TEST_F(Tampered, AChangedDisturbanceIsRefuted) {
   problem_->declaration.disturbance = Eigen::VectorXd::Zero(6);
   EXPECT_EQ(Verdict_().status, Status::kConfirmed) << "zeros change nothing";
   problem_->declaration.disturbance[2] = 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
-TEST_F(Tampered, ChangedDeclaration) {
+TEST_F(Tampered, AChangedDeclarationIsRefuted) {
   problem_->declaration.lipschitz(2, 5) += 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
-TEST_F(Tampered, ChangedWheelbase) {
+TEST_F(Tampered, AChangedWheelbaseIsRefuted) {
   problem_->model = MakeKinematicBicycle(0.1, 2.49);
   EXPECT_EQ(Verdict_().status, Status::kRefuted);
 }
 
-TEST_F(Tampered, ChangedControl) {
+TEST_F(Tampered, AChangedControlIsRefuted) {
   certificate_.controls(1, 3) += 1e-9;
   EXPECT_EQ(Verdict_().status, Status::kRefuted);
   EXPECT_EQ(Verdict_().failure.step, 4);
 }
 
-TEST_F(Tampered, ShrunkenEnvelopeAndRemainder) {
+TEST_F(Tampered, AShrunkenEnvelopeOrRemainderIsRefuted) {
   RecordedSlice& slice = certificate_.slices[3];
   const double before = slice.remainder[0];
   slice.remainder[0] *= 1 - 0x1p-30;
