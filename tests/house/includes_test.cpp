@@ -150,7 +150,7 @@ TEST_F(IncludesTest, TheVerifierSharesNoArithmetic) {
   ExpectRefused();
 }
 
-TEST_F(IncludesTest, OneFolderMayIncludeTheHeadersOfALibrary) {
+TEST_F(IncludesTest, OnlyItsOwnerMayIncludeTheHeadersOfALibrary) {
   for (const char* file :
        {"certifier/process/bad.cpp", "robot/bad.cpp", "logger/bad.cpp", "cli/bad.cpp", "bus/node.cpp"})
     Refuse(file, "<lcm/lcm-cpp.hpp>", "LCM belongs to bus/bus.cpp alone");

@@ -209,7 +209,7 @@ TEST_F(SignedLoggerTest, MakesMissingRowsAgainOfAuthenticMessagesOnly) {
   ExpectOneGap(ReadRows());
 }
 
-TEST_F(SignedLoggerTest, WhatWasSignedLongBeforeMakesNoRow) {
+TEST_F(SignedLoggerTest, AMessageSignedLongBeforeMakesNoRow) {
   bus_.now_us -= 10'000'000;
   const auto recorded = Candidate(*planner_, std::int64_t{1} << 40);
   bus_.now_us = kStart;

@@ -151,7 +151,7 @@ TEST_F(FinishedRunsTest, AResultIsReusedOnlyForTheInputsItWasMadeFrom) {
   EXPECT_NE(finished.KeyOf(run), key) << "another byte";
 }
 
-TEST_F(FinishedRunsTest, WhatIsDamagedCountsAsNone) {
+TEST_F(FinishedRunsTest, ADamagedResultIsNotReused) {
   const std::string key(64, 'a');
   const FinishedRuns finished(directory_, "export");
   const std::string part = finished.PathOf(key, "csv");
