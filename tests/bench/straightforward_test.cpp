@@ -91,7 +91,7 @@ TEST(StraightforwardTest, SeesAViolatingPair) {
   EXPECT_TRUE(Certifier(problem).violation());
 }
 
-TEST(TasksTest, EachNGivesACertificateAndABlockedPathAnAbstentionS) {
+TEST(TasksTest, CertifiesAtEachNumberOfObservationsAndAbstainsWhereThePathIsBlocked) {
   for (const Scenario scenario : {Scenario::kBicycle, Scenario::kPointMass, Scenario::kDense}) {
     SCOPED_TRACE(NameOf(scenario));
     for (const int observations : {25, 400}) {

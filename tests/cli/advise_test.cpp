@@ -67,14 +67,14 @@ TEST_F(AdviseTest, NamesWhatMakesTheDataConsistent) {
                                  HasSubstr("without observation 6: then it is \"abstain F")));
 }
 
-TEST_F(AdviseTest, HasNothingToSayOfACertificate) {
+TEST_F(AdviseTest, GivesNoAdviceOnACertificate) {
   const Output output = AdviseOn("bicycle.yaml", "bicycle_certified.csv", " --json");
   const auto document = nlohmann::json::parse(output.text);
   EXPECT_EQ(document["certified"], 1);
   EXPECT_EQ(document["abstentions"].size(), 0u);
 }
 
-TEST_F(AdviseTest, TurnsEveryAbstentionOfACourse) {
+TEST_F(AdviseTest, FindsAChangeThatCertifiesForEachAbstentionOfACourse) {
   const Output output = Forereach("advise --json " + kCourse);
   EXPECT_EQ(output.code, 0);
   const auto document = nlohmann::json::parse(output.text);
@@ -90,7 +90,7 @@ TEST_F(AdviseTest, TurnsEveryAbstentionOfACourse) {
 }
 
 // One candidate, answered by a gate at several times.
-TEST_F(AdviseTest, NamesTheTimeThatWouldHaveHeld) {
+TEST_F(AdviseTest, NamesTheOptionWithWhichALateOrEarlyCandidateIsAccepted) {
   const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
   candidate_plan_t candidate{};
   for (const LogEvent& event : ReadLog(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog").events)
@@ -161,7 +161,7 @@ TEST_F(AdviseTest, GoesOnAfterAnInterruption) {
   EXPECT_EQ(Forereach(resume + "--json 2>&1").text, whole);
 }
 
-TEST_F(AdviseTest, KeptAdviceThatDoesNotFitIsSearchedAnew) {
+TEST_F(AdviseTest, SearchesAgainWhenKeptAdviceDoesNotMatchTheRun) {
   const std::string log = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
   const RunTasks tasks(FOREREACH_SOURCE_DIR "/tests/data/course.yaml", {}, false);
   int left = 2;
@@ -190,7 +190,7 @@ TEST_F(AdviseTest, KeptAdviceThatDoesNotFitIsSearchedAnew) {
   EXPECT_EQ(advised_after(nlohmann::json::array({fitting[0]})).at(0), fitting) << "one is missing";
 }
 
-TEST_F(AdviseTest, NamesTheQueueAndTheSilenceThatWouldHaveHeld) {
+TEST_F(AdviseTest, NamesTheQueueLengthAndTheTimeoutThatSuffice) {
   Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
   config.gate.obstacles = ObstaclesSource::kBus;
   config.gate.queue = 4;
@@ -217,7 +217,7 @@ TEST_F(AdviseTest, NamesTheQueueAndTheSilenceThatWouldHaveHeld) {
 }
 
 // Anyone may have written a log: its numbers need not fit each other.
-TEST_F(AdviseTest, AFalseLogIsNotReadBeyondItsMessages) {
+TEST_F(AdviseTest, FindsNoAdviceForALogWhoseNumbersContradictEachOther) {
   const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
   const std::string log = scratch_ / "events-20260101-120000-000000.lcmlog";
   EventLogWriter writer(log);
@@ -250,7 +250,7 @@ TEST_F(AdviseTest, AFalseLogIsNotReadBeyondItsMessages) {
                                  HasSubstr("8 abstentions and rejections, 0 have")));
 }
 
-TEST_F(AdviseTest, WhatIsNoRecordIsSaid) {
+TEST_F(AdviseTest, RefusesAFileThatIsNoRecord) {
   scratch_.Write("no.json", "{\"outcome\": \"domain\"}");
   const Output output = Forereach("advise " + (scratch_ / "no.json") + " 2>&1");
   EXPECT_EQ(output.code, 2);

@@ -44,7 +44,7 @@ struct Case {
 
 class Shipped : public testing::TestWithParam<Case> {};
 
-TEST_P(Shipped, GivesItsOutcome) {
+TEST_P(Shipped, EachShippedPlanGetsItsOutcomeAndExitCode) {
   const Case& c = GetParam();
   const Output output =
       Forereach(std::string("certify --config config/") + c.config + ".yaml --plan config/plans/" + c.plan + ".csv");
@@ -222,7 +222,7 @@ TEST(CertifyJsonTest, WithoutObstaclesThereIsNoClosestOne) {
   EXPECT_EQ(WitnessOf(decision), Keys{});
 }
 
-TEST(CertifyJsonTest, TubeEndsWhereDEndedIt) {
+TEST(CertifyJsonTest, TubeEndsAtTheStepThatLeftTheDomain) {
   const Json decision = CertifyJson("bicycle", "bicycle_domain");
   EXPECT_EQ(decision["tube"].size(), decision["step"].get<std::size_t>() + 1);
   EXPECT_FALSE(decision["tube"].back().contains("envelope"));
@@ -262,7 +262,7 @@ TEST(BadInput, UsageExitsWithTwo) {
 }
 
 // Bad input of the file itself, so it was taken as the task.
-TEST(BadInput, OneTaskStandsWithItsOptionOrAlone) {
+TEST(BadInput, ATaskFileIsTakenWithAndWithoutItsOption) {
   for (const char* command : {"fit", "declare", "check", "export-model", "run", "plan --out x.csv"})
     for (const char* before : {" ", " --config "}) {
       const Output output = Forereach(std::string(command) + before + "none.yaml 2>&1 >/dev/null");
@@ -296,7 +296,7 @@ TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
 }
 
 // Each is refused with 2 and says what cannot be used.
-TEST(BadInput, NamesWhatCannotBeUsed) {
+TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
   const forereach::ScratchDirectory scratch;
   scratch.Write("empty", "");
   const std::string certify = "certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv";
@@ -475,7 +475,7 @@ std::string DemoWith(const forereach::ScratchDirectory& scratch, const Replaceme
   return scratch.Write("task.yaml", text);
 }
 
-TEST(Plan, SaysWhyWhenThereIsNone) {
+TEST(Plan, SaysWhyWhenNoPlanIsFound) {
   const std::string first = "{center: [18, 3], radius: 2.5}", speed_noise = "noise_bound: [0, 0, 0, 0";
   const struct {
     Replacements task;

@@ -90,7 +90,7 @@ TEST_F(DeclareDataTest, SaysSoIfNoSlopesAreConsistent) {
   EXPECT_THAT(output.text, HasSubstr("their residuals of vx differ by"));
 }
 
-TEST_F(DeclareDataTest, HoldOutCountsAndDraws) {
+TEST_F(DeclareDataTest, HoldOutCountsContradictionsOfEachFactorAndDrawsThem) {
   const std::string picture = scratch_ / "trade";
   const Json document = Json::parse(Declare("--by vx --hold-out --blocks 8 --json --picture " + picture).text);
   ASSERT_EQ(document["factors"].size(), 7u);

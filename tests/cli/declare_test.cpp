@@ -68,7 +68,7 @@ TEST_F(DeclareTest, ADisturbanceLeavesTheCoverAlone) {
   EXPECT_THAT(Declare("--between").text, testing::Not(HasSubstr("disturbance")));
 }
 
-TEST(Declare, GivesTheMatrixOfTheShippedTask) {
+TEST(Declare, ProvesTheMatrixOfTheShippedBicycleTask) {
   const Output output = Forereach("declare --config config/bicycle.yaml --json");
   EXPECT_EQ(output.code, 0);
   const Json document = Json::parse(output.text);
@@ -343,7 +343,7 @@ TEST_F(DeclareTest, BadInputExitsWithTwoAndOneLine) {
   EXPECT_EQ(Forereach("declare --config config/bicycle.yaml --gap 0 2>/dev/null").code, 2);
 }
 
-TEST(DeclareHelp, Teaches) {
+TEST(DeclareHelp, ShowsOptionsExitCodesAndAnExample) {
   const Output output = Forereach("declare --help");
   EXPECT_EQ(output.code, 0);
   for (const char* text :

@@ -54,7 +54,7 @@ TEST_F(FitCommandTest, ItsLineGoesIntoATaskFile) {
   EXPECT_EQ(document["states"][1]["rms_before"], 0);
 }
 
-TEST_F(FitCommandTest, NamesWhatIsNotDetermined) {
+TEST_F(FitCommandTest, NamesParametersThatTheDataDoNotDetermine) {
   const std::string task = Read(task_);
   scratch_.Write("task.yaml",
                  Replaced(Replaced(task, "decay: 1,", "decay: 1, more: 1, idle: 3,"), "x: decay*x", "x: decay*more*x"));

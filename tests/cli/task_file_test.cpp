@@ -213,7 +213,7 @@ TEST_F(InitTest, UnknownModelsAreRefusedWithTheNearest) {
   EXPECT_FALSE(fs::exists(task_));
 }
 
-TEST_F(InitTest, AHeaderNamesStatesAndInputs) {
+TEST_F(InitTest, TakesStatesAndInputsFromTheHeaderOfTheTransitions) {
   scratch_.Write("log.csv", "\xef\xbb\xbfx , v,x_next,u, v_next\r\n0,1,0.1,5,1.5\n2,-1,1.9,5,-0.5\n");
   const Output output = Init("--dt 0.1 --transitions " + (scratch_ / "log.csv"));
   ASSERT_EQ(output.code, 0) << output.text;
@@ -230,7 +230,7 @@ TEST_F(InitTest, AHeaderNamesStatesAndInputs) {
   EXPECT_THAT(Read(task_), HasSubstr("transitions: log.csv\n"));
 }
 
-TEST_F(InitTest, AnyRangeContainsItsData) {
+TEST_F(InitTest, ARoundedRangeContainsItsData) {
   const double values[] = {0, 5e-324, 1e-300, 0.1, 1, 999.9999, 1e15, 1e300};
   for (const double a : values)
     for (const double b : values)
@@ -280,7 +280,7 @@ TEST_F(InitTest, HeadersThatAreNoTransitionsAreRefused) {
   EXPECT_EQ(Init("--dt 0.1 --model unicycle --transitions " + (scratch_ / "log.csv")).code, 2);
 }
 
-TEST(YamlTextTest, QuotesWhatIsNotPlain) {
+TEST(YamlTextTest, QuotesTextThatYamlWouldReadOtherwise) {
   EXPECT_EQ(YamlText("a/b_c-1.csv"), "a/b_c-1.csv");
   EXPECT_EQ(YamlText("a b's: #"), "'a b''s: #'");
   EXPECT_EQ(YamlText("-a"), "'-a'");
@@ -289,7 +289,7 @@ TEST(YamlTextTest, QuotesWhatIsNotPlain) {
 
 // ---- check
 
-TEST(Check, ShippedTasks) {
+TEST(Check, ExitsWithTheExpectedCodeForEachShippedTask) {
   for (const auto& [task, code] : {std::pair("demo", 0),
                                    {"post", 0},
                                    {"truck", 0},
@@ -305,7 +305,7 @@ TEST(Check, ShippedTasks) {
   }
 }
 
-TEST_F(CheckTest, AnExampleWithoutFindings) {
+TEST_F(CheckTest, SaysThatAPlanCouldBeCertifiedWhenNothingIsWrong) {
   WriteTask();
   const Output output = Check();
   EXPECT_EQ(output.code, 0) << output.text;
@@ -374,7 +374,7 @@ TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
   EXPECT_EQ(Check().code, 0) << Check().text;
 }
 
-TEST_F(CheckTest, WhereNothingIsDeclaredThereIsNoShareOfIt) {
+TEST_F(CheckTest, PrintsNoShareOfTheDeclarationWhereNothingIsDeclared) {
   const auto with = [&](const std::string& noise_bound) {
     WriteTask("[0.01, 0.01, 0.01, 0.01]", noise_bound);
     return Check();
@@ -391,7 +391,7 @@ TEST_F(CheckTest, WhereNothingIsDeclaredThereIsNoShareOfIt) {
 }
 
 // X0 is a square of half-width 0.1, and the circle's edge is at 3 - radius.
-TEST_F(CheckTest, ObstaclesAtTheStart) {
+TEST_F(CheckTest, FindsAnObstacleThatTheInitialSetMayTouch) {
   const auto with = [&](const std::string& radius) {
     WriteTask("{center: [3, 2], radius: 0.8}", "{center: [3, 0], radius: " + radius + "}");
     return Check();
@@ -402,7 +402,7 @@ TEST_F(CheckTest, ObstaclesAtTheStart) {
 }
 
 // In 0.15 s at up to 5.4 m/s along both axes, and 3 m/s^2 along both: sqrt(2) (0.81 + 0.03375) = 1.1933 m.
-TEST_F(CheckTest, ObstaclesThinnerThanAStep) {
+TEST_F(CheckTest, FindsAnObstacleThatIsThinnerThanAStep) {
   const auto with = [&](const std::string& radius) {
     WriteTask("radius: 0.8", "radius: " + radius);
     return Check();
@@ -417,7 +417,7 @@ TEST_F(CheckTest, ObstaclesThinnerThanAStep) {
 }
 
 // The hand, 0.6 m from the first joint or so, moves with 1.2 + 1.6 rad/s; a post of 1 cm is thinner than that.
-TEST_F(CheckTest, BodiesAtExpressionsMoveToo) {
+TEST_F(CheckTest, FindsAThinObstacleForABodyAtExpressions) {
   std::string task = Read(scratch_ / "drive/reaching_arm.yaml");
   const auto line = task.find("  between:");
   task.replace(line, task.find('\n', line) - line, "  between: samples");
@@ -431,7 +431,7 @@ TEST_F(CheckTest, BodiesAtExpressionsMoveToo) {
   EXPECT_THAT(thin.text, HasSubstr("task.between: the robot moves by up to 0."));
 }
 
-TEST_F(CheckTest, TheRobotsStart) {
+TEST_F(CheckTest, FindsAStartOfTheRobotOutsideTheDomain) {
   const auto with = [&](const std::string& start) {
     WriteTask("  between: samples\n", "  between: samples\nrobot: {start: " + start + "}\n");
     return Check();
@@ -444,7 +444,7 @@ TEST_F(CheckTest, TheRobotsStart) {
   EXPECT_THAT(with("[3.79, 2, 0, 0]").text, HasSubstr("robot.start: the robot touches task.obstacles[0] there"));
 }
 
-TEST_F(CheckTest, ALawThatStopsTheRobotFromNowhere) {
+TEST_F(CheckTest, FindsALawThatStopsTheRobotFromNoState) {
   const auto with = [&](const std::string& ax) {
     WriteTask("  between: samples\n", "  between: samples\nplanner: {at_rest: {vx: 0.1, vy: 0.1}, stop: {ax: " + ax +
                                           ", ay: -vy}}\nrobot: {hold: [vx, vy]}\n");
@@ -456,7 +456,7 @@ TEST_F(CheckTest, ALawThatStopsTheRobotFromNowhere) {
   EXPECT_THAT(output.text, HasSubstr(task_ + ":20: planner.stop: from none of"));
 }
 
-TEST_F(CheckTest, Goals) {
+TEST_F(CheckTest, FindsAGoalOutsideTheDomainOrCoveredByAnObstacle) {
   const auto with = [&](const std::string& goal) {
     WriteTask("  between: samples\n", "  between: samples\nplanner: {goal: " + goal + ", goal_radius: 0.5}\n");
     return Check();
@@ -469,7 +469,7 @@ TEST_F(CheckTest, Goals) {
 }
 
 // Where the error depends on the place, data are needed on the way to the goal: here px is at most 1 in them.
-TEST_F(CheckTest, GoalsBeyondTheData) {
+TEST_F(CheckTest, RemarksOnAGoalBeyondTheDataWhereTheErrorDependsOnThePlace) {
   WriteTask("  between: samples\n", "  between: samples\nplanner: {goal: [8, 0], goal_radius: 0.5}\n");
   EXPECT_THAT(Check().text, Not(HasSubstr("planner.goal: remark")));
   scratch_.Write("task.yaml", Replaced(Read(task_), "lipschitz:\n", "lipschitz:\n    px: {px: 0.001}\n"));
@@ -477,7 +477,7 @@ TEST_F(CheckTest, GoalsBeyondTheData) {
   EXPECT_EQ(Check().code, 0) << Check().text;
 }
 
-TEST_F(CheckTest, Rest) {
+TEST_F(CheckTest, FindsABoundOfRestThatIsSmallerThanTheTube) {
   const auto with = [&](const std::string& bound) {
     WriteTask("  between: samples\n", "  between: samples\n  rest: {vx: " + bound + "}\n");
     return Check();
@@ -488,7 +488,7 @@ TEST_F(CheckTest, Rest) {
 }
 
 // The table is that of `certify` where there are no obstacles.
-TEST_F(CheckTest, WidthsAreThoseOfTheTube) {
+TEST_F(CheckTest, PrintsTheHalfWidthsThatCertifyPrints) {
   WriteTask("obstacles: [{circle: {center: [3, 2], radius: 0.8}}]", "obstacles: []");
   const std::string plan = scratch_.Write("plan.csv", "ax,ay\n1,0\n0,-1\n0,0\n");
   const Json check = Json::parse(Check("--json --plan " + plan).text);
@@ -499,7 +499,7 @@ TEST_F(CheckTest, WidthsAreThoseOfTheTube) {
 }
 
 // Of a plan that somebody gives, the whole tube counts.
-TEST_F(CheckTest, APlanThatLeavesTheDomain) {
+TEST_F(CheckTest, FindsThatAGivenPlanLeavesTheDomain) {
   WriteTask();
   std::string controls = "ax,ay\n";
   for (int t = 0; t < 15; ++t) controls += "2,0\n";
@@ -522,13 +522,13 @@ TEST_F(CheckTest, BadInputIsRefused) {
   EXPECT_EQ(Forereach("check 2>/dev/null").code, 2);
 }
 
-TEST_F(CheckTest, DrawsWhatItSaw) {
+TEST_F(CheckTest, DrawsAPicture) {
   WriteTask();
   EXPECT_EQ(Check("--picture " + (scratch_ / "a.svg")).code, 0);
   EXPECT_THAT(Read(scratch_ / "a.svg"), HasSubstr("<svg"));
 }
 
-TEST_F(CheckTest, SaysWhatItFoundWhereThereIsNoPicture) {
+TEST_F(CheckTest, PrintsItsFindingsEvenIfItCannotDrawThem) {
   const Output output =
       Forereach("check config/drive/quadrotor.yaml --picture " + (scratch_ / "a.svg") + " 2>&1 >" + (scratch_ / "out"));
   EXPECT_EQ(output.code, 2);

@@ -201,7 +201,7 @@ TEST_F(KeptTaskTest, ATaskWithAKeyAsksForIt) {
 }
 
 // Every command against every kind of input that is none for it.
-TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
+TEST_F(KeptTaskTest, EachCommandRefusesInputThatIsNotItsOwn) {
   const ScratchDirectory own;
   const std::string empty = own.Write("empty.lcmlog", ""), text = own.Write("text.lcmlog", "hello\nworld\n");
   const std::string json = own.Write("decision.lcmlog", "{\"outcome\": \"certified\"}");

@@ -60,7 +60,7 @@ TEST_F(CsvTest, BlankLinesMayEndTheFile) {
   EXPECT_EQ(ReadCsv(files_.Write("t.csv", "a,b\n\n"), {"a", "b"}).rows(), 0);
 }
 
-TEST_F(CsvTest, ErrorsInTheHeader) {
+TEST_F(CsvTest, RefusesAWrongHeader) {
   EXPECT_EQ(Error("a,c\n"), "t.csv:1: unknown column 'c'; the columns are a, b");
   EXPECT_EQ(Error("a,b,a\n"), "t.csv:1: a: duplicate column");
   EXPECT_EQ(Error("b\n"), "t.csv:1: a: the column is missing");
@@ -80,7 +80,7 @@ TEST_F(CsvTest, OtherColumnsOfTransitionsNameTheImport) {
                   HasSubstr("vy_next; `forereach import` makes transitions of a log with other columns")));
 }
 
-TEST_F(CsvTest, MissingFileAndDirectory) {
+TEST_F(CsvTest, RefusesMissingFilesAndDirectories) {
   EXPECT_THAT([&] { (void)ReadCsv(files_ / "none.csv", {"a"}); },
               testing::ThrowsMessage<ConfigError>(HasSubstr("none.csv: cannot be read: No such file or directory")));
   EXPECT_THAT([&] { (void)ReadCsv(files_ / "", {"a"}); },

@@ -123,7 +123,7 @@ TEST(ObstaclesDigest, DoesNotDependOnHowTheyAreWritten) {
 }
 
 // The byte string is a contract with every recorded log: a change of it makes them all disagree.
-TEST(CanonicalBytes, AreThoseWrittenDown) {
+TEST(CanonicalBytes, MatchTheSpecifiedBytes) {
   CanonicalBytes bytes("kind");
   bytes.Texts({"ab"});
   bytes.Number(-0.0);

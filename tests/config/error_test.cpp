@@ -18,9 +18,9 @@ class ErrorTest : public testing::Test {
   TaskFiles files_;
 };
 
-TEST_F(ErrorTest, TheGoodTaskIsGood) { EXPECT_EQ(files_.Error(kTask), ""); }
+TEST_F(ErrorTest, TheTaskThatTheseTestsChangeHasNoError) { EXPECT_EQ(files_.Error(kTask), ""); }
 
-TEST_F(ErrorTest, UnknownKeys) {
+TEST_F(ErrorTest, AnUnknownKeyIsAnErrorThatSuggestsTheNearest) {
   EXPECT_EQ(files_.ErrorWith("  noise_bound:", "  noise_bounds:"),
             "task.yaml:11: declaration.noise_bounds: unknown key; did you mean noise_bound?");
   EXPECT_EQ(ErrorAfter("planer: {}\n"), "task.yaml:20: planer: unknown key; did you mean planner?");
@@ -52,7 +52,7 @@ TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
             "task.yaml:1: model.name: point?mass is not known; did you mean point_mass?");
 }
 
-TEST_F(ErrorTest, EmergencyStops) {
+TEST_F(ErrorTest, AnEmergencyStopThatDoesNotFitIsAnError) {
   EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 3, vy: 1e-3}}\n"), "");
   EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 3}, hold: [vx]}\n"), "");
   EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 3, vy: 3}, hold: [vx]}\n"),
@@ -67,7 +67,7 @@ TEST_F(ErrorTest, EmergencyStops) {
             "task.yaml:20: robot.emergency_stop.speed: unknown key; known here: px, py, vx, vy");
 }
 
-TEST_F(ErrorTest, WhatStandingIs) {
+TEST_F(ErrorTest, BoundsOfRestThatDoNotFitAreAnError) {
   const auto error = [&](const std::string& rest) {
     return files_.ErrorWith("  projection:", "  rest: " + rest + "\n  projection:");
   };
@@ -82,7 +82,7 @@ TEST_F(ErrorTest, WhatStandingIs) {
   EXPECT_THAT(ErrorAfter("gate: {require_stop: yes}\n"), HasSubstr("gate.require_stop: yes is not known"));
 }
 
-TEST_F(ErrorTest, Bodies) {
+TEST_F(ErrorTest, ABodyThatDoesNotFitIsAnError) {
   const auto error = [&](const std::string& body) {
     return files_.ErrorWith("  projection: [px, py]", "  body: " + body);
   };
@@ -126,7 +126,7 @@ TEST_F(ErrorTest, Bodies) {
                                HasSubstr(", as many as the points of the body, or one more, the heading")));
 }
 
-TEST_F(ErrorTest, BodiesAtExpressions) {
+TEST_F(ErrorTest, ABodyAtExpressionsThatDoesNotFitIsAnError) {
   const auto error = [&](const std::string& body) {
     return files_.ErrorWith("  projection: [px, py]", "  body: " + body);
   };
@@ -152,7 +152,7 @@ TEST_F(ErrorTest, BodiesAtExpressions) {
             "task.yaml:17: task.body.pose: missing: the states that are the position of the robot's frame");
 }
 
-TEST_F(ErrorTest, Limits) {
+TEST_F(ErrorTest, ALimitThatDoesNotFitIsAnError) {
   const auto error = [&](const std::string& limits) {
     return files_.ErrorWith("  projection:", "  limits: " + limits + "\n  projection:");
   };
@@ -197,7 +197,7 @@ TEST_F(ErrorTest, ABodyHasAtMostSixteenPointsInAll) {
   EXPECT_EQ(error(9, 8), "task.yaml:17: task.body.parts: have 17 points, which is outside [1, 16]");
 }
 
-TEST_F(ErrorTest, BoundsBetweenSamples) {
+TEST_F(ErrorTest, BoundsBetweenSamplesThatDoNotFitAreAnError) {
   const auto error = [&](const std::string& between) {
     return files_.ErrorWith("between: samples", "between: " + between);
   };
@@ -235,7 +235,7 @@ TEST_F(ErrorTest, BoundsBetweenSamples) {
             "task.yaml:19: task.between.turn_rate: -1 is outside [0, inf)");
 }
 
-TEST_F(ErrorTest, MotionsOfObstacles) {
+TEST_F(ErrorTest, AMotionOfAnObstacleThatDoesNotFitIsAnError) {
   const auto error = [&](const std::string& motion) {
     return files_.ErrorWith("radius: 0.8}}", "radius: 0.8}, motion: " + motion + "}");
   };
@@ -263,7 +263,7 @@ TEST_F(ErrorTest, MotionsOfObstacles) {
       "task.yaml:18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
 }
 
-TEST_F(ErrorTest, KeysOfAnotherModel) {
+TEST_F(ErrorTest, AKeyOfAnotherModelIsAnError) {
   EXPECT_EQ(files_.ErrorWith("dt: 0.15}", "dt: 0.15, wheelbase: 2.5}"),
             "task.yaml:1: model.wheelbase: is for kinematic_bicycle, not for point_mass");
   EXPECT_EQ(files_.ErrorWith("point_mass", "kinematic_bicycle"),
@@ -275,7 +275,7 @@ TEST_F(ErrorTest, KeysOfAnotherModel) {
             "which point_mass does not have");
 }
 
-TEST_F(ErrorTest, ResidualsAsText) {
+TEST_F(ErrorTest, AResidualAsTextThatDoesNotFitIsAnError) {
   const auto with = [&](const std::string& value) { return ErrorAfter("residual: {" + value + "}\n"); };
   EXPECT_EQ(with(""),
             "task.yaml:20: residual: has neither add, what the next states have beyond the model's, nor name");
@@ -305,7 +305,7 @@ TEST_F(ErrorTest, DefinitionsOfThePlannerHaveNamesOfTheirOwn) {
             "task.yaml:20:21: the name vx is used twice");
 }
 
-TEST_F(ErrorTest, Disturbances) {
+TEST_F(ErrorTest, ADisturbanceThatDoesNotFitIsAnError) {
   const auto with = [&](const std::string& value) {
     const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
     return files_.ErrorWith(line, line + "  disturbance: " + value + "\n");
@@ -317,7 +317,7 @@ TEST_F(ErrorTest, Disturbances) {
   EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a list of numbers");
 }
 
-TEST_F(ErrorTest, MissingKeys) {
+TEST_F(ErrorTest, AMissingKeyIsAnError) {
   EXPECT_THAT(files_.ErrorWith("transitions: steps.csv\n", ""), StartsWith("task.yaml:1: transitions: missing: "));
   EXPECT_THAT(files_.ErrorWith(", dt: 0.15", ""), StartsWith("task.yaml:1: model.dt: missing: "));
   EXPECT_THAT(files_.ErrorWith("  noise_bound: [0, 0, 0.01, 0.01]\n", ""),
@@ -331,14 +331,14 @@ TEST_F(ErrorTest, MissingKeys) {
   EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:20: robot.residual: has neither add"));
 }
 
-TEST_F(ErrorTest, DoubleKeys) {
+TEST_F(ErrorTest, ADuplicateKeyIsAnErrorThatNamesTheFirst) {
   EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"),
             "task.yaml:9: declaration.lipschitz.vx.vx: duplicate key, first in line 9; delete one of them");
   EXPECT_EQ(ErrorAfter("transitions: other.csv\n"),
             "task.yaml:20: transitions: duplicate key, first in line 12; delete one of them");
 }
 
-TEST_F(ErrorTest, SizesThatDoNotFit) {
+TEST_F(ErrorTest, AListOfAWrongSizeIsAnError) {
   EXPECT_EQ(files_.ErrorWith("lower: [-20, -20, -5.4, -5.4]", "lower: [-20, -20, -5.4]"),
             "task.yaml:4: domain.state.lower: has 3 entries, has to have 4: px, py, vx, vy");
   EXPECT_EQ(files_.ErrorWith("{lower: [-3, -3]", "{lower: [-3]"),
@@ -357,7 +357,7 @@ TEST_F(ErrorTest, SizesThatDoNotFit) {
             "task.body)");
 }
 
-TEST_F(ErrorTest, MatricesThatDoNotFit) {
+TEST_F(ErrorTest, AMatrixOfAWrongSizeIsAnError) {
   const std::string names = "\n    vx: {vx: 0.1, vy: 0.05}\n    vy: {vx: 0.05, vy: 0.1}\n";
   EXPECT_EQ(files_.ErrorWith(names, " [[0, 0, 0, 0, 0, 0]]\n"),
             "task.yaml:8: declaration.lipschitz: has 1 rows, has to have 4, one a state");
@@ -369,7 +369,7 @@ TEST_F(ErrorTest, MatricesThatDoNotFit) {
             "task.yaml:8: declaration.lipschitz: 3 is not a map or a list of lists of numbers");
 }
 
-TEST_F(ErrorTest, NumbersThatAreNotFinite) {
+TEST_F(ErrorTest, ANumberThatIsNotFiniteIsAnError) {
   EXPECT_THAT(files_.ErrorWith("upper: [20, 20, 5.4, 5.4]", "upper: [20, .inf, 5.4, 5.4]"),
               StartsWith("task.yaml:5: domain.state.upper[1]: .inf is not a finite number; write a number in "));
   EXPECT_THAT(
@@ -377,7 +377,7 @@ TEST_F(ErrorTest, NumbersThatAreNotFinite) {
       StartsWith("task.yaml:9: declaration.lipschitz.vx.vx: NaN is not a finite number; write a number in [0, inf)"));
 }
 
-TEST_F(ErrorTest, NumbersOutsideTheirRange) {
+TEST_F(ErrorTest, ANumberOutsideItsRangeIsAnError) {
   EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: -0.1, vy"),
             "task.yaml:9: declaration.lipschitz.vx.vx: -0.1 is outside [0, inf)");
   EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0"), "task.yaml:1: model.dt: 0 is outside (0, 60]");
@@ -401,7 +401,7 @@ TEST_F(ErrorTest, NumbersOutsideTheirRange) {
 TEST_F(ErrorTest, TheLargestOrderIsAccepted) { EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 26}\n"), ""); }
 
 // Each says what was found and what to write.
-TEST_F(ErrorTest, NumbersThatAreWrittenOtherwise) {
+TEST_F(ErrorTest, ANumberInAnotherNotationIsAnErrorThatSaysWhatToWrite) {
   const struct {
     const char *written, *error;
   } of_dt[] = {{"'0.15'", "\"0.15\" is quoted text, not a number; write 0.15 without quotes"},
@@ -456,7 +456,7 @@ TEST_F(ErrorTest, NumbersThatAreWrittenOtherwise) {
             "task.yaml:5: domain.state.upper[1]: \"20\" is quoted text, not a number; write 20 without quotes");
 }
 
-TEST_F(ErrorTest, YamlThatReadsOtherwiseThanItLooks) {
+TEST_F(ErrorTest, YamlThatIsReadOtherwiseThanItLooksIsAnError) {
   EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt:0.15"),
             "task.yaml:1: model.dt:0.15: unknown key; write a space after the colon: dt: 0.15");
   EXPECT_THAT(files_.ErrorWith("  lipschitz:", "\tlipschitz:"),
@@ -465,7 +465,7 @@ TEST_F(ErrorTest, YamlThatReadsOtherwiseThanItLooks) {
             "task.yaml:21: robot.time_limit_s: 0,5 is not a number; write 0.5, with a point");
 }
 
-TEST_F(ErrorTest, ValuesOfAnotherType) {
+TEST_F(ErrorTest, AValueOfAnotherTypeIsAnError) {
   EXPECT_EQ(ErrorAfter("gate: 3\n"), "task.yaml:20: gate: 3 is not a map");
   EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: [0, 0, fast, 0]"),
             "task.yaml:15: task.initial_set.center[2]: fast is not a number; write a number in (-inf, inf)");
@@ -473,7 +473,7 @@ TEST_F(ErrorTest, ValuesOfAnotherType) {
             "task.yaml:15: task.initial_set.center: 1 is not a list of numbers");
 }
 
-TEST_F(ErrorTest, WordsThatAreNotKnown) {
+TEST_F(ErrorTest, AnUnknownWordIsAnErrorThatSuggestsTheNearest) {
   EXPECT_EQ(files_.ErrorWith("point_mass", "pointmass"),
             "task.yaml:1: model.name: pointmass is not known; did you mean point_mass?");
   EXPECT_EQ(ErrorAfter("certifier: {method: magic}\n"),
@@ -491,7 +491,7 @@ TEST_F(ErrorTest, WordsThatAreNotKnown) {
             "task.yaml:20: logger.quota_mb: 10 is less than logger.rotate_mb, 20");
 }
 
-TEST_F(ErrorTest, ObstaclesThatMakeNoSense) {
+TEST_F(ErrorTest, AnImpossibleObstacleIsAnError) {
   const auto with = [&](const std::string& obstacle) {
     return files_.ErrorWith("{circle: {center: [3, 2], radius: 0.8}}", obstacle);
   };
@@ -510,7 +510,7 @@ TEST_F(ErrorTest, ObstaclesThatMakeNoSense) {
   EXPECT_EQ(with(many), "task.yaml:18: task.obstacles: has 65 entries, which is outside [0, 64]");
 }
 
-TEST_F(ErrorTest, TransitionsOutsideTheDomain) {
+TEST_F(ErrorTest, ATransitionOutsideTheDomainIsAnError) {
   const std::string good(kTransitions);
   EXPECT_EQ(files_.Error(kTask, good + "0,0,5.5,0,0,0,0,0,0,0\n"),
             "steps.csv:4: vx: 5.5 is outside [-5.4, 5.4] of domain.state");
@@ -529,7 +529,7 @@ TEST_F(ErrorTest, TransitionsOutsideTheDomain) {
             "steps.csv:4: vx, ax: sum 4 is outside (-inf, 3] of domain.inequalities[0]");
 }
 
-TEST_F(ErrorTest, TransitionsThatCannotBeRead) {
+TEST_F(ErrorTest, TransitionsThatCannotBeReadAreAnError) {
   EXPECT_EQ(files_.ErrorWith("steps.csv", "none.csv"),
             "task.yaml:12: transitions: none.csv: cannot be read: No such file or directory");
   EXPECT_EQ(files_.Error(kTask, "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n"),
@@ -541,7 +541,7 @@ TEST_F(ErrorTest, TransitionsThatCannotBeRead) {
             "steps.csv:4: vx_next: 'nan' is not a finite number");
 }
 
-TEST_F(ErrorTest, FilesThatAreNotTasks) {
+TEST_F(ErrorTest, AFileThatIsNoTaskIsAnError) {
   EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML: "));
   EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML: "));
   EXPECT_EQ(files_.Error(""), "task.yaml:1: has no YAML document, has to have one");
@@ -554,7 +554,7 @@ TEST_F(ErrorTest, FilesThatAreNotTasks) {
   EXPECT_THAT(files_.Error(std::string((1 << 24) + 1, ' ')), HasSubstr("task.yaml: is larger than 16 MiB"));
 }
 
-TEST_F(ErrorTest, FilesThatAreNotThere) {
+TEST_F(ErrorTest, AMissingFileOrADirectoryIsAnError) {
   EXPECT_THAT(
       [&] { (void)LoadConfig(files_.directory() / "none.yaml"); },
       testing::ThrowsMessage<ConfigError>(files_.directory() / "none.yaml: cannot be read: No such file or directory"));

@@ -99,7 +99,7 @@ TEST_F(FilesTest, ALineOfCsvIsBounded) {
   EXPECT_THAT([&] { (void)ReadCsv(path, {"a"}); }, ThrowsMessage<ConfigError>(HasSubstr("is larger than 16384 MiB")));
 }
 
-TEST_F(FilesTest, CsvRowsAcrossTheReadersChunks) {
+TEST_F(FilesTest, ReadsCsvRowsThatCrossTheReadersChunks) {
   std::string text = "a,b\n";
   for (int i = 0; i < 40'000; ++i) text += std::to_string(i) + "," + std::to_string(-i) + "\n";
   for (const std::string& whole : {text, text.substr(0, text.size() - 1)}) {
@@ -164,7 +164,7 @@ class ReloadingTest : public testing::Test {
   const std::shared_ptr<Mount> mount_ = std::make_shared<Mount>();
 };
 
-TEST_F(ReloadingTest, NobodyWaitsForOneThatNeverEnds) {
+TEST_F(ReloadingTest, DoesNotWaitForAReadThatNeverEnds) {
   mount_->Set(1, true);
   {
     Reloading<int> reloads = Reloads(milliseconds(0));
@@ -175,7 +175,7 @@ TEST_F(ReloadingTest, NobodyWaitsForOneThatNeverEnds) {
   EXPECT_EQ(reloads_under_way, 1);
 }
 
-TEST_F(ReloadingTest, NoneStallsBeforeItsTime) {
+TEST_F(ReloadingTest, ReportsNoStallBeforeItsTime) {
   mount_->Set(1, true);
   Reloading<int> reloads = Reloads(std::chrono::hours(1));
   EXPECT_TRUE(reloads.Ask());
@@ -185,7 +185,7 @@ TEST_F(ReloadingTest, NoneStallsBeforeItsTime) {
   EXPECT_EQ(Await(reloads), 1);
 }
 
-TEST_F(ReloadingTest, AGoodOneAfterOneThatStallsIsTaken) {
+TEST_F(ReloadingTest, TakesAGoodFileAfterAReadThatStalled) {
   mount_->Set(1, true);
   Reloading<int> reloads = Reloads(milliseconds(20));
   EXPECT_TRUE(reloads.Ask());
@@ -202,7 +202,7 @@ TEST_F(ReloadingTest, AGoodOneAfterOneThatStallsIsTaken) {
   EXPECT_EQ(reloads.Take(), std::nullopt) << "older than what was taken";
 }
 
-TEST_F(ReloadingTest, OfThoseThatStallAtMostTwoAreUnderWayAndTheNextIsAnswered) {
+TEST_F(ReloadingTest, RefusesAThirdReadWhileTwoStallAndReadsLater) {
   mount_->Set(1, true);
   Reloading<int> reloads = Reloads(milliseconds(20));
   const auto stalls = [&] {
@@ -225,7 +225,7 @@ TEST_F(ReloadingTest, OfThoseThatStallAtMostTwoAreUnderWayAndTheNextIsAnswered) 
   EXPECT_EQ(mount_->reading, 3) << "what was asked for meanwhile is read after all";
 }
 
-TEST_F(ReloadingTest, WhatIsThrownArrives) {
+TEST_F(ReloadingTest, PassesOnTheExceptionOfTheReader) {
   Reloading<int> reloads([]() -> int { throw std::runtime_error("no"); });
   EXPECT_TRUE(reloads.Ask());
   EXPECT_THROW((void)Await(reloads), std::runtime_error);

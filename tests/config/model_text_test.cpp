@@ -167,7 +167,7 @@ TEST_F(ModelTextTest, ACommaInsideBracesEndsAnExpression) {
   EXPECT_EQ(Error(flow + "  next: {px: \"hypot(px, vx)\", py: py, vx: vx, vy: vy}\n"), "");
 }
 
-TEST_F(ModelTextTest, Names) {
+TEST_F(ModelTextTest, RefusesNamesThatAreNoNamesOrAreTaken) {
   EXPECT_EQ(ErrorWith("{px: m,", "{p-x: m,"),
             "task.yaml:2: model.states.p-x: is not a name; a name has letters, digits and underscores, and does not "
             "begin with a digit");
@@ -226,7 +226,7 @@ TEST_F(ModelTextTest, EachStateHasItsEquation) {
               HasSubstr("model.next.vx: nothing is not an expression"));
 }
 
-TEST_F(ModelTextTest, WhatIsRequired) {
+TEST_F(ModelTextTest, NamesARequiredKeyThatIsMissing) {
   EXPECT_EQ(ErrorWith("dt: 0.15, ", ""), "task.yaml:4: model.parameters.dt: missing: the step of the model, in s");
   EXPECT_EQ(ErrorWith("  parameters: {dt: 0.15, drag: 0.5, mass: [1, 1.2]}\n", ""),
             "task.yaml:2: model.parameters.dt: missing: the step of the model, in s");
@@ -277,7 +277,7 @@ TEST_F(ModelTextTest, AtMostSixteenStates) {
   EXPECT_EQ(Error(ManyStates(17)), "task.yaml:1: model.states: has 17 entries, which is outside [1, 16]");
 }
 
-TEST_F(ModelTextTest, FormsDoNotMix) {
+TEST_F(ModelTextTest, RefusesKeysOfTwoFormsOfAModel) {
   EXPECT_EQ(Error(std::string(kModel) + "  dt: 0.15\n"),
             "task.yaml:13: model.dt: is model.parameters.dt of a model as text");
   EXPECT_EQ(Error(std::string(kModel) + "  name: point_mass\n  dt: 0.15\n"),
@@ -292,7 +292,7 @@ class ModelFileTest : public ModelTextTest {
   ModelFileTest() { files_.directory().Write("drag.yaml", kModel); }
 };
 
-TEST_F(ModelFileTest, IsTheModelThatStandsInIt) {
+TEST_F(ModelFileTest, GivesTheSameModelAsTheTaskWithItsText) {
   const Config here = Load(kModel), included = Load("model: {file: drag.yaml}\n");
   EXPECT_EQ(included.problem->model->text()->equations, here.problem->model->text()->equations);
   EXPECT_EQ(included.problem->model->text()->name, "drag");
@@ -310,7 +310,7 @@ TEST_F(ModelFileTest, TheTaskReplacesParameters) {
             "task.yaml:1: model.parameters.dt: 61 is outside (0, 60], its unit is s");
 }
 
-TEST_F(ModelFileTest, ItsBytesBelongToTheTask) {
+TEST_F(ModelFileTest, ChangesTheDigestOfTheTaskWithItsBytes) {
   const std::string task = "model: {file: drag.yaml}\n" + WithoutModel();
   const Digest digest = files_.Load(task).grounds.config;
   EXPECT_EQ(digest, TaskDigest(task, kModel));
@@ -451,7 +451,7 @@ TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {
             "which is more than pi/2: how often it has turned cannot be told");
 }
 
-TEST_F(AnglesTest, OfACompiledModel) {
+TEST_F(AnglesTest, ACompiledModelTakesAnglesToo) {
   const auto task = [](const std::string& model) { return TaskFor(model, 6, 2, "x, y"); };
   const std::string columns =
       "x,y,theta,v,a,delta,jerk,steer_rate,x_next,y_next,theta_next,v_next,a_next,delta_next\n0,0,0,0,0,0,0,0,0,0,-6.2,"

@@ -164,7 +164,7 @@ TEST(Shipped, AModelAsTextDecidesAsTheCompiledOneInOtherTasks) {
   }
 }
 
-TEST(Shipped, ACarKeepsItsLaneOrNot) {
+TEST(Shipped, ACarIsCertifiedIfItKeepsItsLane) {
   const Config config = LoadConfig(kDirectory + "lane.yaml");
   const auto decide = [&](const std::string& plan) {
     return Decide(config, LoadPlan(kDirectory + "plans/" + plan + ".csv", *config.problem->model));

@@ -39,7 +39,7 @@ class Covers : public testing::Test {
   SlopeClaim claim_ = ClaimOf(family_, 2, 3);
 };
 
-TEST_F(Covers, AsTheyAreHold) {
+TEST_F(Covers, ACoverHoldsAsItIsWritten) {
   EXPECT_EQ(Check().answer, Answer::kYes);
   claim_ = ClaimOf(family_, 2, 5);
   EXPECT_EQ(Check().answer, Answer::kYes);
@@ -105,7 +105,7 @@ TEST_F(Covers, ForALargerDomainDoesNotHold) {
   EXPECT_NE(Check().answer, Answer::kYes);
 }
 
-TEST_F(Covers, OnlyOfWhatIsNotZero) {
+TEST_F(Covers, ACoverOfAnEntryThatIsZeroIsRefuted) {
   claim_.row = 0;
   ExpectRefuted("zero");
 }
@@ -163,7 +163,7 @@ TEST(SlopesOfATextTest, AreThePapersFormulas) {
 }
 
 // The slope |y| sign(x) is zero in the middle of the box, and 1 at its corners: no expansion may leave the kink out.
-TEST(SlopesOfATextTest, OverAKinkAreNotExpanded) {
+TEST(SlopesOfATextTest, SlopesOverAKinkAreNotExpanded) {
   const Family family = Made(Square(1), "abs(x)*y", "0");
   const auto check = [&](double bound) {
     Cover cover;

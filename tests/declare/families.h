@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/models/named_residuals.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 
@@ -33,22 +33,18 @@ inline ParametricResidual Widened(const NominalModel& model, const char* name, d
 }
 
 inline Family Bicycle(double widen = 0) {
-  Domain domain;
-  Eigen::VectorXd upper(6);
-  upper << 40, 40, 3, 25, 3, 0.48;
-  Eigen::VectorXd lower = -upper;
+  const Problem problem = PaperBicycle();
+  Domain domain = problem.domain;
+  Eigen::VectorXd lower = domain.state.lower();
   lower[3] = 0;
-  domain.state = Box(lower, upper);
-  domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
-  return {domain, Widened(*MakeKinematicBicycle(0.1, 2.5), "heading_saturation", widen)};
+  domain.state = Box(lower, domain.state.upper());
+  return {domain, Widened(*problem.model, "heading_saturation", widen)};
 }
 
 inline Family PointMassInBall(double widen = 0) {
-  Domain domain;
-  domain.state = Box(Eigen::Vector4d(-20, -20, -5.4, -5.4), Eigen::Vector4d(20, 20, 5.4, 5.4));
-  domain.input = Box(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3));
-  domain.balls.push_back({{2, 3}, Eigen::Vector2d::Zero(), 5.4});
-  return {domain, Widened(*MakePointMass(0.15), "velocity_knee", widen)};
+  Problem problem = PaperPointMass();
+  problem.domain.balls.push_back({{2, 3}, Eigen::Vector2d::Zero(), 5.4});
+  return {problem.domain, Widened(*problem.model, "velocity_knee", widen)};
 }
 
 /** {|x|, |y| <= half_width, |u| <= 1}. */

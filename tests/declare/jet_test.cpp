@@ -42,7 +42,7 @@ TEST(Jet, EnclosesWhatDifferencesShow) {
   }
 }
 
-TEST(Jet, KinkHasBothSidesAndNoCurvature) {
+TEST(Jet, AcrossAKinkTheSlopeCoversBothSidesAndTheCurvatureIsUnbounded) {
   const Jet across = abs(Jet::Argument({-1, 2}, 0, true)), beside = abs(Jet::Argument({0, 2}, 0, true));
   EXPECT_EQ(across.slope, Interval(-1, 1));
   EXPECT_FALSE(across.curvature[0].IsFinite());
@@ -53,7 +53,7 @@ TEST(Jet, KinkHasBothSidesAndNoCurvature) {
   EXPECT_EQ(larger.slope, Interval(0, 1));
 }
 
-TEST(Jet, WhatIsOffIsExactlyZero) {
+TEST(Jet, ASmoothGateThatIsOffIsExactlyZero) {
   const Jet off = SmoothGate(Jet::Argument({-3, 0}, 0, true));
   EXPECT_EQ(off.value, Interval(0, 0));
   EXPECT_EQ(off.slope, Interval(0, 0));
@@ -75,7 +75,7 @@ TEST(Jet, OfJumpsIsFlatBesideThemAndUnboundedAcross) {
     EXPECT_FALSE(jump.slope.IsFinite());
 }
 
-TEST(Jet, OfTheTangentsCurvature) {
+TEST(Jet, CurvatureOfTheTangentHasItsDerivatives) {
   const Jet t = TanCurvature(Jet::Argument({1, 2}, 0, true));  // 2 t + 2 t^3
   EXPECT_EQ(t.value, Interval(4, 20));
   EXPECT_EQ(t.slope, Interval(8, 26));

@@ -58,7 +58,7 @@ TEST(MotionBound, OfAPointMassIsItsLargestControl) {
 }
 
 // Then no place moves at first, only after the speed has.
-TEST(MotionBound, OfAMotionThatBeginsAtRest) {
+TEST(MotionBound, BoundsAMotionThatBeginsAtRestByItsInputs) {
   const auto model = MakePointMass(0.15);
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, 0, 0), Eigen::Vector4d(9, 9, 0, 0), Eigen::Vector2d(2, 0.5));
   const MotionBounds bounds = Bound(*model, domain, 0.15, -1, NoRest(4));
@@ -380,7 +380,7 @@ TEST(MotionBound, ThereIsOneIffTheDenominatorHasNoZero) {
 }
 
 // The mean-value form bounds by what it expands: nothing in the range has more.
-TEST(MeanValue, NoPointHasMoreThanTheExpansion) {
+TEST(MeanValue, ExpansionBoundsEveryPointOfTheRange) {
   for (const Interval rise : {Interval(-1, 3), Interval(-3, 1), Interval(-2, 2), Interval(-1e300, 1e300)}) {
     const Interval range(-1, 7);
     const ExpansionPoint at = ExpandForUpperBound(range, rise);

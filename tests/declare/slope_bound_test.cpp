@@ -34,19 +34,19 @@ void ExpectSupremum(const SlopeBound& bound, double supremum) {
   EXPECT_LE(bound.gap(), 1e-7);
 }
 
-TEST(SlopeBound, OfAPolynomialInACorner) {
+TEST(SlopeBound, FindsTheSupremumOfAPolynomialInACorner) {
   ExpectSupremum(Cubic(Square(2)).Bound(0, 0), 12);
   ExpectSupremum(Cubic(Square(2)).Bound(0, 1), 24);
 }
 
-TEST(SlopeBound, OverAParameter) { ExpectSupremum(Cubic(Square(2), {-3, 2}).Bound(0, 1), 72); }
+TEST(SlopeBound, FindsTheSupremumOverAParameter) { ExpectSupremum(Cubic(Square(2), {-3, 2}).Bound(0, 1), 72); }
 
 TEST(SlopeBound, OfAKinkIsTheGeneralisedGradients) {
   ExpectSupremum(Cubic(Square(2)).Bound(1, 0), 1);
   ExpectSupremum(Cubic(Square(2)).Bound(1, 2), 0.5);
 }
 
-TEST(SlopeBound, InsideAnInterval) { ExpectSupremum(Wave(Square(2)).Bound(0, 0), 1); }
+TEST(SlopeBound, FindsASupremumInTheMiddleOfTheDomain) { ExpectSupremum(Wave(Square(2)).Bound(0, 0), 1); }
 
 TEST(SlopeBound, OverABallItsBoundaryCounts) {
   Domain domain = Square(2);
@@ -55,7 +55,7 @@ TEST(SlopeBound, OverABallItsBoundaryCounts) {
   ExpectSupremum(Wave(domain).Bound(1, 0), 2 * std::sqrt(2.0));  // x + y
 }
 
-TEST(SlopeBound, OverAnInequality) {
+TEST(SlopeBound, FindsTheSupremumUnderAnInequality) {
   Domain domain = Square(2);
   Eigen::VectorXd coefficients(3);
   coefficients << 2, 1, 0;
@@ -93,7 +93,7 @@ TEST(SlopeBound, OverAPoleNamesABoxAndEnds) {
 }
 
 // Zero for x below 1, but for x <= -c it is undefined.
-TEST(SlopeBound, OfWhatIsUndefinedIsInfiniteThoughItIsOff) {
+TEST(SlopeBound, IsInfiniteWhereAnUndefinedTermIsMultipliedByZero) {
   const auto bound = [](double c) { return Made(Square(2), "smooth_gate(x - 1)*log(x + c)", "y", c).Bound(0, 0); };
   const SlopeBound undefined = bound(0);
   EXPECT_EQ(undefined.upper, kInfinity);
@@ -122,7 +122,7 @@ TEST(SlopeBound, BesideAPoleIsFinite) {
 }
 
 // Widths that overflow, that are subnormal, that have no double between their ends: it ends, and what it says holds.
-TEST(SlopeBound, EndsOnEveryScale) {
+TEST(SlopeBound, HoldsAndEndsForDomainsOfEveryScale) {
   for (const double size : {kMaxDouble, 0x1p+1000, 0x1p+400, 1e-300, 0x1p-1022, 0x3p-1074, 0x1p-1074, 0.0}) {
     const Domain domain = Square(size);
     for (const auto& [row, column] : {std::pair{0, 0}, {0, 1}, {1, 0}, {1, 1}, {1, 2}}) {

@@ -422,7 +422,7 @@ TEST_F(ExportTest, AFileThatExistsIsNotChanged) {
   EXPECT_EQ(FilesIn(scratch_.path()), (std::set<std::string>{"precious", "tables", "link", "empty"}));
 }
 
-TEST_F(ExportTest, WhatCannotBeExportedIsSaid) {
+TEST_F(ExportTest, RefusesWhatItCannotExportAndSaysWhy) {
   EXPECT_EQ(Forereach("export README.md --format csv -o '" + (scratch_ / "x") + "' 2>&1").code, 2);
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "x/decisions.csv"));
   EXPECT_EQ(Forereach("export '" + kCourse + "' --format xlsx -o '" + (scratch_ / "x.xlsx") + "' 2>&1").code, 2);

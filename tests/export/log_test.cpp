@@ -164,7 +164,7 @@ TEST_F(LogTest, NamesOfAHostileLogDoNotReachTheTerminal) {
   EXPECT_THAT(output.text, HasSubstr("\\x1b[2J"));
 }
 
-TEST_F(LogTest, WhatCannotBeDoneIsSaid) {
+TEST_F(LogTest, RefusesWhatItCannotDoAndSaysWhy) {
   const std::string a = Small("a", 0, "A");
   const auto before = ReadBytes(a);
   EXPECT_THAT(Log("cut '" + a + "' -o '" + a + "'").text, HasSubstr("the file exists, and is not changed"));

@@ -119,7 +119,7 @@ TEST(MessageJson, AnAdviceIsOfTheCandidateThatItIsAbout) {
   EXPECT_EQ(summary->plan, GetDigest(advice.plan_digest));
 }
 
-TEST(MessageJson, OtherBytesAreNoMessage) {
+TEST(MessageJson, RefusesBytesThatAreNoWholeMessage) {
   auto bytes = Encode(decision_t{});
   EXPECT_TRUE(Summarize(bytes).has_value());
   bytes.push_back(0);

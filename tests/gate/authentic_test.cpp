@@ -81,7 +81,7 @@ TEST(Authentic, TheTrailerIsAsItIsWrittenDown) {
   EXPECT_TRUE(std::ranges::equal(TestKeys().Tag(tagged), trailer.subspan(24 + 64, 16)));
 }
 
-TEST(Authentic, EveryBitCounts) {
+TEST(Authentic, RefusesAMessageWithAnyBitFlipped) {
   const std::vector<std::uint8_t> bytes = Signed();
   for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
     std::vector<std::uint8_t> altered = bytes;
@@ -150,7 +150,7 @@ TEST(Authentic, ACounterIsTakenOnce) {
   EXPECT_EQ(authenticator.refusals().replayed, 3);
 }
 
-TEST(Authentic, NothingFromBeforeTheReceiverBegan) {
+TEST(Authentic, RefusesMessagesFromBeforeTheReceiverBegan) {
   EXPECT_EQ(Judge(Signed(kBegun)), Authenticity::kReplayed);
   EXPECT_EQ(Judge(Signed(kBegun + 1)), Authenticity::kAuthentic);
 }
@@ -179,7 +179,7 @@ TEST(Authentic, ATrailerUnderManyAlteredBodiesIsRefusedAndNoOther) {
   EXPECT_EQ(authenticator.Check("certifier", next).first, Authenticity::kAuthentic);
 }
 
-TEST(Authentic, WhatIsForgottenIsNotTakenASecondTime) {
+TEST(Authentic, RefusesAReplayOfASenderThatItHasForgotten) {
   Authenticator authenticator = Receiver();
   std::vector<std::vector<std::uint8_t>> sent;
   for (std::size_t i = 0; i < 3 * Authenticator::kMaxSenders; ++i) {

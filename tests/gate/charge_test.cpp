@@ -30,7 +30,7 @@ Charge InState(State state, std::int64_t& now) {
 }
 
 // In each state: each heartbeat that can be heard, and what follows from it.
-TEST(ChargeTest, EveryHeartbeatInEveryState) {
+TEST(ChargeTest, EveryHeartbeatInEveryStateHasTheSpecifiedEffect) {
   const std::vector<std::pair<Charge::Identity, bool>> others{
       {kEarlier, true}, {kLater, false}, {kSameTimeSmaller, true}, {kSameTimeLarger, false}};
   for (const State state : {State::kListening, State::kInCharge, State::kStandingBy}) {
@@ -51,7 +51,7 @@ TEST(ChargeTest, EveryHeartbeatInEveryState) {
   }
 }
 
-TEST(ChargeTest, OnesOwnHeartbeatsComeBackByMulticastAndMeanNothing) {
+TEST(ChargeTest, IgnoresItsOwnHeartbeats) {
   for (const State state : {State::kListening, State::kInCharge, State::kStandingBy}) {
     std::int64_t now = 0;
     Charge charge = InState(state, now);
@@ -71,7 +71,7 @@ TEST(ChargeTest, TakesChargeOnceItHasListenedLongEnough) {
   EXPECT_EQ(charge.state(), State::kInCharge);
 }
 
-TEST(ChargeTest, WhoWasPausedHasNotListened) {
+TEST(ChargeTest, APauseDoesNotCountAsListening) {
   Charge charge(kSelf, Charge::kListenUs);
   charge.Advance(0);
   charge.Advance(Charge::kListenUs * 100);
@@ -124,7 +124,7 @@ TEST(ChargeTest, OneInChargeThatWasPausedListensAnewBeforeItDecides) {
 
 // Three certifiers on a bus that loses heartbeats; they are paused, killed and started again at random. Whenever
 // nothing has happened for a while exactly one is in charge, and two at once only where heartbeats were lost.
-TEST(ChargeTest, OneIsInChargeWhateverHappens) {
+TEST(ChargeTest, ExactlyOneIsInChargeAfterAnyLossPauseOrRestart) {
   for (const double loss : {0.0, 0.2}) {
     const unsigned seed = std::random_device{}();
     SCOPED_TRACE("seed " + std::to_string(seed) + ", loss " + std::to_string(loss));

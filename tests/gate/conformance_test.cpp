@@ -47,7 +47,7 @@ TEST(ConformanceTest, TheSliceIsClosed) {
   EXPECT_TRUE(conformance.Check(At(30, 7, 1, std::numeric_limits<double>::quiet_NaN(), 1)));
 }
 
-TEST(ConformanceTest, WhatItWasExecutingBeforeCountsWhereAnotherPlanTakesOver) {
+TEST(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
   Conformance conformance;
   conformance.Remember(Plan(7));
   certified_plan_v2_t next = Plan(8);

@@ -51,7 +51,7 @@ TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
   EXPECT_TRUE(gate.Decide(Encode(brakes), kNow).certified);
 }
 
-TEST(GateLimit, APlanThatMayExceedOneIsAbstainedFrom) {
+TEST(GateLimit, AbstainsFromAPlanThatMayExceedALimit) {
   Config config = SmallTask();
   Problem problem = *config.problem;
   problem.limits = {{.name = "height", .that = {"py", 1, 1}, .at_most = 9},
@@ -82,7 +82,7 @@ void ExpectDigestsOf(const Config& config, const Message& message) {
   EXPECT_EQ(GetDigest(message.obstacles_digest), config.grounds.obstacles);
 }
 
-TEST_F(GateAnswerTest, Certificate) {
+TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
   const candidate_plan_t candidate = Candidate(7);
   const GateAnswer answer = Decide(candidate);
   const decision_t& decision = answer.decision;
@@ -126,7 +126,7 @@ TEST_F(GateAnswerTest, ACertificateNamesTheTransitionsOfTheTaskWithoutWhatWasLea
             ChainedDigest(config_.grounds.observations, Encode(learned)));
 }
 
-TEST_F(GateAnswerTest, AbstentionForAnObstacle) {
+TEST_F(GateAnswerTest, AbstainsForAnObstacleAndNamesIt) {
   const GateAnswer answer = Decide(Candidate(1, kAccelerationIntoTheCircle));
   const decision_t& decision = answer.decision;
   EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_SAFETY);
@@ -155,7 +155,7 @@ TEST_F(GateAnswerTest, AControlOutsideTheInputDomainIsAnAbstentionNotARejection)
   EXPECT_FALSE(answer.certified);
 }
 
-TEST_F(GateAnswerTest, DomainPrecedesSafety) {
+TEST_F(GateAnswerTest, NamesTheDomainWhereSafetyFailsToo) {
   EXPECT_EQ(Decide(Candidate(1, kAccelerationOutsideDomain)).decision.outcome, decision_t::ABSTAIN_DOMAIN);
 }
 
@@ -218,7 +218,7 @@ TEST_F(GateAnswerTest, AnErrorAfterTheProofLeavesNoCertificate) {
   EXPECT_EQ(gate_.Status(kNow).by_outcome[decision_t::CERTIFIED], 0);
 }
 
-TEST_F(GateAnswerTest, WhatWasUsedBeforeAReloadIsUsedAfterIt) {
+TEST_F(GateAnswerTest, RejectsPlanIdsThatWereUsedBeforeAReload) {
   ASSERT_TRUE(Decide(Candidate(7)).certified);
   ASSERT_FALSE(Decide(Candidate(8, kAccelerationOutsideDomain)).certified);
   Gate reloaded{config_};
@@ -385,7 +385,7 @@ TEST_F(GateAdviceTest, SaysNothingOfACertificateOrUnderOtherGrounds) {
   EXPECT_FALSE(gate_.Advise(wrong, decision_, {}));
 }
 
-TEST_F(GateAdviceTest, ASearchEndsWhenItIsToldTo) {
+TEST_F(GateAdviceTest, StopsItsSearchWhenAsked) {
   const candidate_plan_t candidate = Candidate(1, kAccelerationIntoTheCircle);
   int asked = 0;
   ASSERT_TRUE(AdviceOn(gate_, candidate, {4, [&] { return ++asked > 0; }}));
@@ -396,7 +396,7 @@ TEST_F(GateAdviceTest, ASearchEndsWhenItIsToldTo) {
   }
 }
 
-TEST(GateTransitionTest, ARefusedOneNamesTheCheckThatRefusedItAndChangesNothing) {
+TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   Config config = SmallTask();
   config.gate.learns = true;

@@ -76,7 +76,7 @@ std::vector<Obstacle> Both(std::vector<Obstacle> some, const std::vector<Obstacl
   return some;
 }
 
-TEST_F(GateObstaclesTest, ThoseHeardCountBesideTheTasksAndDecisionsAreBoundToThem) {
+TEST_F(GateObstaclesTest, ObstaclesOfTheBusCountBesideThoseOfTheTaskAndEnterTheDigest) {
   EXPECT_EQ(Decide(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
 
   EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
@@ -100,7 +100,7 @@ TEST_F(GateObstaclesTest, ThoseHeardCountBesideTheTasksAndDecisionsAreBoundToThe
 }
 
 // As logs from before gate.obstacles were made.
-TEST(GateOldLogsTest, WhereNothingIsSaidThoseHeardReplaceTheTasks) {
+TEST(GateOldLogsTest, ObstaclesOfTheBusReplaceThoseOfATaskThatNamesNoSource) {
   Config config = SmallTask();
   config.gate.obstacles = ObstaclesSource::kUnsaid;
   Gate gate(config);
@@ -113,7 +113,7 @@ TEST(GateOldLogsTest, WhereNothingIsSaidThoseHeardReplaceTheTasks) {
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
 }
 
-TEST(GateTaskObstaclesTest, WhereTheTaskIsTheWorldTheBusIsNotHeard) {
+TEST(GateTaskObstaclesTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAll) {
   Gate gate(SmallTask());
   EXPECT_THAT(gate.UpdateObstacles(Encode(Message(kOnTheWay, 0)), kNow), HasSubstr("gate.obstacles is task"));
   EXPECT_THAT(gate.UpdateObstacles({}, kNow), HasSubstr("gate.obstacles is task"));
@@ -128,7 +128,7 @@ TEST(GateTaskObstaclesTest, WhereTheTaskIsTheWorldTheBusIsNotHeard) {
 
 // ---- When all obstacles are known.
 
-TEST_F(GateObstaclesTest, NothingIsKnownBeforeTheFirstMessage) {
+TEST_F(GateObstaclesTest, ObstaclesAreUnknownBeforeTheFirstMessage) {
   EXPECT_EQ(Why(), "none has been heard yet");
   EXPECT_EQ(gate_.Status(kNow).obstacles_known, 0);
   EXPECT_EQ(gate_.Status(kNow).obstacles_source, certifier_status_v3_t::OBSTACLES_BUS);
@@ -140,7 +140,7 @@ TEST_F(GateObstaclesTest, NothingIsKnownBeforeTheFirstMessage) {
   EXPECT_EQ(gate_.Status(kNow + 7).obstacles_in_force, 2);
 }
 
-TEST_F(GateObstaclesTest, TheyAreKnownUntilTheTimeoutAndNotLonger) {
+TEST_F(GateObstaclesTest, ObstaclesAreKnownUntilTheTimeoutAndNotLonger) {
   Say(0);
   EXPECT_EQ(Why(kNow + 1'000'000), "");
   EXPECT_THAT(Why(kNow + 1'000'001), HasSubstr("1000 ms old, at most 1000 ms are allowed"));
@@ -155,7 +155,7 @@ TEST_F(GateObstaclesTest, TheAgeCountsFromTheStampNotFromTheArrival) {
   EXPECT_NE(Why(kNow + 600'001), "");
 }
 
-TEST_F(GateObstaclesTest, AGapMakesThemUnknownUntilTheNextInOrder) {
+TEST_F(GateObstaclesTest, AGapMakesObstaclesUnknownUntilTheNextMessageInOrder) {
   Say(0);
   Say(1);
   Say(3);
@@ -219,7 +219,7 @@ TEST_F(GateObstaclesTest, TwoSendersAreNeverKnownTogether) {
   }
 }
 
-TEST_F(GateObstaclesTest, OneThatIsRefusedMakesThemUnknownUntilAGoodOne) {
+TEST_F(GateObstaclesTest, ARefusedMessageMakesObstaclesUnknownUntilAGoodMessage) {
   Say(0);
   ExpectRefused({1, 2, 3}, "not an obstacles_t");
   EXPECT_NE(Why(), "");
@@ -268,7 +268,7 @@ TEST_F(GateObstaclesTest, ASenderThatBeganAnewIsTakenByItsStamp) {
   ExpectRefused(Encode(anew), "sequence 0 does not exceed the last, 0, nor does its stamp");
 }
 
-TEST_F(GateObstaclesTest, AClockThatWasSetBackKeepsNobodyOut) {
+TEST_F(GateObstaclesTest, TakesObstaclesAfterTheClockWasSetBack) {
   const std::int64_t later = kNow + 3'600'000'000;
   obstacles_t before = Message(kFarAway, 7);
   before.utime = later;
@@ -307,7 +307,7 @@ TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
   EXPECT_NE(reloaded(gate_)->WhyObstaclesUnknown(kNow), "") << "a refused one is not forgotten either";
 }
 
-TEST_F(GateObstaclesTest, OldOrFutureOnesAreRefused) {
+TEST_F(GateObstaclesTest, RefusesMessagesThatAreTooOldOrFromTheFuture) {
   for (const std::int64_t age : {0, 500'000, -50'000}) {
     obstacles_t message = Message(kFarAway, next_sequence_++);
     message.utime = kNow - age;
@@ -316,7 +316,7 @@ TEST_F(GateObstaclesTest, OldOrFutureOnesAreRefused) {
   for (const std::int64_t age : {500'001, -50'001}) ExpectRefused("stamped", [age](auto& m) { m.utime = kNow - age; });
 }
 
-TEST_F(GateObstaclesTest, BytesThatAreNone) {
+TEST_F(GateObstaclesTest, RefusesBytesThatAreNoObstaclesMessage) {
   std::vector<std::uint8_t> bytes = Encode(Message(kOnTheWay, 0));
   ExpectRefused({}, "not an obstacles_t");
   ExpectRefused(Encode(transition_t{}), "not an obstacles_t");
@@ -382,7 +382,7 @@ std::vector<std::uint8_t> MovingMessage(std::int64_t sequence, std::int64_t utim
   return Encode(message);
 }
 
-TEST(GateMovingTest, BothTypesAreOneStream) {
+TEST(GateMovingTest, BothMessageTypesBelongToOneStream) {
   Gate gate(SmallTaskWithAClock());
   const std::vector<Obstacle> of_task = SmallTask().obstacles;
   EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
@@ -400,7 +400,7 @@ TEST(GateMovingTest, BothTypesAreOneStream) {
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow + 1'000'002), "") << "it is silent for too long";
 }
 
-TEST(GateMovingTest, OnesThatAreStaleAheadOrNoMessageAreRefused) {
+TEST(GateMovingTest, RefusesMessagesThatAreStaleFromTheFutureOrMalformed) {
   for (const std::int64_t age : {500'001, -50'001}) {
     Gate gate(SmallTaskWithAClock());
     EXPECT_THAT(gate.UpdateObstacles(MovingMessage(0, kNow - age), kNow), HasSubstr("stamped"));
@@ -421,7 +421,7 @@ TEST(GateMovingTest, OnesThatAreStaleAheadOrNoMessageAreRefused) {
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
 }
 
-TEST(GateMovingTest, WithoutAClockNothingMoves) {
+TEST(GateMovingTest, RefusesMovingObstaclesWithoutABoundOnTheClockError) {
   Gate gate(SmallTaskOnTheBus());
   EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0, kNow, kFarAway), kNow), "") << "what stands needs none";
   EXPECT_THAT(gate.UpdateObstacles(MovingMessage(1), kNow),

@@ -58,33 +58,33 @@ class GateRefusalTest : public testing::Test {
   std::int64_t next_plan_id_ = 1;
 };
 
-TEST_F(GateRefusalTest, StaleBeyondMaxAge) {
+TEST_F(GateRefusalTest, RejectsACandidateThatIsOlderThanMaxAge) {
   ExpectAdmitted([](auto& c) { c.utime = kNow - 500'000; });
   ExpectRefused(decision_t::CAUSE_STALE, [](auto& c) { c.utime = kNow - 500'001; });
   ExpectRefused(decision_t::CAUSE_STALE, [](auto& c) { c.utime = 0; });
   ExpectRefused(decision_t::CAUSE_STALE, [](auto& c) { c.utime = kMin; });
 }
 
-TEST_F(GateRefusalTest, FutureBeyondMaxAhead) {
+TEST_F(GateRefusalTest, RejectsACandidateThatIsFurtherAheadThanMaxAhead) {
   ExpectAdmitted([](auto& c) { c.utime = kNow + 50'000; });
   ExpectRefused(decision_t::CAUSE_FUTURE, [](auto& c) { c.utime = kNow + 50'001; });
   ExpectRefused(decision_t::CAUSE_FUTURE, [](auto& c) { c.utime = kMax; });
 }
 
-TEST_F(GateRefusalTest, TooLateForItsStart) {
+TEST_F(GateRefusalTest, RejectsACandidateThatArrivesAfterItsStart) {
   ExpectAdmitted([](auto& c) { c.start_utime = kNow; });
   ExpectRefused(decision_t::CAUSE_TOO_LATE, [](auto& c) { c.start_utime = kNow - 1; });
   ExpectRefused(decision_t::CAUSE_TOO_LATE, [](auto& c) { c.start_utime = 0; });
   ExpectRefused(decision_t::CAUSE_TOO_LATE, [](auto& c) { c.start_utime = kMin; });
 }
 
-TEST_F(GateRefusalTest, StartsAfterItsCertificateWouldHaveExpired) {
+TEST_F(GateRefusalTest, RejectsACandidateThatStartsAfterItsCertificateWouldExpire) {
   ExpectAdmitted([](auto& c) { c.start_utime = kNow + 2'000'000; });
   ExpectRefused(decision_t::CAUSE_FUTURE, [](auto& c) { c.start_utime = kNow + 2'000'001; });
   ExpectRefused(decision_t::CAUSE_FUTURE, [](auto& c) { c.start_utime = kMax; });
 }
 
-TEST_F(GateRefusalTest, StartsBeforeADecisionCanBeExpected) {
+TEST_F(GateRefusalTest, AbstainsFromACandidateThatStartsBeforeADecisionCanBeExpected) {
   Config config = SmallTask();
   config.gate.decision_budget_ms = 400;
   Gate gate(config);
@@ -110,7 +110,7 @@ TEST_F(GateRefusalTest, LimitsInMillisecondsAreRoundedToTheNearestMicrosecond) {
   EXPECT_EQ(gate.Decide(Encode(candidate), kNow).decision.outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(GateRefusalTest, DuplicateOrOlderPlanId) {
+TEST_F(GateRefusalTest, RejectsAPlanIdThatIsUsedOrTooOld) {
   for (const std::int64_t plan_id : {5, 6, 100}) EXPECT_EQ(Decide(Candidate(plan_id)).outcome, decision_t::CERTIFIED);
   next_plan_id_ = 101;
   ExpectRefused(Candidate(100), decision_t::CAUSE_DUPLICATE);
@@ -144,7 +144,7 @@ TEST_F(GateRefusalTest, TheWholeLabelTellsSourcesApart) {
   EXPECT_EQ(Decide(other).outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(GateRefusalTest, OneSourceMoreThanItKeepsApart) {
+TEST_F(GateRefusalTest, RejectsOneSourceMoreThanItKeepsApart) {
   static_assert(Sources::kMaxSources == 16);
   for (int source = 0; source < 16; ++source) {
     candidate_plan_t candidate = Candidate(1);
@@ -169,7 +169,7 @@ TEST_F(GateRefusalTest, ARefusedCandidateTakesNoSourceSlot) {
   EXPECT_EQ(Decide(Candidate(1)).outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(GateRefusalTest, WrongDimension) {
+TEST_F(GateRefusalTest, RejectsACandidateOfAWrongDimension) {
   for (const std::int16_t n : Shorts{-32768, -1, 0, 3, 5, 16, 17, 32767})
     ExpectRefused(decision_t::CAUSE_WRONG_DIMENSION, [n](auto& c) { c.num_states = n; });
   for (const std::int16_t m : Shorts{-32768, -1, 0, 1, 3, 8, 9, 32767})
@@ -180,7 +180,7 @@ TEST_F(GateRefusalTest, WrongDimension) {
     ExpectRefused(decision_t::CAUSE_WRONG_DIMENSION, [progress](auto& c) { c.progress_steps = progress; });
 }
 
-TEST_F(GateRefusalTest, ALongerStepThanItsMotionIsBoundedFor) {
+TEST_F(GateRefusalTest, RejectsAStepThatIsLongerThanTheBoundedMotion) {
   Config config = SmallTask();
   Problem problem = *config.problem;
   problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, 0.15};
@@ -203,7 +203,7 @@ TEST_F(GateRefusalTest, SmallestAndLargestDimensionsAreAdmitted) {
   ExpectAdmitted([](auto& c) { c.num_steps = 128, c.progress_steps = 128; });
 }
 
-TEST_F(GateRefusalTest, NotFiniteWhereItIsRead) {
+TEST_F(GateRefusalTest, RejectsNumbersThatAreNotFiniteInEntriesInUse) {
   for (const double bad : {kNaN, -kNaN, kInf, -kInf}) {
     for (int k = 0; k < 4; ++k) {
       ExpectRefused(decision_t::CAUSE_NON_FINITE, [=](auto& c) { c.initial_center[k] = bad; });
@@ -214,14 +214,14 @@ TEST_F(GateRefusalTest, NotFiniteWhereItIsRead) {
   }
 }
 
-TEST_F(GateRefusalTest, WhatIsNotReadMayBeAnything) {
+TEST_F(GateRefusalTest, AdmitsAnyNumbersInEntriesNotInUse) {
   candidate_plan_t candidate = Candidate(1);
   candidate.initial_center[4] = candidate.initial_half_width[15] = kNaN;
   candidate.control[0][2] = candidate.control[10][0] = candidate.control[127][7] = kInf;
   EXPECT_EQ(Decide(candidate).outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(GateRefusalTest, NegativeHalfWidth) {
+TEST_F(GateRefusalTest, RejectsANegativeHalfWidth) {
   for (int k = 0; k < 4; ++k) {
     ExpectRefused(decision_t::CAUSE_NON_FINITE,
                   [k](auto& c) { c.initial_half_width[k] = -std::numeric_limits<double>::denorm_min(); });
@@ -230,7 +230,7 @@ TEST_F(GateRefusalTest, NegativeHalfWidth) {
   }
 }
 
-TEST_F(GateRefusalTest, EveryTruncation) {
+TEST_F(GateRefusalTest, RejectsEveryTruncation) {
   const std::vector<std::uint8_t> good = Encode(Candidate(1));
   for (std::size_t size = 0; size < good.size(); ++size) {
     const decision_t decision = Decide(std::vector(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)));
@@ -240,7 +240,7 @@ TEST_F(GateRefusalTest, EveryTruncation) {
   EXPECT_EQ(Decide(good).outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(GateRefusalTest, TrailingBytes) {
+TEST_F(GateRefusalTest, RejectsTrailingBytes) {
   for (const std::size_t more : {1, 2, 8, 100'000}) {
     std::vector<std::uint8_t> bytes = Encode(Candidate(next_plan_id_));
     bytes.resize(bytes.size() + more);
@@ -248,7 +248,7 @@ TEST_F(GateRefusalTest, TrailingBytes) {
   }
 }
 
-TEST_F(GateRefusalTest, UnknownFingerprint) {
+TEST_F(GateRefusalTest, RejectsAnUnknownFingerprint) {
   ExpectRefused(Encode(transition_t{}), decision_t::CAUSE_UNKNOWN_FINGERPRINT);
   ExpectRefused(Encode(decision_t{}), decision_t::CAUSE_UNKNOWN_FINGERPRINT);
   for (std::size_t i = 0; i < 8; ++i) {
@@ -289,7 +289,7 @@ TEST_F(GateRefusalTest, ADisplacedCandidateIsRejectedHoweverGood) {
   EXPECT_EQ(Decide(Candidate(2)).outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(GateRefusalTest, AnErrorInsideIsARejection) {
+TEST_F(GateRefusalTest, RejectsACandidateWhenCertifyingThrows) {
   Config config = SmallTask();
   config.obstacles = {Obstacle::HalfSpace(Eigen::VectorXd::Ones(1), 100)};  // not in the safety dimension
   Gate gate(config);
@@ -314,7 +314,7 @@ TEST_F(GateRefusalTest, NumbersTooLargeToWorkWithAreNeitherCertifiedNorFatal) {
   }
 }
 
-TEST(FreshnessTest, BoundariesAndExtremes) {
+TEST(FreshnessTest, IsFreshUpToItsBoundsAndForExtremeStamps) {
   using enum Freshness;
   EXPECT_EQ(FreshnessOf(0, 0, 0, 0), kFresh);
   EXPECT_EQ(FreshnessOf(-1, 0, 0, 0), kStale);

@@ -50,7 +50,7 @@ class IssuedPlansTest : public testing::Test {
   IssuedPlans issued_{Gate(), kSteady};
 };
 
-TEST_F(IssuedPlansTest, UnknownOnesAreToleratedAsLongAsTheyMayRun) {
+TEST_F(IssuedPlansTest, ToleratesUnknownPlansUntilThoseOfAnEarlierCertifierHaveEnded) {
   EXPECT_EQ(Judge(Executing(1, 0), kLater - 1), "");
   EXPECT_THAT(Judge(Executing(1, 0), kLater), HasSubstr("plan 1, which was not certified"));
   EXPECT_THAT(Judge(Executing(-1, -1), kLater), HasSubstr("plan -1, which was not certified"));
@@ -61,14 +61,14 @@ TEST_F(IssuedPlansTest, UnknownOnesAreToleratedAsLongAsTheyMayRun) {
   }
 }
 
-TEST_F(IssuedPlansTest, AKnownOneRunsAsLongAsItMayAndNoLonger) {
+TEST_F(IssuedPlansTest, AllowsAKnownPlanUntilItsEndAndNoLonger) {
   issued_.Add(Plan(1), kLater);
   EXPECT_EQ(Judge(Executing(1, 9), kLater + Life(10)), "");
   EXPECT_THAT(Judge(Executing(1, 9), kLater + Life(10) + 1), HasSubstr("should have ended"));
   EXPECT_THAT(Judge(Executing(2, 0), kLater), HasSubstr("plan 2, which was not certified"));
 }
 
-TEST_F(IssuedPlansTest, OnlyItsOwnSteps) {
+TEST_F(IssuedPlansTest, RefusesAStepThatThePlanDoesNotHave) {
   issued_.Add(Plan(1), kLater);
   EXPECT_EQ(Judge(Executing(1, 0), kLater), "");
   EXPECT_EQ(Judge(Executing(1, 9), kLater), "");
@@ -80,7 +80,7 @@ TEST_F(IssuedPlansTest, OnlyItsOwnSteps) {
   EXPECT_EQ(Judge(Executing(1, 10), kLater), "") << "another source has used its number";
 }
 
-TEST_F(IssuedPlansTest, ItBeginsBeforeItExpires) {
+TEST_F(IssuedPlansTest, RefusesAPlanThatBeganAfterItExpired) {
   const std::int64_t latest = kWall + kLifetime + kAge;
   for (const int step : {0, 9}) {
     IssuedPlans issued(Gate(), kSteady);
@@ -94,7 +94,7 @@ TEST_F(IssuedPlansTest, ItBeginsBeforeItExpires) {
   }
 }
 
-TEST_F(IssuedPlansTest, NumbersOfAnySizeAreHarmless) {
+TEST_F(IssuedPlansTest, SurvivesNumbersOfAnySize) {
   certified_plan_v2_t odd = Plan(1);
   odd.plan.step_us = INT64_MIN;
   issued_.Add(odd, kLater);
@@ -103,7 +103,7 @@ TEST_F(IssuedPlansTest, NumbersOfAnySizeAreHarmless) {
 }
 
 // What is pushed out by a flood of certificates may still be executing.
-TEST_F(IssuedPlansTest, AFloodPushesNobodyOut) {
+TEST_F(IssuedPlansTest, ToleratesAPlanThatAFloodOfCertificatesPushedOut) {
   issued_.Add(Plan(1), kLater);
   for (std::size_t i = 0; i < IssuedPlans::kPlans - 1; ++i) issued_.Add(Plan(1000, 20), kLater + 1);
   EXPECT_THAT(Judge(Executing(2, 0), kLater + 1), HasSubstr("not certified"));

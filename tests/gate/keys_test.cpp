@@ -120,7 +120,7 @@ TEST_F(KeyFiles, AWriteThatFailsLeavesNothingBehind) {
   EXPECT_FALSE(std::filesystem::exists(made));
 }
 
-TEST_F(KeyFiles, ANameIsBounded) {
+TEST_F(KeyFiles, RefusesARobotsNameThatIsTooLongOrHasOtherCharacters) {
   for (const std::string& bad :
        {std::string(), std::string("a b"), std::string("a\nb"), std::string("../a/b"), std::string(65, 'a')})
     EXPECT_THAT(ProblemOf([&] { MakeKeys(bad, scratch_ / "new"); }), HasSubstr("robot's name has to be")) << bad;

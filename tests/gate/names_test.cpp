@@ -124,7 +124,7 @@ TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
 
 // Recorded logs carry the numbers, and the fingerprint does not cover them: a new constant gets a new line, no line
 // ever changes.
-TEST(NamesTest, NumbersAreNeverReused) {
+TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
   const auto [outcomes, causes] = OutcomesAndCauses();
   EXPECT_EQ(outcomes, (Constants{{"CERTIFIED", 1},
                                  {"ABSTAIN_FALSIFIED", 2},

@@ -88,7 +88,7 @@ std::pair<std::int64_t, std::int64_t> WindowOf(const Obstacle& obstacle) {
 }
 constexpr std::int64_t kBegin = -ObstacleMotion::kAlways, kEnd = ObstacleMotion::kAlways;
 
-TEST(ObstaclesV2Test, WhatDoesNotMoveStands) {
+TEST(ObstaclesV2Test, APieceWithoutMotionStandsAtAllTimes) {
   for (const std::int64_t from : {kLeast, kBegin, std::int64_t{0}, kNow})
     for (const std::int64_t until : {kNow, kNow + 1, kMost}) {
       const std::vector<Obstacle> taken = Taken({Piece(from, until)});
@@ -99,7 +99,7 @@ TEST(ObstaclesV2Test, WhatDoesNotMoveStands) {
   EXPECT_FALSE(Taken({Gone(Piece(0, kMost))})[0].motion()) << "it is gone after all times";
 }
 
-TEST(ObstaclesV2Test, EachOfTheseMoves) {
+TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
   for (const auto& change : std::vector<std::function<void(obstacle_v2_t&)>>{
            [](auto& piece) { piece.velocity[0] = 1e-300; }, [](auto& piece) { piece.velocity[1] = -1; },
            [](auto& piece) { piece.uncertainty = 0.1; }, [](auto& piece) { piece.growth = 0.2; },
@@ -120,7 +120,7 @@ TEST(ObstaclesV2Test, EachOfTheseMoves) {
   EXPECT_FALSE(Taken({third})[0].motion()) << "entries beyond the dimension are not read";
 }
 
-TEST(ObstaclesV2Test, AnObstacleHasBeenThereAlways) {
+TEST(ObstaclesV2Test, ATrackExtendsBackToTheBeginningOfTime) {
   EXPECT_EQ(WindowOf(Taken({Gone(Piece(kNow, kNow + 5))})[0]), std::pair(kBegin, kNow + 5));
   EXPECT_THAT(WhyRefused({Piece(kNow + 1, kMost)}),
               HasSubstr("track 7 begins at 1700000000000001 us, after the message of 1700000000000000 us"));
@@ -145,7 +145,7 @@ TEST(ObstaclesV2Test, ThePiecesOfATrackHaveToJoin) {
       << "the window in the middle lies in the first";
 }
 
-TEST(ObstaclesV2Test, OnlyTheLastPieceIsGone) {
+TEST(ObstaclesV2Test, OnlyTheLastPieceOfATrackMayBeGone) {
   const obstacle_v2_t first = Piece(kNow, kNow + 10), last = Piece(kNow + 10, kNow + 20);
   EXPECT_THAT(WhyRefused({Gone(first), last}),
               HasSubstr("track 7 is gone at 1700000000000010 us and goes on until 1700000000000020 us"));

@@ -50,7 +50,7 @@ TEST(ObstacleSenderTest, AClockThatWasSetBackDelaysNothing) {
   EXPECT_TRUE(sender.Due(5));
 }
 
-TEST(ObstacleSenderTest, WhatCannotBeSaidIsRefused) {
+TEST(ObstacleSenderTest, RefusesMoreObstaclesThanFitAndAPeriodThatIsNotPositive) {
   ObstacleSender sender(1000);
   sender.Set(std::vector<Obstacle>(64, kOne[0]));
   EXPECT_THROW(sender.Set(std::vector<Obstacle>(65, kOne[0])), std::invalid_argument);

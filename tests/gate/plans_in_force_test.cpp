@@ -111,7 +111,7 @@ TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt
 }
 
 // The motion under control t ends at sample t + 1, so the step that fails is the first control that does not stand.
-TEST_F(PlansInForceTest, BetweenTheSamplesTheStepThatMayTouchIsTheFirstToFall) {
+TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) {
   Problem problem = *config_.problem;
   problem.between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};
   config_.problem = std::make_shared<const Problem>(problem);
@@ -144,7 +144,7 @@ TEST_F(PlansInForceTest, BetweenTheSamplesTheStepThatMayTouchIsTheFirstToFall) {
 }
 
 // The robot goes on in the steps of the plan, and neither model nor bounds of the new task are about these.
-TEST_F(PlansInForceTest, UnderATaskOfAShorterStepNothingStands) {
+TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
   for (const bool is_bounded : {true, false}) {
     const auto with_period = [&](double period) {
       Config config = config_;
@@ -199,7 +199,7 @@ TEST_F(PlansInForceTest, AWithdrawalNamesThePlanTheWitnessAndWhatItRestsOn) {
   EXPECT_EQ(plans_.withdrawals(), 1);
 }
 
-TEST_F(PlansInForceTest, WhatIsPastIsNotJudged) {
+TEST_F(PlansInForceTest, DoesNotJudgeStepsThatArePast) {
   const Obstacle behind = Obstacle::Circle(Eigen::Vector2d(0.15 * 3, 0.03), 0.01);
   Certify(1);
   SeeRobot(1, 6);
@@ -219,7 +219,7 @@ TEST_F(PlansInForceTest, WhatIsPastIsNotJudged) {
   EXPECT_EQ(message.valid_steps, 2);
 }
 
-TEST_F(PlansInForceTest, IsRepeatedUntilItIsAnswered) {
+TEST_F(PlansInForceTest, RepeatsAWithdrawalUntilItIsAnswered) {
   Certify(1);
   SeeWall(1);
   const withdrawal_t first = Due().value();
@@ -261,7 +261,7 @@ TEST_F(PlansInForceTest, PlansOfTwoSourcesWithOneIdAreAnsweredEachForItself) {
   EXPECT_FALSE(Due());
 }
 
-TEST_F(PlansInForceTest, NothingStandsAgainAndLessIsSaidAnew) {
+TEST_F(PlansInForceTest, NeverRestoresStepsAndWithdrawsAgainWhenFewerStand) {
   const certified_plan_v2_t plan = Certify(1);
   SeeWall(Reach(plan, 6) - 1e-9);
   EXPECT_EQ(Due()->valid_steps, 5);
@@ -278,7 +278,7 @@ TEST_F(PlansInForceTest, NothingStandsAgainAndLessIsSaidAnew) {
   EXPECT_TRUE(Due());
 }
 
-TEST_F(PlansInForceTest, WithoutAChangeNothingIsJudged) {
+TEST_F(PlansInForceTest, WithdrawsNothingWhileThePlanStaysValid) {
   const certified_plan_v2_t plan = Certify(1);
   See({});
   plans_.Judge(gate_, now_);
@@ -357,7 +357,7 @@ TEST_F(PlansInForceTest, AnObservationThatContradictsNothingWithdrawsNothing) {
   EXPECT_FALSE(Due());
 }
 
-TEST_F(PlansInForceTest, AFalsifiedDeclarationLeavesNothing) {
+TEST_F(PlansInForceTest, AFalsifiedDeclarationWithdrawsEveryStep) {
   config_.gate.learns = true;
   Certify(1);
   SeeRobot(1, 2);
@@ -374,7 +374,7 @@ TEST_F(PlansInForceTest, AFalsifiedDeclarationLeavesNothing) {
   EXPECT_EQ(message.valid_steps, 0);
 }
 
-TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
+TEST_F(PlansInForceTest, JudgesThePlanUnderATaskThatWasReadAgain) {
   const certified_plan_v2_t plan = Certify(1);
   Gate gate(NarrowerFrom(plan, 8));
   gate.Inherit(gate_);
@@ -386,7 +386,7 @@ TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
 }
 
 // The task file is the same, its file of transitions is not.
-TEST_F(PlansInForceTest, UnderOtherTransitionsOfTheTaskItIsJudgedAgain) {
+TEST_F(PlansInForceTest, JudgesThePlanAgainUnderOtherTransitionsOfTheTask) {
   const certified_plan_v2_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
   EXPECT_FALSE(Due());

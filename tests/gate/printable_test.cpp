@@ -7,7 +7,7 @@
 namespace forereach {
 namespace {
 
-TEST(PrintableTest, TextStays) {
+TEST(PrintableTest, LeavesOrdinaryTextUnchanged) {
   for (const char* text : {"", "PLAN_CANDIDATE", "a b/c~", "Stra\u00dfe, \u03b8, \u4e16, \U0001F916"}) {
     EXPECT_EQ(Printable(text), text);
     EXPECT_EQ(PrintableLines(text), text);
@@ -38,7 +38,7 @@ TEST(PrintableTest, WhatIsNoUtf8IsEscaped) {
   EXPECT_EQ(Printable("\xe2\x82"), "\\xe2\\x82") << "cut";
 }
 
-TEST(PrintableTest, NothingElseComesOutOfRandomBytes) {
+TEST(PrintableTest, GivesOnlyPrintableTextForRandomBytes) {
   std::mt19937 random(1);
   for (int i = 0; i < 20'000; ++i) {
     std::string text(random() % 40, '\0');

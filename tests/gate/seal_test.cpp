@@ -84,12 +84,12 @@ TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
 }
 
 // Fast for good: other implementations have to come to the same.
-TEST(Seal, DigestOfAnExample) {
+TEST(Seal, DigestOfAnExampleIsTheRecordedOne) {
   EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "f7d10124a54a007bccd52d554097834e3a705860ebdb4ca31e9a304a4c29e4ce");
 }
 
 // Of logs that were recorded before.
-TEST(Seal, OfTheTypeBeforeIsWhatItWas) {
+TEST(Seal, DigestOfTheOldMessageTypeIsUnchanged) {
   const certified_plan_v2_t plan = Plan(6, 12);
   certified_plan_t old{};
   old.utime = plan.utime;
@@ -107,7 +107,7 @@ TEST(Seal, OfTheTypeBeforeIsWhatItWas) {
   ASSERT_EQ(FindSealFaults(old).size(), 2u);
 }
 
-TEST(Seal, BreaksWithAnyBit) {
+TEST(Seal, BreaksWhenAnyBitIsFlipped) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -124,13 +124,13 @@ TEST(Seal, BreaksWithAnyBit) {
   }
 }
 
-TEST(Seal, OneUlpOfASliceInUse) {
+TEST(Seal, BreaksWhenASliceInUseChangesByOneUlp) {
   const auto nudge = [](double& x) { x = std::nextafter(x, 0); };
   EXPECT_THAT(FaultsAfter([&](auto& c) { nudge(c.slice_upper[12][5]); }), ElementsAre(Kind::kCertificateDigest));
   EXPECT_THAT(FaultsAfter([&](auto& c) { nudge(c.slice_lower[0][0]); }), ElementsAre(Kind::kCertificateDigest));
 }
 
-TEST(Seal, AnEntryBeyondThoseInUse) {
+TEST(Seal, BreaksWhenAnUnusedEntryIsNotZero) {
   for (const double stray :
        {1.0, -0.0, std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_lower[12][6] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
@@ -154,7 +154,7 @@ TEST(Seal, TheFirstStrayEntryIsNamed) {
   EXPECT_EQ(faults[0].found, "1e-300");
 }
 
-TEST(Seal, ThePlansBytes) {
+TEST(Seal, BreaksWhenThePlanChanges) {
   EXPECT_THAT(FaultsAfter([](auto& c) { c.plan.control[4][0] = 1; }), ElementsAre(Kind::kPlanDigest));
   EXPECT_THAT(FaultsAfter([](auto& c) { c.plan.control[100][7] = 1; }), ElementsAre(Kind::kPlanDigest)) << "unused";
   const auto with_its_digest = [](auto& c) {
@@ -164,7 +164,7 @@ TEST(Seal, ThePlansBytes) {
   EXPECT_THAT(FaultsAfter(with_its_digest), ElementsAre(Kind::kCertificateDigest));
 }
 
-TEST(Seal, TimesAndDigests) {
+TEST(Seal, BreaksWhenATimeOrADigestChanges) {
   EXPECT_THAT(FaultsAfter([](auto& c) { ++c.utime; }), ElementsAre(Kind::kCertificateDigest));
   EXPECT_THAT(FaultsAfter([](auto& c) { ++c.sequence; }), ElementsAre(Kind::kCertificateDigest));
   EXPECT_THAT(FaultsAfter([](auto& c) { ++c.expires_utime; }), ElementsAre(Kind::kCertificateDigest));
@@ -175,7 +175,7 @@ TEST(Seal, TimesAndDigests) {
 }
 
 // Fewer slices in use, or the same numbers as more slices of fewer states: the plan says otherwise.
-TEST(Seal, Counts) {
+TEST(Seal, BreaksWhenTheCountsChange) {
   const auto with = [](int states, int steps) {
     return FaultsAfter([=](certified_plan_v2_t& c) {
       c.plan.num_states = static_cast<std::int16_t>(states);

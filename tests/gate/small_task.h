@@ -10,21 +10,17 @@ outside the input domain. */
 #include <string_view>
 #include <vector>
 
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "lcmtypes/codec.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 
 inline constexpr std::int64_t kNow = 1'700'000'000'000'000;
 
 inline Config SmallTask() {
-  Problem problem;
-  problem.model = MakePointMass(0.15);
-  problem.domain.state = Box(Eigen::Vector4d(-20, -20, -5, -5), Eigen::Vector4d(20, 20, 5, 5));
-  problem.domain.input = Box(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3));
-  problem.declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
+  Problem problem = PaperPointMass(5);
   problem.transitions.z = Eigen::MatrixXd{{0, 0, 1, 0, 0, 0}, {1, 2, -1, 0.5, 0.25, -0.5}};
   problem.transitions.x_next.resize(2, 4);
   for (int i = 0; i < 2; ++i) {
@@ -33,7 +29,6 @@ inline Config SmallTask() {
     problem.model->Evaluate({z.data(), 6}, {next.data(), 4});
     problem.transitions.x_next.row(i) = next;
   }
-  problem.projection = Eigen::MatrixXd::Identity(2, 4);
 
   Config config;
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)};

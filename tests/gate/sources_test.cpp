@@ -31,21 +31,21 @@ Admission Take(Sources& sources, std::int64_t plan_id, std::int64_t sequence, st
   return sources.Admit(candidate, now);
 }
 
-TEST(SourcesTest, EachPlanIdOnceInAnyOrder) {
+TEST(SourcesTest, AdmitsEachPlanIdOnceInAnyOrder) {
   Sources sources(kForget);
   for (const std::int64_t id : {10, 8, 9, 12, 11}) EXPECT_EQ(sources.Admit(From("a", id), 0), Admission::kNew) << id;
   for (const std::int64_t id : {8, 9, 10, 11, 12}) EXPECT_EQ(sources.Admit(From("a", id), 0), Admission::kUsed) << id;
   EXPECT_EQ(sources.Admit(From("b", 10), 0), Admission::kNew);
 }
 
-TEST(SourcesTest, TheWindowEndsWhereItSays) {
+TEST(SourcesTest, TakesPlanIdsBelowTheWindowAsUsed) {
   Sources sources(kForget);
   EXPECT_EQ(sources.Admit(From("a", 5000), 0), Admission::kNew);
   EXPECT_EQ(sources.Admit(From("a", 5000 - Sources::kWindow + 1), 0), Admission::kNew);
   EXPECT_EQ(sources.Admit(From("a", 5000 - Sources::kWindow), 0), Admission::kUsed) << "too old to tell";
 }
 
-TEST(SourcesTest, ExtremeIdsAreIdsLikeOthers) {
+TEST(SourcesTest, AdmitsTheSmallestAndLargestPlanIds) {
   constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min(),
                          kHighest = std::numeric_limits<std::int64_t>::max();
   Sources sources(kForget);
@@ -70,7 +70,7 @@ TEST(SourcesTest, AgreesWithASetOfIdsInsideTheWindow) {
   }
 }
 
-TEST(SourcesTest, SilentSourcesMakeRoomAndAHugeIdLocksNobodyOutForLong) {
+TEST(SourcesTest, ForgetsSilentSourcesAndRecoversFromAHugePlanId) {
   Sources sources(kForget);
   for (int i = 0; i < 16; ++i) EXPECT_EQ(sources.Admit(From(std::to_string(i), 1), 0), Admission::kNew);
   EXPECT_EQ(sources.Admit(From("17", 1), kForget), Admission::kTooManySources);
@@ -88,7 +88,7 @@ TEST(SourcesTest, AClockThatWasSetBackLocksNobodyOut) {
   EXPECT_EQ(sources.Admit(From("a", 10), 0), Admission::kNew);
 }
 
-TEST(SourcesTest, WhoInheritsRemembersAsLongAsItIsToItself) {
+TEST(SourcesTest, RemembersInheritedPlanIdsForItsOwnTime) {
   Sources before(kForget), after(2 * kForget);
   static_cast<void>(Take(before, 1, 1, 0, 0));
   static_cast<void>(Take(before, 2, 3, 0, 0));
@@ -133,7 +133,7 @@ TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
 }
 
 // What a source has used is forgotten with time; what it sent is not counted as lost when it comes behind the newest.
-TEST(SourcesTest, CountsAcrossASilence) {
+TEST(SourcesTest, CountsLossesCorrectlyAcrossASilence) {
   Sources sources(kForget);
   std::int64_t now = 0;
   const auto take = [&](std::int64_t sequence) { return Take(sources, sequence, sequence, sequence, now); };

@@ -104,7 +104,7 @@ TEST(StreamOrderTest, EveryShortHistoryIsAnsweredAsSpecified) {
     }
 }
 
-TEST(StreamOrderTest, LongerOnesWithoutAHorizon) {
+TEST(StreamOrderTest, EveryLongerHistoryWithoutAHorizonIsAnsweredAsSpecified) {
   for (const Takes takes : {IsNews, Reads, AnyAtAll}) {
     Histories histories(Alphabet({0, 1, 2}, {0, 1, 2}, {StreamOrder::kNoHorizon}), 0, takes);
     histories.Try(6);
@@ -112,7 +112,7 @@ TEST(StreamOrderTest, LongerOnesWithoutAHorizon) {
   }
 }
 
-TEST(StreamOrderTest, NumbersAtTheEndsOfTheirRange) {
+TEST(StreamOrderTest, EveryHistoryOfExtremeNumbersIsAnsweredAsSpecified) {
   for (const std::int64_t ahead : {std::int64_t{0}, std::int64_t{1}, kMax}) {
     Histories histories(Alphabet({kMin, 0, kMax}, {kMin, 0, kMax - 1, kMax}, {kMin, 0, kMax - 1, kMax}), ahead,
                         AnyAtAll);

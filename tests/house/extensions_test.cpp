@@ -95,7 +95,7 @@ void ExpectListed(const std::string& title, const std::vector<std::string>& kind
   for (const std::string& file : listed) EXPECT_TRUE(sources.contains(file)) << title << ": no source " << file;
 }
 
-TEST(Extensions, TheFilesOfANominalModel) {
+TEST(Extensions, DocumentListsTheFilesOfANominalModel) {
   ExpectListed("A nominal model", {R"(\w*PointMass\b|"point_mass")", R"(\w*KinematicBicycle\b|"kinematic_bicycle")"});
 }
 
@@ -110,7 +110,7 @@ TEST(Extensions, NothingElseKnowsAModelByName) {
   EXPECT_GE(found, 4);
 }
 
-TEST(Extensions, TheFilesOfAnObstacleKind) {
+TEST(Extensions, DocumentListsTheFilesOfAnObstacleKind) {
   ExpectListed("An obstacle kind", {R"(\bkCircle\b|\bObstacle::Circle\b|\bCIRCLE\b|\]\.circle\b)",
                                     R"(\bkBox\b|\bAxisBox\b|\bBOX\b|\]\.box\b)",
                                     R"(\bkPolygon\b|\bObstacle::Polygon\b|\bPOLYGON\b|\]\.polygon\b)",

@@ -66,25 +66,25 @@ class IncludesTest : public testing::Test {
   std::vector<std::string> expected_;
 };
 
-TEST_F(IncludesTest, TheSourcesKeepToTheArrows) {
+TEST_F(IncludesTest, OurSourcesKeepTheIncludeRules) {
   const Output result = CheckIncludes(FOREREACH_SOURCE_DIR);
   EXPECT_EQ(result.code, 0) << result.text;
   EXPECT_THAT(result.text, HasSubstr(" 0 against the arrows"));
 }
 
-TEST_F(IncludesTest, AHouseInOrderPasses) {
+TEST_F(IncludesTest, ATreeThatKeepsTheRulesPasses) {
   const Output result = CheckIncludes(root_.string());
   EXPECT_EQ(result.code, 0) << result.text;
   EXPECT_THAT(result.text, HasSubstr("14 files, 23 includes, 0 against the arrows"));
 }
 
-TEST_F(IncludesTest, AnEmptyHouseIsAnErrorNotAPass) {
+TEST_F(IncludesTest, ATreeWithoutSourcesIsAnError) {
   std::filesystem::remove_all(root_);
   std::filesystem::create_directories(root_);
   EXPECT_EQ(CheckIncludes(root_.string()).code, 2);
 }
 
-TEST_F(IncludesTest, FloorsGoDownOnly) {
+TEST_F(IncludesTest, ALayerMayIncludeLowerLayersOnly) {
   Refuse("certifier/numerics/bad.h", "\"certifier/sets/box.h\"", "numerics may not include sets");
   Refuse("certifier/sets/bad.cpp", "<certifier/gate/gate.h>", "sets may not include gate");
   Refuse("certifier/certify/bad.cpp", "\"certifier/gate/gate.h\"", "certify may not include gate");
@@ -94,7 +94,7 @@ TEST_F(IncludesTest, FloorsGoDownOnly) {
   ExpectRefused();
 }
 
-TEST_F(IncludesTest, TheLibraryNeedsEigenOnly) {
+TEST_F(IncludesTest, TheLibraryMayIncludeEigenOnly) {
   for (const char* floor : {"numerics", "sets", "dynamics", "residual", "safety", "reach", "declare", "certify"}) {
     const std::string file = std::string("certifier/") + floor + "/bad.cpp";
     for (const char* include : {"\"lcmtypes/codec.h\"", "\"forereach/decision_t.hpp\"", "<fmt/core.h>", "<unistd.h>"})
@@ -103,7 +103,7 @@ TEST_F(IncludesTest, TheLibraryNeedsEigenOnly) {
   ExpectRefused();
 }
 
-TEST_F(IncludesTest, ThePartsOfTheHouse) {
+TEST_F(IncludesTest, AFolderMayIncludeItsListedFoldersOnly) {
   Refuse("lcmtypes/bad.h", "\"certifier/sets/box.h\"", "lcmtypes may not include certifier");
   Refuse("certifier/process/bad.cpp", "\"records/database.h\"", "certifier may not include records");
   for (const char* other : {"planner_bridge", "logger", "robot", "cli", "bench"})
@@ -150,7 +150,7 @@ TEST_F(IncludesTest, TheVerifierSharesNoArithmetic) {
   ExpectRefused();
 }
 
-TEST_F(IncludesTest, OtherPeoplesHeadersHaveOneOwner) {
+TEST_F(IncludesTest, OnlyItsOwnerMayIncludeTheHeadersOfALibrary) {
   for (const char* file :
        {"certifier/process/bad.cpp", "robot/bad.cpp", "logger/bad.cpp", "cli/bad.cpp", "bus/node.cpp"})
     Refuse(file, "<lcm/lcm-cpp.hpp>", "LCM belongs to bus/bus.cpp alone");

@@ -15,6 +15,7 @@
 #include "identify/smallest_row.h"
 #include "tests/identify/seed.h"
 #include "tests/oracle/exact.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -101,7 +102,7 @@ TEST(SmallestRow, IsConsistentAndNeverWeighsMoreThanTheTruth) {
   }
 }
 
-TEST(SmallestRow, OfOneEntryIsALowerBoundIfTheOthersAreBounds) {
+TEST(SmallestRow, ASingleEntryIsNeverAboveTheTruthIfTheOthersAreTrue) {
   const unsigned first = SeedOf(1);
   for (unsigned trial = 0; trial < 40; ++trial) {
     SCOPED_TRACE("seed " + std::to_string(first + trial));
@@ -118,7 +119,7 @@ TEST(SmallestRow, OfOneEntryIsALowerBoundIfTheOthersAreBounds) {
   }
 }
 
-TEST(SmallestRow, ByHand) {
+TEST(SmallestRow, IsTheOneWorkedOutByHand) {
   Observations observations{(Eigen::MatrixXd(3, 2) << 0, 0, 2, 0, 0, 5).finished(),
                             (Eigen::MatrixXd(3, 1) << 0, 1, -2).finished(),
                             (Eigen::MatrixXd(3, 1) << 0, 1, -2).finished()};
@@ -184,7 +185,7 @@ TEST(ProbabilityUpper, IsClopperAndPearsonsInRationals) {
 
 // ---- hold-out
 
-TEST(Split, AlternatesAndLosesNothing) {
+TEST(Split, AlternatesBlocksAndCoversEveryTransition) {
   const Split split = SplitByTime(10, 4);
   std::vector<int> ends;
   for (const auto& block : split.learn) ends.insert(ends.end(), {block.begin, block.end});
@@ -200,9 +201,6 @@ class HoldOutTest : public testing::Test {
   // The point mass from rest, with a residual of vx that falls with vx and noise.
   HoldOutTest() : random_(seed_) {
     SCOPED_TRACE("seed " + std::to_string(seed_));
-    problem_.model = MakePointMass(0.1);
-    problem_.domain.state = Box(Eigen::Vector4d(-99, -99, -9, -9), Eigen::Vector4d(99, 99, 9, 9));
-    problem_.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
     Transitions& data = problem_.transitions;
     data.z = Eigen::MatrixXd::Zero(120, 6);
     data.x_next = Eigen::MatrixXd::Zero(120, 4);
@@ -234,7 +232,7 @@ class HoldOutTest : public testing::Test {
 
   const unsigned seed_ = SeedOf(1);
   std::mt19937 random_;
-  Problem problem_;
+  Problem problem_ = WorldOf(MakePointMass(0.1), Within({99, 99, 9, 9}), Within({1, 1}));
   Declaration declaration_;
 };
 
@@ -257,7 +255,7 @@ TEST_F(HoldOutTest, CountsEachFreshTransitionThatContradictsALearnedOne) {
   EXPECT_GT(CountContradictions(problem_, declaration_, SplitByTime(120, 8)).contradicting, 0);
 }
 
-TEST_F(HoldOutTest, WindowsAreChainsInJudgingBlocks) {
+TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   const Split split = SplitByTime(120, 4);  // judges by 30..60 and 90..120
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 10).size(), 6u);
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 30).size(), 2u);

@@ -72,7 +72,7 @@ TEST(Fit, WithNoiseIsWithinSomeStandardErrors) {
   }
 }
 
-TEST(Fit, LeavesTheOthersAndSaysWhatIsNotDetermined) {
+TEST(Fit, KeepsTheOtherParametersAndNamesAnUndeterminedOne) {
   const Transitions data = Drive(Pendulum(0.8, 0.3), SeedOf(3), 0.01);
   const Fit one = FitParameters(Pendulum(0.8, 0), data, {"damping"});
   ASSERT_EQ(one.parameters.size(), 1u);

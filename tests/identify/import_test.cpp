@@ -11,6 +11,7 @@
 #include "certifier/dynamics/models/named_models.h"
 #include "certifier/task/config_error.h"
 #include "tests/identify/seed.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -28,9 +29,6 @@ struct Row {
 class ImportTest : public testing::Test {
  protected:
   ImportTest() {
-    problem_.model = MakePointMass(0.1);
-    problem_.domain.state = Box(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3));
-    problem_.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
     options_.period = 0.1;
     options_.tolerance = 1e-9;
     options_.factors.assign(6, 1);
@@ -53,13 +51,13 @@ class ImportTest : public testing::Test {
   }
   ImportedLog Again() { return Import(table_, problem_, options_); }
 
-  Problem problem_;
+  Problem problem_ = WorldOf(MakePointMass(0.1), Within({9, 9, 3, 3}), Within({1, 1}));
   ImportOptions options_;
   LogTable table_;
 };
 
 // Beside a first stamp of another clock all others would be one moment.
-TEST_F(ImportTest, AFirstStampFarAwayMovesNoOther) {
+TEST_F(ImportTest, AFirstStampFarAwayDoesNotShiftTheOthers) {
   EXPECT_EQ(From({{1e300}, {0}, {0.05}, {0.09}, {0.3}}).transitions.size(), 0);
   EXPECT_EQ(From({{1e300}, {0}, {0.05}, {0.1}, {0.3}}).transitions.size(), 1);
   EXPECT_LE(Again().largest_offset, options_.tolerance);
@@ -125,7 +123,7 @@ TEST_F(ImportTest, AMeanIsOverTimeAndNotOverRows) {
   EXPECT_DOUBLE_EQ(log.transitions.z(0, 4), 0.75);
 }
 
-TEST_F(ImportTest, ABehindStartIsTriedAtTheNextSample) {
+TEST_F(ImportTest, TriesTheNextSampleWhenAStepCannotStartAtThisOne) {
   // Inputs change at 0.05, 0.15, 0.25: only steps that start there have one input.
   const ImportedLog log =
       From({{0, 0, 1}, {0.05, 1, 0}, {0.1, 2, 0}, {0.15, 3, 1}, {0.2, 4, 1}, {0.25, 5, 0}, {0.3, 6, 0}});
@@ -160,7 +158,7 @@ TEST_F(ImportTest, OnlyFiniteStatesInTheDomainCount) {
   EXPECT_EQ(From({{0, 0, 1.001}, {0.1, 0}}).At(Dropped::kOutsideDomain).first, "ax 1.001");
 }
 
-TEST_F(ImportTest, AnglesGoTheShortWay) {
+TEST_F(ImportTest, UnwrapsAnglesTheShortWayAround) {
   const double pi = std::numbers::pi;
   options_.unwrapped = {0};
   const ImportedLog log = From({{0, pi - 0.1}, {0.1, -pi + 0.1}, {0.2, pi - 0.2}});
@@ -185,7 +183,7 @@ TEST_F(ImportTest, WithoutStampsTheRowsHaveARate) {
   EXPECT_EQ(Again().transitions.size(), 2);
 }
 
-TEST_F(ImportTest, AWindowIsCutOut) {
+TEST_F(ImportTest, TakesOnlyStepsInsideTheWindowOfTime) {
   options_.from = 0.1;
   options_.until = 0.3;
   EXPECT_THAT(From({{7}, {7.1}, {7.2}, {7.3}, {7.4}}).lines, ElementsAre(4)) << "7.1 and 7.3 lie just outside";

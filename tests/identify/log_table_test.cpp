@@ -84,7 +84,7 @@ TEST_F(LogTableTest, ACarriageReturnInsideARowEndsIt) {
   EXPECT_EQ(Error("t,\"pos\"x\n1,2\n"), "log.csv:1: the names of the columns: quotes inside a field");
 }
 
-TEST_F(LogTableTest, WhatIsNotClearIsRefused) {
+TEST_F(LogTableTest, RefusesALogWhoseColumnsAreNotClear) {
   EXPECT_EQ(Error("t,pos y\n1,2\n"), "log.csv:1: no column 'pos x'; did you mean pos y?");
   EXPECT_EQ(Error("\n1,2\n3,4\n"),
             "log.csv:2: this line has numbers only, so no column has a name; give the names of the columns");
@@ -98,7 +98,7 @@ TEST_F(LogTableTest, WhatIsNotClearIsRefused) {
   EXPECT_THAT(Error(text), HasSubstr("log.csv:2: longer than 1048576 bytes"));
 }
 
-TEST_F(LogTableTest, ItsFormatMayBeSaid) {
+TEST_F(LogTableTest, TakesAGivenFormat) {
   EXPECT_EQ(Table("1,2\n3,4\n", {.delimiter = {}, .comment = "#", .header = {"t", "pos x"}}).values.rows(), 2);
   EXPECT_EQ(Table("% x\nt;pos x\n1;2\n", {.delimiter = ';', .comment = "%", .header = {}}).values.rows(), 1);
   EXPECT_EQ(Table("t,pos x\n#,2\n", {.delimiter = {}, .comment = "", .header = {}}).not_a_number[0].count, 1);

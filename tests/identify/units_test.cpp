@@ -23,7 +23,7 @@ TEST(Units, FactorsAreThoseOfTheirDefinitions) {
   EXPECT_EQ(FactorOf("furlong", "furlong"), 1) << "a unit of the model that is not in the table";
 }
 
-TEST(Units, EveryUnitLeadsToItsBaseAndToNoOther) {
+TEST(Units, EveryUnitConvertsToItsBaseAndToNoOther) {
   for (const Unit& unit : KnownUnits()) {
     EXPECT_EQ(FactorOf(unit.name, unit.base), unit.factor);
     EXPECT_THROW((void)FactorOf(unit.name, "kg"), std::invalid_argument) << unit.name;

@@ -11,7 +11,7 @@ Answer Get(std::string_view target, Headers headers = {{"Host", "127.0.0.1:8080"
   return Judge({.method = "GET", .target = target, .headers = std::move(headers)});
 }
 
-TEST(AccessTest, AnswersTwoTargets) {
+TEST(AccessTest, AnswersThePageAndItsEventsAndNothingElse) {
   EXPECT_EQ(Get("/"), Answer::kPage);
   EXPECT_EQ(Get("/events"), Answer::kEvents);
   for (const char* other : {"", "/x", "//", "/events/", "/EVENTS", "/../etc/passwd", "/.", "http://127.0.0.1:8080/",

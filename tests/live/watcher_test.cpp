@@ -31,7 +31,7 @@ int CountDrawn(const std::vector<json>& decisions, const std::string& outcome) {
   }));
 }
 
-TEST(WatcherTest, ShowsTheRecordedCourse) {
+TEST(WatcherTest, SendsEveryDecisionOfTheRecordedCourse) {
   Watcher watcher(CourseTask(), {}, CourseTask);
   Reader reader;
   Play(CourseEvents(), watcher, &reader);
@@ -111,7 +111,7 @@ TEST(WatcherTest, DrawsTheBoxesOfACertificateWhoseCandidateItLacks) {
   EXPECT_THAT(detail.at("missing").get<std::string>(), HasSubstr("the boxes of its certificate"));
 }
 
-TEST(WatcherTest, AnotherTaskFileIsReadAgainOrSaid) {
+TEST(WatcherTest, ReadsAnotherTaskFileAgainOrSaysThatItDiffers) {
   Config other = CourseTask();
   other.grounds.config = DigestOf("another file");
   int read = 0;
@@ -174,7 +174,7 @@ LogEvent EventOf(const std::string& channel, const Message& message, std::int64_
   return {0, utime, channel, {bytes.begin(), bytes.end()}};
 }
 
-TEST(WatcherTest, NoBytesEndIt) {
+TEST(WatcherTest, SurvivesAnyBytes) {
   std::mt19937_64 random(7);
   Watcher watcher(CourseTask(), {}, CourseTask);
   Reader reader;
@@ -223,7 +223,7 @@ TEST(WatcherTest, AFloodIsBounded) {
   EXPECT_GT(reader.now.at("counts").at("not_shown"), 15'000);
 }
 
-TEST(WatcherTest, RepeatedFaultsAndWithdrawalsAreOne) {
+TEST(WatcherTest, ShowsARepeatedFaultOrWithdrawalOnce) {
   Watcher watcher(CourseTask(), {}, CourseTask);
   for (int i = 0; i < 5; ++i) {
     fault_t fault{};

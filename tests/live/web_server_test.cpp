@@ -99,7 +99,7 @@ TEST_F(WebServerTest, SendsWhatTheWatcherTells) {
   EXPECT_THAT(reader.Receive("\"decisions\":67"), HasSubstr("\"outcome\":\"certified\""));
 }
 
-TEST_F(WebServerTest, RefusesWhatIsNotForIt) {
+TEST_F(WebServerTest, RefusesOtherHostsOriginsAndTargets) {
   EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(Get("/events", "Origin: http://evil.example\r\n"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(Get("/", "Sec-Fetch-Site: cross-site\r\n"), StartsWith("HTTP/1.1 403"));
@@ -122,7 +122,7 @@ TEST_F(WebServerTest, RefusesWhatIsNotForIt) {
 }
 
 // What it says of a request that it cannot read is civetweb's; that it goes on is ours.
-TEST_F(WebServerTest, HostileBytesEndNothing) {
+TEST_F(WebServerTest, KeepsServingAfterHostileBytes) {
   std::mt19937_64 random(11);
   const std::string good = "GET / HTTP/1.1\r\nHost: localhost\r\nAccept: */*\r\nOrigin: http://localhost\r\n\r\n";
   std::vector<std::string> requests{
@@ -158,7 +158,7 @@ TEST_F(WebServerTest, ListensOnOneAddress) {
   EXPECT_THROW(WebServer(watcher_, server_.port()), ServerError);
 }
 
-TEST_F(WebServerTest, ServesSoManyReadersAndThenRefuses) {
+TEST_F(WebServerTest, RefusesOneReaderMoreThanItsLimit) {
   {
     std::vector<std::unique_ptr<Connection>> readers;
     for (int i = 0; i < WebServer::kMostReaders; ++i) {
@@ -182,7 +182,7 @@ TEST_F(WebServerTest, ServesSoManyReadersAndThenRefuses) {
 }
 
 // A reader that does not read is behind; messages are taken meanwhile, others read, and the server ends.
-TEST(SlowReaderTest, HoldsUpNobody) {
+TEST(SlowReaderTest, DelaysNeitherMessagesNorOtherReadersNorTheEnd) {
   Watcher watcher(CourseTask(), {}, CourseTask);
   auto server = std::make_unique<WebServer>(watcher, 0);
   const Connection slow(server->port(), "127.0.0.1", 2048);

@@ -47,7 +47,7 @@ TEST_F(DiskTest, AnEventLargerThanAFileGetsOneOfItsOwn) {
   EXPECT_EQ(Recorded(), UpTo(3));
 }
 
-TEST_F(DiskTest, AFileEndsByTimeButNoEmptyOne) {
+TEST_F(DiskTest, EndsAFileByTimeUnlessItIsEmpty) {
   config_.logger.rotate_minutes = 1;
   Start();
   Feed(5);
@@ -151,7 +151,7 @@ TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
 }
 
 // As after a power cut that took the database's last words, or the database.
-TEST_F(DiskTest, ALogThatNoRunKnowsIsTakenAndItsRowsAreMade) {
+TEST_F(DiskTest, AdoptsALogWithoutARunAndMakesItsRows) {
   config_.logger.rotate_mb = 10 * kRecord * 1e-6;
   Start();
   Feed(25);
@@ -179,7 +179,7 @@ TEST_F(DiskTest, ALogThatNoRunKnowsIsTakenAndItsRowsAreMade) {
 }
 
 // As after a SIGKILL between making the file and recording its run.
-TEST_F(DiskTest, ALogThatNoRunKnowsAndThatHoldsNothingGoes) {
+TEST_F(DiskTest, DeletesAnEmptyLogWithoutARun) {
   std::filesystem::create_directory(scratch_ / "log");
   const std::string empty = scratch_ / "log/events-20231114-221319-000000.lcmlog";
   { const EventLogWriter made(empty); }
@@ -295,7 +295,7 @@ TEST_F(DiskTest, ALongPauseWritesFewGapsAndFindsThoseOfTheBus) {
   EXPECT_EQ(LostTo("bus"), 7);
 }
 
-TEST_F(DiskTest, TheHeartbeatSaysHowItFares) {
+TEST_F(DiskTest, HeartbeatReportsCountsAndState) {
   Start();
   Feed(1200);
   ASSERT_EQ(bus_.heartbeats.size(), 3u);
@@ -416,7 +416,7 @@ TEST_F(DiskTest, AFailingFlushIsAnError) {
   EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk"), fed_);
 }
 
-TEST_F(DiskTest, OnARealDiskThatFills) {
+TEST_F(DiskTest, PausesOnAFullDiskAndResumesWhenThereIsRoom) {
   const SmallDisk disk(config_.logger.directory, "size=6m");
   if (!disk.mounted) GTEST_SKIP() << "no right to mount a small disk here";
   const auto use = [this](const std::string& name, std::size_t bytes) {

@@ -42,7 +42,7 @@ class GoneTest : public DiskTest {
   }
 };
 
-TEST_F(GoneTest, ALogThatIsDeleted) {
+TEST_F(GoneTest, GoesOnInANewFileWhenItsLogIsDeleted) {
   fs::remove(log());
   ExpectGoesOnWithout(50, "was deleted or replaced, 50 confirmed events are gone");
   const std::vector<RunRow> runs = Runs();
@@ -55,19 +55,19 @@ TEST_F(GoneTest, ALogThatIsDeleted) {
   EXPECT_TRUE(checks[1].whole_log());
 }
 
-TEST_F(GoneTest, WhatWaitsInMemoryIsNotLostWithIt) {
+TEST_F(GoneTest, KeepsEventsInMemoryWhenItsLogIsDeleted) {
   Feed(5);
   fs::remove(log());
   ExpectGoesOnWithout(50, "50 confirmed events are gone");
   EXPECT_EQ(Recorded().front(), 50);
 }
 
-TEST_F(GoneTest, ALogThatIsMoved) {
+TEST_F(GoneTest, GoesOnInANewFileWhenItsLogIsMoved) {
   fs::rename(log(), scratch_ / "elsewhere");
   ExpectGoesOnWithout(50, "was moved, 50 confirmed");
 }
 
-TEST_F(GoneTest, ALogThatIsReplaced) {
+TEST_F(GoneTest, GoesOnInANewFileWhenItsLogIsReplaced) {
   fs::copy(log(), scratch_ / "copy");
   fs::rename(scratch_ / "copy", log());
   Feed(700);
@@ -76,27 +76,27 @@ TEST_F(GoneTest, ALogThatIsReplaced) {
   EXPECT_EQ(last().events_lost, 50);
 }
 
-TEST_F(GoneTest, ALogThatIsCutKeepsWhatIsLeft) {
+TEST_F(GoneTest, GoesOnInANewFileWhenItsLogIsCutAndKeepsTheRest) {
   fs::resize_file(log(), 20 * kRecord + 7);
   ExpectGoesOnWithout(30, "was cut short, 30 confirmed events are gone");
   EXPECT_EQ(Recorded().front(), 0);
 }
 
-TEST_F(GoneTest, ALogThatIsCutAndGrowsAgain) {
+TEST_F(GoneTest, NoticesALogThatWasCutEvenIfItHasItsOldSize) {
   const auto size = fs::file_size(log());
   fs::resize_file(log(), 0);
   fs::resize_file(log(), size);
   ExpectGoesOnWithout(50, "was cut short, 50 confirmed events are gone");
 }
 
-TEST_F(GoneTest, ADirectoryThatIsDeleted) {
+TEST_F(GoneTest, GoesOnInANewDirectoryWhenItsDirectoryIsDeleted) {
   fs::remove_all(directory());
   ExpectGoesOnWithout(50, "gone");
   for (const LogCheck& check : CheckLogs(directory()))
     EXPECT_TRUE(check.whole_log() || check.log == LogCheck::Log::kMissing) << check.log_file;
 }
 
-TEST_F(GoneTest, ADirectoryThatIsRenamed) {
+TEST_F(GoneTest, GoesOnInANewDirectoryWhenItsDirectoryIsRenamed) {
   fs::rename(directory(), scratch_ / "renamed");
   ExpectGoesOnWithout(50, "gone");
   Database renamed(scratch_ / "renamed/decisions.sqlite");
@@ -118,7 +118,7 @@ TEST_F(GoneTest, ADirectoryThatCannotBeMadeAgainIsAnErrorUntilItCan) {
 }
 
 // Files that ended before, too.
-TEST_F(GoneTest, EarlierFilesOfTheRunAreCounted) {
+TEST_F(GoneTest, CountsTheLostEventsOfEarlierFilesOfTheRun) {
   node_.reset();
   bus_.Disconnect();
   fs::remove_all(directory());
@@ -135,7 +135,7 @@ TEST_F(GoneTest, EarlierFilesOfTheRunAreCounted) {
   EXPECT_EQ(LostTo("gone"), 45);
 }
 
-TEST_F(GoneTest, ManyTimes) {
+TEST_F(GoneTest, GoesOnAfterItsLogIsDeletedManyTimes) {
   for (int i = 0; i < 20; ++i) {
     fs::remove(log());
     Feed(50);
@@ -167,7 +167,7 @@ class DatabaseGoneTest : public GoneTest {
   }
 };
 
-TEST_F(DatabaseGoneTest, ADatabaseThatIsDeleted) {
+TEST_F(DatabaseGoneTest, ReportsADeletedDatabaseAndTheNextStartMakesItsRowsAgain) {
   RemoveDatabase();
   Feed(600);
   EXPECT_EQ(last().state, logger_status_t::STALE);
@@ -176,12 +176,12 @@ TEST_F(DatabaseGoneTest, ADatabaseThatIsDeleted) {
   EXPECT_THAT(out_.str(), HasSubstr("decisions.sqlite was deleted or moved"));
 }
 
-TEST_F(DatabaseGoneTest, OnlyTheDatabaseFileItself) {
+TEST_F(DatabaseGoneTest, TheNextStartMakesTheRowsAgainWhenOnlyTheDatabaseFileIsDeleted) {
   fs::remove(scratch_ / "log/decisions.sqlite");
   ExpectRowsAgain();
 }
 
-TEST_F(DatabaseGoneTest, ADatabaseThatIsReplacedByAnOldOne) {
+TEST_F(DatabaseGoneTest, TheNextStartMakesTheRowsAgainWhenAnotherDatabaseTookItsPlace) {
   RemoveDatabase();
   { const Database other(scratch_ / "log/decisions.sqlite"); }
   ExpectRowsAgain();
@@ -199,7 +199,7 @@ TEST_F(DatabaseGoneTest, ADatabaseThatIsReplacedBySomethingElseWaitsUntilThatIsG
   ExpectRowsAgain();
 }
 
-TEST_F(DatabaseGoneTest, ItsWriteAheadLogAlone) {
+TEST_F(DatabaseGoneTest, LosesNoRowWhenOnlyTheWriteAheadLogIsDeleted) {
   for (const char* ending : {"-wal", "-shm"}) {
     ASSERT_TRUE(fs::remove(scratch_ / (std::string("log/decisions.sqlite") + ending)));
     Feed(600);

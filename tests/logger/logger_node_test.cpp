@@ -209,7 +209,7 @@ TEST_F(SignedLoggerTest, MakesMissingRowsAgainOfAuthenticMessagesOnly) {
   ExpectOneGap(ReadRows());
 }
 
-TEST_F(SignedLoggerTest, WhatWasSignedLongBeforeMakesNoRow) {
+TEST_F(SignedLoggerTest, AMessageSignedLongBeforeMakesNoRow) {
   bus_.now_us -= 10'000'000;
   const auto recorded = Candidate(*planner_, std::int64_t{1} << 40);
   bus_.now_us = kStart;
@@ -223,7 +223,7 @@ TEST_F(SignedLoggerTest, WhatWasSignedLongBeforeMakesNoRow) {
   EXPECT_EQ(node.recorder().interpreter().refusals().replayed, 1);
 }
 
-TEST_F(LoggerNodeTest, RecordsOverflowOnce) {
+TEST_F(LoggerNodeTest, RecordsAnOverflowOfItsQueueOnce) {
   config_.logger.queue = 4;
   LoggerNode node(config_, bus_, out_);
   node.Tick(kStart);
@@ -351,7 +351,7 @@ TEST_F(LoggerNodeTest, LeavesARunningLoggersFileAlone) {
   }
 }
 
-TEST_F(LoggerNodeTest, SurvivesAKill) {
+TEST_F(LoggerNodeTest, KeepsConfirmedEventsWhenItIsKilled) {
   config_.logger.flush_ms = 5;
   config_.logger.rotate_mb = 0.4;  // some 40 candidates and their decisions
   const unsigned seed = std::random_device{}();

@@ -72,7 +72,7 @@ TEST_F(PowerCutTest, ALogAndItsRunAreThereBeforeItsFirstEvent) {
   recorder.End(now);
 }
 
-TEST_F(PowerCutTest, WhatRunsAreToldIsConfirmedRowsNeedNotBe) {
+TEST_F(PowerCutTest, RowsOfRunsAreSyncedToDiskAndRowsOfEventsAreNot) {
   Database database(scratch_ / "log/decisions.sqlite");
   const auto confirmed = [](const auto& act) {
     Confirmed().clear();

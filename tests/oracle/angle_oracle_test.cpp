@@ -24,7 +24,7 @@ bool IsInside(double value, double lower, double upper) {
   return false;
 }
 
-TEST(LiesWithin, OnlyWhatIsThereAfterWholeTurns) {
+TEST(LiesWithin, AcceptsAnAngleOnlyIfItIsInsideAfterWholeTurns) {
   Random random(641);
   SCOPED_TRACE(random.trace());
   int inside = 0, left_out = 0;
@@ -50,7 +50,7 @@ TEST(LiesWithin, OnlyWhatIsThereAfterWholeTurns) {
   EXPECT_GT(left_out, 0) << "of those that are inside by less than the rounding";
 }
 
-TEST(LiesWithin, WithoutATurnItIsExact) {
+TEST(LiesWithin, ComparesExactlyWhereNoTurnIsNeeded) {
   for (const bool is_angle : {false, true}) {
     EXPECT_TRUE(LiesWithin(0.1, 0.1, 0.1, is_angle));
     EXPECT_TRUE(LiesWithin(0.1, -3, 0.1, is_angle));
@@ -66,7 +66,7 @@ TEST(LiesWithin, WithoutATurnItIsExact) {
 }
 
 // 0 after a turn is 2 pi, which is no double: it lies between two neighbours.
-TEST(LiesWithin, TwoPiItselfIsNoDouble) {
+TEST(LiesWithin, AcceptsATurnedNumberOnlyIfItsRoundingLiesInsideToo) {
   const double above = std::nextafter(kTurn, 9), far_above = std::nextafter(above, 9), below = std::nextafter(kTurn, 0);
   ASSERT_LT(Real(kTurn), Turned(0, 1));
   ASSERT_LT(Turned(0, 1), Real(above));
@@ -93,7 +93,7 @@ TEST(TurnTowards, EnclosesTheTurnedNumber) {
   }
 }
 
-TEST(AnglesOf, AreStates) {
+TEST(AnglesOf, RefusesIndicesThatAreNoStates) {
   EXPECT_EQ(AnglesOf(std::array{2, 0}, 3), Angles(0b101));
   EXPECT_EQ(AnglesOf(std::span<const int>(), 3), Angles());
   for (const int wrong : {-1, 3, 16})

@@ -14,6 +14,7 @@
 #include "certifier/numerics/size.h"
 #include "tests/oracle/problems.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 
@@ -306,15 +307,12 @@ constexpr double kTextReach = 3;  ///< Of each state; of each input it is 1.
 /** A random text with transitions of it and an admissible residual, for some value of its parameters. Null if the text
 has no value at most points. */
 inline std::shared_ptr<Problem> AnyTextProblem(Random& random, const ModelText& text) {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakeTextModel(text);
-  const int n = problem->model->num_states(), inputs = problem->model->num_inputs(), variables = n + inputs;
-  problem->domain.state = Box(Eigen::VectorXd::Constant(n, -kTextReach), Eigen::VectorXd::Constant(n, kTextReach));
-  problem->domain.input = Box(Eigen::VectorXd::Constant(inputs, -1), Eigen::VectorXd::Constant(inputs, 1));
+  const auto model = MakeTextModel(text);
+  const int n = model->num_states(), variables = model->num_variables();
+  auto problem = std::make_shared<Problem>(
+      WorldOf(model, Within(Eigen::VectorXd::Constant(n, kTextReach)), Within(Eigen::VectorXd::Ones(variables - n))));
   problem->zonotope_order = random.Integer(1, 6);
-  problem->projection = Eigen::MatrixXd::Identity(std::min(n, 2), n);
   Declaration& declaration = problem->declaration;
-  declaration = {Eigen::MatrixXd::Zero(n, variables), Eigen::VectorXd::Zero(n)};
   for (int k = 0; k < n; ++k) {
     for (int l = 0; l < variables; ++l)
       if (random.Coin(0.2)) declaration.lipschitz(k, l) = random.Uniform(0, 0.05);

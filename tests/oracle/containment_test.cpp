@@ -184,7 +184,7 @@ double Excess(const Tube& tube, const Tube& of) {
 
 // A certificate is about all residuals that the observations of its moment admit. More observations admit some of
 // these, so it holds for them; whether it could be derived again is not said.
-TEST_P(Containment, WhatIsCertifiedHoldsForWhatMoreObservationsAdmit) {
+TEST_P(Containment, ACertificateHoldsForEveryResidualThatMoreObservationsAdmit) {
   const auto [bicycle, disturbed] = GetParam();
   Random random(821 + bicycle), winds(831 + bicycle);
   SCOPED_TRACE(random.trace());

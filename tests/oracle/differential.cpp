@@ -17,11 +17,11 @@
 
 #include "certifier/dynamics/expression.h"
 #include "command_line/command_line.h"
+#include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/motions.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
-#include "tests/oracle/worlds.h"
 #include "tests/verifier/record.h"
 
 namespace forereach {

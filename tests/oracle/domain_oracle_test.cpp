@@ -214,7 +214,7 @@ TEST(FindExit, ABoundThatIsMetIsInsideAndOneUlpBelowIsOutside) {
   }
 }
 
-TEST(FindExit, NumbersThatAreNoneAreOutside) {
+TEST(FindExit, NanAndInfinityLieOutsideTheDomain) {
   Query query;
   Domain domain = Around(10);
   domain.inequalities = {{Eigen::VectorXd::Ones(kSize), 100}};

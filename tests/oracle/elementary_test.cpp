@@ -158,7 +158,7 @@ TEST_P(Elementary, LibraryErrorIsWithinWhatIsAssumed) {
 INSTANTIATE_TEST_SUITE_P(All, Elementary, testing::ValuesIn(kFunctions),
                          [](const auto& f) { return std::string(f.param.name); });
 
-TEST(Elementary, OverflowAndUnderflow) {
+TEST(Elementary, EnclosesAtOverflowAndUnderflow) {
   EXPECT_EQ(exp(Interval(-800)).lower, 0);
   EXPECT_EQ(exp(Interval(800)).upper, kInfinity);
   EXPECT_EQ(tanh(Interval(-kMaxDouble, kMaxDouble)), Interval(-1, 1));
@@ -214,7 +214,7 @@ TEST(Atan2, IsTheRangeOfTheAngles) {
   EXPECT_GT(angles, 8000);
 }
 
-TEST(Atan2, AtTheAxesAndTheCut) {
+TEST(Atan2, EnclosesAtTheAxesAndAtTheCut) {
   Random random(224);
   SCOPED_TRACE(random.trace());
   constexpr std::array ends{-kMaxDouble, -1.0, -0x1p-1022, -kTiny, -0.0, 0.0, kTiny, 0x1p-1022, 1.0, kMaxDouble};
@@ -326,7 +326,7 @@ TEST(AbsMinMax, AreExact) {
   }
 }
 
-TEST(Kinks, StandWhereTheIntervalMeetsZero) {
+TEST(Kinks, AFunctionHasAKinkWhereItsIntervalMeetsZero) {
   struct Case {
     Interval x, step, sign, kink;
   };
@@ -340,7 +340,7 @@ TEST(Kinks, StandWhereTheIntervalMeetsZero) {
   }
 }
 
-TEST(Cut, IsTheNegativeHalfOfTheAxisWithTheOrigin) {
+TEST(Cut, IsFoundOnTheNegativeHalfAxisAndAtTheOrigin) {
   const Interval nothing(0), everything = Interval::Entire();
   EXPECT_EQ(cut({-1, 1}, {kTiny, 2}), nothing);
   EXPECT_EQ(cut({-1, 1}, {0, 2}), everything);

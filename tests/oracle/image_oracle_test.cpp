@@ -83,7 +83,7 @@ Rational LeftOut(Random& random, const Program& program, const Case& c, const Zo
   return sum;
 }
 
-TEST(ImageOracle, SlackBoundsWhatThePlainImageLeavesOut) {
+TEST(ImageOracle, SlackBoundsTheRoundingErrorOfTheImage) {
   Random random(614);
   SCOPED_TRACE(random.trace());
   const std::shared_ptr<const NominalModel> last_is_one = std::make_shared<EquationsModel<LastIsOne>>(LastIsOne());
@@ -101,7 +101,7 @@ TEST(ImageOracle, SlackBoundsWhatThePlainImageLeavesOut) {
 }
 
 // With the error forgotten, the test above would notice.
-TEST(ImageOracle, RoundingIsThereToBeBounded) {
+TEST(ImageOracle, WithoutItsRoundingErrorTheImageWouldBeTooSmall) {
   Random random(615);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   int beyond = 0;

@@ -22,7 +22,7 @@ TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
 
 class WithoutOnePart : public testing::TestWithParam<Untold> {};
 
-TEST_P(WithoutOnePart, MeetsObstacles) {
+TEST_P(WithoutOnePart, ObstaclesAreMetWhenOnePartOfTheDeclarationIsLeftOut) {
   int contacts = 0;
   std::uint64_t number = 0;
   for (; contacts < 3 && number < 400; ++number) try {
@@ -44,7 +44,7 @@ INSTANTIATE_TEST_SUITE_P(OfTheDeclaration, WithoutOnePart,
                                          Untold::kGrowth, Untold::kClockError, Untold::kLateness),
                          NameOf);
 
-TEST(Bulge, KeepsBothEndsAndUsesItsBound) {
+TEST(Bulge, IsZeroAtBothEndsAndReachesItsBound) {
   const Bulge constant({-1.0});
   for (const double s : {0.0, 0.25, 0.5, 1.0}) EXPECT_EQ(constant.At<Real>(s), Real(s * (1 - s) / 2));
   EXPECT_EQ(constant.Steepest(), Real(0.5));
@@ -55,7 +55,7 @@ TEST(Bulge, KeepsBothEndsAndUsesItsBound) {
 }
 
 // The judge of one moment, just inside and just outside.
-TEST(Meeting, IsDecidedExactly) {
+TEST(Meeting, ContactIsDecidedExactly) {
   const auto point = [](double x, double y, double z) { return Point3<Real>{Real(x), Real(y), Real(z)}; };
   const Point3<Real> still = point(0, 0, 0);
   const std::vector<Point3<Real>> square{point(-1, -1, 0), point(1, -1, 0), point(1, 1, 0), point(-1, 1, 0)};

@@ -1,11 +1,11 @@
 /** What a certificate claims at all times, tried: continuous motions under certified plans, in 256 bits.
 
-A trial makes one random problem (worlds.h) and plans of it, and places obstacles that the certifier just accepts. Under
-each certificate it follows admissible residuals from sample to sample. Between two samples it follows motions whose
-second derivatives are piecewise constant, within the declared bounds and often equal to them, and that keep the
-samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A contact is a broken promise.
-Then an obstacle appears that the certifier just accepts up to some step of the plan: what it says still stands is
-followed in the same way. */
+A trial makes one random problem (problems.h, any_surroundings.h) and plans of it, and places obstacles that the
+certifier just accepts. Under each certificate it follows admissible residuals from sample to sample. Between two
+samples it follows motions whose second derivatives are piecewise constant, within the declared bounds and often equal
+to them, and that keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A
+contact is a broken promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what
+it says still stands is followed in the same way. */
 #pragma once
 
 #include <algorithm>
@@ -22,10 +22,10 @@ followed in the same way. */
 #include "certifier/certify/standing.h"
 #include "certifier/numerics/size.h"
 #include "tests/oracle/admissible.h"
+#include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/meeting.h"
 #include "tests/oracle/random.h"
-#include "tests/oracle/worlds.h"
 
 namespace forereach {
 

@@ -12,6 +12,7 @@
 #include "certifier/dynamics/models/point_mass.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 
@@ -78,26 +79,21 @@ struct Query {
 };
 
 inline Eigen::VectorXd StateReach(bool bicycle) {
-  return bicycle ? (Eigen::VectorXd(6) << 40, 40, 3.14, 25, 3, 0.48).finished()
-                 : (Eigen::VectorXd(4) << 20, 20, 6, 6).finished();
+  return bicycle ? Vec({40, 40, 3.14, 25, 3, 0.48}) : Vec({20, 20, 6, 6});
 }
 
 /** The bicycle or the point mass with `count` transitions. Few entries of L are not zero; a third of the coordinates
 have noise, up to its bound. */
 inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int count) {
-  auto problem = std::make_shared<Problem>();
-  problem->model = bicycle ? MakeKinematicBicycle(0.1, 2.5) : MakePointMass(0.15);
-  const int n = problem->model->num_states(), inputs = problem->model->num_inputs(), variables = n + inputs;
+  const std::shared_ptr<const NominalModel> model = bicycle ? MakeKinematicBicycle(0.1, 2.5) : MakePointMass(0.15);
+  const int n = model->num_states(), variables = model->num_variables();
   const Eigen::VectorXd reach = StateReach(bicycle), input = bicycle ? Eigen::Vector2d(20, 2) : Eigen::Vector2d(3, 3);
-  problem->domain.state = Box(-reach, reach);
-  problem->domain.input = Box(-input, input);
+  auto problem = std::make_shared<Problem>(WorldOf(model, Within(reach), Within(input)));
   if (!bicycle && random.Coin()) problem->domain.balls.push_back({{2, 3}, Eigen::Vector2d::Zero(), 5.4});
   problem->zonotope_order = random.Integer(1, 6);
-  problem->projection = Eigen::MatrixXd::Identity(2, n);
   if (random.Coin(0.2)) problem->projection += random.Matrix(2, n, 0.1);
 
   Declaration& declaration = problem->declaration;
-  declaration = {Eigen::MatrixXd::Zero(n, variables), Eigen::VectorXd::Zero(n)};
   for (int k = 0; k < n; ++k) {
     for (int l = 0; l < variables; ++l)
       if (random.Coin(0.12)) declaration.lipschitz(k, l) = random.Uniform(0, 0.05);

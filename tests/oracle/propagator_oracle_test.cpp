@@ -12,6 +12,7 @@
 #include "certifier/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -28,13 +29,8 @@ struct Task {
 
   // @param reach of the domain: beyond some size the expansion is made of intervals.
   Task(Random& random, double reach, bool disturbed) {
-    problem->model = MakePointMass(kDt);
-    problem->domain.state = Box(Eigen::Vector4d::Constant(-reach), Eigen::Vector4d::Constant(reach));
-    problem->domain.input = Box(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3));
-    problem->declaration = {Eigen::MatrixXd::Zero(kStates, 6), Eigen::VectorXd::Zero(kStates)};
-    problem->projection = Eigen::MatrixXd::Identity(2, kStates);
+    *problem = WorldOf(MakePointMass(kDt), Within({reach, reach, reach, reach}), Within({3, 3}));
     problem->zonotope_order = kOrder;
-    problem->transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, kStates)};
     for (int k = 0; k < kStates; ++k) {  // from rest at the origin: f0 is zero, and the successor is the residual
       const double residual = random.Coin(0.3) ? 0 : random.Uniform(-1, 1) * std::ldexp(1, -random.Integer(0, 40));
       const double sigma = random.Coin() ? 0 : std::ldexp(random.Uniform(0, 1), -random.Integer(0, 40));

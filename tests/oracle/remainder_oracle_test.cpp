@@ -100,7 +100,7 @@ TEST(RemainderOracle, ContainsEveryQuadraticFormOfTheSlice) {
 }
 
 // Every size is a power of two of its own, so that some products are subnormal numbers or zero and others are large.
-TEST(RemainderOracle, ContainsThemWhereProductsUnderflow) {
+TEST(RemainderOracle, ContainsEveryQuadraticFormWhereProductsUnderflow) {
   Random random(614);
   SCOPED_TRACE(random.trace());
   const auto model = MakeKinematicBicycle(0.1, 2.5);
@@ -123,7 +123,7 @@ TEST(RemainderOracle, ContainsThemWhereProductsUnderflow) {
 }
 
 // Lower and upper ends that are odd subnormals, so that neither half of their sum nor of their difference is a double.
-TEST(RemainderOracle, ContainsThemWhereHalvingRounds) {
+TEST(RemainderOracle, ContainsEveryQuadraticFormWhereHalvingRounds) {
   Random random(616);
   SCOPED_TRACE(random.trace());
   const auto model = MakeKinematicBicycle(0.1, 2.5);
@@ -143,7 +143,7 @@ TEST(RemainderOracle, ContainsThemWhereHalvingRounds) {
   }
 }
 
-TEST(RemainderOracle, SeesANumberThatIsNone) {
+TEST(RemainderOracle, IsNotFiniteWhereADerivativeIsNan) {
   Random random(615);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   const Program& program = model->program();

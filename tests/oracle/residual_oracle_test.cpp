@@ -130,7 +130,7 @@ TEST(Observe, TakesTheTurnsOffAnAngleAndEnclosesItsResidual) {
 }
 
 // Where nothing else rounds, 2 pi does: it lies between two doubles.
-TEST(Observe, ATurnIsNoDouble) {
+TEST(Observe, EnclosesTheRoundingOfATurn) {
   const auto model = MakeKinematicBicycle(0.5, 2, {2});
   for (const double next : {6.2, -6.2, 6.3, -12.5, 12.6, 25.1}) {
     Transitions data{Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
@@ -144,7 +144,7 @@ TEST(Observe, ATurnIsNoDouble) {
 }
 
 // The nominal successor of theta is zero, exactly, and its record is known to 2^-49.
-TEST(Observe, AQuarterOfATurnIsTheEnd) {
+TEST(Observe, RefusesAnAngleThatIsAQuarterOfATurnOrMoreFromItsSuccessor) {
   const auto model = MakeKinematicBicycle(0.5, 2, {2});
   const auto observe = [&](double next) {
     Transitions data{Eigen::MatrixXd::Zero(3, 8), Eigen::MatrixXd::Zero(3, 6)};
@@ -315,7 +315,7 @@ TEST(FindViolation, OfConstantRowsAgreesWithExactArithmetic) {
   }
 }
 
-TEST(FindViolation, WithoutProofByRationalsNeverFalsifies) {
+TEST(FindViolation, NeverFalsifiesWhatRationalsDoNotProve) {
   Random random(605);
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 1500; ++trial) {
@@ -465,7 +465,7 @@ void ExpectEnvelope(const Sample& s, const Zonotope& slice, const Eigen::VectorX
 
 class Envelope : public testing::TestWithParam<int> {};
 
-TEST_P(Envelope, IsTheExactOneRoundedOutward) {
+TEST_P(Envelope, IsTheExactEnvelopeRoundedOutward) {
   const int active = GetParam(), states = std::max(2, std::min(active, 9)), inputs = std::max(1, active - states + 1);
   Random random(607 + static_cast<std::uint64_t>(active));
   SCOPED_TRACE(random.trace());

@@ -229,7 +229,7 @@ TEST(ZonogonOracle, RadiusIsTheFarthestCorner) {
   }
 }
 
-TEST(ZonogonOracle, RadiusOfManyNearlyParallelGenerators) {
+TEST(ZonogonOracle, RadiusOfManyNearlyParallelGeneratorsIsTheFarthestCorner) {
   Random random(408);
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 100; ++trial) {

@@ -130,7 +130,7 @@ TEST(TextEnclosure, ContainsTheValueAtEveryPoint) {
 }
 
 // The second order: the width beyond the linear part shrinks with the square.
-TEST(TextEnclosure, IsOfSecondOrder) {
+TEST(TextEnclosure, WidthBeyondTheLinearPartShrinksWithTheSquare) {
   const TextEnclosure enclosure(kNames, Texts());
   const std::vector<double> center{0.3, -0.4, 0.2}, input{0.5};
   std::vector<AffineEnclosure> wide(kExpressions.size()), narrow(kExpressions.size());
@@ -144,7 +144,7 @@ TEST(TextEnclosure, IsOfSecondOrder) {
   }
 }
 
-TEST(TextEnclosure, KnowsWhichUseAnInput) {
+TEST(TextEnclosure, TellsWhichExpressionsUseAnInput) {
   const TextEnclosure enclosure(
       {{"x"}, {"u"}, {}, {{"twice", {"2*u", 1, 1}}}},
       std::vector<ExpressionText>{{"x", 1, 1}, {"x + twice", 1, 1}, {"u", 1, 1}, {"1", 1, 1}});

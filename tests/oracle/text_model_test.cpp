@@ -58,7 +58,7 @@ class SameBitsTest : public testing::TestWithParam<int> {
   }
 };
 
-TEST_P(SameBitsTest, InExpansionRemainderAndImage) {
+TEST_P(SameBitsTest, TextAndCompiledModelAgreeInExpansionRemainderAndImage) {
   const auto [text, compiled, largest] = Models();
   const auto n = static_cast<std::size_t>(text->num_states()), d = static_cast<std::size_t>(text->num_variables());
   ASSERT_EQ(text->program().num_first, compiled->program().num_first);
@@ -157,7 +157,7 @@ TEST(TextModel, ExpansionsAreWithinTheirErrors) {
   EXPECT_GT(bounded, 30000);
 }
 
-TEST_P(SameBitsTest, InValuesAndIntervals) {
+TEST_P(SameBitsTest, TextAndCompiledModelAgreeInValuesAndIntervals) {
   const auto [text, compiled, largest] = Models();
   Random random(7103);
   SCOPED_TRACE(random.trace());
@@ -310,7 +310,7 @@ TEST(TextModel, AParameterMayBeARange) {
   EXPECT_THAT(model->description(), HasSubstr("wheelbase=[2.7,2.9]"));
 }
 
-TEST(TextModel, SaysWhatIsWrong) {
+TEST(TextModel, RefusesAWrongTextAndSaysWhy) {
   const auto make = [](const ModelText& text) { return [text] { static_cast<void>(MakeTextModel(text)); }; };
   const auto with = [](auto change) {
     ModelText text = PointMass();
@@ -337,7 +337,7 @@ TEST(TextModel, SaysWhatIsWrong) {
 }
 
 // What is known of a compiled model, its equations in continuous time for example, is not known of a text of that name.
-TEST(TextModel, HasTheNameOfNoCompiledModel) {
+TEST(TextModel, IsNotTakenForTheCompiledModelOfTheSameName) {
   ModelText text = PointMass();
   for (const std::string name : {"point_mass", "kinematic_bicycle"}) {
     text.name = name;
@@ -360,7 +360,7 @@ TEST(TextModel, OfTooManyOperationsIsRefused) {
 }
 
 // Definitions that each use the one before twice: the derivatives are shared like the values.
-TEST(TextModel, SharesDerivatives) {
+TEST(TextModel, ComputesSharedDerivativesOnce) {
   ModelText text = TextModel({{"x", "d60"}}, {"u"}, {{"dt", 0.1, 0.1}}, {{"d0", "sin(x)"}});
   for (int i = 1; i <= 60; ++i) {
     const std::string before = "d" + std::to_string(i - 1);

@@ -60,7 +60,7 @@ TEST(RoundedText, IsOnTheSafeSideAndNextToTheNumber) {
     ExpectOnBothSides(random.Double(), random.Coin(0.9) ? random.Integer(1, 17) : random.Integer(18, 30));
 }
 
-TEST(RoundedText, OfHardNumbers) {
+TEST(RoundedText, RoundsHardNumbersToTheExpectedText) {
   for (const double x : {0.1,
                          0.5,
                          0.25,

@@ -8,6 +8,7 @@
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/verifier/record.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -24,18 +25,11 @@ struct Cancelling : testing::Test {
   static constexpr double kBefore = -0.037031071903388016, kRate = 0.37031071903388013, kAfter = -0x1.a8p-61;
 
   Cancelling() {
-    problem->model = MakeKinematicBicycle(kDt, 2.5);
-    Eigen::VectorXd reach(6);
-    reach << 40, 40, 3.1, 25, 3, 0.48;
-    problem->domain.state = Box(-reach, reach);
-    problem->domain.input = Box(Eigen::Vector2d(-10, -1), Eigen::Vector2d(10, 1));
-    problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
     problem->transitions = {Eigen::MatrixXd::Zero(2, 8), Eigen::MatrixXd::Zero(2, 6)};
     problem->transitions.z(0, kDelta) = kBefore;
     problem->transitions.z(0, kSteerRate) = kRate;
     problem->transitions.x_next(0, kDelta) = kAfter;
     problem->transitions.z(1, kDelta) = problem->transitions.x_next(1, kDelta) = kAfter;
-    problem->projection = Eigen::MatrixXd::Identity(2, 6);
     problem->method = Method::kPaper;
   }
 
@@ -68,7 +62,8 @@ struct Cancelling : testing::Test {
     return verifier::Verifier(problem, verifier::Method::kPaper).Verify(certificate);
   }
 
-  std::shared_ptr<Problem> problem = std::make_shared<Problem>();
+  std::shared_ptr<Problem> problem = std::make_shared<Problem>(
+      WorldOf(MakeKinematicBicycle(kDt, 2.5), Within({40, 40, 3.1, 25, 3, 0.48}), Within({10, 1})));
   verifier::Certificate certificate;
 };
 
@@ -85,14 +80,14 @@ TEST_F(Cancelling, DataContradictEachOtherAndDoublesDoNotShowIt) {
   }
 }
 
-TEST_F(Cancelling, TheCertificateIsConfirmedAllTheSame) {
+TEST_F(Cancelling, ACertificateOfSuchDataIsConfirmed) {
   Certify();
   const verifier::Verdict verdict = Verify();
   EXPECT_EQ(verdict.status, verifier::Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
 }
 
 // Steps that cancel, off by up to 2^-62 of their terms; sets from points to wide ones.
-TEST_F(Cancelling, RandomCertificatesAreConfirmed) {
+TEST_F(Cancelling, RandomCertificatesOfSuchDataAreConfirmed) {
   Random random(1);
   SCOPED_TRACE(random.trace());
   int contradicting = 0;

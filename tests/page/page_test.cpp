@@ -237,7 +237,7 @@ TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
   EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not kept next to it")));
 }
 
-TEST_F(DirectoryTest, WithoutADatabaseItHasItsLogs) {
+TEST_F(DirectoryTest, WithoutADatabaseItReadsTheLogs) {
   std::filesystem::remove(directory_ / "decisions.sqlite");
   EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), 67u);
   std::filesystem::remove(log_);
@@ -286,7 +286,7 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
   EXPECT_EQ(few.details.size(), 5u) << "of the page, not of each run";
 }
 
-TEST_F(ManyRunsTest, APageThatWasInterruptedIsTheSame) {
+TEST_F(ManyRunsTest, APageMadeAfterAnInterruptionIsTheSame) {
   const std::string resume = "--resume '" + (directory_ / "kept") + "'";
   const Output first = Report("first.html", resume);
   EXPECT_EQ(first.code, 0) << first.text;
@@ -303,7 +303,7 @@ TEST_F(ManyRunsTest, APageThatWasInterruptedIsTheSame) {
 }
 
 // What is kept of a run comes back with every bit.
-TEST(RowsJsonTest, NumbersAndTextsComeBack) {
+TEST(RowsJsonTest, NumbersAndTextsSurviveARoundTrip) {
   PageRun run;
   DecisionRow row;
   row.event = {"a", 7, "digest"};
@@ -348,7 +348,7 @@ TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
   EXPECT_EQ(Forereach(report + directory.path() + "/none/page.html' 2>&1").code, 2);
 }
 
-TEST(WriteTest, TextsOfARunBeginNoTag) {
+TEST(WriteTest, TextsOfARunCannotOpenATag) {
   PageRun run = GatherPage({kLog}, kTask, {}, {0, 0, 0});
   const std::string plain = PageHtml(run);
   const auto tags = [](const std::string& html) { return std::ranges::count(html, '<'); };
@@ -360,7 +360,7 @@ TEST(WriteTest, TextsOfARunBeginNoTag) {
   EXPECT_THAT(html, Not(HasSubstr("</script><!--")));
 }
 
-TEST(WriteTest, ALogMayHaveTheNameOfAKey) {
+TEST(WriteTest, ALogNamedLikeAKeyIsWritten) {
   PageRun run;
   run.parts = {{"", {{"type", "one"}, {"data", "two"}}}};
   EXPECT_THAT(PageHtml(run), HasSubstr(R"("replays":{"data":"two","type":"one"})"));

@@ -65,7 +65,7 @@ TEST(CertifiedPlan, LearnsTheMarginFromALimit) {
   }
 }
 
-TEST(Lessons, OfALimitAreHowFarTheTubeReachesBeyondIt) {
+TEST(Lessons, AnExceededLimitAddsTheExcessOfTheTubeToItsMargin) {
   Lessons lessons(PlannerOptions{}, 2);
   Decision decision;
   decision.outcome = Outcome::kSafety;
@@ -102,7 +102,7 @@ advice_t Advised(std::int16_t kind, int index, double value, std::int16_t count 
   return advice;
 }
 
-TEST(Lessons, AreThoseOfAnAdvice) {
+TEST(Lessons, AnAdviceSetsTheClearancesThatItNames) {
   PlannerOptions options;
   options.clearance = 0.5;
   Lessons lessons(options, 2);
@@ -133,7 +133,7 @@ TEST(Lessons, AreThoseOfAnAdvice) {
 }
 
 // Where there are no keys anybody may have sent it.
-TEST(Lessons, OfAFalseAdviceAreNone) {
+TEST(Lessons, AFalseAdviceChangesNoMargin) {
   Lessons lessons(PlannerOptions{}, 2);
   for (const int kind : {-1, 0, 1, 2, 3, 4, 32767})
     for (const int index : {-32768, -1, 0, 2, 32767})

@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, DisturbedRun,
                                          std::pair("adversarial", 2)));
 
 // A certifier that knows nothing of the disturbance stops the robot: its data contradict each other.
-TEST(UndeclaredDisturbance, IsNoticed) {
+TEST(UndeclaredDisturbance, StopsTheRobotBecauseItsDataContradictTheDeclaration) {
   Config config = Task("adversarial", 1);
   Problem told = *config.problem;
   told.declaration.disturbance.setZero();

@@ -8,6 +8,7 @@
 #include "certifier/dynamics/text_model.h"
 #include "planner_bridge/motion.h"
 #include "tests/planner/tasks.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -28,12 +29,9 @@ Config Unicycle() {
       {"x + dt*v*cos(theta)"}, {"y + dt*v*sin(theta)"}, {"theta + dt*omega"}, {"v + change"}, {"omega + dt*alpha"}};
   Config config;
   config.path = "unicycle";
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakeTextModel(text);
-  problem->domain.state = Box(Vec({-10, -10, -4, -0.1, -2}), Vec({10, 10, 4, 2, 2}));
-  problem->domain.input = Box(Vec({-1, -3}), Vec({0.5, 3}));
-  problem->projection = Eigen::MatrixXd::Identity(2, 5);
-  config.problem = problem;
+  config.problem = std::make_shared<const Problem>(WorldOf(MakeTextModel(text),
+                                                           Box(Vec({-10, -10, -4, -0.1, -2}), Vec({10, 10, 4, 2, 2})),
+                                                           Box(Vec({-1, -3}), Vec({0.5, 3}))));
   config.laws.stop = {{{"-v/dt"}, {"-omega/dt"}}};
   config.laws.at_rest = std::vector<RestBound>{{3, 1e-3}, {4, 1e-3}};
   config.robot.hold = std::vector<std::string>{"v", "omega"};
@@ -68,7 +66,7 @@ TEST(Laws, ATailEndsAtRestInsideTheInputDomain) {
   }
 }
 
-TEST(Laws, ATailHasAsManyStepsAsItMayOrIsRefused) {
+TEST(Laws, ATailThatNeedsMoreStepsThanAllowedIsRefused) {
   const RobotMotion motion(Unicycle(), Braking::kPlanned);
   const Eigen::VectorXd x = Vec({0, 0, 0, 1, 0});  // by 0.1 m/s in each step
   Eigen::MatrixXd controls;
@@ -87,7 +85,7 @@ TEST(Laws, ALawWithoutAValueGivesNoTail) {
   EXPECT_FALSE(RobotMotion(config, Braking::kPlanned).Brake(Span(Vec({0, 0, 0, 1, 0})), 0, 100, controls));
 }
 
-TEST(Laws, WithoutARestATailIsAsLongAsItMayBe) {
+TEST(Laws, ATailHasTheLargestLengthWhereNoRestIsDefined) {
   Config config = Unicycle();
   config.laws.at_rest.emplace();
   const RobotMotion motion(config, Braking::kPlanned);
@@ -97,7 +95,7 @@ TEST(Laws, WithoutARestATailIsAsLongAsItMayBe) {
   EXPECT_FALSE(motion.IsAtRest(Span(Vec({0, 0, 0, 0, 0}))));
 }
 
-TEST(Laws, EachWayToStopIsATail) {
+TEST(Laws, EachStopLawGivesATailOfItsOwn) {
   Config config = Unicycle();
   config.laws.stop.push_back({{"-v/dt"}, {"(0.5*v - omega)/dt"}});
   config.laws.emergency_stop = {{{"-v/dt"}, {"0"}}};
@@ -111,7 +109,7 @@ TEST(Laws, EachWayToStopIsATail) {
   EXPECT_TRUE(controls.row(1).isZero(0));
 }
 
-TEST(Laws, HintsKnowWhatTheSearchWants) {
+TEST(Laws, HintsReadTheDesiredSpeedAndHeading) {
   Config config = Unicycle();
   EXPECT_FALSE(RobotMotion(config, Braking::kPlanned).has_hints());
   config.laws.definitions = {{"turn", {"desired_heading - theta"}}, {"late", {"twice*gain"}}};
@@ -126,7 +124,7 @@ TEST(Laws, HintsKnowWhatTheSearchWants) {
   EXPECT_EQ(u, Vec({0.5, 3})) << "clipped";
 }
 
-TEST(Laws, SpeedIsThatOfTheWayAndHoldingLeavesThePlace) {
+TEST(Laws, SpeedIsThatOfThePositionAndHoldingKeepsThePlace) {
   const RobotMotion motion(Unicycle(), Braking::kPlanned);
   EXPECT_NEAR(motion.Speed(Span(Vec({3, 1, 0.7, 1.25, 1}))), 1.25, 1e-12);
   EXPECT_NEAR(motion.Speed(Span(Vec({3, 1, 0.7, -0.1, 1}))), 0.1, 1e-12);
@@ -136,7 +134,7 @@ TEST(Laws, SpeedIsThatOfTheWayAndHoldingLeavesThePlace) {
   EXPECT_EQ(x, Vec({1, 2, 3, 0, 0}));
 }
 
-TEST(Laws, AControlToTryLiesBetweenTheLawsAndAnyOther) {
+TEST(Laws, AnExploredControlLiesBetweenTheStopLawAndAGivenControl) {
   const RobotMotion motion(Unicycle(), Braking::kPlanned);
   const Eigen::VectorXd x = Vec({0, 0, 0, 0.05, 0});  // the law: -0.5, 0
   Eigen::VectorXd u = Vec({0.5, -3});
@@ -147,7 +145,7 @@ TEST(Laws, AControlToTryLiesBetweenTheLawsAndAnyOther) {
   EXPECT_TRUE(u.isApprox(Vec({0.5, -3})));
 }
 
-TEST(Laws, WithHintsAnyControlIsTried) {
+TEST(Laws, WithHintsAGivenControlIsExploredUnchanged) {
   Config config = Unicycle();
   config.laws.hints = {{"desired_speed - v"}, {"desired_heading - theta"}};
   const RobotMotion motion(config, Braking::kPlanned);
@@ -156,7 +154,7 @@ TEST(Laws, WithHintsAnyControlIsTried) {
   EXPECT_EQ(u, Vec({-1, 3}));
 }
 
-TEST(Laws, SpeedIsWhatTheTaskSays) {
+TEST(Laws, SpeedIsTheExpressionOfTheTask) {
   Config config = Unicycle();
   config.laws.speed = ExpressionText{"v + 0*twice"};
   EXPECT_EQ(RobotMotion(config, Braking::kPlanned).Speed(Span(Vec({3, 1, 0.7, -0.125, 1}))), -0.125);
@@ -186,7 +184,7 @@ TEST(Laws, WhatALawMayNotUseIsAnError) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("the name alpha is used twice")));
 }
 
-TEST(Laws, WhatIsMissingIsNamed) {
+TEST(Laws, AMissingLawIsAnErrorThatNamesIt) {
   const auto missing = [](void (*spoil)(Config&)) -> std::string {
     Config config = Unicycle();
     spoil(config);

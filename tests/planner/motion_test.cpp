@@ -71,7 +71,7 @@ TEST(Motion, ARobotThatStandsNeedsNoTail) {
   EXPECT_EQ(controls.cols(), 0);
 }
 
-TEST(Motion, KnowsTheTimeOfAStep) {
+TEST(Motion, HasTheStepOfItsModel) {
   EXPECT_DOUBLE_EQ(RobotMotion(Bicycle(), Braking::kPlanned).dt(), 0.1);
   EXPECT_DOUBLE_EQ(RobotMotion(PointMass(), Braking::kPlanned).dt(), 0.15);
 }

@@ -11,7 +11,7 @@ namespace {
 
 const Box kRegion(Vec({-50, -50}), Vec({50, 50}));
 
-TEST(NavigationField, InTheOpenItIsTheStraightDistance) {
+TEST(NavigationField, IsTheStraightDistanceWithoutObstacles) {
   const NavigationField field(kRegion, RoomOfPoint({}), 0.5, Vec({10, 5}));
   for (const Eigen::VectorXd& y : {Vec({-30, 5}), Vec({10, -20}), Vec({-11, 26}), Vec({25, 12})})
     EXPECT_NEAR(field.DistanceToGo(y), (y - Vec({10, 5})).norm(), 0.05 * (y - Vec({10, 5})).norm() + 0.5);
@@ -58,7 +58,7 @@ TEST(NavigationField, AGoalOutsideTheRegionIsApproached) {
   EXPECT_GT(field.Descent(Vec({0, 0}))(0), 0.99);
 }
 
-TEST(NavigationField, OnTheLineItIsTheDistance) {
+TEST(NavigationField, IsTheDistanceInOneDimension) {
   const NavigationField field(Box(Vec({-5}), Vec({5})), RoomOfPoint({}), 0.5, Vec({2}));
   EXPECT_DOUBLE_EQ(field.DistanceToGo(Vec({-3})), 5);
   EXPECT_DOUBLE_EQ(field.Descent(Vec({-3}))(0), 1);

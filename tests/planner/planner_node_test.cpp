@@ -134,7 +134,7 @@ TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
   EXPECT_EQ(candidates_.size(), 1u);
 }
 
-TEST_F(PlannerNodeTest, ACandidateSaysWhatItIs) {
+TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
   const robot_state_t state = Standing();
   Say(state);
   Run(3);
@@ -302,7 +302,7 @@ TEST_F(AdvisedPlannerTest, WaitsNoLongerThanTwiceTheBudgetOfADecision) {
   EXPECT_EQ(Summary()["advised"], 0);
 }
 
-TEST_F(AdvisedPlannerTest, HeedsNoneThatIsNotOnItsCandidate) {
+TEST_F(AdvisedPlannerTest, IgnoresAdviceThatIsNotOnItsCandidate) {
   const std::int64_t ignored = Summary()["messages_ignored"];
   Say(Advice());  // nothing was abstained on
   AbstainOn(candidates_[0]);
@@ -353,7 +353,7 @@ TEST_F(PlannerNodeTest, WaitsForNoAdviceUnlessItIsSent) {
   EXPECT_EQ(candidates_.size(), 2u);
 }
 
-TEST_F(PlannerNodeTest, GoesOnAfterARejectionAndAfterD) {
+TEST_F(PlannerNodeTest, ProposesAgainAfterARejectionAndAfterAnAbstentionForTheDomain) {
   Say(Standing());
   Run(3);
   Say(Decision(candidates_.back(), decision_t::REJECTED, decision_t::CAUSE_QUEUE_FULL));
@@ -735,7 +735,7 @@ TEST_F(WithdrawnPlanTest, AStopIsProposedAtOnceFromTheNextHandover) {
   EXPECT_EQ(Summary()["stopping_rounds"], 1);
 }
 
-TEST_F(WithdrawnPlanTest, OtherWaysToStopFollowAnAbstention) {
+TEST_F(WithdrawnPlanTest, OtherStopsAreProposedAfterAnAbstention) {
   Execute(3);
   Withdraw(6);
   Run(1);
@@ -755,7 +755,7 @@ TEST_F(WithdrawnPlanTest, OtherWaysToStopFollowAnAbstention) {
   EXPECT_GE(steering.size(), 3u) << "held, to the left, to the right";
 }
 
-TEST_F(WithdrawnPlanTest, NoStopIsProposedBeyondWhatStands) {
+TEST_F(WithdrawnPlanTest, NoStopIsProposedAfterTheLastStepThatStands) {
   Execute(3);
   Withdraw(3);
   Run(3);
@@ -765,14 +765,14 @@ TEST_F(WithdrawnPlanTest, NoStopIsProposedBeyondWhatStands) {
   EXPECT_EQ(candidates_.size(), 1u) << "what was withdrawn does not stand again";
 }
 
-TEST_F(WithdrawnPlanTest, TheLastBoundaryThatStandsIsStillGood) {
+TEST_F(WithdrawnPlanTest, AStopIsProposedAtTheLastBoundaryThatStands) {
   Execute(3);
   Withdraw(4);
   Run(1);
   EXPECT_EQ(candidates_.size(), 2u);
 }
 
-TEST_F(WithdrawnPlanTest, ARepetitionBeginsNoOtherRound) {
+TEST_F(WithdrawnPlanTest, ARepeatedWithdrawalStartsNoNewRound) {
   Execute(3);
   Withdraw(6);
   Run(1);
@@ -797,7 +797,7 @@ TEST_F(WithdrawnPlanTest, ARoundUnderWayGivesWayToTheStop) {
   EXPECT_EQ(candidates_[2].progress_steps, 0);
 }
 
-TEST_F(WithdrawnPlanTest, ACertifiedPlanThatTakesOverInTimeIsEnough) {
+TEST_F(WithdrawnPlanTest, NoStopIsProposedWhereACertifiedPlanTakesOverInTime) {
   Execute(3);
   const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
   now_ = candidates_[0].start_utime + due * kPeriod;

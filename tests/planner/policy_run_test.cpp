@@ -84,7 +84,7 @@ TEST(PolicyRun, ThePolicyProposesTheGateDecidesAndOnlyCertifiedPlansAreDriven) {
   EXPECT_EQ(traffic.planner["proposed"], traffic.candidates.size());
 }
 
-TEST(PolicyRun, IsTheSameEveryTime) {
+TEST(PolicyRun, TwoRunsAreIdentical) {
   const Config config = LoadConfig(kTask);
   const Traffic one = RunTask(config), two = RunTask(config);
   EXPECT_EQ(one.robot, two.robot);

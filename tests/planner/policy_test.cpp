@@ -33,7 +33,7 @@ Policy Small() {
   return policy;
 }
 
-TEST(Policy, ComputesWhatItsHeaderSays) {
+TEST(Policy, ComputesTheDocumentedFormula) {
   const Eigen::MatrixXd block = Small().Act(Vec({5, 4}));
   const double h = std::tanh(0.3 * (5 - 1) / 2.0 - 0.1 * (4 - 2) / 4.0 + 0.25);
   ASSERT_EQ(block.rows(), 1);
@@ -141,7 +141,7 @@ TEST(Reference, IsFeasibleAndHoldsItsAccelerationAndSteering) {
   EXPECT_EQ(states(5, 20), 0.1);
 }
 
-TEST(Reference, FeaturesDoNotDependOnWhereItIs) {
+TEST(Reference, FeaturesDoNotDependOnPositionAndHeading) {
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   const Eigen::VectorXd start = Vec({0, 0, 0, 5, 1, 0.1}), off = Vec({0.1, -0.2, 0.05, 0.3, -0.4, 0.01});
   const double turn = 0.7;

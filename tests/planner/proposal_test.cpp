@@ -186,7 +186,7 @@ TEST(Planner, SearchesWhereHintsAreOfNoUse) {
   EXPECT_FALSE(AreEqual(*searched, *proposed)) << "otherwise the above shows nothing";
 }
 
-TEST(Planner, TheHintsKeepMarginsToo) {
+TEST(Planner, ProposalsByHintsKeepTheMargins) {
   const Config config = Bicycle();
   PlanRequest request = WithHints(From(Vec({0, 3, 0, 7, 0, 0}), 1));
   const auto planner = PlannerOf(config);
@@ -218,7 +218,7 @@ TEST(Planner, AnObstacleNearerThanTheClearanceAtTheStartDoesNotStopIt) {
   EXPECT_TRUE(planner->Propose(From(beside, 5, 1)));
 }
 
-TEST(Planner, NoProposalFromWhereNoneCanBe) {
+TEST(Planner, ProposesNothingFromAnObstacleFromOutsideTheDomainOrWithoutRoomToStop) {
   const Config config = Bicycle();
   const auto planner = PlannerOf(config);
   EXPECT_FALSE(planner->Propose(From(Vec({25, 1, 0, 0, 0, 0}), 1)));   // inside an obstacle

@@ -41,13 +41,13 @@ TEST(ResidualEstimate, AtAnObservationItIsWhatWasObserved) {
   for (const double v : {1.0, 3.0, 6.0}) EXPECT_NEAR(PredictedHeading(estimate, v), 0.01 * v, 1e-12);
 }
 
-TEST(ResidualEstimate, BetweenObservationsItLiesBetween) {
+TEST(ResidualEstimate, InterpolatesBetweenObservations) {
   const ResidualEstimate estimate(WithResidual({1, 2, 3, 4, 5, 6}, [](double v) { return 0.01 * v; }));
   EXPECT_NEAR(PredictedHeading(estimate, 3.5), 0.035, 1e-12);
   EXPECT_GT(PredictedHeading(estimate, 3.8), PredictedHeading(estimate, 3.5));
 }
 
-TEST(ResidualEstimate, OneObservationIsEnough) {
+TEST(ResidualEstimate, PredictsFromASingleObservation) {
   const ResidualEstimate estimate(WithResidual({2}, [](double) { return 0.25; }));
   EXPECT_NEAR(PredictedHeading(estimate, 9), 0.25, 1e-12);
 }

@@ -209,7 +209,7 @@ TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
   EXPECT_EQ(refusals.foreign, channels);
 }
 
-TEST(BusCommandsTest, NobodyThereIsSaid) {
+TEST(BusCommandsTest, StatusSaysThatNoCertifierAnswered) {
   const ScratchDirectory scratch;
   const std::string path = scratch.Write("task.yaml", PatientTask());
   const Output status = Forereach("status --config '" + path + "' --lcm-url '" + PrivateBusUrl() + "' 2>&1");

@@ -80,7 +80,7 @@ TEST(MemoryBusTest, EverySubscriberHears) {
   EXPECT_THAT(heard, testing::UnorderedElementsAre(1, 2));
 }
 
-TEST(MemoryBusTest, IsPrivateToItself) {
+TEST(MemoryBusTest, TwoBusesDoNotHearEachOther) {
   const auto one = OpenBus("memq://"), other = OpenBus("memq://");
   int heard = 0;
   other->Subscribe("A", [&](const Received&) { ++heard; });
@@ -105,7 +105,7 @@ TEST(MemoryBusTest, CountsWhatItsQueueCannotHold) {
 }
 
 // Messages that are long are bounded by their bytes, before there are so many.
-TEST(MemoryBusTest, HoldsSoManyBytesOnly) {
+TEST(MemoryBusTest, DropsMessagesBeyondItsBoundOfBytes) {
   const auto bus = OpenBus("memq://", [] { return 0; });
   constexpr std::size_t kBound = std::size_t{32} << 20, kLongest = kMaxDatagramBytes - kDatagramHeaderBytes - 2;
   const std::vector<std::uint8_t> longest(kLongest), rest(kBound % kLongest), more(kBound % kLongest + 1);
@@ -156,7 +156,7 @@ class ThrowingHandlerTest : public testing::TestWithParam<const char*> {
 INSTANTIATE_TEST_SUITE_P(Buses, ThrowingHandlerTest, testing::Values("memq", "udpm"),
                          [](const auto& instance) { return std::string(instance.param); });
 
-TEST_P(ThrowingHandlerTest, LosesThatMessageOnly) {
+TEST_P(ThrowingHandlerTest, LosesOnlyTheMessageOnWhichItThrows) {
   const auto bus = OpenBus(url());
   std::vector<std::int64_t> heard;
   bus->Subscribe("A", [&](const Received& r) {

@@ -20,7 +20,7 @@ TEST(BusUrlTest, EveryPartIsRead) {
   EXPECT_EQ(url.ForSending(), "udpm://224.1.2.3:65535?ttl=255") << "LCM's sender receives nothing";
 }
 
-TEST(BusUrlTest, WhatIsLeftOutIsAsLcmHasIt) {
+TEST(BusUrlTest, PartsLeftOutHaveTheDefaultsOfLcm) {
   for (const char* text : {"udpm://", "udpm://?ttl=0", "udpm://239.255.76.67:7667", "udpm://239.255.76.67:7667?"}) {
     EXPECT_EQ(ParseMulticastUrl(text).ForSending(), "udpm://239.255.76.67:7667?ttl=0") << text;
     EXPECT_EQ(ParseMulticastUrl(text).receive_buffer_bytes, 0) << text;

@@ -131,7 +131,7 @@ TEST_F(AdvisingCertifierTest, AnAdviceComesAfterItsDecisionAndNotInItsTick) {
   EXPECT_EQ(advices_[1].sequence, 1);
 }
 
-TEST_F(AdvisingCertifierTest, ThereIsNoneUnlessTheTaskAsksForIt) {
+TEST_F(AdvisingCertifierTest, GivesNoAdviceUnlessTheTaskAsksForIt) {
   Begin(false);
   Ask(1, kAccelerationIntoTheCircle);
   Run();
@@ -140,7 +140,7 @@ TEST_F(AdvisingCertifierTest, ThereIsNoneUnlessTheTaskAsksForIt) {
   EXPECT_EQ(order_, "d");
 }
 
-TEST_F(AdvisingCertifierTest, ACertificateAsksForNone) {
+TEST_F(AdvisingCertifierTest, GivesNoAdviceOnACertificate) {
   Ask(1, kAccelerationThatCertifies);
   Run();
   EXPECT_FALSE(node_->busy());
@@ -149,7 +149,7 @@ TEST_F(AdvisingCertifierTest, ACertificateAsksForNone) {
 }
 
 // What waits is answered first, and who has asked before has gone on.
-TEST_F(AdvisingCertifierTest, ANewerCandidateDropsIt) {
+TEST_F(AdvisingCertifierTest, DropsItsAdviceForANewerCandidate) {
   Ask(1, kAccelerationIntoTheCircle);
   Run();
   Ask(2, kAccelerationThatCertifies);
@@ -162,7 +162,7 @@ TEST_F(AdvisingCertifierTest, ANewerCandidateDropsIt) {
   EXPECT_EQ(order_.back(), 'a') << "of many that wait, after all of them, and on one";
 }
 
-TEST_F(AdvisingCertifierTest, AMessageThatArrivesMeanwhileDropsIt) {
+TEST_F(AdvisingCertifierTest, DropsItsAdviceWhenAMessageArrivesDuringTheSearch) {
   Ask(1, kAccelerationIntoTheCircle);
   Run();
   Ask(2, kAccelerationThatCertifies);  // arrives during the search
@@ -185,7 +185,7 @@ TEST_F(AdvisingCertifierTest, ASearchTakesNoLongerThanADecisionMay) {
   EXPECT_FALSE(node_->busy()) << "and is not tried again";
 }
 
-TEST_F(AdvisingCertifierTest, OtherObstaclesDropIt) {
+TEST_F(AdvisingCertifierTest, DropsItsAdviceWhenTheObstaclesChange) {
   config_.gate.obstacles = ObstaclesSource::kBus;
   Begin(true);
   const auto see = [&](double x, int sequence) {
@@ -204,7 +204,7 @@ TEST_F(AdvisingCertifierTest, OtherObstaclesDropIt) {
   EXPECT_EQ(order_, "d");
 }
 
-TEST_F(CertifierNodeTest, WhatStillWaitsAtTheEndIsAnswered) {
+TEST_F(CertifierNodeTest, AnswersWaitingCandidatesBeforeItEnds) {
   for (int id = 1; id <= 20; ++id) bus_->Publish("PLAN_CANDIDATE", Candidate(id));
   bus_->Dispatch(0);
   testing::internal::CaptureStdout();
@@ -214,7 +214,7 @@ TEST_F(CertifierNodeTest, WhatStillWaitsAtTheEndIsAnswered) {
   EXPECT_EQ(decisions_.size(), 20u);
 }
 
-TEST_F(CertifierNodeTest, WhoWaitsIsAnsweredBeforeItsStart) {
+TEST_F(CertifierNodeTest, AnswersAWaitingCandidateBeforeItsStart) {
   for (int id = 1; id <= 12; ++id) {
     candidate_plan_t candidate = Candidate(id);
     if (id == 1) candidate.start_utime = now_us_ + 4999;  // gate.decision_budget_ms is 5
@@ -233,7 +233,7 @@ TEST_F(CertifierNodeTest, WhoWaitsIsAnsweredBeforeItsStart) {
 }
 
 // Each answer takes its time, and those of a flood together longer than the few that may wait have.
-TEST_F(CertifierNodeTest, AFloodKeepsNobodyWaitingBeyondItsStart) {
+TEST_F(CertifierNodeTest, AnswersEachCandidateOfAFloodBeforeItsStart) {
   const Clock slow = [this] { return now_us_ += 50; };
   clocks_ = {slow, slow};
   Restart();
@@ -384,7 +384,7 @@ class ObstaclesNodeTest : public CertifierNodeTest {
   std::int64_t next_sequence_ = 0, next_plan_id_ = 1;
 };
 
-TEST_F(ObstaclesNodeTest, NothingIsCertifiedBeforeTheyAreHeardNorAfterARestart) {
+TEST_F(ObstaclesNodeTest, CertifiesNothingBeforeObstaclesAreHeardNorAfterARestart) {
   for (int start = 0; start < 2; ++start) {
     ExpectUnknown("none has been heard yet");
     EXPECT_TRUE(certified_.empty());
@@ -399,7 +399,7 @@ TEST_F(ObstaclesNodeTest, NothingIsCertifiedBeforeTheyAreHeardNorAfterARestart) 
   }
 }
 
-TEST_F(ObstaclesNodeTest, SilenceNeverBecomesNoObstacles) {
+TEST_F(ObstaclesNodeTest, SilenceMakesObstaclesUnknownNotAbsent) {
   Say({});
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   now_us_ += 1'000'000;
@@ -431,7 +431,7 @@ TEST_F(ObstaclesNodeTest, TheTimeoutCountsWithinATick) {
   EXPECT_EQ(decisions_.back().cause, decision_t::CAUSE_NO_OBSTACLES);
 }
 
-TEST_F(ObstaclesNodeTest, OneThatIsRefusedOrMissingMakesThemUnknown) {
+TEST_F(ObstaclesNodeTest, ARefusedOrMissingMessageMakesObstaclesUnknown) {
   Say({});
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   obstacles_t bad = Seen(kOnTheWay);
@@ -449,7 +449,7 @@ TEST_F(ObstaclesNodeTest, OneThatIsRefusedOrMissingMakesThemUnknown) {
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(ObstaclesNodeTest, TheyOvertakeCandidatesThatWait) {
+TEST_F(ObstaclesNodeTest, ObstaclesAreTakenBeforeCandidatesThatWait) {
   bus_->Publish("PLAN_CANDIDATE", Candidate(1));
   Say(kOnTheWay);
   bus_->Publish("PLAN_CANDIDATE", Candidate(2));
@@ -458,7 +458,7 @@ TEST_F(ObstaclesNodeTest, TheyOvertakeCandidatesThatWait) {
   EXPECT_EQ(GetDigest(decisions_[0].obstacles_digest), GetDigest(decisions_[1].obstacles_digest));
 }
 
-TEST_F(ObstaclesNodeTest, AllThatIsMissingIsNamed) {
+TEST_F(ObstaclesNodeTest, NamesEveryMissingPrecondition) {
   config_.gate.needs_robot_state = true;
   Restart();
   const decision_t decision = Ask();
@@ -471,7 +471,7 @@ TEST_F(ObstaclesNodeTest, AllThatIsMissingIsNamed) {
   EXPECT_EQ(GetText(Ask().message), "rejected: waits for the robot's state");
 }
 
-TEST_F(ObstaclesNodeTest, WhereTheTaskIsTheWorldOthersAreRefusedAndTheHeartbeatSaysSo) {
+TEST_F(ObstaclesNodeTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAllAndSaysSo) {
   config_.gate.obstacles = ObstaclesSource::kTask;
   Restart();
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
@@ -486,7 +486,7 @@ TEST_F(ObstaclesNodeTest, WhereTheTaskIsTheWorldOthersAreRefusedAndTheHeartbeatS
   EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr("; OBSTACLES is refused"));
 }
 
-TEST_F(ObstaclesNodeTest, ATaskThatDoesNotSayWhereTheyComeFromIsRefused) {
+TEST_F(ObstaclesNodeTest, RefusesATaskThatDoesNotSayWhereObstaclesComeFrom) {
   config_.gate.obstacles = ObstaclesSource::kUnsaid;
   config_.path = "task.yaml";
   try {
@@ -645,7 +645,7 @@ TEST_F(TwoCertifiersTest, OneThatTakesOverWithoutObstaclesCertifiesNothing) {
   EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_NO_OBSTACLES);
 }
 
-TEST_F(TwoCertifiersTest, TheFirstWasPausedAndFindsTheSecondInCharge) {
+TEST_F(TwoCertifiersTest, TheFirstGivesWayAfterAPauseInWhichTheSecondTookOver) {
   FOREREACH_START_BOTH();
   paused_[0] = true;
   Pass(4'000'000);
@@ -741,7 +741,7 @@ TEST_F(TwoCertifiersTest, AFaultThatNoHeartbeatHasShownIsTakenOver) {
   EXPECT_EQ(Status(1).fault, fault_t::CLOCK_JUMP);
 }
 
-TEST_F(TwoCertifiersTest, AnOldHeartbeatIsNoCertifier) {
+TEST_F(TwoCertifiersTest, IgnoresARecordedHeartbeat) {
   for (SharedBus& bus : buses_) bus.clock = clock_;
   Start(0);
   Pass(1'000'000);
@@ -994,7 +994,7 @@ class StrangerTest : public ArmedNodeTest {
   }
 };
 
-TEST_F(StrangerTest, APlanThatNobodyCertifiedLatchesOnceAnotherCertifiersAreOver) {
+TEST_F(StrangerTest, LatchesOnAnUnknownPlanOnceEarlierCertifiersPlansHaveEnded) {
   SayState(State());
   StandFor(kTolerated);
   SayState(State(7, 3));
@@ -1012,7 +1012,7 @@ TEST_F(StrangerTest, APlanThatNobodyCertifiedLatchesOnceAnotherCertifiersAreOver
   EXPECT_EQ(faults_.back().sequence, 1) << "it still does";
 }
 
-TEST_F(StrangerTest, WhatThisCertifierCertifiedMayBeExecutedAndNoFurther) {
+TEST_F(StrangerTest, LatchesWhenItsOwnPlanRunsBeyondItsEnd) {
   SayState(State());
   StandFor(kTolerated + 1);
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
@@ -1038,7 +1038,7 @@ TEST_F(StrangerTest, WhatThisCertifierCertifiedMayBeExecutedAndNoFurther) {
   EXPECT_EQ(faults_.back().sequence, 1);
 }
 
-TEST_F(StrangerTest, ARejectedCandidateIsNotCertified) {
+TEST_F(StrangerTest, LatchesWhenAnAbstainedCandidateIsExecuted) {
   SayState(State());
   StandFor(kTolerated + 1);
   ASSERT_EQ(Ask(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
@@ -1048,7 +1048,7 @@ TEST_F(StrangerTest, ARejectedCandidateIsNotCertified) {
 }
 
 // A certifier in shadow mode looks on while something else decides.
-TEST_F(StrangerTest, ShadowModeLatchesNothing) {
+TEST_F(StrangerTest, ShadowModeDoesNotLatchOnAnUnknownPlan) {
   config_.gate.shadow = true;
   Restart();
   bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
@@ -1124,7 +1124,7 @@ TEST_F(ArmedNodeTest, AFaultThatStopsTheRobotTakesThePlaceOfOneThatDoesNot) {
   }
 }
 
-TEST_F(ArmedNodeTest, ManyTransitionsAreIndexedOnTheWay) {
+TEST_F(ArmedNodeTest, IndexesManyTransitionsWhileItRuns) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> anywhere(-2, 2);
   for (int i = 0; i < 1000; ++i) {
@@ -1139,7 +1139,7 @@ TEST_F(ArmedNodeTest, ManyTransitionsAreIndexedOnTheWay) {
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
 }
 
-TEST_F(ArmedNodeTest, ATaskThatDoesNotLearnIgnoresThem) {
+TEST_F(ArmedNodeTest, ATaskThatDoesNotLearnIgnoresTransitions) {
   config_.gate.learns = false;
   Restart();
   bus_->Publish("TRANSITION", Executed(*config_.problem->model, Eigen::VectorXd::Zero(6), 0.01));
@@ -1238,7 +1238,7 @@ class ReloadTest : public testing::Test {
   certifier_status_v3_t status_{};
 };
 
-TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
+TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
   const auto node = Begin();
   const Config before = LoadConfig(path_);
   ASSERT_EQ(status_.version, 1);
@@ -1303,7 +1303,7 @@ TEST_F(ReloadTest, TheSizesOfTheModelCannotChange) {
   expect_refused(2, "the number of safety coordinates");
 }
 
-TEST_F(ReloadTest, TheKeyCannotChange) {
+TEST_F(ReloadTest, RefusesATaskWithAnotherKey) {
   const std::string keys = MakeTestKeys(scratch_ / "keys"), others = MakeTestKeys(scratch_ / "others");
   const auto with_key = [&](const std::string& key) {
     Copy([&](const std::string& text) { return text + (key.empty() ? "" : "\nbus: {key: " + key + "}\n"); });
@@ -1392,7 +1392,7 @@ TEST_F(ReloadTest, NoDeclarationComesBackThatATransitionContradicts) {
   EXPECT_EQ(status_.failed_reloads, 3) << "nor after another";
 }
 
-TEST_F(ReloadTest, OneThatIsAskedForMeanwhileComesAfter) {
+TEST_F(ReloadTest, ReloadsOnceMoreForRequestsDuringAReload) {
   const auto node = Begin();
   for (int i = 0; i < 3; ++i) node->Reload();
   TickUntil(*node, [&] { return status_.version >= 3; });

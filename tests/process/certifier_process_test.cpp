@@ -209,7 +209,7 @@ class CertifierObstaclesTest : public testing::Test {
 };
 
 // Before: S; SIGKILL; restart: "certified: no obstacles".
-TEST_F(CertifierObstaclesTest, ARestartedCertifierCertifiesNothingBeforeItHasHeardThem) {
+TEST_F(CertifierObstaclesTest, ARestartedCertifierCertifiesNothingBeforeItHearsObstacles) {
   auto perception = StartPerception();
   auto certifier = StartCertifier();
   EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
@@ -245,7 +245,7 @@ TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
   EXPECT_EQ(second->Terminate(), 0) << second->error();
 }
 
-TEST_F(CertifierObstaclesTest, ATaskThatDoesNotSayWhereTheyComeFromIsRefused) {
+TEST_F(CertifierObstaclesTest, RefusesATaskThatDoesNotSayWhereObstaclesComeFrom) {
   std::string task = PatientTask();
   task.replace(task.find("obstacles: task, "), 17, "");
   const std::string path = scratch_.Write("unsaid.yaml", task);

@@ -87,12 +87,12 @@ TEST(DatagramTest, ANameIsPrintable) {
   EXPECT_FALSE(IsChannelName(std::string_view("A\0B", 3)));
 }
 
-TEST(DatagramTest, TheSequenceMayBeAnything) {
+TEST(DatagramTest, AnySequenceNumberIsTaken) {
   for (const std::uint32_t sequence : {0u, 1u, 0x8000'0000u, 0xffff'ffffu})
     EXPECT_EQ(KindOf(ShortMessage("A", {}, sequence)), DatagramKind::kMessage);
 }
 
-TEST(DatagramTest, WhatFitsOneDatagram) {
+TEST(DatagramTest, AMessageFitsUpToTheLargestDatagram) {
   for (const std::size_t name : {std::size_t{1}, std::size_t{14}, kMaxChannelBytes}) {
     const std::size_t longest = kMaxDatagramBytes - kDatagramHeaderBytes - name - 1;
     EXPECT_TRUE(FitsOneDatagram(name, longest)) << name;

@@ -291,7 +291,7 @@ TEST_F(LatchTest, OneContradictionOfADeclarationIsEnough) {
   EXPECT_EQ(held->contradictions.size(), 1u);
 }
 
-TEST_F(LatchTest, MoreContradictionsThanFitArmNobody) {
+TEST_F(LatchTest, IsNotReadyWithMoreContradictionsThanFit) {
   FalsifyAndEnd();
   LatchFile file(directory_);
   LatchFile::Content content = file.Read().value();
@@ -338,7 +338,7 @@ TEST_F(LatchTest, AsManyContradictionsFitAsAreAllowed) {
   EXPECT_EQ(read->contradictions.back().pair.z, pair.z);
 }
 
-TEST_F(LatchTest, OneDirectoryIsOneCertifiers) {
+TEST_F(LatchTest, RefusesADirectoryThatAnotherCertifierUses) {
   Begin();
   try {
     const LatchFile second(directory_);
@@ -358,7 +358,7 @@ struct Damage {
 };
 class DamagedLatchTest : public LatchTest, public testing::WithParamInterface<Damage> {};
 
-TEST_P(DamagedLatchTest, IsNoFreedom) {
+TEST_P(DamagedLatchTest, ADamagedLatchFileDoesNotArm) {
   Begin();
   Fault();
   node_.reset();
@@ -528,7 +528,7 @@ TEST_F(LatchTest, AResetThatCannotBeWrittenClearsNothing) {
   ExpectArmed();
 }
 
-TEST_F(LatchTest, AFullDiskTakesAFaultOrArmsNobody) {
+TEST_F(LatchTest, StoresAFaultOnAFullDiskOrDoesNotArm) {
   const SmallDisk disk(directory_, "size=256k");
   if (!disk.mounted) GTEST_SKIP() << "no right to mount a small disk here";
   const std::string filler = directory_ + "/filler";
@@ -549,7 +549,7 @@ TEST_F(LatchTest, AFullDiskTakesAFaultOrArmsNobody) {
   ExpectArmed();
 }
 
-TEST_F(LatchTest, AReadOnlyDiskArmsNobodyAndItsFaultIsSaid) {
+TEST_F(LatchTest, DoesNotArmOnAReadOnlyDiskAndSaysWhy) {
   const SmallDisk disk(directory_, "size=256k");
   if (!disk.mounted) GTEST_SKIP() << "no right to mount a small disk here";
   ASSERT_TRUE(disk.Remount(MS_RDONLY));

@@ -41,7 +41,7 @@ TEST(LoggerProcessTest, RecordsAndEndsWithASummary) {
 }
 
 // Exit status 1 tells whoever started it that something which it had confirmed is gone.
-TEST(LoggerProcessTest, EndsWithOneIfItsLogWasDeleted) {
+TEST(LoggerProcessTest, ExitsWithOneIfItsLogWasDeleted) {
   const ScratchDirectory scratch;
   const std::string path = scratch.Write("task.yaml", PatientTask()), directory = scratch / "recorded";
   BusProbe probe(PrivateBusUrl(), {"LOGGER_STATUS"});

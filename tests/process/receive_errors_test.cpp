@@ -54,7 +54,7 @@ INSTANTIATE_TEST_SUITE_P(Errors, ReceiveErrorsTest,
                          testing::Values(ENETDOWN, ENOBUFS, ENOMEM, EHOSTUNREACH, EIO, EBADF),
                          [](const auto& instance) { return "Errno" + std::to_string(instance.param); });
 
-TEST_P(ReceiveErrorsTest, AreCountedAndPassAndDoNotMakeItSpin) {
+TEST_P(ReceiveErrorsTest, CountsErrorsAndReceivesAgainWithoutSpinning) {
   ASSERT_TRUE(sender_.Send(Bytes(ShortMessage("BEFORE", {}))));
   ASSERT_TRUE(WaitUntil([this] { return heard_ == 1; }));
   const auto begin = std::chrono::steady_clock::now();
@@ -69,7 +69,7 @@ TEST_P(ReceiveErrorsTest, AreCountedAndPassAndDoNotMakeItSpin) {
   EXPECT_TRUE(WaitUntil([this] { return heard_ == 2; })) << "it goes on with what has come";
 }
 
-TEST_F(NoErrorsTest, ATimeoutOrASignalIsNone) {
+TEST_F(NoErrorsTest, DoesNotCountATimeoutOrASignal) {
   for (const int error : {EAGAIN, EINTR}) {
     calls_with_error = 0;
     error_now = error;

@@ -35,7 +35,7 @@ class ReloadProcessTest : public testing::TestWithParam<const char*> {
                          "--lcm-url", PrivateBusUrl()}};
 };
 
-TEST_P(ReloadProcessTest, OfWhatIsNoRegularFileIsRefusedAndTheNextIsTaken) {
+TEST_P(ReloadProcessTest, RefusesAFileThatIsNotRegularAndTakesTheNext) {
   std::filesystem::remove(path_);
   ASSERT_EQ(::mkfifo(path_.c_str(), 0600), 0);
   process_.Signal(SIGHUP);
@@ -51,14 +51,14 @@ TEST_P(ReloadProcessTest, OfWhatIsNoRegularFileIsRefusedAndTheNextIsTaken) {
   EXPECT_EQ(process_.Terminate(), 0) << process_.error();
 }
 
-TEST_P(ReloadProcessTest, ThatNeverEndsKeepsNobodyFromEndingIt) {
+TEST_P(ReloadProcessTest, EndsDuringAReadThatNeverEnds) {
   std::ofstream(marker_) << "";
   process_.Signal(SIGHUP);
   EXPECT_TRUE(process_.WaitForLog("does not answer")) << process_.error();
   EXPECT_EQ(process_.Terminate(), 0) << process_.error();
 }
 
-TEST_P(ReloadProcessTest, ThatNeverEndsKeepsNobodyFromAnother) {
+TEST_P(ReloadProcessTest, ReloadsAgainDuringAReadThatNeverEnds) {
   std::ofstream(marker_) << "";
   process_.Signal(SIGHUP);
   EXPECT_TRUE(process_.WaitForLog("does not answer")) << process_.error();

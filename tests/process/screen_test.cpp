@@ -71,7 +71,7 @@ class ScreenTest : public testing::TestWithParam<const char*> {
 INSTANTIATE_TEST_SUITE_P(Buses, ScreenTest, testing::Values("memq", "udpm"),
                          [](const auto& instance) { return std::string(instance.param); });
 
-TEST_P(ScreenTest, HandlersGetWhatItAdmitsWithoutWhatItCutOff) {
+TEST_P(ScreenTest, HandlersGetAdmittedMessagesWithoutTheirTrailer) {
   std::vector<Heard> heard;
   bus_->Subscribe("A", Into(heard));
   Send("A", {kGood, 10, 11});
@@ -82,7 +82,7 @@ TEST_P(ScreenTest, HandlersGetWhatItAdmitsWithoutWhatItCutOff) {
   EXPECT_EQ(bus_->dropped(), 0) << "refused is not dropped";
 }
 
-TEST_P(ScreenTest, UncheckedHandlersGetAllInOrderAndOfTheRefusedNoMessage) {
+TEST_P(ScreenTest, UncheckedHandlersGetEveryMessageInOrderWithoutTheContentOfRefusedOnes) {
   std::vector<Heard> heard, checked;
   bus_->SubscribeUnchecked(Bus::kEveryChannel, Into(heard));
   bus_->Subscribe("A", Into(checked));
@@ -120,7 +120,7 @@ TEST_P(ScreenTest, AMessageForWhichItThrowsIsLostAndCounted) {
 }
 
 // So that a flood of forged messages costs no honest one.
-TEST_P(ScreenTest, RefusedOnesMakeRoomAmongThemselvesAlone) {
+TEST_P(ScreenTest, RefusedMessagesNeverDisplaceAdmittedOnes) {
   std::vector<Heard> heard;
   bus_->SubscribeUnchecked("A", Into(heard));
   constexpr int kForged = 1000;
@@ -136,7 +136,7 @@ TEST_P(ScreenTest, RefusedOnesMakeRoomAmongThemselvesAlone) {
   EXPECT_EQ(bus_->dropped(), 0);
 }
 
-TEST_P(ScreenTest, RefusedOnesAreBoundedByTheirBytesToo) {
+TEST_P(ScreenTest, RefusedMessagesAreBoundedByTheirBytes) {
   std::vector<Heard> heard;
   bus_->SubscribeUnchecked("A", Into(heard));
   Raw forged(60'000);

@@ -235,7 +235,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
   });
 }
 
-TEST(SignedChannels, AreTheseAndTheirSpeakers) { EXPECT_EQ(BusOptions{}.speakers(), kSpeakers); }
+TEST(SignedChannels, EveryChannelHasItsSpeaker) { EXPECT_EQ(BusOptions{}.speakers(), kSpeakers); }
 
 TEST_P(SignedChannelsTest, OnlyWhatItsSpeakerSignsNowHasAnEffect) {
   const std::string& channel = GetParam();

@@ -128,7 +128,7 @@ TEST_F(UdpReceiverTest, WithIpOptionsOrAnyTimeToLiveAMessageIsAMessage) {
 }
 
 // A signal makes the receiving thread's recvmsg fail; it goes on.
-TEST_F(UdpReceiverTest, SignalsDoNotDisturbIt) {
+TEST_F(UdpReceiverTest, ReceivesOnAfterASignal) {
   struct sigaction action {
   }, before{};
   action.sa_handler = [](int) {};
@@ -148,7 +148,7 @@ TEST_F(UdpReceiverTest, SignalsDoNotDisturbIt) {
   ::sigaction(SIGUSR1, &before, nullptr);
 }
 
-TEST_F(UdpReceiverTest, NoDatagramMakesItTakeMemory) {
+TEST_F(UdpReceiverTest, NoDatagramMakesItsMemoryGrow) {
   std::mt19937 random(7);
   const RawDatagram real = ShortMessage("ROBOT_STATE", RawDatagram(300, 5));
   const double before = ResidentBytes(::getpid());

@@ -57,7 +57,7 @@ TEST_P(UsageTest, WithoutAKeyItWarns) {
   }
 }
 
-TEST_P(UsageTest, WithoutConfigItSaysSo) {
+TEST_P(UsageTest, ExitsWithTwoWithoutConfig) {
   ChildProcess process({program()});
   EXPECT_EQ(process.WaitForExit(), 2);
   EXPECT_THAT(process.error(), HasSubstr("--config is required"));

@@ -199,7 +199,7 @@ TEST_F(WithdrawnDriveTest, LostWithdrawalsAreRepeated) {
 }
 
 // Replayed from before: a certifier that was restarted counts its withdrawals from 0 again.
-TEST_F(WithdrawnDriveTest, AnOldAnswerAnswersNothing) {
+TEST_F(WithdrawnDriveTest, AnOldAnswerDoesNotStopTheRepetition) {
   Drive();
   RunFor(200'000);
   lossy_.to_lose["PLAN_WITHDRAWN"] = 3;

@@ -43,7 +43,7 @@ class CheckTest : public testing::Test {
   Database database_;
 };
 
-TEST_F(CheckTest, AWholeLogIsWhole) {
+TEST_F(CheckTest, AnUndamagedLogIsReportedWhole) {
   const LogCheck check = Check();
   EXPECT_TRUE(check.whole_log());
   EXPECT_EQ(check.whole, 5);
@@ -87,7 +87,7 @@ TEST_F(CheckTest, ALogThatNoRunKnowsIsListed) {
   EXPECT_EQ(ToJson(checks)[1]["state"], "unknown");
 }
 
-TEST_F(CheckTest, AMissingLogIsAFaultADeletedOneIsNot) {
+TEST_F(CheckTest, AMissingLogIsAFaultUnlessItWasDeletedForTheQuota) {
   std::filesystem::remove(log_);
   EXPECT_EQ(Check().log, LogCheck::Log::kMissing);
   EXPECT_FALSE(Check().whole_log());

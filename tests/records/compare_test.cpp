@@ -92,7 +92,7 @@ TEST_F(CompareTest, ACertificateThatIsLostIsNamed) {
   EXPECT_EQ(twice.candidates, 134);
 }
 
-TEST_F(CompareTest, SaysItAsJsonToo) {
+TEST_F(CompareTest, PrintsJson) {
   const Output output = CompareUnder(kConfig, kLog, "--json");
   EXPECT_EQ(output.code, 0) << output.text;
   const auto document = nlohmann::json::parse(output.text);
@@ -142,7 +142,7 @@ TEST_F(CompareTest, ManyRobotsAreToldApart) {
   EXPECT_THAT(first.text, HasSubstr((scratch_ / "night/a") + ": 0 of 47 abstentions"));
 }
 
-TEST_F(CompareTest, NeedsATask) {
+TEST_F(CompareTest, RefusesToCompareWithoutOneTask) {
   EXPECT_EQ(Forereach("replay '" + kLog + "' --compare 2>&1").code, 2);
   EXPECT_EQ(Forereach("replay '" + kLog + "' --compare --other-task --config '" + kConfig + "' 2>&1").code, 2);
 }

@@ -56,7 +56,7 @@ Rows SampleRows() {
   return rows;
 }
 
-TEST(Database, RoundTrip) {
+TEST(Database, RowsSurviveARoundTrip) {
   const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");
   database.BeginRun("a.lcmlog", 10);

@@ -39,7 +39,7 @@ void PutLength(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t v
     bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
 }
 
-TEST(EventLog, RoundTrip) {
+TEST(EventLog, EventsSurviveARoundTrip) {
   const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   const LogContents contents = ReadLog(scratch / "log");
@@ -105,7 +105,7 @@ TEST(EventLog, WeReadLcmsFile) {
   EXPECT_EQ(std::string(contents.events[2].data.begin(), contents.events[2].data.end()), data);
 }
 
-TEST(EventLog, EmptyFileEnds) {
+TEST(EventLog, AnEmptyFileHasNoEventsAndAMissingOneIsAnError) {
   const ScratchDirectory scratch;
   WriteBytes(scratch / "log", {});
   EXPECT_EQ(ReadLog(scratch / "log").end, LogStatus::kEnd);
@@ -113,7 +113,7 @@ TEST(EventLog, EmptyFileEnds) {
   EXPECT_THROW(EventLogReader(scratch.path()), LogError);
 }
 
-TEST(EventLog, CutAtEveryByteOfTheLastRecord) {
+TEST(EventLog, ALogCutInsideItsLastRecordKeepsTheOthers) {
   const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
@@ -142,7 +142,7 @@ TEST(EventLog, CutAtEveryByteOfTheLastRecord) {
 
 class CorruptLength : public testing::TestWithParam<std::uint32_t> {};
 
-TEST_P(CorruptLength, LosesThatRecordOnly) {
+TEST_P(CorruptLength, ARecordWithACorruptLengthIsTheOnlyOneLost) {
   const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   for (const std::size_t field : {20u, 24u}) {
@@ -256,7 +256,7 @@ TEST(EventLog, RecoveryRemovesNoGarbage) {
   EXPECT_GT(std::filesystem::file_size(scratch / "log"), size + 100);
 }
 
-TEST(EventLog, OneWriterAFile) {
+TEST(EventLog, RefusesASecondWriter) {
   const ScratchDirectory scratch;
   const EventLogWriter writer(scratch / "log");
   EXPECT_THROW(EventLogWriter(scratch / "log"), LogError);
@@ -280,7 +280,7 @@ class FileSizeLimit final {
 };
 
 // A flush fails half-way, and the file cannot be cut back: it is sealed against that here.
-TEST(EventLog, NothingConfirmedIsLostWhereTheFileCannotBePutBack) {
+TEST(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
   const int file = ::memfd_create("log", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   ASSERT_GE(file, 0);
   ASSERT_EQ(::fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK), 0);
@@ -324,7 +324,7 @@ TEST(EventLog, RefusesWhatTheFormatCannotHold) {
 }
 
 // Whatever is changed, the reader ends, accounts for every byte, and returns only records that are in the file.
-TEST(EventLog, SurvivesMutation) {
+TEST(EventLog, ReadsAnyMutationWithoutInventingRecords) {
   const ScratchDirectory scratch;
   WriteSample(scratch / "log", 12);
   const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");

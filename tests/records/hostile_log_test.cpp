@@ -226,7 +226,7 @@ TEST_F(HostileLog, LengthsDoNotFillTheMemory) {
 }
 
 // Claims of 16 MiB before every tiny record, each of which the file is long enough for: none is believed.
-TEST_F(HostileLog, ClaimsThatAreNotBelievedTakeNoMemory) {
+TEST_F(HostileLog, RefusedLengthsTakeNoMemory) {
   constexpr int kRecords = 10'000;
   std::vector<std::uint8_t> claim{0xED, 0xA1, 0xDA, 0x01};
   claim.resize(28);

@@ -45,7 +45,7 @@ TEST_F(InterpreterTest, AnOvertakenMessageCostsOneGap) {
   ExpectOneGap("bus", 2, 3, 1);  // what comes late stays counted
 }
 
-TEST_F(InterpreterTest, ZeroIsANewBeginningWhateverItsStamp) {
+TEST_F(InterpreterTest, SequenceZeroAfterHigherOnesIsARestartWhateverItsStamp) {
   for (const std::int64_t first : {std::int64_t{0}, 100 * kSecond, 50 * kSecond})
     for (std::int64_t sequence = 0; sequence < 10; ++sequence) Hear(sequence, first + sequence);
   ASSERT_EQ(rows_.gaps.size(), 2u);
@@ -57,7 +57,7 @@ TEST_F(InterpreterTest, ZeroIsANewBeginningWhateverItsStamp) {
   }
 }
 
-TEST_F(InterpreterTest, WhatIsSaidAgainAndAgainIsNoRestartThoughItsClockIsAhead) {
+TEST_F(InterpreterTest, ARepeatedMessageIsNoRestartEvenIfItsClockIsAhead) {
   for (const std::int64_t sequence : {0, 7}) {
     Interpreter fresh({}, "log");
     std::swap(interpreter_, fresh);
@@ -66,12 +66,12 @@ TEST_F(InterpreterTest, WhatIsSaidAgainAndAgainIsNoRestartThoughItsClockIsAhead)
   }
 }
 
-TEST_F(InterpreterTest, ZeroThatComesTwiceIsNone) {
+TEST_F(InterpreterTest, ARepeatedSequenceZeroIsNoRestart) {
   for (const std::int64_t sequence : {0, 0, 1, 2, 0, 3}) Hear(sequence, sequence);
   EXPECT_TRUE(rows_.gaps.empty());
 }
 
-TEST_F(InterpreterTest, ALaterStampWithASmallerSequenceIsANewBeginning) {
+TEST_F(InterpreterTest, ALaterStampWithASmallerSequenceIsARestart) {
   for (const std::int64_t sequence : {7, 8, 9}) Hear(sequence, sequence);
   Hear(3, kSecond);
   Hear(2, kSecond - 1);
@@ -79,7 +79,7 @@ TEST_F(InterpreterTest, ALaterStampWithASmallerSequenceIsANewBeginning) {
   ExpectOneGap("restart", 10, 3, 3);  // lost: the first ones of the new count
 }
 
-TEST_F(InterpreterTest, AStampFarAheadHidesNoNewBeginning) {
+TEST_F(InterpreterTest, ARestartIsFoundAfterAStampFarAhead) {
   Hear(7, 3600 * kSecond, 0);
   Hear(8, std::numeric_limits<std::int64_t>::max() - kNow, 1);
   Hear(3, 2 * kSecond);
@@ -88,7 +88,7 @@ TEST_F(InterpreterTest, AStampFarAheadHidesNoNewBeginning) {
   EXPECT_EQ(rows_.gaps[0].got, 3);
 }
 
-TEST_F(InterpreterTest, SequencesAtTheEndsOfTheirRange) {
+TEST_F(InterpreterTest, CountsGapsAtTheEndsOfTheRangeOfSequences) {
   using Limits = std::numeric_limits<std::int64_t>;
   constexpr std::int64_t kMin = Limits::min(), kMax = Limits::max();
   std::int64_t stamp = 0;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -31,21 +32,12 @@ TEST(Outlines, HullsAreCounterClockwiseAndConvex) {
 }
 
 Problem Car() {
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.1, 2.5);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -100), Eigen::VectorXd::Constant(6, 100));
-  problem.domain.state =
-      Box(Eigen::VectorXd{{-100, -100, -3, -20, -3, -0.5}}, Eigen::VectorXd{{100, 100, 3, 20, 3, 0.5}});
-  problem.domain.input = Box(Vector2d(-1, -1), Vector2d(1, 1));
-  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
-  problem.transitions.z = Eigen::MatrixXd::Zero(1, 8);
-  problem.transitions.x_next = Eigen::MatrixXd::Zero(1, 6);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2.5), Within({100, 100, 3, 20, 3, 0.5}), Within({1, 1}));
   problem.body = {.heading = 2, .parts = {{{{-1, -1, 0}, {3, -1, 0}, {3, 1, 0}, {-1, 1, 0}}, 0}, {{{4, 0, 0}}, 0.5}}};
   return problem;
 }
 
-TEST(Outlines, AStandingBodyIsItsParts) {
+TEST(Outlines, ABodyAtAStateIsDrawnPartByPart) {
   const Problem car = Car();
   const Eigen::VectorXd x{{10, 20, M_PI / 2, 0, 0, 0}};
   const auto parts = BodyAt(car, x);

@@ -28,7 +28,7 @@ Picture Sample() {
   return picture;
 }
 
-TEST(Picture, WritesBothFormats) {
+TEST(Picture, WritesSvgAndPng) {
   const ScratchDirectory scratch;
   DrawPicture(Sample(), scratch / "a.svg");
   DrawPicture(Sample(), scratch / "a.png", 600, 400);
@@ -40,7 +40,7 @@ TEST(Picture, WritesBothFormats) {
   EXPECT_EQ(png[22] << 8 | png[23], 400);
 }
 
-TEST(Picture, SameInputSameBytes) {
+TEST(Picture, TheSameInputGivesTheSameBytes) {
   const ScratchDirectory scratch;
   DrawPicture(Sample(), scratch / "a.png");
   DrawPicture(Sample(), scratch / "b.png");
@@ -51,7 +51,7 @@ TEST(Picture, SameInputSameBytes) {
   EXPECT_NE(ReadBytes(scratch / "a.png"), ReadBytes(scratch / "c.png"));
 }
 
-TEST(Picture, DrawsNothingAndDegenerateThings) {
+TEST(Picture, DrawsAnEmptyPictureAndDegenerateShapes) {
   const ScratchDirectory scratch;
   EXPECT_NO_THROW(DrawPicture({}, scratch / "empty.svg"));
   Picture picture;
@@ -91,7 +91,7 @@ TEST(Picture, FilesAreThoseOfTheNameOrRefusedWithASentence) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1) << "no file is touched";
 }
 
-TEST(Picture, APdfIsAPdf) {
+TEST(Picture, WritesAPdf) {
   const ScratchDirectory scratch;
   DrawPicture(Sample(), scratch / "a.pdf");
   const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "a.pdf");

@@ -101,7 +101,7 @@ TEST_F(QueriesTest, EveryQueryAnswers) {
   EXPECT_GE(with_rows, queries - 3) << "the course has gaps of no kind, and no rejections";
 }
 
-TEST_F(QueriesTest, TheFirstOneCountsWhatTheLogHas) {
+TEST_F(QueriesTest, TheFirstQueryCountsTheDecisionsOfTheLog) {
   const std::string text = Document();
   const std::size_t at = text.find("```sql\n") + 7;
   int decisions = 0, certified = 0;

@@ -127,7 +127,7 @@ TEST_F(WithdrawnReplayTest, EachWithdrawalIsJudgedAgainOnce) {
   EXPECT_THAT(result.differences, testing::IsEmpty());
 }
 
-TEST_F(WithdrawnReplayTest, AnotherNumberOfStepsAnotherObstacleOrOtherGroundsDiffer) {
+TEST_F(WithdrawnReplayTest, ListsAWithdrawalWithOtherStepsAnotherObstacleOrOtherGrounds) {
   const auto differences = [this](auto alter) { return Replayed(alter).differences; };
   EXPECT_THAT(differences([](withdrawal_t& message) { ++message.valid_steps; }),
               testing::Each(HasSubstr("steps that stand, cause obstacle; replayed")));
@@ -138,7 +138,7 @@ TEST_F(WithdrawnReplayTest, AnotherNumberOfStepsAnotherObstacleOrOtherGroundsDif
               testing::Each(HasSubstr("its certified plan is not in the log")));
 }
 
-TEST_F(WithdrawnReplayTest, AWithdrawalWithoutAJudgementIsACircumstance) {
+TEST_F(WithdrawnReplayTest, ListsNoDifferenceForAWithdrawalWithoutAJudgement) {
   const ReplayResult result = Replayed([](withdrawal_t& message) { message.cause = withdrawal_t::NOT_JUDGED; });
   EXPECT_EQ(result.circumstances, 2);
   EXPECT_THAT(result.differences, testing::IsEmpty());
@@ -327,7 +327,7 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
 }
 
 // Each message has other stamps; the sender changes its type between them.
-TEST_F(ReplayTest, ObstaclesThatMoveReplay) {
+TEST_F(ReplayTest, AgreesOnARunWithMovingObstacles) {
   Config config = SmallTaskOnTheBus();
   config.gate.max_clock_error_ms = 20;
   const std::string path = NewLog();

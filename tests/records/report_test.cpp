@@ -12,23 +12,16 @@
 #include "forereach/robot_state_t.hpp"
 #include "tests/paths.h"
 #include "tests/records/logs.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
 
 /** A point mass without residual, and one circle at (3, 0). */
 Config PointMassConfig() {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakePointMass(0.15);
-  problem->domain.state = Box(Eigen::VectorXd::Constant(4, -20), Eigen::VectorXd::Constant(4, 20));
-  problem->domain.input = Box(Eigen::VectorXd::Constant(2, -1), Eigen::VectorXd::Constant(2, 1));
-  problem->declaration.lipschitz = Eigen::MatrixXd::Zero(4, 6);
-  problem->declaration.noise_bound = Eigen::VectorXd::Zero(4);
-  problem->transitions.z = Eigen::MatrixXd::Zero(1, 6);
-  problem->transitions.x_next = Eigen::MatrixXd::Zero(1, 4);
-  problem->projection = Eigen::MatrixXd::Identity(2, 4);
   Config config;
-  config.problem = problem;
+  config.problem =
+      std::make_shared<const Problem>(WorldOf(MakePointMass(0.15), Within({20, 20, 20, 20}), Within({1, 1})));
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3, 0), 0.5)};
   config.planner.goal = {0, 5};
   return config;
@@ -140,7 +133,7 @@ TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {
   EXPECT_TRUE(drawn.picture.abstained.empty());
 }
 
-TEST_F(LogPictureTest, WantsAPlane) {
+TEST_F(LogPictureTest, RefusesATaskThatIsNotPlanar) {
   Config config = PointMassConfig();
   auto line = std::make_shared<Problem>(*config.problem);
   line->projection = Eigen::MatrixXd::Identity(1, 4);

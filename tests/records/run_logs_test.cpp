@@ -124,7 +124,7 @@ class FinishedRunsTest : public RunLogsTest {
   const std::string directory_ = scratch_ / "kept";
 };
 
-TEST_F(FinishedRunsTest, AResultBelongsToWhatItWasMadeOf) {
+TEST_F(FinishedRunsTest, AResultIsReusedOnlyForTheInputsItWasMadeFrom) {
   const RunLogs run{"r", {Log("log/a.lcmlog", 0, 3)}, "", {}};
   std::string key;
   {
@@ -151,7 +151,7 @@ TEST_F(FinishedRunsTest, AResultBelongsToWhatItWasMadeOf) {
   EXPECT_NE(finished.KeyOf(run), key) << "another byte";
 }
 
-TEST_F(FinishedRunsTest, WhatIsDamagedCountsAsNone) {
+TEST_F(FinishedRunsTest, ADamagedResultIsNotReused) {
   const std::string key(64, 'a');
   const FinishedRuns finished(directory_, "export");
   const std::string part = finished.PathOf(key, "csv");
@@ -187,7 +187,7 @@ TEST_F(FinishedRunsTest, OtherFilesOfTheDirectoryStay) {
   EXPECT_THROW(FinishedRuns(scratch_ / "file", ""), BadInput);
 }
 
-TEST(OutputFile, HasItsNameWhenItIsWhole) {
+TEST(OutputFile, HasItsNameOnlyOnceItIsWhole) {
   const ScratchDirectory scratch;
   const auto files = [&] {
     return std::distance(std::filesystem::directory_iterator(scratch.path()), std::filesystem::directory_iterator());

@@ -118,7 +118,7 @@ TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
   EXPECT_EQ(of_log, of_database);
 }
 
-TEST(Summary, OfNothingIsUnknownNotZero) {
+TEST(Summary, DistanceToTheGoalOfAnEmptyLogIsUnknownNotZero) {
   const ScratchDirectory scratch;
   WriteBytes(scratch / "log", {});
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());

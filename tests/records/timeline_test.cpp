@@ -166,7 +166,7 @@ TEST_F(TimelineTest, ObstaclesThatCameBeforeARestartAreForgottenAlsoWhereNothing
   ExpectAllAgree();
 }
 
-TEST_F(TimelineTest, AStartThatADecisionTellsOf) {
+TEST_F(TimelineTest, FindsAStartOfTheCertifierFromADecisionAlone) {
   Heartbeat(7, 1);
   Certify();
   Certify();
@@ -181,7 +181,7 @@ TEST_F(TimelineTest, AStartThatADecisionTellsOf) {
   ExpectAllAgree();
 }
 
-TEST_F(TimelineTest, ARunWithSeveralFilesRestartsAndReloads) {
+TEST_F(TimelineTest, ReconstructsGroundsAcrossFilesRestartsAndReloads) {
   Restart();
   Obstacles(80);
   Transition();
@@ -206,7 +206,7 @@ TEST_F(TimelineTest, ARunWithSeveralFilesRestartsAndReloads) {
 }
 
 // The log has a message before the decision; the certifier receives it only afterwards.
-TEST_F(TimelineTest, ADecisionWithoutTheLatestObstacles) {
+TEST_F(TimelineTest, ReconstructsADecisionMadeBeforeTheLatestObstaclesArrived) {
   Restart();
   Obstacles(80);
   Certify();

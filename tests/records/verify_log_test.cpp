@@ -75,7 +75,7 @@ TEST(VerifyLog, RecordedCourseIsConfirmed) {
   }
 }
 
-TEST(VerifyLog, SliceShrunkenByOneUlp) {
+TEST(VerifyLog, NoticesASliceShrunkenByOneUlp) {
   ScratchDirectory scratch;
   const auto path = EditedCertificate(scratch, false, [](certified_plan_t& certified) {
     certified.slice_upper[9][0] = std::nextafter(certified.slice_upper[9][0], -HUGE_VAL);
@@ -87,7 +87,7 @@ TEST(VerifyLog, SliceShrunkenByOneUlp) {
 }
 
 // The seal made good again covers no entry beyond those in use: these have to be zero.
-TEST(VerifyLog, AnEntryBeyondThoseInUse) {
+TEST(VerifyLog, NoticesAnUnusedEntryThatIsNotZero) {
   ScratchDirectory scratch;
   const auto path = EditedCertificate(
       scratch, true, [](certified_plan_t& certified) { certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5; });
@@ -98,7 +98,7 @@ TEST(VerifyLog, AnEntryBeyondThoseInUse) {
   EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed) << "the mathematics does not see it";
 }
 
-TEST(VerifyLog, ALaterExpiry) {
+TEST(VerifyLog, NoticesALaterExpiry) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1'000'000; });
@@ -107,7 +107,7 @@ TEST(VerifyLog, ALaterExpiry) {
   EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("certificate_digest"));
 }
 
-TEST(VerifyLog, SliceShrunkenAndResealed) {
+TEST(VerifyLog, RefutesASliceThatWasShrunkenAndResealed) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
@@ -119,7 +119,7 @@ TEST(VerifyLog, SliceShrunkenAndResealed) {
   EXPECT_THAT(verdict.failure.what, HasSubstr("contains x"));
 }
 
-TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
+TEST(VerifyLog, NoticesAChangedControlOfTheCertifiedPlan) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
@@ -245,7 +245,7 @@ class VerifyObstacles : public testing::Test {
   std::function<void(decision_t&)> edit_decision_;
 };
 
-TEST_F(VerifyObstacles, ThoseInForceAreTaken) {
+TEST_F(VerifyObstacles, JudgesByTheObstaclesInForce) {
   const auto file = ReadCertificates(Record(), kConfig);
   ASSERT_EQ(file.certificates.size(), 1u);
   EXPECT_TRUE(file.certificates[0].mismatches.empty());
@@ -253,7 +253,7 @@ TEST_F(VerifyObstacles, ThoseInForceAreTaken) {
   EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
 }
 
-TEST_F(VerifyObstacles, MovedOntoThePath) {
+TEST_F(VerifyObstacles, NoticesAnObstacleMovedOntoThePath) {
   const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_v2_t& certified) {
                                        obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
                                        obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
@@ -264,7 +264,7 @@ TEST_F(VerifyObstacles, MovedOntoThePath) {
   EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle 0"));
 }
 
-TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
+TEST_F(VerifyObstacles, RefutesAnObstacleMovedOntoThePathAndResealed) {
   const auto file =
       ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_v2_t& certified) {
                          obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
@@ -279,7 +279,7 @@ TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
 }
 
 // The robot goes by them after a restart of the certifier.
-TEST_F(VerifyObstacles, OtherTransitionsOfTheTaskAndResealed) {
+TEST_F(VerifyObstacles, NoticesOtherTransitionsOfTheTaskThatAreResealed) {
   const auto file = ReadCertificates(Record([](obstacles_t&, certified_plan_v2_t& certified) {
                                        certified.transitions_digest[7] ^= 1;
                                        SetDigest(certified.certificate_digest, CertificateDigest(certified));
@@ -538,7 +538,7 @@ TEST_F(VerifyMovingObstacles, WhatIsNowhereDuringThePlanIsNotNamed) {
             Status::kRefuted);
 }
 
-TEST_F(VerifyObstacles, StaleOnesWereNeverInForce) {
+TEST_F(VerifyObstacles, NoticesStaleObstaclesThatWereNeverInForce) {
   const auto file = ReadCertificates(
       Record([](obstacles_t& obstacles, certified_plan_v2_t&) { obstacles.utime -= 10'000'000; }), kConfig);
   EXPECT_GE(file.certificates[0].mismatches.size(), 1u);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -18,9 +19,7 @@ constexpr std::int64_t kT0 = 1'700'000'000'000'000;
 
 // A bicycle with P = (x, y), so that both coordinates and the heading can bulge.
 Problem Bicycle() {
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.2, 2.5);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  Problem problem = WorldOf(MakeKinematicBicycle(0.2, 2.5), Within({40, 40, 3, 25, 3, 0.48}), Within({20, 2}));
   problem.between = Between{Vector2d(0, 4), 0, 0, 0.2};
   return problem;
 }
@@ -50,7 +49,7 @@ TEST(Contacts, AreMetAtTheFullBulgeOnEitherSide) {
   }
 }
 
-TEST(Contacts, KeepTheSamples) {
+TEST(Contacts, AreFoundAtASampleWhateverTheBound) {
   Problem problem = Bicycle();
   problem.between->acceleration = Vector2d(40, 40);
   EXPECT_THAT(Contacts(problem, Post(2.4, 0.05 - kLittle)), SizeIs(1));
@@ -113,7 +112,7 @@ TEST(Contacts, OfPartsAtExpressionsAreMetOnTheirOwnWay) {
   EXPECT_THAT(Contacts(problem, Post(0, 0), from, to), IsEmpty()) << "the frame is no part of this body";
 }
 
-TEST(Contacts, InASampleAreThoseOfTheWholeBody) {
+TEST(Contacts, AtASampleCoverTheWholeBody) {
   Problem problem = Bicycle();
   problem.body = {.heading = 2, .parts = {{{{2, 1, 0}, {2, -1, 0}, {-1, -1, 0}, {-1, 1, 0}}, 0}}};
   const std::vector<Obstacle> obstacles{Post(2 + 0.05 + kLittle, 0), Post(2 + 0.05 - kLittle, 0), Post(9, 9)};

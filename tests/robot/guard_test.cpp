@@ -65,7 +65,7 @@ TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
   EXPECT_EQ(guard.executing(), nullptr);
 }
 
-TEST(GuardAccept, WhatItExpectsCanChange) {
+TEST(GuardAccept, TakesPlansOfTheTaskThatItIsToldToExpect) {
   Guard guard(TwoStates());
   const auto cause = [&](std::int64_t plan_id, const char* config, const char* model) {
     certified_plan_v2_t certified = SmallPlan();
@@ -207,7 +207,7 @@ TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
   EXPECT_EQ(altered([](auto& c) { c.slice_lower[128][15] = kNaN; }).cause, GuardCause::kUnusedEntry);
 }
 
-TEST(GuardAccept, RefusesNumbersThatBoundNothing) {
+TEST(GuardAccept, RefusesNumbersThatAreNotFiniteAndEmptyBounds) {
   for (const double bad : {kNaN, kInf, -kInf}) {
     for (const auto change : {+[](certified_plan_v2_t&c, double x) { c.plan.initial_center[1] = x; },
                               +[](certified_plan_v2_t&c, double x) { c.plan.initial_half_width[0] = x; },
@@ -292,7 +292,7 @@ TEST(GuardAccept, ARefusedPlanLeavesPendingAndLastIdAlone) {
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
 }
 
-TEST(GuardStart, TheBoundsOfX0AreInside) {
+TEST(GuardStart, TakesTheBoundsOfX0AsInside) {
   for (const double x : {0.5, 1.5}) EXPECT_TRUE(Start(SmallPlan(), {x, -2}).ok()) << x;
   for (const double y : {-2.25, -1.75}) EXPECT_TRUE(Start(SmallPlan(), {1, y}).ok()) << y;
   for (const State outside : {State{Below(0.5), -2}, {Above(1.5), -2}, {1, Below(-2.25)}, {1, Above(-1.75)}})
@@ -334,7 +334,7 @@ TEST(GuardStart, X0IsComparedExactly) {
   EXPECT_GT(on_the_edge, 100) << "some rounded sums lie outside, or the exact comparison is not tested";
 }
 
-TEST(GuardStart, AFlatX0HasOneState) {
+TEST(GuardStart, AFlatX0AdmitsOneStateOnly) {
   certified_plan_v2_t certified = SmallPlan();
   certified.plan.initial_half_width[0] = certified.plan.initial_half_width[1] = 0;
   EXPECT_TRUE(Start(certified, {1, -2}).ok());
@@ -391,7 +391,7 @@ TEST(GuardStart, ARobotThatWasHeldUpDoesNotStartWhatHasExpiredMeanwhile) {
   }
 }
 
-TEST(GuardStart, OnlyAnEarlyPlanIsKept) {
+TEST(GuardStart, KeepsAPendingPlanOnlyIfItIsEarly) {
   Guard guard(TwoStates());
   EXPECT_EQ(guard.TryStart(kStart, kStart, State{1, -2}).cause, GuardCause::kNothingPending);
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
@@ -585,7 +585,7 @@ TEST(GuardSchedule, TimesThatNoIntegerHoldsAreOffTheSchedule) {
   EXPECT_EQ(guard.Check(3, State{0, 0}, -kMost - 1).cause, GuardCause::kOffSchedule);
 }
 
-TEST(GuardSchedule, WithoutAJitterNoTimeCounts) {
+TEST(GuardSchedule, ChecksNoTimesWithoutAJitter) {
   Guard guard = Executing();
   EXPECT_TRUE(guard.Check(1, State{0, 0}, kMost).ok());
   EXPECT_TRUE(guard.Check(2, State{0, 0}, -kMost - 1).ok());
@@ -639,7 +639,7 @@ TEST(GuardKey, TheKeyFileOfTheRobotIsEnough) {
 }
 
 // It does not say which transitions its observations rest on.
-TEST(GuardAccept, APlanOfTheTypeBeforeIsNone) {
+TEST(GuardAccept, RefusesAPlanOfTheOldMessageType) {
   certified_plan_t old{};
   const certified_plan_v2_t plan = SmallPlan();
   old.expires_utime = plan.expires_utime;
@@ -742,7 +742,7 @@ TEST(GuardDomainTest, TheInitialSetIsComparedExactly) {
   EXPECT_EQ(Guard(options).Accept(Sealed(certified), kNow).cause, GuardCause::kOutsideDomain);
 }
 
-TEST(GuardDomainTest, ComesWithTheTaskThatIsReadAgain) {
+TEST(GuardDomainTest, TheDomainChangesWithATaskThatIsReadAgain) {
   GuardOptions options = TwoStates();
   options.domain = Around();
   Guard guard(options);
@@ -776,7 +776,7 @@ GuardOptions WithAnAngle() {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-TEST(GuardAngle, IsInsideAfterWholeTurns) {
+TEST(GuardAngle, AnAngleIsInsideAfterWholeTurns) {
   for (const double turns : {-2, -1, 0, 1, 3}) {
     for (const double heading : {2.6, 3.0, 3.4}) {
       Guard guard(WithAnAngle());
@@ -808,7 +808,7 @@ TEST(GuardAngle, NoOtherStateIsTurned) {
 }
 
 // A state counts as inside only if it certainly is, and without a turn the bounds themselves are.
-TEST(GuardAngle, TheRoundingOfTurnsCountsAgainstIt) {
+TEST(GuardAngle, AnAngleAtItsBoundIsRefusedWhereTurnsAreRounded) {
   const auto start = [](double heading) {
     Guard guard(WithAnAngle());
     EXPECT_TRUE(guard.Accept(Sealed(TurningPlan()), kNow).ok());
@@ -827,7 +827,7 @@ TEST(GuardAngle, TheRoundingOfTurnsCountsAgainstIt) {
     }
 }
 
-TEST(GuardAngle, ComesWithTheTaskThatIsReadAgain) {
+TEST(GuardAngle, TheAnglesChangeWithATaskThatIsReadAgain) {
   Guard guard(TwoStates());
   guard.Expect(DigestOf("second"), DigestOf("model"), {}, std::vector{0});
   guard.Expect(DigestOf("third"), DigestOf("model"));
@@ -853,7 +853,7 @@ TEST(GuardAngle, ComesWithTheTaskThatIsReadAgain) {
   EXPECT_FALSE(guard.TryStart(kStart, kStart, State{3 - kTurn, -2}).ok());
 }
 
-TEST(GuardHalt, ForgetsWhatWaitsAndWhatExecutes) {
+TEST(GuardHalt, ForgetsThePendingAndTheExecutingPlan) {
   Guard guard = Executing();
   ASSERT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   guard.Halt();

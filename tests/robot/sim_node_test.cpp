@@ -26,6 +26,7 @@
 #include "tests/keys.h"
 #include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -55,18 +56,18 @@ std::int64_t BoundaryTime(int j) { return kT0 + j * kPeriod; }
 Config PointMassTask() {
   Config config;
   config.path = "task.yaml";
-  Problem problem;
-  problem.model = MakePointMass(0.15);
-  problem.projection = Eigen::MatrixXd::Identity(2, 4);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(4, -1e3), Eigen::VectorXd::Constant(4, 1e3));
-  problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
-  config.problem = std::make_shared<const Problem>(problem);
+  config.problem =
+      std::make_shared<const Problem>(WorldOf(MakePointMass(0.15), Within({1e3, 1e3, 1e3, 1e3}), Within({1e3, 1e3})));
   config.grounds.config = DigestOf("config");
   config.grounds.model = DigestOf("model");
   config.planner.goal = {100, 0};
   config.robot.start = {0, 0, 0, 0};
   config.robot.step_period_ms = 40;
   return config;
+}
+
+Problem LargeBicycle(std::shared_ptr<const NominalModel> model) {
+  return WorldOf(std::move(model), Within({1e3, 1e3, 1e3, 1e3, 1e3, 1e3}), Within({1e3, 1e3}));
 }
 
 // Forward for half of the steps, then back to rest: the second half is the tail. X0 = `state` +- 0.1, slices anything.
@@ -267,7 +268,7 @@ TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
 }
 
 // A model as text has names of its own, so the task says what is zero while the robot stands.
-TEST(RobotSim, APlantMovesItInPlaceOfTheTarget) {
+TEST(RobotSim, AGivenPlantReplacesTheTarget) {
   const Config config = PointMassTask();
   std::vector<std::vector<double>> from;
   double hidden = 0;
@@ -284,7 +285,7 @@ TEST(RobotSim, APlantMovesItInPlaceOfTheTarget) {
   EXPECT_EQ(rig.StateAt(3), (std::vector<double>{0.02, 0, 2, 0}));
 }
 
-TEST(RobotSim, OfATextStandsByRobotHold) {
+TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
   Config config = PointMassTask();
   ModelText text;
   text.name = "text";
@@ -391,7 +392,7 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
 }
 
 // It begins while the certifier has a fault latched, and hears of the reset first.
-TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
+TEST(RobotSim, IgnoresAFaultFromBeforeTheLastReset) {
   const Config config = PointMassTask();
   Rig rig(config);
   const auto send = [&](const std::string& channel, const auto& message) {
@@ -425,7 +426,7 @@ TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
 }
 
-TEST(RobotSim, WhoHaltsLateIsResetBySomethingLaterStill) {
+TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
@@ -637,7 +638,7 @@ TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
   EXPECT_NEAR(summary["distance_to_goal"].get<double>(), 0.01, 1e-9);
 }
 
-TEST(RobotSim, TheGoalRadiusItselfCounts) {
+TEST(RobotSim, TakesADistanceEqualToTheGoalRadiusAsReached) {
   for (const bool inside : {true, false}) {
     Config config = PointMassTask();
     config.planner.goal = {3, 4};
@@ -709,7 +710,7 @@ TEST(RobotSim, ReportsLimitsThatDoNotHoldAtABoundaryOrWithItsControl) {
   EXPECT_EQ(rig.Summary()["contacts"], 0);
 }
 
-TEST(RobotSim, JudgesPartsAtExpressions) {
+TEST(RobotSim, ReportsContactOfPartsAtExpressions) {
   Config config = PointMassTask();
   Problem problem = *config.problem;
   problem.body.parts = {BodyPart{{}, 0.25, {{{"px + 1"}, {"py"}}}}};
@@ -771,7 +772,7 @@ TEST(RobotSim, ALateTickGivesTheSameRun) {
   }
 }
 
-TEST(RobotSim, WhatExpiredWhileItWasHeldUpIsNotStarted) {
+TEST(RobotSim, DoesNotStartAPlanThatExpiredWhileItWasHeldUp) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
@@ -783,11 +784,7 @@ TEST(RobotSim, WhatExpiredWhileItWasHeldUpIsNotStarted) {
 
 TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   Config config = PointMassTask();
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.1, 2.5);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -1e3), Eigen::VectorXd::Constant(6, 1e3));
-  problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
+  const Problem problem = LargeBicycle(MakeKinematicBicycle(0.1, 2.5));
   config.problem = std::make_shared<const Problem>(problem);
   config.robot.start = {0, 0, 0, 20, 1, 0.3};
   config.robot_residual = ResidualOf(*problem.model, ResidualNamed("heading_saturation"));
@@ -867,10 +864,7 @@ TEST(RobotSim, AConfigThatDoesNotFitTheModelIsAnError) {
 // A bicycle that turns left from a heading just below pi.
 Config TurningTask() {
   Config config = PointMassTask();
-  Problem problem = *config.problem;
-  problem.model = MakeKinematicBicycle(0.1, 2, {2});
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
-  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -1e3), Eigen::VectorXd::Constant(6, 1e3));
+  Problem problem = LargeBicycle(MakeKinematicBicycle(0.1, 2, {2}));
   problem.body.heading = 2;
   problem.between = Between{Eigen::Vector2d(1, 1), 0.7, 1, 0.1};
   config.problem = std::make_shared<const Problem>(problem);

@@ -202,7 +202,7 @@ TEST_F(SupervisorTest, AResetOlderThanTheFaultIsRefusedAndARepeatedFaultIgnored)
   EXPECT_TRUE(supervisor_.halted());
 }
 
-TEST_F(SupervisorTest, ACommandHasToBeFresh) {
+TEST_F(SupervisorTest, RefusesACommandThatIsTooOldOrFromTheFuture) {
   Fault(At(0), At(0));
   const std::int64_t now = At(100);
   EXPECT_EQ(ResetAt(now - 500'001, now), "stamped 500 ms ago, at most 500 ms allowed");
@@ -265,7 +265,7 @@ TEST_F(SupervisorTest, APlanThatExpiresWhileTheRobotIsHeldUpIsRefused) {
   EXPECT_EQ(supervisor_.counts().started, 1);
 }
 
-TEST_F(SupervisorTest, FinishStepIsPartOfBoundaryAndIsDoneOnce) {
+TEST_F(SupervisorTest, FinishesEachStepOnceWithAndWithoutFinishStep) {
   Accept(SmallPlan(), 0);
   Boundary(0);
   supervisor_.FinishStep(At(1), At(1));

@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 #include <mpfr.h>
 
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/dynamics/models/residuals.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/residual/consistency.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -101,29 +101,17 @@ Reals PointMassTarget(const std::vector<double>& z) {
   return next;
 }
 
-Config Task(std::shared_ptr<const NominalModel> model, std::vector<double> bound, const ResidualText& residual) {
+Config Task(const Problem& problem, const ResidualText& residual) {
   Config config;
   config.path = "task.yaml";
-  Problem problem;
-  const auto n = static_cast<std::size_t>(model->num_states());
-  const auto box = [&bound](std::size_t begin, std::size_t end) {
-    const auto size = static_cast<Eigen::Index>(end - begin);
-    const Eigen::VectorXd upper = Eigen::Map<Eigen::VectorXd>(bound.data() + begin, size);
-    return Box(-upper, upper);
-  };
-  problem.domain.state = box(0, n);
-  problem.domain.input = box(n, bound.size());
-  config.robot_residual = ResidualOf(*model, residual);
-  problem.model = std::move(model);
-  config.problem = std::make_shared<const Problem>(std::move(problem));
+  config.robot_residual = ResidualOf(*problem.model, residual);
+  config.problem = std::make_shared<const Problem>(problem);
   return config;
 }
 
-Config Bicycle() {
-  return Task(MakeKinematicBicycle(0.1, 2.5), {40, 40, 3, 25, 3, 0.48, 20, 2}, ResidualNamed("heading_saturation"));
-}
+Config Bicycle() { return Task(PaperBicycle(), ResidualNamed("heading_saturation")); }
 
-Config PointMassTask() { return Task(MakePointMass(0.15), {20, 20, 5.4, 5.4, 2, 2}, ResidualNamed("velocity_knee")); }
+Config PointMassTask() { return Task(PaperPointMass(5.4, 2), ResidualNamed("velocity_knee")); }
 
 std::vector<double> Step(const Target& target, const std::vector<double>& z, std::size_t n) {
   std::vector<double> next(n);
@@ -170,7 +158,7 @@ TEST(Target, BicycleIsRoundedOnce) { ExpectOneRounding(Bicycle(), BicycleTarget,
 TEST(Target, PointMassIsRoundedOnce) { ExpectOneRounding(PointMassTask(), PointMassTarget, 2); }
 
 // Rates with stages, and a residual with definitions and a kink.
-TEST(Target, OfTextsIsRoundedOnce) {
+TEST(Target, TextModelIsRoundedOnce) {
   const ModelText text = TextModel({{"angle", "rate"}, {"rate", "torque - 9.81*sin(angle)"}}, {"torque"},
                                    {{"dt", 0.05, 0.05}}, {}, ModelText::Integrator::kRk4);
   const ResidualText friction{
@@ -187,7 +175,7 @@ TEST(Target, OfTextsIsRoundedOnce) {
     next[1] = next[1] - dt * Real(0.3) * Real(z[1]) * Abs(Real(z[1]));
     return next;
   };
-  ExpectOneRounding(Task(MakeTextModel(text), {3, 5, 2}, friction), reference, 3);
+  ExpectOneRounding(Task(WorldOf(MakeTextModel(text), Within({3, 5}), Within({2})), friction), reference, 3);
 }
 
 // The bits of the compiled equations of model and residual, in the same order of operations.
@@ -222,7 +210,7 @@ TEST(Target, WithoutResidualItIsTheNominalModel) {
   }
 }
 
-TEST(Target, StepsInPlace) {
+TEST(Target, StepsWithInputAndOutputInOneArray) {
   const std::unique_ptr<Target> target = MakeTarget(Bicycle());
   const std::vector<double> z{1, 2, 0.3, 20, 0.5, 0.3, 1, -0.5};
   std::vector<double> x(z.begin(), z.begin() + 6);
@@ -356,7 +344,7 @@ TEST(MakeTransitionsTest, SamplesLieInTheNarrowedDomainAndAreThoseOfTheSeed) {
 
 // The generator and its mapping to numbers are fixed by the standard and by this project, not by the library:
 // the first output of mt19937_64 seeded with 5489 is 14514284786278117030.
-TEST(MakeTransitionsTest, TheFirstSampleIsKnown) {
+TEST(MakeTransitionsTest, TheFirstSampleOfASeedIsTheSpecifiedOne) {
   const Config config = PointMassTask();
   const Transitions made = MakeTransitions(*MakeTarget(config), *config.problem, 5489, 1);
   const double fraction = static_cast<double>(14514284786278117030ull >> 11) * 0x1p-53;

@@ -88,7 +88,7 @@ TEST_F(GuardWithdrawTest, WithoutAWithdrawalEachControlIsGiven) {
   EXPECT_TRUE(guard_.control().empty());
 }
 
-TEST_F(GuardWithdrawTest, NoMessageExtendsWhatStands) {
+TEST_F(GuardWithdrawTest, ALaterWithdrawalNeverRestoresSteps) {
   Start();
   EXPECT_EQ(Withdraw(2), 2);
   EXPECT_EQ(Withdraw(3), 2);
@@ -98,7 +98,7 @@ TEST_F(GuardWithdrawTest, NoMessageExtendsWhatStands) {
   EXPECT_TRUE(guard_.control().empty());
 }
 
-TEST_F(GuardWithdrawTest, MoreStepsThanThePlanHasAreAllOfThem) {
+TEST_F(GuardWithdrawTest, AWithdrawalOfMoreStepsThanThePlanHasLeavesAllOfThem) {
   Start();
   EXPECT_EQ(Withdraw(32767), 3);
   EXPECT_EQ(guard_.standing_steps(), 3);
@@ -112,7 +112,7 @@ TEST_F(GuardWithdrawTest, APendingPlanIsDroppedHoweverManyStepsStand) {
   }
 }
 
-TEST_F(GuardWithdrawTest, ItTakesNoOtherPlan) {
+TEST_F(GuardWithdrawTest, AWithdrawalLeavesOtherPlansAlone) {
   Start(7);
   certified_plan_v2_t next = SmallPlan(8);
   next.plan.start_utime += 2 * kStep;
@@ -133,14 +133,14 @@ TEST_F(GuardWithdrawTest, AWithdrawalThatOvertakesItsPlanKeepsItOut) {
   Accept(8);
 }
 
-TEST_F(GuardWithdrawTest, ItCountsWhileHalted) {
+TEST_F(GuardWithdrawTest, AWithdrawalWhileHaltedKeepsItsPlanOut) {
   guard_.Halt();
   EXPECT_EQ(Withdraw(2), 0);
   guard_.Reset();
   EXPECT_EQ(guard_.Accept(Sealed(SmallPlan(7)), kNow).cause, GuardCause::kReplayed);
 }
 
-TEST_F(GuardWithdrawTest, ThePlanAfterItIsWhole) {
+TEST_F(GuardWithdrawTest, ThePlanAfterAWithdrawnOneHasAllItsSteps) {
   Start(7);
   EXPECT_EQ(Withdraw(1), 1);
   Start(8);
@@ -193,7 +193,7 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsWhateverWasLearnedAfterTheFile) {
   EXPECT_EQ(standing_steps(file, Digest{}), 0) << "as one names that knows of a contradiction and has not learned it";
 }
 
-TEST_F(GuardWithdrawTest, WhatACertifierOfAnotherTaskWithdrewStandsUnderNone) {
+TEST_F(GuardWithdrawTest, AWithdrawalByACertifierOfAnotherTaskLeavesNoStep) {
   Start();
   withdrawal_t unknown = Withdrawal(SmallPlan(), 0, withdrawal_t::UNKNOWN_PLAN);
   EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 3);
@@ -343,7 +343,7 @@ TEST_F(SupervisorWithdrawTest, AControlThatIsBeingAppliedIsStoppedAtOnce) {
   }
 }
 
-TEST_F(SupervisorWithdrawTest, EachMessageIsAnswered) {
+TEST_F(SupervisorWithdrawTest, EachWithdrawalIsAnswered) {
   Make();
   Accept(PlanFrom(0, 7));
   Withdraw(PlanFrom(0, 7), 2, 11);
@@ -415,7 +415,7 @@ TEST_F(SupervisorWithdrawTest, ABrakeThatTakesTimeBeginsBeforeTheEnd) {
   }
 }
 
-TEST_F(SupervisorWithdrawTest, AnEndThatIsNotAtRestIsNoCertifiedStand) {
+TEST_F(SupervisorWithdrawTest, StopsWhereTheStepsThatStandDoNotEndAtRest) {
   Make();
   Accept(PlanFrom(0, 7));
   Boundary(0);
@@ -476,7 +476,7 @@ TEST_F(SupervisorWithdrawTest, AStopThatWaitedForAPlanBeginsOnceThatPlanIsGone) 
   EXPECT_EQ(holds_, 1);
 }
 
-TEST(BrakeTest, TakesAsManyStepsAsItSays) {
+TEST(BrakeTest, StopsInTheNumberOfStepsThatItReports) {
   std::mt19937_64 random(20261123);
   std::uniform_real_distribution<double> exponent(-3, 3), sign(-1, 1);
   for (int i = 0; i < 20'000; ++i) {
@@ -524,7 +524,7 @@ TEST(BrakeTest, TheFarthestStateOfTheBoxCounts) {
   EXPECT_EQ(Brake().StepsToRest(x, x), 0);
 }
 
-TEST(BrakeTest, APartOfAStepTakesAPartOfTheDecline) {
+TEST(BrakeTest, AppliesTheDeclineInProportionToThePartOfAStep) {
   const Brake brake({2, 0});
   const State before{-3, 1};
   State x{-5, 4};

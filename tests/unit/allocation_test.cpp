@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FOREREACH_SANITIZED 1  // the sanitizers own malloc
@@ -51,21 +51,15 @@ namespace forereach {
 namespace {
 
 Problem BicycleProblem() {
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.1, 2.5);
-  const Eigen::VectorXd reach = (Eigen::VectorXd(6) << 40, 40, 3, 25, 3, 0.48).finished();
-  problem.domain.state = Box(-reach, reach);
-  problem.domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
+  Problem problem = PaperBicycle();
   problem.domain.balls.push_back({{0, 1}, Eigen::Vector2d::Zero(), 39});
   problem.domain.inequalities.push_back({Eigen::VectorXd::Unit(8, 3), 20});
-  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
   problem.declaration.lipschitz(2, 3) = 0.02;
   problem.declaration.lipschitz(2, 5) = 0.6;
   problem.transitions.z = Eigen::MatrixXd::Zero(200, 8);
   problem.transitions.z.col(3) = Eigen::VectorXd::LinSpaced(200, 5, 15);
   problem.transitions.x_next = problem.transitions.z.leftCols(6);
   problem.transitions.x_next.col(0) += 0.1 * problem.transitions.z.col(3);
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
   return problem;
 }
 
@@ -91,7 +85,7 @@ class Allocation : public testing::Test {
   Tube tube_;
 };
 
-TEST_F(Allocation, IsCounted) {
+TEST_F(Allocation, TheCounterSeesAllocations) {
   const long before = allocations;
   std::vector<double> block(100);
   Eigen::VectorXd vector(static_cast<Eigen::Index>(block.size()));
@@ -101,7 +95,7 @@ TEST_F(Allocation, IsCounted) {
   EXPECT_GE(allocations - before, 2) << "a counter that counts nothing proves nothing";
 }
 
-TEST_F(Allocation, CertifyDoesNone) {
+TEST_F(Allocation, CertifyAllocatesNothing) {
   std::vector<Obstacle> obstacles{
       Obstacle::Circle(Eigen::Vector2d(10, 8), 1), Obstacle::AxisBox(Eigen::Vector2d(5, 6), Eigen::Vector2d(7, 9)),
       Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 9),
@@ -112,7 +106,7 @@ TEST_F(Allocation, CertifyDoesNone) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
-TEST_F(Allocation, LimitsAndPlacesAtExpressionsDoNone) {
+TEST_F(Allocation, CertifyAllocatesNothingForLimitsAndPlacesAtExpressions) {
   Problem problem = BicycleProblem();
   problem.limits = {{.name = "lateral acceleration", .that = {"v^2*tan(delta)/wheelbase", 1, 1}, .at_most = 4}};
   problem.body.parts = {{{}, 0.5, {{{"x + cos(theta)", 1, 1}, {"y + sin(theta)", 1, 1}}}}};

@@ -32,7 +32,7 @@ ModelText Of(const std::string& x, const std::string& q, Integrator integrator =
 class IsAnAngle : public testing::TestWithParam<const char*> {};
 
 // f0(z + 2 pi e) = f0(z) + 2 pi e, as far as doubles show.
-TEST_P(IsAnAngle, ATurnChangesNothingElse) {
+TEST_P(IsAnAngle, AStateWhoseTurnChangesNothingElseIsAccepted) {
   Random random(651);
   SCOPED_TRACE(random.trace());
   for (const Integrator integrator : {Integrator::kNone, Integrator::kEuler, Integrator::kMidpoint, Integrator::kRk4}) {
@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Equations, IsAnAngle,
 
 class IsNoAngle : public testing::TestWithParam<const char*> {};
 
-TEST_P(IsNoAngle, IsRefusedWithTheEquation) {
+TEST_P(IsNoAngle, AStateThatIsNoAngleIsRefusedWithTheEquation) {
   for (const Integrator integrator : {Integrator::kNone, Integrator::kEuler, Integrator::kRk4})
     EXPECT_THAT([&] { return MakeTextModel(Of(GetParam(), integrator == Integrator::kNone ? "q" : "u", integrator)); },
                 ThrowsMessage<std::invalid_argument>(HasSubstr("angles: q: the equation of x is not seen")));
@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Equations, IsNoAngle,
                                          "abs(q)", "sin(q*x)", "max(q, 0)", "sin(sqrt(q^2 + 1))", "tan(q/4)",
                                          "sin(q*0.1*10)", "sin(q/0.1)", "sin(x/q)", "q/q"));
 
-TEST(Angles, HaveTheirOwnEquation) {
+TEST(Angles, RefuseAnEquationThatDoesNotAddToTheAngle) {
   for (const char* good : {"q", "q + dt*u", "u + q", "2*q - q", "q + sin(q)"})
     EXPECT_NO_THROW(MakeTextModel(Of("x", good))) << good;
   for (const char* wrong : {"u", "2*q", "-q", "one*q", "q + x*q", "0.5*q + 0.25*q"})
@@ -83,7 +83,7 @@ TEST(Angles, HaveTheirOwnEquation) {
       << "a rate that is the angle";
 }
 
-TEST(Angles, OfTheCompiledBicycle) {
+TEST(Angles, TheCompiledBicycleTakesTheHeadingAlone) {
   EXPECT_EQ(MakeKinematicBicycle(0.1, 2, {2})->angles(), std::vector<int>{2});
   EXPECT_TRUE(MakeKinematicBicycle(0.1, 2)->angles().empty());
   for (const int wrong : {3, 4, 6, -1})  // delta stands in a tangent alone
@@ -94,7 +94,7 @@ TEST(Angles, OfTheCompiledBicycle) {
   EXPECT_EQ(MakeKinematicBicycle(0.1, 2)->description(), "kinematic_bicycle dt=0.1 wheelbase=2");
 }
 
-TEST(Angles, AreNamesOfStates) {
+TEST(Angles, RefuseNamesThatAreNoStates) {
   ModelText text = Of("x", "q");
   text.angles = {"u"};
   EXPECT_THROW(MakeTextModel(text), std::invalid_argument);

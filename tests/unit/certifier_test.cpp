@@ -17,6 +17,7 @@
 #include "certifier/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -34,12 +35,6 @@ static_assert(noexcept(std::declval<const Propagator&>().Step(std::declval<const
                                                               std::declval<StepRecord&>(), std::declval<Zonotope&>(),
                                                               nullptr)));
 
-Eigen::VectorXd Vec(std::initializer_list<double> entries) {
-  Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
-  std::copy(entries.begin(), entries.end(), vector.begin());
-  return vector;
-}
-
 // A successor as the nominal model gives it: the residual is zero.
 void AddNominalTransition(Problem& problem, const Eigen::VectorXd& z) {
   Transitions& data = problem.transitions;
@@ -52,21 +47,7 @@ void AddNominalTransition(Problem& problem, const Eigen::VectorXd& z) {
   data.x_next.bottomRows(1) = next.transpose();
 }
 
-Problem Bare(std::shared_ptr<const NominalModel> model, Eigen::VectorXd state, Eigen::VectorXd input) {
-  Problem problem;
-  const int n = model->num_states();
-  problem.model = std::move(model);
-  problem.domain.state = Box(-state, state);
-  problem.domain.input = Box(-input, input);
-  problem.declaration = {Eigen::MatrixXd::Zero(n, problem.model->num_variables()), Eigen::VectorXd::Zero(n)};
-  problem.projection = Eigen::MatrixXd::Identity(2, n);
-  AddNominalTransition(problem, Eigen::VectorXd::Zero(problem.model->num_variables()));
-  return problem;
-}
-
-// One step of 0.5 s: whole numbers stay exact. The residual is declared zero.
-Problem PointMassProblem() { return Bare(MakePointMass(0.5), Vec({100, 100, 4, 4}), Vec({2, 2})); }
-Problem BicycleProblem() { return Bare(MakeKinematicBicycle(0.1, 2.5), Vec({40, 40, 3.2, 25, 3, 2}), Vec({20, 2})); }
+Problem BicycleProblem() { return PaperBicycle(3.2, 2); }
 
 Zonotope PointSet(const Eigen::VectorXd& x) { return Zonotope(x, Eigen::MatrixXd(x.size(), 0)); }
 
@@ -99,7 +80,7 @@ void ExpectNoWitness(const Decision& d, bool coordinate, bool pair, bool obstacl
 }
 
 TEST(Certificate, NamesTheClosestObstacleAndStep) {
-  Judge judge(PointMassProblem());
+  Judge judge(PointMassInHalves());
   const std::vector<Obstacle> obstacles{Obstacle::Circle(Vec({0, 9}), 1), Obstacle::Circle(Vec({2, 3}), 1),
                                         Obstacle::HalfSpace(Vec({1, 0}), 50)};
   const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(4), obstacles);  // 1 m a step along x
@@ -119,16 +100,16 @@ TEST(Certificate, NamesTheClosestObstacleAndStep) {
 }
 
 TEST(Certificate, WithoutObstaclesHasNoMargin) {
-  Judge judge(PointMassProblem());
+  Judge judge(PointMassInHalves());
   const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {});
   EXPECT_EQ(d.outcome, Outcome::kCertified);
   EXPECT_EQ(d.obstacle, -1);
   EXPECT_EQ(d.margin, kInfinity);
 }
 
-TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
+TEST(AbstainSafety, NamesTheStepAtTheStartTheMiddleAndTheEnd) {
   for (const int step : {0, 3, 6}) {
-    Judge judge(PointMassProblem());
+    Judge judge(PointMassInHalves());
     const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(6),
                              {Obstacle::Circle(Vec({0, 50}), 1), Obstacle::Circle(Vec({1.0 * step, 1}), 1.25)});
     EXPECT_EQ(d.outcome, Outcome::kSafety);
@@ -144,8 +125,8 @@ TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
   }
 }
 
-TEST(AbstainSafety, WhereTheStartTouchesAnObstacle) {
-  Judge judge(PointMassProblem());
+TEST(AbstainSafety, AbstainsWhereTheStartTouchesAnObstacle) {
+  Judge judge(PointMassInHalves());
   const Zonotope start = Zonotope::FromBox(Vec({0, 0, 2, 0}), Vec({1, 1, 0, 0}));
   const auto at = [&](double left) {
     return judge(start, Coast(1), {Obstacle::AxisBox(Vec({-9, left}), Vec({9, 9}))});
@@ -158,7 +139,7 @@ TEST(AbstainSafety, WhereTheStartTouchesAnObstacle) {
 
 TEST(AbstainDomain, NamesTheBoundOfEveryKind) {
   using Kind = DomainExit::Kind;
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.domain.inequalities.push_back({Vec({1, 1, 0, 0, 0, 0}), 50});
   problem.domain.balls.push_back({{kVx, kVy}, Vec({0, 0}), 5});
   Judge judge(problem);
@@ -191,7 +172,7 @@ TEST(AbstainDomain, NamesTheBoundOfEveryKind) {
 }
 
 TEST(AbstainDomain, BoundsAreClosed) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.domain.inequalities.push_back({Vec({1, 0, 1, 0, 0, 0}), 8});
   problem.domain.balls.push_back({{kVx, kVy}, Vec({0, 0}), 5});
   Judge judge(problem);
@@ -212,7 +193,7 @@ TEST(AbstainDomain, BoundsAreClosed) {
 }
 
 TEST(AbstainDomain, TheLastSliceMayLieOutside) {
-  Judge judge(PointMassProblem());
+  Judge judge(PointMassInHalves());
   EXPECT_EQ(judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(1), {}).outcome, Outcome::kCertified);
   const Decision d = judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(2), {});
   EXPECT_EQ(d.outcome, Outcome::kDomain);
@@ -220,14 +201,14 @@ TEST(AbstainDomain, TheLastSliceMayLieOutside) {
 }
 
 TEST(AbstainDomain, ComesBeforeSafety) {
-  Judge judge(PointMassProblem());
+  Judge judge(PointMassInHalves());
   const Decision d = judge(PointSet(Vec({98, 0, 3.5, 0})), Coast(3), {Obstacle::Circle(Vec({98, 0}), 1)});
   EXPECT_EQ(d.outcome, Outcome::kDomain) << "although the obstacle is touched at step 0";
   EXPECT_EQ(d.step, 2);
   EXPECT_EQ(d.obstacle, -1);
 }
 
-TEST(AbstainDomain, ThePoleOfTheSteeringHasItsOwnCause) {
+TEST(AbstainDomain, NamesThePoleOfTheSteeringAsItsCause) {
   Judge judge(BicycleProblem());
   const Decision d = judge(Zonotope::FromBox(Vec({0, 0, 0, 5, 0, 1.5}), Vec({0, 0, 0, 0, 0, 0.1})), Coast(2), {});
   EXPECT_EQ(d.outcome, Outcome::kDomain);
@@ -247,7 +228,8 @@ TEST(AbstainDomain, ThePoleOfTheSteeringHasItsOwnCause) {
 
 TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
   const Lines equations{{"x", "x + dt*v"}, {"y", "y"}, {"v", "v - dt*v*abs(v) + dt*u"}};
-  Problem problem = Bare(MakeTextModel(TextModel(equations, {"u"}, {{"dt", 0.5, 0.5}})), Vec({9, 9, 9}), Vec({1}));
+  Problem problem =
+      WorldOf(MakeTextModel(TextModel(equations, {"u"}, {{"dt", 0.5, 0.5}})), Within({9, 9, 9}), Within({1}));
   AddNominalTransition(problem, Eigen::VectorXd::Zero(4));
   const auto shared = std::make_shared<Problem>(problem);
   const Certifier certifier(shared);
@@ -273,7 +255,7 @@ TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
 class NoStop : public testing::TestWithParam<double> {
  protected:
   Decision Brake(double tolerance, const std::vector<Obstacle>& obstacles = {}) {
-    Problem problem = PointMassProblem();
+    Problem problem = PointMassInHalves();
     problem.rest = {{kVy, 1}, {kVx, tolerance}};
     judge_.emplace(problem);
     const double sign = GetParam();
@@ -319,7 +301,7 @@ TEST_P(NoStop, ComesBeforeSafety) {
 INSTANTIATE_TEST_SUITE_P(BothDirections, NoStop, testing::Values(1.0, -1.0));
 
 TEST(AbstainFalsified, NamesThePairBeforeAnythingElse) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   for (const double px : {1.0, 2.0}) AddNominalTransition(problem, Vec({px, 0, 0, 0, 0, 0}));
   problem.declaration.lipschitz(kVy, kPx) = 0.25;
   problem.transitions.x_next(1, kVy) += 0.125;
@@ -344,7 +326,7 @@ TEST(AbstainFalsified, NamesThePairBeforeAnythingElse) {
 }
 
 TEST(Certifier, ConstantResidualMovesTheTube) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.transitions.x_next(0, kVx) += 0.25;
   problem.declaration.noise_bound[kVx] = 0.125;
   Judge judge(problem);
@@ -358,7 +340,7 @@ TEST(Certifier, ConstantResidualMovesTheTube) {
 
 // It widens what an observation says of the residual, and each step anew: each of t steps by twice the bound.
 TEST(Certifier, ADisturbanceCountsForTheObservationAndForEachStep) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.transitions.x_next(0, kVx) += 0.25;
   problem.declaration.noise_bound[kVx] = 0.125;
   problem.declaration.disturbance = Vec({0, 0, 0.0625, 0});
@@ -377,7 +359,7 @@ TEST(Certifier, ADisturbanceCountsForTheObservationAndForEachStep) {
 }
 
 TEST(Certifier, ZerosAreTheSameAsNoDisturbance) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.transitions.x_next(0, kVx) += 0.25;
   problem.declaration.noise_bound[kVx] = 0.1;
   Judge without(problem);
@@ -393,7 +375,7 @@ TEST(Certifier, ZerosAreTheSameAsNoDisturbance) {
 }
 
 TEST(Certifier, ADisturbanceExplainsDataThatContradictEachOtherWithoutIt) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.transitions = {Eigen::MatrixXd::Zero(2, 6), Eigen::MatrixXd::Zero(2, 4)};
   problem.transitions.x_next(1, kVx) = 0.5;
   EXPECT_TRUE(Judge(problem).certifier().violation());
@@ -420,7 +402,7 @@ Eigen::Vector3d ReferenceWidths(Method method) {
   return {width(0), width(1), width(2)};
 }
 
-TEST(ReferenceTube, HasTheKnownWidths) {
+TEST(ReferenceTube, HasTheWidthsOfThePaper) {
   EXPECT_TRUE(ReferenceWidths(Method::kPaper).isApprox(Eigen::Vector3d(0.8492, 1.1410, 0.1117), 1e-4));
 }
 
@@ -498,12 +480,12 @@ void ExpectRefused(const Problem& problem, const std::string& part) {
 
 template <class Spoil>
 void ExpectRefused(Spoil spoil, const std::string& part) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   spoil(problem);
   ExpectRefused(problem, part);
 }
 
-TEST(Certifier, NamesThePartThatDoesNotFit) {
+TEST(Certifier, RefusesAProblemAndNamesThePartThatDoesNotFit) {
   EXPECT_THROW(Certifier(nullptr), std::invalid_argument);
   ExpectRefused([](Problem& p) { p.model = nullptr; }, "model");
   ExpectRefused([](Problem& p) { p.domain.state = Box(); }, "domain: state box");
@@ -541,13 +523,13 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
     ExpectRefused([bad](Problem& p) { p.rest = {{0, bad}}; }, "rest: coordinate 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 0; }, "zonotope_order: 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 27; }, "zonotope_order: 27");
-  Problem largest = PointMassProblem();
+  Problem largest = PointMassInHalves();
   largest.zonotope_order = 26;
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(largest)));
 }
 
-TEST(Certifier, AProjectionKnowsNoAngle) {
-  Problem problem = Bare(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Vec({9, 9, 9, 9, 1, 1}), Vec({1, 1}));
+TEST(Certifier, RefusesAProjectionThatDependsOnAnAngle) {
+  Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Within({9, 9, 9, 9, 1, 1}), Within({1, 1}));
   AddNominalTransition(problem, Eigen::VectorXd::Zero(8));
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(problem)));
   problem.projection(1, kTheta) = 1e-300;
@@ -556,8 +538,8 @@ TEST(Certifier, AProjectionKnowsNoAngle) {
                   Eq("projection: depends on theta, which is an angle: how often it has turned is not known")));
 }
 
-TEST(Certifier, ABodysPlacesAreTheSameAfterATurn) {
-  Problem problem = Bare(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Vec({9, 9, 9, 9, 1, 1}), Vec({1, 1}));
+TEST(Certifier, RefusesPlacesOfABodyThatChangeWithATurn) {
+  Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Within({9, 9, 9, 9, 1, 1}), Within({1, 1}));
   AddNominalTransition(problem, Eigen::VectorXd::Zero(8));
   problem.body.parts = {BodyPart{.radius = 0.1, .places = {{{"x + cos(theta)"}, {"y + sin(theta)"}}}}};
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(problem)));
@@ -570,7 +552,7 @@ TEST(Certifier, ABodysPlacesAreTheSameAfterATurn) {
 }
 
 TEST(Certifier, RequireNamesWhatItCannotJudge) {
-  const Certifier certifier(std::make_shared<Problem>(PointMassProblem()));
+  const Certifier certifier(std::make_shared<Problem>(PointMassInHalves()));
   const std::vector<double> controls(2 * (kMaxSteps + 1), 0.0);
   const Zonotope start = PointSet(Eigen::VectorXd::Zero(4));
   const auto refuses = [&](const Plan& plan, const Zonotope& set, const std::vector<Obstacle>& obstacles,
@@ -600,7 +582,7 @@ TEST(Certifier, RequireNamesWhatItCannotJudge) {
 }
 
 TEST(Certifier, WorksAtTheLargestOrderAndHorizon) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.zonotope_order = 26;
   problem.declaration.noise_bound.setConstant(1e-9);
   Judge judge(problem);
@@ -612,7 +594,7 @@ TEST(Certifier, WorksAtTheLargestOrderAndHorizon) {
 }
 
 TEST(Certifier, SpatialAndLinearProjectionsAreJudged) {
-  Problem problem = PointMassProblem();
+  Problem problem = PointMassInHalves();
   problem.projection = Eigen::MatrixXd::Identity(3, 4);  // px, py, vx
   Judge spatial(problem);
   const auto box = [](double vx) { return Obstacle::AxisBox(Vec({-9, -9, vx}), Vec({9, 9, vx + 1})); };
@@ -627,14 +609,14 @@ TEST(Certifier, SpatialAndLinearProjectionsAreJudged) {
   EXPECT_EQ(d.step, 3);
 }
 
-TEST(Decision, WithoutAnswerIsNoCertificate) {
+TEST(Decision, ADefaultDecisionIsNoCertificate) {
   EXPECT_EQ(Decision{}.outcome, Outcome::kNone);
   EXPECT_NE(Outcome{}, Outcome::kCertified);
-  EXPECT_EQ(Explain(Decision{}, PointMassProblem()), "no decision");
+  EXPECT_EQ(Explain(Decision{}, PointMassInHalves()), "no decision");
 }
 
 TEST(Explain, SaysWhenADecisionHoldsAndOfSeveralPartsWhich) {
-  Problem point = PointMassProblem(), body = point;
+  Problem point = PointMassInHalves(), body = point;
   point.between.reset();
   body.between = Between{.acceleration = Eigen::Vector2d(1, 1), .period = 0.1};
   body.body.parts = {BodyPart{}, {{{1, 0, 0}}, 0.5}};

@@ -47,7 +47,7 @@ TEST(BodyPlaces, TurnPartsInTheirFirstTwoCoordinatesAndMoveThem) {
   EXPECT_EQ(places.At(x)[0].points[0], Vector3d(12, 20, 3 + x[2]));
 }
 
-TEST(BodyPlaces, AtExpressionsAreWhereTheseSayForTheMiddlesOfTheParameters) {
+TEST(BodyPlaces, AtExpressionsUseTheMiddlesOfTheParameters) {
   const auto model = Unicycle();
   const auto expression = [](const char* text) { return ExpressionText{text, 1, 1}; };
   Body body{.heading = 2, .parts = {Hull({{2, 0, 0}}, 0.5), BodyPart{{}, 0.25, {}}}};
@@ -83,7 +83,7 @@ TEST(PartDistance, OfOnePointIsThatOfThePointLessTheRadius) {
     }
 }
 
-TEST(PartDistance, OfASquare) {
+TEST(PartDistance, IsTheKnownOneForASquare) {
   EXPECT_DOUBLE_EQ(ApproximateDistance(Obstacle::Circle(Vector2d(5, 0), 1), Square(0, 0, 1)), 3);
   EXPECT_DOUBLE_EQ(ApproximateDistance(Obstacle::Circle(Vector2d(4, 5), 1), Square(0, 0, 1)), 4);
   EXPECT_DOUBLE_EQ(ApproximateDistance(Obstacle::Circle(Vector2d(0.2, 0.1), 1), Square(0, 0, 1)), -1);

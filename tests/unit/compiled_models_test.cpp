@@ -17,6 +17,7 @@
 #include "certifier/dynamics/text_model.h"
 #include "tests/paths.h"
 #include "tests/unit/exported_model.inc"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -56,7 +57,7 @@ TEST(EquationsHeader, IsTheOneThatIsCompiledHere) {
 }
 
 // A unit is any text, and what a task says does not become code.
-TEST(EquationsHeader, UnitsAndOriginEndNoComment) {
+TEST(EquationsHeader, HostileUnitsAndOriginsCannotEndAComment) {
   ModelText text = EveryOperation();
   text.states[0].unit = "m**//\n#error */";
   text.inputs[0].unit = "/*m/*/s";
@@ -101,7 +102,7 @@ TEST(HaveSameValues, TellsProgramsApart) {
   EXPECT_FALSE(HaveSameValues(EquationsModel<ExportedOperations>::kProgram, MakeTextModel(swapped)->program()));
 }
 
-TEST(StructNameTest, IsAWordOfItsOwn) {
+TEST(StructNameTest, IsAValidNameThatIsNotTaken) {
   EXPECT_EQ(StructName("differential_drive"), "DifferentialDrive");
   EXPECT_EQ(StructName("robot"), "Robot");
   EXPECT_EQ(StructName("3_wheels"), "Model3Wheels");
@@ -122,7 +123,7 @@ void ExpectRefused(const ModelText& text, const std::string& why) {
   }
 }
 
-TEST(EquationsHeader, WhatGainsNothingIsRefused) {
+TEST(EquationsHeader, RefusesAModelThatGainsNothingByCompiling) {
   const auto with = [](const auto& change) {
     ModelText text = EveryOperation();
     change(text);
@@ -165,10 +166,8 @@ TEST(UseCompiledTest, DecisionsHaveTheSameBits) {
     std::vector<Tube> tubes(2);
     std::vector<Decision> decisions;
     for (const auto& model : {interpreted, compiled}) {
-      auto problem = std::make_shared<Problem>();
-      problem->model = model;
-      problem->domain.state = Box(Eigen::Vector3d(0.5, -8, -3), Eigen::Vector3d(18, 60, 60));
-      problem->domain.input = Box(Eigen::Vector2d(0.5, -5), Eigen::Vector2d(5, 5));
+      auto problem = std::make_shared<Problem>(
+          WorldOf(model, Box(Vec({0.5, -8, -3}), Vec({18, 60, 60})), Box(Vec({0.5, -5}), Vec({5, 5}))));
       problem->declaration.lipschitz = Eigen::MatrixXd::Constant(3, 5, 1e-3);
       problem->declaration.noise_bound = Eigen::Vector3d::Constant(1e-3);
       problem->transitions.z = Eigen::MatrixXd::Zero(1, 5);
@@ -177,7 +176,6 @@ TEST(UseCompiledTest, DecisionsHaveTheSameBits) {
       const Eigen::VectorXd z = problem->transitions.z.row(0).transpose();
       model->Evaluate({z.data(), 5}, {next.data(), 3});
       problem->transitions.x_next = next.transpose();
-      problem->projection = Eigen::MatrixXd::Identity(2, 3);
       const Certifier certifier(problem);
       const std::vector<double> controls{1, 1, 2, 0.5, 1, -1};
       const Plan plan{controls.data(), 2, 3, 2};

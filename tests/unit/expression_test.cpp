@@ -185,7 +185,7 @@ TEST(Expression, AnUnknownNameComesWithThoseThatAreKnown) {
   }
 }
 
-TEST(Expression, NamesAndReservedNames) {
+TEST(Expression, TellsNamesAndReservedNamesApart) {
   for (const char* name : {"x", "_", "x_1", "Theta2"}) EXPECT_TRUE(IsName(name)) << name;
   for (const char* name : {"", "1x", "x-y", "x y", "x.y", "\xc3\xa4"}) EXPECT_FALSE(IsName(name)) << name;
   for (const char* name : {"pi", "sin", "hypot", "smooth_gate"}) EXPECT_TRUE(IsReserved(name)) << name;

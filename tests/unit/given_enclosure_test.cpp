@@ -7,6 +7,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -32,11 +33,9 @@ class Velocities final : public ResidualEnclosure {
 };
 
 std::shared_ptr<const Problem> PointMassProblem() {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakePointMass(0.125);
-  problem->domain.state = Box(Eigen::Vector4d::Constant(-10), Eigen::Vector4d::Constant(10));
-  problem->domain.input = Box(Eigen::Vector2d::Constant(-1), Eigen::Vector2d::Constant(1));
-  problem->projection = Eigen::MatrixXd::Identity(2, 4);
+  auto problem = std::make_shared<Problem>(WorldOf(MakePointMass(0.125), Within({10, 10, 10, 10}), Within({1, 1})));
+  problem->declaration = {};
+  problem->transitions = {};
   return problem;
 }
 

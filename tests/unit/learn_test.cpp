@@ -9,6 +9,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -19,16 +20,9 @@ constexpr int kBase = 5, kLearned = 400;
 class LearnTest : public testing::Test {
  protected:
   LearnTest() {
-    problem_.model = MakeKinematicBicycle(0.1, 2.5);
-    problem_.domain.state = Box(Eigen::VectorXd::Constant(6, -30), Eigen::VectorXd::Constant(6, 30));
-    problem_.domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
-    problem_.domain.state = Box((Eigen::VectorXd(6) << -40, -40, -3, 0, -3, -0.4).finished(),
-                                (Eigen::VectorXd(6) << 40, 40, 3, 20, 3, 0.4).finished());
     problem_.domain.balls.push_back({{3, 5}, Eigen::Vector2d(10, 0), 9});
-    problem_.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
     problem_.declaration.lipschitz(2, 3) = 0.02;
     problem_.declaration.lipschitz(2, 5) = 0.3;
-    problem_.projection = Eigen::MatrixXd::Identity(2, 6);
     problem_.transitions.z.resize(0, 8);
     problem_.transitions.x_next.resize(0, 6);
   }
@@ -65,7 +59,8 @@ class LearnTest : public testing::Test {
   const unsigned seed_ = std::random_device{}();
   const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
   std::mt19937 random_{seed_};
-  Problem problem_;
+  Problem problem_ = WorldOf(MakeKinematicBicycle(0.1, 2.5),
+                             Box(Vec({-40, -40, -3, 0, -3, -0.4}), Vec({40, 40, 3, 20, 3, 0.4})), Within({20, 2}));
 };
 
 // Two steps from the same place that differ by twice the bound, and by little more.
@@ -81,7 +76,7 @@ TEST_F(LearnTest, ALearnedStepMayHaveBeenDisturbedAsAnyOther) {
   }
 }
 
-TEST_F(LearnTest, SaysWhatOneSaysThatKnewAllFromTheBeginning) {
+TEST_F(LearnTest, AnswersAsACertifierThatHadAllDataFromTheStart) {
   Problem all = problem_;
   std::vector<Eigen::VectorXd> points;
   for (int i = 0; i < kBase + kLearned; ++i) {
@@ -110,7 +105,7 @@ TEST_F(LearnTest, SaysWhatOneSaysThatKnewAllFromTheBeginning) {
   }
 }
 
-TEST_F(LearnTest, TheWholeDomainCountsNotItsBoxAlone) {
+TEST_F(LearnTest, RefusesATransitionInsideTheBoxAndOutsideTheDomain) {
   Add(problem_, Draw(), Next(Draw()));
   problem_.transitions.x_next.row(0) = Next(problem_.transitions.z.row(0).transpose()).transpose();
   Certifier certifier(std::make_shared<Problem>(problem_));
@@ -128,15 +123,9 @@ TEST_F(LearnTest, TheWholeDomainCountsNotItsBoxAlone) {
   EXPECT_EQ(certifier.num_observations(), 2u);
 }
 
-TEST_F(LearnTest, WhereTheNominalModelHasNoFiniteValueNothingIsLearned) {
-  Problem problem;
-  problem.model = MakePointMass(10);
+TEST_F(LearnTest, LearnsNothingWhereTheNominalModelHasNoFiniteValue) {
   constexpr double kHuge = 1.5e308;
-  problem.domain.state = Box(Eigen::Vector4d::Constant(-kHuge), Eigen::Vector4d::Constant(kHuge));
-  problem.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
-  problem.declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
-  problem.projection = Eigen::MatrixXd::Identity(2, 4);
-  problem.transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
+  const Problem problem = WorldOf(MakePointMass(10), Within({kHuge, kHuge, kHuge, kHuge}), Within({1, 1}));
   Certifier certifier(std::make_shared<Problem>(problem));
   Eigen::VectorXd z = Eigen::VectorXd::Zero(6);
   z[2] = kHuge;
@@ -145,13 +134,8 @@ TEST_F(LearnTest, WhereTheNominalModelHasNoFiniteValueNothingIsLearned) {
 }
 
 TEST_F(LearnTest, AnAngleIsLearnedWithAnyTurnsThatCanBeTold) {
-  Problem problem;
-  problem.model = MakeKinematicBicycle(0.1, 2, {2});
-  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -9), Eigen::VectorXd::Constant(6, 9));
-  problem.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
-  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Constant(6, 0.1)};
-  problem.projection = Eigen::MatrixXd::Identity(2, 6);
-  problem.transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
+  Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2, {2}), Within({9, 9, 9, 9, 9, 9}), Within({1, 1}));
+  problem.declaration.noise_bound.setConstant(0.1);
   Certifier certifier(std::make_shared<Problem>(problem));
   const std::vector<double> z(8, 0);
   const auto learn = [&](double theta) { return certifier.Learn(z, std::array{0.0, 0.0, theta, 0.0, 0.0, 0.0}); };

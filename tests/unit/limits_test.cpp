@@ -10,9 +10,9 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/explain.h"
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -27,17 +27,6 @@ Limit AtLeast(const std::string& that, double bound) { return {.name = "it", .th
 // A point mass in steps of 0.5 s without a residual: whole numbers stay exact. vx is 0.5 to 1.5 at all samples.
 class Limits : public testing::Test {
  protected:
-  static Problem PointMassProblem() {
-    Problem problem;
-    problem.model = MakePointMass(0.5);
-    problem.domain.state = Box(Eigen::Vector4d(-100, -100, -4, -4), Eigen::Vector4d(100, 100, 4, 4));
-    problem.domain.input = Box(Eigen::Vector2d(-2, -2), Eigen::Vector2d(2, 2));
-    problem.declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
-    problem.transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
-    problem.projection = Eigen::MatrixXd::Identity(2, 4);
-    return problem;
-  }
-
   Decision Judge(const std::vector<Limit>& limits, const std::vector<Obstacle>& obstacles = {}) {
     problem_.limits = limits;
     certifier_.emplace(std::make_shared<Problem>(problem_));
@@ -47,7 +36,7 @@ class Limits : public testing::Test {
   bool IsKept(const Limit& limit) { return Judge({limit}).outcome == Outcome::kCertified; }
   Plan plan() const { return {controls_.data(), 2, static_cast<int>(controls_.cols()), 2}; }
 
-  Problem problem_ = PointMassProblem();
+  Problem problem_ = PointMassInHalves();
   Zonotope start_ = Zonotope::FromBox(Eigen::Vector4d(0, 0, 1, 0), Eigen::Vector4d(0, 0, 0.5, 0));
   Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(2, 4);
   std::optional<Certifier> certifier_;
@@ -84,7 +73,7 @@ TEST_F(Limits, AreClosedToTheLastBit) {
 }
 
 // 1 + 2 d + d^2 for |d| <= 0.5: the second order gives the upper end, the range the lower one.
-TEST_F(Limits, OfACurvedFunction) {
+TEST_F(Limits, OfACurvedFunctionHoldUpToItsRange) {
   EXPECT_TRUE(IsKept(AtMost("vx^2", 2.25 + 1e-12)));
   EXPECT_FALSE(IsKept(AtMost("vx^2", 2.25 - 1e-12)));
   EXPECT_TRUE(IsKept(AtLeast("vx^2", 0.25 - 1e-12)));
@@ -94,13 +83,13 @@ TEST_F(Limits, OfACurvedFunction) {
 }
 
 // px = t vx / 2 in every slice: the box knows nothing of it.
-TEST_F(Limits, KnowHowStatesAreCorrelated) {
+TEST_F(Limits, UseTheCorrelationOfStates) {
   EXPECT_TRUE(IsKept(AtMost("px - 2*vx", 1e-12)));
   EXPECT_FALSE(IsKept(AtMost("px - 2*vx", -1e-12)));
   EXPECT_TRUE(IsKept(AtLeast("px - 2*vx", -3 - 1e-12))) << "at the start";
 }
 
-TEST_F(Limits, OfAFunctionWithAKink) {
+TEST_F(Limits, OfAFunctionWithAKinkHoldUpToItsRange) {
   EXPECT_TRUE(IsKept(AtMost("abs(vx - 1)", 0.5 + 1e-12)));
   EXPECT_FALSE(IsKept(AtMost("abs(vx - 1)", 0.5 - 1e-12)));
   EXPECT_TRUE(IsKept(AtLeast("abs(vx - 1)", 0)));
@@ -152,7 +141,7 @@ TEST_F(Limits, TheFirstFailureIsNamed) {
   EXPECT_EQ(Judge({AtMost("px", 2.5), AtMost("px", 1)}, {}).coordinate, 1);
 }
 
-TEST_F(Limits, OfWhatIsLeftOfAPlan) {
+TEST_F(Limits, OnTheRestOfAPlanCountFromItsFirstStep) {
   controls_.row(0).setConstant(-2);  // 1 m/s, 0, -1, -2
   const std::vector<Limit> limits{AtMost("vx", 0.6)};
   EXPECT_EQ(Judge(limits).step, 0);
@@ -179,7 +168,7 @@ TEST_F(Limits, ACertificateSaysWhenTheyHold) {
                              testing::EndsWith("from obstacle 0; within its limits at the sample instants")));
 }
 
-TEST_F(Limits, ThatAreNoneAreRefused) {
+TEST_F(Limits, AreRefusedIfTheyAreMalformed) {
   const auto refused = [&](const Limit& limit, const std::string& why) {
     EXPECT_THAT([&] { Judge({AtMost("vx", 9), limit}); }, ThrowsMessage<std::invalid_argument>(HasSubstr(why)));
   };

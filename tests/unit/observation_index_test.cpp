@@ -110,7 +110,7 @@ TEST_P(Search, TreeAndRowAgreeToTheLastBitOnEveryInstructionSet) {
 }
 
 // Each observation by itself is an envelope of one: the best of them all is the envelope.
-TEST_P(Search, IsTheBestOfAllObservations) {
+TEST_P(Search, FindsTheTightestBoundOfAllObservations) {
   Random random(720 + static_cast<std::uint64_t>(GetParam()));
   SCOPED_TRACE(random.trace());
   for (const int count : {1, 3, 40, 200}) {

@@ -396,7 +396,7 @@ TEST(EnvelopeTail, BoundsAreRoundedOutwardAndValuesBeyondTheHeadroomAreNotCovere
   }
 }
 
-TEST(ObservationStore, KeepsToItsBudget) {
+TEST(ObservationStore, HoldsAtMostItsLargestNumberOfObservations) {
   Random random(808);
   SCOPED_TRACE(random.trace());
   std::vector<Sample> samples = Observe(random, 30);
@@ -527,7 +527,7 @@ TEST(ObservationStore, BoundsAsOneRowDoesWhenTheSameRowIsRepeated) {
   }
 }
 
-TEST(MostUseful, DropsTheLeastGainFirst) {
+TEST(MostUseful, DropsTheObservationThatNarrowsLeast) {
   // Far apart on a line, all but two that stand close together: either may go, not both.
   Declaration declaration{Eigen::MatrixXd::Constant(1, 1, 1), Eigen::VectorXd::Zero(1)};
   Observations o{Eigen::MatrixXd(5, 1), Eigen::MatrixXd::Zero(5, 1), Eigen::MatrixXd::Zero(5, 1)};

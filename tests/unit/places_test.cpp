@@ -12,6 +12,7 @@
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_model.h"
 #include "tests/text_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -33,14 +34,11 @@ BodyPart At(const std::vector<std::vector<std::string>>& places, double radius) 
 class Places : public testing::Test {
  protected:
   Places() {
-    problem_.model = MakeTextModel(TextModel({{"q1", "q1 + dt*u1"}, {"q2", "q2 + dt*u2"}}, {"u1", "u2"},
-                                             {{"dt", 0.5, 0.5}, {"length", 2, 2}},
-                                             {{"x", "length*cos(q1)"}, {"y", "length*sin(q1)"}}));
-    problem_.domain.state = Box(Eigen::Vector2d(-7, -7), Eigen::Vector2d(7, 7));
-    problem_.domain.input = Box(Eigen::Vector2d(-7, -7), Eigen::Vector2d(7, 7));
-    problem_.declaration = {Eigen::MatrixXd::Zero(2, 4), Eigen::VectorXd::Zero(2)};
-    problem_.transitions = {Eigen::MatrixXd::Zero(1, 4), Eigen::MatrixXd::Zero(1, 2)};
-    problem_.projection = Eigen::MatrixXd::Zero(2, 2);
+    problem_ = WorldOf(MakeTextModel(TextModel({{"q1", "q1 + dt*u1"}, {"q2", "q2 + dt*u2"}}, {"u1", "u2"},
+                                               {{"dt", 0.5, 0.5}, {"length", 2, 2}},
+                                               {{"x", "length*cos(q1)"}, {"y", "length*sin(q1)"}})),
+                       Within({7, 7}), Within({7, 7}));
+    problem_.projection.setZero();
     problem_.body.parts = {At({{"0", "0"}, {"x", "y"}}, 0.25),
                            At({{"x", "y"}, {"x + cos(q1 + q2)", "y + sin(q1 + q2)"}}, 0.125)};
   }
@@ -67,7 +65,7 @@ class Places : public testing::Test {
 Obstacle Circle(double x, double y, double radius) { return Obstacle::Circle(Eigen::Vector2d(x, y), radius); }
 
 // Along x, and then its forearm along y.
-TEST_F(Places, OfAnArmThatStands) {
+TEST_F(Places, OfAStandingArmAreDecidedWithinAHair) {
   Stand(0, M_PI / 2);
   EXPECT_TRUE(IsClear(Circle(1, 1, 0.75 - kHair))) << "beside the first link";
   EXPECT_FALSE(IsClear(Circle(1, 1, 0.75 + kHair)));
@@ -106,7 +104,7 @@ TEST_F(Places, AreCorrelatedWithTheSlice) {
   EXPECT_FALSE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 0.125 + 0.0199)));
 }
 
-TEST_F(Places, WithoutASecondOrderAreInTheirRange) {
+TEST_F(Places, WithAKinkAreEnclosedByTheirRange) {
   problem_.body.parts = {At({{"abs(q1)", "q2"}}, 0)};
   Stand(0, 0, 0.25);
   EXPECT_TRUE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(-1, 0), kHair)));
@@ -116,7 +114,7 @@ TEST_F(Places, WithoutASecondOrderAreInTheirRange) {
 }
 
 // There may be no place at all, so its other coordinate proves nothing.
-TEST_F(Places, WithoutABoundTouchEverything) {
+TEST_F(Places, ThatAreUnboundedTouchEveryObstacle) {
   for (const char* x : {"1/q1", "log(q1)", "tan(q1 + pi/2)", "log(q1 - 10)", "sqrt(q1)", "asin(q1 + 1)", "q1^0.5"}) {
     problem_.body.parts = {At({{x, "q2"}}, 0)};
     Stand(0, 0, 0.25);
@@ -147,7 +145,7 @@ TEST_F(Places, BetweenTheSamplesAreOnTheirChordAndItsBulge) {
 }
 
 // A cart at (q1, 0) with a mast that is 2 m long.
-TEST_F(Places, StandBesideTheFrame) {
+TEST_F(Places, CountBesidePartsOfTheFrame) {
   problem_.projection << 1, 0, 0, 0;
   problem_.body.parts = {{{Eigen::Vector3d(0, 0, 0)}, 0.5}, At({{"q1 + 2*sin(q2)", "2*cos(q2)"}}, 0.25)};
   Stand(1, 0);
@@ -157,7 +155,7 @@ TEST_F(Places, StandBesideTheFrame) {
   EXPECT_EQ(Judge(Circle(1, -3, 2.5 + kHair)).part, 0);
 }
 
-TEST_F(Places, ThatAreNoneAreRefused) {
+TEST_F(Places, AreRefusedIfTheyAreMalformed) {
   const auto refused = [&](const BodyPart& part, const std::string& why) {
     problem_.body.parts = {part};
     EXPECT_THAT([&] { Judge(Circle(0, 0, 1)); }, ThrowsMessage<std::invalid_argument>(HasSubstr(why)));

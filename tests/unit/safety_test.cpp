@@ -17,7 +17,7 @@ const double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Eigen::VectorXd Point(double x, double y) { return Vector2d(x, y); }
 
-TEST(Obstacle, RefusesWhatIsNone) {
+TEST(Obstacle, RefusesWrongDimensionsAndNumbers) {
   EXPECT_THROW(Obstacle::Circle(Vector3d::Zero(), 1), std::invalid_argument);
   EXPECT_THROW(Obstacle::Circle(Point(0, kNan), 1), std::invalid_argument);
   for (const double radius : {-1.0, kNan, std::numeric_limits<double>::infinity()})
@@ -41,7 +41,7 @@ TEST(Obstacle, RefusesWhatIsNone) {
   EXPECT_THROW(Obstacle::HalfSpace(Eigen::VectorXd::Ones(4), 0), std::invalid_argument);
 }
 
-TEST(Obstacle, KnowsItsCore) {
+TEST(Obstacle, HasTheHullAndRadiusOfItsKind) {
   const Obstacle box = Obstacle::AxisBox(Vector3d(0, 1, 2), Vector3d(3, 4, 5));
   EXPECT_EQ(box.hull().size(), 8u);
   EXPECT_EQ(box.dim(), 3);
@@ -67,7 +67,7 @@ TEST(Obstacle, ApproximateDistanceIsNegativeInside) {
   EXPECT_DOUBLE_EQ(ApproximateDistance(square, Point(2, 5)), 3);
 }
 
-TEST(Separation, StartsUnproven) {
+TEST(Separation, IsUnprovenByDefaultAndForNan) {
   EXPECT_FALSE(Separation{}.IsProven());
   EXPECT_FALSE((Separation{kNan, 0}.IsProven()));
   EXPECT_FALSE((Separation{1, kNan}.IsProven()));

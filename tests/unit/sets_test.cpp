@@ -13,6 +13,7 @@
 #include "certifier/sets/zonotope.h"
 #include "tests/oracle/random.h"
 #include "tests/oracle/reduce_order.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -21,12 +22,6 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
-
-Eigen::VectorXd Vec(std::initializer_list<double> entries) {
-  Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
-  std::copy(entries.begin(), entries.end(), vector.begin());
-  return vector;
-}
 
 TEST(Box, IsClosed) {
   const Box box(Vec({-1, 2}), Vec({1, 2}));
@@ -190,7 +185,7 @@ TEST(LinearMap, RowsThatCopyACoordinateAreExact) {
   EXPECT_EQ(image.GeneratorMatrix().row(1), -set.GeneratorMatrix().row(0));
 }
 
-TEST(LinearMap, OfAPointIsAPoint) {
+TEST(LinearMap, MapsAPointToAPoint) {
   const Zonotope point(Vec({2, 3}), Eigen::MatrixXd(2, 0));
   const MatrixEntry entries[] = {{0, 0, Interval(0.5)}, {0, 1, Interval(2)}};
   Zonotope image;
@@ -199,7 +194,7 @@ TEST(LinearMap, OfAPointIsAPoint) {
   EXPECT_EQ(image.num_generators(), 0);
 }
 
-TEST(Outline, OfAPointASegmentAndASquare) {
+TEST(Outline, HasTheCornersOfAPointASegmentAndASquare) {
   EXPECT_EQ(Outline(Zonotope(Vec({1, 2}), Eigen::MatrixXd(2, 0))).size(), 1u);
   Eigen::MatrixXd segment(2, 2);
   segment << 1, 0, 1, 0;

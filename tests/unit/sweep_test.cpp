@@ -9,6 +9,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -17,27 +18,10 @@ using Eigen::Vector3d;
 
 constexpr double kHair = 1e-9;  // above the rounding of a few steps, metres
 
-Eigen::VectorXd Vec(std::initializer_list<double> entries) {
-  Eigen::VectorXd vector(std::ssize(entries));
-  std::copy(entries.begin(), entries.end(), vector.data());
-  return vector;
+Problem PointMassProblem() { return PointMassInHalves(8); }
+Problem BicycleProblem() {
+  return WorldOf(MakeKinematicBicycle(0.5, 2.5), Within({40, 40, 3.2, 25, 3, 1}), Within({20, 2}));
 }
-
-Problem Bare(std::shared_ptr<const NominalModel> model, const Eigen::VectorXd& state, const Eigen::VectorXd& input) {
-  Problem problem;
-  const int n = model->num_states(), variables = model->num_variables();
-  problem.model = std::move(model);
-  problem.domain.state = Box(-state, state);
-  problem.domain.input = Box(-input, input);
-  problem.declaration = {Eigen::MatrixXd::Zero(n, variables), Eigen::VectorXd::Zero(n)};
-  problem.projection = Eigen::MatrixXd::Identity(2, n);
-  problem.transitions = {Eigen::MatrixXd::Zero(1, variables), Eigen::MatrixXd::Zero(1, n)};
-  return problem;
-}
-
-// One step of 0.5 s: whole numbers stay exact. The residual is zero.
-Problem PointMassProblem() { return Bare(MakePointMass(0.5), Vec({100, 100, 8, 8}), Vec({2, 2})); }
-Problem BicycleProblem() { return Bare(MakeKinematicBicycle(0.5, 2.5), Vec({40, 40, 3.2, 25, 3, 1}), Vec({20, 2})); }
 
 Between Curving(double x, double y) {
   Between between;
@@ -107,7 +91,7 @@ TEST(Between, AHalfPlaneIsMetBetweenSamples) {
   EXPECT_FALSE(IsCertified(Judge(problem, Vec({0, 0, 4, 0}), 1, wall(0.0625 - kHair))));
 }
 
-TEST(Body, ADiscAndAHullThatDoNotTurn) {
+TEST(Body, ADiscAndAHullThatDoNotTurnAreJudgedWithinAHair) {
   Problem problem = PointMassProblem();
   const Eigen::VectorXd start = Vec({0, 0, 0, 0});
   const auto disc_at = [](double x, double y) { return std::vector{Obstacle::Circle(Vec({x, y}), 1)}; };
@@ -159,7 +143,7 @@ TEST(Body, APlaceIsCorrelatedWithTheSlice) {
 }
 
 // A point 2 m ahead that may turn by 1 rad/s and 3 rad/s^2 leaves its chord by 2 (1 + 3) 0.5^2 / 8.
-TEST(Body, ATurningPointLeavesItsChord) {
+TEST(Body, ATurningPointIsWidenedByItsBulge) {
   Problem problem = BicycleProblem();
   problem.body = Parts({{{Vector3d(2, 0, 0)}, 0}}, 2);
   problem.between = Curving(0, 0);
@@ -170,7 +154,7 @@ TEST(Body, ATurningPointLeavesItsChord) {
   EXPECT_FALSE(IsCertified(Judge(problem, Vec({0, 0, 0, 0, 0, 0}), 1, post(-kHair))));
 }
 
-TEST(Body, IsRefusedIfItIsNone) {
+TEST(Body, IsRefusedIfItIsMalformed) {
   const auto refusal = [](const std::function<void(Problem&)>& change) -> std::string {
     Problem problem = BicycleProblem();
     change(problem);
@@ -321,7 +305,7 @@ TEST(Moving, NeedsASchedule) {
     EXPECT_TRUE(IsCertified(Judge(problem, rest, 100, moving, {start, longest, longest})));
 }
 
-TEST(Moving, RefusesAMotionThatIsNone) {
+TEST(Moving, RefusesAMalformedMotion) {
   const Obstacle disc = Obstacle::Circle(Vec({0, 0}), 1);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto refused = [&](const std::function<void(ObstacleMotion&)>& change) {
@@ -341,7 +325,7 @@ TEST(Moving, RefusesAMotionThatIsNone) {
   refused([](ObstacleMotion& m) { m.from_us = 1, m.until_us = 0; });
 }
 
-TEST(SafetyTest, BeginsWhereItIsTold) {
+TEST(SafetyTest, BeginsAtTheGivenStep) {
   Problem problem = PointMassProblem();
   problem.between = Curving(0, 0);
   Certifier certifier(std::make_shared<Problem>(problem));
@@ -458,7 +442,7 @@ TEST(Body, TheSupportOfAPartContainsItsPlaces) {
   }
 }
 
-TEST(Body, AHeadingThatIsFarOffHasNoSupport) {
+TEST(Body, SupportIsUnboundedForAVeryLargeHeading) {
   const Placement placement(Eigen::MatrixXd::Identity(2, 3), Parts({{{Vector3d(1, 0, 0)}, 0}}, 2), std::nullopt, 3);
   const std::array<double, 3> half_width{};
   Placement::Sample sample;
@@ -566,7 +550,7 @@ TEST(SeparatePieces, FindsTheDistanceOfTheirHull) {
   }
 }
 
-TEST(HullJoin, ContainsBothAndForgetsNoNumberThatIsNone) {
+TEST(HullJoin, ContainsBothAndIsUnboundedForNan) {
   const Hull a{{0, 1, 0}, {1, 0.5, 0}}, b{{3, 1, 0}, {0.5, 0.25, 0}};
   const Hull joined = Join(a, b, 2);
   EXPECT_EQ(joined.center[0] - joined.half_width[0], -1);
@@ -584,7 +568,7 @@ TEST(HullJoin, ContainsBothAndForgetsNoNumberThatIsNone) {
 }
 
 // Two points 1.7 m apart in space: their segment passes the obstacle, a point, at a distance of sqrt(2 / 3).
-TEST(SeparatePieces, ASegmentInSpace) {
+TEST(SeparatePieces, DecidesASegmentInSpaceWithinAHair) {
   Problem problem = PointMassProblem();
   problem.projection = Eigen::MatrixXd::Identity(3, 4);
   problem.body = Parts({{{Vector3d(0, 0, 0), Vector3d(1, 1, 1)}, 0}});

@@ -42,7 +42,7 @@ struct Case {
 
 class OfAnOperation : public testing::TestWithParam<Case> {};
 
-TEST_P(OfAnOperation, OnlyWhereItMayMeet) {
+TEST_P(OfAnOperation, IsFoundOnlyWhereItMayMeetItsKinkOrPole) {
   const auto& [equation, operation, meets, misses] = GetParam();
   const auto found = Find(Of(equation), meets);
   ASSERT_TRUE(found);
@@ -64,7 +64,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"max(v, x)", "max", {0, 0.5}, {0, 0.5 + kBelow}}, Case{"atan2(v, x - 1)", "atan2", {0, 1}, {kAbove, 1}},
         Case{"hypot(v, x - 0.5)", "hypot", {0, 1}, {kAbove, 1}}, Case{"exp(v)", "exp", {0, 1000}, {0, 700}}));
 
-TEST(FindUnbounded, NoneWhereEverythingIsBounded) {
+TEST(FindUnbounded, FindsNothingWhereEverythingIsBounded) {
   EXPECT_FALSE(Find(Of("x + abs(v)*sin(w)/w + sqrt(2 + x) + atan2(v, w)"), {1, 2}));
   EXPECT_FALSE(Find(Of("x + abs(u) + abs(p)"), {-1, 1})) << "what depends on no state has no derivative by one";
   EXPECT_FALSE(Find(Of("x", Integrator::kNone, {{"unused", "1/v"}}), {-1, 1}));
@@ -72,7 +72,7 @@ TEST(FindUnbounded, NoneWhereEverythingIsBounded) {
   EXPECT_FALSE(Find(Of("1/v"), {-1, 1}, 0, -1));
 }
 
-TEST(FindUnbounded, InCompiledEquationsToo) {
+TEST(FindUnbounded, NamesTheOperationInCompiledEquations) {
   const auto found = FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-9, 9)), 2);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->operation, "tan");
@@ -85,7 +85,7 @@ TEST(FindUnbounded, APoleInAnInputOrAParameterCounts) {
   EXPECT_FALSE(Find(Of("x/u"), {1, 2}, 0.5));
 }
 
-TEST(FindUnbounded, TheFirstInTheOrderOfTheTextAndThroughDefinitions) {
+TEST(FindUnbounded, NamesTheFirstInTheOrderOfTheTextAndThroughDefinitions) {
   EXPECT_EQ(Find(Of("sqrt(abs(v))"), {-1, 1})->operation, "abs");
   EXPECT_EQ(Find(Of("1/x + 1/v + sqrt(v)"), {-1, 1})->column, 8);
   const auto found = Find(Of("x + a*b", Integrator::kNone, {{"a", "1/w"}, {"b", "2*log(v)"}}), {-1, 1});
@@ -103,7 +103,7 @@ TEST(FindUnbounded, TheAskedStateComesFirst) {
 }
 
 // v' = v - 1, so v falls through zero within the step.
-TEST(FindUnbounded, InALaterStageOfTheStep) {
+TEST(FindUnbounded, FindsAKinkInALaterStageOfTheStep) {
   for (const Integrator integrator : {Integrator::kMidpoint, Integrator::kRk4}) {
     const auto found = Find(Of("abs(v)", integrator), {0.02, 0.08});
     ASSERT_TRUE(found);

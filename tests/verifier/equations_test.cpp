@@ -129,7 +129,7 @@ struct Unicycle {
   [[nodiscard]] std::array<double, 0> parameters() const { return {}; }
 };
 
-TEST(Equations, OfAnUnknownModelAreNone) { EXPECT_FALSE(EquationsOf(EquationsModel<Unicycle>(Unicycle{}))); }
+TEST(Equations, AnUnknownModelHasNoEquations) { EXPECT_FALSE(EquationsOf(EquationsModel<Unicycle>(Unicycle{}))); }
 
 }  // namespace
 }  // namespace forereach::verifier

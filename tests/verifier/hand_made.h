@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models/named_models.h"
+#include "tests/worlds.h"
 #include "verifier/verifier.h"
 
 namespace forereach::verifier {
@@ -22,14 +23,7 @@ inline double Down(double x) { return std::nextafter(x, -HUGE_VAL); }
 // dt = 1/2, so that every number of a step is a double. The one observation is of the nominal model: its residual is
 // known to a last bit of zero, the smallest double there is, in every coordinate.
 inline std::shared_ptr<Problem> Halves() {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakePointMass(0.5);
-  problem->domain.state = Box(Eigen::Vector4d::Constant(-8), Eigen::Vector4d::Constant(8));
-  problem->domain.input = Box(Eigen::Vector2d(-2, -2), Eigen::Vector2d(2, 2));
-  problem->declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
-  problem->transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
-  problem->projection = Eigen::MatrixXd::Identity(2, 4);
-  return problem;
+  return std::make_shared<Problem>(WorldOf(MakePointMass(0.5), Within({8, 8, 8, 8}), Within({2, 2})));
 }
 
 inline Verdict Judge(const std::shared_ptr<const Problem>& problem, const Certificate& certificate,

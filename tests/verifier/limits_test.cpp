@@ -32,7 +32,7 @@ void ExpectDecided(const char* that, double least, double most, int first, int l
   ExpectRefuted(Judge(AtLeast(that, least + kHair)), first, "the slice keeps the limit it");
 }
 
-TEST(LimitOf, FunctionsIsDecidedWithinAHair) {
+TEST(LimitOf, ALimitOfAFunctionIsDecidedWithinAHair) {
   ExpectDecided("px", 0.75, 2, 0, 1);
   ExpectDecided("vx^2", 0.25, 2.25, 0, 0);
   ExpectDecided("exp(px)", std::exp(0.75), std::exp(2), 0, 1);
@@ -54,7 +54,7 @@ TEST(LimitOf, AFunctionWithoutABoundIsNotConfirmed) {
 }
 
 // x y over [-1, 1]^2 from a slice that is no box: enclosed by more than it reaches, so that neither is shown.
-TEST(LimitOf, WhatIsNotShownIsNotRefuted) {
+TEST(LimitOf, ALimitThatIsNotShownExceededIsNotRefuted) {
   Certificate certificate = OneStep();
   certificate.initial_set = {};
   certificate.initial_set.center = Eigen::Vector4d(0, 0, 0, 0);
@@ -73,7 +73,7 @@ TEST(LimitOf, WhatIsLeftOfAPlanCountsFromItsFirstStep) {
   ExpectConfirmed(Judge(limit, certificate));
 }
 
-TEST(LimitOf, NoExpressionCannotBeVerified) {
+TEST(LimitOf, AMalformedExpressionCannotBeVerified) {
   const Verdict verdict = Judge(AtMost("vx +", 9));
   EXPECT_EQ(verdict.status, Status::kCannotVerify);
   EXPECT_THAT(verdict.failure.what, testing::HasSubstr("a limit or place is no expression"));

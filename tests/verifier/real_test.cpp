@@ -10,7 +10,7 @@
 namespace forereach::verifier {
 namespace {
 
-TEST(Real, ThirdIsEnclosedButNotKnown) {
+TEST(Real, AThirdIsEnclosedAndNotExact) {
   const Real third = Real(1.0) / Real(3.0);
   EXPECT_FALSE(CertainlyAtMost(third.upper(), third.lower()));
   EXPECT_EQ(IsAtMost(Real(3.0) * third, 1.0), Answer::kUnknown);
@@ -25,7 +25,7 @@ TEST(Real, SumsOfDoublesAreExactWithEnoughBits) {
   EXPECT_TRUE((Real(huge) + Real(tiny) - Real(huge) - Real(tiny)).IsZero());
 }
 
-TEST(Real, AnswersAtEquality) {
+TEST(Real, ComparesEqualNumbersAndNan) {
   EXPECT_EQ(IsAtMost(1.0, 1.0), Answer::kYes);
   EXPECT_EQ(IsBelow(1.0, 1.0), Answer::kNo);
   EXPECT_EQ(IsAtMost(std::nan(""), 1.0), Answer::kUnknown);
@@ -37,7 +37,7 @@ TEST(Real, TangentIsUnboundedOverItsPole) {
   EXPECT_TRUE(tan(Real::FromTo(1.4, 1.5)).IsFinite());
 }
 
-TEST(Real, EndsAndMiddle) {
+TEST(Real, AnIntervalHasItsEndsMiddleAndMagnitude) {
   const Real x = Real::FromTo(-1.0, 3.0);
   EXPECT_EQ(x.lower().ToDouble(), -1);
   EXPECT_EQ(x.upper().ToDouble(), 3);

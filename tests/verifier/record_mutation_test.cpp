@@ -136,9 +136,9 @@ const char* WhyNothingDependsOn(const Pointer& at, const std::string& what, cons
   return nullptr;
 }
 
-TEST_F(RecordMutation, AsItIsConfirmed) { EXPECT_TRUE(IsConfirmed(valid_.dump())); }
+TEST_F(RecordMutation, TheUnchangedRecordIsConfirmed) { EXPECT_TRUE(IsConfirmed(valid_.dump())); }
 
-TEST_F(RecordMutation, OfAnyValueIsRefused) {
+TEST_F(RecordMutation, AChangeOfAnyValueIsRefused) {
   int mutations = 0;
   std::map<std::string, int> allowed;
   ForEachMutation([&](const Pointer& at, const std::string& what, const Json& changed) {
@@ -201,7 +201,7 @@ TEST_F(RecordMutation, ResealedIsRefusedUnlessItIsStillTrue) {
 }
 
 // The holes that were found: each in a record that is consistent in itself.
-TEST_F(RecordMutation, OneColumnOfTheSameRowSumsIsRefused) {
+TEST_F(RecordMutation, GeneratorsMergedIntoOneColumnAreRefused) {
   for (std::size_t t = 0; t < valid_["tube"].size(); ++t) {
     Json changed = valid_;
     std::vector<double> sums(4);

@@ -28,7 +28,7 @@ void ExpectDistance(const Slice& slice, const Obstacle& obstacle, double distanc
   EXPECT_EQ(IsClear(projected, obstacle, std::nextafter(distance, 100), best), Answer::kNo);
 }
 
-TEST(Separation, PlanarDistances) {
+TEST(Separation, PlanarDistancesAreExact) {
   const Slice unit = BoxSlice({1, 1});
   ExpectDistance(unit, Obstacle::Circle(Eigen::Vector2d(4, 5), 2), 3);  // corner (1, 1), 3-4-5
   ExpectDistance(unit, Obstacle::Circle(Eigen::Vector2d(4, 0.5), 2), 1);
@@ -40,7 +40,7 @@ TEST(Separation, PlanarDistances) {
   ExpectDistance(unit, Obstacle::Polygon({Eigen::Vector2d(0, 3), Eigen::Vector2d(-2, 9), Eigen::Vector2d(2, 9)}), 2);
 }
 
-TEST(Separation, ObliqueEdges) {
+TEST(Separation, DistancesToObliqueEdgesAreExact) {
   Slice rhombus;  // |x| + |y| <= 2
   rhombus.center = {Real(), Real()};
   rhombus.columns = {{Real(1.0), Real(1.0)}, {Real(1.0), Real(-1.0)}};
@@ -51,7 +51,7 @@ TEST(Separation, ObliqueEdges) {
   EXPECT_EQ(IsClear(projected, circle, 2.8284271247461903, best), Answer::kNo);  // the double above it
 }
 
-TEST(Separation, OnTheLineAndInSpace) {
+TEST(Separation, DistancesOnTheLineAndInSpaceAreExact) {
   ExpectDistance(BoxSlice({1}), Obstacle::AxisBox(Eigen::VectorXd::Constant(1, 1.25), Eigen::VectorXd::Constant(1, 2)),
                  0.25);
   const Slice cube = BoxSlice({1, 1, 1});
@@ -60,7 +60,7 @@ TEST(Separation, OnTheLineAndInSpace) {
   ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(-1, 1.125, -1), Eigen::Vector3d(9, 9, 9)), 0.125);  // faces
 }
 
-TEST(Separation, OverlapHasNoDirection) {
+TEST(Separation, OverlappingSetsAreNotClear) {
   const ProjectedSlice unit(BoxSlice({1, 1}), Eigen::Matrix2d::Identity());
   Real best;
   EXPECT_EQ(IsClear(unit, Obstacle::Circle(Eigen::Vector2d(0.5, 0), 0.1), 0, best), Answer::kNo);

@@ -59,7 +59,7 @@ TEST(Hull, OfSlicesReachesAsFarAsEither) {
   EXPECT_EQ(Clear(sweep, square, distance + kHair), Answer::kNo);
 }
 
-TEST(Hull, RadiusAndEqualBallsAreDistancesToBeKept) {
+TEST(Hull, RadiusAndEqualBallsReduceTheDistance) {
   const Sweep sweep({At({0.0, 0.0}, 0.5), At({4.0, 0.0}, 0.5)}, 0.25);
   ExpectClearBy(sweep, Obstacle::Circle(Eigen::Vector2d(2, 3), 1), 1.25);
   ExpectClearBy(sweep, Obstacle::HalfSpace(Eigen::Vector2d(0, 2), 4), 1.25);
@@ -136,7 +136,7 @@ TEST(Turning, AnUncertainHeadingBendsThePlace) {
   }
 }
 
-TEST(Turning, TheBendIsTheHullOfItsArc) {
+TEST(Turning, TheBendHasTheSupportOfItsArc) {
   Random random(17);
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 400; ++trial) {
@@ -322,7 +322,7 @@ TEST(Bodies, EveryPartAndItsRadiusIsHeldClear) {
 }
 
 // A rectangle 4 m ahead, 1 m to both sides, turns by -1.3 rad in its step: its corner cuts what no sample meets.
-TEST(Bodies, TheCornerOfARectangleInATurn) {
+TEST(Bodies, TheCornerOfATurningRectangleIsMetBetweenTheSamples) {
   Body truck{kVy, {{{}, 0}}};
   for (const double x : {0.0, 4.0})
     for (const double y : {-1.0, 1.0}) truck.parts[0].points.emplace_back(x, y, 0);
@@ -356,7 +356,7 @@ Obstacle Crossing(double radius, ObstacleMotion motion = {}) {
 }
 
 // Seen from the disc the robot drives from (0, 0) to (4, 3): 4 m beside (0, 5). At the samples 5 and sqrt(20) m.
-TEST(Moving, ADiscThatCrossesBetweenTheSamples) {
+TEST(Moving, ADiscThatCrossesBetweenTheSamplesIsMet) {
   ExpectConfirmed(With(Halves(), Crossing(4.25)));
   ExpectRefuted(With(Halves(), Crossing(4.5)), 1, "the slice keeps clear of obstacle 0");
   const auto problem = AtAllTimes(Curving(0, 0));
@@ -452,7 +452,7 @@ TEST(Moving, AnInfiniteClearanceSaysThatTheObstacleIsNowhere) {
 
 // ---- What does not fit.
 
-TEST(Misfit, OfBodyAndBounds) {
+TEST(Misfit, ABodyOrBoundsThatDoNotFitAreRefuted) {
   const auto expect_misfit = [](const std::shared_ptr<Problem>& problem, const char* what) {
     ExpectRefuted(Judge(problem, Driving()), -1, what);
   };
@@ -477,7 +477,7 @@ TEST(Misfit, OfBodyAndBounds) {
   expect_misfit(AtAllTimes({Eigen::Vector2d::Zero(), 0, 0, Down(0.5)}), "the model's step");
 }
 
-TEST(Misfit, OfSchedules) {
+TEST(Misfit, AScheduleThatDoesNotFitIsRefuted) {
   const auto judge = [](const Schedule& schedule, bool moves) {
     return With(Halves(), moves ? Crossing(1) : Post(0, 5, 1), schedule);
   };

@@ -11,6 +11,7 @@
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/record.h"
+#include "tests/worlds.h"
 
 namespace forereach::verifier {
 namespace {
@@ -18,20 +19,11 @@ namespace {
 using Integrator = ModelText::Integrator;
 
 std::shared_ptr<Problem> ProblemOf(const ModelText& text, double reach) {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakeTextModel(text);
-  const int n = problem->model->num_states(), m = problem->model->num_inputs();
-  const Eigen::VectorXd state = Eigen::VectorXd::Constant(n, reach), input = Eigen::VectorXd::Constant(m, 10);
-  problem->domain.state = Box(-state, state);
-  problem->domain.input = Box(-input, input);
-  problem->declaration = {Eigen::MatrixXd::Zero(n, n + m), Eigen::VectorXd::Zero(n)};
+  const auto model = MakeTextModel(text);
+  auto problem = std::make_shared<Problem>(WorldOf(model, Within(Eigen::VectorXd::Constant(model->num_states(), reach)),
+                                                   Within(Eigen::VectorXd::Constant(model->num_inputs(), 10))));
   problem->declaration.lipschitz.diagonal().setConstant(0.002);
-  problem->projection = Eigen::MatrixXd::Identity(2, n);
   problem->zonotope_order = 3;
-  problem->transitions = {Eigen::MatrixXd::Zero(1, n + m), Eigen::MatrixXd::Zero(1, n)};
-  std::vector<double> next(static_cast<std::size_t>(n));
-  problem->model->Evaluate(std::vector<double>(static_cast<std::size_t>(n + m)), next);
-  for (int k = 0; k < n; ++k) problem->transitions.x_next(0, k) = next[static_cast<std::size_t>(k)];
   problem->declaration.noise_bound.setConstant(1e-6);
   return problem;
 }
@@ -146,7 +138,7 @@ TEST_P(TextCertificates, OfWrappedHeadingsAreConfirmed) {
 }
 
 // An envelope that is narrower than wrapped data allow by less than the unit of an angle.
-TEST(AngleCertificates, TheUnitOfAnAngleCounts) {
+TEST(AngleCertificates, AnEnvelopeNarrowerThanTheUnitOfAnAngleIsRefuted) {
   ModelText text =
       TextModel({{"x", "x + dt*cos(q)"}, {"y", "y + dt*sin(q)"}, {"q", "q + dt*u"}}, {"u"}, {{"dt", 0.5, 0.5}});
   text.angles = {"q"};
@@ -195,7 +187,7 @@ class PointAtAKink : public testing::TestWithParam<std::tuple<const char*, forer
   forereach::Tube tube_;
 };
 
-TEST_P(PointAtAKink, IsConfirmed) {
+TEST_P(PointAtAKink, ACertificateOfAPointAtAKinkIsConfirmed) {
   ASSERT_EQ(certifier_.Certify(plan_, Initial(0, 0), {}, tube_).outcome, Outcome::kCertified);
   const Certificate certificate = CertificateOf(certifier_, plan_, Initial(0, 0), {}, tube_);
   const Verdict verdict = judge_.Verify(certificate);
@@ -205,7 +197,7 @@ TEST_P(PointAtAKink, IsConfirmed) {
   EXPECT_EQ(judge_.Verify(smaller).status, Status::kRefuted);
 }
 
-TEST_P(PointAtAKink, IsNotIfItIsNoPoint) {
+TEST_P(PointAtAKink, ASetAroundAKinkIsNotConfirmed) {
   ASSERT_EQ(certifier_.Certify(plan_, Initial(0, 0), {}, tube_).outcome, Outcome::kCertified);
   Certificate certificate = CertificateOf(certifier_, plan_, Initial(0, 0), {}, tube_);
   for (const double half_width : {0x1p-1074, 0x1p-60, 1e-3}) {
@@ -220,7 +212,7 @@ TEST_P(PointAtAKink, IsNotIfItIsNoPoint) {
 }
 
 // The kink comes in the second step, where the residual has made a box of the point.
-TEST_P(PointAtAKink, IsNotInTheNextStep) {
+TEST_P(PointAtAKink, AKinkInTheSecondStepIsNotConfirmed) {
   const Zonotope initial = Initial(-0.5, 0);
   const Decision decision = certifier_.Certify(plan_, initial, {}, tube_);
   EXPECT_EQ(decision.outcome, Outcome::kDomain);

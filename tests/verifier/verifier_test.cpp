@@ -11,6 +11,7 @@
 #include "tests/oracle/random.h"
 #include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"
+#include "tests/worlds.h"
 #include "verifier/containment.h"
 #include "verifier/equations.h"
 #include "verifier/tube.h"
@@ -42,15 +43,8 @@ TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), On
 TEST(SplitRemainder, HoldsAllOverTheSlice) {
   Random random(51);
   SCOPED_TRACE(random.trace());
-  const auto problem = std::make_shared<Problem>();
-  problem->model = MakeKinematicBicycle(0.1, 2.5);
-  Eigen::VectorXd reach(6);
-  reach << 1e3, 1e3, 20, 100, 10, 1.5;
-  problem->domain.state = Box(-reach, reach);
-  problem->domain.input = Box(Eigen::Vector2d(-10, -1), Eigen::Vector2d(10, 1));
-  problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
-  problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
-  problem->projection = Eigen::MatrixXd::Identity(2, 6);
+  const auto problem = std::make_shared<Problem>(
+      WorldOf(MakeKinematicBicycle(0.1, 2.5), Within({1e3, 1e3, 20, 100, 10, 1.5}), Within({10, 1})));
   const auto equations = EquationsOf(*problem->model);
   constexpr int kTheta = 2, kV = 3, kDelta = 5;
   for (int trial = 0; trial < 300; ++trial) {
@@ -209,7 +203,7 @@ TEST(HandMade, TouchingIsNotClear) {
   ExpectRefuted(Judge(Halves(), certificate), 0, "clear of obstacle 1");
 }
 
-TEST(HandMade, ClearanceIsADistance) {
+TEST(HandMade, AClearanceAboveTheDistanceIsRefuted) {
   Certificate certificate = OneStep();
   certificate.obstacles = {Obstacle::Circle(Eigen::Vector2d(4, 5), 2)};
   certificate.slices[0].clearance = {3};
@@ -223,7 +217,7 @@ TEST(HandMade, ClearanceIsADistance) {
   ExpectRefuted(Judge(Halves(), certificate), 0, "claims to be clear");
 }
 
-TEST(HandMade, EnvelopeAndRadius) {
+TEST(HandMade, EnvelopeRemainderAndRadiusAreDecidedToTheLastBit) {
   Certificate certificate = OneStep();
   certificate.slices[0].envelope_lower = Eigen::Vector4d::Constant(-kTiny);
   certificate.slices[0].envelope_upper = Eigen::Vector4d::Constant(kTiny);
@@ -305,12 +299,8 @@ TEST(HandMade, AContradictionOfRoundingSizeWidensTheSlice) {
 
 // A bicycle at v = 1 with theta within 1/4, for one step.
 std::pair<std::shared_ptr<Problem>, Certificate> Turning() {
-  auto problem = Halves();
-  problem->model = MakeKinematicBicycle(0.5, 1);
-  problem->domain.state = Box(Eigen::VectorXd::Constant(6, -1.5), Eigen::VectorXd::Constant(6, 1.5));
-  problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
-  problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
-  problem->projection = Eigen::MatrixXd::Identity(2, 6);
+  auto problem = std::make_shared<Problem>(
+      WorldOf(MakeKinematicBicycle(0.5, 1), Within({1.5, 1.5, 1.5, 1.5, 1.5, 1.5}), Within({2, 2})));
   Certificate certificate;
   certificate.initial_set = {{}, {}, Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6)};
   certificate.initial_set.center[3] = 1;
@@ -394,13 +384,7 @@ TEST(HandMade, WithoutRecordedSlicesSafetyIsDerived) {
 class Tampered : public testing::Test {
  protected:
   Tampered() {
-    problem_ = std::make_shared<Problem>();
-    problem_->model = MakeKinematicBicycle(0.1, 2.5);
-    Eigen::VectorXd reach(6);
-    reach << 40, 40, 3.1, 25, 3, 0.48;
-    problem_->domain.state = Box(-reach, reach);
-    problem_->domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
-    problem_->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+    problem_ = std::make_shared<Problem>(PaperBicycle(3.1));
     problem_->declaration.lipschitz(2, 3) = 0.018;
     problem_->method = forereach::Method::kPaper;
     problem_->declaration.lipschitz(2, 5) = 0.61;
@@ -413,7 +397,6 @@ class Tampered : public testing::Test {
       problem_->transitions.z.row(i) = z;
       problem_->transitions.x_next.row(i) = next;
     }
-    problem_->projection = Eigen::MatrixXd::Identity(2, 6);
     const Certifier certifier(problem_);
     Eigen::VectorXd center = Eigen::VectorXd::Zero(6), half(6);
     center[3] = 10;
@@ -433,9 +416,9 @@ class Tampered : public testing::Test {
   Certificate certificate_;
 };
 
-TEST_F(Tampered, Untouched) { ExpectConfirmed(Verdict_()); }
+TEST_F(Tampered, TheUnchangedCertificateIsConfirmed) { ExpectConfirmed(Verdict_()); }
 
-TEST_F(Tampered, MovedObstacle) {
+TEST_F(Tampered, AMovedObstacleIsRefuted) {
   certificate_.obstacles = {Obstacle::Circle(Eigen::Vector2d(9, 3 - 0x1p-30), 1)};  // the clearances are now too large
   EXPECT_EQ(Verdict_().status, Status::kRefuted);
   for (RecordedSlice& slice : certificate_.slices) slice.clearance.clear();
@@ -444,46 +427,46 @@ TEST_F(Tampered, MovedObstacle) {
   EXPECT_THAT(Verdict_().failure.what, HasSubstr("clear of obstacle 0"));
 }
 
-TEST_F(Tampered, ShrunkenSlice) {
+TEST_F(Tampered, AShrunkenSliceIsRefuted) {
   certificate_.slices[4].half_width[0] *= 1 - 0x1p-40;
   ExpectRefuted(Verdict_(), 4, "hull");
 }
 
-TEST_F(Tampered, DroppedGenerator) {
+TEST_F(Tampered, ADroppedGeneratorIsRefuted) {
   Eigen::MatrixXd& generators = certificate_.slices[6].generators;
   generators = generators.rightCols(generators.cols() - 1).eval();
   ExpectRefuted(Verdict_(), 6, "the hull of the recorded generators");
 }
 
-TEST_F(Tampered, ChangedSigma) {
+TEST_F(Tampered, AChangedSigmaIsRefuted) {
   problem_->declaration.noise_bound[2] = 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
-TEST_F(Tampered, ChangedDisturbance) {
+TEST_F(Tampered, AChangedDisturbanceIsRefuted) {
   problem_->declaration.disturbance = Eigen::VectorXd::Zero(6);
   EXPECT_EQ(Verdict_().status, Status::kConfirmed) << "zeros change nothing";
   problem_->declaration.disturbance[2] = 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
-TEST_F(Tampered, ChangedDeclaration) {
+TEST_F(Tampered, AChangedDeclarationIsRefuted) {
   problem_->declaration.lipschitz(2, 5) += 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
-TEST_F(Tampered, ChangedWheelbase) {
+TEST_F(Tampered, AChangedWheelbaseIsRefuted) {
   problem_->model = MakeKinematicBicycle(0.1, 2.49);
   EXPECT_EQ(Verdict_().status, Status::kRefuted);
 }
 
-TEST_F(Tampered, ChangedControl) {
+TEST_F(Tampered, AChangedControlIsRefuted) {
   certificate_.controls(1, 3) += 1e-9;
   EXPECT_EQ(Verdict_().status, Status::kRefuted);
   EXPECT_EQ(Verdict_().failure.step, 4);
 }
 
-TEST_F(Tampered, ShrunkenEnvelopeAndRemainder) {
+TEST_F(Tampered, AShrunkenEnvelopeOrRemainderIsRefuted) {
   RecordedSlice& slice = certificate_.slices[3];
   const double before = slice.remainder[0];
   slice.remainder[0] *= 1 - 0x1p-30;

@@ -63,13 +63,13 @@ class VerifyDecision : public testing::Test {
   Json decision_;
 };
 
-TEST_F(VerifyDecision, AsItIsConfirmed) {
+TEST_F(VerifyDecision, TheUnchangedDecisionIsConfirmed) {
   const Output output = Verify();
   EXPECT_EQ(output.code, 0) << output.text;
   EXPECT_THAT(output.text, HasSubstr("1 certificates, 1 confirmed, 0 refuted"));
 }
 
-TEST_F(VerifyDecision, OfEveryShippedCertificateConfirmed) {
+TEST_F(VerifyDecision, EveryShippedCertificateIsConfirmed) {
   for (const auto& [task, plan] : {std::pair{"bicycle", "bicycle_certified"},
                                    {"point_mass", "point_mass_certified"},
                                    {"post_samples", "straight"},
@@ -118,7 +118,7 @@ TEST_F(VerifyDecision, NestedWithoutEndIsBadInput) {
   EXPECT_THAT(output.text, HasSubstr("nested deeper than 32 levels"));
 }
 
-TEST_F(VerifyDecision, AsJson) {
+TEST_F(VerifyDecision, PrintsItsVerdictAsJson) {
   Json document = Json::parse(Verify("--json").text);
   EXPECT_EQ(document["confirmed"], 1);
   EXPECT_TRUE(document["failures"].empty());
@@ -129,13 +129,13 @@ TEST_F(VerifyDecision, AsJson) {
   EXPECT_EQ(document["failures"][0]["mismatches"].size(), 1u);
 }
 
-TEST_F(VerifyDecision, AnotherTaskByOption) {
+TEST_F(VerifyDecision, TakesAnotherTaskByOption) {
   EXPECT_EQ(Verify("--config config/bicycle.yaml").code, 0);
   EXPECT_EQ(Verify("--config config/point_mass.yaml").code, 2) << "of another size";
   EXPECT_EQ(Verify("--config none.yaml").code, 2);
 }
 
-TEST_F(VerifyDecision, AbstentionIsNoCertificate) {
+TEST_F(VerifyDecision, RefusesAnAbstention) {
   decision_ = Certify("bicycle_safety");
   const Output output = Verify();
   EXPECT_EQ(output.code, 1);
@@ -144,7 +144,7 @@ TEST_F(VerifyDecision, AbstentionIsNoCertificate) {
   ExpectRefuted({"refuted", "clear of obstacle"});
 }
 
-TEST_F(VerifyDecision, SliceShrunkenByOneUlp) {
+TEST_F(VerifyDecision, RefutesASliceShrunkenByOneUlp) {
   for (std::size_t t = 0; t < decision_["tube"].size(); ++t) {
     const Json before = decision_;
     Json& half_width = decision_["tube"][t]["half_width"][t % 6];
@@ -154,7 +154,7 @@ TEST_F(VerifyDecision, SliceShrunkenByOneUlp) {
   }
 }
 
-TEST_F(VerifyDecision, SliceShrunkenAndResealed) {
+TEST_F(VerifyDecision, RefutesASliceThatWasShrunkenAndResealed) {
   Json& half_width = decision_["tube"][5]["half_width"][0];
   half_width = half_width.get<double>() * (1 - 1e-12);
   Reseal();
@@ -164,26 +164,26 @@ TEST_F(VerifyDecision, SliceShrunkenAndResealed) {
   EXPECT_THAT(output.text, Not(HasSubstr("altered")));
 }
 
-TEST_F(VerifyDecision, InitialSliceShrunkenByOneUlpAndResealed) {
+TEST_F(VerifyDecision, RefutesAnInitialSliceShrunkenByOneUlpAndResealed) {
   Json& slice = decision_["tube"][0];
   slice["half_width"][3] = std::nextafter(slice["half_width"][3].get<double>(), 0.0);
   Reseal();
   ExpectRefuted({"step 0: not so"});
 }
 
-TEST_F(VerifyDecision, DroppedGenerator) {
+TEST_F(VerifyDecision, RefutesADroppedGenerator) {
   decision_["tube"][7]["generators"].erase(2);
   ExpectRefuted({"digest of tube", "step 7: not so: the hull of the recorded generators"});
   Reseal();
   ExpectRefuted({"step 7: not so: the hull of the recorded generators"});
 }
 
-TEST_F(VerifyDecision, ChangedControl) {
+TEST_F(VerifyDecision, RefutesAChangedControl) {
   decision_["inputs"]["controls"][2][1] = decision_["inputs"]["controls"][2][1].get<double>() + 1e-6;
   ExpectRefuted({"digest of plan", "step 3: not so"});
 }
 
-TEST_F(VerifyDecision, ChangedSigma) {
+TEST_F(VerifyDecision, RefutesAChangedSigma) {
   WriteTask(std::regex_replace(task_, std::regex("noise_bound: .*"), "noise_bound: [0, 0, 1e-9, 0, 0, 0]"));
   ExpectRefuted({"digest of the config", "digest of the declaration", "step 0: not so", "residual of theta"});
   Reseal(LoadConfig(scratch_ / "task.yaml"));
@@ -192,7 +192,7 @@ TEST_F(VerifyDecision, ChangedSigma) {
   EXPECT_THAT(output.text, Not(HasSubstr("digest of")));
 }
 
-TEST_F(VerifyDecision, MovedObstacle) {
+TEST_F(VerifyDecision, RefutesAMovedObstacle) {
   std::smatch center;
   ASSERT_TRUE(std::regex_search(task_, center, std::regex("circle: \\{center: \\[([^,]*), ([^\\]]*)\\]")));
   const Json& last = decision_["tube"].back()["center"];
@@ -229,7 +229,7 @@ class VerifyWorld : public VerifyDecision {
   void ExpectAltered(const char* field) { ExpectRefuted({"the record was altered after it was made: ", field}); }
 };
 
-TEST_F(VerifyWorld, AsItIsConfirmed) {
+TEST_F(VerifyWorld, ADecisionWithABodyAndMovingObstaclesIsConfirmed) {
   EXPECT_EQ(decision_["holds"], "all_times");
   EXPECT_EQ(decision_["inputs"]["schedule"]["step_us"], 100'000);
   EXPECT_TRUE(decision_["tube"].back()["clearance"].empty());
@@ -272,7 +272,7 @@ TEST_F(VerifyWorld, AnotherMotionIsRefuted) {
   ExpectRefuted({"digest of the obstacles", "obstacle 1"});
 }
 
-TEST_F(VerifyDecision, ChangedObservation) {
+TEST_F(VerifyDecision, RefutesAChangedObservation) {
   std::string data = Read(scratch_ / "data/bicycle_corridor_400.csv");
   data.erase(data.rfind('\n', data.size() - 2) + 1);  // the last row
   std::ofstream(scratch_ / "data/bicycle_corridor_400.csv") << data;
@@ -288,7 +288,7 @@ TEST_F(VerifyDecision, BadInputExitsWithTwo) {
   EXPECT_EQ(Verify().code, 2);
 }
 
-TEST(VerifyHelp, Teaches) {
+TEST(VerifyHelp, ShowsOptionsExitCodesAndAnExample) {
   const Output output = Forereach("verify --help");
   EXPECT_EQ(output.code, 0);
   for (const char* text : {"DECISION|LOG|DATABASE", "exit 0", "forereach verify decision.json",
@@ -296,7 +296,7 @@ TEST(VerifyHelp, Teaches) {
     EXPECT_THAT(output.text, HasSubstr(text));
 }
 
-TEST(ProgressTest, SaysHowMuchAndHowLong) {
+TEST(ProgressTest, PrintsTheShareDoneAndTheTimeLeft) {
   EXPECT_EQ(Progress::Line("plans", 5, 10, 3), "[###############...............] 5 of 10 plans, 3 s left");
   EXPECT_EQ(Progress::Line("plans", 0, 10, 3), "[..............................] 0 of 10 plans");
   EXPECT_EQ(Progress::Line("plans", 10, 10, 3), "[##############################] 10 of 10 plans");
