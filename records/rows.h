@@ -28,7 +28,7 @@ struct DecisionRow {
   std::int64_t utime = 0, candidate_utime = 0, sequence = 0, plan_id = 0;
   std::string source, outcome, cause, message;
   int step = -1, coordinate = -1, obstacle = -1, first_observation = -1, second_observation = -1;
-  double margin = kNoNumber, threshold = kUnknown, elapsed_us = kUnknown;
+  double margin = kNoNumber, threshold = kNoNumber, elapsed_us = kNoNumber;
   /** The time between the receipts of candidate and decision at the logger. Unknown if the log lacks the candidate. */
   double latency_us = kNoNumber;
   std::string plan_digest;

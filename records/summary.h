@@ -22,7 +22,7 @@ namespace forereach {
 
 /** Nearest-rank quantiles of durations in microseconds; NaN if there are none. */
 struct Quantiles {
-  double p50 = kNoNumber, p99 = kUnknown;
+  double p50 = kNoNumber, p99 = kNoNumber;
 
   /** False also if all durations are zero, as on the simulated clock of `forereach run`, which stops during
   computations. */
