@@ -28,24 +28,25 @@ controls that stand: if the next slice, which contains the next state, allows it
 for another step. If the time is too short already when the withdrawal arrives, the stop begins at once. The robot is
 not halted by it.
 
-After every other emergency stop no plan is accepted until a reset arrives whose stamp is later than everything that
+After STEP_OUTSIDE and HALTED no plan is accepted until a reset arrives whose stamp is later than everything that
 halted the robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is
 executing is not affected by Expect.
 
 **Exceptions.** No exception leaves this class, except from the constructor and Expect.
-- Send comes last: a call first takes its messages and measurements, decides, and sets the control or holds. Then it
-  passes its reports to Robot::Send. If Send throws, whatever it is, nothing else changes: the report is counted and
-sent again, in the next calls and in the order of its channel. At most 64 reports of a channel wait; after that the
-oldest is lost. Each report has its sequence number from the beginning, so receivers see a gap for each lost one. A
-report that Send did send before it threw arrives twice, with the same sequence number and time.
-- Anything else that throws (state, Hold, StepsToRest, Reload, an allocation) ends the call and the executing plan: the
-  robot holds, and ERROR_STOP is reported. The robot is not halted. The next plan starts as any other one does. If Hold
-  throws, each later call calls it again, and no control is returned until it returns.
-- A boundary whose state could not be measured sends no ROBOT_STATE; its number is left out.
-- Boundary checks the state and the time again if FinishStep has been called before it. So a control is returned only
-for the state and the time of that call, whatever was called and whatever threw before.
-- What your program does between the calls is its own: if it throws there (a clock, a sensor, a receiver), hold until
-  Boundary returns a control.
+
+- A call decides first and sets the control or holds. It calls Robot::Send last. If Send throws anything, nothing else
+  changes: the report is counted, and sent again in the next calls, in the order of its channel. At most 64 reports of
+  a channel wait; then the oldest is lost. A report keeps its sequence number, so receivers see a gap for each lost
+  one. A report that was sent before Send threw arrives twice, with the same sequence number and time.
+- If anything else throws (state, Hold, StepsToRest, Reload, an allocation), the plan ends and the robot holds:
+  ERROR_STOP. The robot is not halted, and the next plan starts as any other. If Hold throws, each later call calls it
+  again, and no plan starts until it returns.
+- A boundary whose state could not be measured sends no robot_state_t, and leaves out its sequence number.
+- Boundary checks state and time again if FinishStep was called before it. So a control is returned only if the guard
+  has checked the state and the time of that call, whatever was called or threw before. The time is checked only with
+  GuardOptions::max_jitter_us.
+- If your program throws between the calls (a clock, a receiver), this object does not know it: hold until Boundary
+  returns a control.
 
 The functions of Robot may call Report and Expect, and Send also what takes messages, as if after the call that sends.
 If one of them calls anything else, this does nothing, and the robot holds as after an exception.
