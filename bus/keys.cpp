@@ -2,15 +2,20 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>  // renameat2
+#include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <sodium.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -369,6 +374,152 @@ void MakeKeys(const std::string& robot, const std::string& directory) {
     ::unlink((directory + "/" + std::string(kVerifyFile)).c_str());
     ::rmdir(directory.c_str());
     throw;
+  }
+}
+
+// ---- A new key for one role.
+
+namespace {
+
+// A directory of keys, and what it is exchanged for. Holds the parent directory, locked against other calls.
+class KeyDirectory final {
+ public:
+  explicit KeyDirectory(const std::string& directory) : path_(Resolve(directory)) {
+    const std::size_t slash = path_.rfind('/');
+    name_ = path_.substr(slash + 1);
+    other_ = "." + name_ + ".replacing";
+    parent_path_ = path_.substr(0, std::max<std::size_t>(slash, 1));
+    parent_.emplace(::open(parent_path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (parent_->get() < 0) FailSystem(parent_path_, "cannot be read");
+    if (::flock(parent_->get(), LOCK_EX | LOCK_NB) != 0)
+      Fail(path_, errno == EWOULDBLOCK ? "another `forereach keygen --again` is at work here"
+                                       : std::string("cannot be locked: ") + std::strerror(errno));
+  }
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] std::string other_path() const { return path_.substr(0, path_.rfind('/') + 1) + other_; }
+
+  void RequireOnlyKeys() const {
+    const std::unique_ptr<DIR, int (*)(DIR*)> listing(::opendir(path_.c_str()), ::closedir);
+    if (!listing) FailSystem(path_, "cannot be read");
+    std::string stranger;
+    int keys = 0;
+    while (const dirent* entry = ::readdir(listing.get())) {
+      const std::string name = entry->d_name;
+      if (name == "." || name == "..") continue;
+      if (std::ranges::count(KeyFiles(), name) > 0)
+        ++keys;
+      else
+        stranger = name;
+    }
+    if (keys == 0) Fail(path_, "there are no keys in it; without --again, `forereach keygen` makes a new directory");
+    if (!stranger.empty())
+      Fail(path_ + "/" + Printable(stranger), "is no key file; --again needs a directory that holds nothing else");
+  }
+
+  void WriteOther(const KeyRing::Content& content) const {
+    if (::mkdirat(parent_->get(), other_.c_str(), S_IRWXU) != 0) FailSystem(other_path(), "cannot be made");
+    if (::fchmodat(parent_->get(), other_.c_str(), S_IRWXU, 0) != 0)  // whatever the umask
+      FailSystem(other_path(), "cannot be made");
+    const Descriptor handle(::openat(parent_->get(), other_.c_str(), kOpenDirectory));
+    if (handle.get() < 0) FailSystem(other_path(), "cannot be made");
+    WriteAll(handle.get(), other_path(), content);
+  }
+
+  void Exchange() const {
+    if (::renameat2(parent_->get(), other_.c_str(), parent_->get(), name_.c_str(), RENAME_EXCHANGE) != 0)
+      FailSystem(path_, "cannot be exchanged for " + other_path() +
+                            ", which needs a file system that exchanges "
+                            "directories in one step");
+  }
+  void Sync() const {
+    if (::fsync(parent_->get()) != 0) FailSystem(parent_path_, "cannot be written");
+  }
+
+  // @throws KeyError if there is something else than keys in it, or it cannot be removed.
+  void RemoveOther() const {
+    const Descriptor handle(::openat(parent_->get(), other_.c_str(), kOpenDirectory));
+    if (handle.get() < 0 && errno == ENOENT) return;
+    if (handle.get() < 0) FailSystem(other_path(), "cannot be removed");
+    for (const std::string& name : KeyFiles())
+      if (::unlinkat(handle.get(), name.c_str(), 0) != 0 && errno != ENOENT)
+        FailSystem(other_path() + "/" + name, "cannot be removed");
+    if (::unlinkat(parent_->get(), other_.c_str(), AT_REMOVEDIR) != 0) FailSystem(other_path(), "cannot be removed");
+    Sync();
+  }
+
+ private:
+  static constexpr int kOpenDirectory = O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC;
+
+  static std::string Resolve(const std::string& directory) {
+    const std::unique_ptr<char, void (*)(void*)> path(::realpath(directory.c_str(), nullptr), std::free);
+    if (!path) FailSystem(directory, "cannot be read");
+    if (!IsDirectory(path.get())) Fail(directory, "is no directory; --again needs the directory of all keys");
+    return path.get();
+  }
+  static std::vector<std::string> KeyFiles() {
+    std::vector<std::string> names{std::string(kVerifyFile)};
+    for (const Role role : kAllRoles) names.push_back(FileOf(role));
+    return names;
+  }
+
+  const std::string path_;
+  std::string name_, other_, parent_path_;
+  std::optional<Descriptor> parent_;
+};
+
+// The secrets of all roles but one, whose file may be missing.
+std::shared_ptr<KeyRing::Content> LoadAllBut(Role lost, const std::string& directory) {
+  const KeyFile verify = Load(directory + "/" + std::string(kVerifyFile));
+  if (verify.role) Fail(directory + "/" + std::string(kVerifyFile), "line 1: has to be " + std::string(kVerifyFormat));
+  const std::shared_ptr<KeyRing::Content> all = verify.content;
+  for (const Role role : kAllRoles) {
+    const std::string path = directory + "/" + FileOf(role);
+    if (role == lost && ::access(path.c_str(), F_OK) != 0 && errno == ENOENT) continue;
+    const KeyFile key = Load(path);
+    if (key.role != role) Fail(path, "line 3: role: has to be " + std::string(RoleName(role)));
+    if (all->robot != key.content->robot || all->public_keys != key.content->public_keys)
+      Fail(path, "belongs to other keys than " + std::string(kVerifyFile) + " in the same directory");
+    const SecretKey& group = key.content->secrets->group;
+    if (all->holds_group && sodium_memcmp(group.data(), all->secrets->group.data(), sizeof group) != 0)
+      Fail(path, "line 5: group: is not that of the other files in the same directory");
+    all->secrets->group = group;
+    all->holds_group = true;
+    all->Hold(role, key.content->secrets->seed[At(role)]);
+  }
+  return all;
+}
+
+}  // namespace
+
+void ReplaceKey(const std::string& robot, const std::string& directory, Role role) {
+  RequireSodium(directory);
+  const KeyDirectory keys(directory);
+  keys.RequireOnlyKeys();
+  const std::shared_ptr<KeyRing::Content> content = LoadAllBut(role, keys.path());
+  if (content->robot != robot)
+    Fail(directory, "the keys are of robot " + content->robot + ", not of " + Printable(robot.substr(0, kMaxName + 1)));
+  keys.RemoveOther();
+  SecretKey seed;
+  randombytes_buf(seed.data(), seed.size());
+  content->Hold(role, seed);
+  sodium_memzero(seed.data(), seed.size());
+  try {
+    keys.WriteOther(*content);
+    keys.Exchange();
+  } catch (...) {
+    try {
+      keys.RemoveOther();
+    } catch (const KeyError&) {  // the next call does
+    }
+    throw;
+  }
+  try {
+    keys.Sync();
+    keys.RemoveOther();
+  } catch (const KeyError& error) {
+    Fail(directory, "the new keys are in place, but see to it that the old ones in " + keys.other_path() +
+                        " are gone: " + error.what());
   }
 }
 

@@ -93,6 +93,17 @@ class KeyRing final {
 @throws KeyError if `directory` exists or cannot be written; it then leaves no files. */
 void MakeKeys(const std::string& robot, const std::string& directory);
 
+/** Gives one role a new key in a directory that MakeKeys has made, as after the loss of a machine: ROLE.key has a new
+secret, and every file the new public key. The other secrets and the group key stay. ROLE.key need not be there before.
+
+The directory is exchanged for a complete new one in one step (renameat2, RENAME_EXCHANGE), so whatever ends the
+process, it holds the old keys or the new ones. The other one is beside it, as `.NAME.replacing`, until it is removed;
+if this call cannot do that, the next one does.
+@throws KeyError if `robot` is not the robot of the keys, a file is missing, cannot be used (as LoadKeys) or belongs to
+other keys than the others, there is anything else in the directory, another call is at work, or the file system cannot
+exchange directories. The keys are then the old ones, unless the text says that the new ones are in place. */
+void ReplaceKey(const std::string& robot, const std::string& directory, Role role);
+
 /** Reads the ring of one role. @param path one .key file, or a directory, in which ROLE.key is read.
 @throws KeyError if the file cannot be read, is not a regular file, belongs to another user than this program's or root,
 can be read or written by others, violates the format above, or is another role's. */

@@ -173,26 +173,64 @@ Command ReloadCommand() {
                     [](const CommandArguments& options) { return Send(options, command_t::RELOAD); });
 }
 
+namespace {
+
+std::vector<std::string> RoleNames() {
+  std::vector<std::string> names;
+  for (const Role role : kAllRoles) names.emplace_back(RoleName(role));
+  return names;
+}
+
+// The other roles' files first: with them, the machines refuse the lost key.
+void PrintWhoNeedsWhat(const std::string& directory, const std::string& replaced) {
+  std::cout << directory << ": " << replaced
+            << " has a new key. The old one counts until the machines below have their new files.\n"
+               "Copy them in this order, and restart the programs that use them:\n";
+  for (const std::string& name : RoleNames())
+    if (name != replaced) std::cout << "  " << name << ".key to the machine of the " << name << '\n';
+  std::cout << "  " << replaced << ".key to the new machine of the " << replaced << ", and to no other\n"
+            << "  verify.pub to those who read logs; logs from before need the verify.pub from before" << std::endl;
+}
+
+}  // namespace
+
 Command KeygenCommand() {
   struct KeygenArguments {
-    std::string robot, directory;
+    std::string robot, directory, again;
   };
   const auto options = std::make_shared<KeygenArguments>();
-  return {.name = "keygen",
-          .purpose = "Make the keys of one robot: a directory with one key file for each role",
-          .footer =
-              "Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or set bus.key "
-              "in the task file. On another machine a process needs only its own role's file, as in\n"
-              "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub contains no secret; "
-              "report, replay and verify check logs with it.",
-          .options = {Required({"--robot", &options->robot, "NAME",
-                                "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature"}),
-                      Required({"directory", &options->directory, "DIR", "The new directory"})},
-          .run = [options] {
-            MakeKeys(options->robot, options->directory);
-            std::cout << options->directory << std::endl;
-            return 0;
-          }};
+  return {
+      .name = "keygen",
+      .purpose = "Make the keys of one robot: a directory with one key file for each role",
+      .footer =
+          "Examples:\n  forereach keygen --robot alpha keys\n  forereach keygen --robot alpha keys --again planner\n"
+          "Then give --key keys to every process, or set bus.key "
+          "in the task file. On another machine a process needs only its own role's file, as in\n"
+          "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub contains no secret; "
+          "report, replay and verify check logs with it.\n\nIf the machine of a role is lost, --again "
+          "gives that role a new key and keeps the others'. It prints which machine needs which file; a machine "
+          "without its new file still believes the lost key, and refuses the new one. Keep a copy of verify.pub if "
+          "there are logs from before.",
+      .options = {Required({"--robot", &options->robot, "NAME",
+                            "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature"}),
+                  Required({"directory", &options->directory, "DIR",
+                            "The new directory; with --again, the one that was made"}),
+                  {.name = "--again",
+                   .variable = &options->again,
+                   .type = "ROLE",
+                   .help = "Replace the key of this role in DIR, and no other: its machine is lost",
+                   .one_of = RoleNames()}},
+      .run = [options] {
+        const auto again = std::ranges::find(kAllRoles, options->again, RoleName);
+        if (again == kAllRoles.end()) {
+          MakeKeys(options->robot, options->directory);
+          std::cout << options->directory << std::endl;
+        } else {
+          ReplaceKey(options->robot, options->directory, *again);
+          PrintWhoNeedsWhat(options->directory, options->again);
+        }
+        return 0;
+      }};
 }
 
 }  // namespace forereach

@@ -72,6 +72,7 @@ std::string_view EventName(std::int16_t kind) {
     case execution_event_t::EMERGENCY_STOP: return "emergency_stop";
     case execution_event_t::OFF_SCHEDULE: return "off_schedule";
     case execution_event_t::LIMIT_EXCEEDED: return "limit_exceeded";
+    case execution_event_t::ERROR_STOP: return "error_stop";
     default: return "unknown";
   }
 }

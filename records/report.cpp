@@ -158,7 +158,9 @@ class PictureMaker final : public TimelineUser {
       executed_.insert({event.plan_id, event.step});
     if (event.kind == execution_event_t::GOAL_REACHED) arrived_ = true;
     const bool stops = event.kind == execution_event_t::STANDING || event.kind == execution_event_t::STEP_OUTSIDE ||
-                       event.kind == execution_event_t::OFF_SCHEDULE || event.kind == execution_event_t::EMERGENCY_STOP;
+                       event.kind == execution_event_t::OFF_SCHEDULE ||
+                       event.kind == execution_event_t::EMERGENCY_STOP ||
+                       (event.kind == execution_event_t::ERROR_STOP && event.plan_id >= 0);
     const auto position = PositionOf(event.state, event.num_states);
     if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
   }

@@ -179,7 +179,9 @@ void SummaryBuilder::Add(const EventRow& row) {
   if (row.kind == "goal_reached") summary_.goal_reached = true;
   if (!summary_.goal_reached) {
     if (row.kind == "tail_begun") ++summary_.tails;
-    if (row.kind == "standing" || row.kind == "step_outside" || row.kind == "emergency_stop") ++summary_.stops;
+    if (row.kind == "standing" || row.kind == "step_outside" || row.kind == "emergency_stop" ||
+        (row.kind == "error_stop" && row.plan_id >= 0))
+      ++summary_.stops;
   }
   if (row.kind == "emergency_stop") ++summary_.emergency_stops;
   const std::pair left(row.plan_id, static_cast<int>(row.step));

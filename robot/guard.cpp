@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <initializer_list>
+#include <new>
 #include <stdexcept>
 
 #include "lcmtypes/grounds.h"
@@ -17,13 +18,16 @@ namespace {
 constexpr std::size_t kMostExpected = 8;  // reloaded tasks without a plan yet
 constexpr int kMaxPlanStates = 16, kMaxPlanInputs = 8, kMaxPlanSteps = 128;
 
-[[gnu::format(printf, 1, 2)]] std::string Sentence(const char* format, ...) {
+// Empty without memory for it: a refusal keeps its cause.
+[[gnu::format(printf, 1, 2)]] std::string Sentence(const char* format, ...) try {
   char text[256];
   std::va_list arguments;
   va_start(arguments, format);
   std::vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
   return text;
+} catch (const std::bad_alloc&) {
+  return {};
 }
 
 GuardVerdict Refuse(GuardCause cause, std::string message) {
@@ -211,6 +215,7 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
                                 ", it must not be negative");
   RequireDomain(options_.domain, options_);
   angles_ = AnglesOf(options_.angles, options_.num_states);
+  expected_.reserve(kMostExpected);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
   // A plan expires and its plan_id has to be new, so a plan from before the guard's start does no more harm than a late
@@ -269,19 +274,24 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     if (!verdict.ok()) return verdict;
     last_accepted_ = certified->plan.plan_id;
     last_expiry_ = std::max(last_expiry_, certified->expires_utime);
-    if (const auto task = FindExpected(*certified); task != expected_.end()) {
-      options_.config_digest = task->config;
-      options_.model_digest = task->model;
-      if (task->domain) options_.domain = task->domain;
-      angles_ = task->angles.value_or(angles_);
-      expected_.erase(expected_.begin(), task + 1);
-    }
+    TakeTaskOf(*certified);
     pending_ = std::move(certified);
     pending_angles_ = angles_;
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
   return verdict;
+}
+
+// Throws nothing: it moves what Expect has allocated.
+void Guard::TakeTaskOf(const certified_plan_v2_t& certified) {
+  const auto task = expected_.begin() + (FindExpected(certified) - expected_.cbegin());
+  if (task == expected_.end()) return;
+  options_.config_digest = task->config;
+  options_.model_digest = task->model;
+  if (task->domain) options_.domain = std::move(task->domain);
+  angles_ = task->angles.value_or(angles_);
+  expected_.erase(expected_.begin(), task + 1);
 }
 
 namespace {
@@ -512,10 +522,10 @@ GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int
 }
 
 // Of the step that ends: its motion is bounded for so long.
-GuardVerdict Guard::ExamineDuration(int step, std::int64_t now_us) const {
-  if (!options_.max_jitter_us || now_us <= last_step_utime_) return {};
+GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const {
+  if (!options_.max_jitter_us || now_us <= began_utime) return {};
   const candidate_plan_t& plan = executing_->plan;
-  const std::uint64_t lasted = Apart(now_us, last_step_utime_);
+  const std::uint64_t lasted = Apart(now_us, began_utime);
   const std::uint64_t most =
       static_cast<std::uint64_t>(options_.step_us) + static_cast<std::uint64_t>(*options_.max_jitter_us);
   if (lasted <= most) return {};
@@ -527,7 +537,7 @@ GuardVerdict Guard::ExamineDuration(int step, std::int64_t now_us) const {
 }
 
 GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const {
-  if (!executing_) return Refuse(GuardCause::kNotExecuting, "no plan is executing");
+  if (!executing_) return Refuse(GuardCause::kNotExecuting, Sentence("no plan is executing"));
   const int num_steps = executing_->plan.num_steps;
   if (step != last_step_ + 1 || step > num_steps)
     return Refuse(GuardCause::kStepOutOfOrder, Sentence("step %d of %d after step %d", step, num_steps, last_step_));
@@ -537,7 +547,16 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
   GuardVerdict verdict = ExamineStateSize(state);
   if (verdict.ok()) verdict = CheckSlice(*executing_, executing_angles_, step, state);
   if (verdict.ok()) verdict = ExamineTime(executing_->plan, step, now_us);
-  return verdict.ok() ? ExamineDuration(step, now_us) : verdict;
+  return verdict.ok() ? ExamineDuration(step, last_step_utime_, now_us) : verdict;
+}
+
+GuardVerdict Guard::ExamineAgain(std::span<const double> state, std::int64_t now_us) const {
+  if (!executing_) return Refuse(GuardCause::kNotExecuting, Sentence("no plan is executing"));
+  GuardVerdict verdict = ExamineStateSize(state);
+  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, executing_angles_, state);
+  if (verdict.ok()) verdict = CheckSlice(*executing_, executing_angles_, last_step_, state);
+  if (verdict.ok()) verdict = ExamineTime(executing_->plan, last_step_, now_us);
+  return verdict.ok() && last_step_ > 0 ? ExamineDuration(last_step_, step_before_utime_, now_us) : verdict;
 }
 
 GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept {
@@ -547,12 +566,28 @@ GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std:
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
-  if (executing_) verdict.plan_id = executing_->plan.plan_id;
   last_step_ = step;
+  step_before_utime_ = std::exchange(last_step_utime_, now_us);
+  EndIfRefused(verdict);
+  return verdict;
+}
+
+GuardVerdict Guard::CheckAgain(std::span<const double> measured_state, std::int64_t now_us) noexcept {
+  GuardVerdict verdict;
+  try {
+    verdict = ExamineAgain(measured_state, now_us);
+  } catch (...) {
+    verdict.cause = GuardCause::kInternalError;
+  }
   last_step_utime_ = now_us;
+  EndIfRefused(verdict);
+  return verdict;
+}
+
+void Guard::EndIfRefused(GuardVerdict& verdict) noexcept {
+  if (executing_) verdict.plan_id = executing_->plan.plan_id;
   if (verdict.cause == GuardCause::kOutsideSlice) Halt();
   if (!verdict.ok()) executing_.reset();
-  return verdict;
 }
 
 }  // namespace forereach

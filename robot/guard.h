@@ -8,6 +8,7 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
                  the plan before it
     Check     -> after each control: the state is inside X_t, so the next control may be applied. With
                  GuardOptions::max_jitter_us also: the step is on time and has not lasted too long
+    CheckAgain -> the same once more, if time has passed since Check
     Withdraw  -> controls of a plan stand no longer: a pending plan is dropped, and of the executing one only the
                  controls before `standing_steps` may still be applied
     Finish    -> no plan is executing
@@ -85,7 +86,7 @@ enum class GuardCause {
   kStepOutOfOrder,  ///< Not the step after the last one checked, or past the horizon.
   kWithdrawn,       ///< The control before this step had been withdrawn.
   // all of them
-  kInternalError,  ///< Out of memory.
+  kInternalError,  ///< An exception: out of memory.
 };
 
 /** The name of a cause: "wrong_length", "trailing_bytes", ...; "none" for kNone. */
@@ -179,6 +180,11 @@ class Guard final {
   it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
 
+  /** Checks the step that was checked or started last once more, before its control is applied: for a robot that lets
+  time pass in between. The state against X_0 and the hull of slice 0, or the hull of slice `step`; the time as Check
+  does, with the step that has ended. After a refusal no plan is executing. Cost and allocations as Check. */
+  [[nodiscard]] GuardVerdict CheckAgain(std::span<const double> measured_state, std::int64_t now_us) noexcept;
+
   /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed
   it. A plan is meant if its certificate digest is the message's, or if the message names none and the plan_id is equal.
   - Pending: it is dropped.
@@ -201,7 +207,7 @@ class Guard final {
   /** After a reload of the task: also accepts plans certified under this configuration and model. The certifier may not
   have taken the new task yet, so plans of the old one are accepted until the first plan of the new one arrives.
   @param domain the domain of these plans; nothing: the domain in force stays. @param angles likewise.
-  @throws std::invalid_argument as the constructor. */
+  @throws std::invalid_argument as the constructor. What throws changes nothing. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
               const std::optional<std::vector<int>>& angles = {});
   [[nodiscard]] bool halted() const { return halted_; }
@@ -225,6 +231,8 @@ class Guard final {
 
   [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes);
   void Take(const withdrawal_t& message, GuardWithdrawal& answer);
+  void TakeTaskOf(const certified_plan_v2_t& certified);
+  void EndIfRefused(GuardVerdict& verdict) noexcept;
   [[nodiscard]] GuardVerdict Examine(const certified_plan_v2_t& certified, std::int64_t now_us) const;
   [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_v2_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
@@ -234,7 +242,8 @@ class Guard final {
                                           std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const;
-  [[nodiscard]] GuardVerdict ExamineDuration(int step, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineAgain(std::span<const double> state, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;
@@ -246,9 +255,10 @@ class Guard final {
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
   std::unique_ptr<certified_plan_v2_t> pending_, executing_;
   Angles pending_angles_, executing_angles_;
-  int last_step_ = 0;                  // last checked step of the executing plan
-  std::int64_t last_step_utime_ = 0;   // when it was checked
-  std::optional<int> standing_steps_;  // of the executing plan
+  int last_step_ = 0;                   // last checked step of the executing plan
+  std::int64_t last_step_utime_ = 0;    // when it was checked
+  std::int64_t step_before_utime_ = 0;  // when the one before it was
+  std::optional<int> standing_steps_;   // of the executing plan
 };
 
 }  // namespace forereach

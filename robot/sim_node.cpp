@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <stdexcept>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -96,7 +97,7 @@ void RequireSize(const Config& config, const char* key, std::size_t size, std::i
 
 RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Plant plant)
     : config_(WithKeysOfRobot(config)),
-      sender_(bus),
+      bus_(bus),
       out_(out),
       plant_(plant ? std::move(plant) : TargetOf(config)),
       places_(*config.problem->model, config.problem->projection, config.problem->body),
@@ -192,7 +193,9 @@ void RobotSimNode::BrakeUntil(std::int64_t utime) {
   is_stopping_ = brake_.StepsToRest(state_, state_) > 0;
 }
 
-void RobotSimNode::Send(const std::string& channel, Bytes message) { sender_.Send(channel, message); }
+void RobotSimNode::Send(const std::string& channel, Bytes message) {
+  if (!bus_.Publish(channel, message)) throw std::runtime_error("the bus does not take it");
+}
 
 void RobotSimNode::LogProgress(std::int64_t utime) {
   if (utime < next_progress_utime_) return;
@@ -286,7 +289,7 @@ std::string RobotSimNode::Summary() const {
   summary["plans_accepted"] = counts.accepted;
   summary["plans_started"] = counts.started;
   summary["plans_refused"] = counts.refused;
-  summary["messages_not_sent"] = sender_.refused();
+  summary["messages_not_sent"] = counts.reports_lost + static_cast<std::int64_t>(supervisor_.reports_waiting());
   return JsonText(summary);
 }
 

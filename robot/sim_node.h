@@ -91,7 +91,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   [[nodiscard]] double DistanceToGoal() const;
 
   const Config config_;
-  Sender sender_;
+  Bus& bus_;
   std::ostream& out_;
   const Plant plant_;
   const BodyPlaces places_;

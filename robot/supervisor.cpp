@@ -1,6 +1,11 @@
 #include "robot/supervisor.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <exception>
+#include <new>
+#include <stdexcept>
 #include <utility>
 
 #include "forereach/robot_state_t.hpp"
@@ -12,6 +17,8 @@
 namespace forereach {
 namespace {
 
+constexpr std::size_t kMostStates = sizeof(robot_state_t::state) / sizeof(double);
+
 // What a message has room for. A state of another size than the task's does not get past the guard.
 template <std::size_t N>
 std::int16_t SetValues(double (&field)[N], std::span<const double> values) {
@@ -20,10 +27,52 @@ std::int16_t SetValues(double (&field)[N], std::span<const double> values) {
   return static_cast<std::int16_t>(count);
 }
 
+// A sentence for an event, cut to what it has room for. Allocates nothing.
+class EventText final {
+ public:
+  EventText& operator<<(std::string_view text) {
+    size_ += text.copy(text_.data() + size_, text_.size() - size_);
+    return *this;
+  }
+  EventText& operator<<(int number) {
+    std::array<char, 16> digits;
+    return *this << std::string_view(digits.data(),
+                                     std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr);
+  }
+  operator std::string_view() const { return {text_.data(), size_}; }
+
+ private:
+  std::array<char, sizeof(execution_event_t::message)> text_;
+  std::size_t size_ = 0;
+};
+
+// Of the exception that is being handled.
+EventText TextOfException() noexcept {
+  EventText text;
+  text << "emergency stop, not certified: the robot's program threw ";
+  try {
+    throw;
+  } catch (const std::bad_alloc&) {
+    text << "std::bad_alloc, it is out of memory";
+  } catch (const std::exception& error) {
+    text << "an exception: " << error.what();
+  } catch (...) {
+    text << "what is no std::exception";
+  }
+  return text;
+}
+
+enum : std::size_t { kRobotState, kTransition, kEvent };  // indices of channels
+
 }  // namespace
 
 Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
-    : options_(std::move(options)), robot_(robot), guard_(options_.guard) {
+    : options_(std::move(options)),
+      robot_(robot),
+      guard_(options_.guard),
+      reports_({options_.robot_state, options_.transition, options_.event}) {
+  state_.reserve(kMostStates);
+  step_began_at_.reserve(kMostStates);
   if (!options_.guard.keys) return;
   // Nothing recorded earlier releases the robot: a command has to be fresh, and later than what halted it.
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
@@ -37,22 +86,78 @@ std::optional<Bytes> Supervisor::Authentic(const std::string& channel, Bytes mes
   return authenticity == Authenticity::kAuthentic ? std::optional(content) : std::nullopt;
 }
 
-void Supervisor::OnCertified(Bytes message, std::int64_t now_us) {
-  const GuardVerdict verdict = guard_.Accept(message, now_us);
-  if (!verdict.ok()) return SendRefusal(now_us, verdict);
-  ++counts_.accepted;
-  SendEvent(now_us, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");
+// Whether a function of the robot calls what it may not: that does nothing, and the call under way ends with a hold.
+bool Supervisor::IsMisuse(bool may_be_sending) noexcept {
+  const bool is_misuse = is_deciding_ || (is_sending_ && !may_be_sending);
+  is_misused_ = is_misused_ || is_misuse;
+  return is_misuse;
 }
 
-void Supervisor::OnWithdrawn(Bytes message, std::int64_t now_us) {
-  const GuardWithdrawal answer = guard_.Withdraw(message);
-  if (!answer.verdict.ok()) return SendRefusal(now_us, answer.verdict);
-  SendEvent(now_us, execution_event_t::WITHDRAWN, answer.verdict.plan_id, answer.standing_steps,
-            static_cast<double>(answer.sequence), answer.message);
-  if (IsExecuting() && MustStop()) StopInEmergency(now_us);
+// Does the work of a call. The reports that it adds are sent after it.
+template <class Work>
+void Supervisor::Run(std::int64_t utime, const Work& work) noexcept {
+  is_deciding_ = true;
+  try {
+    work();
+    if (!IsExecuting()) HoldIfMoving();  // after a fault, or if Hold threw before
+    if (is_misused_) throw std::logic_error("a function of Supervisor::Robot called the supervisor");
+  } catch (...) {
+    StopAfterException(utime);
+  }
+  is_deciding_ = is_misused_ = false;
 }
 
-void Supervisor::OnFault(Bytes message, std::int64_t now_us) {
+// Called where the exception is caught.
+void Supervisor::StopAfterException(std::int64_t utime) noexcept {
+  ++counts_.errors;
+  ReportEvent(utime, execution_event_t::ERROR_STOP, PlanId(), Step(), 0, TextOfException());
+  try {
+    HoldIfMoving();
+  } catch (...) {  // the next call tries it again
+  }
+}
+
+void Supervisor::Measure() {
+  is_measured_ = false;
+  const std::span<const double> state = robot_.state();
+  state_.assign(state.begin(), state.end());
+  is_measured_ = true;
+}
+
+void Supervisor::OnCertified(Bytes message, std::int64_t now_us) noexcept {
+  if (IsMisuse(true)) return;
+  Run(now_us, [&] {
+    const GuardVerdict verdict = guard_.Accept(message, now_us);
+    Measure();
+    if (!verdict.ok()) return ReportRefusal(now_us, verdict);
+    ++counts_.accepted;
+    ReportEvent(now_us, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");
+  });
+  SendReports(now_us);
+}
+
+void Supervisor::OnWithdrawn(Bytes message, std::int64_t now_us) noexcept {
+  if (IsMisuse(true)) return;
+  Run(now_us, [&] {
+    const GuardWithdrawal answer = guard_.Withdraw(message);
+    Measure();
+    if (answer.verdict.ok())
+      ReportEvent(now_us, execution_event_t::WITHDRAWN, answer.verdict.plan_id, answer.standing_steps,
+                  static_cast<double>(answer.sequence), answer.message);
+    else
+      ReportRefusal(now_us, answer.verdict);
+    if (IsExecuting() && MustStop()) StopInEmergency(now_us);
+  });
+  SendReports(now_us);
+}
+
+void Supervisor::OnFault(Bytes message, std::int64_t now_us) noexcept {
+  if (IsMisuse(true)) return;
+  Run(now_us, [&] { TakeFault(message, now_us); });
+  SendReports(now_us);
+}
+
+void Supervisor::TakeFault(Bytes message, std::int64_t now_us) {
   const std::optional<Bytes> authentic = Authentic(options_.fault, message);
   const auto fault = authentic ? Decoded<fault_t>(*authentic) : std::nullopt;
   if (!fault || !StopsTheRobot(fault->cause)) return;
@@ -62,12 +167,21 @@ void Supervisor::OnFault(Bytes message, std::int64_t now_us) {
   if (guard_.halted()) return;
   const std::int64_t plan_id = PlanId();
   const int step = Step();
-  if (IsExecuting()) Hold();
   guard_.Halt();
-  SendEvent(now_us, execution_event_t::HALTED, plan_id, step, 0, "emergency stop: " + GetText(fault->message));
+  Measure();
+  ReportEvent(now_us, execution_event_t::HALTED, plan_id, step, 0,
+              EventText() << "emergency stop: " << GetText(fault->message));
 }
 
-std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) {
+std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) noexcept {
+  std::string why = "not obeyed";  // short enough for a string without an allocation
+  if (IsMisuse(true)) return why;
+  Run(now_us, [&] { why = Obey(message, now_us); });
+  SendReports(now_us);
+  return why;
+}
+
+std::string Supervisor::Obey(Bytes message, std::int64_t now_us) {
   const std::optional<Bytes> authentic = Authentic(options_.command, message);
   if (!authentic) return "the operator has not signed it";
   const auto command = Decoded<command_t>(*authentic);
@@ -81,47 +195,67 @@ std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) {
   reset_utime_ = std::min(command->utime, now_us);  // a clock that is ahead clears no fault to come
   if (!guard_.halted()) return "";
   guard_.Reset();
-  SendEvent(now_us, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
+  Measure();
+  ReportEvent(now_us, execution_event_t::RESET, -1, -1, 0, EventText() << GetText(command->source) << " lets it go on");
   return "";
 }
 
-std::span<const double> Supervisor::Boundary(std::int64_t utime, std::int64_t now_us, bool ends) {
-  FinishStep(utime, now_us);
-  if (!ends) StartPending(utime, now_us);
-  if (IsExecuting()) ContinuePlan(utime);
-  SendState(utime, ends);
+std::span<const double> Supervisor::Boundary(std::int64_t utime, std::int64_t now_us, bool ends) noexcept {
+  if (IsMisuse(false)) return {};
+  Run(utime, [&] {
+    Measure();
+    CheckStep(utime, now_us);
+    if (!ends) StartPending(utime, now_us);
+    if (IsExecuting()) ContinuePlan(utime);
+    step_began_at_ = state_;
+    is_under_way_ = IsExecuting();
+  });
+  ReportState(utime, ends);
   ++counts_.boundaries;
-  is_under_way_ = IsExecuting();
-  step_began_at_.assign(robot_.state().begin(), robot_.state().end());
+  SendReports(utime);
   return control();
 }
 
-void Supervisor::FinishStep(std::int64_t utime, std::int64_t now_us) {
-  if (!std::exchange(is_under_way_, false) || !IsExecuting()) return;
+void Supervisor::FinishStep(std::int64_t utime, std::int64_t now_us) noexcept {
+  if (IsMisuse(false)) return;
+  Run(utime, [&] {
+    Measure();
+    CheckStep(utime, now_us);
+  });
+  SendReports(utime);
+}
+
+void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
+  if (!IsExecuting()) return HoldIfMoving();
   const std::int64_t plan_id = PlanId();
-  SendTransition(utime - options_.guard.step_us);
-  ++step_;
-  const GuardVerdict verdict = guard_.Check(step_, robot_.state(), now_us);
-  if (verdict.ok()) {
-    ++counts_.steps_inside;
-    return SendEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
+  const bool is_new = std::exchange(is_under_way_, false);
+  if (is_new) {
+    ReportTransition(utime - options_.guard.step_us);
+    ++step_;
   }
-  const bool is_off = verdict.cause == GuardCause::kOffSchedule;
-  SendEvent(utime, is_off ? execution_event_t::OFF_SCHEDULE : execution_event_t::STEP_OUTSIDE, plan_id, step_,
-            verdict.value, "emergency stop: " + verdict.message, verdict.coordinate);
+  const GuardVerdict verdict = is_new ? guard_.Check(step_, state_, now_us) : guard_.CheckAgain(state_, now_us);
+  if (verdict.ok()) {
+    if (!is_new) return;
+    ++counts_.steps_inside;
+    return ReportEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
+  }
   halted_utime_ = now_us;
+  const bool is_off = verdict.cause == GuardCause::kOffSchedule;
+  ReportEvent(utime, is_off ? execution_event_t::OFF_SCHEDULE : execution_event_t::STEP_OUTSIDE, plan_id, step_,
+              verdict.value, EventText() << "emergency stop: " << verdict.message, verdict.coordinate);
   Hold();
 }
 
 void Supervisor::StartPending(std::int64_t utime, std::int64_t now_us) {
   if (guard_.pending() == nullptr) return;
-  const GuardVerdict verdict = guard_.TryStart(utime, now_us, robot_.state());
+  const GuardVerdict verdict = guard_.TryStart(utime, now_us, state_);
   if (verdict.cause == GuardCause::kTooEarly) return;
-  if (!verdict.ok()) return SendRefusal(utime, verdict);
+  if (!verdict.ok()) return ReportRefusal(utime, verdict);
   step_ = 0;
+  is_holding_ = false;
   ++counts_.started;
-  SendEvent(utime, execution_event_t::STARTED, verdict.plan_id, 0, 0,
-            std::to_string(guard_.executing()->plan.num_steps) + " steps");
+  ReportEvent(utime, execution_event_t::STARTED, verdict.plan_id, 0, 0,
+              EventText() << guard_.executing()->plan.num_steps << " steps");
 }
 
 void Supervisor::ContinuePlan(std::int64_t utime) {
@@ -129,10 +263,10 @@ void Supervisor::ContinuePlan(std::int64_t utime) {
   if (MustStop()) return StopInEmergency(utime);
   const candidate_plan_t& plan = guard_.executing()->plan;
   if (step_ == plan.num_steps) {
-    SendEvent(utime, execution_event_t::STANDING, plan.plan_id, step_, 0, "the plan is finished: holding still");
+    ReportEvent(utime, execution_event_t::STANDING, plan.plan_id, step_, 0, "the plan is finished: holding still");
     Hold();
   } else if (step_ == plan.progress_steps) {
-    SendEvent(utime, execution_event_t::TAIL_BEGUN, plan.plan_id, step_, 0, "no newer certificate: braking");
+    ReportEvent(utime, execution_event_t::TAIL_BEGUN, plan.plan_id, step_, 0, "no newer certificate: braking");
   }
 }
 
@@ -163,14 +297,20 @@ bool Supervisor::TakesOver(int standing) const {
 }
 
 void Supervisor::StopInEmergency(std::int64_t utime) {
+  const int standing = *guard_.standing_steps();
+  const bool can_be_asked = std::ssize(state_) == options_.guard.num_states;
+  const int needed = can_be_asked ? robot_.StepsToRest(state_, state_) : Brake::kNoEnd;
   ++counts_.emergency_stops;
-  const int standing = *guard_.standing_steps(), needed = robot_.StepsToRest(robot_.state(), robot_.state());
-  const bool is_known = needed != Brake::kNoEnd;
-  SendEvent(utime, execution_event_t::EMERGENCY_STOP, PlanId(), step_, is_known ? needed : -1,
-            "emergency stop, not certified: controls from " + std::to_string(standing) +
-                " on were withdrawn, no newer certificate takes over; " +
-                std::to_string(std::max(standing - step_, 0)) + " stand, the stop takes " +
-                (is_known ? std::to_string(needed) : "an unknown number of") + " steps");
+  EventText text;
+  text << "emergency stop, not certified: controls from " << standing
+       << " on were withdrawn, no newer certificate takes over; " << std::max(standing - step_, 0)
+       << " stand, the stop takes ";
+  if (needed == Brake::kNoEnd)
+    text << "an unknown number of";
+  else
+    text << needed;
+  ReportEvent(utime, execution_event_t::EMERGENCY_STOP, PlanId(), step_, needed == Brake::kNoEnd ? -1 : needed,
+              text << " steps");
   Hold();
 }
 
@@ -180,7 +320,14 @@ int Supervisor::Robot::StepsToRest(std::span<const double> /*lower*/, std::span<
 
 void Supervisor::Hold() {
   guard_.Finish();
+  is_under_way_ = false;
   robot_.Hold();
+  is_holding_ = true;
+  Measure();  // the brakes may act at once
+}
+
+void Supervisor::HoldIfMoving() {
+  if (!is_holding_) Hold();
 }
 
 void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
@@ -188,42 +335,48 @@ void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest,
   guard_.Expect(config_digest, model_digest, std::move(domain), angles);
 }
 
-void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) {
-  SendEvent(utime, kind, PlanId(), Step(), value, text);
+void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) noexcept {
+  if (is_deciding_) return ReportEvent(utime, kind, PlanId(), Step(), value, text);
+  Run(utime, [&] {
+    Measure();
+    ReportEvent(utime, kind, PlanId(), Step(), value, text);
+  });
+  SendReports(utime);
 }
 
 std::int64_t Supervisor::PlanId() const { return IsExecuting() ? guard_.executing()->plan.plan_id : -1; }
 
-void Supervisor::SendState(std::int64_t utime, bool ends) {
+void Supervisor::ReportState(std::int64_t utime, bool ends) noexcept {
+  if (!is_measured_) return;
   robot_state_t message{};
   message.utime = utime;
   message.sequence = counts_.boundaries;
   message.executing_plan_id = PlanId();
   message.executing_step = static_cast<std::int16_t>(Step());
   message.mode = IsExecuting() ? robot_state_t::EXECUTING : ends ? robot_state_t::FINISHED : robot_state_t::STANDING;
-  message.num_states = SetValues(message.state, robot_.state());
-  Send(options_.robot_state, message);
+  message.num_states = SetValues(message.state, state_);
+  reports_.Add(kRobotState, message);
 }
 
-void Supervisor::SendTransition(std::int64_t utime) {
+void Supervisor::ReportTransition(std::int64_t utime) noexcept {
   transition_t message{};
   message.utime = utime;
   message.sequence = counts_.steps++;
   message.num_states = SetValues(message.state, step_began_at_);
-  message.num_inputs = SetValues(message.input, control());
-  SetValues(message.next_state, robot_.state());
-  Send(options_.transition, message);
+  message.num_inputs = SetValues(message.input, guard_.control());
+  SetValues(message.next_state, state_);
+  reports_.Add(kTransition, message);
 }
 
-void Supervisor::SendRefusal(std::int64_t utime, const GuardVerdict& verdict) {
-  const std::string cause(GuardCauseName(verdict.cause));
-  ++counts_.refused[cause];
-  SendEvent(utime, execution_event_t::REFUSED, verdict.plan_id, verdict.step, verdict.value,
-            cause + ": " + verdict.message, verdict.coordinate);
+void Supervisor::ReportRefusal(std::int64_t utime, const GuardVerdict& verdict) {
+  const std::string_view cause = GuardCauseName(verdict.cause);
+  ReportEvent(utime, execution_event_t::REFUSED, verdict.plan_id, verdict.step, verdict.value,
+              EventText() << cause << ": " << verdict.message, verdict.coordinate);
+  ++counts_.refused[std::string(cause)];
 }
 
-void Supervisor::SendEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
-                           std::string_view text, int coordinate) {
+void Supervisor::ReportEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
+                             std::string_view text, int coordinate) noexcept {
   execution_event_t message{};
   message.utime = utime;
   message.sequence = events_++;
@@ -231,10 +384,19 @@ void Supervisor::SendEvent(std::int64_t utime, std::int16_t kind, std::int64_t p
   message.kind = kind;
   message.step = static_cast<std::int16_t>(step);
   message.coordinate = static_cast<std::int16_t>(coordinate);
-  message.num_states = SetValues(message.state, robot_.state());
+  message.num_states = SetValues(message.state, state_);
   message.value = value;
   SetText(message.message, text);
-  Send(options_.event, message);
+  reports_.Add(kEvent, message);
+}
+
+void Supervisor::SendReports(std::int64_t utime) noexcept {
+  if (std::exchange(is_sending_, true)) return;
+  reports_.Send([this](const std::string& channel, Bytes message) { robot_.Send(channel, message); });
+  is_sending_ = false;
+  if (is_misused_) Run(utime, [] {});
+  counts_.failed_sends = reports_.failures();
+  counts_.reports_lost = reports_.lost();
 }
 
 }  // namespace forereach

@@ -28,9 +28,28 @@ controls that stand: if the next slice, which contains the next state, allows it
 for another step. If the time is too short already when the withdrawal arrives, the stop begins at once. The robot is
 not halted by it.
 
-After every other emergency stop no plan is accepted until a reset arrives whose stamp is later than everything that
+After STEP_OUTSIDE and HALTED no plan is accepted until a reset arrives whose stamp is later than everything that
 halted the robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is
 executing is not affected by Expect.
+
+**Exceptions.** No exception leaves this class, except from the constructor and Expect.
+
+- A call decides first and sets the control or holds. It calls Robot::Send last. If Send throws anything, nothing else
+  changes: the report is counted, and sent again in the next calls, in the order of its channel. At most 64 reports of
+  a channel wait; then the oldest is lost. A report keeps its sequence number, so receivers see a gap for each lost
+  one. A report that was sent before Send threw arrives twice, with the same sequence number and time.
+- If anything else throws (state, Hold, StepsToRest, Reload, an allocation), the plan ends and the robot holds:
+  ERROR_STOP. The robot is not halted, and the next plan starts as any other. If Hold throws, each later call calls it
+  again, and no plan starts until it returns.
+- A boundary whose state could not be measured sends no robot_state_t, and leaves out its sequence number.
+- Boundary checks state and time again if FinishStep was called before it. So a control is returned only if the guard
+  has checked the state and the time of that call, whatever was called or threw before. The time is checked only with
+  GuardOptions::max_jitter_us.
+- If your program throws between the calls (a clock, a receiver), this object does not know it: hold until Boundary
+  returns a control.
+
+The functions of Robot may call Report and Expect, and Send also what takes messages, as if after the call that sends.
+If one of them calls anything else, this does nothing, and the robot holds as after an exception.
 
 With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command.
 Messages that this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
@@ -53,6 +72,7 @@ since the Unix epoch. */
 #include "forereach/fault_t.hpp"
 #include "lcmtypes/codec.h"
 #include "robot/guard.h"
+#include "robot/report_queue.h"
 
 namespace forereach {
 
@@ -79,6 +99,7 @@ class Supervisor final {
     upper, num_states entries each (robot/brake.h computes such bounds). The default is
     Brake::kNoEnd, none is known: an emergency stop for a withdrawal begins as soon as the withdrawal is known. */
     [[nodiscard]] virtual int StepsToRest(std::span<const double> lower, std::span<const double> upper) const;
+    /** Sends a report. It must not wait. If it throws, the report is sent again later. */
     virtual void Send(const std::string& channel, Bytes message) = 0;
     /** A person asks for the task to be read again; call Expect once that is done. */
     virtual void Reload() = 0;
@@ -86,6 +107,9 @@ class Supervisor final {
 
   struct Counts {
     std::int64_t boundaries = 0, steps = 0, steps_inside = 0, accepted = 0, started = 0, emergency_stops = 0;
+    std::int64_t errors = 0;                      ///< ERROR_STOPs.
+    std::int64_t failed_sends = 0;                ///< Calls of Robot::Send that threw.
+    std::int64_t reports_lost = 0;                ///< Reports that will not be sent again, as too many waited.
     std::map<std::string, std::int64_t> refused;  ///< By GuardCauseName.
   };
 
@@ -93,53 +117,64 @@ class Supervisor final {
   Supervisor(SupervisorOptions options, Robot& robot);
 
   /** A message of its channel, as it came, trailer included, and when. */
-  void OnCertified(Bytes message, std::int64_t now_us);
-  void OnWithdrawn(Bytes message, std::int64_t now_us);
-  void OnFault(Bytes message, std::int64_t now_us);
+  void OnCertified(Bytes message, std::int64_t now_us) noexcept;
+  void OnWithdrawn(Bytes message, std::int64_t now_us) noexcept;
+  void OnFault(Bytes message, std::int64_t now_us) noexcept;
   /** @return why the command is refused, in words; empty if it is obeyed or not for robots. */
-  std::string OnCommand(Bytes message, std::int64_t now_us);
+  std::string OnCommand(Bytes message, std::int64_t now_us) noexcept;
 
   /** Handles a step boundary. @param utime the boundary's time. @param now_us later than that if the robot was held up;
   a plan that has expired meanwhile is refused, and with the guard's max_jitter_us the plan under way ends where now_us
   is too late. @param ends the robot ends its run: no further plan starts, and at rest it reports FINISHED.
   @return the control to apply until the next boundary, num_inputs entries, valid until the next call of this object;
   empty: hold. */
-  std::span<const double> Boundary(std::int64_t utime, std::int64_t now_us, bool ends = false);
-  /** The first part of Boundary, which then leaves it out: for a robot that reports events of its own in between. */
-  void FinishStep(std::int64_t utime, std::int64_t now_us);
+  std::span<const double> Boundary(std::int64_t utime, std::int64_t now_us, bool ends = false) noexcept;
+  /** The first part of Boundary, which then only checks again: for a robot that reports events of its own in between.
+   */
+  void FinishStep(std::int64_t utime, std::int64_t now_us) noexcept;
 
   /** Guard::Expect. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
               const std::optional<std::vector<int>>& angles = {});
 
   /** Sends an event. @param text one sentence. */
-  void Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text);
+  void Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) noexcept;
 
-  /** The control that applies now; empty: hold. */
-  [[nodiscard]] std::span<const double> control() const { return guard_.control(); }
+  /** The control that Boundary has returned, until FinishStep, a stop or a withdrawal ends it; empty: hold. */
+  [[nodiscard]] std::span<const double> control() const {
+    return is_under_way_ ? guard_.control() : std::span<const double>();
+  }
   [[nodiscard]] bool halted() const { return guard_.halted(); }
   [[nodiscard]] const Counts& counts() const { return counts_; }
+  /** The number of reports that wait to be sent again. */
+  [[nodiscard]] std::size_t reports_waiting() const { return reports_.waiting(); }
 
  private:
+  template <class Work>
+  void Run(std::int64_t utime, const Work& work) noexcept;
+  void StopAfterException(std::int64_t utime) noexcept;
+  [[nodiscard]] bool IsMisuse(bool may_be_sending) noexcept;
+  void Measure();
   [[nodiscard]] std::optional<Bytes> Authentic(const std::string& channel, Bytes message);
   [[nodiscard]] bool IsExecuting() const { return guard_.executing() != nullptr; }
   [[nodiscard]] std::int64_t PlanId() const;
   [[nodiscard]] int Step() const { return IsExecuting() ? step_ : -1; }
+  void TakeFault(Bytes message, std::int64_t now_us);
+  [[nodiscard]] std::string Obey(Bytes message, std::int64_t now_us);
+  void CheckStep(std::int64_t utime, std::int64_t now_us);
   void StartPending(std::int64_t utime, std::int64_t now_us);
   void ContinuePlan(std::int64_t utime);
   [[nodiscard]] bool MustStop() const;
   [[nodiscard]] bool TakesOver(int standing) const;
   void StopInEmergency(std::int64_t utime);
   void Hold();
-  void SendState(std::int64_t utime, bool ends);
-  void SendTransition(std::int64_t utime);
-  void SendRefusal(std::int64_t utime, const GuardVerdict& verdict);
-  void SendEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
-                 std::string_view text, int coordinate = -1);
-  template <class Message>
-  void Send(const std::string& channel, const Message& message) {
-    robot_.Send(channel, Bytes(Encode(message)));
-  }
+  void HoldIfMoving();
+  void ReportState(std::int64_t utime, bool ends) noexcept;
+  void ReportTransition(std::int64_t utime) noexcept;
+  void ReportRefusal(std::int64_t utime, const GuardVerdict& verdict);
+  void ReportEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
+                   std::string_view text, int coordinate = -1) noexcept;
+  void SendReports(std::int64_t utime) noexcept;
 
   const SupervisorOptions options_;
   Robot& robot_;
@@ -147,10 +182,16 @@ class Supervisor final {
   std::optional<Authenticator> authenticator_;       // of faults and commands
   std::int64_t halted_utime_ = 0, reset_utime_ = 0;  // the last time: by a fault or the guard; by a person
   int step_ = 0;                                     // of the executing plan: the control that applies now
-  bool is_under_way_ = false;                        // that control's step has not been finished
+  bool is_under_way_ = false;                        // Boundary has returned that control, its step is not finished
+  bool is_holding_ = true;                           // Hold has returned since the last control
   std::int64_t step_utime_ = 0;                      // the boundary from which that control applies
   std::vector<double> step_began_at_;                // the state
+  std::vector<double> state_;                        // measured last
+  bool is_measured_ = false;                         // in this call
+  bool is_deciding_ = false, is_sending_ = false;    // a call is under way
+  bool is_misused_ = false;                          // a function of the robot called what it may not
   std::int64_t events_ = 0;
+  ReportQueue reports_;
   Counts counts_;
 };
 

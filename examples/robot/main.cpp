@@ -4,6 +4,7 @@
 //   robot [URL [BOUNDARIES]]      by default on the loopback bus, without end
 #include <chrono>
 #include <iostream>
+#include <stdexcept>
 
 #include <lcm/lcm-cpp.hpp>
 
@@ -24,7 +25,8 @@ class Robot final : public Supervisor::Robot {
   int StepsToRest(std::span<const double>, std::span<const double>) const override { return 0; }  // their time
   void Reload() override {}  // without a digest it accepts plans of every task
   void Send(const std::string& channel, Bytes message) override {
-    lcm_.publish(channel, message.data(), static_cast<unsigned>(message.size()));
+    if (lcm_.publish(channel, message.data(), static_cast<unsigned>(message.size())) != 0)
+      throw std::runtime_error("not sent");  // the supervisor sends it again later
   }
   void Move(std::span<const double> control) {  // your actuators, for one step; without a control they hold
     for (std::size_t k = 0; k < control.size(); ++k) {

@@ -340,6 +340,10 @@ TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
       {"keygen --robot alpha config", "config: cannot be made: File exists"},
       {"keygen --robot alpha ''", "the value is empty; write a DIR"},
       {"keygen --robot 'a b' " + (scratch / "keys"), "\"a b\": a robot's name has to be 1 to 64 letters"},
+      {"keygen --robot alpha config --again planer",
+       "--again: planer not in {certifier,planner,perception,robot,operator,logger}"},
+      {"keygen --robot alpha config --again planner", "/config: there are no keys in it"},
+      {"keygen --robot alpha none --again planner", "key none: cannot be read: No such file or directory"},
       {"status --config none.yaml", "none.yaml: cannot be read"},
       {"status --config config/demo.yaml --lcm-url nonsense", "nonsense has to begin with udpm:// or memq://"},
       {"declare --config config/bicycle.yaml --gap nan", "--gap"},
@@ -353,6 +357,25 @@ TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
     EXPECT_EQ(output.code, 2) << arguments << "\n" << output.text;
     EXPECT_THAT(output.text, HasSubstr(sentence)) << arguments;
   }
+}
+
+TEST(Keygen, AgainReplacesOneKeyAndSaysWhoNeedsWhichFile) {
+  const forereach::ScratchDirectory scratch;
+  const std::string keys = scratch / "keys";
+  ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
+  const Output output = Forereach("keygen --robot alpha " + keys + " --again planner 2>&1");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr(keys + ": planner has a new key."));
+  std::size_t at = 0;
+  for (const char* line :
+       {"  certifier.key to the machine of the certifier", "  perception.key to", "  robot.key to", "  operator.key to",
+        "  logger.key to", "  planner.key to the new machine of the planner", "  verify.pub to"}) {
+    at = output.text.find(line, at);
+    EXPECT_NE(at, std::string::npos) << line << "\n" << output.text;
+  }
+  const Output other = Forereach("keygen --robot beta " + keys + " --again planner 2>&1");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_THAT(other.text, HasSubstr("the keys are of robot alpha, not of beta"));
 }
 
 // The lines below "Example:", "Examples:" or "Try:".

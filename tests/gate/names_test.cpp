@@ -174,7 +174,8 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                                                          {"WITHDRAWN", 12},
                                                          {"EMERGENCY_STOP", 13},
                                                          {"OFF_SCHEDULE", 14},
-                                                         {"LIMIT_EXCEEDED", 15}}));
+                                                         {"LIMIT_EXCEEDED", 15},
+                                                         {"ERROR_STOP", 16}}));
   EXPECT_EQ(ConstantsOf("withdrawal_t"), (Constants{{"FALSIFIED", 1},
                                                     {"DOMAIN_EXIT", 2},
                                                     {"NO_FINITE_ENCLOSURE", 3},

@@ -447,6 +447,47 @@ TEST(GuardCheck, AfterARefusalNothingIsExecuting) {
   }
 }
 
+TEST(GuardCheck, AgainItLooksAtTheSameSliceAndAtTheTime) {
+  GuardOptions options = TwoStates();
+  options.max_jitter_us = 3000;
+  const auto after = [&](int steps, const State& state, std::int64_t late_us) {
+    Guard guard(options);
+    EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+    EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
+    for (int t = 1; t <= steps; ++t) EXPECT_TRUE(guard.Check(t, State{0, 0}, kStart + t * kStep).ok());
+    const GuardVerdict verdict = guard.CheckAgain(state, kStart + steps * kStep + late_us);
+    EXPECT_EQ(guard.executing() != nullptr, verdict.ok());
+    EXPECT_EQ(guard.halted(), verdict.cause == GuardCause::kOutsideSlice);
+    return verdict.cause;
+  };
+  EXPECT_EQ(after(0, {1.5, -2}, 3000), GuardCause::kNone);
+  EXPECT_EQ(after(0, {1.51, -2}, 0), GuardCause::kOutsideInitialSet);
+  EXPECT_EQ(after(0, {1, -2}, 3001), GuardCause::kOffSchedule);
+  EXPECT_EQ(after(1, {11, 0}, 3000), GuardCause::kNone);
+  EXPECT_EQ(after(1, {11.1, 0}, 0), GuardCause::kOutsideSlice) << "of step 1, not of step 2";
+  EXPECT_EQ(after(1, {0, 0}, 3001), GuardCause::kOffSchedule);
+  EXPECT_EQ(after(1, {0, 0}, -3001), GuardCause::kOffSchedule);
+  EXPECT_EQ(after(3, {0, 0}, 0), GuardCause::kNone);
+  Guard idle(options);
+  EXPECT_EQ(idle.CheckAgain(State{0, 0}, kNow).cause, GuardCause::kNotExecuting);
+}
+
+// A step that began early and ends late is too long, though both are on time.
+TEST(GuardCheck, AgainItLooksAtHowLongTheStepBeforeHasLasted) {
+  for (const bool too_long : {false, true}) {
+    GuardOptions options = TwoStates();
+    options.max_jitter_us = 3000;
+    Guard guard(options);
+    EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+    EXPECT_TRUE(guard.TryStart(kStart, kStart - 1000, State{1, -2}).ok());
+    EXPECT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
+    EXPECT_EQ(guard.CheckAgain(State{0, 0}, kStart + kStep + 2000 + too_long).ok(), !too_long);
+    if (!too_long) {
+      EXPECT_TRUE(guard.Check(2, State{0, 0}, kStart + 2 * kStep + 3000).ok()) << "its control is applied from then on";
+    }
+  }
+}
+
 TEST(GuardCheck, StepsComeInOrderAndEndAtTheHorizon) {
   Guard guard = Executing();
   EXPECT_EQ(guard.Check(2, State{0, 0}, kNow).cause, GuardCause::kStepOutOfOrder) << "step 1 was not checked";
