@@ -48,7 +48,7 @@ Eigen::MatrixXd FrameOf(const Problem& problem) {
 }
 
 std::vector<MotionRow> RowsOf(const Config& config, const std::vector<MotionBound>& acceleration,
-                        const MotionBound& turn_rate, const MotionBound& turn_acceleration) {
+                              const MotionBound& turn_rate, const MotionBound& turn_acceleration) {
   const Problem& problem = *config.problem;
   const std::vector<std::string>& states = problem.model->state_names();
   const Eigen::MatrixXd frame = FrameOf(problem);
@@ -156,13 +156,14 @@ Json ToJson(const MotionProposal& proposal, const Config& config) {
 void PrintForPeople(const MotionProposal& proposal, const Config& config) {
   const bool proven = proposal.source == "equations";
   std::ostringstream text;
-  text << std::left << "declare: motion between two samples, at most " << RoundedUp(LongestPeriod(config), kMotionDigits)
-       << " s apart, from the " << (proven ? "equations of " + config.problem->model->name() : "logged positions")
+  text << std::left << "declare: motion between two samples, at most "
+       << RoundedUp(LongestPeriod(config), kMotionDigits) << " s apart, from the "
+       << (proven ? "equations of " + config.problem->model->name() : "logged positions")
        << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
   for (const MotionRow& row : proposal.rows) {
     text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)
-         << (proven ? RoundedUp(row.bound.upper, kMotionDigits) : RoundedDown(row.bound.lower, kMotionDigits)) << std::setw(8)
-         << row.unit;
+         << (proven ? RoundedUp(row.bound.upper, kMotionDigits) : RoundedDown(row.bound.lower, kMotionDigits))
+         << std::setw(8) << row.unit;
     if (proven)
       text << "  largest found " << RoundedDown(row.bound.lower, kMotionDigits) << ", " << row.bound.boxes << " boxes";
     text << "\n";
@@ -176,7 +177,8 @@ void PrintForPeople(const MotionProposal& proposal, const Config& config) {
 int DeclareBetween(const BetweenCommand& command) {
   const Config config =
       LoadConfig(command.config, command.from_positions ? TransitionsFile::kRead : TransitionsFile::kIgnore);
-  const MotionProposal proposal = command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
+  const MotionProposal proposal =
+      command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
   if (command.json)
     std::cout << JsonText(ToJson(proposal, config)) << std::endl;
   else

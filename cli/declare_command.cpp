@@ -100,8 +100,8 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
     if (!bound.unbounded.empty()) {
       std::string box;
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))
-        box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) + ", " +
-               RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
+        box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) +
+               ", " + RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
       throw std::runtime_error(
           "no finite bound for the slope of " + NameOf(bound, names) + ": " + config.residual->name +
           " has none over " + box + ", found after " + std::to_string(bound.boxes) +
@@ -189,8 +189,8 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
        << " at\n";
   for (const SlopeBound& bound : bounds) {
     text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
-         << RoundedUp(bound.upper, kBoundDigits) << std::setw(18) << RoundedDown(bound.lower, kBoundDigits) << std::setw(10)
-         << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
+         << RoundedUp(bound.upper, kBoundDigits) << std::setw(18) << RoundedDown(bound.lower, kBoundDigits)
+         << std::setw(10) << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
     if (!bound.point.empty())
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))
         text << " " << names[i] << " " << bound.point[i];

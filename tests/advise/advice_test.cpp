@@ -15,7 +15,7 @@
 #include "tests/tries.h"
 
 namespace forereach {
-namespace {
+namespace advice_test {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -247,5 +247,5 @@ TEST(Advise, EveryAdviceDoesWhatItSays) {
     EXPECT_GT(turned[cause], abstentions[cause] / 2) << cause;
 }
 
-}  // namespace
+}  // namespace advice_test
 }  // namespace forereach

@@ -14,7 +14,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach::bench {
-namespace {
+namespace straightforward_test {
 
 constexpr double kTolerance = 1e-9;
 
@@ -121,5 +121,5 @@ TEST(TasksTest, FewerObservationsAreTheFirstOfMore) {
   EXPECT_EQ(few.problem->transitions.x_next, more.problem->transitions.x_next.topRows(25));
 }
 
-}  // namespace
+}  // namespace straightforward_test
 }  // namespace forereach::bench

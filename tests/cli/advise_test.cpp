@@ -24,7 +24,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace advise_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -271,5 +271,5 @@ TEST_F(AdviseTest, RefusesAFileThatIsNoRecord) {
               HasSubstr("judged again by what is recorded: certified"));
 }
 
-}  // namespace
+}  // namespace advise_test
 }  // namespace forereach

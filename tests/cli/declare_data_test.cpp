@@ -15,7 +15,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace declare_data_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -161,5 +161,5 @@ TEST_F(DeclareDataTest, BadInputIsExitTwo) {
   EXPECT_EQ(Forereach("declare --config " + task_ + " --hold-out 2>&1").code, 2) << "it needs --from-data";
 }
 
-}  // namespace
+}  // namespace declare_data_test
 }  // namespace forereach

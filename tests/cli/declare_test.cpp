@@ -15,7 +15,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace declare_test {
 
 using testing::HasSubstr;
 using Json = nlohmann::json;
@@ -351,5 +351,5 @@ TEST(DeclareHelp, ShowsOptionsExitCodesAndAnExample) {
     EXPECT_THAT(output.text, HasSubstr(text));
 }
 
-}  // namespace
+}  // namespace declare_test
 }  // namespace forereach

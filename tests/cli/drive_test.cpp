@@ -14,7 +14,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace drive_test {
 
 using Json = nlohmann::json;
 
@@ -60,5 +60,5 @@ std::vector<std::string> Drives() {
 
 INSTANTIATE_TEST_SUITE_P(Models, Drive, testing::ValuesIn(Drives()), [](const auto& info) { return info.param; });
 
-}  // namespace
+}  // namespace drive_test
 }  // namespace forereach

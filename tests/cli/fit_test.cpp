@@ -13,7 +13,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace fit_test {
 
 using testing::HasSubstr;
 using Json = nlohmann::json;
@@ -82,5 +82,5 @@ TEST_F(FitCommandTest, BadInputIsExitTwo) {
   EXPECT_THAT(compiled.text, HasSubstr("only the parameters of a model as text can be fitted"));
 }
 
-}  // namespace
+}  // namespace fit_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace import_test {
 
 using testing::HasSubstr;
 using Json = nlohmann::json;
@@ -156,5 +156,5 @@ TEST(DataDocument, CommandsPrintWhatItSays) {
   EXPECT_GE(commands, 1);
 }
 
-}  // namespace
+}  // namespace import_test
 }  // namespace forereach

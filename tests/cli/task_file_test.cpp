@@ -19,7 +19,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace task_file_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -536,5 +536,5 @@ TEST_F(CheckTest, PrintsItsFindingsEvenIfItCannotDrawThem) {
   EXPECT_EQ(Read(scratch_ / "out"), Forereach("check config/drive/quadrotor.yaml").text);
 }
 
-}  // namespace
+}  // namespace task_file_test
 }  // namespace forereach

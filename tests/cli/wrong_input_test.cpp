@@ -21,7 +21,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace wrong_input_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -287,5 +287,5 @@ TEST_F(KeptTaskTest, ADatabaseDoesNotLeadOutOfItsDirectory) {
   ExpectRefused("check-log " + copy, {"not in its directory"});
 }
 
-}  // namespace
+}  // namespace wrong_input_test
 }  // namespace forereach

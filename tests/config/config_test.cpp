@@ -15,7 +15,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace config_test {
 
 Eigen::VectorXd Numbers(std::initializer_list<double> entries) {
   Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
@@ -422,5 +422,5 @@ TEST(Schema, EveryKeyStandsInAMapOrList) {
   }
 }
 
-}  // namespace
+}  // namespace config_test
 }  // namespace forereach

@@ -14,7 +14,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace csv_test {
 
 using testing::HasSubstr;
 
@@ -150,5 +150,5 @@ TEST_F(CsvTest, PlansHaveOneToTheLargestNumberOfSteps) {
               testing::ThrowsMessage<ConfigError>(HasSubstr("p.csv:130: 129 steps are outside [1, 128]")));
 }
 
-}  // namespace
+}  // namespace csv_test
 }  // namespace forereach

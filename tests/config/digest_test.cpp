@@ -10,7 +10,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace digest_test {
 
 using Eigen::Vector2d;
 
@@ -138,5 +138,5 @@ TEST(CanonicalBytes, MatchTheSpecifiedBytes) {
   EXPECT_EQ(bytes.digest(), DigestOf(std::string_view(expected)));
 }
 
-}  // namespace
+}  // namespace digest_test
 }  // namespace forereach

@@ -5,7 +5,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace error_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -562,5 +562,5 @@ TEST_F(ErrorTest, AMissingFileOrADirectoryIsAnError) {
               testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
 }
 
-}  // namespace
+}  // namespace error_test
 }  // namespace forereach

@@ -16,7 +16,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace expressions_document_test {
 
 std::string Document() {
   std::ifstream file(FOREREACH_SOURCE_DIR "/docs/expressions.md");
@@ -153,5 +153,5 @@ TEST(ExpressionsDocument, AStepThatIsWrittenOutIsTheIntegrators) {
   EXPECT_THROW(static_cast<void>(EquationsHeader(*staged->text(), "robot", "")), ExportError);
 }
 
-}  // namespace
+}  // namespace expressions_document_test
 }  // namespace forereach

@@ -24,7 +24,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace files_test {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
@@ -232,5 +232,5 @@ TEST_F(ReloadingTest, PassesOnTheExceptionOfTheReader) {
   EXPECT_EQ(reloads.Take(), std::nullopt);
 }
 
-}  // namespace
+}  // namespace files_test
 }  // namespace forereach

@@ -14,7 +14,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace model_library_test {
 
 const std::string kDirectory = FOREREACH_SOURCE_DIR "/config/models/";
 
@@ -289,5 +289,5 @@ TEST(ModelLibrary, EquationsAreThoseOfTheSource) {
   }
 }
 
-}  // namespace
+}  // namespace model_library_test
 }  // namespace forereach

@@ -7,7 +7,7 @@
 #include "tests/config/task_files.h"
 
 namespace forereach {
-namespace {
+namespace model_text_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -482,5 +482,5 @@ TEST_F(AnglesTest, OfAModelFileMayBeReplaced) {
               HasSubstr("task.yaml:1: model.angles: u is no state"));
 }
 
-}  // namespace
+}  // namespace model_text_test
 }  // namespace forereach

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace number_test {
 
 TEST(ParseNumber, ReadsDecimals) {
   const std::pair<const char*, double> cases[] = {{"0", 0},
@@ -60,5 +60,5 @@ TEST(ParseInteger, ReadsIntegersOnly) {
   EXPECT_EQ(ParseInteger("017").problem, "has a leading zero");
 }
 
-}  // namespace
+}  // namespace number_test
 }  // namespace forereach

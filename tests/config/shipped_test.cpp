@@ -16,7 +16,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace shipped_test {
 
 const std::string kDirectory = FOREREACH_SOURCE_DIR "/config/";
 
@@ -230,5 +230,5 @@ TEST(Shipped, TheReadmesErrorsAreThoseItQuotes) {
     EXPECT_THAT(readme, testing::HasSubstr("\n" + error + "\n"));
 }
 
-}  // namespace
+}  // namespace shipped_test
 }  // namespace forereach

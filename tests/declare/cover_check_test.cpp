@@ -11,7 +11,7 @@
 #include "verifier/ranges.h"
 
 namespace forereach::verifier {
-namespace {
+namespace cover_check_test {
 
 using testing::HasSubstr;
 
@@ -194,5 +194,5 @@ TEST(SlopesOfATextTest, OverBoxesAreRanges) {
   for (int column = 0; column < 3; ++column) EXPECT_EQ(hidden.slopes.Occurs(0, column), column == 2);
 }
 
-}  // namespace
+}  // namespace cover_check_test
 }  // namespace forereach::verifier

@@ -9,7 +9,7 @@
 #include "certifier/dynamics/saturation.h"
 
 namespace forereach {
-namespace {
+namespace jet_test {
 
 // One expression with every smooth operation of two arguments.
 template <class T>
@@ -88,5 +88,5 @@ TEST(Jet, SquareIsNotNegative) {
   EXPECT_EQ((x * x).slope, Interval(-4, 6));
 }
 
-}  // namespace
+}  // namespace jet_test
 }  // namespace forereach

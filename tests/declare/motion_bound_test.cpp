@@ -18,7 +18,7 @@
 #include "tests/text_models.h"
 
 namespace forereach {
-namespace {
+namespace motion_bound_test {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kGap = 1e-5;
@@ -472,5 +472,5 @@ TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
   EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).triples, 1);
 }
 
-}  // namespace
+}  // namespace motion_bound_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/declare/families.h"
 
 namespace forereach {
-namespace {
+namespace slope_bound_test {
 
 // Slopes 3 c (x^2 - y^2) and -6 c x y; the second has kinks.
 Family Cubic(const Domain& domain, const Interval& c = {1, 1}) {
@@ -300,5 +300,5 @@ TEST(SlopeBound, OverParameterBoxesGrowsAndContainsSamples) {
   }
 }
 
-}  // namespace
+}  // namespace slope_bound_test
 }  // namespace forereach

@@ -32,7 +32,7 @@
 #include "tests/tries.h"
 
 namespace forereach {
-namespace {
+namespace export_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -556,5 +556,5 @@ TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {
   EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 135u);
 }
 
-}  // namespace
+}  // namespace export_test
 }  // namespace forereach

@@ -14,7 +14,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace log_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -177,5 +177,5 @@ TEST_F(LogTest, RefusesWhatItCannotDoAndSaysWhy) {
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "x"));
 }
 
-}  // namespace
+}  // namespace log_test
 }  // namespace forereach

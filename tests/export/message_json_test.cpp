@@ -34,7 +34,7 @@
 #include "tests/tries.h"
 
 namespace forereach {
-namespace {
+namespace message_json_test {
 
 using nlohmann::json;
 
@@ -177,5 +177,5 @@ TEST(MessageJson, AnyMessageFitsItsSchema) {
   TryAnyBytes<withdrawal_t>(random);
 }
 
-}  // namespace
+}  // namespace message_json_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace authentic_test {
 
 constexpr std::int64_t kBegun = 1'000'000;
 constexpr std::int64_t kFar = std::numeric_limits<std::int64_t>::max() - 1000;
@@ -280,5 +280,5 @@ TEST(SignedBus, DoesNotSpeakAsAnotherRole) {
   EXPECT_TRUE(bus->Publish("nobody's", Bytes(kMessage)));
 }
 
-}  // namespace
+}  // namespace authentic_test
 }  // namespace forereach

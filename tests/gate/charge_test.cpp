@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace charge_test {
 
 using State = Charge::State;
 
@@ -179,5 +179,5 @@ TEST(ChargeTest, ExactlyOneIsInChargeAfterAnyLossPauseOrRestart) {
   }
 }
 
-}  // namespace
+}  // namespace charge_test
 }  // namespace forereach

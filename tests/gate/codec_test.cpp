@@ -27,7 +27,7 @@
 #include "forereach/withdrawal_t.hpp"
 
 namespace forereach {
-namespace {
+namespace codec_test {
 
 // The contract with everything that has ever been recorded or built against these messages. A changed type is a new
 // type with a new name, and a new line here; no line ever changes.
@@ -166,5 +166,5 @@ TEST(DigestTest, GoesIntoAFieldAndBack) {
   EXPECT_EQ(GetDigest(decision.plan_digest), digest);
 }
 
-}  // namespace
+}  // namespace codec_test
 }  // namespace forereach

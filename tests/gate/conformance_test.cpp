@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace conformance_test {
 
 // Slices [t, t + 1] in both coordinates, T = 3.
 certified_plan_v2_t Plan(std::int64_t plan_id) {
@@ -186,5 +186,5 @@ TEST(ConformanceTest, TheLastPlansAreRemembered) {
   EXPECT_TRUE(conformance.Check(At(20, count, 0, 100, 100)));
 }
 
-}  // namespace
+}  // namespace conformance_test
 }  // namespace forereach

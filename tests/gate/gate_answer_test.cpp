@@ -17,7 +17,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace gate_answer_test {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -436,5 +436,5 @@ TEST(CandidateMessageTest, TheStartIsReadFromTheBytesAsADecoderReadsIt) {
   EXPECT_EQ(StartOf(bytes), INT64_MAX);
 }
 
-}  // namespace
+}  // namespace gate_answer_test
 }  // namespace forereach

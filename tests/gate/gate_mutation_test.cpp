@@ -13,7 +13,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace gate_mutation_test {
 
 class Mutator {
  public:
@@ -210,5 +210,5 @@ TEST(GateReplayTest, TheSameBytesAndClockGiveTheSameAnswers) {
   EXPECT_GT(certified, 100);
 }
 
-}  // namespace
+}  // namespace gate_mutation_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace gate_obstacles_test {
 
 using testing::HasSubstr;
 using Shorts = std::initializer_list<std::int16_t>;
@@ -564,5 +564,5 @@ TEST(GateMovingTest, StartsBeyondTheLatestTimeOfAScheduleAreRejected) {
   }
 }
 
-}  // namespace
+}  // namespace gate_obstacles_test
 }  // namespace forereach

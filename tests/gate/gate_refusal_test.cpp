@@ -13,7 +13,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace gate_refusal_test {
 
 using testing::HasSubstr;
 using Shorts = std::initializer_list<std::int16_t>;
@@ -333,5 +333,5 @@ TEST(FreshnessTest, IsFreshUpToItsBoundsAndForExtremeStamps) {
   EXPECT_EQ(FreshnessOf(kMax, kMax, 0, 0), kFresh);
 }
 
-}  // namespace
+}  // namespace gate_refusal_test
 }  // namespace forereach

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace issued_plans_test {
 
 using testing::HasSubstr;
 
@@ -126,5 +126,5 @@ TEST_F(IssuedPlansTest, AnotherCertifierBeginsTheToleranceAnewAReloadDoesNot) {
   EXPECT_EQ(Judge(Executing(1, 0), kLater + Life(128) + 1000), "") << "never for less than before";
 }
 
-}  // namespace
+}  // namespace issued_plans_test
 }  // namespace forereach

@@ -50,7 +50,7 @@ extern "C" int renameat2(int from_at, const char* from, int to_at, const char* t
 }
 
 namespace forereach {
-namespace {
+namespace key_replacement_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -318,5 +318,5 @@ TEST_F(KeyReplacement, ALinkADotAndAnyUmaskLeadToTheSame) {
   (void)LoadAllKeys(keys_);
 }
 
-}  // namespace
+}  // namespace key_replacement_test
 }  // namespace forereach

@@ -17,7 +17,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace keys_test {
 
 using testing::HasSubstr;
 
@@ -216,5 +216,5 @@ TEST_F(KeyFiles, AreReadLineByLine) {
   EXPECT_THAT(problem({""}), HasSubstr("line 1"));
 }
 
-}  // namespace
+}  // namespace keys_test
 }  // namespace forereach

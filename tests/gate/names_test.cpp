@@ -16,7 +16,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace names_test {
 
 using Constants = std::map<std::string, int>;
 
@@ -209,5 +209,5 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
   EXPECT_EQ(ConstantsOf("obstacle_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
 }
 
-}  // namespace
+}  // namespace names_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace obstacle_message_test {
 
 using testing::HasSubstr;
 
@@ -293,5 +293,5 @@ TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
   EXPECT_GT(refused, 1000);
 }
 
-}  // namespace
+}  // namespace obstacle_message_test
 }  // namespace forereach

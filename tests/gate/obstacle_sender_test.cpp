@@ -9,7 +9,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace obstacle_sender_test {
 
 const std::vector<Obstacle> kOne{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)};
 
@@ -143,5 +143,5 @@ TEST(ObstacleSenderTest, AtItsPeriodAGateKnowsWhereTwoMessagesInARowAreLost) {
   }
 }
 
-}  // namespace
+}  // namespace obstacle_sender_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace plans_in_force_test {
 
 using testing::HasSubstr;
 
@@ -502,5 +502,5 @@ TEST_F(PlansInForceTest, NoUnknownPlanStandsUnderADeclarationThatIsKnownToBeFals
   EXPECT_EQ(GetDigest(Due().value().observations_digest), Digest{}) << "no certificate names these";
 }
 
-}  // namespace
+}  // namespace plans_in_force_test
 }  // namespace forereach

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace printable_test {
 
 TEST(PrintableTest, LeavesOrdinaryTextUnchanged) {
   for (const char* text : {"", "PLAN_CANDIDATE", "a b/c~", "Stra\u00dfe, \u03b8, \u4e16, \U0001F916"}) {
@@ -48,5 +48,5 @@ TEST(PrintableTest, GivesOnlyPrintableTextForRandomBytes) {
   }
 }
 
-}  // namespace
+}  // namespace printable_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {
-namespace {
+namespace seal_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -189,5 +189,5 @@ TEST(Seal, BreaksWhenTheCountsChange) {
     EXPECT_THAT(with(states, steps), ElementsAre(Kind::kPlanDigest, Kind::kUnusedEntry)) << states << " " << steps;
 }
 
-}  // namespace
+}  // namespace seal_test
 }  // namespace forereach

@@ -10,7 +10,7 @@
 #include "lcmtypes/codec.h"
 
 namespace forereach {
-namespace {
+namespace sources_test {
 
 using Admission = Sources::Admission;
 constexpr std::int64_t kForget = 550'000;
@@ -144,5 +144,5 @@ TEST(SourcesTest, CountsLossesCorrectlyAcrossASilence) {
   EXPECT_EQ(sources.lost(), 1) << "3999";
 }
 
-}  // namespace
+}  // namespace sources_test
 }  // namespace forereach

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace stream_order_test {
 
 constexpr std::int64_t kMin = std::numeric_limits<std::int64_t>::min(), kMax = std::numeric_limits<std::int64_t>::max();
 
@@ -135,5 +135,5 @@ TEST(SumOfLostTest, EndsAtTheLargestNumber) {
   EXPECT_EQ(SumOfLost(0, kMin), 0);
 }
 
-}  // namespace
+}  // namespace stream_order_test
 }  // namespace forereach

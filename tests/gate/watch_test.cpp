@@ -7,7 +7,7 @@
 #include "forereach/fault_t.hpp"
 
 namespace forereach {
-namespace {
+namespace watch_test {
 
 using testing::HasSubstr;
 
@@ -110,5 +110,5 @@ TEST(WatchTest, OptionsThatAreFollowedDecideWhetherTheRobotIsNeeded) {
   EXPECT_EQ(watch.state(), Watch::State::kArmed);
 }
 
-}  // namespace
+}  // namespace watch_test
 }  // namespace forereach

@@ -18,7 +18,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace estimates_test {
 
 using exact::Rational;
 using testing::ElementsAre;
@@ -267,5 +267,5 @@ TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   EXPECT_THAT(begins, ElementsAre(30, 45, 90, 100, 110));
 }
 
-}  // namespace
+}  // namespace estimates_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/identify/seed.h"
 
 namespace forereach {
-namespace {
+namespace fit_test {
 
 // A pendulum with damping: rates, by Runge and Kutta.
 ModelText Pendulum(double length, double damping, double unused = 1) {
@@ -178,5 +178,5 @@ TEST(Fit, RefusesWhatItCannotFit) {
   EXPECT_THROW((void)FitParameters(Pendulum(1, 0), none, {"length"}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace fit_test
 }  // namespace forereach

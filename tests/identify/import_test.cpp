@@ -14,7 +14,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace import_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -247,5 +247,5 @@ TEST_F(ImportTest, KeepsItsPromisesOnRandomLogs) {
   }
 }
 
-}  // namespace
+}  // namespace import_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace log_table_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -125,5 +125,5 @@ TEST_F(LogTableTest, AnyBytesAreReadOrRefused) {
   }
 }
 
-}  // namespace
+}  // namespace log_table_test
 }  // namespace forereach

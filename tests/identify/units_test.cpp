@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace units_test {
 
 TEST(Units, FactorsAreThoseOfTheirDefinitions) {
   EXPECT_DOUBLE_EQ(static_cast<double>(180 * FactorOf("deg", "rad")), std::numbers::pi);
@@ -41,5 +41,5 @@ TEST(Units, WhatIsNoUnitIsRefused) {
   }
 }
 
-}  // namespace
+}  // namespace units_test
 }  // namespace forereach

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace access_test {
 
 using Headers = std::vector<std::pair<std::string_view, std::string_view>>;
 
@@ -60,5 +60,5 @@ TEST(AccessTest, AnswersGetWithoutABodyAlone) {
   EXPECT_EQ(with("Upgrade", "websocket"), Answer::kBadRequest);
 }
 
-}  // namespace
+}  // namespace access_test
 }  // namespace forereach

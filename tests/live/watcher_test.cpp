@@ -14,7 +14,7 @@
 #include "tests/tries.h"
 
 namespace forereach {
-namespace {
+namespace watcher_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -241,5 +241,5 @@ TEST(WatcherTest, ShowsARepeatedFaultOrWithdrawalOnce) {
   EXPECT_EQ(reader.withdrawals.size(), 1u);
 }
 
-}  // namespace
+}  // namespace watcher_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/tries.h"
 
 namespace forereach {
-namespace {
+namespace web_server_test {
 
 using namespace std::chrono_literals;
 using testing::HasSubstr;
@@ -203,5 +203,5 @@ TEST(SlowReaderTest, DelaysNeitherMessagesNorOtherReadersNorTheEnd) {
   EXPECT_LT(std::chrono::steady_clock::now() - end, std::chrono::milliseconds(WebServer::kWriteMs + 3000));
 }
 
-}  // namespace
+}  // namespace web_server_test
 }  // namespace forereach

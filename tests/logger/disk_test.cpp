@@ -10,7 +10,7 @@
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach {
-namespace {
+namespace disk_test {
 
 using testing::AllOf;
 using testing::Ge;
@@ -443,5 +443,5 @@ TEST_F(DiskTest, PausesOnAFullDiskAndResumesWhenThereIsRoom) {
   EXPECT_EQ(std::ssize(ReadRows().events), std::ssize(Recorded()));
 }
 
-}  // namespace
+}  // namespace disk_test
 }  // namespace forereach

@@ -9,7 +9,7 @@
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach {
-namespace {
+namespace gone_test {
 
 using testing::HasSubstr;
 
@@ -234,5 +234,5 @@ TEST_F(GoneTest, ADirectoryThatBecomesReadOnlyIsSaidAtTheNextFile) {
   EXPECT_EQ(std::ssize(Recorded()), fed_);
 }
 
-}  // namespace
+}  // namespace gone_test
 }  // namespace forereach

@@ -8,7 +8,7 @@
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach {
-namespace {
+namespace invented_names_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -58,5 +58,5 @@ TEST_F(InventedNamesTest, DoNotReachTheTerminal) {
   EXPECT_THAT(out_.str(), Not(HasSubstr("\x1b")));
 }
 
-}  // namespace
+}  // namespace invented_names_test
 }  // namespace forereach

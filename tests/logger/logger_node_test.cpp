@@ -19,7 +19,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace logger_node_test {
 
 class LoggerNodeTest : public testing::Test {
  protected:
@@ -434,5 +434,5 @@ TEST_F(LoggerNodeTest, TakesWhatTheMemoryBusCarries) {
   EXPECT_EQ(node.recorder().summary().contacts, 1);
 }
 
-}  // namespace
+}  // namespace logger_node_test
 }  // namespace forereach

@@ -33,7 +33,7 @@ extern "C" int fsync(int file) { return Note(file, SYS_fsync); }
 extern "C" int fdatasync(int file) { return Note(file, SYS_fdatasync); }
 
 namespace forereach {
-namespace {
+namespace power_cut_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -87,5 +87,5 @@ TEST_F(PowerCutTest, RowsOfRunsAreSyncedToDiskAndRowsOfEventsAreNot) {
   EXPECT_THAT(confirmed([&] { EXPECT_TRUE(database.Write({}, "a", 2)); }), IsEmpty()) << "after a failure too";
 }
 
-}  // namespace
+}  // namespace power_cut_test
 }  // namespace forereach

@@ -10,7 +10,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace angle_oracle_test {
 
 using exact::Real;
 
@@ -101,5 +101,5 @@ TEST(AnglesOf, RefusesIndicesThatAreNoStates) {
   EXPECT_THROW(static_cast<void>(AnglesOf(std::array{16}, 17)), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace angle_oracle_test
 }  // namespace forereach

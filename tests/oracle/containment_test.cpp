@@ -15,7 +15,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace containment_test {
 
 using exact::Rational;
 using exact::Real;
@@ -305,5 +305,5 @@ TEST(ContainmentJudge, NoticesAStateJustOutside) {
   }
 }
 
-}  // namespace
+}  // namespace containment_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "verifier/cover_check.h"
 
 namespace forereach {
-namespace {
+namespace declared_slopes_test {
 
 using exact::Real;
 
@@ -131,5 +131,5 @@ TEST(DeclaredSlopes, OfRandomExpressionsBoundThemAndAreConfirmed) {
   EXPECT_GT(count.narrowed, 60);
 }
 
-}  // namespace
+}  // namespace declared_slopes_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace directed_test {
 
 using exact::AtLeast;
 using exact::AtMost;
@@ -237,5 +237,5 @@ TEST(Directed, DotErrorUpperBoundsTheErrorOfDotProducts) {
   EXPECT_EQ(DotErrorUpper(0, 5), 0);
 }
 
-}  // namespace
+}  // namespace directed_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace domain_oracle_test {
 
 using exact::Rational;
 using Kind = DomainExit::Kind;
@@ -238,5 +238,5 @@ TEST(FindExit, NanAndInfinityLieOutsideTheDomain) {
   }
 }
 
-}  // namespace
+}  // namespace domain_oracle_test
 }  // namespace forereach

@@ -17,7 +17,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace elementary_test {
 
 using exact::Inside;
 using exact::Real;
@@ -412,5 +412,5 @@ TEST(SoftplusRanges, HaveNoBoundWhereTheTemperatureMayBeZero) {
   }
 }
 
-}  // namespace
+}  // namespace elementary_test
 }  // namespace forereach

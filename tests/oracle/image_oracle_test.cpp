@@ -15,7 +15,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace image_oracle_test {
 
 using exact::Rational;
 
@@ -125,5 +125,5 @@ TEST(ImageOracle, RowsThatCopyACoordinateAddNothing) {
   EXPECT_EQ(copies, 2);  // acceleration and steering, whose inputs are points
 }
 
-}  // namespace
+}  // namespace image_oracle_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace interval_test {
 
 using exact::AtLeast;
 using exact::AtMost;
@@ -308,5 +308,5 @@ TEST_P(Trigonometric, LibraryErrorIsBelowOneUnit) {
 
 INSTANTIATE_TEST_SUITE_P(All, Trigonometric, testing::Values(Function::kSin, Function::kCos, Function::kTan));
 
-}  // namespace
+}  // namespace interval_test
 }  // namespace forereach

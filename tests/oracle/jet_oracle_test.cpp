@@ -10,7 +10,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace jet_oracle_test {
 
 using exact::Inside;
 using exact::Real;
@@ -197,5 +197,5 @@ TEST(JetOutsideTheDomain, HasNoFiniteValueWhateverItIsMultipliedBy) {
   }
 }
 
-}  // namespace
+}  // namespace jet_oracle_test
 }  // namespace forereach

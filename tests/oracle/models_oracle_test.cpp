@@ -13,7 +13,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace models_oracle_test {
 
 using exact::Inside;
 using exact::Rational;
@@ -559,5 +559,5 @@ TEST(ExpansionError, IsInfiniteWhereTheDomainHoldsAPole) {
   EXPECT_EQ(BoundExpansionError(model->program(), model->parameters(), domain).value[kTheta], kInfinity);
 }
 
-}  // namespace
+}  // namespace models_oracle_test
 }  // namespace forereach

@@ -6,7 +6,7 @@
 #include "tests/oracle/motions.h"
 
 namespace forereach {
-namespace {
+namespace motion_oracle_test {
 
 using exact::Real;
 
@@ -119,5 +119,5 @@ TEST(Meeting, OfRandomHullsLiesBetweenTheGapsAndTheDistancesOfPoints) {
   }
 }
 
-}  // namespace
+}  // namespace motion_oracle_test
 }  // namespace forereach

@@ -7,7 +7,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace places_oracle_test {
 
 using exact::Real;
 
@@ -72,5 +72,5 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
   }
 }
 
-}  // namespace
+}  // namespace places_oracle_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace propagator_oracle_test {
 
 using exact::Rational;
 
@@ -163,5 +163,5 @@ TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
   }
 }
 
-}  // namespace
+}  // namespace propagator_oracle_test
 }  // namespace forereach

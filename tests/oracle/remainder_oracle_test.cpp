@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace remainder_oracle_test {
 
 using exact::Rational;
 
@@ -183,5 +183,5 @@ TEST(RemainderOracle, OfAnAffineModelIsExactlyZero) {
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(c.Bound(*model, Method::kCentred).half_width[k], 0);
 }
 
-}  // namespace
+}  // namespace remainder_oracle_test
 }  // namespace forereach

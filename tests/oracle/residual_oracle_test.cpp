@@ -13,7 +13,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace residual_oracle_test {
 
 void Enclose(const ResidualEnclosure& envelope, const Zonotope& slice, std::span<const double> input,
              ResidualBounds& bounds) {
@@ -546,5 +546,5 @@ TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
   }
 }
 
-}  // namespace
+}  // namespace residual_oracle_test
 }  // namespace forereach

@@ -29,7 +29,7 @@ Real TanCurvature(const Real& t) { return Real(2) * t * (Real(1) + t * t); }
 }  // namespace forereach::exact
 
 namespace forereach {
-namespace {
+namespace rounding_oracle_test {
 
 using exact::Inside;
 using exact::Real;
@@ -253,5 +253,5 @@ TEST(RoundingAt, KinksAndEndsOfDomainsHasNoBound) {
   }
 }
 
-}  // namespace
+}  // namespace rounding_oracle_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace separation_oracle_test {
 
 Separation SeparateByHulls(const Zonotope& slice, const Obstacle& obstacle) {
   Hull hull{};
@@ -540,5 +540,5 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
   }
 }
 
-}  // namespace
+}  // namespace separation_oracle_test
 }  // namespace forereach

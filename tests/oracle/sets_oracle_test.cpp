@@ -12,7 +12,7 @@
 #include "tests/oracle/reduce_order.h"
 
 namespace forereach {
-namespace {
+namespace sets_oracle_test {
 
 using exact::AtMost;
 using exact::Rational;
@@ -257,5 +257,5 @@ TEST(ZonogonOracle, RadiusOfManyNearlyParallelGeneratorsIsTheFarthestCorner) {
   }
 }
 
-}  // namespace
+}  // namespace sets_oracle_test
 }  // namespace forereach

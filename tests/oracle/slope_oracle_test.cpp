@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace slope_oracle_test {
 
 using exact::Rational;
 
@@ -108,5 +108,5 @@ TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
   EXPECT_GT(reduced, 500);
 }
 
-}  // namespace
+}  // namespace slope_oracle_test
 }  // namespace forereach

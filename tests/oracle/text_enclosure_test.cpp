@@ -8,7 +8,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace text_enclosure_test {
 
 using exact::Real;
 
@@ -154,5 +154,5 @@ TEST(TextEnclosure, TellsWhichExpressionsUseAnInput) {
   EXPECT_FALSE(enclosure.UsesInput(3));
 }
 
-}  // namespace
+}  // namespace text_enclosure_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/text_models.h"
 
 namespace forereach {
-namespace {
+namespace text_model_test {
 
 using exact::Real;
 using testing::HasSubstr;
@@ -369,5 +369,5 @@ TEST(TextModel, ComputesSharedDerivativesOnce) {
   EXPECT_LT(MakeTextModel(text)->program().size, 2000);
 }
 
-}  // namespace
+}  // namespace text_model_test
 }  // namespace forereach

@@ -10,7 +10,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace text_oracle_test {
 
 using exact::Rational;
 
@@ -111,5 +111,5 @@ TEST(RoundedText, ReadsAsPeopleWriteIt) {
   EXPECT_EQ(RoundedUp(std::nan("")), "nan");
 }
 
-}  // namespace
+}  // namespace text_oracle_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace verifier_oracle_test {
 
 using exact::Rational;
 
@@ -153,5 +153,5 @@ TEST_F(Cancelling, AContradictionThatDoublesShowIsRefuted) {
   }
 }
 
-}  // namespace
+}  // namespace verifier_oracle_test
 }  // namespace forereach

@@ -19,7 +19,7 @@
 #include "tests/tries.h"
 
 namespace forereach {
-namespace {
+namespace page_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -380,5 +380,5 @@ TEST(WriteTest, APageIsOfAsciiWhereItsTextsAre) {
   EXPECT_TRUE(std::ranges::all_of(html, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
 }
 
-}  // namespace
+}  // namespace page_test
 }  // namespace forereach

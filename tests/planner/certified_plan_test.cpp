@@ -8,7 +8,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace certified_plan_test {
 
 Config WithInitialSet(Config config) {
   const Eigen::VectorXd center = Vec({0, 0, 0, 0}), half_width = Vec({0.05, 0.05, 0.03, 0.03});
@@ -147,5 +147,5 @@ TEST(Lessons, AFalseAdviceChangesNoMargin) {
   EXPECT_EQ(lessons.DomainMargin(Eigen::Vector2d(1, 1), Eigen::MatrixXd::Identity(1, 2)), Eigen::Vector2d(0, 0));
 }
 
-}  // namespace
+}  // namespace certified_plan_test
 }  // namespace forereach

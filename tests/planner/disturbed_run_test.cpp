@@ -13,7 +13,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace disturbed_run_test {
 
 // X0 of a candidate leaves room for the two steps until it starts.
 Config Task(const std::string& disturbance, int seed) {
@@ -86,5 +86,5 @@ TEST(UndeclaredDisturbance, StopsTheRobotBecauseItsDataContradictTheDeclaration)
   EXPECT_TRUE(Certifier(std::make_shared<const Problem>(told)).violation());
 }
 
-}  // namespace
+}  // namespace disturbed_run_test
 }  // namespace forereach

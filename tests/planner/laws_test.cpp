@@ -11,7 +11,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace laws_test {
 
 using testing::HasSubstr, testing::ThrowsMessage;
 
@@ -201,5 +201,5 @@ TEST(Laws, AMissingLawIsAnErrorThatNamesIt) {
   EXPECT_THAT(missing([](Config& config) { config.robot.hold.reset(); }), HasSubstr("robot.hold: missing"));
 }
 
-}  // namespace
+}  // namespace laws_test
 }  // namespace forereach

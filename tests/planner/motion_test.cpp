@@ -9,7 +9,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace motion_test {
 
 Eigen::VectorXd Successor(const NominalModel& model, const Eigen::VectorXd& x, const Eigen::VectorXd& u) {
   Eigen::VectorXd z(x.size() + u.size()), next(x.size());
@@ -92,5 +92,5 @@ TEST(Motion, PursuitTurnsTowardsTheHeadingWithinTheInputDomain) {
   }
 }
 
-}  // namespace
+}  // namespace motion_test
 }  // namespace forereach

@@ -7,7 +7,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace navigation_test {
 
 const Box kRegion(Vec({-50, -50}), Vec({50, 50}));
 
@@ -64,5 +64,5 @@ TEST(NavigationField, IsTheDistanceInOneDimension) {
   EXPECT_DOUBLE_EQ(field.Descent(Vec({-3}))(0), 1);
 }
 
-}  // namespace
+}  // namespace navigation_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace planner_node_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000, kPeriod = 40'000;
 
@@ -874,5 +874,5 @@ TEST(PlannerNode, RefusesATaskThatDoesNotFit) {
   EXPECT_THROW(PlannerNode(config, *bus), ConfigError);
 }
 
-}  // namespace
+}  // namespace planner_node_test
 }  // namespace forereach

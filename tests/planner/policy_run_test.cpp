@@ -17,7 +17,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace policy_run_test {
 
 const std::string kTask = FOREREACH_SOURCE_DIR "/config/policy.yaml";
 
@@ -185,5 +185,5 @@ TEST(PolicyProposer, RefusesWhatDoesNotFit) {
   EXPECT_EQ(refusal(config, fewer), "planner.policy: has 4 features, has to have 12");
 }
 
-}  // namespace
+}  // namespace policy_run_test
 }  // namespace forereach

@@ -16,7 +16,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace policy_test {
 
 using Json = nlohmann::json;
 
@@ -173,5 +173,5 @@ TEST(ShippedPolicy, FollowsReferencesOfASlowRobot) {
     }
 }
 
-}  // namespace
+}  // namespace policy_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace proposal_test {
 
 std::unique_ptr<Proposer> PlannerOf(const Config& config) { return MakeOmplProposer(config); }
 
@@ -418,5 +418,5 @@ TEST(Planner, RefusesOptionsThatDoNotFit) {
   }
 }
 
-}  // namespace
+}  // namespace proposal_test
 }  // namespace forereach

@@ -7,7 +7,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace residual_estimate_test {
 
 // The bicycle's task with transitions at the given speeds, whose heading residual is `residual` of the speed.
 template <class Residual>
@@ -62,5 +62,5 @@ TEST(ResidualEstimate, AConstantCoordinateTakesTheMean) {
   EXPECT_NEAR(next[4], 0.2, 1e-12);
 }
 
-}  // namespace
+}  // namespace residual_estimate_test
 }  // namespace forereach

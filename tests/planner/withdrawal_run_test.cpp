@@ -16,7 +16,7 @@
 #include "tests/planner/tasks.h"
 
 namespace forereach {
-namespace {
+namespace withdrawal_run_test {
 
 Config Task() {
   Config config = Bicycle();
@@ -102,5 +102,5 @@ TEST_F(WithdrawalRunTest, AWallTooNearToStopBeforeItIsAnEmergency) {
   EXPECT_LT(robot_.state()[0], wall) << "the simulated robot's emergency stop takes no way";
 }
 
-}  // namespace
+}  // namespace withdrawal_run_test
 }  // namespace forereach

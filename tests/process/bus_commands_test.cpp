@@ -21,7 +21,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace bus_commands_test {
 
 using testing::HasSubstr;
 
@@ -217,5 +217,5 @@ TEST(BusCommandsTest, StatusSaysThatNoCertifierAnswered) {
   EXPECT_THAT(status.text, HasSubstr("no certifier answered"));
 }
 
-}  // namespace
+}  // namespace bus_commands_test
 }  // namespace forereach

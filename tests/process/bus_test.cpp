@@ -15,7 +15,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace bus_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -244,5 +244,5 @@ TEST(BusErrorTest, OtherKindsOfBusAreRefused) {
     EXPECT_THROW((void)OpenBus(url), BusError) << url;
 }
 
-}  // namespace
+}  // namespace bus_test
 }  // namespace forereach

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace bus_url_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -72,5 +72,5 @@ TEST(BusUrlTest, AWrongPartIsNamedWithWhatItHasToBe) {
   }
 }
 
-}  // namespace
+}  // namespace bus_url_test
 }  // namespace forereach

@@ -29,7 +29,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace certifier_node_test {
 
 using testing::ElementsAre;
 
@@ -1399,5 +1399,5 @@ TEST_F(ReloadTest, ReloadsOnceMoreForRequestsDuringAReload) {
   EXPECT_EQ(status_.version, 3) << "the first, and one for those asked for while it was under way";
 }
 
-}  // namespace
+}  // namespace certifier_node_test
 }  // namespace forereach

@@ -24,7 +24,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace certifier_process_test {
 
 const Eigen::Vector2d kGentle(0.2, 0), kIntoTheCircle(0, 1.2), kOutsideDomain(0, 3.5);
 
@@ -293,5 +293,5 @@ TEST_F(CertifierProcessTest, StopsInTheMiddleOfAFlood) {
   EXPECT_TRUE(nlohmann::json::accept(certifier_.output())) << certifier_.output();
 }
 
-}  // namespace
+}  // namespace certifier_process_test
 }  // namespace forereach

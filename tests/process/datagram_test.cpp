@@ -10,7 +10,7 @@
 #include "tests/process/raw_datagrams.h"
 
 namespace forereach {
-namespace {
+namespace datagram_test {
 
 using testing::HasSubstr;
 
@@ -119,5 +119,5 @@ TEST(DatagramTest, RefusedOnesAreCountedByTheirCauseAndSaid) {
     EXPECT_THAT(words, HasSubstr(part));
 }
 
-}  // namespace
+}  // namespace datagram_test
 }  // namespace forereach

@@ -21,7 +21,7 @@
 #include "tests/process/raw_datagrams.h"
 
 namespace forereach {
-namespace {
+namespace hostile_datagrams_test {
 
 constexpr double kMegabyte = 1 << 20;
 constexpr double kMayGrowBy =
@@ -146,5 +146,5 @@ TEST_P(HostileDatagramsTest, EveryProcessLivesOnAndWorks) {
   }
 }
 
-}  // namespace
+}  // namespace hostile_datagrams_test
 }  // namespace forereach

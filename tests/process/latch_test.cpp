@@ -21,7 +21,7 @@
 #include "tests/small_disk.h"
 
 namespace forereach {
-namespace {
+namespace latch_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -572,5 +572,5 @@ TEST_F(LatchTest, DoesNotArmOnAReadOnlyDiskAndSaysWhy) {
   ExpectArmed();
 }
 
-}  // namespace
+}  // namespace latch_test
 }  // namespace forereach

@@ -26,7 +26,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace lcm_interoperation_test {
 
 using Message = std::pair<std::string, std::vector<std::uint8_t>>;  // channel, bytes
 
@@ -265,5 +265,5 @@ TEST_F(LcmInteroperationTest, OurLargestMessageFitsOneDatagramWithItsSignature) 
   EXPECT_TRUE(FitsOneDatagram(kMaxChannelBytes, EncodedSize<certified_plan_v2_t>() + kTrailerBytes));
 }
 
-}  // namespace
+}  // namespace lcm_interoperation_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace logger_process_test {
 
 TEST(LoggerProcessTest, RecordsAndEndsWithASummary) {
   const ScratchDirectory scratch;
@@ -61,5 +61,5 @@ TEST(LoggerProcessTest, ExitsWithOneIfItsLogWasDeleted) {
   EXPECT_NE(logger.output().find("confirmed events are gone"), std::string::npos) << logger.output();
 }
 
-}  // namespace
+}  // namespace logger_process_test
 }  // namespace forereach

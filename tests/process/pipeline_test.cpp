@@ -15,7 +15,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace pipeline_test {
 
 TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   const ScratchDirectory scratch;
@@ -58,5 +58,5 @@ TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   }
 }
 
-}  // namespace
+}  // namespace pipeline_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace planner_process_test {
 
 class PlannerProcessTest : public testing::Test {
  protected:
@@ -94,5 +94,5 @@ TEST_F(PlannerProcessTest, EndsWhenTheRobotHasFinished) {
   EXPECT_EQ(planner_.WaitForExit(), 0) << planner_.error();
 }
 
-}  // namespace
+}  // namespace planner_process_test
 }  // namespace forereach

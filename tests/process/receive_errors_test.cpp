@@ -28,7 +28,7 @@ extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
 }
 
 namespace forereach {
-namespace {
+namespace receive_errors_test {
 
 using std::chrono::milliseconds;
 
@@ -79,5 +79,5 @@ TEST_F(NoErrorsTest, DoesNotCountATimeoutOrASignal) {
   EXPECT_EQ(receiver_.counts().receive_errors, 0);
 }
 
-}  // namespace
+}  // namespace receive_errors_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace reload_process_test {
 
 class ReloadProcessTest : public testing::TestWithParam<const char*> {
  protected:
@@ -71,5 +71,5 @@ TEST_P(ReloadProcessTest, ReloadsAgainDuringAReadThatNeverEnds) {
 INSTANTIATE_TEST_SUITE_P(All, ReloadProcessTest, testing::Values(FOREREACH_CERTIFIER, FOREREACH_ROBOT_SIM),
                          [](const auto& info) { return info.index == 0 ? "Certifier" : "Robot"; });
 
-}  // namespace
+}  // namespace reload_process_test
 }  // namespace forereach

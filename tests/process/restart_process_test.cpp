@@ -19,7 +19,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace restart_process_test {
 
 constexpr int kSteps = 14;  // 4.2 s
 
@@ -121,5 +121,5 @@ TEST_F(RestartProcessTest, WithoutAnObstacleItStopsTheRobot) {
   ExpectAStop();
 }
 
-}  // namespace
+}  // namespace restart_process_test
 }  // namespace forereach

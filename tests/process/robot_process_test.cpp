@@ -16,7 +16,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace robot_process_test {
 
 constexpr int kSteps = 5;
 
@@ -123,5 +123,5 @@ TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {
   EXPECT_EQ(robot_.Terminate(), 0) << robot_.error();
 }
 
-}  // namespace
+}  // namespace robot_process_test
 }  // namespace forereach

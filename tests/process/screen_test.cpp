@@ -15,7 +15,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace screen_test {
 
 using testing::ElementsAre;
 
@@ -166,5 +166,5 @@ TEST_P(ScreenTest, WhatDoesNotFitOneDatagramOrHasNoNameIsNotSent) {
   EXPECT_EQ(heard.size(), 2u) << "the first, and what DispatchAll sends";
 }
 
-}  // namespace
+}  // namespace screen_test
 }  // namespace forereach

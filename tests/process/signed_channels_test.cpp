@@ -33,7 +33,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace signed_channels_test {
 
 using Message = std::vector<std::uint8_t>;
 
@@ -292,5 +292,5 @@ INSTANTIATE_TEST_SUITE_P(All, SignedChannelsTest, testing::ValuesIn([] {
                          }()),
                          [](const auto& instance) { return instance.param; });
 
-}  // namespace
+}  // namespace signed_channels_test
 }  // namespace forereach

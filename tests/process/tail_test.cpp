@@ -15,7 +15,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace tail_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -109,5 +109,5 @@ TEST_F(TailTest, ColoursOnATerminalUnlessNoColorIsSet) {
   }
 }
 
-}  // namespace
+}  // namespace tail_test
 }  // namespace forereach

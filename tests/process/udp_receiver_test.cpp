@@ -24,7 +24,7 @@
 #include "tests/process/raw_datagrams.h"
 
 namespace forereach {
-namespace {
+namespace udp_receiver_test {
 
 using testing::ElementsAre;
 
@@ -219,5 +219,5 @@ TEST(BusCountsTest, WhatTheKernelLostIsDroppedByTheBus) {
   EXPECT_GT(bus->datagrams().messages, 0);
 }
 
-}  // namespace
+}  // namespace udp_receiver_test
 }  // namespace forereach

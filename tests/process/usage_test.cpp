@@ -10,7 +10,7 @@
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
-namespace {
+namespace usage_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -117,5 +117,5 @@ TEST_P(UsageTest, EndsCleanlyOnSigterm) {
   EXPECT_NE(process.output(), "") << "a summary";
 }
 
-}  // namespace
+}  // namespace usage_test
 }  // namespace forereach

@@ -17,7 +17,7 @@
 #include "tests/gate/small_task.h"
 
 namespace forereach {
-namespace {
+namespace withdrawn_drive_test {
 
 using testing::Contains;
 using testing::Not;
@@ -499,5 +499,5 @@ TEST_F(RestartedCertifierTest, ThePlanStopsWhereSomethingChangesLater) {
   EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP));
 }
 
-}  // namespace
+}  // namespace withdrawn_drive_test
 }  // namespace forereach

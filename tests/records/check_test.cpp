@@ -14,7 +14,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace check_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -139,5 +139,5 @@ TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
   EXPECT_EQ(ToJson({check})[0]["damaged_tasks"].size(), 1u);
 }
 
-}  // namespace
+}  // namespace check_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace compare_test {
 
 using testing::HasSubstr;
 
@@ -147,5 +147,5 @@ TEST_F(CompareTest, RefusesToCompareWithoutOneTask) {
   EXPECT_EQ(Forereach("replay '" + kLog + "' --compare --other-task --config '" + kConfig + "' 2>&1").code, 2);
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace forereach

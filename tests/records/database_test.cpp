@@ -9,7 +9,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace database_test {
 
 void Sql(const std::string& path, const char* sql) {
   sqlite3* handle = nullptr;
@@ -247,5 +247,5 @@ TEST(Database, WritesAllOrNothing) {
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
 }
 
-}  // namespace
+}  // namespace database_test
 }  // namespace forereach

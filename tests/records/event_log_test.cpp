@@ -14,7 +14,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace event_log_test {
 
 constexpr int kHeader = 28;
 
@@ -368,5 +368,5 @@ TEST(EventLog, ReadsAnyMutationWithoutInventingRecords) {
   }
 }
 
-}  // namespace
+}  // namespace event_log_test
 }  // namespace forereach

@@ -32,7 +32,7 @@ std::size_t live_bytes = 0, peak_bytes = 0;
 [[gnu::noinline]] void operator delete(void* block, std::size_t) noexcept { operator delete(block); }
 
 namespace forereach {
-namespace {
+namespace hostile_log_test {
 
 constexpr std::size_t kMemory = kMaxLogDataBytes + (1 << 16);  // one event, its channel and the reader itself
 
@@ -266,5 +266,5 @@ TEST_F(HostileLog, NestedClaimsTakeNoLongerThanTheirBytes) {
   EXPECT_GT(reader.damage().places, 25'000);
 }
 
-}  // namespace
+}  // namespace hostile_log_test
 }  // namespace forereach

@@ -9,7 +9,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace interpreter_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000, kSecond = 1'000'000;
 
@@ -104,5 +104,5 @@ TEST(GapsTest, ASumOfLossesEndsAtTheLargestNumber) {
   EXPECT_EQ(SumOfLost(2, -3), 2) << "a database may hold anything";
 }
 
-}  // namespace
+}  // namespace interpreter_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace kept_tasks_test {
 
 namespace fs = std::filesystem;
 
@@ -132,5 +132,5 @@ TEST_F(KeptTest, TheQuotaTakesATaskWithTheLastLogThatNeedsIt) {
   Stop();
 }
 
-}  // namespace
+}  // namespace kept_tasks_test
 }  // namespace forereach

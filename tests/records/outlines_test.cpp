@@ -9,7 +9,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace outlines_test {
 
 using Eigen::Vector2d;
 
@@ -95,5 +95,5 @@ TEST(Outlines, PredictionsGrowWhereTheObstacleIs) {
   EXPECT_TRUE(PredictionOf(Obstacle::HalfSpace(Vector2d(1, 0), 3).Moving(motion)).empty());
 }
 
-}  // namespace
+}  // namespace outlines_test
 }  // namespace forereach

@@ -10,7 +10,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace picture_test {
 
 Picture Sample() {
   Picture picture;
@@ -99,5 +99,5 @@ TEST(Picture, WritesAPdf) {
   EXPECT_EQ(std::string(bytes.begin(), bytes.begin() + 5), "%PDF-");
 }
 
-}  // namespace
+}  // namespace picture_test
 }  // namespace forereach

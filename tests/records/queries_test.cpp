@@ -16,7 +16,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace queries_test {
 
 const std::string kData = FOREREACH_SOURCE_DIR "/tests/data/";
 
@@ -113,5 +113,5 @@ TEST_F(QueriesTest, TheFirstQueryCountsTheDecisionsOfTheLog) {
   EXPECT_EQ(certified, 20);
 }
 
-}  // namespace
+}  // namespace queries_test
 }  // namespace forereach

@@ -23,7 +23,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace replay_test {
 
 using testing::HasSubstr;
 
@@ -409,5 +409,5 @@ TEST_F(ReplayTest, AnotherTaskIsNoticed) {
   EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
 }
 
-}  // namespace
+}  // namespace replay_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace report_test {
 
 /** A point mass without residual, and one circle at (3, 0). */
 Config PointMassConfig() {
@@ -170,5 +170,5 @@ TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
   EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 2u);
 }
 
-}  // namespace
+}  // namespace report_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace run_logs_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -215,5 +215,5 @@ TEST(OutputFile, HasItsNameOnlyOnceItIsWhole) {
             std::filesystem::perms::group_read);
 }
 
-}  // namespace
+}  // namespace run_logs_test
 }  // namespace forereach

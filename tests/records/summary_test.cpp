@@ -8,7 +8,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace summary_test {
 
 Config GoalConfig() {
   Config config;
@@ -181,5 +181,5 @@ TEST(Summary, PassesDamageAndCountsIt) {
   EXPECT_GT(summary.damage.bytes, 0);
 }
 
-}  // namespace
+}  // namespace summary_test
 }  // namespace forereach

@@ -22,7 +22,7 @@
 #include "tests/records/signed_log.h"
 
 namespace forereach {
-namespace {
+namespace timeline_test {
 
 using testing::IsEmpty;
 
@@ -254,5 +254,5 @@ TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
   EXPECT_EQ(believed["passed_over"]["not_authentic"]["unsigned"], 0);
 }
 
-}  // namespace
+}  // namespace timeline_test
 }  // namespace forereach

@@ -25,7 +25,7 @@
 #include "tests/records/signed_log.h"
 
 namespace forereach {
-namespace {
+namespace verify_log_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -545,5 +545,5 @@ TEST_F(VerifyObstacles, NoticesStaleObstaclesThatWereNeverInForce) {
   EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
 }
 
-}  // namespace
+}  // namespace verify_log_test
 }  // namespace forereach

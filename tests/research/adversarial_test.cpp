@@ -8,7 +8,7 @@
 #include "research/experiment.h"
 
 namespace forereach::research {
-namespace {
+namespace adversarial_test {
 
 TEST(AdversarialFamily, TheTrueDeclarationIsSoundAndTheOthersAreNot) {
   const Scope scope{1, true};
@@ -33,5 +33,5 @@ TEST(AdversarialFamily, TheTrueDeclarationIsSoundAndTheOthersAreNot) {
   EXPECT_GT(figure(1, "lambda = 32: estimate, false certificates, all groups"), 8);
 }
 
-}  // namespace
+}  // namespace adversarial_test
 }  // namespace forereach::research

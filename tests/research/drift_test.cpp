@@ -11,7 +11,7 @@
 #include "tests/scratch.h"
 
 namespace forereach::research {
-namespace {
+namespace drift_test {
 
 using testing::HasSubstr;
 
@@ -113,5 +113,5 @@ TEST(DriftDrive, ReachesItsGoalInsideItsSlices) {
   }
 }
 
-}  // namespace
+}  // namespace drift_test
 }  // namespace forereach::research

@@ -10,7 +10,7 @@
 #include "research/methods/envelope.h"
 
 namespace forereach::research {
-namespace {
+namespace evaluate_test {
 
 // Claims that the residual is zero.
 class NoResidual final : public ResidualEnclosure {
@@ -234,5 +234,5 @@ TEST(RunCell, CountsAddUpAndADeclarationThatDataContradictIsF) {
   for (const Tally& tally : RunCell(cell, {10, 20})) EXPECT_EQ(tally.falsified, tally.plans);
 }
 
-}  // namespace
+}  // namespace evaluate_test
 }  // namespace forereach::research

@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach::research {
-namespace {
+namespace labels_test {
 
 constexpr PixelBox kFrame{100, 50, 500, 450};
 constexpr double kRadius = 5, kClearance = 7;
@@ -78,5 +78,5 @@ TEST(Labels, WithoutRoomAreAnError) {
       testing::ThrowsMessage<std::runtime_error>("picture: no room for the label 100"));
 }
 
-}  // namespace
+}  // namespace labels_test
 }  // namespace forereach::research

@@ -8,7 +8,7 @@
 #include "research/random.h"
 
 namespace forereach::research {
-namespace {
+namespace membership_test {
 
 Membership At(const Zonotope& set, std::initializer_list<double> x) { return Locate(set, {x.begin(), x.size()}); }
 
@@ -66,5 +66,5 @@ TEST(Locate, AgreesWithSupportFunctions) {
   }
 }
 
-}  // namespace
+}  // namespace membership_test
 }  // namespace forereach::research

@@ -11,7 +11,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach::research {
-namespace {
+namespace paper_grids_test {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
 double RoundedUp(double x) { return std::ceil(x * 1e9) / 1e9; }
@@ -83,5 +83,5 @@ TEST(PaperGrids, AFinerGridIsLower) {
   EXPECT_GT(PaperPointMassGrid(knee, 5.4, 40000).velocity_diagonal, 0.06145786);
 }
 
-}  // namespace
+}  // namespace paper_grids_test
 }  // namespace forereach::research

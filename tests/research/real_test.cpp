@@ -25,7 +25,7 @@
 #include "tests/shell.h"
 
 namespace forereach::research {
-namespace {
+namespace real_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -352,5 +352,5 @@ TEST_F(RealTest, WithoutDataItSaysWhereTheyCanBeHad) {
   EXPECT_THAT(standing.text, HasSubstr("run_a: the car drives at 1 m/s or more, under power, in 0 steps"));
 }
 
-}  // namespace
+}  // namespace real_test
 }  // namespace forereach::research

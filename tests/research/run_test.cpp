@@ -20,7 +20,7 @@
 #include "tests/shell.h"
 
 namespace forereach::research {
-namespace {
+namespace run_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -360,5 +360,5 @@ TEST_F(RunTest, TheCommandTeachesRunsAndRefuses) {
   EXPECT_THAT(quick.text, HasSubstr("run.json: scenarios: begun with 600, this run has 30"));
 }
 
-}  // namespace
+}  // namespace run_test
 }  // namespace forereach::research

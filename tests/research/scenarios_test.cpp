@@ -10,7 +10,7 @@
 #include "research/truth.h"
 
 namespace forereach::research {
-namespace {
+namespace scenarios_test {
 
 constexpr int kCount = 200;
 
@@ -110,5 +110,5 @@ TEST(Scenarios, TheObstacleIsOutsideTheCurve) {
   }
 }
 
-}  // namespace
+}  // namespace scenarios_test
 }  // namespace forereach::research

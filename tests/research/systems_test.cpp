@@ -12,7 +12,7 @@
 #include "research/scenarios.h"
 
 namespace forereach::research {
-namespace {
+namespace systems_test {
 
 // The largest |r_k(z) - r_k(z')| / sum_l L_kl |z_l - z'_l| over random near pairs of the domain.
 double LargestSlopeRatio(const System& system, const Eigen::MatrixXd& lipschitz) {
@@ -118,5 +118,5 @@ TEST(Data, DoNotContradictTheDeployedDeclaration) {
     }
 }
 
-}  // namespace
+}  // namespace systems_test
 }  // namespace forereach::research

@@ -14,7 +14,7 @@
 #include "research/statistics.h"
 
 namespace forereach::research {
-namespace {
+namespace table_test {
 
 using testing::HasSubstr;
 
@@ -162,5 +162,5 @@ TEST(PaperValues, HaveKeysOfTheirOwn) {
   EXPECT_THROW((void)Paper("bicycle.D.recall"), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace table_test
 }  // namespace forereach::research

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach::research {
-namespace {
+namespace truth_test {
 
 TEST(Rollouts, StartAtTheCenterThenAtEachCornerThenInside) {
   for (const System* system : Systems()) {
@@ -65,5 +65,5 @@ TEST(Rollouts, ACircleThatIsMetExactlyIsTouched) {
   EXPECT_TRUE(path.StayClearOf({beyond, std::nextafter(distance, 0)}));
 }
 
-}  // namespace
+}  // namespace truth_test
 }  // namespace forereach::research

@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach::research {
-namespace {
+namespace variants_test {
 
 struct Point {
   std::vector<double> z, residual, next;
@@ -138,5 +138,5 @@ TEST(Escaping, MembersAgreeBelowTheKneeAndTheFirstIsTheKnee) {
   EXPECT_GT(EscapeAt(32, 3), 29 * EscapeAt(1, 3));
 }
 
-}  // namespace
+}  // namespace variants_test
 }  // namespace forereach::research

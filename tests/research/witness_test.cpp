@@ -10,7 +10,7 @@
 #include "research/variants.h"
 
 namespace forereach::research {
-namespace {
+namespace witness_test {
 
 TEST(FactorForContainment, HoldsAndFailsJustBelow) {
   const Undeclared kept{Escaping(32), PointMassSystem().deployed};
@@ -99,5 +99,5 @@ TEST(NoiseFloor, TheShiftIsAddedInEveryStep) {
   EXPECT_NEAR(ShiftedRollout(system, still, controls, -shift)(0, 3), -1.5, 1e-9);
 }
 
-}  // namespace
+}  // namespace witness_test
 }  // namespace forereach::research

@@ -8,7 +8,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace contacts_test {
 
 using Eigen::Vector2d;
 using testing::IsEmpty;
@@ -121,5 +121,5 @@ TEST(Contacts, AtASampleCoverTheWholeBody) {
   EXPECT_EQ(met[0].obstacle, 1);
 }
 
-}  // namespace
+}  // namespace contacts_test
 }  // namespace forereach

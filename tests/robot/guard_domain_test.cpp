@@ -14,7 +14,7 @@
 #include "tests/paths.h"
 
 namespace forereach {
-namespace {
+namespace guard_domain_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000;
 
@@ -93,5 +93,5 @@ TEST(GuardDomainProperty, EveryHonestCertificatePasses) {
   }
 }
 
-}  // namespace
+}  // namespace guard_domain_test
 }  // namespace forereach

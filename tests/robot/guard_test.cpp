@@ -19,7 +19,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace guard_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -926,5 +926,5 @@ TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
   }
 }
 
-}  // namespace
+}  // namespace guard_test
 }  // namespace forereach

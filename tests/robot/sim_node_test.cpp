@@ -29,7 +29,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace sim_node_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -943,5 +943,5 @@ TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
   }
 }
 
-}  // namespace
+}  // namespace sim_node_test
 }  // namespace forereach

@@ -68,7 +68,7 @@ struct Trouble {
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace forereach {
-namespace {
+namespace supervisor_exceptions_test {
 
 constexpr std::int64_t kJitterUs = 3000;
 
@@ -740,5 +740,5 @@ TEST(SupervisorExceptions, AStateOfAnotherSizeIsNotGivenToTheBrakeLaw) {
   EXPECT_EQ(robot.holds, 1);
 }
 
-}  // namespace
+}  // namespace supervisor_exceptions_test
 }  // namespace forereach

@@ -9,7 +9,7 @@
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {
-namespace {
+namespace supervisor_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -309,5 +309,5 @@ TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
   EXPECT_FALSE(supervisor.halted());
 }
 
-}  // namespace
+}  // namespace supervisor_test
 }  // namespace forereach

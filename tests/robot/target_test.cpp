@@ -19,7 +19,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace target_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -447,5 +447,5 @@ TEST(MakeTransitionsTest, RefusesWhatIsNotInsideTheDomain) {
                std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace target_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {
-namespace {
+namespace withdrawal_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -539,5 +539,5 @@ TEST(BrakeTest, RefusesWhatIsNoDecline) {
   EXPECT_THROW(Brake({std::numeric_limits<double>::quiet_NaN()}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace withdrawal_test
 }  // namespace forereach

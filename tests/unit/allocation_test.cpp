@@ -48,7 +48,7 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
 #endif
 
 namespace forereach {
-namespace {
+namespace allocation_test {
 
 Problem BicycleProblem() {
   Problem problem = PaperBicycle();
@@ -116,5 +116,5 @@ TEST_F(Allocation, CertifyAllocatesNothingForLimitsAndPlacesAtExpressions) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
-}  // namespace
+}  // namespace allocation_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/text_models.h"
 
 namespace forereach {
-namespace {
+namespace angles_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -104,5 +104,5 @@ TEST(Angles, RefuseNamesThatAreNoStates) {
   EXPECT_EQ(MakeTextModel(text)->angles(), (std::vector<int>{0, 1}));
 }
 
-}  // namespace
+}  // namespace angles_test
 }  // namespace forereach

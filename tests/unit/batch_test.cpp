@@ -12,7 +12,7 @@
 #include "tests/oracle/problems.h"
 
 namespace forereach {
-namespace {
+namespace batch_test {
 
 auto Fields(const Decision& d) {
   return std::tuple(d.outcome, d.cause, d.step, d.exit.kind, d.exit.index, d.coordinate, d.first_observation,
@@ -105,5 +105,5 @@ TEST_F(BatchTest, SaysWhatDoesNotFit) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("0 threads")));
 }
 
-}  // namespace
+}  // namespace batch_test
 }  // namespace forereach

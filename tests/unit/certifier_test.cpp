@@ -20,7 +20,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace certifier_test {
 
 using testing::Eq, testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -657,5 +657,5 @@ TEST(Explain, SaysWhenADecisionHoldsAndOfSeveralPartsWhich) {
   EXPECT_EQ(Explain(abstention, body), "abstain S: between steps 3 and 4 part 1 may touch obstacle 0 (by 0.5 m)");
 }
 
-}  // namespace
+}  // namespace certifier_test
 }  // namespace forereach

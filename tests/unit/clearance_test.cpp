@@ -10,7 +10,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace clearance_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -188,5 +188,5 @@ TEST(Deviation, IsTheLengthOfTheBulgeAndTheTurnOfTheFarthestPoint) {
   EXPECT_DOUBLE_EQ(Deviation(between, Hull({{3, 4, 0}, {1, 1, 0}})), (5 + 5 * 1) * 0.04 / 8);
 }
 
-}  // namespace
+}  // namespace clearance_test
 }  // namespace forereach

@@ -20,7 +20,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace compiled_models_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -199,5 +199,5 @@ TEST(UseCompiledTest, DecisionsHaveTheSameBits) {
   EXPECT_THROW(static_cast<void>(CompiledFor(MakeTextModel(changed))), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace compiled_models_test
 }  // namespace forereach

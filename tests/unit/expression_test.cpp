@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 namespace forereach {
-namespace {
+namespace expression_test {
 
 const std::vector<std::string> kNames{"x", "y", "theta", "v", "dt"};
 constexpr long double Wide(double x) { return x; }
@@ -282,5 +282,5 @@ TEST(Expression, AnyTextIsTakenOrRefusedInItsPlace) {
   EXPECT_GT(taken, 100) << "seed " << seed;
 }
 
-}  // namespace
+}  // namespace expression_test
 }  // namespace forereach

@@ -10,7 +10,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace given_enclosure_test {
 
 // r(x) in slope * (x - c) +- width in the velocities, zero in the positions.
 class Velocities final : public ResidualEnclosure {
@@ -82,5 +82,5 @@ TEST_F(GivenEnclosure, ASlopeThatIsNotFiniteIsNoBound) {
   EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
 }
 
-}  // namespace
+}  // namespace given_enclosure_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace learn_test {
 
 constexpr int kBase = 5, kLearned = 400;
 
@@ -164,5 +164,5 @@ TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {
   EXPECT_EQ(Certify(certifier, tube).outcome, Outcome::kFalsified);
 }
 
-}  // namespace
+}  // namespace learn_test
 }  // namespace forereach

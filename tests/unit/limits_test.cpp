@@ -15,7 +15,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace limits_test {
 
 using testing::HasSubstr, testing::ThrowsMessage;
 
@@ -186,5 +186,5 @@ TEST_F(Limits, AreRefusedIfTheyAreMalformed) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("33 limits, must be at most 32")));
 }
 
-}  // namespace
+}  // namespace limits_test
 }  // namespace forereach

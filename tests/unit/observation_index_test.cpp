@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace observation_index_test {
 
 constexpr int kStates = 9, kInputs = 5, kVariables = kStates + kInputs;
 constexpr int kFlat = 1 << 20;
@@ -259,5 +259,5 @@ TEST(PairSearch, SaysTheSameOnEveryInstructionSet) {
   }
 }
 
-}  // namespace
+}  // namespace observation_index_test
 }  // namespace forereach

@@ -34,7 +34,7 @@ thread_local std::function<void()>* at_next_allocation = nullptr;
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace forereach {
-namespace {
+namespace observation_store_test {
 
 constexpr int kStates = 3, kVariables = 5;
 const std::vector<double> kLower(kVariables, -1), kUpper(kVariables, 1);
@@ -541,5 +541,5 @@ TEST(MostUseful, DropsTheObservationThatNarrowsLeast) {
   EXPECT_EQ(MostUseful(declaration, o, 1).size(), 1u);
 }
 
-}  // namespace
+}  // namespace observation_store_test
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace places_test {
 
 using testing::HasSubstr, testing::ThrowsMessage;
 
@@ -168,5 +168,5 @@ TEST_F(Places, AreRefusedIfTheyAreMalformed) {
   refused(At(std::vector<std::vector<std::string>>(17, {"q1", "q2"}), 0), "17 points, must be at most 16");
 }
 
-}  // namespace
+}  // namespace places_test
 }  // namespace forereach

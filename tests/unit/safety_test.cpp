@@ -8,7 +8,7 @@
 #include "certifier/safety/separation.h"
 
 namespace forereach {
-namespace {
+namespace safety_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -82,5 +82,5 @@ TEST(Projection, RefusesWhatProjectsToNothing) {
   EXPECT_THROW(Projection(Eigen::MatrixXd::Constant(2, 4, kNan), 4), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace safety_test
 }  // namespace forereach

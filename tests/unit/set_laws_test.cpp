@@ -12,7 +12,7 @@
 #include "tests/oracle/random.h"
 
 namespace forereach {
-namespace {
+namespace set_laws_test {
 
 using exact::AtLeast;
 using exact::AtMost;
@@ -185,5 +185,5 @@ TYPED_TEST(SetLaws, HullEndsAreTheSupportAlongTheAxes) {
   });
 }
 
-}  // namespace
+}  // namespace set_laws_test
 }  // namespace forereach

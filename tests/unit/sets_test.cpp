@@ -16,7 +16,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace sets_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -239,5 +239,5 @@ TEST(Outline, IsTheHullOfAllSignVectors) {
   }
 }
 
-}  // namespace
+}  // namespace sets_test
 }  // namespace forereach

@@ -12,7 +12,7 @@
 #include "tests/worlds.h"
 
 namespace forereach {
-namespace {
+namespace sweep_test {
 
 using Eigen::Vector3d;
 
@@ -580,5 +580,5 @@ TEST(SeparatePieces, DecidesASegmentInSpaceWithinAHair) {
   }
 }
 
-}  // namespace
+}  // namespace sweep_test
 }  // namespace forereach

@@ -10,7 +10,7 @@
 #include "tests/text_models.h"
 
 namespace forereach {
-namespace {
+namespace unbounded_test {
 
 using Integrator = ModelText::Integrator;
 
@@ -114,5 +114,5 @@ TEST(FindUnbounded, FindsAKinkInALaterStageOfTheStep) {
   EXPECT_FALSE(Find(Of("abs(v)", Integrator::kEuler), {0.02, 0.08})) << "Euler's step looks at its beginning only";
 }
 
-}  // namespace
+}  // namespace unbounded_test
 }  // namespace forereach

@@ -11,7 +11,7 @@
 #include "verifier/equations.h"
 
 namespace forereach::verifier {
-namespace {
+namespace equations_test {
 
 const Real kStep(0x1p-60), kTolerance(0x1p-90);
 
@@ -131,5 +131,5 @@ struct Unicycle {
 
 TEST(Equations, AnUnknownModelHasNoEquations) { EXPECT_FALSE(EquationsOf(EquationsModel<Unicycle>(Unicycle{}))); }
 
-}  // namespace
+}  // namespace equations_test
 }  // namespace forereach::verifier

@@ -8,7 +8,7 @@
 #include "verifier/jet.h"
 
 namespace forereach::verifier {
-namespace {
+namespace expressions_test {
 
 // With x = 3, y = -2.
 Real ValueOf(const std::string& text) {
@@ -168,5 +168,5 @@ TEST(Tape, EvaluatesOnlyWhatIsWanted) {
   EXPECT_EQ(Evaluate(tape, std::vector{wanted, wanted}, RealArithmetic(zero, {}))[1].ToDouble(), 1);
 }
 
-}  // namespace
+}  // namespace expressions_test
 }  // namespace forereach::verifier

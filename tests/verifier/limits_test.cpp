@@ -2,7 +2,7 @@
 #include "tests/verifier/hand_made.h"
 
 namespace forereach::verifier {
-namespace {
+namespace limits_test {
 
 constexpr double kHair = 1e-9;
 
@@ -79,5 +79,5 @@ TEST(LimitOf, AMalformedExpressionCannotBeVerified) {
   EXPECT_THAT(verdict.failure.what, testing::HasSubstr("a limit or place is no expression"));
 }
 
-}  // namespace
+}  // namespace limits_test
 }  // namespace forereach::verifier

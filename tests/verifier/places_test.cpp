@@ -2,7 +2,7 @@
 #include "tests/verifier/hand_made.h"
 
 namespace forereach::verifier {
-namespace {
+namespace places_test {
 
 constexpr double kHair = 1e-9;
 
@@ -62,5 +62,5 @@ TEST(PlacesOf, AMotionAreOnTheChordAndItsBulge) {
   ExpectRefuted(Judge(part, wall(3 - kHair), 0, M_PI, 16), 0, "the motion to the next sample keeps clear");
 }
 
-}  // namespace
+}  // namespace places_test
 }  // namespace forereach::verifier

@@ -8,7 +8,7 @@
 #include "verifier/real.h"
 
 namespace forereach::verifier {
-namespace {
+namespace real_test {
 
 TEST(Real, AThirdIsEnclosedAndNotExact) {
   const Real third = Real(1.0) / Real(3.0);
@@ -48,5 +48,5 @@ TEST(Real, AnIntervalHasItsEndsMiddleAndMagnitude) {
   EXPECT_EQ(Real(0.1).text(), "0.10000000000000001");
 }
 
-}  // namespace
+}  // namespace real_test
 }  // namespace forereach::verifier

@@ -19,7 +19,7 @@
 #include "tests/scratch.h"
 
 namespace forereach {
-namespace {
+namespace record_mutation_test {
 
 using Json = nlohmann::json;
 using Pointer = Json::json_pointer;
@@ -218,5 +218,5 @@ TEST_F(RecordMutation, AKeyThatStandsTwiceIsRefused) {
   EXPECT_FALSE(IsConfirmed(text));
 }
 
-}  // namespace
+}  // namespace record_mutation_test
 }  // namespace forereach

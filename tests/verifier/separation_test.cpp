@@ -6,7 +6,7 @@
 #include "verifier/separation.h"
 
 namespace forereach::verifier {
-namespace {
+namespace separation_test {
 
 Slice BoxSlice(std::vector<double> half_widths) {
   Slice slice;
@@ -74,5 +74,5 @@ TEST(Separation, RadiusIsThatOfTheFarthestCorner) {
   EXPECT_EQ(ProjectedSlice(BoxSlice({2, 3, 6}), Eigen::Matrix3d::Identity()).Radius().ToDouble(), 7);
 }
 
-}  // namespace
+}  // namespace separation_test
 }  // namespace forereach::verifier

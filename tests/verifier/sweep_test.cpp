@@ -8,7 +8,7 @@
 #include "verifier/separation.h"
 
 namespace forereach::verifier {
-namespace {
+namespace sweep_test {
 
 constexpr double kHair = 1e-12;
 
@@ -491,5 +491,5 @@ TEST(Misfit, AScheduleThatDoesNotFitIsRefuted) {
     ExpectRefuted(judge(bad, false), -1, "the schedule lies within its bounds");
 }
 
-}  // namespace
+}  // namespace sweep_test
 }  // namespace forereach::verifier

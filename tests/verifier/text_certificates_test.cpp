@@ -14,7 +14,7 @@
 #include "tests/worlds.h"
 
 namespace forereach::verifier {
-namespace {
+namespace text_certificates_test {
 
 using Integrator = ModelText::Integrator;
 
@@ -231,5 +231,5 @@ INSTANTIATE_TEST_SUITE_P(Terms, PointAtAKink,
 INSTANTIATE_TEST_SUITE_P(Integrators, TextCertificates,
                          testing::Values(Integrator::kEuler, Integrator::kMidpoint, Integrator::kRk4));
 
-}  // namespace
+}  // namespace text_certificates_test
 }  // namespace forereach::verifier

@@ -14,7 +14,7 @@
 #include "verifier/expressions.h"
 
 namespace forereach::verifier {
-namespace {
+namespace text_equations_test {
 
 using Integrator = ModelText::Integrator;
 
@@ -449,5 +449,5 @@ TEST_P(RandomTexts, HaveTheDerivativesOfTheirValues) {
 
 INSTANTIATE_TEST_SUITE_P(Integrators, RandomTexts, testing::Range(0, 4));
 
-}  // namespace
+}  // namespace text_equations_test
 }  // namespace forereach::verifier

@@ -17,7 +17,7 @@
 #include "verifier/tube.h"
 
 namespace forereach::verifier {
-namespace {
+namespace verifier_test {
 
 using testing::HasSubstr;
 
@@ -476,5 +476,5 @@ TEST_F(Tampered, AShrunkenEnvelopeOrRemainderIsRefuted) {
   ExpectRefuted(Verdict_(), 3, "residual of theta");
 }
 
-}  // namespace
+}  // namespace verifier_test
 }  // namespace forereach::verifier

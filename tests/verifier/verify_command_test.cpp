@@ -16,7 +16,7 @@
 #include "tests/records/logs.h"
 
 namespace forereach {
-namespace {
+namespace verify_command_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -302,5 +302,5 @@ TEST(ProgressTest, PrintsTheShareDoneAndTheTimeLeft) {
   EXPECT_EQ(Progress::Line("plans", 10, 10, 3), "[##############################] 10 of 10 plans");
 }
 
-}  // namespace
+}  // namespace verify_command_test
 }  // namespace forereach

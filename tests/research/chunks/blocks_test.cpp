@@ -13,7 +13,7 @@
 #include "research/truth.h"
 
 namespace forereach::research {
-namespace {
+namespace blocks_test {
 
 TEST(Blocks, AreThePolicysAndTheirOwnForEachPlan) {
   std::set<double> first_jerks;
@@ -97,5 +97,5 @@ TEST(Chunks, QuickFiguresAreInTheirBands) {
     }
 }
 
-}  // namespace
+}  // namespace blocks_test
 }  // namespace forereach::research

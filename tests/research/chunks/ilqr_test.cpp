@@ -6,7 +6,7 @@
 #include "research/chunks/demonstrations.h"
 
 namespace forereach::research {
-namespace {
+namespace ilqr_test {
 
 double Cost(const NominalModel& model, const Eigen::VectorXd& start, const Eigen::MatrixXd& controls,
             const Eigen::MatrixXd& reference, const TrackingWeights& weights) {
@@ -76,5 +76,5 @@ TEST(Ilqr, TracksTheReferencesOfEveryGroup) {
     }
 }
 
-}  // namespace
+}  // namespace ilqr_test
 }  // namespace forereach::research

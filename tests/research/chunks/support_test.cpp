@@ -8,7 +8,7 @@
 #include "research/chunks/blocks.h"
 
 namespace forereach::research {
-namespace {
+namespace support_test {
 
 TEST(Support, CorrelationOfRanksWithTies) {
   // Ranks off their mean by -1.5, 0, 0, 1.5; abstentions by -0.5, -0.5, 0.5, 0.5.
@@ -44,5 +44,5 @@ TEST(Support, DistanceIsThatOfTheFarthestStateToItsNearestObservation) {
   EXPECT_NEAR(DistanceToData(system, scenario, data), std::hypot(10.0 / 40, 0.25 / 0.5), 1e-12);
 }
 
-}  // namespace
+}  // namespace support_test
 }  // namespace forereach::research

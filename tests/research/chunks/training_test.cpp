@@ -5,7 +5,7 @@
 #include "research/chunks/blocks.h"
 
 namespace forereach::research {
-namespace {
+namespace training_test {
 
 TrainingOptions Few(int epochs, std::uint64_t seed) { return {384, epochs, seed, 1}; }
 
@@ -43,5 +43,5 @@ TEST(Training, TheShippedPolicyDoesAsTheExpertDoes) {
   EXPECT_LT(CloningError(ShippedPolicy(), MakeDemonstrations(300, 2, 1)), 0.16);
 }
 
-}  // namespace
+}  // namespace training_test
 }  // namespace forereach::research

@@ -10,7 +10,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace extremal_test {
 
 TEST(ExtremalResiduals, ByHand) {
   Task task = HandTask(0.5, 1);
@@ -124,5 +124,5 @@ TEST(ExtremalRollouts, LieInThePointMassTube) {
                              Eigen::Vector4d(0.05, 0.05, 0.03, 0.03), {0.1, -0.1});
 }
 
-}  // namespace
+}  // namespace extremal_test
 }  // namespace forereach::research

@@ -8,7 +8,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace two_systems_test {
 
 const Bump kUnit{Eigen::VectorXd::Zero(1), 1};
 
@@ -73,5 +73,5 @@ TEST(TwoSystems, OfAnAffineModelSeparateByTheGain) {
   EXPECT_NEAR(pair.HalfSeparation(Eigen::MatrixXd::Identity(2, 4), 12), 0.05 * 8 * 0.15, 1e-14);
 }
 
-}  // namespace
+}  // namespace two_systems_test
 }  // namespace forereach::research

@@ -10,7 +10,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace width_bound_test {
 
 const Eigen::MatrixXd kPosition6 = Eigen::MatrixXd::Identity(2, 6), kPosition4 = Eigen::MatrixXd::Identity(2, 4);
 
@@ -162,5 +162,5 @@ TEST(WidthBound, RefusesAClassWithoutSlack) {
   EXPECT_THROW((void)BoundWidth(scene.question, 0, 6), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace width_bound_test
 }  // namespace forereach::research

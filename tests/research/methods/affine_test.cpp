@@ -6,7 +6,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace affine_test {
 
 // r_vx at vx = 0 and 1 is 0 and 2, each known to 0.1.
 Task TwoPoints() {
@@ -53,5 +53,5 @@ TEST(AffineEnclosure, OfTooFewObservationsIsUnbounded) {
   EXPECT_EQ(bounds.upper[2], kInfinity);
 }
 
-}  // namespace
+}  // namespace affine_test
 }  // namespace forereach::research

@@ -10,7 +10,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace alanwar_test {
 
 TEST(CoveringRadius, ByHand) {
   const std::array<Interval, 1> box{Interval(0, 2)};
@@ -107,5 +107,5 @@ TEST(Alanwar, IsNoNarrowerOnALargerQuery) {
   }
 }
 
-}  // namespace
+}  // namespace alanwar_test
 }  // namespace forereach::research

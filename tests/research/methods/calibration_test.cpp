@@ -11,7 +11,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace calibration_test {
 
 constexpr double kRounding = 1e-14;  // what a recorded successor of size 4 hides, and some
 
@@ -200,5 +200,5 @@ TEST(PlugInGaussian, OfOneObservationIsThatOne) {
   EXPECT_NEAR(bounds.upper[2], 0.25, kRounding);
 }
 
-}  // namespace
+}  // namespace calibration_test
 }  // namespace forereach::research

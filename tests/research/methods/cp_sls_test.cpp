@@ -9,7 +9,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace cp_sls_test {
 
 constexpr Covariance kAll[] = {Covariance::kLocal, Covariance::kLocalDiagonal, Covariance::kGlobal,
                                Covariance::kGlobalDiagonal};
@@ -168,5 +168,5 @@ TEST(CpSls, RefusesAnOptionOutOfRange) {
   EXPECT_THROW(CpSls(task.setting(), {Covariance::kLocal, 0.1, 0}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace cp_sls_test
 }  // namespace forereach::research

@@ -9,7 +9,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace gaussian_process_test {
 
 Eigen::VectorXd Scalar(double x) { return Eigen::VectorXd::Constant(1, x); }
 
@@ -90,5 +90,5 @@ TEST(GaussianProcessBand, ContainsAFunctionOnItsDataAndWidensWithK) {
   EXPECT_GT(whole.upper[2], 0.98);
 }
 
-}  // namespace
+}  // namespace gaussian_process_test
 }  // namespace forereach::research

@@ -10,7 +10,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace methods_test {
 
 using testing::ElementsAre;
 
@@ -100,5 +100,5 @@ TEST(ScalarEnvelope, IsNeverNarrowerThanForeReach) {
   }
 }
 
-}  // namespace
+}  // namespace methods_test
 }  // namespace forereach::research

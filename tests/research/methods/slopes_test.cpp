@@ -10,7 +10,7 @@
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {
-namespace {
+namespace slopes_test {
 
 constexpr SlopeEstimator kAll[] = {SlopeEstimator::kLacki, SlopeEstimator::kStrongin, SlopeEstimator::kKnuthChou};
 
@@ -96,5 +96,5 @@ TEST(ExtremeValueEnd, IsNeverBelowTheLargest) {
   EXPECT_GE(ExtremeValueEnd({1, 2, 3}), 3);
 }
 
-}  // namespace
+}  // namespace slopes_test
 }  // namespace forereach::research
