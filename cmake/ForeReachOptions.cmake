@@ -4,6 +4,7 @@ set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+add_compile_options(-pthread)  # for all alike, or a header that was compiled without it is not taken
 
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
@@ -22,9 +23,10 @@ if(NOT DEFINED CMAKE_UNITY_BUILD_BATCH_SIZE)
   set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
 endif()
 
-# Precompiled headers, of g++ alone: clang's do not survive a cache. They hold no header of ours.
-if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON)
+# Precompiled headers hold no header of ours. clang's would hold the time at which they were made, and no cache would find
+# what was compiled with them.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  add_compile_options("SHELL:-Xclang -fno-pch-timestamp")
 endif()
 set(standard_headers <algorithm> <array> <cmath> <cstdint> <filesystem> <fstream> <functional> <iostream> <limits> <map>
   <memory> <optional> <set> <sstream> <stdexcept> <string> <thread> <variant> <vector>)

@@ -8,6 +8,15 @@ say() { printf '\n\033[1m== %s\033[0m  (%s)\n' "$*" "$(minutes_and_seconds $SECO
 # Since the script began, or of as many seconds.
 minutes_and_seconds() { printf '%d:%02d' $(($1 / 60)) $(($1 % 60)); }
 
+# spend STAGE SECONDS adds to what print_spent tells: where the minutes went.
+declare -A spent
+spend() { spent[$1]=$((${spent[$1]:-0} + $2)); }
+print_spent() {
+  local stage text=''
+  for stage in packages configuring building testing; do text+="$stage $(minutes_and_seconds "${spent[$stage]:-0}"), "; done
+  echo "${text}in all $(minutes_and_seconds $SECONDS); load $(cut -d' ' -f1-3 /proc/loadavg)"
+}
+
 # progress WHAT LOG COMMAND...: runs COMMAND with its output in LOG, and shows one line: WHAT, the last "[n/m]" of the output,
 # and for how long. On a terminal the line is written over each second, elsewhere a new one comes each half minute. If the
 # command fails, shows its output and ends the script.
@@ -49,19 +58,38 @@ install_packages() {
   done
   ((${#missing[@]} == 0)) && return
   say "Installing ${#missing[@]} Debian packages"
-  local list="apt-get install -y --no-install-recommends ${missing[*]}"
+  local list="apt-get install -y --no-install-recommends ${missing[*]}" begin=$SECONDS
   as_root true || { echo "This needs root. As root, run:  $list" >&2; exit 1; }
   progress "fetching the list of packages" build/apt.log as_root apt-get update -q
   progress "installing" build/apt.log as_root env DEBIAN_FRONTEND=noninteractive $list
+  spend packages $((SECONDS - begin))
+}
+
+# What a test reads MCAP files with, as the lock file names it with its digests, into build/mcap_core. Where it cannot be
+# had, that test is skipped.
+install_node_packages() {
+  local from=tests/export/mcap_core to=build/mcap_core begin=$SECONDS
+  cmp -s "$from/package-lock.json" "$to/installed" && return
+  say "Installing @mcap/core by npm"
+  mkdir -p "$to"
+  cp "$from/package.json" "$from/package-lock.json" "$from/read.mjs" "$to"
+  if (cd "$to" && timeout 60 npm ci --ignore-scripts --no-audit --no-fund --fetch-retries 1 >npm.log 2>&1); then
+    cp "$from/package-lock.json" "$to/installed"
+  else
+    echo "npm could not install it ($to/npm.log), so one test is skipped"
+  fi
+  spend packages $((SECONDS - begin))
 }
 
 # build PRESET [-DOPTION...] [TARGET...]
 build() {
-  local preset=$1 options=() targets=(); shift
+  local preset=$1 options=() targets=() begin=$SECONDS; shift
   for argument; do if [[ $argument == -D* ]]; then options+=("$argument"); else targets+=("$argument"); fi; done
   say "Building ($preset)"
   progress "configuring" "build/$preset/configure.log" cmake --preset "$preset" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "${options[@]}"
+  spend configuring $((SECONDS - begin)); begin=$SECONDS
   progress "building" "build/$preset/build.log" cmake --build --preset "$preset" ${targets[0]:+--target "${targets[@]}"}
+  spend building $((SECONDS - begin))
 }
 
 # For a build of the programs alone.

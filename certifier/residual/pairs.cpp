@@ -142,11 +142,15 @@ struct PairSearch::Kernel {
   }
 
   // As Descent of search.h, for a point and an entry that is left out.
-  Other BestOther(const Point& point, const double* group, std::size_t side, std::uint32_t self) const {
+  Other BestOther(const Point& point, const double* group, std::size_t side, std::uint32_t self, double enough) const {
     Other best;
     const double own = side == 0 ? point.floor : point.negated_ceiling;
     std::array<Pack, ObservationIndex::kMaxHeight + 1> bounds;
     std::array<std::size_t, ObservationIndex::kMaxHeight + 1> first;
+    if (!(margin < kInfinity)) {  // the bounds of nodes say nothing
+      for (std::size_t b = 0; b < index.num_blocks(); ++b) BestOther(point, own, b, side, self, best);
+      return best;
+    }
     const int top = index.height();
     int level = top + 1;
     for (std::size_t child = 0;;) {
@@ -159,7 +163,7 @@ struct PairSearch::Kernel {
              ++b)
           BestOther(point, own, b, side, self, best);
       }
-      if (best.value >= own) return best;  // no other value changes what this says of the point
+      if (best.value >= enough) return best;
       double next;
       while (!((next = MaxLane(bounds[ToSize(level)])) >= best.value && next > ObservationIndex::kMissing))
         if (++level > top) return best;
@@ -228,9 +232,9 @@ void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const Pac
   Dispatch<&Kernel::InBlocks>(BestInstructionSet(), kernel, point, blocks, count, partners);
 }
 
-PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self) const {
+PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self, double enough) const {
   const Point at_zero{point.coordinates, 0, 0};
-  return Kernel{index_, margin_}.BestOther(point, GroupOf(at_zero).data(), side, self);
+  return Kernel{index_, margin_}.BestOther(point, GroupOf(at_zero).data(), side, self, enough);
 }
 
 std::vector<double> PairSearch::GroupOf(std::size_t leaf) const {

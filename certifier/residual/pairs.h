@@ -43,14 +43,15 @@ class PairSearch final {
                        double margin, std::vector<std::uint32_t>& partners);
 
   /** The entry j other than `self` with the largest v_j - d(point, j), where v is the floor for side 0 and the negated
-  ceiling for side 1; or any entry for which that is not below the point's own v. An entry that equals the point and has
+  ceiling for side 1; or any entry for which that is at least `enough`. An entry that equals the point and has
   an id above `self` is skipped, so that of two equal entries only the later is dominated by the other. Without any
-  other entry: kNone. @pre the margin is finite. */
+  other entry: kNone. If the margin is infinite, it looks at all entries. */
   struct Other {
     double value = -kInfinity;
     std::uint32_t id = ObservationIndex::kNone;
   };
-  [[nodiscard]] Other BestOther(const Point& point, std::size_t side, std::uint32_t self) const;
+  [[nodiscard]] Other BestOther(const Point& point, std::size_t side, std::uint32_t self,
+                                double enough = kInfinity) const;
 
   /** Sets `leaves` to the leaves with numbers >= `first` that may hold a partner of a group's entry.
   @param group the bounds of a leaf or a point, as one lane of a node: node_packs() doubles. */

@@ -63,8 +63,8 @@ void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o
       if (id == kNone) continue;
       const PairSearch::Point point = PointOf(entries, static_cast<int>(id));
       for (std::size_t side = 0; side < 2; ++side) {
-        const PairSearch::Other other = search.BestOther(point, side, id);
         const double own = side == 0 ? point.floor : point.negated_ceiling;
+        const PairSearch::Other other = search.BestOther(point, side, id, own);  // what is no gain need not be exact
         Take(gains, id, other.id == kNone ? 1 : (own - other.value) / range, other.id);
       }
     }

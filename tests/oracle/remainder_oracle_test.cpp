@@ -54,7 +54,7 @@ struct Case {
 };
 
 // Corners mostly, where quadratic forms are largest.
-std::vector<Rational> PointOf(Random& random, const Zonotope& slice) {
+std::vector<Rational> RationalPointOf(Random& random, const Zonotope& slice) {
   std::vector<Rational> d;
   for (int k = 0; k < slice.dim(); ++k) d.push_back(Rational(random.Sign()) * Rational(slice.slack(k)));
   for (int j = 0; j < slice.num_generators(); ++j) {
@@ -84,7 +84,7 @@ void ExpectContainsForms(Random& random, const Case& c, const NominalModel& mode
   for (const Method method : {Method::kPaper, Method::kCentred}) {
     const Remainder bound = c.Bound(model, method);
     for (int sample = 0; sample < 6; ++sample) {
-      const std::vector<Rational> form = FormAt(random, c, model.program(), PointOf(random, c.slice));
+      const std::vector<Rational> form = FormAt(random, c, model.program(), RationalPointOf(random, c.slice));
       for (std::size_t k = 0; k < form.size(); ++k)
         ASSERT_LE(abs(form[k] - Rational(bound.center[k])), Rational(bound.half_width[k])) << "output " << k;
     }

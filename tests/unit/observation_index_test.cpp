@@ -239,6 +239,56 @@ TEST(FindViolation, TakesManyObservationsThatAllContradictEachOther) {
   EXPECT_EQ(violation->first, 0);
 }
 
+TEST(PairSearch, FindsTheBestOtherEntryAmongTiesAndWithoutAFiniteMargin) {
+  Random random(773);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 200; ++trial) {
+    const int count = random.Integer(1, trial % 20 ? 70 : 600), active = random.Integer(1, 6);
+    Data data = Make(random, count, active, 1);
+    if (random.Coin()) {  // of few kinds, or of one
+      const int kinds = random.Integer(1, 3);
+      for (int i = kinds; i < count; ++i) {
+        data.observations.z.row(i) = data.observations.z.row(i % kinds);
+        data.observations.lower.row(i) = data.observations.lower.row(i % kinds);
+        data.observations.upper.row(i) = data.observations.upper.row(i % kinds);
+      }
+    }
+    const LipschitzRow row(data.declaration, 0);
+    const auto entries = EntriesOf(row, data.declaration, data.observations, 0);
+    const ObservationIndex index(entries);
+    const auto value = [&](const PairSearch::Point& point, std::size_t side, int j) {
+      const PairSearch::Point other = PointOf(entries, j);
+      double distance = 0;
+      for (std::size_t c = 0; c < point.coordinates.size(); ++c) {
+        const double along = std::abs(point.coordinates[c] - other.coordinates[c]);
+        distance = row.has_patterns() ? std::max(distance, along) : distance + along;
+      }
+      return (side == 0 ? other.floor : other.negated_ceiling) - distance;
+    };
+    for (const double margin : {MarginUpper(row, entries, data.observations), kInfinity}) {
+      const PairSearch search(index, margin);
+      for (int i = 0; i < count; i += 1 + count / 40)
+        for (std::size_t side = 0; side < 2; ++side) {
+          const PairSearch::Point point = PointOf(entries, i);
+          const double own = side == 0 ? point.floor : point.negated_ceiling;
+          double best = -kInfinity;
+          for (int j = 0; j < count; ++j) {
+            const PairSearch::Point other = PointOf(entries, j);
+            const bool same = value(point, side, j) == own && (side == 0 ? other.floor : other.negated_ceiling) == own;
+            if (j != i && !(same && j > i)) best = std::max(best, value(point, side, j));
+          }
+          const auto found = search.BestOther(point, side, static_cast<std::uint32_t>(i));
+          ASSERT_EQ(found.value, best) << count << " entries, " << active << " columns";
+          ASSERT_EQ(found.id == ObservationIndex::kNone, best == -kInfinity);
+          if (found.id != ObservationIndex::kNone) {
+            ASSERT_LT(found.id, ToSize(count));
+            ASSERT_EQ(value(point, side, static_cast<int>(found.id)), best);
+          }
+        }
+    }
+  }
+}
+
 TEST(PairSearch, SaysTheSameOnEveryInstructionSet) {
   Random random(772);
   SCOPED_TRACE(random.trace());
