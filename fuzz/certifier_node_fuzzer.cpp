@@ -153,6 +153,7 @@ std::vector<Config> Tasks() {
   stubborn.gate.learns = false;
   stubborn.gate.queue = 1;
   Config seeing = SmallTaskOnTheBus();
+  seeing.gate.obstacles_lost_ms = 1000;
   seeing.gate.needs_robot_state = true;
   Config timed = seeing;
   timed.gate.max_clock_error_ms = 20;
