@@ -338,13 +338,14 @@ TEST_F(BrakingDriveTest, WhereTooFewStepsStandItStopsAtOnceAndSaysSo) {
 // under the same task file.
 // ---- Obstacles that nobody says any more, or that nobody can use.
 
+Config TaskThatLoses(double after_ms) {
+  Config config = Task();
+  config.gate.obstacles_lost_ms = after_ms;
+  return config;
+}
+
 class LostObstaclesDriveTest : public WithdrawnDriveTest {
  protected:
-  static Config TaskThatLoses(double after_ms) {
-    Config config = Task();
-    config.gate.obstacles_lost_ms = after_ms;
-    return config;
-  }
   explicit LostObstaclesDriveTest(double after_ms = 1000) : WithdrawnDriveTest(TaskThatLoses(after_ms)) {}
 
   // From now on all that comes is a wall across the way, with stamps that are 2 s old.
@@ -397,6 +398,8 @@ TEST_F(NeverLostDriveTest, ThePlanGoesThroughThePlaceOfTheWall) {
 
 class RestartedCertifierTest : public WithdrawnDriveTest {
  protected:
+  explicit RestartedCertifierTest(Config config = Task()) : WithdrawnDriveTest(std::move(config)) {}
+
   void Drive() {
     Gate predecessor(config_);
     Drive(predecessor);
@@ -445,6 +448,25 @@ TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereNothingHasChanged) {
   EXPECT_GT(certifier_->gate().certifier().num_observations(), 2u) << "what it learns itself takes nothing back";
   EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
   EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+// The certifier does not know what is in the way of the plan that it finds, and has not certified it.
+class RestartedAmongLostObstaclesTest : public RestartedCertifierTest {
+ protected:
+  RestartedAmongLostObstaclesTest() : RestartedCertifierTest(TaskThatLoses(1000)) {}
+};
+
+TEST_F(RestartedAmongLostObstaclesTest, ThePlanStopsAfterTheTime) {
+  Drive();
+  stamps_late_us_ = 2'000'000;
+  Begin();
+  RunFor(950'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  RunFor(300'000);
+  ASSERT_FALSE(withdrawn_.empty());
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::OBSTACLES_LOST);
+  EXPECT_EQ(GetDigest(withdrawn_[0].certificate_digest), Digest{});
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
 }
 
 TEST_F(RestartedCertifierTest, ThePlanStopsWhereItHadOtherTransitionsOfTheTask) {
