@@ -24,6 +24,9 @@ struct BusOptions {
   std::string logger_status = "LOGGER_STATUS";
   std::string fault = "FAULT";
   std::string command = "COMMAND";
+  /** The longest time from a message's stamp to its arrival at the certifier, if all clocks agree. A loaded machine may
+  wake a process 8 ms late (docs/reliability.md). */
+  double delay_ms = 10;
   std::string name;             ///< Of the bus, in every signature; empty: address and port of `url`.
   std::string key;              ///< Path of a directory of keys or of a key file; empty: messages are not signed.
   bool key_is_given = false;    ///< On the command line, so the task file does not say which.

@@ -131,6 +131,9 @@ class Examination final {
       Remark(
           "gate.obstacles", "missing: no certifier starts on a bus with this task",
           "write `gate: {obstacles: bus}` if a sender repeats the obstacles, or `task` if those of this file are all");
+    if (config_.gate.obstacles == ObstaclesSource::kBus && !config_.gate.obstacles_lost_ms)
+      Remark("gate.obstacles_lost_ms", "missing: no certifier starts on a bus with this task",
+             "write how long a plan may go on while the obstacles are unknown, in ms, or `never`");
     if (config_.gate.obstacles == ObstaclesSource::kTask && config_.obstacles.empty())
       Remark("gate.obstacles", "is `task`, and task.obstacles has none: every plan is clear of obstacles",
              "list the obstacles, or write `bus`");

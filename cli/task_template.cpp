@@ -277,8 +277,9 @@ std::string PlannerKey(const TaskTemplate& task, const std::vector<std::string>&
 std::string Processes(const TaskTemplate& task, const std::vector<std::string>& positions) {
   return "# The certifier on the bus: where the obstacles come from. bus: those above and those that a sender repeats; "
          "nothing is\n"
-         "# certified while none is heard. task: those above are all there are.\n"
-         "gate: {obstacles: bus}\n"
+         "# certified while none is heard, and plans under way are withdrawn once they have been unknown for\n"
+         "# obstacles_lost_ms. task: those above are all there are.\n"
+         "gate: {obstacles: bus, obstacles_lost_ms: 2000}\n"
          "\n" +
          PlannerKey(task, positions) + "\n" + RobotKey(task) +
          "\n"

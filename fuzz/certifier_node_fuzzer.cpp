@@ -75,10 +75,9 @@ class WitnessBus final : public Bus {
 
   void TakeWithdrawal(const std::optional<withdrawal_t>& withdrawal) {
     Require(withdrawal.has_value() && withdrawal->sequence == withdrawals_++ && withdrawal->valid_steps >= 0);
-    if (withdrawal->cause == withdrawal_t::UNKNOWN_PLAN) {
-      Require(withdrawal->valid_steps == 0 && GetDigest(withdrawal->certificate_digest) == Digest{});
-      return;
-    }
+    const bool is_stranger = GetDigest(withdrawal->certificate_digest) == Digest{};
+    Require(is_stranger || withdrawal->cause != withdrawal_t::UNKNOWN_PLAN);
+    if (is_stranger) return Require(withdrawal->valid_steps == 0);
     const auto standing = standing_.find(GetDigest(withdrawal->certificate_digest));
     Require(standing != standing_.end() && withdrawal->valid_steps <= standing->second);
     standing->second = withdrawal->valid_steps;
@@ -154,6 +153,7 @@ std::vector<Config> Tasks() {
   stubborn.gate.learns = false;
   stubborn.gate.queue = 1;
   Config seeing = SmallTaskOnTheBus();
+  seeing.gate.obstacles_lost_ms = 1000;
   seeing.gate.needs_robot_state = true;
   Config timed = seeing;
   timed.gate.max_clock_error_ms = 20;

@@ -119,6 +119,7 @@ std::string_view WithdrawalName(std::int16_t cause) {
     case withdrawal_t::NOT_JUDGED: return "not_judged";
     case withdrawal_t::UNKNOWN_PLAN: return "unknown_plan";
     case withdrawal_t::LIMIT: return "limit";
+    case withdrawal_t::OBSTACLES_LOST: return "obstacles_lost";
     default: return "unknown";
   }
 }

@@ -77,7 +77,9 @@ class Replayer final : public GateFollower {
 
   void OnWithdrawn(const RecordedWithdrawal& recorded) override {
     const withdrawal_t& withdrawal = recorded.withdrawal;
-    if (withdrawal.cause == withdrawal_t::NOT_JUDGED || withdrawal.cause == withdrawal_t::UNKNOWN_PLAN) {
+    const auto& cause = withdrawal.cause;
+    if (cause == withdrawal_t::NOT_JUDGED || cause == withdrawal_t::UNKNOWN_PLAN ||
+        cause == withdrawal_t::OBSTACLES_LOST) {
       ++result_.circumstances;
       return;
     }

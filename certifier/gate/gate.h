@@ -51,6 +51,8 @@ class Gate final {
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
   /** The reason why obstacles() may be incomplete at this time (obstacles_in_force.h); empty if it is complete. */
   [[nodiscard]] std::string WhyObstaclesUnknown(std::int64_t now_us) const { return obstacles_.WhyUnknown(now_us); }
+  /** Stamp and arrival of the obstacles in force; nothing if none were received. */
+  [[nodiscard]] const std::optional<Arrival>& obstacles_arrival() const { return obstacles_.arrival(); }
   /** The tube of the last plan that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 

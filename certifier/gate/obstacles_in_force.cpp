@@ -13,7 +13,10 @@
 namespace forereach {
 
 ObstaclesInForce::ObstaclesInForce(const Config& config)
-    : options_(config.gate), dim_(static_cast<int>(config.problem->projection.rows())), of_task_(config.obstacles) {
+    : options_(config.gate),
+      clocks_(ClockBoundsOf(config)),
+      dim_(static_cast<int>(config.problem->projection.rows())),
+      of_task_(config.obstacles) {
   Put(true);
 }
 
@@ -44,6 +47,7 @@ std::string ObstaclesInForce::Take(const Message& message, std::int64_t now_us) 
     return Doubt(error.what());
   }
   state_.order.Take(position, horizon);
+  state_.arrival = Arrival{position.utime, now_us};
   state_.doubt.clear();
   Put(options_.obstacles != ObstaclesSource::kUnsaid);
   return {};
@@ -88,6 +92,9 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   if (state_.unconfirmed > 0)
     return "sequence " + std::to_string(last->sequence) +
            " came out of order: messages were lost, or there are two senders";
+  if (clocks_ && state_.arrival)
+    if (const std::string why = WhyOff(*state_.arrival, *clocks_); !why.empty())
+      return "their sender's clock is " + why;
   switch (FreshnessOfLast(now_us)) {
     case Freshness::kStale:
       return "the last message is " + Milliseconds(now_us, last->utime) + " old, at most " +

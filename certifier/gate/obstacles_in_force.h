@@ -7,6 +7,8 @@ message on, until one of these events:
 - The last message's stamp is older than gate.obstacles_timeout_ms.
 - A message is refused, except for a late or repeated one, because its content is unknown. The next valid message ends
 this.
+- The last message taken was stamped further from its arrival than the task allows (stream_clock.h): the clock of its
+sender is off. It is taken, because what it shows may withdraw a plan. The next one decides anew.
 - A message is out of order: messages were lost, or two senders alternate and each knows a part. The message is taken.
 After a gap, one message in order confirms it; after a repeated sequence number, two do. A sender that restarts at 0
 with a later stamp is in order. If the last message of the old stream is still fresh, one more message in order is
@@ -25,6 +27,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include <string>
 #include <vector>
 
+#include "certifier/gate/stream_clock.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
@@ -54,6 +57,8 @@ class ObstaclesInForce final {
   [[nodiscard]] const Digest& digest() const { return digest_; }
   /** The stamp of the message in force; nothing if none was received. */
   [[nodiscard]] std::optional<std::int64_t> stamp() const;
+  /** Stamp and arrival of the message in force; nothing if none was received. */
+  [[nodiscard]] const std::optional<Arrival>& arrival() const { return state_.arrival; }
   /** The number of lost messages, from gaps in the sequence. */
   [[nodiscard]] std::int64_t lost() const { return state_.lost; }
 
@@ -61,6 +66,7 @@ class ObstaclesInForce final {
   struct State {
     StreamOrder order;                 // of the messages taken
     std::vector<Obstacle> heard;       // from the last of them
+    std::optional<Arrival> arrival;    // of the last of them
     std::optional<std::int64_t> next;  // the sequence after the last one seen, including refused messages
     std::string doubt;                 // why the last message was refused
     int unconfirmed = 0;               // number of messages in order that are still needed
@@ -77,6 +83,7 @@ class ObstaclesInForce final {
   void Put(bool of_task);
 
   GateOptions options_;
+  std::optional<ClockBounds> clocks_;
   int dim_;  // of the safety coordinates
   std::vector<Obstacle> of_task_, all_;
   State state_;

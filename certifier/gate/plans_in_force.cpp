@@ -59,6 +59,8 @@ void PlansInForce::Follow(const GateOptions& gate) {
   lifetime_us_ = Microseconds(gate.certificate_lifetime_ms);
   delay_us_ = Microseconds(gate.max_age_ms);
   step_us_ = Microseconds(gate.longest_step_ms);
+  const double lost_ms = gate.obstacles_lost_ms.value_or(kNeverLost);
+  lost_us_ = lost_ms == kNeverLost ? std::nullopt : std::optional(Microseconds(lost_ms));
   silence_us_ = gate.needs_robot_state ? std::optional(Microseconds(gate.robot_timeout_ms)) : std::nullopt;
 }
 
@@ -140,9 +142,19 @@ void PlansInForce::TakeAnswer(const execution_event_t& event) {
   }
 }
 
+void PlansInForce::SeeObstacles(const std::string& why_unknown, std::int64_t steady_us) {
+  why_unknown_ = why_unknown;
+  if (why_unknown.empty())
+    unknown_since_us_.reset();
+  else if (!unknown_since_us_)
+    unknown_since_us_ = steady_us;
+  unknown_us_ = unknown_since_us_ ? steady_us - *unknown_since_us_ : 0;
+}
+
 void PlansInForce::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) {
   const Grounds grounds = gate.grounds();
-  const Premises premises{grounds.config, gate.transitions(), grounds.obstacles, is_contradicted};
+  const bool has_lost_obstacles = unknown_since_us_ && lost_us_ && unknown_us_ >= *lost_us_;
+  const Premises premises{grounds.config, gate.transitions(), grounds.obstacles, is_contradicted, has_lost_obstacles};
   if (premises_ != premises) {
     if (premises_)
       for (Entry& entry : plans_) entry.is_changed = is_any_changed_ = true;
@@ -152,7 +164,7 @@ void PlansInForce::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) 
   const bool knows_obstacles = gate.WhyObstaclesUnknown(now_us).empty();
   for (Entry& entry : plans_) {
     if (!entry.is_changed) continue;
-    if (entry.is_known || knows_obstacles)
+    if (entry.is_known || knows_obstacles || has_lost_obstacles)
       Judge(entry, gate);
     else
       is_any_changed_ = true;  // later
@@ -161,6 +173,7 @@ void PlansInForce::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) 
 
 void PlansInForce::Judge(Entry& entry, Gate& gate) {
   entry.is_changed = false;
+  if (premises_->has_lost_obstacles) return WithdrawForObstacles(entry, gate);
   if (!entry.is_known) {
     withdrawal_t message =
         Unjudged(withdrawal_t::UNKNOWN_PLAN, "this certifier has not certified it, and cannot judge whether it holds");
@@ -176,6 +189,15 @@ void PlansInForce::Judge(Entry& entry, Gate& gate) {
       entry.plan ? Judged(standing, gate.certifier().problem())
                  : Unjudged(withdrawal_t::NOT_JUDGED, "something has changed, and newer plans are judged in its place");
   message.valid_steps = static_cast<std::int16_t>(standing.steps);
+  SetGrounds(message, gate.grounds());
+  Withdraw(entry, message);
+}
+
+void PlansInForce::WithdrawForObstacles(Entry& entry, const Gate& gate) {
+  if (entry.is_known && entry.is_withdrawn && entry.standing_steps <= entry.first_step) return;
+  withdrawal_t message =
+      Unjudged(withdrawal_t::OBSTACLES_LOST, "the obstacles have been unknown for " + Milliseconds(unknown_us_, 0) +
+                                                 ", so nothing stands, and the stop is not certified: " + why_unknown_);
   SetGrounds(message, gate.grounds());
   Withdraw(entry, message);
 }

@@ -5,6 +5,7 @@ that may be executed are judged again, and what no longer holds is withdrawn. An
 contradict the declaration, changes nothing: it leaves fewer admissible residuals, and the certificate is about all that
 there were (docs/soundness.md, 3.13). If it contradicts the declaration, nothing stands.
 
+    SeeObstacles     whether the obstacles are known, and since when they are not
     Add, SeeRobot    which plans may be executed: those that were certified and may still be pending, and the one that
                      the robot executes, from the step that it was last seen at
     Judge            after a change: how many controls of each plan stand (Gate::JudgeAgain); fewer: a withdrawal
@@ -24,6 +25,10 @@ obstacles are known. A guard heeds this unless the plan was certified under what
 transitions, the obstacles. The transitions that the other process had learned before do not count: the certificate
 proves what it proves under them, and they stay true if this process does not know them (docs/soundness.md, 3.13).
 
+Obstacles that have been unknown for gate.obstacles_lost_ms are lost, which is a change like any other: nothing is known
+to stand, so every plan is withdrawn whole (OBSTACLES_LOST), also one that is not known. The stop that follows is not
+certified. Nothing stands again when they return.
+
 No bus, no clock. Times of a monotonic clock and of the wall clock in microseconds. */
 #pragma once
 
@@ -33,6 +38,7 @@ No bus, no clock. Times of a monotonic clock and of the wall clock in microsecon
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "certifier/gate/gate.h"
 #include "certifier/task/gate_options.h"
@@ -61,10 +67,16 @@ class PlansInForce final {
   /** Uses new options from now on. */
   void Follow(const GateOptions& gate);
   /** Forgets all plans: another certifier is in charge. */
-  void Clear() { plans_.clear(); }
+  void Clear() {
+    plans_.clear();
+    unknown_since_us_.reset();
+  }
 
   /** True if no further plan may be certified, because it could not be withdrawn. */
   [[nodiscard]] bool IsFull() const { return plans_.size() >= kPlans; }
+  /** Notes whether the obstacles are known now. To be called before each Judge. @param why_unknown by
+  Gate::WhyObstaclesUnknown; empty: they are known. */
+  void SeeObstacles(const std::string& why_unknown, std::int64_t steady_us);
   /** Adds a plan that was certified and sent. @pre not IsFull(). Cost: a copy of the candidate. */
   void Add(const certified_plan_v2_t& certified, std::int64_t steady_us);
   /** Takes a usable state of the robot. Cost O(plans). */
@@ -72,10 +84,10 @@ class PlansInForce final {
   /** Takes the robot's answer to a withdrawal. @pre event.kind == execution_event_t::WITHDRAWN. */
   void TakeAnswer(const execution_event_t& event);
 
-  /** Judges the plans again if obstacles, task, its file of transitions or the truth of the declaration have changed
-  since the last call. @param is_contradicted the declaration is known to be false, by this gate's observations or by
-  what was learned before a restart. Then no plan that is not known stands. Cost: at most kJudged + 1 times that of
-  Certify; without a change O(1). */
+  /** Judges the plans again if obstacles, whether they are lost, task, its file of transitions or the truth of the
+  declaration have changed since the last call. @param is_contradicted the declaration is known to be false, by this
+  gate's observations or by what was learned before a restart. Then no plan that is not known stands. Cost: at most
+  kJudged + 1 times that of Certify; without a change O(1). */
   void Judge(Gate& gate, std::int64_t now_us, bool is_contradicted);
   void Judge(Gate& gate, std::int64_t now_us) { Judge(gate, now_us, gate.certifier().violation().has_value()); }
 
@@ -108,7 +120,7 @@ class PlansInForce final {
   };
   struct Premises {
     Digest config{}, transitions{}, obstacles{};  // transitions: those of the task's file
-    bool is_falsified = false;
+    bool is_falsified = false, has_lost_obstacles = false;
     friend bool operator==(const Premises&, const Premises&) = default;
   };
 
@@ -117,11 +129,16 @@ class PlansInForce final {
   void RememberStranger(const robot_state_t& state, std::int64_t steady_us);
   void DropOldest();
   void Judge(Entry& entry, Gate& gate);
+  void WithdrawForObstacles(Entry& entry, const Gate& gate);
   void Withdraw(Entry& entry, const withdrawal_t& withdrawal);
 
   std::int64_t lifetime_us_ = 0, delay_us_ = 0, step_us_ = 0;
-  std::optional<std::int64_t> silence_us_;  // after which a robot's state is lost; nothing: it is not needed
-  std::deque<Entry> plans_;                 // the oldest first
+  std::optional<std::int64_t> silence_us_;        // after which a robot's state is lost; nothing: it is not needed
+  std::optional<std::int64_t> lost_us_;           // after which unknown obstacles are lost; nothing: never
+  std::optional<std::int64_t> unknown_since_us_;  // by the monotonic clock; nothing: they are known
+  std::int64_t unknown_us_ = 0;                   // since then
+  std::string why_unknown_;
+  std::deque<Entry> plans_;  // the oldest first
   StreamOrder states_;
   std::optional<Premises> premises_;  // at the last Judge
   bool is_any_changed_ = false, is_any_unanswered_ = false;

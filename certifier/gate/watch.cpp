@@ -20,6 +20,7 @@ struct Answer {
 constexpr std::array<Answer, Watch::kNeeds> kAnswers{{{decision_t::CAUSE_SECOND_CERTIFIER},
                                                       {decision_t::CAUSE_LATCH_UNWRITABLE},
                                                       {decision_t::CAUSE_NOT_ARMED},
+                                                      {decision_t::CAUSE_NOT_ARMED},
                                                       {decision_t::CAUSE_NO_OBSTACLES, decision_t::ABSTAIN_OBSTACLES}}};
 
 }  // namespace
@@ -42,6 +43,17 @@ void Watch::SeeRobot(std::int64_t now_us) {
   LookForRobot();
 }
 
+void Watch::SeeStamps(const std::optional<Arrival>& robot, const std::optional<Arrival>& obstacles) {
+  std::string why;
+  if (const auto& bounds = options_.clocks; bounds && robot) {
+    if (why = WhyOff(*robot, *bounds); !why.empty())
+      why = "the robot's clock is " + why;
+    else if (obstacles && WhyOff(*obstacles, *bounds).empty())
+      why = WhyApart(*robot, *obstacles, *bounds);
+  }
+  Set(Need::kClocks, std::move(why));
+}
+
 void Watch::RobotHasFinished() {
   robot_seen_us_.reset();
   LookForRobot();
@@ -50,6 +62,7 @@ void Watch::RobotHasFinished() {
 std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t steady_us) {
   const std::int64_t offset = now_us - steady_us, moved = offset - offset_us_.value_or(offset);
   offset_us_ = offset;
+  Run(now_us, steady_us);
   std::optional<Fault> found;
   if (std::abs(moved) > options_.max_clock_jump_us) {
     found = {fault_t::CLOCK_JUMP, now_us,
@@ -58,7 +71,9 @@ std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t ste
   } else if (options_.needs_robot_state && robot_seen_us_ && now_us - *robot_seen_us_ > options_.robot_timeout_us) {
     found = {fault_t::ROBOT_STATE_LOST, now_us,
              "the robot's state was last heard " + Milliseconds(now_us, *robot_seen_us_) + " ago, at most " +
-                 Milliseconds(options_.robot_timeout_us, 0) + " are allowed"};
+                 Milliseconds(options_.robot_timeout_us, 0) + " are allowed" +
+                 pauses_.Explain(*robot_seen_us_, options_.robot_timeout_us)};
+    if (!Lacks(Need::kClocks).empty()) found->why += "; " + Lacks(Need::kClocks);
   }
   return found && Latch(*found) ? found : std::nullopt;
 }

@@ -11,6 +11,7 @@
 
 #include "bus/bus_options.h"
 #include "bus/log.h"
+#include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/process/faults.h"
 #include "lcmtypes/names.h"
@@ -23,8 +24,10 @@ constexpr std::int64_t kClocksApartUs = 60'000'000;  // of two certifiers on one
 // An index of so many is built in about a millisecond; of more it is built in a thread of its own.
 constexpr std::size_t kIndexedAtOnce = 4096;
 
-WatchOptions OptionsOf(const GateOptions& gate) {
-  return {gate.needs_robot_state, Microseconds(gate.robot_timeout_ms), Microseconds(gate.max_clock_jump_ms)};
+WatchOptions OptionsOf(const Config& config) {
+  const GateOptions& gate = config.gate;
+  return {gate.needs_robot_state, Microseconds(gate.robot_timeout_ms), Microseconds(gate.max_clock_jump_ms),
+          ClockBoundsOf(config)};
 }
 
 std::int64_t PageFaults() {
@@ -62,7 +65,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       bus_(bus),
       sender_(bus),
       gate_(std::make_unique<Gate>(config)),
-      watch_(OptionsOf(config.gate)),
+      watch_(OptionsOf(config)),
       charge_({clocks_.wall(), RandomInstance()}, listen_us),
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
@@ -133,6 +136,7 @@ void CertifierNode::OnFault(const Received& received) {
 // Called before a message is processed: a paused process may have been replaced, and it receives the queued messages
 // first.
 void CertifierNode::LookAtCharge() {
+  watch_.Run(clocks_.wall(), clocks_.steady());
   const Charge::State before = charge_.state();
   charge_.Advance(clocks_.steady());
   FollowCharge(before);
@@ -176,7 +180,7 @@ void CertifierNode::TakeCharge() {
 void CertifierNode::StandBy() {
   logging::Warn("{}", WhyNotInCharge());
   LeaveWaiting();
-  watch_.RobotHasFinished();
+  ForgetRobot();
   plans_.Clear();
   if (!std::exchange(has_begun_, false) || gate_->certifier().violation()) return;
   if (compaction_.valid()) compaction_.wait();  // it works on *gate_
@@ -219,8 +223,17 @@ void CertifierNode::OnObstacles(const Received& received) {
 }
 
 void CertifierNode::LookForObstacles(std::int64_t now_us) {
-  const std::string why = gate_->WhyObstaclesUnknown(now_us);
+  std::string why = gate_->WhyObstaclesUnknown(now_us);
+  if (const auto& arrival = gate_->obstacles_arrival(); arrival && !why.empty())
+    why += watch_.pauses().Explain(arrival->utime, Microseconds(gate_->options().obstacles_timeout_ms));
   watch_.Set(Watch::Need::kObstacles, why.empty() ? "" : "waits for " + channels_.obstacles + ": " + why);
+  LookAtStamps();
+}
+
+void CertifierNode::ForgetRobot() {
+  watch_.RobotHasFinished();
+  robot_arrival_.reset();
+  LookAtStamps();
 }
 
 void CertifierNode::OnRobotState(const Received& received) {
@@ -228,11 +241,15 @@ void CertifierNode::OnRobotState(const Received& received) {
   if (!has_begun_) return;
   robot_state_t state;
   if (Decode(received.bytes, state) != DecodeStatus::kOk) return Refuse(channels_.robot_state, "not a robot_state_t");
+  if (FaultOf(state, config_.problem->model->num_states()).empty()) {
+    robot_arrival_ = {state.utime, received.utime};
+    LookAtStamps();
+  }
   const std::string error = gate_->CheckRobotState(state, received.utime);
   if (!error.empty()) return Refuse(channels_.robot_state, error);
   last_state_ = state;
   if (is_in_charge() && !gate_->options().shadow) plans_.SeeRobot(state, clocks_.steady());
-  if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
+  if (state.mode == robot_state_t::FINISHED) return ForgetRobot();
   watch_.SeeRobot(received.utime);
   if (!is_in_charge()) return;  // the robot may execute another's plans
   if (const auto departure = conformance_.Check(state)) Fail(SliceLeft(*departure));
@@ -291,7 +308,10 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
         return Refuse(channels_.command, "the reset was sent before the fault, so nobody has inspected the fault");
       if (!latch_.Forget())
         return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_.why_not());
-      if (watch_.Reset()) logging::Warn("{} has cleared the fault", GetText(command.source));
+      if (watch_.Reset()) {
+        ForgetRobot();
+        logging::Warn("{} has cleared the fault", GetText(command.source));
+      }
       reporter_.Hurry();
       return;
     case command_t::RELOAD: return Reload();
@@ -349,6 +369,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
 void CertifierNode::WithdrawPlans(std::int64_t now_us) {
   withdraws_more_ = false;
   if (!is_in_charge()) return;
+  plans_.SeeObstacles(gate_->WhyObstaclesUnknown(now_us), clocks_.steady());
   plans_.Judge(*gate_, now_us, gate_->certifier().violation() || contradictions_.ContradictInForce());
   reporter_.counts.withdrawals = plans_.withdrawals();
   for (int i = 0; i < kAtOnce && plans_.withdraws(); ++i) {
@@ -450,7 +471,7 @@ void CertifierNode::TakeReload() {
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);
-  watch_.Follow(OptionsOf(gate_->options()));
+  watch_.Follow(OptionsOf(config_));
   issued_.Follow(gate_->options());
   plans_.Follow(gate_->options());
   contradictions_.Follow(config_);

@@ -105,6 +105,8 @@ class CertifierNode final : public Node {
   void LeaveWaiting();
   [[nodiscard]] std::string WhyNotInCharge() const;
   void LookForObstacles(std::int64_t now_us);
+  void LookAtStamps() { watch_.SeeStamps(robot_arrival_, gate_->obstacles_arrival()); }
+  void ForgetRobot();
 
   void OnObstacles(const Received& received);
   void OnRobotState(const Received& received);
@@ -149,6 +151,7 @@ class CertifierNode final : public Node {
   CandidateQueue queue_;
   AdviceGiver advice_;
   robot_state_t last_state_{};
+  std::optional<Arrival> robot_arrival_;  // of the last state
   transition_t last_transition_{};
 
   TaskReload reload_;

@@ -52,6 +52,7 @@ std::string TaskReload::WhyNotTaken(const Config& config, const Config& in_force
   bus.key = channels_.key, bus.keys = channels_.keys, bus.key_is_given = channels_.key_is_given;  // Load compares keys
   for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
            {bus.name != channels_.name, "bus.name"},
+           {bus.delay_ms != channels_.delay_ms, "bus.delay_ms"},
            {bus != channels_, "bus.channels"},
            {config.realtime != in_force.realtime, "realtime"},
            {config.gate.obstacles != in_force.gate.obstacles, "gate.obstacles"},

@@ -163,6 +163,11 @@ void RequireForCertifyingOnBus(const Config& config) {
                       ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last "
                       "OBSTACLES message; nothing is certified before the first message or while there are none. "
                       "`task`: the obstacles are those of this file");
+  if (config.gate.obstacles == ObstaclesSource::kBus && !config.gate.obstacles_lost_ms)
+    throw ConfigError(config.path +
+                      ": gate.obstacles_lost_ms: missing. With `gate.obstacles: bus`, plans under way are withdrawn, "
+                      "which is an emergency stop, once the obstacles have been unknown for this many milliseconds. "
+                      "`never`: the robot executes its plan to the end, through whatever has come there");
   const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
   if (moving != config.obstacles.end())
     throw ConfigError(

@@ -211,12 +211,25 @@ class Checker {
     throw ConfigError(At(path_, LineOf(node.Mark())) + OneLine(key + (key.empty() ? "" : ": ") + what));
   }
 
+  // The row of a key whose value is a number or one of these words. Null if it is none of them.
+  const Key* WordRowFor(const YAML::Node& node, const std::string& pattern) const {
+    const auto has_it = [&](const Key& row) {
+      return row.path == pattern && row.type == Type::kWord &&
+             std::ranges::find(row.words, node.Scalar()) != row.words.end();
+    };
+    const auto row = std::ranges::find_if(schema_, has_it);
+    return row == schema_.end() ? nullptr : &*row;
+  }
+
   const Key& RowFor(const YAML::Node& node, const std::string& pattern, const std::string& key) const {
     const Key* last = nullptr;
     std::string forms;
     for (const Key& row : schema_) {
       if (row.path != pattern) continue;
-      if (HasForm(node, row.type)) return row;
+      if (HasForm(node, row.type)) {
+        const Key* const word = IsNumber(row.type) ? WordRowFor(node, pattern) : nullptr;
+        return word ? *word : row;
+      }
       forms += (last ? " or " : "") + FormName(row.type);
       last = &row;
     }

@@ -1,6 +1,7 @@
 /** The options of the gate, from `gate` in a task file. Times in milliseconds. */
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -12,6 +13,9 @@ enum class ObstaclesSource {
   kBus,     ///< The file's and those on OBSTACLES. Nothing is certified while no sender is heard.
   kTask,    ///< The file's only.
 };
+
+/** A value of GateOptions::obstacles_lost_ms. */
+inline constexpr double kNeverLost = std::numeric_limits<double>::infinity();
 
 struct GateOptions {
   double max_age_ms = 500;
@@ -25,12 +29,15 @@ struct GateOptions {
   double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;
   /** How far step t of a plan may be from start_utime + t step_us, on the clock of the obstacles' stamps. Without it no
-  obstacle may move. */
+  obstacle may move. Stamps of states and obstacles are held to it at their arrival (gate/stream_clock.h). */
   std::optional<double> max_clock_error_ms;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
-  bool learns = true;                  ///< Adds executed transitions to the observations.
-  std::string state = "state";         ///< The directory that keeps a latched fault across restarts.
+  /** Plans under way are withdrawn once the obstacles of the bus have been unknown for so long; kNeverLost: never.
+  Nothing: not said, only for logs of tasks without the key. */
+  std::optional<double> obstacles_lost_ms;
+  bool learns = true;            ///< Adds executed transitions to the observations.
+  std::string state = "state";   ///< The directory that keeps a latched fault across restarts.
   double longest_step_ms = 150;  ///< An upper bound on a step. The larger of the model's dt and robot.step_period_ms.
 };
 

@@ -24,11 +24,19 @@ void ReadRequireStop(const Document& file, const std::string& key, TaskDraft& dr
   if (!required) rest.clear();
 }
 
+// Three messages in obstacles_timeout_ms may make them known again.
+void CheckGate(const Document& file, const std::string&, TaskDraft& draft) {
+  const GateOptions& gate = draft.config.gate;
+  if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms < gate.obstacles_timeout_ms)
+    file.Fail("gate.obstacles_lost_ms", ToText(*gate.obstacles_lost_ms) + " is less than gate.obstacles_timeout_ms, " +
+                                            ToText(gate.obstacles_timeout_ms));
+}
+
 std::vector<Key> GateKeys() {
   const OptionRows<GateOptions> gate("gate", [](TaskDraft& draft) -> GateOptions& { return draft.config.gate; });
   using Source = ObstaclesSource;
   return {
-      Optional(Map("gate", "What the certifier accepts from the bus."), "all defaults"),
+      Optional(Map("gate", "What the certifier accepts from the bus.", CheckGate), "all defaults"),
       gate.Number("max_age_ms", "ms", UpTo(kHourMs), &GateOptions::max_age_ms,
                   "A candidate older than this is rejected as stale."),
       gate.Number("max_ahead_ms", "ms", Between(0, kHourMs), &GateOptions::max_ahead_ms,
@@ -58,7 +66,9 @@ std::vector<Key> GateKeys() {
                            "the obstacles. Half of it is for the robot: its guard stops a plan at a step that is "
                            "further off on the robot's own clock, or that comes later than that after the step before. "
                            "The other half is for the difference between the clocks of the robot and of the obstacles' "
-                           "sender. Moving obstacles need this key."),
+                           "sender. Moving obstacles need this key. With it, a robot's state or obstacles that arrive "
+                           "further than this from their stamp, less `bus.delay_ms`, keep the certifier from "
+                           "certifying until one arrives inside."),
                "no obstacle may move"),
       Optional(gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
                                  "bus: the obstacles are task.obstacles and those of the last OBSTACLES message; "
@@ -69,6 +79,17 @@ std::vector<Key> GateKeys() {
       gate.Number("obstacles_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_timeout_ms,
                   "With `obstacles: bus`: the obstacles become unknown this long after the stamp of the last message. "
                   "Send the whole set at least three times in this period."),
+      Optional(gate.Number("obstacles_lost_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_lost_ms,
+                           "Required with `obstacles: bus`, and not less than obstacles_timeout_ms. When the obstacles "
+                           "have been unknown for so long, the plans under way are withdrawn: the robot makes an "
+                           "emergency stop, which no certificate covers. It is the time that a robot may drive among "
+                           "obstacles that nobody sees."),
+               "not said"),
+      Word("gate.obstacles_lost_ms", {"never"},
+           "A robot whose obstacles are unknown executes its plan to the end, through whatever has come there.",
+           [](const Document&, const std::string&, TaskDraft& draft) {
+             draft.config.gate.obstacles_lost_ms = kNeverLost;
+           }),
       gate.Word<bool>("learn", {{"executed", true}, {"none", false}}, &GateOptions::learns,
                       "executed: transitions that the robot reports are added to the observations while it drives; "
                       "declaration.noise_bound has to cover their errors, and declaration.disturbance what disturbs "
@@ -139,6 +160,12 @@ std::vector<Key> BusKeys() {
       bus.Text("url", &BusOptions::url,
                "Address of the bus in LCM's form: multicast group and port, options `ttl` and `recv_buf_size`. "
                "`--lcm-url` takes precedence."),
+      bus.Number(
+          "delay_ms", "ms", Between(0, kHourMs), &BusOptions::delay_ms,
+          "The longest time from a message's stamp to its arrival at the certifier if all clocks agree: what the "
+          "sender does between them, the network, and the wait for a processor. With gate.max_clock_error_ms, "
+          "what arrives later by more than that is taken for the message of a clock that is behind. A clock "
+          "that is behind by less than this may stay unnoticed, so declare no more than is needed."),
       Optional(bus.Text("name", &BusOptions::name,
                         "Name of the bus, which is part of every signature: a message signed for one bus is refused on "
                         "another. All processes of a robot need the same name."),

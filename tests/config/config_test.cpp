@@ -147,10 +147,39 @@ TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
                                                    testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
   for (const auto& [word, source] : std::initializer_list<std::pair<std::string, ObstaclesSource>>{
            {"bus", ObstaclesSource::kBus}, {"task", ObstaclesSource::kTask}}) {
-    const Config config = files.Load(std::string(kTask) + "gate: {obstacles: " + word + "}\n");
+    const Config config = files.Load(std::string(kTask) + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
     EXPECT_EQ(config.gate.obstacles, source);
     EXPECT_EQ(RefusalOnBus(config), "");
   }
+}
+
+TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
+  const TaskFiles files;
+  const auto load = [&](const std::string& more) {
+    return files.Load(std::string(kTask) + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
+  };
+  const Config unsaid = load("");
+  EXPECT_FALSE(unsaid.gate.obstacles_lost_ms) << "a log of before the key can be read";
+  EXPECT_THAT(RefusalOnBus(unsaid),
+              testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles_lost_ms: missing"),
+                             testing::HasSubstr("`never`")));
+  EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: 400")), "");
+  EXPECT_EQ(load(", obstacles_lost_ms: 400").gate.obstacles_lost_ms, 400);
+  EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: never")), "");
+  EXPECT_EQ(load(", obstacles_lost_ms: never").gate.obstacles_lost_ms, kNeverLost);
+  try {
+    static_cast<void>(load(", obstacles_lost_ms: 399"));
+    ADD_FAILURE() << "it is taken";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(),
+                testing::HasSubstr("gate.obstacles_lost_ms: 399 is less than gate.obstacles_timeout_ms, 400"));
+  }
+}
+
+TEST(LoadConfig, TheDelayOfTheBusHasADefaultAndMayBeDeclared) {
+  const TaskFiles files;
+  EXPECT_EQ(files.Load(kTask).bus.delay_ms, 10);
+  EXPECT_EQ(files.Load(std::string(kTask) + "bus: {delay_ms: 0}\n").bus.delay_ms, 0);
 }
 
 TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
@@ -266,7 +295,7 @@ TEST(LoadConfig, OnABusNoObstacleOfTheFileMoves) {
   const std::string moves = Replaced(
       kTask, "radius: 0.8}}", "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
   for (const char* source : {"bus", "task"}) {
-    const Config config = files.Load(moves + "gate: {obstacles: " + source + "}\n");
+    const Config config = files.Load(moves + "gate: {obstacles: " + source + ", obstacles_lost_ms: never}\n");
     EXPECT_THAT(RefusalOnBus(config), testing::AllOf(testing::StartsWith(config.path + ": task.obstacles[1].motion: "),
                                                      testing::HasSubstr("`forereach obstacles`")));
   }

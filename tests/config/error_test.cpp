@@ -27,7 +27,7 @@ TEST_F(ErrorTest, AnUnknownKeyIsAnErrorThatSuggestsTheNearest) {
   EXPECT_EQ(ErrorAfter("gate: {colour: 3}\n"),
             "task.yaml:20: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
             "decision_budget_ms, queue, mode, advice, arming, robot_timeout_ms, max_clock_jump_ms, "
-            "max_clock_error_ms, obstacles, obstacles_timeout_ms, learn, require_stop, state");
+            "max_clock_error_ms, obstacles, obstacles_timeout_ms, obstacles_lost_ms, learn, require_stop, state");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
             "task.yaml:9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");
   EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: 0.1, v_y"),
@@ -388,6 +388,7 @@ TEST_F(ErrorTest, ANumberOutsideItsRangeIsAnError) {
   EXPECT_EQ(files_.ErrorWith("radius: 0.8", "radius: -0.8"),
             "task.yaml:18: task.obstacles[0].circle.radius: -0.8 is outside [0, inf)");
   EXPECT_EQ(ErrorAfter("gate: {max_age_ms: 0}\n"), "task.yaml:20: gate.max_age_ms: 0 is outside (0, 3600000]");
+  EXPECT_EQ(ErrorAfter("bus: {delay_ms: -1}\n"), "task.yaml:20: bus.delay_ms: -1 is outside [0, 3600000]");
   EXPECT_EQ(ErrorAfter("gate: {queue: 0}\n"), "task.yaml:20: gate.queue: 0 is outside [1, 65536]");
   EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 0}\n"),
             "task.yaml:20: certifier.zonotope_order: 0 is outside [1, 112]");

@@ -809,6 +809,131 @@ class Campaign final {
     }
   }
 
+  // What the heartbeat says last.
+  static bool Says(const Rig& rig, const std::string& what) {
+    const auto& status = rig.witness().status();
+    return status && GetText(status->message).find(what) != std::string::npos;
+  }
+
+  // A robot that starts with a clock that is off: its states come, and nothing is certified on them.
+  void OffClock(const char* how, microseconds offset) {
+    std::vector<Obstacle> seen = LoadConfig(world_.Write("world.yaml", DemoTask())).obstacles;
+    seen.push_back(Drifting(60, 14));
+    Rig rig(DemoTaskOnTheBus(", max_clock_error_ms: 200"), {.settable_clocks = true, .seen = seen});
+    rig.witness().SetWorld({ObstaclesDigest(seen)});
+    Row& row = Begin(std::string("The clock of the robot is 0.4 s ") + how + " from its start", options_.others);
+    const auto start_with = [&](microseconds clock) {
+      rig.End(Rig::kRobot);
+      rig.SetClock(Rig::kRobot, clock);
+      rig.Start(Rig::kRobot);
+    };
+    Tries(
+        row, rig,
+        [&](int) {
+          start_with(offset);
+          rig.witness().Forget();
+          const auto says_so = [&] {
+            // One that takes long to start is lost, which a person has to clear.
+            if (rig.witness().fault()) rig.witness().ForgetFault(), rig.Command(command_t::RESET);
+            return Says(rig, std::string("the robot's clock is ") + how);
+          };
+          Demand(row, rig.ListenUntil(says_so, kStarts), "the heartbeat does not say that the robot's clock is off");
+          const std::int64_t before = rig.witness().certificates();
+          for (int j = 0; j < 3; ++j) {
+            const auto cause = CauseOfACandidate(rig);
+            Demand(row, cause == decision_t::CAUSE_NOT_ARMED || cause == decision_t::CAUSE_FAULT,
+                   "a candidate was answered " + std::string(cause ? CauseName(*cause) : "nothing"));
+          }
+          rig.Listen(kHeartbeat);
+          Demand(row, rig.witness().certificates() == before, "it certified on states of a clock that is off");
+          start_with(microseconds(0));
+        },
+        options_.others);
+  }
+
+  // The robot drives. From then on all that comes is a wall across its way, with stamps that are 2 s old.
+  void StaleWall() {
+    const std::vector<Obstacle> seen = LoadConfig(world_.Write("world.yaml", DemoTask())).obstacles;
+    Rig rig(DemoTaskOnTheBus(), {.seen = seen});
+    std::int64_t withdrawn = 0, stops = 0;
+    rig.Hear(rig.config().bus.withdrawn, [&](const Received& r) {
+      const auto message = Decoded<withdrawal_t>(r.bytes);
+      withdrawn += message && message->cause == withdrawal_t::OBSTACLES_LOST;
+    });
+    rig.Hear(rig.config().bus.event, [&](const Received& r) {
+      const auto event = Decoded<execution_event_t>(r.bytes);
+      stops += event && event->kind == execution_event_t::EMERGENCY_STOP;
+    });
+    Row& row = Begin("A wall with stamps 2 s old while a plan is under way (signed)", options_.others);
+    std::int64_t all_stops = 0;
+    Tries(
+        row, rig,
+        [&](int) {
+          withdrawn = stops = 0;
+          // A plan of a robot that has just begun to drive may end before the obstacles are lost.
+          for (int walls = 0; walls < 5 && stops == 0; ++walls) {
+            if (walls > 0) rig.Listen(milliseconds(1000 + Below(1000)));
+            SendStaleWall(row, rig, seen, [&] { return stops > 0; });
+          }
+          Demand(row, withdrawn > 0 && stops > 0, "no plan was withdrawn, or the robot did not stop");
+          all_stops += stops;
+        },
+        options_.others);
+    Remark(row, std::to_string(all_stops) + " emergency stops");
+  }
+  void SendStaleWall(Row& row, Rig& rig, const std::vector<Obstacle>& seen, const std::function<bool()>& stopped) {
+    std::vector<Obstacle> with_wall = seen;
+    with_wall.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 30));
+    rig.perception().SetSilent(true);
+    rig.perception().See(with_wall);
+    std::int64_t before = 0;
+    for (int j = 0; j < 20 && !stopped(); ++j) {
+      rig.perception().SayNow([](obstacles_v2_t& message) {
+        message.utime -= 2'000'000;
+        return true;
+      });
+      rig.Listen(milliseconds(100));
+      if (j == 0) before = rig.witness().certificates();  // what was decided before has arrived
+    }
+    Demand(row, rig.witness().certificates() == before, "it certified after the wall was refused");
+    rig.perception().See(seen);
+    rig.perception().SetSilent(false);
+  }
+
+  // What it has not heard meanwhile, it has not heard because it did not run.
+  void StoppedCertifier() {
+    const std::vector<Obstacle> seen = LoadConfig(world_.Write("world.yaml", DemoTask())).obstacles;
+    Rig rig(DemoTaskOnTheBus(), {.seen = seen});
+    Row& row = Begin("The certifier is stopped for 2 s", options_.others);
+    int faults = 0, explained = 0;
+    Tries(
+        row, rig,
+        [&](int) {
+          rig.witness().ForgetFault();
+          rig.Signal(Rig::kCertifier, SIGSTOP);
+          rig.Listen(milliseconds(2000));
+          rig.Signal(Rig::kCertifier, SIGCONT);
+          rig.Listen(kHeartbeat);
+          const auto& fault = rig.witness().fault();
+          if (!fault) return;
+          ++faults;
+          DemandLatched(row, rig, fault_t::ROBOT_STATE_LOST);
+          const bool says_so = GetText(fault->message).find("this certifier itself did not run") != std::string::npos;
+          Demand(row, says_so, "it blames the robot: " + GetText(fault->message));
+          explained += says_so;
+        },
+        options_.others);
+    Remark(row, std::to_string(faults) + " faults latched, " + std::to_string(explained) +
+                    " of them say that the certifier did not run");
+  }
+
+  void Times() {
+    OffClock("behind", microseconds(-400'000));
+    OffClock("ahead", microseconds(400'000));
+    StaleWall();
+    StoppedCertifier();
+  }
+
   void Moving() {
     MovingTries("Moving OBSTACLES fall silent", [&](Row& row, Rig& rig, int, auto&) { FallSilent(row, rig); });
     MovingTries("Moving OBSTACLES come too late (signed)", [&](Row& row, Rig& rig, int, auto&) {
@@ -925,10 +1050,11 @@ const std::vector<Campaign::Kind> Campaign::kKinds{
     {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
     {"latch", &Campaign::LatchedKills},  {"statedisk", &Campaign::StateDisks},
     {"strangers", &Campaign::Strangers}, {"obstacles", &Campaign::Obstacles},
-    {"moving", &Campaign::Moving},       {"forgeries", &Campaign::Forgeries},
-    {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
-    {"disks", &Campaign::Disks},         {"gone", &Campaign::Gone},
-    {"route", &Campaign::Routes},        {"reload", &Campaign::BadReload}};
+    {"moving", &Campaign::Moving},       {"times", &Campaign::Times},
+    {"forgeries", &Campaign::Forgeries}, {"flood", &Campaign::Flood},
+    {"datagrams", &Campaign::Datagrams}, {"disks", &Campaign::Disks},
+    {"gone", &Campaign::Gone},           {"route", &Campaign::Routes},
+    {"reload", &Campaign::BadReload}};
 
 // A small file system of its own for the log, filled, made read-only, and given back.
 void Campaign::Disks() {
@@ -1271,7 +1397,7 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "- the certifier did not latch a jump of its clock or a state outside its slice, certified before the reset, "
           "forgot a\n"
        << "  fault at a restart, or certified while it could not write faults;\n"
-       << "- a plan was certified under other obstacles than the perceived ones;\n"
+       << "- a plan was certified under other obstacles than the perceived ones, or on states of a clock that is off;\n"
        << "- a required refusal or message was missing;\n"
        << "- the logs and the database disagreed at the end;\n"
        << "- a process grew by 48 MB under raw datagrams.\n"

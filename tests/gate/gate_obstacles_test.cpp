@@ -99,6 +99,51 @@ TEST_F(GateObstaclesTest, ObstaclesOfTheBusCountBesideThoseOfTheTaskAndEnterTheD
   EXPECT_EQ(GetDigest(Decide().obstacles_digest), ObstaclesDigest(of_task_));
 }
 
+// ---- The clock of who sees them.
+
+Gate GateWithClock() {
+  Config config = SmallTaskOnTheBus();
+  config.gate.max_clock_error_ms = 40;
+  config.bus.delay_ms = 10;
+  return Gate(config);
+}
+
+TEST(GateObstaclesClockTest, TheyAreKnownIfTheyArriveAsTheClocksAllow) {
+  for (const auto& [late_us, how] : std::initializer_list<std::pair<std::int64_t, std::string>>{
+           {0, ""}, {50'000, ""}, {-40'000, ""}, {50'001, "behind, or its messages are late"}, {-40'001, "ahead"}}) {
+    Gate gate = GateWithClock();
+    EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kOnTheWay, 0)), kNow + late_us), "");
+    EXPECT_EQ(gate.obstacles().size(), SmallTask().obstacles.size() + kOnTheWay.size()) << "what is seen is taken";
+    const std::string why = gate.WhyObstaclesUnknown(kNow + late_us);
+    EXPECT_TRUE(how.empty() ? why.empty() : why.starts_with("their sender's clock is " + how)) << late_us << why;
+    EXPECT_EQ(gate.Status(kNow + late_us).obstacles_known, how.empty());
+    EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 1)), kNow), "");
+    EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "") << "the next one decides anew";
+  }
+}
+
+// The bytes and the times of arrival are all that it rests on, and a log has both.
+TEST(GateObstaclesClockTest, TheSameMessagesAtTheSameTimesAreJudgedTheSame) {
+  Gate one = GateWithClock(), another = GateWithClock();
+  const std::vector<std::int64_t> late_us{0, 50'001, 49'999, 90'000, -41'000, 10};
+  for (std::size_t i = 0; i < late_us.size(); ++i) {
+    obstacles_t message = Message(i % 2 == 0 ? kFarAway : kOnTheWay, static_cast<std::int64_t>(i));
+    message.utime += static_cast<std::int64_t>(i) * 100'000;
+    const std::int64_t arrived = message.utime + late_us[i];
+    for (Gate* gate : {&one, &another}) EXPECT_EQ(gate->UpdateObstacles(Encode(message), arrived), "");
+    EXPECT_EQ(one.WhyObstaclesUnknown(arrived), another.WhyObstaclesUnknown(arrived));
+    EXPECT_EQ(one.WhyObstaclesUnknown(arrived).empty(), -40'000 <= late_us[i] && late_us[i] <= 50'000);
+    EXPECT_EQ(one.grounds().obstacles, another.grounds().obstacles);
+  }
+}
+
+TEST(GateObstaclesClockTest, AReloadKeepsTheDoubt) {
+  Gate gate = GateWithClock(), reloaded = GateWithClock();
+  ASSERT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 0)), kNow + 50'001), "");
+  reloaded.Inherit(gate);
+  EXPECT_THAT(reloaded.WhyObstaclesUnknown(kNow + 50'001), HasSubstr("clock is behind"));
+}
+
 // As logs from before gate.obstacles were made.
 TEST(GateOldLogsTest, ObstaclesOfTheBusReplaceThoseOfATaskThatNamesNoSource) {
   Config config = SmallTask();

@@ -183,7 +183,8 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                                                     {"NO_STOP", 5},
                                                     {"NOT_JUDGED", 6},
                                                     {"UNKNOWN_PLAN", 7},
-                                                    {"LIMIT", 8}}));
+                                                    {"LIMIT", 8},
+                                                    {"OBSTACLES_LOST", 9}}));
   EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},

@@ -341,6 +341,145 @@ TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
   EXPECT_FALSE(Due());
 }
 
+// ---- Obstacles that are lost.
+
+class LostObstaclesTest : public PlansInForceTest {
+ protected:
+  static constexpr std::int64_t kLostUs = 1'000'000;
+
+  LostObstaclesTest() { Lose(kLostUs / 1e3); }
+
+  void Lose(double after_ms) {
+    config_.gate.obstacles_lost_ms = after_ms;
+    plans_.Follow(config_.gate);
+  }
+  // A wall is seen on the way of the plan, with a stamp that is 2 s old.
+  void SeeStaleWall() {
+    obstacles_t message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1)});
+    message.utime = now_ - 2'000'000;
+    message.sequence = sequence_++;
+    EXPECT_THAT(gate_.UpdateObstacles(Encode(message), now_), HasSubstr("stamped 2000 ms ago"));
+  }
+  void Judge() { JudgeBy(gate_); }
+  void JudgeBy(Gate& gate) {
+    plans_.SeeObstacles(gate.WhyObstaclesUnknown(now_), now_);
+    plans_.Judge(gate, now_);
+  }
+};
+
+TEST_F(LostObstaclesTest, WhatIsUnderWayIsWithdrawnWholeOnceTheyHaveBeenUnknownForSoLong) {
+  const certified_plan_v2_t executing = Certify(1), pending = Certify(2);
+  SeeRobot(1, 3);
+  Judge();
+  SeeStaleWall();
+  Judge();
+  EXPECT_FALSE(Due());
+  now_ += kLostUs - 1;
+  SeeStaleWall();
+  Judge();
+  EXPECT_FALSE(Due()) << "a moment before";
+  now_ += 1;
+  Judge();
+  for (const certified_plan_v2_t& plan : {executing, pending}) {
+    const withdrawal_t message = Due().value();
+    EXPECT_EQ(message.plan_id, plan.plan.plan_id);
+    EXPECT_EQ(message.cause, withdrawal_t::OBSTACLES_LOST);
+    EXPECT_EQ(message.valid_steps, 0);
+    EXPECT_EQ(message.step, -1);
+    EXPECT_EQ(message.obstacle, -1);
+    EXPECT_EQ(GetDigest(message.certificate_digest), GetDigest(plan.certificate_digest));
+    EXPECT_EQ(GroundsOf(message), gate_.grounds());
+    EXPECT_THAT(GetText(message.message),
+                HasSubstr("the obstacles have been unknown for 1000 ms, so nothing stands, and "
+                          "the stop is not certified: the last message was refused"));
+  }
+  EXPECT_FALSE(Due());
+  EXPECT_EQ(plans_.withdrawals(), 2);
+}
+
+TEST_F(LostObstaclesTest, ASenderThatFallsSilentLosesThemAfterBothTimes) {
+  Certify(1);
+  SeeRobot(1, 0);
+  const std::int64_t last = now_, timeout = 1'000'000;  // gate.obstacles_timeout_ms
+  for (const std::int64_t us : {timeout, timeout + 1, timeout + kLostUs}) {
+    now_ = last + us;
+    Judge();
+    EXPECT_FALSE(Due()) << us;
+  }
+  now_ = last + timeout + 1 + kLostUs;
+  Judge();
+  EXPECT_EQ(Due().value().cause, withdrawal_t::OBSTACLES_LOST);
+}
+
+TEST_F(LostObstaclesTest, ThatTheyAreKnownOnceInBetweenBeginsTheTimeAnew) {
+  const certified_plan_v2_t plan = Certify(1);
+  SeeRobot(1, 0);
+  const Obstacle beyond = Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, kSteps) + 0.1);
+  for (int i = 0; i < 5; ++i) {
+    SeeStaleWall();
+    Judge();
+    now_ += kLostUs - 1;
+    Judge();
+    EXPECT_EQ(See({beyond}), "");
+    Judge();
+    EXPECT_FALSE(Due()) << i;
+  }
+}
+
+TEST_F(LostObstaclesTest, WithNeverThePlanGoesOn) {
+  Lose(kNeverLost);
+  Certify(1);
+  SeeRobot(1, 0);
+  SeeStaleWall();
+  Judge();
+  now_ += 3'000'000;
+  Judge();
+  EXPECT_FALSE(Due());
+}
+
+TEST_F(LostObstaclesTest, APlanThatIsNotKnownIsWithdrawnToo) {
+  Gate restarted(config_);
+  JudgeBy(restarted);
+  SeeRobot(77, 4);
+  JudgeBy(restarted);
+  now_ += kLostUs;
+  JudgeBy(restarted);
+  const withdrawal_t stranger = Due().value();
+  EXPECT_EQ(stranger.plan_id, 77);
+  EXPECT_EQ(stranger.cause, withdrawal_t::OBSTACLES_LOST);
+  EXPECT_EQ(GetDigest(stranger.certificate_digest), Digest{});
+  Answer(77, 0, static_cast<double>(stranger.sequence));
+}
+
+TEST_F(LostObstaclesTest, NothingStandsAgainWhenTheyReturn) {
+  Certify(1);
+  SeeRobot(1, 0);
+  SeeStaleWall();
+  Judge();
+  now_ += kLostUs;
+  Judge();
+  const withdrawal_t lost = Due().value();
+  Answer(1, 0, static_cast<double>(lost.sequence));
+  EXPECT_EQ(See({}), "");
+  Judge();
+  now_ += PlansInForce::kRepeatUs;
+  EXPECT_FALSE(Due());
+  EXPECT_EQ(plans_.withdrawals(), 1);
+  Certify(2);
+  Judge();
+  EXPECT_FALSE(Due()) << "a plan that is certified when they are known stands";
+}
+
+TEST_F(LostObstaclesTest, WhoStandsByForgetsSinceWhen) {
+  SeeStaleWall();
+  Judge();
+  plans_.Clear();
+  now_ += kLostUs;
+  SeeRobot(77, 4);
+  Judge();
+  EXPECT_FALSE(Due()) << "another has seen them meanwhile";
+}
+
 // To contradict, not to be added, is what ends a certificate.
 TEST_F(PlansInForceTest, AnObservationThatContradictsNothingWithdrawsNothing) {
   const certified_plan_v2_t plan = Certify(1);

@@ -44,6 +44,7 @@ inline Config SmallTask() {
 inline Config SmallTaskOnTheBus() {
   Config config = SmallTask();
   config.gate.obstacles = ObstaclesSource::kBus;
+  config.gate.obstacles_lost_ms = kNeverLost;
   return config;
 }
 

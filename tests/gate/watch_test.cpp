@@ -84,6 +84,73 @@ TEST(WatchTest, ALostRobotLatchesAndALaterFaultThatStopsItTakesItsPlace) {
   EXPECT_EQ(watch.fault()->cause, fault_t::SLICE_LEFT);
 }
 
+// Its states come, and are queued. What a process did not hear while it was stopped is not the robot's silence.
+TEST(WatchTest, ACertifierThatWasStoppedSaysSoAndNotTheRobotAlone) {
+  Watch watch({true, 1'000'000, 200});
+  for (std::int64_t us = 0; us <= 85'000; us += 5'000) {
+    if (us <= 80'000) watch.SeeRobot(us);
+    EXPECT_FALSE(watch.Advance(us, us));
+  }
+  const auto fault = watch.Advance(1'995'000, 1'995'000);
+  ASSERT_TRUE(fault) << "it stays a fault";
+  EXPECT_EQ(fault->cause, fault_t::ROBOT_STATE_LOST);
+  EXPECT_EQ(fault->why,
+            "the robot's state was last heard 1915 ms ago, at most 1000 ms are allowed: this certifier itself did not "
+            "run for 1910 ms");
+}
+
+TEST(WatchTest, ARobotThatIsSilentWhileTheCertifierRunsIsBlamedAlone) {
+  Watch watch({true, 1'000'000, 200});
+  watch.Advance(0, 0);
+  watch.Advance(500'000, 500'000);  // a pause before it was heard
+  watch.SeeRobot(500'000);
+  std::optional<Watch::Fault> fault;
+  for (std::int64_t us = 500'000; us <= 1'600'000 && !fault; us += 50'000) fault = watch.Advance(us, us);
+  ASSERT_TRUE(fault);
+  EXPECT_EQ(fault->why, "the robot's state was last heard 1050 ms ago, at most 1000 ms are allowed");
+}
+
+TEST(WatchTest, IsArmedOnlyWhileTheNewestStampsAreInside) {
+  Watch watch({true, 1'000'000, 200, ClockBounds{60'000, 10'000}});
+  watch.SeeRobot(0);
+  const auto see = [&](std::int64_t robot_late_us, std::optional<std::int64_t> obstacles_late_us) {
+    watch.SeeStamps(Arrival{0, robot_late_us},
+                    obstacles_late_us ? std::optional(Arrival{0, *obstacles_late_us}) : std::nullopt);
+    return watch.WhyNot();
+  };
+  EXPECT_FALSE(see(70'000, std::nullopt));
+  EXPECT_FALSE(see(-60'000, std::nullopt));
+  ASSERT_TRUE(see(70'001, std::nullopt));
+  EXPECT_EQ(watch.WhyNot()->cause, decision_t::CAUSE_NOT_ARMED);
+  EXPECT_EQ(watch.WhyNot()->outcome, decision_t::REJECTED);
+  EXPECT_EQ(watch.state(), Watch::State::kDisarmed);
+  EXPECT_THAT(watch.WhyNot()->why, HasSubstr("the robot's clock is behind"));
+  EXPECT_FALSE(see(0, std::nullopt)) << "the next one decides anew";
+  EXPECT_THAT(see(-60'001, std::nullopt)->why, HasSubstr("the robot's clock is ahead"));
+  EXPECT_FALSE(see(40'000, -30'000));
+  EXPECT_THAT(see(40'000, -30'001)->why, HasSubstr("are apart"));
+  EXPECT_FALSE(see(40'000, -60'001)) << "the obstacles are unknown then, which is said as another need";
+  watch.SeeStamps(std::nullopt, std::nullopt);
+  EXPECT_FALSE(watch.WhyNot());
+}
+
+TEST(WatchTest, WithoutAClockErrorStampsAreNotCompared) {
+  Watch watch(kOptions);
+  watch.SeeRobot(0);
+  watch.SeeStamps(Arrival{0, 400'000}, Arrival{0, -400'000});
+  EXPECT_EQ(watch.state(), Watch::State::kArmed);
+}
+
+TEST(WatchTest, ARobotThatIsLostForItsStampsIsNotCalledSilentOnly) {
+  Watch watch({true, 1'000'000, 200, ClockBounds{60'000, 10'000}});
+  watch.SeeRobot(0);
+  watch.SeeStamps(Arrival{0, 600'000}, std::nullopt);
+  std::optional<Watch::Fault> fault;
+  for (std::int64_t us = 0; us <= 1'100'000 && !fault; us += 50'000) fault = watch.Advance(us, us);
+  ASSERT_TRUE(fault);
+  EXPECT_THAT(fault->why, HasSubstr("; the robot's clock is behind"));
+}
+
 TEST(WatchTest, AClockThatJumpsForwardOrBackIsAFault) {
   constexpr std::int64_t kBegin = 1'000'000, kMost = 200;
   for (const std::int64_t direction : {1, -1}) {

@@ -21,6 +21,7 @@ namespace withdrawal_run_test {
 Config Task() {
   Config config = Bicycle();
   config.gate.obstacles = ObstaclesSource::kBus;
+  config.gate.obstacles_lost_ms = kNeverLost;
   config.grounds = GroundsOf(DigestOf(std::string_view("withdrawal run")), *config.problem, config.obstacles);
   config.robot.time_limit_s = 60;
   return config;

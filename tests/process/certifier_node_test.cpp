@@ -187,6 +187,7 @@ TEST_F(AdvisingCertifierTest, ASearchTakesNoLongerThanADecisionMay) {
 
 TEST_F(AdvisingCertifierTest, DropsItsAdviceWhenTheObstaclesChange) {
   config_.gate.obstacles = ObstaclesSource::kBus;
+  config_.gate.obstacles_lost_ms = kNeverLost;
   Begin(true);
   const auto see = [&](double x, int sequence) {
     obstacles_t seen = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 0.5)});
@@ -351,6 +352,7 @@ class ObstaclesNodeTest : public CertifierNodeTest {
  protected:
   ObstaclesNodeTest() {
     config_.gate.obstacles = ObstaclesSource::kBus;
+    config_.gate.obstacles_lost_ms = kNeverLost;
     Restart();
   }
 
@@ -420,7 +422,7 @@ TEST_F(ObstaclesNodeTest, TheTimeoutCountsWithinATick) {
   Restart();
   Say({});
   Run();
-  now_us_ += 999'900;
+  now_us_ += 999'800;
   for (int id = 1; id <= 8; ++id) {
     candidate_plan_t candidate = Candidate(id, kAccelerationThatCertifies, now_us_);
     bus_->Publish("PLAN_CANDIDATE", candidate);
@@ -820,6 +822,198 @@ TEST_F(ArmedNodeTest, CertifiesNothingBeforeItHasHeardTheRobot) {
   SayState(State());
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   EXPECT_EQ(certified_.size(), 1u);
+}
+
+// ---- The robot's clock. E is 60 ms, D is 10 ms.
+
+class RobotClockTest : public ArmedNodeTest {
+ protected:
+  RobotClockTest() {
+    config_.gate.max_clock_error_ms = 60;
+    config_.bus.delay_ms = 10;
+    config_.gate.obstacles = ObstaclesSource::kBus;
+    config_.gate.obstacles_lost_ms = kNeverLost;
+    Begin();
+  }
+
+  void Begin() {
+    Restart();
+    bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+    next_seen_ = 0;
+    See(0);
+  }
+
+  // Their arrival is so much after their stamp.
+  void SayStateLate(std::int64_t late_us) {
+    robot_state_t state = State();
+    state.utime -= late_us;
+    SayState(state);
+  }
+  void See(std::int64_t late_us) {
+    obstacles_t message = ToMessage({});
+    message.utime = now_us_ - late_us;
+    message.sequence = next_seen_++;
+    bus_->Publish("OBSTACLES", message);
+    Run();
+  }
+  void ExpectNotArmed(const std::string& why) {
+    const decision_t decision = Ask();
+    EXPECT_EQ(decision.cause, decision_t::CAUSE_NOT_ARMED);
+    EXPECT_THAT(GetText(decision.message), testing::HasSubstr(why));
+    Pass(CertifierNode::kHeartbeatUs);
+    Run();
+    EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
+    EXPECT_EQ(status_.back().state, certifier_status_v3_t::DISARMED);
+    EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr(why));
+  }
+
+  std::int64_t next_seen_ = 0;
+};
+
+TEST_F(RobotClockTest, OneThatIsBehindFromTheStartArmsNothing) {
+  for (int i = 0; i < 20; ++i) {
+    Pass(150'000);
+    See(0);
+    SayStateLate(473'000);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED) << "nothing is learned of it";
+  }
+  ExpectNotArmed(
+      "the robot's clock is behind, or its messages are late: the last one arrived 473 ms after its stamp, at "
+      "most 70 ms are allowed");
+  EXPECT_TRUE(certified_.empty());
+  EXPECT_TRUE(faults_.empty()) << "a need, which a clock that is set right meets by itself";
+  SayStateLate(0);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(RobotClockTest, ItMayBeLateByErrorAndDelayAndEarlyByTheError) {
+  for (const std::int64_t late_us : {70'000, -50'000}) {  // gate.max_ahead_ms is 50
+    SayStateLate(late_us);
+    EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << late_us;
+  }
+  SayStateLate(70'001);
+  ExpectNotArmed("the robot's clock is behind");
+  See(0);
+  SayStateLate(0);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(RobotClockTest, OneThatIsAheadArmsNothing) {
+  config_.gate.max_ahead_ms = 500;
+  Begin();
+  SayStateLate(-60'000);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  SayStateLate(-60'001);
+  ExpectNotArmed(
+      "the robot's clock is ahead: the last message arrived 60 ms before its stamp, at most 60 ms are allowed");
+}
+
+// A hiccup costs the time to the next state, and no person has to come.
+TEST_F(RobotClockTest, AfterOneDatagramThatIsLateTheNextOneArms) {
+  SayStateLate(1000);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  SayStateLate(90'000);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED) << "not armed while the newest state is outside";
+  SayStateLate(1000);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  EXPECT_TRUE(faults_.empty());
+}
+
+// It is older than any message may be, and so it is refused. It says nothing good of the clock.
+TEST_F(RobotClockTest, AStateThatIsRefusedForItsStampDisarmsAtOnce) {
+  for (const std::int64_t late_us : std::initializer_list<std::int64_t>{500'001, -50'001, 3'600'000'000}) {
+    SayStateLate(0);
+    EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+    SayStateLate(late_us);
+    EXPECT_EQ(Ask().outcome, late_us == -50'001 ? decision_t::CERTIFIED : decision_t::REJECTED) << late_us;
+  }
+  robot_state_t nonsense = State();
+  SayStateLate(0);
+  nonsense.state[1] = std::numeric_limits<double>::quiet_NaN();
+  nonsense.utime -= 400'000;
+  SayState(nonsense);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "what is no state says nothing";
+}
+
+TEST_F(RobotClockTest, TheClockOfWhoSeesTheObstaclesCountsToo) {
+  SayStateLate(0);
+  See(70'000);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  See(70'001);
+  const decision_t decision = Ask();
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_NO_OBSTACLES);
+  EXPECT_THAT(GetText(decision.message), testing::HasSubstr("waits for OBSTACLES: their sender's clock is behind"));
+  See(0);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(RobotClockTest, BothMayNotBeOffInOppositeDirections) {
+  See(-30'000);
+  SayStateLate(40'000);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  SayStateLate(40'001);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+  See(-29'999);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  See(-30'000);
+  ExpectNotArmed("the clocks of the robot and of the obstacles' sender are apart");
+}
+
+TEST_F(RobotClockTest, WithoutAClockErrorNoStampIsCompared) {
+  config_.gate.max_clock_error_ms.reset();
+  Begin();
+  See(400'000);
+  SayStateLate(473'000);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "nothing moves";
+}
+
+TEST_F(RobotClockTest, WhatARobotThatHasFinishedOrAResetLeavesIsForgotten) {
+  SayStateLate(90'000);
+  robot_state_t last = State();
+  last.mode = robot_state_t::FINISHED;
+  last.utime -= 90'000;
+  SayState(last);
+  const decision_t decision = Ask();
+  EXPECT_EQ(GetText(decision.message), "rejected: waits for the robot's state");
+}
+
+// ---- A certifier that was stopped.
+
+TEST_F(ArmedNodeTest, OneThatWasStoppedSaysSoInTheFaultThatItLatches) {
+  SayState(State());
+  for (int i = 0; i < 17; ++i) {
+    Pass(5'000);
+    Run();
+  }
+  Pass(1'830'000);
+  const decision_t decision = Ask();
+  ASSERT_EQ(faults_.size(), 1u) << "it stays a fault";
+  EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+  const std::string why =
+      "the robot's state was last heard 1915 ms ago, at most 1000 ms are allowed: this certifier itself did not run "
+      "for "
+      "1830 ms";
+  EXPECT_EQ(GetText(faults_[0].message), why);
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_FAULT);
+  EXPECT_EQ(GetText(decision.message), "rejected: fault: " + why);
+  EXPECT_EQ(GetText(status_.back().message), "robot_state_lost: " + why);
+}
+
+TEST_F(ObstaclesNodeTest, OneThatWasStoppedSaysSoOfTheObstaclesThatItMissed) {
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  now_us_ += 1'990'000;
+  EXPECT_THAT(
+      GetText(Ask().message),
+      testing::HasSubstr("waits for OBSTACLES: the last message is 1990 ms old, at most 1000 ms are allowed: this "
+                         "certifier itself did not run for 1990 ms"));
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "what was queued arms it again";
+  for (int i = 0; i < 12; ++i) {
+    now_us_ += 90'000;
+    Run();
+  }
+  EXPECT_THAT(GetText(Ask().message), testing::EndsWith("at most 1000 ms are allowed")) << "now it is the sender";
 }
 
 TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
@@ -1261,8 +1455,10 @@ TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
   }
 
   for (const auto& [gate, what] :
-       {std::pair{"gate: {obstacles: bus}", "gate.obstacles cannot change while"},
+       {std::pair{"gate: {obstacles: bus, obstacles_lost_ms: never}", "gate.obstacles cannot change while"},
         std::pair{"gate: {obstacles: task, max_clock_error_ms: 5}", "gate.max_clock_error_ms cannot change while"},
+        std::pair{"gate: {obstacles: bus}", "gate.obstacles_lost_ms: missing"},
+        std::pair{"gate: {obstacles: task}\nbus: {delay_ms: 11}", "bus.delay_ms cannot change while"},
         std::pair{"gate: {}", "gate.obstacles: missing"}}) {
     const std::int64_t failed = status_.failed_reloads;
     Copy([&](const std::string& text) {

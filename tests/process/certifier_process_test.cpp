@@ -157,7 +157,7 @@ class CertifierObstaclesTest : public testing::Test {
     EXPECT_NE(task.find(none), std::string::npos);
     world_ = scratch_.Write("world.yaml", task);
     task.replace(task.find(none), none.size(), "obstacles: []\n");
-    task.replace(task.find("obstacles: task,"), 16, "obstacles: bus,");
+    task.replace(task.find("obstacles: task,"), 16, "obstacles: bus, obstacles_lost_ms: never,");
     path_ = scratch_.Write("task.yaml", task);
     config_ = LoadConfig(path_);
   }

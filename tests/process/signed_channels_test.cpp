@@ -51,6 +51,7 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = MakeTestKeys(scratch_ / "keys");
     config_.gate.obstacles = ObstaclesSource::kBus;
+    config_.gate.obstacles_lost_ms = kNeverLost;
     config_.gate.advises = true;
     config_.logger.directory = scratch_ / "log";
     open_ = OpenBus(config_.bus.url);

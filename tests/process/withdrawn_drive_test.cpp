@@ -75,7 +75,7 @@ class WithdrawnDriveTest : public testing::Test {
 
   void SendObstacles() {
     obstacles_t message = ToMessage(obstacles_);
-    message.utime = now_;
+    message.utime = now_ - stamps_late_us_;
     message.sequence = sequence_++;
     bus_->Publish("OBSTACLES", message);
   }
@@ -130,7 +130,7 @@ class WithdrawnDriveTest : public testing::Test {
     return t;
   }
 
-  std::int64_t now_ = kNow, sequence_ = 0, next_obstacles_ = kNow;
+  std::int64_t now_ = kNow, sequence_ = 0, next_obstacles_ = kNow, stamps_late_us_ = 0;
   const Clock clock_ = [this] { return now_; };
   const Config config_;
   std::vector<Obstacle> obstacles_;
@@ -336,8 +336,70 @@ TEST_F(BrakingDriveTest, WhereTooFewStepsStandItStopsAtOnceAndSaysSo) {
 
 // The certifier restarts while the robot executes what its predecessor certified, which may have had other transitions
 // under the same task file.
+// ---- Obstacles that nobody says any more, or that nobody can use.
+
+Config TaskThatLoses(double after_ms) {
+  Config config = Task();
+  config.gate.obstacles_lost_ms = after_ms;
+  return config;
+}
+
+class LostObstaclesDriveTest : public WithdrawnDriveTest {
+ protected:
+  explicit LostObstaclesDriveTest(double after_ms = 1000) : WithdrawnDriveTest(TaskThatLoses(after_ms)) {}
+
+  // From now on all that comes is a wall across the way, with stamps that are 2 s old.
+  void DriveOnWithAStaleWall(std::int64_t us) {
+    obstacles_.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Place() + 3));
+    stamps_late_us_ = 2'000'000;
+    RunFor(us);
+  }
+};
+
+TEST_F(LostObstaclesDriveTest, AWallThatComesTooLateToBeTakenStopsTheRobotAfterTheTime) {
+  Drive();
+  DriveOnWithAStaleWall(950'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+  RunFor(300'000);
+  ASSERT_FALSE(withdrawn_.empty());
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::OBSTACLES_LOST);
+  EXPECT_EQ(withdrawn_[0].valid_steps, 0);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+  const auto stop = std::ranges::find(events_, execution_event_t::EMERGENCY_STOP, &execution_event_t::kind);
+  EXPECT_THAT(GetText(stop->message), testing::HasSubstr("emergency stop, not certified"));
+  const std::size_t sent = withdrawn_.size();
+  RunFor(500'000);
+  EXPECT_EQ(withdrawn_.size(), sent) << "it has answered";
+}
+
+TEST_F(LostObstaclesDriveTest, ASenderThatIsSilentForLessChangesNothing) {
+  Drive();
+  DriveOnWithAStaleWall(900'000);
+  obstacles_.clear();
+  stamps_late_us_ = 0;
+  RunFor(6'000'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+class NeverLostDriveTest : public LostObstaclesDriveTest {
+ protected:
+  NeverLostDriveTest() : LostObstaclesDriveTest(kNeverLost) {}
+};
+
+TEST_F(NeverLostDriveTest, ThePlanGoesThroughThePlaceOfTheWall) {
+  Drive();
+  DriveOnWithAStaleWall(6'000'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
+}
+
 class RestartedCertifierTest : public WithdrawnDriveTest {
  protected:
+  explicit RestartedCertifierTest(Config config = Task()) : WithdrawnDriveTest(std::move(config)) {}
+
   void Drive() {
     Gate predecessor(config_);
     Drive(predecessor);
@@ -386,6 +448,25 @@ TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereNothingHasChanged) {
   EXPECT_GT(certifier_->gate().certifier().num_observations(), 2u) << "what it learns itself takes nothing back";
   EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
   EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+// The certifier does not know what is in the way of the plan that it finds, and has not certified it.
+class RestartedAmongLostObstaclesTest : public RestartedCertifierTest {
+ protected:
+  RestartedAmongLostObstaclesTest() : RestartedCertifierTest(TaskThatLoses(1000)) {}
+};
+
+TEST_F(RestartedAmongLostObstaclesTest, ThePlanStopsAfterTheTime) {
+  Drive();
+  stamps_late_us_ = 2'000'000;
+  Begin();
+  RunFor(950'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  RunFor(300'000);
+  ASSERT_FALSE(withdrawn_.empty());
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::OBSTACLES_LOST);
+  EXPECT_EQ(GetDigest(withdrawn_[0].certificate_digest), Digest{});
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
 }
 
 TEST_F(RestartedCertifierTest, ThePlanStopsWhereItHadOtherTransitionsOfTheTask) {

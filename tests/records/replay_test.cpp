@@ -139,9 +139,11 @@ TEST_F(WithdrawnReplayTest, ListsAWithdrawalWithOtherStepsAnotherObstacleOrOther
 }
 
 TEST_F(WithdrawnReplayTest, ListsNoDifferenceForAWithdrawalWithoutAJudgement) {
-  const ReplayResult result = Replayed([](withdrawal_t& message) { message.cause = withdrawal_t::NOT_JUDGED; });
-  EXPECT_EQ(result.circumstances, 2);
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  for (const std::int16_t cause : {withdrawal_t::NOT_JUDGED, withdrawal_t::OBSTACLES_LOST}) {
+    const ReplayResult result = Replayed([cause](withdrawal_t& message) { message.cause = cause; });
+    EXPECT_EQ(result.circumstances, 2) << cause;
+    EXPECT_THAT(result.differences, testing::IsEmpty()) << cause;
+  }
 }
 
 TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {
@@ -324,6 +326,42 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
   EXPECT_EQ(result.agreed, decided);
   EXPECT_EQ(result.circumstances, 2);
+}
+
+// They are in force though they are not known, by the times of the log as by those of the certifier.
+TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
+  Config config = SmallTaskOnTheBus();
+  config.gate.max_clock_error_ms = 20;
+  const std::string path = NewLog();
+  {
+    EventLogWriter writer(path);
+    certifier_status_v3_t status{};
+    status.state = certifier_status_v3_t::ARMED;
+    Gate gate(config);
+    writer.Append(kNow, config.bus.status, Encode(status));
+    for (int i = 0; i < 6; ++i) {
+      const bool is_late = i % 2 == 0;
+      obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)});
+      message.utime = kNow - (is_late ? 30'001 : 30'000);
+      message.sequence = i;
+      writer.Append(kNow, config.bus.obstacles, Encode(message));
+      EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
+      EXPECT_EQ(gate.WhyObstaclesUnknown(kNow).empty(), !is_late);
+      const auto candidate = Encode(Candidate(i + 1));
+      if (!is_late) {
+        DecideAndLog(gate, candidate, decision_t::CERTIFIED, config, writer);
+        continue;
+      }
+      writer.Append(kNow, config.bus.candidate, candidate);
+      writer.Append(kNow, config.bus.decision,
+                    Encode(gate.Refuse(candidate, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
+    }
+    EXPECT_TRUE(writer.Flush());
+  }
+  const ReplayResult result = Replay({path}, {config});
+  EXPECT_TRUE(result.differences.empty()) << result.differences.front();
+  EXPECT_EQ(result.agreed, 3);
+  EXPECT_EQ(result.circumstances, 3);
 }
 
 // Each message has other stamps; the sender changes its type between them.
