@@ -181,14 +181,18 @@ std::vector<std::string> RoleNames() {
   return names;
 }
 
-// The other roles' files first: with them, the machines refuse the lost key.
-void PrintWhoNeedsWhat(const std::string& directory, const std::string& replaced) {
-  std::cout << directory << ": " << replaced
+// The other roles' files first, because with them the machines refuse the lost key: those that others obey before those
+// that listen.
+void PrintWhoNeedsWhat(const std::string& directory, Role replaced) {
+  std::cout << directory << ": the " << RoleName(replaced)
             << " has a new key. The old one counts until the machines below have their new files.\n"
                "Copy them in this order, and restart the programs that use them:\n";
-  for (const std::string& name : RoleNames())
-    if (name != replaced) std::cout << "  " << name << ".key to the machine of the " << name << '\n';
-  std::cout << "  " << replaced << ".key to the new machine of the " << replaced << ", and to no other\n"
+  for (const Role role :
+       {Role::kCertifier, Role::kRobot, Role::kPlanner, Role::kPerception, Role::kOperator, Role::kLogger})
+    if (role != replaced)
+      std::cout << "  " << RoleName(role) << ".key to the machine that speaks as " << RoleName(role) << '\n';
+  std::cout << "  " << RoleName(replaced) << ".key to the new machine of the " << RoleName(replaced)
+            << ", and to no other\n"
             << "  verify.pub to those who read logs; logs from before need the verify.pub from before" << std::endl;
 }
 
@@ -227,7 +231,7 @@ Command KeygenCommand() {
           std::cout << options->directory << std::endl;
         } else {
           ReplaceKey(options->robot, options->directory, *again);
-          PrintWhoNeedsWhat(options->directory, options->again);
+          PrintWhoNeedsWhat(options->directory, *again);
         }
         return 0;
       }};

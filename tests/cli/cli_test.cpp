@@ -365,11 +365,11 @@ TEST(Keygen, AgainReplacesOneKeyAndSaysWhoNeedsWhichFile) {
   ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
   const Output output = Forereach("keygen --robot alpha " + keys + " --again planner 2>&1");
   EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr(keys + ": planner has a new key."));
+  EXPECT_THAT(output.text, HasSubstr(keys + ": the planner has a new key."));
   std::size_t at = 0;
   for (const char* line :
-       {"  certifier.key to the machine of the certifier", "  perception.key to", "  robot.key to", "  operator.key to",
-        "  logger.key to", "  planner.key to the new machine of the planner", "  verify.pub to"}) {
+       {"  certifier.key to the machine that speaks as certifier", "  robot.key to", "  perception.key to",
+        "  operator.key to", "  logger.key to", "  planner.key to the new machine of the planner", "  verify.pub to"}) {
     at = output.text.find(line, at);
     EXPECT_NE(at, std::string::npos) << line << "\n" << output.text;
   }
