@@ -19,7 +19,7 @@ class KeyScreen final : public Screen {
   std::optional<Bytes> Admit(const std::string& channel, Bytes raw) override {
     const std::scoped_lock lock(mutex_);
     if (!authenticator_.IsSpoken(channel)) return raw;
-    const auto [authenticity, message] = authenticator_.Check(channel, raw);
+    const auto [authenticity, message] = authenticator_.Check(channel, raw, clock_());
     return authenticity == Authenticity::kAuthentic ? std::optional(message) : std::nullopt;
   }
   std::optional<std::vector<std::uint8_t>> ToSend(const std::string& channel, Bytes message) override {

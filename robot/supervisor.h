@@ -32,7 +32,9 @@ After every other emergency stop no plan is accepted until a reset arrives whose
 halted the robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is
 executing is not affected by Expect.
 
-With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command.
+With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command; and
+if they were signed since this robot's start and not ahead of its clock (bus/authentic.h): a fault recorded earlier
+halts no robot. The start is the first message of each of the two, guard and supervisor. What is refused is REFUSED.
 Messages that this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
 
 No clock, no bus, no thread, not thread-safe. It needs the guard and the message types only. All times are microseconds
@@ -121,7 +123,8 @@ class Supervisor final {
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
  private:
-  [[nodiscard]] std::optional<Bytes> Authentic(const std::string& channel, Bytes message);
+  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, std::string_view speaker, Bytes& message,
+                                           std::int64_t now_us);
   [[nodiscard]] bool IsExecuting() const { return guard_.executing() != nullptr; }
   [[nodiscard]] std::int64_t PlanId() const;
   [[nodiscard]] int Step() const { return IsExecuting() ? step_ : -1; }
