@@ -99,7 +99,7 @@ void RunCheck(State& state) {
       next = 0;
       state.ResumeTiming();
     }
-    if (authenticator.Check("PLAN", batch[next++]).first != Authenticity::kAuthentic)
+    if (authenticator.Check("PLAN", batch[next++], kNow).first != Authenticity::kAuthentic)
       return state.SkipWithError("not authentic");
   }
 }
@@ -112,9 +112,10 @@ void RunRefuse(State& state, Flood flood, std::size_t body_bytes) {
   std::vector<std::uint8_t> bytes = Signer(BenchKeys(), flood == Flood::kForeign ? "another bus" : "bus")
                                         .Sign(Role::kPlanner, "PLAN", std::vector<std::uint8_t>(body_bytes), kNow);
   if (flood == Flood::kForgedTag) bytes[bytes.size() - 9] ^= 1;
-  if (flood == Flood::kReplayed) benchmark::DoNotOptimize(authenticator.Check("PLAN", bytes));
+  if (flood == Flood::kReplayed) benchmark::DoNotOptimize(authenticator.Check("PLAN", bytes, kNow));
   for (auto _ : state)
-    if (authenticator.Check("PLAN", bytes).first == Authenticity::kAuthentic) return state.SkipWithError("authentic");
+    if (authenticator.Check("PLAN", bytes, kNow).first == Authenticity::kAuthentic)
+      return state.SkipWithError("authentic");
 }
 
 // The straightforward check, to compare with: hash the whole message and verify, whatever it is.

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <string_view>
 
 #include <sodium.h>
+
+#include "lcmtypes/freshness.h"
 
 namespace forereach {
 namespace {
@@ -124,6 +127,11 @@ struct Authenticator::Trailer {
 
 Bytes WithoutSignature(Bytes bytes) { return HasTrailer(bytes) ? bytes.first(bytes.size() - kTrailerBytes) : bytes; }
 
+SenderId SenderOf(Bytes bytes) {
+  if (!HasTrailer(bytes)) return std::nullopt;
+  return FromBigEndian<std::uint64_t>(bytes.last(kTrailerBytes).subspan(kNumberBytes));
+}
+
 BusId BusIdOf(const std::string& bus_name) {
   const Digest digest = DigestOf(bus_name);
   BusId bus;
@@ -143,12 +151,21 @@ std::uint64_t Signer::RandomSender() {
   return sender;
 }
 
+// The sender id after a clock was set back follows from the one before, so a run with given ids can be repeated.
+std::pair<std::uint64_t, std::int64_t> Signer::Next(std::int64_t now_us) {
+  const std::scoped_lock lock(mutex_);
+  if (FreshnessOf(now_us, last_counter_, kSetBackUs, 0) == Freshness::kStale) {
+    sender_ = FromBigEndian<std::uint64_t>(Bytes(DigestOf(NumbersOf(bus_, sender_, last_counter_))));
+    last_counter_ = now_us - 1;
+  }
+  last_counter_ = std::max(now_us, last_counter_ + 1);
+  return {sender_, last_counter_};
+}
+
 std::vector<std::uint8_t> Signer::Sign(Role role, const std::string& channel, Bytes message, std::int64_t now_us) {
   RequireChannel(channel);
-  std::int64_t last = last_counter_, counter = 0;
-  do counter = std::max(now_us, last + 1);
-  while (!last_counter_.compare_exchange_weak(last, counter));
-  const Numbers numbers = NumbersOf(bus_, sender_, counter);
+  const auto [sender, counter] = Next(now_us);
+  const Numbers numbers = NumbersOf(bus_, sender, counter);
   const Signature signature = keys_.Sign(role, ToSign(keys_.robot(), role, numbers, channel, message).bytes());
   std::vector<std::uint8_t> bytes;
   bytes.reserve(message.size() + kTrailerBytes);
@@ -164,29 +181,41 @@ std::vector<std::uint8_t> Signer::Sign(Role role, const std::string& channel, By
 // ---- Checking.
 
 Authenticator::Authenticator(KeyRing keys, const std::optional<std::string>& bus_name, Speakers speakers,
-                             std::int64_t begun_us)
-    : keys_(std::move(keys)) {
+                             std::optional<std::int64_t> begun_us)
+    : keys_(std::move(keys)), begun_us_(begun_us), latest_us_(std::numeric_limits<std::int64_t>::min()) {
   if (bus_name) bus_ = BusIdOf(*bus_name);
-  for (const auto& [channel, role] : speakers) {
+  for (const auto& [channel, speaker] : speakers) {
     RequireChannel(channel);
-    channels_.emplace(channel, Channel{role, begun_us, {}});
+    channels_.emplace(channel, Channel{speaker, {}, {}});
   }
 }
 
-std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, Bytes bytes) {
-  const Authenticity authenticity = Classify(channel, bytes);
+std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, Bytes bytes, std::int64_t now_us) {
+  FollowClock(now_us);
+  const Authenticity authenticity = Classify(channel, bytes, now_us);
   switch (authenticity) {
     case Authenticity::kAuthentic: return {authenticity, WithoutSignature(bytes)};
     case Authenticity::kUnsigned: ++refusals_.unsigned_ones; break;
     case Authenticity::kForged: ++refusals_.forged; break;
     case Authenticity::kReplayed: ++refusals_.replayed; break;
     case Authenticity::kForeign: ++refusals_.foreign; break;
+    case Authenticity::kOld: ++refusals_.old; break;
+    case Authenticity::kAhead: ++refusals_.ahead; break;
   }
   return {authenticity, {}};
 }
 
+// After the clock was set back, senders sign with times from before the start.
+void Authenticator::FollowClock(std::int64_t now_us) {
+  const std::int64_t earliest =
+      std::max(now_us, std::numeric_limits<std::int64_t>::min() + kClockErrorUs) - kClockErrorUs;
+  const bool is_set_back = FreshnessOf(now_us, latest_us_, kClockErrorUs, 0) == Freshness::kStale;
+  if (!begun_us_ || is_set_back) begun_us_ = std::min(begun_us_.value_or(earliest), earliest);
+  latest_us_ = is_set_back ? now_us : std::max(latest_us_, now_us);
+}
+
 // The checks run from cheap to expensive, so that an early refusal costs little.
-Authenticity Authenticator::Classify(const std::string& name, Bytes bytes) {
+Authenticity Authenticator::Classify(const std::string& name, Bytes bytes, std::int64_t now_us) {
   if (!HasTrailer(bytes)) return Authenticity::kUnsigned;
   const auto found = channels_.find(name);
   if (found == channels_.end()) return Authenticity::kForged;
@@ -197,10 +226,11 @@ Authenticity Authenticator::Classify(const std::string& name, Bytes bytes) {
     if (sodium_memcmp(tag.data(), trailer.tag.data(), tag.size()) != 0) return Authenticity::kForged;
   }
   if (bus_ && trailer.bus() != *bus_) return Authenticity::kForeign;
-  if (!IsFresh(channel, trailer)) return Authenticity::kReplayed;
+  if (const Authenticity timely = Timeliness(channel, trailer, now_us); timely != Authenticity::kAuthentic)
+    return timely;
   if (keys_.HoldsGroup() && IsDoubted(trailer.tag)) return Authenticity::kForged;
-  const Covered covered = ToSign(keys_.robot(), channel.role, trailer.numbers, name, trailer.message);
-  if (!keys_.IsSigned(channel.role, covered.bytes(), trailer.signature)) {
+  const Covered covered = ToSign(keys_.robot(), channel.speaker, trailer.numbers, name, trailer.message);
+  if (!keys_.IsSigned(channel.speaker, covered.bytes(), trailer.signature)) {
     CountTry(trailer.tag);
     return Authenticity::kForged;
   }
@@ -209,9 +239,18 @@ Authenticity Authenticator::Classify(const std::string& name, Bytes bytes) {
   return Authenticity::kAuthentic;
 }
 
-bool Authenticator::IsFresh(const Channel& channel, const Trailer& trailer) {
+// When it was signed, by its counter. A known sender's counter is above one that was accepted since the start.
+Authenticity Authenticator::Timeliness(const Channel& channel, const Trailer& trailer, std::int64_t now_us) const {
+  const std::int64_t signed_us = trailer.counter();
   const auto known = channel.last_counter.find(trailer.sender());
-  return trailer.counter() > (known == channel.last_counter.end() ? channel.oldest : known->second);
+  if (known != channel.last_counter.end()) {
+    if (signed_us <= known->second) return Authenticity::kReplayed;
+  } else {
+    if (signed_us <= *begun_us_) return Authenticity::kOld;
+    if (channel.forgotten && signed_us <= *channel.forgotten) return Authenticity::kReplayed;
+  }
+  const Freshness freshness = FreshnessOf(signed_us, now_us, INT64_MAX, channel.speaker.max_ahead_us);
+  return freshness == Freshness::kFuture ? Authenticity::kAhead : Authenticity::kAuthentic;
 }
 
 bool Authenticator::Take(Channel& channel, const Trailer& trailer) {
@@ -222,9 +261,9 @@ bool Authenticator::Take(Channel& channel, const Trailer& trailer) {
   }
   if (last.size() >= kMaxSenders) {  // counters of a forgotten sender must not be accepted again
     const auto lowest = std::ranges::min_element(last, {}, [](const auto& sender) { return sender.second; });
-    channel.oldest = std::max(channel.oldest, lowest->second);
+    channel.forgotten = std::max(channel.forgotten.value_or(lowest->second), lowest->second);
     last.erase(lowest);
-    if (trailer.counter() <= channel.oldest) return false;
+    if (trailer.counter() <= *channel.forgotten) return false;
   }
   last.emplace(trailer.sender(), trailer.counter());
   return true;
@@ -242,6 +281,19 @@ void Authenticator::CountTry(const GroupTag& tag) {
     *doubt = {tag, 0};
   }
   ++doubt->tries;
+}
+
+std::string DescribeRefusals(const Refusals& refusals) {
+  if (refusals.all() == 0) return "";
+  std::string text = std::to_string(refusals.all()) + " (unsigned " + std::to_string(refusals.unsigned_ones) +
+                     ", forged " + std::to_string(refusals.forged) + ", replayed " + std::to_string(refusals.replayed);
+  const auto add = [&text](const char* what, std::int64_t count) {
+    if (count > 0) text += std::string(", ") + what + " " + std::to_string(count);
+  };
+  add("signed before the start", refusals.old);
+  add("signed ahead of the clock", refusals.ahead);
+  add("of another bus", refusals.foreign);
+  return text + ")";
 }
 
 }  // namespace forereach

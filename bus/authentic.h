@@ -21,17 +21,28 @@ A receiver makes the cheap checks first. The tag covers about 130 bytes for ever
 costs one short keyed hash. A genuine trailer that was received before is refused by its counter. Only a fresh and
 genuine trailer reaches the hash of the message and Ed25519.
 
-A receiver accepts a counter only if it is above the last one of that sender on that channel and not from before the
-receiver's start. So an earlier recorded message is refused, even by a process that has just started. The clocks of
-sender and receiver have to agree: messages of a sender whose clock is behind are refused until its clock has passed the
-receiver's start. The stored counters of a channel depend only on messages of that channel's role, so no other role can
-use up or displace them. */
+A receiver accepts a counter only if all of these hold, on every channel. No other code looks at when a message was
+signed:
+
+    once          it is above the last one of that sender on that channel
+    since         it is not from before the receiver's start: an earlier recorded message is refused, also by a process
+                  that has just started
+    not ahead     it is not further ahead of the receiver's clock than the channel allows: what was signed while a clock
+                  was ahead is refused, also after the receiver's restart
+
+So the clocks of sender and receiver have to agree. Messages of a sender whose clock is behind are refused until its
+clock has passed the receiver's start; of one whose clock is ahead, until it is set right. A sender whose clock is set
+back goes on under another sender id, with counters of the new time. A receiver whose own clock is set back takes that
+time for its start if it is the earlier one, as if it had been started then.
+
+The stored counters of a channel depend only on messages of that channel's role, so no other role can use up or displace
+them. */
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -39,6 +50,7 @@ use up or displace them. */
 
 #include "bus/keys.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/sole_sender.h"
 
 namespace forereach {
 
@@ -46,15 +58,35 @@ inline constexpr std::size_t kTrailerBytes = 3 * 8 + sizeof(Signature) + sizeof(
 
 /** The message without its trailer, if it has one. It checks nothing. */
 [[nodiscard]] Bytes WithoutSignature(Bytes bytes);
+/** The sender in the trailer, if it has one. It checks nothing. */
+[[nodiscard]] SenderId SenderOf(Bytes bytes);
 
 using BusId = std::array<std::uint8_t, 8>;
 [[nodiscard]] BusId BusIdOf(const std::string& bus_name);
 
-/** The role that owns each channel. Channels that are not listed belong to no role. */
-using Speakers = std::map<std::string, Role>;
+/** By how much the clocks of sender and receiver may differ, microseconds. Stamps in messages have limits of their own,
+which are tighter. */
+inline constexpr std::int64_t kClockErrorUs = 1'000'000;
+
+/** The role that owns a channel. */
+struct Speaker {
+  Role role;
+  std::int64_t max_ahead_us;  ///< How far ahead of the receiver's clock a message may be signed.
+
+  // Both conversions are implicit: most channels are described by their role.
+  constexpr Speaker(Role of, std::int64_t max_ahead = kClockErrorUs) : role(of), max_ahead_us(max_ahead) {}
+  constexpr operator Role() const { return role; }
+};
+
+/** The speaker of each channel. Channels that are not listed belong to no role. */
+using Speakers = std::map<std::string, Speaker>;
 
 class Signer final {
  public:
+  /** A clock that is set back by more than this makes it another sender. Less is made up for by the counter, which then
+  runs ahead of the clock by at most this. Microseconds. */
+  static constexpr std::int64_t kSetBackUs = kClockErrorUs / 2;
+
   /** @param sender identifies this process; 64 random bits by default. */
   Signer(KeyRing keys, const std::string& bus_name, std::uint64_t sender = RandomSender());
 
@@ -65,34 +97,44 @@ class Signer final {
 
  private:
   [[nodiscard]] static std::uint64_t RandomSender();
+  /** Sender and counter of the next message. */
+  [[nodiscard]] std::pair<std::uint64_t, std::int64_t> Next(std::int64_t now_us);
 
   const KeyRing keys_;
   const BusId bus_;
-  const std::uint64_t sender_;
-  std::atomic<std::int64_t> last_counter_ = 0;
+  std::mutex mutex_;  // of the next two
+  std::uint64_t sender_;
+  std::int64_t last_counter_ = 0;
 };
 
 enum class Authenticity {
   kAuthentic,
   kUnsigned,  ///< No trailer.
   kForged,    ///< Wrong tag or signature: altered, another role's, another robot's, or for another channel.
-  kReplayed,  ///< Its counter was used before, or is from before the receiver's start.
+  kReplayed,  ///< Its counter was used before.
   kForeign,   ///< From this robot, but for another bus.
+  kOld,       ///< Signed before the receiver's start.
+  kAhead,     ///< Signed further ahead of the receiver's clock than the channel allows.
 };
 
 /** Numbers of refused messages by reason. */
 struct Refusals {
-  std::int64_t unsigned_ones = 0, forged = 0, replayed = 0, foreign = 0;
+  std::int64_t unsigned_ones = 0, forged = 0, replayed = 0, foreign = 0, old = 0, ahead = 0;
 
   Refusals& operator+=(const Refusals& more) {
     unsigned_ones += more.unsigned_ones;
     forged += more.forged;
     replayed += more.replayed;
     foreign += more.foreign;
+    old += more.old;
+    ahead += more.ahead;
     return *this;
   }
-  [[nodiscard]] std::int64_t all() const { return unsigned_ones + forged + replayed + foreign; }
+  [[nodiscard]] std::int64_t all() const { return unsigned_ones + forged + replayed + foreign + old + ahead; }
 };
+
+/** "3 (unsigned 1, forged 1, replayed 1)", with the other causes where there are any; empty if there are none. */
+[[nodiscard]] std::string DescribeRefusals(const Refusals& refusals);
 
 class Authenticator final {
  public:
@@ -105,24 +147,26 @@ class Authenticator final {
 
   /** @param keys a ring with public keys only checks no tags. @param bus_name empty: the bus of the first authentic
   message.
-  @param speakers the role of each channel. @param begun_us microseconds since the Unix epoch; earlier messages are
-  refused. */
-  Authenticator(KeyRing keys, const std::optional<std::string>& bus_name, Speakers speakers, std::int64_t begun_us);
+  @param begun_us the receiver's start, microseconds since the Unix epoch: messages that were signed at this time or
+  before are refused. Nothing: kClockErrorUs before the time of the first Check. */
+  Authenticator(KeyRing keys, const std::optional<std::string>& bus_name, Speakers speakers,
+                std::optional<std::int64_t> begun_us);
 
   /** Whether a role owns the channel, so that its messages have to be checked. */
   [[nodiscard]] bool IsSpoken(const std::string& channel) const { return channels_.contains(channel); }
 
-  /** Checks a message. If it is authentic, returns the message without trailer and uses up its counter. Otherwise it
-  counts the refusal. On a channel without a role no message is authentic. */
-  [[nodiscard]] std::pair<Authenticity, Bytes> Check(const std::string& channel, Bytes bytes);
+  /** Checks a message that arrived at `now_us` by the receiver's wall clock. If it is authentic, returns the message
+  without trailer and uses up its counter. Otherwise it counts the refusal. On a channel without a role no message is
+  authentic. */
+  [[nodiscard]] std::pair<Authenticity, Bytes> Check(const std::string& channel, Bytes bytes, std::int64_t now_us);
 
   [[nodiscard]] const Refusals& refusals() const { return refusals_; }
 
  private:
   struct Trailer;
   struct Channel {
-    Role role;
-    std::int64_t oldest;                                 // counters up to this one are refused
+    Speaker speaker;
+    std::optional<std::int64_t> forgotten;               // no counter up to this one is new
     std::map<std::uint64_t, std::int64_t> last_counter;  // by sender
   };
   struct Doubt {
@@ -130,14 +174,17 @@ class Authenticator final {
     int tries = 0;  // signatures found wrong
   };
 
-  [[nodiscard]] Authenticity Classify(const std::string& channel, Bytes bytes);
-  [[nodiscard]] static bool IsFresh(const Channel& channel, const Trailer& trailer);
+  [[nodiscard]] Authenticity Classify(const std::string& channel, Bytes bytes, std::int64_t now_us);
+  void FollowClock(std::int64_t now_us);
+  [[nodiscard]] Authenticity Timeliness(const Channel& channel, const Trailer& trailer, std::int64_t now_us) const;
   [[nodiscard]] static bool Take(Channel& channel, const Trailer& trailer);
   [[nodiscard]] bool IsDoubted(const GroupTag& tag) const;
   void CountTry(const GroupTag& tag);
 
   KeyRing keys_;
   std::optional<BusId> bus_;
+  std::optional<std::int64_t> begun_us_;
+  std::int64_t latest_us_;  // the receiver's clock, by the last Check
   std::map<std::string, Channel> channels_;
   std::array<Doubt, 16> doubts_;
   std::size_t next_doubt_ = 0;

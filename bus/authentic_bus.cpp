@@ -19,7 +19,7 @@ class KeyScreen final : public Screen {
   std::optional<Bytes> Admit(const std::string& channel, Bytes raw) override {
     const std::scoped_lock lock(mutex_);
     if (!authenticator_.IsSpoken(channel)) return raw;
-    const auto [authenticity, message] = authenticator_.Check(channel, raw);
+    const auto [authenticity, message] = authenticator_.Check(channel, raw, clock_());
     return authenticity == Authenticity::kAuthentic ? std::optional(message) : std::nullopt;
   }
   std::optional<std::vector<std::uint8_t>> ToSend(const std::string& channel, Bytes message) override {
@@ -44,9 +44,14 @@ class KeyScreen final : public Screen {
 
 }  // namespace
 
+std::shared_ptr<Screen> MakeKeyScreen(const KeyRing& keys, const std::string& bus_name, const Speakers& speakers,
+                                      Clock clock) {
+  return std::make_shared<KeyScreen>(keys, bus_name, speakers, std::move(clock));
+}
+
 std::unique_ptr<Bus> OpenSignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name,
                                    const Speakers& speakers, Clock clock) {
-  const auto screen = std::make_shared<KeyScreen>(keys, bus_name, speakers, clock);
+  const auto screen = MakeKeyScreen(keys, bus_name, speakers, clock);
   return OpenBus(url, std::move(clock), screen);
 }
 

@@ -9,6 +9,11 @@
 
 namespace forereach {
 
+/** The screen of a signed bus: it admits authentic messages, without their trailer, and signs what is sent. It accepts
+nothing that was signed before this call. @param clock for the counters. */
+[[nodiscard]] std::shared_ptr<Screen> MakeKeyScreen(const KeyRing& keys, const std::string& bus_name,
+                                                    const Speakers& speakers, Clock clock);
+
 /** Opens a bus (bus.h). On every channel of `speakers`, Publish signs as the channel's role and returns false if `keys`
 lack its secret. Handlers receive only authentic messages, without their trailer; refused messages are counted
 (Bus::refusals). Other channels carry messages unchanged.

@@ -16,14 +16,16 @@ Handlers run in the thread that calls Dispatch, never in the receive thread, so 
 #include "bus/clock.h"
 #include "bus/datagram.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/sole_sender.h"
 
 namespace forereach {
 
 struct Received {
   const std::string& channel;
-  Bytes bytes;         ///< The message that the screen admitted; empty if it was refused.
-  std::int64_t utime;  ///< Time of arrival, microseconds since the Unix epoch.
-  Bytes raw;           ///< The bytes as they arrived, with the trailer if there is one.
+  Bytes bytes;           ///< The message that the screen admitted; empty if it was refused.
+  std::int64_t utime;    ///< Time of arrival, microseconds since the Unix epoch.
+  Bytes raw;             ///< The bytes as they arrived, with the trailer if there is one.
+  SenderId sender = {};  ///< Of the signature that the screen has verified; nothing if it verified none.
 };
 
 /** Decides which messages a bus admits, and signs those that it sends. */

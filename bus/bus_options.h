@@ -9,6 +9,10 @@
 
 namespace forereach {
 
+/** By how much the clocks of two certifiers on one bus may differ, microseconds: each has to hear that the other is
+there. */
+inline constexpr std::int64_t kCertifiersApartUs = 60'000'000;
+
 struct BusOptions {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string candidate = "PLAN_CANDIDATE";
@@ -34,11 +38,12 @@ struct BusOptions {
 
   /** The role that speaks on each channel where there are keys. */
   [[nodiscard]] Speakers speakers() const {
-    return {{decision, Role::kCertifier},  {certified, Role::kCertifier},  {status, Role::kCertifier},
-            {fault, Role::kCertifier},     {withdrawn, Role::kCertifier},  {advice, Role::kCertifier},
-            {candidate, Role::kPlanner},   {obstacles, Role::kPerception}, {robot_state, Role::kRobot},
-            {transition, Role::kRobot},    {event, Role::kRobot},          {command, Role::kOperator},
-            {logger_status, Role::kLogger}};
+    return {
+        {decision, Role::kCertifier},  {certified, Role::kCertifier},  {status, {Role::kCertifier, kCertifiersApartUs}},
+        {fault, Role::kCertifier},     {withdrawn, Role::kCertifier},  {advice, Role::kCertifier},
+        {candidate, Role::kPlanner},   {obstacles, Role::kPerception}, {robot_state, Role::kRobot},
+        {transition, Role::kRobot},    {event, Role::kRobot},          {command, Role::kOperator},
+        {logger_status, Role::kLogger}};
   }
 
   /** `name`, or address and port of `url`: "239.255.76.67:7667"; "memq" for memq. @throws BusError if `url` is none. */

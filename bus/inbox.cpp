@@ -41,11 +41,12 @@ Inbox::Subscriptions Inbox::Wanting(std::string_view channel) {
 void Inbox::Put(std::string_view channel, Bytes raw, std::int64_t utime) noexcept try {
   Subscriptions wanting = Wanting(channel);
   if (wanting.empty()) return;
-  Stored stored{0, std::string(channel), {}, 0, 0, utime, {}};
+  Stored stored{0, std::string(channel), {}, 0, 0, utime, {}, {}};
   const std::optional<Bytes> message = screen_ ? screen_->Admit(stored.channel, raw) : raw;
   if (message && !message->empty()) {
     stored.message_begin = OffsetIn(raw, *message);
     stored.message_bytes = message->size();
+    if (message->size() < raw.size()) stored.sender = SenderOf(raw);  // otherwise no signature was looked at
   }
   if (!message) std::erase_if(wanting, [](const Subscription* subscription) { return !subscription->unchecked; });
   if (wanting.empty()) return;
@@ -93,8 +94,8 @@ int Inbox::HandOut(int timeout_ms) {
     for (const Subscription* subscription : stored.for_whom) {
       ++calls;
       try {
-        subscription->handler(
-            {stored.channel, raw.subspan(stored.message_begin, stored.message_bytes), stored.utime, raw});
+        subscription->handler({stored.channel, raw.subspan(stored.message_begin, stored.message_bytes), stored.utime,
+                               raw, stored.sender});
       } catch (...) {
         failure = std::current_exception();
       }

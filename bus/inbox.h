@@ -52,6 +52,7 @@ class Inbox final {
     std::vector<std::uint8_t> raw;
     std::size_t message_begin, message_bytes;  // inside raw
     std::int64_t utime;
+    SenderId sender;
     Subscriptions for_whom;
   };
   struct Queue {

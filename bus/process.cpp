@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::int64_t kSaysAgainAfterUs = 10'000'000;
 
-// Runs a node, and warns of what comes from the network that is no message: when it begins, and at most every ten
-// seconds while it goes on, since anybody on the network can send as much of it as he likes.
+// Runs a node, and warns of what comes from the network that is no message or no authentic one: when it begins, and at
+// most every ten seconds while it goes on, since anybody on the network can send as much of it as he likes.
 class DatagramWatch final : public Node {
  public:
   DatagramWatch(Node& node, const Bus& bus) : node_(node), bus_(bus) {}
@@ -35,6 +35,17 @@ class DatagramWatch final : public Node {
 
  private:
   bool Say() {
+    const bool says_datagrams = SayDatagrams(), says_refusals = SayRefusals();
+    return says_datagrams || says_refusals;
+  }
+  bool SayRefusals() {
+    const Refusals refused = bus_.refusals();
+    if (refused.all() == std::exchange(said_refused_, refused.all())) return false;
+    logging::Warn("from the network, since the start: messages that are not authentic and count for nothing: {}",
+                  DescribeRefusals(refused));
+    return true;
+  }
+  bool SayDatagrams() {
     const DatagramCounts counts = bus_.datagrams();
     const std::int64_t amiss = counts.refused() + counts.lost_by_kernel + counts.receive_errors;
     if (amiss == std::exchange(said_, amiss)) return false;
@@ -47,7 +58,7 @@ class DatagramWatch final : public Node {
 
   Node& node_;
   const Bus& bus_;
-  std::int64_t said_ = 0, next_us_ = 0;
+  std::int64_t said_ = 0, said_refused_ = 0, next_us_ = 0;
 };
 
 }  // namespace

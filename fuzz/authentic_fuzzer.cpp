@@ -1,5 +1,5 @@
 // Signatures: what a receiver takes is what the channel's role signed for this robot, bus and channel, whole, once, and
-// not from before.
+// neither from before nor ahead of its clock.
 #include <map>
 #include <set>
 
@@ -41,8 +41,11 @@ bool Try(Bytes data) {
       case 5: bytes = signer.Sign(Role::kPlanner, "COMMAND", message, now); break;
       case 6: bytes = elsewhere.Sign(Role::kOperator, "COMMAND", message, now); break;
     }
-    const auto [authenticity, inside] = authenticator.Check("COMMAND", bytes);
+    const std::int64_t clock =
+        kBegun + i + 1 + (input.ConsumeBool() ? input.ConsumeIntegralInRange(-kBegun, kBegun) : 0);
+    const auto [authenticity, inside] = authenticator.Check("COMMAND", bytes, clock);
     if (authenticity == Authenticity::kAuthentic) {
+      Require(SenderOf(bytes).has_value());
       Require(made.contains(bytes) && taken.insert(bytes).second);
       Require(inside.data() == bytes.data() && inside.size() + kTrailerBytes == bytes.size());
     } else {

@@ -147,7 +147,7 @@ class Session final {
     const auto before = guard_.executing() ? guard_.standing_steps() : std::nullopt;
     const auto* const executing = guard_.executing();
     const bool was_pending = guard_.pending() != nullptr;
-    const GuardWithdrawal answer = guard_.Withdraw(bytes);
+    const GuardWithdrawal answer = guard_.Withdraw(bytes, kStart);
     Require(answer.verdict.ok() == answer.verdict.message.empty() &&
             answer.verdict.cause != GuardCause::kInternalError && guard_.executing() == executing);
     const auto after = executing ? guard_.standing_steps() : std::nullopt;

@@ -241,7 +241,7 @@ void Watcher::ShowObstacles() {
 }
 
 bool Watcher::TakeObstacles(const LogEvent& event) {
-  const std::string refusal = in_force_->Update(event.message(), event.utime);
+  const std::string refusal = in_force_->Update(event.message(), event.utime, event.sender());
   if (!refusal.empty()) return false;
   if (in_force_->digest() != obstacles_digest_) ShowObstacles();
   return true;
@@ -440,6 +440,8 @@ Json Watcher::NowJson(std::int64_t now_us, const LiveLosses& losses) const {
              {{"unsigned", refused.unsigned_ones},
               {"forged", refused.forged},
               {"replayed", refused.replayed},
+              {"signed_before_the_start", refused.old},
+              {"signed_ahead", refused.ahead},
               {"of_another_bus", refused.foreign}}},
             {"certifier", Json()},
             {"logger", Json()}};

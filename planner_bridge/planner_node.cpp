@@ -39,6 +39,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       residual_(config.problem),
       proposer_(MakeProposer(config)),
       hardest_(config, Braking::kHardest),
+      robot_(Microseconds(config.gate.robot_timeout_ms)),
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
@@ -58,7 +59,10 @@ void PlannerNode::Tick(std::int64_t now_us) {
 
 void PlannerNode::OnRobotState(const Received& received) {
   const auto state = Decoded<robot_state_t>(received.bytes);
-  if (!state || !IsUsable(*state, received.utime) || !TakeOrder(*state, received.utime)) {
+  const SoleSender::Place place = robot_.Hear(received.sender, received.utime);
+  if (place == SoleSender::Place::kTakesOver) states_ = {};
+  if (place == SoleSender::Place::kOther || !state || !IsUsable(*state, received.utime) ||
+      !TakeOrder(*state, received.utime)) {
     ++ignored_;
     return;
   }
@@ -325,7 +329,7 @@ void PlannerNode::LearnWithoutAdvice() {
 }
 
 void PlannerNode::OnObstacles(const Received& received) {
-  if (!obstacles_.Update(received.bytes, received.utime).empty()) {
+  if (!obstacles_.Update(received.bytes, received.utime, received.sender).empty()) {
     ++ignored_;
     return;
   }

@@ -126,7 +126,8 @@ class PlannerNode final : public Node {
   std::int64_t waiting_plan_ = -1;                  // its plan_id
   robot_state_t last_state_{};                      // of the robot, the newest; num_states 0: none yet
   std::map<std::int64_t, int> withdrawn_;           // valid_steps, of plans in plans_
-  StreamOrder states_;                              // the robot's
+  SoleSender robot_;                                // of two, it follows one
+  StreamOrder states_;                              // of that one
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   ObstaclesInForce obstacles_;
   Digest planned_among_{};  // the digest of the obstacles that proposer_ has from a message

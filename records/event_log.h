@@ -39,6 +39,8 @@ struct LogEvent {
 
   /** The data without the signature, if there is one (bus/authentic.h). */
   [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
+  /** The sender in that signature. */
+  [[nodiscard]] SenderId sender() const { return SenderOf(data); }
 };
 
 /** The latest stamp that is accepted in the event's message (StreamOrder::Horizon). The sender's clock may be one

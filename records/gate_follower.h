@@ -17,8 +17,8 @@ class GateFollower : public TimelineUser {
     const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));
     gate_->Inherit(*before);
   }
-  void OnObstacles(Bytes message, std::int64_t utime) override {
-    static_cast<void>(gate_->UpdateObstacles(message, utime));
+  void OnObstacles(Bytes message, std::int64_t utime, SenderId sender) override {
+    static_cast<void>(gate_->UpdateObstacles(message, utime, sender));
   }
   void OnTransition(const ExecutedTransition&, Bytes message) override { static_cast<void>(gate_->Learn(message)); }
 

@@ -20,7 +20,8 @@ class LogAuthenticator final {
       : channels_(channels), speakers_(channels.speakers()), keys_(std::move(keys)) {}
 
   /** Whether the next event of the log is authentic. On a signed channel a message is not authentic if it is unsigned
-  or forged, if its counter was used before, or if it was signed more than a second before the first message here. */
+  or forged, if its counter was used before, or if it was signed more than kClockErrorUs before the first message here
+  or ahead of the logger's clock (bus/authentic.h). */
   [[nodiscard]] bool IsAuthentic(const LogEvent& event);
 
   /** The messages that were not authentic. */
@@ -32,8 +33,5 @@ class LogAuthenticator final {
   std::optional<KeyRing> keys_;
   std::optional<Authenticator> authenticator_;  // from the first message on a signed channel on
 };
-
-/** "3 (unsigned 1, forged 1, replayed 1)"; empty if there are none. */
-[[nodiscard]] std::string DescribeRefusals(const Refusals& refusals);
 
 }  // namespace forereach

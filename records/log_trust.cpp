@@ -35,6 +35,8 @@ nlohmann::json ToJson(const PassedOver& passed_over) {
            {{"unsigned", refused.unsigned_ones},
             {"forged", refused.forged},
             {"replayed", refused.replayed},
+            {"signed_before_the_start", refused.old},
+            {"signed_ahead", refused.ahead},
             {"of_another_bus", refused.foreign}}},
           {"undecodable", passed_over.undecodable}};
 }

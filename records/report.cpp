@@ -47,7 +47,7 @@ class PictureMaker final : public TimelineUser {
     certifier_ = std::make_unique<Certifier>(task.problem);
   }
   void OnReload(const Config& task) override { OnStart(task); }
-  void OnObstacles(Bytes, std::int64_t) override { CertifyAgain(); }
+  void OnObstacles(Bytes, std::int64_t, SenderId) override { CertifyAgain(); }
   void OnTransition(const ExecutedTransition& transition, Bytes) override {
     CertifyAgain();
     static_cast<void>(certifier_->Learn(transition.z, transition.next));

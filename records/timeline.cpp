@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "bus/bus_options.h"
+#include "certifier/gate/stamp.h"
 #include "lcmtypes/heartbeat.h"
 
 namespace forereach {
@@ -48,7 +49,8 @@ Timeline::Timeline(std::vector<const Config*> tasks, TimelineUser& user)
       channels_(tasks.front()->bus),
       authenticator_(channels_, PublicKeysOf(channels_)),
       now_(tasks.front()),
-      logged_obstacles_(*now_) {
+      logged_obstacles_(*now_),
+      transition_sender_(Microseconds(now_->gate.robot_timeout_ms)) {
   SetTasks(std::move(tasks));
 }
 
@@ -136,6 +138,7 @@ const Config* Timeline::TaskOf(const Digest& config) const {
 void Timeline::Start() {
   has_begun_ = true;
   obstacles_ahead_.clear();
+  transition_sender_ = SoleSender(0);
   Follow(ObstaclesInForce(*now_));
   user_.OnStart(*now_);
 }
@@ -151,6 +154,7 @@ void Timeline::Reload() {
 // The task in force begins with these obstacles, and with nothing learned.
 void Timeline::Follow(ObstaclesInForce obstacles) {
   transitions_ahead_.clear();
+  transition_sender_.Follow(Microseconds(now_->gate.robot_timeout_ms));
   logged_obstacles_ = std::move(obstacles);
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
@@ -169,16 +173,16 @@ void Timeline::FollowReload(const Config& task) {
 // ---- What the certifier has heard.
 
 void Timeline::TakeObstacles(const LogEvent& event) {
-  ObstaclesInForce after = logged_obstacles_;
-  if (!after.Update(event.message(), event.utime).empty()) return;
-  const bool is_another_set = after.digest() != logged_obstacles_.digest();  // one set is sent again and again
-  logged_obstacles_ = std::move(after);
-  if (!is_another_set) return;
+  const Digest before = logged_obstacles_.digest();
+  if (!logged_obstacles_.Update(event.message(), event.utime, event.sender()).empty()) return;
+  if (logged_obstacles_.digest() == before) return;  // one set is sent again and again
   obstacles_ahead_.push_back(
-      {place_, event.utime, {event.message().begin(), event.message().end()}, logged_obstacles_});
+      {place_, event.utime, event.sender(), {event.message().begin(), event.message().end()}, logged_obstacles_});
 }
 
 void Timeline::TakeTransition(const LogEvent& event) {
+  transition_sender_.Hear(event.sender(), event.utime);
+  if (!transition_sender_.WhyTwo(event.utime).empty()) return;
   const auto message = Decoded<transition_t>(event.message());
   if (!now_->gate.learns || !message) return;
   ExecutedTransition transition = FromMessage(*message, *now_->problem);
@@ -193,7 +197,7 @@ void Timeline::TakeNextObstacles() {
   obstacles_ahead_.pop_front();
   obstacles_digest_ = change.after.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(change.after.all());
-  user_.OnObstacles(change.bytes, change.utime);
+  user_.OnObstacles(change.bytes, change.utime, change.sender);
 }
 
 void Timeline::LearnNext() {

@@ -95,7 +95,8 @@ class TimelineUser {
   virtual void OnEvent(const LogEvent&) {}  ///< Every authentic message, before the calls that it causes.
   virtual void OnStart(const Config&) {}    ///< The process starts under this task.
   virtual void OnReload(const Config&) {}   ///< The process continues under this task.
-  virtual void OnObstacles(Bytes /*message*/, std::int64_t /*utime*/) {}      ///< A different set is in force.
+  /** A different set is in force. */
+  virtual void OnObstacles(Bytes /*message*/, std::int64_t /*utime*/, SenderId) {}
   virtual void OnTransition(const ExecutedTransition&, Bytes /*message*/) {}  ///< A transition is learned.
   virtual void OnDecision(const RecordedDecision&) {}
   virtual void OnCertified(const RecordedPlan&) {}
@@ -148,6 +149,7 @@ class Timeline final {
   };
   struct ObstaclesChange {
     std::int64_t place, utime;
+    SenderId sender;
     std::vector<std::uint8_t> bytes;
     ObstaclesInForce after;
   };
@@ -202,6 +204,7 @@ class Timeline final {
   Digest obstacles_digest_{}, observations_digest_{};
   std::size_t learned_begin_ = 0;
   ObstaclesInForce logged_obstacles_;
+  SoleSender transition_sender_;
   Digest logged_observations_{};
   std::deque<ObstaclesChange> obstacles_ahead_;
   std::deque<Transition> transitions_ahead_;

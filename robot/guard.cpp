@@ -9,6 +9,7 @@
 #include <new>
 #include <stdexcept>
 
+#include "lcmtypes/freshness.h"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/seal.h"
 
@@ -151,6 +152,8 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kForged: return "forged";
     case GuardCause::kForeign: return "foreign";
     case GuardCause::kSignatureReplayed: return "signature_replayed";
+    case GuardCause::kSignedBefore: return "signed_before_the_start";
+    case GuardCause::kSignedAhead: return "signed_ahead";
     case GuardCause::kWrongLength: return "wrong_length";
     case GuardCause::kTrailingBytes: return "trailing_bytes";
     case GuardCause::kUnknownFingerprint: return "unknown_fingerprint";
@@ -218,10 +221,9 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   expected_.reserve(kMostExpected);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
-  // A plan expires and its plan_id has to be new, so a plan from before the guard's start does no more harm than a late
-  // one.
   authenticator_.emplace(*options_.keys, options_.bus_name,
-                         Speakers{{options_.channel, Role::kCertifier}, {options_.withdrawn, Role::kCertifier}}, 0);
+                         Speakers{{options_.channel, Role::kCertifier}, {options_.withdrawn, Role::kCertifier}},
+                         std::nullopt);
 }
 
 void Guard::Halt() noexcept {
@@ -241,16 +243,24 @@ void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std:
 }
 
 // Checks and removes the signature.
-GuardVerdict Guard::Authenticated(const std::string& channel, Bytes& bytes) {
+GuardVerdict Guard::Authenticated(const std::string& channel, Bytes& bytes, std::int64_t now_us) {
   if (!authenticator_) return {};
-  const auto [authenticity, message] = authenticator_->Check(channel, bytes);
+  const auto [authenticity, message] = authenticator_->Check(channel, bytes, now_us);
   bytes = message;
+  return VerdictOn(authenticity, channel, "certifier");
+}
+
+GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, std::string_view speaker) {
   switch (authenticity) {
     case Authenticity::kAuthentic: return {};
     case Authenticity::kUnsigned: return Refuse(GuardCause::kUnsigned, channel + " is not signed");
     case Authenticity::kForged:
-      return Refuse(GuardCause::kForged, channel + " is not signed by this robot's certifier");
+      return Refuse(GuardCause::kForged, channel + " is not signed by this robot's " + std::string(speaker));
     case Authenticity::kForeign: return Refuse(GuardCause::kForeign, channel + " was signed for another bus");
+    case Authenticity::kOld: return Refuse(GuardCause::kSignedBefore, channel + " was signed before this start");
+    case Authenticity::kAhead:
+      return Refuse(GuardCause::kSignedAhead, channel + " was signed more than " + Milliseconds(kClockErrorUs, 0) +
+                                                  " ahead of this robot's clock");
     case Authenticity::kReplayed: break;
   }
   return Refuse(GuardCause::kSignatureReplayed, "the signature on " + channel + " was used before");
@@ -264,7 +274,7 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
   GuardVerdict verdict;
   try {
     if (halted_) return Refuse(GuardCause::kHalted, "halted until a person resets it");
-    verdict = Authenticated(options_.channel, certified_plan_bytes);
+    verdict = Authenticated(options_.channel, certified_plan_bytes, now_us);
     if (!verdict.ok()) return verdict;
     auto certified = std::make_unique<certified_plan_v2_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
@@ -312,10 +322,10 @@ bool RestsOn(const certified_plan_v2_t& certified, const Grounds& grounds) {
 
 }  // namespace
 
-GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes) noexcept {
+GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes, std::int64_t now_us) noexcept {
   GuardWithdrawal answer;
   try {
-    answer.verdict = Authenticated(options_.withdrawn, withdrawal_bytes);
+    answer.verdict = Authenticated(options_.withdrawn, withdrawal_bytes, now_us);
     if (!answer.verdict.ok()) return answer;
     withdrawal_t message;
     const DecodeStatus status = Decode(withdrawal_bytes, message);

@@ -52,6 +52,8 @@ enum class GuardCause {
   kForged,             ///< With keys: the signature is not that of this robot's certifier over these bytes.
   kForeign,            ///< With keys: the signature is for another bus.
   kSignatureReplayed,  ///< With keys: the signed message was received before.
+  kSignedBefore,       ///< With keys: it was signed before this guard heard anything.
+  kSignedAhead,        ///< With keys: it was signed further ahead of this robot's clock than clocks may differ.
   kWrongLength,
   kTrailingBytes,
   kUnknownFingerprint,
@@ -148,6 +150,9 @@ struct GuardOptions {
 less. Microseconds. */
 [[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
 
+/** As Authenticator::Check's: the refusal of a message on a channel, kNone if it is authentic. */
+[[nodiscard]] GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, std::string_view speaker);
+
 class Guard final {
  public:
   /** @throws std::invalid_argument if an option is out of range. */
@@ -194,8 +199,8 @@ class Guard final {
   Cause UNKNOWN_PLAN comes from a certifier that has not certified the plan, and does not count if the plan was
   certified under the message's configuration, model, declaration and obstacles, and the message's observations are the
   plan's `transitions_digest`: then nothing was taken back, whatever had been learned before the certificate. A
-  valid_steps outside 0 .. num_steps counts as the nearest of these numbers. */
-  [[nodiscard]] GuardWithdrawal Withdraw(Bytes withdrawal_bytes) noexcept;
+  valid_steps outside 0 .. num_steps counts as the nearest of these numbers. @param now_us as of Accept. */
+  [[nodiscard]] GuardWithdrawal Withdraw(Bytes withdrawal_bytes, std::int64_t now_us) noexcept;
 
   /** Ends the executing plan. */
   void Finish() noexcept { executing_.reset(); }
@@ -229,7 +234,7 @@ class Guard final {
     std::optional<Angles> angles;
   };
 
-  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes);
+  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes, std::int64_t now_us);
   void Take(const withdrawal_t& message, GuardWithdrawal& answer);
   void TakeTaskOf(const certified_plan_v2_t& certified);
   void EndIfRefused(GuardVerdict& verdict) noexcept;

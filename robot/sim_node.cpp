@@ -206,7 +206,7 @@ void RobotSimNode::LogProgress(std::int64_t utime) {
 
 void RobotSimNode::OnObstacles(const Received& received) {
   // What it refuses is no news: the certifier reports it.
-  static_cast<void>(obstacles_.Update(received.bytes, received.utime));
+  static_cast<void>(obstacles_.Update(received.bytes, received.utime, received.sender));
 }
 
 std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) const {

@@ -74,16 +74,18 @@ Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
   state_.reserve(kMostStates);
   step_began_at_.reserve(kMostStates);
   if (!options_.guard.keys) return;
-  // Nothing recorded earlier releases the robot: a command has to be fresh, and later than what halted it.
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
-                         Speakers{{options_.fault, Role::kCertifier}, {options_.command, Role::kOperator}}, 0);
+                         Speakers{{options_.fault, Role::kCertifier}, {options_.command, Role::kOperator}},
+                         std::nullopt);
 }
 
-// Without its trailer.
-std::optional<Bytes> Supervisor::Authentic(const std::string& channel, Bytes message) {
-  if (!authenticator_) return message;
-  const auto [authenticity, content] = authenticator_->Check(channel, message);
-  return authenticity == Authenticity::kAuthentic ? std::optional(content) : std::nullopt;
+// Takes off the trailer.
+GuardVerdict Supervisor::Authenticated(const std::string& channel, std::string_view speaker, Bytes& message,
+                                       std::int64_t now_us) {
+  if (!authenticator_) return {};
+  const auto [authenticity, content] = authenticator_->Check(channel, message, now_us);
+  message = content;
+  return VerdictOn(authenticity, channel, speaker);
 }
 
 // Whether a function of the robot calls what it may not: that does nothing, and the call under way ends with a hold.
@@ -139,7 +141,7 @@ void Supervisor::OnCertified(Bytes message, std::int64_t now_us) noexcept {
 void Supervisor::OnWithdrawn(Bytes message, std::int64_t now_us) noexcept {
   if (IsMisuse(true)) return;
   Run(now_us, [&] {
-    const GuardWithdrawal answer = guard_.Withdraw(message);
+    const GuardWithdrawal answer = guard_.Withdraw(message, now_us);
     Measure();
     if (answer.verdict.ok())
       ReportEvent(now_us, execution_event_t::WITHDRAWN, answer.verdict.plan_id, answer.standing_steps,
@@ -158,8 +160,12 @@ void Supervisor::OnFault(Bytes message, std::int64_t now_us) noexcept {
 }
 
 void Supervisor::TakeFault(Bytes message, std::int64_t now_us) {
-  const std::optional<Bytes> authentic = Authentic(options_.fault, message);
-  const auto fault = authentic ? Decoded<fault_t>(*authentic) : std::nullopt;
+  const GuardVerdict verdict = Authenticated(options_.fault, "certifier", message, now_us);
+  if (!verdict.ok()) {
+    Measure();
+    return ReportRefusal(now_us, verdict);
+  }
+  const auto fault = Decoded<fault_t>(message);
   if (!fault || !StopsTheRobot(fault->cause)) return;
   // The certifier repeats a fault until it hears the reset, which the robot may have heard before.
   if (IsNotAfter(fault->utime, reset_utime_, now_us, options_.max_ahead_us)) return;
@@ -182,9 +188,11 @@ std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) noexcept {
 }
 
 std::string Supervisor::Obey(Bytes message, std::int64_t now_us) {
-  const std::optional<Bytes> authentic = Authentic(options_.command, message);
-  if (!authentic) return "the operator has not signed it";
-  const auto command = Decoded<command_t>(*authentic);
+  if (const GuardVerdict verdict = Authenticated(options_.command, "operator", message, now_us); !verdict.ok()) {
+    ++counts_.refused[std::string(GuardCauseName(verdict.cause))];
+    return verdict.message;
+  }
+  const auto command = Decoded<command_t>(message);
   if (!command) return "";
   if (std::string why = WhyNotFresh(command->utime, now_us, options_.max_age_us, options_.max_ahead_us); !why.empty())
     return why;

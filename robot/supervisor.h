@@ -51,7 +51,9 @@ executing is not affected by Expect.
 The functions of Robot may call Report and Expect, and Send also what takes messages, as if after the call that sends.
 If one of them calls anything else, this does nothing, and the robot holds as after an exception.
 
-With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command.
+With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command; and
+if they were signed since this robot's start and not ahead of its clock (bus/authentic.h): a fault recorded earlier
+halts no robot. The start is the first message of each of the two, guard and supervisor. What is refused is REFUSED.
 Messages that this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
 
 No clock, no bus, no thread, not thread-safe. It needs the guard and the message types only. All times are microseconds
@@ -155,7 +157,8 @@ class Supervisor final {
   void StopAfterException(std::int64_t utime) noexcept;
   [[nodiscard]] bool IsMisuse(bool may_be_sending) noexcept;
   void Measure();
-  [[nodiscard]] std::optional<Bytes> Authentic(const std::string& channel, Bytes message);
+  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, std::string_view speaker, Bytes& message,
+                                           std::int64_t now_us);
   [[nodiscard]] bool IsExecuting() const { return guard_.executing() != nullptr; }
   [[nodiscard]] std::int64_t PlanId() const;
   [[nodiscard]] int Step() const { return IsExecuting() ? step_ : -1; }

@@ -277,7 +277,9 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 
-std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) { return obstacles_.Update(bytes, now_us); }
+std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us, SenderId sender) {
+  return obstacles_.Update(bytes, now_us, sender);
+}
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
   const std::string fault = FaultOf(state, certifier_.problem().model->num_states());

@@ -85,7 +85,7 @@ class Gate final {
 
   /** Replaces the obstacles by those of an obstacles_t or obstacles_v2_t, by the rules of obstacles_in_force.h. On an
   error it changes nothing and returns the error's text; otherwise an empty text. */
-  [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
+  [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us, SenderId sender = {});
 
   /** Adds an executed transition to the observations, if the task has gate.learn. grounds().observations becomes the
   BLAKE2b-256 of the digest before and the message's bytes. If a check refuses the transition, nothing changes and the

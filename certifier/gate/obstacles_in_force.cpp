@@ -16,13 +16,23 @@ ObstaclesInForce::ObstaclesInForce(const Config& config)
     : options_(config.gate),
       clocks_(ClockBoundsOf(config)),
       dim_(static_cast<int>(config.problem->projection.rows())),
-      of_task_(config.obstacles) {
+      of_task_(config.obstacles),
+      state_{SoleSender(Microseconds(config.gate.obstacles_timeout_ms)), {}, {}, {}, {}, {}, 0, 0} {
   Put(true);
 }
 
-std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
+std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId sender) {
   if (options_.obstacles == ObstaclesSource::kTask)
     return "gate.obstacles is task: those of the task file are all there are";
+  switch (state_.sender.Hear(sender, now_us)) {
+    case SoleSender::Place::kOther: return state_.sender.WhyTwo(now_us);
+    case SoleSender::Place::kTakesOver:
+      state_.order = {};
+      state_.next.reset();
+      state_.unconfirmed = 0;
+      break;
+    case SoleSender::Place::kGoesOn: break;
+  }
   if (const auto moving = Decoded<obstacles_v2_t>(bytes)) return Take(*moving, now_us);
   if (const auto standing = Decoded<obstacles_t>(bytes)) return Take(*standing, now_us);
   return Doubt("not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) +
@@ -86,6 +96,7 @@ std::string ObstaclesInForce::Doubt(const std::string& why) {
 
 std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   if (options_.obstacles != ObstaclesSource::kBus) return {};
+  if (std::string two = state_.sender.WhyTwo(now_us); !two.empty()) return two;
   if (!state_.doubt.empty()) return "the last message was refused: " + state_.doubt;
   const auto& last = state_.order.newest();
   if (!last) return "none has been heard yet";
@@ -103,7 +114,7 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
       return "the last message is stamped " + Milliseconds(last->utime, now_us) + " ahead: the clock was set back";
     case Freshness::kFresh: break;
   }
-  return {};
+  return state_.sender.WhyNotAlone(now_us);
 }
 
 // The freshness of the last message. @pre there is one.
@@ -119,6 +130,7 @@ std::optional<std::int64_t> ObstaclesInForce::stamp() const {
 
 void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {
   state_ = before.state_;
+  state_.sender.Follow(Microseconds(options_.obstacles_timeout_ms));
   Put(true);
 }
 

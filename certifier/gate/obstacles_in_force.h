@@ -1,15 +1,18 @@
 /** The obstacles in force, and whether they are known to be complete. They depend on gate.obstacles of the task:
 
 `bus`: the obstacles of the task file and those of the last OBSTACLES message, an obstacles_t or an obstacles_v2_t. The
-messages of both types are one stream. An obstacle may move only if the task has gate.max_clock_error_ms; otherwise a
-message with it is refused. No message removes an obstacle of the file. The obstacles are known from the first usable
-message on, until one of these events:
+messages of both types are one stream, of one sender (lcmtypes/sole_sender.h). An obstacle may move only if the task has
+gate.max_clock_error_ms; otherwise a message with it is refused. No message removes an obstacle of the file. The
+obstacles are known from the first usable message on, until one of these events:
 - The last message's stamp is older than gate.obstacles_timeout_ms.
+- Signed: two senders are heard, or the sender has not been heard for gate.obstacles_timeout_ms alone. The messages of a
+second sender are refused until the first one has been silent for that time.
 - A message is refused, except for a late or repeated one, because its content is unknown. The next valid message ends
 this.
 - The last message taken was stamped further from its arrival than the task allows (stream_clock.h): the clock of its
 sender is off. It is taken, because what it shows may withdraw a plan. The next one decides anew.
-- A message is out of order: messages were lost, or two senders alternate and each knows a part. The message is taken.
+- A message is out of order: messages were lost, or, on a bus without signatures, two senders alternate and each knows a
+part. The message is taken.
 After a gap, one message in order confirms it; after a repeated sequence number, two do. A sender that restarts at 0
 with a later stamp is in order. If the last message of the old stream is still fresh, one more message in order is
 needed, because there may be a second sender.
@@ -32,6 +35,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
+#include "lcmtypes/sole_sender.h"
 #include "lcmtypes/stream_order.h"
 
 namespace forereach {
@@ -43,8 +47,8 @@ class ObstaclesInForce final {
 
   /** Takes the bytes of an obstacles_t or an obstacles_v2_t that arrived at `now_us`, completely or not at all. Its
   stamp has to be fresh (stamp.h), and it has to be newer than the last message or from a restarted sender
-  (stream_order.h). Returns the error, or an empty text. */
-  [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us);
+  (stream_order.h). Returns the error, or an empty text. @param sender of its signature. */
+  [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us, SenderId sender = {});
 
   /** The reason why all() may be incomplete at this time; empty if the obstacles are known. Cost O(1). */
   [[nodiscard]] std::string WhyUnknown(std::int64_t now_us) const;
@@ -64,6 +68,7 @@ class ObstaclesInForce final {
 
  private:
   struct State {
+    SoleSender sender;
     StreamOrder order;                 // of the messages taken
     std::vector<Obstacle> heard;       // from the last of them
     std::optional<Arrival> arrival;    // of the last of them

@@ -20,7 +20,6 @@ namespace forereach {
 namespace {
 
 constexpr int kUnindexedAtMost = 128;
-constexpr std::int64_t kClocksApartUs = 60'000'000;  // of two certifiers on one bus, at most
 // An index of so many is built in about a millisecond; of more it is built in a thread of its own.
 constexpr std::size_t kIndexedAtOnce = 4096;
 
@@ -70,6 +69,9 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
       plans_(config.gate),
+      robot_(Microseconds(config.gate.robot_timeout_ms)),
+      transitions_(robot_),
+      events_(robot_),
       advice_(clocks_.steady),
       reload_(config.path, channels_),
       contradictions_(config_),
@@ -104,7 +106,7 @@ void CertifierNode::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   if (!status || status->instance == charge_.self().instance) return;
   // Two certifiers must see each other even if their clocks disagree. Messages of a replayed log must not count.
-  if (FreshnessOf(status->utime, received.utime, kClocksApartUs, kClocksApartUs) != Freshness::kFresh)
+  if (FreshnessOf(status->utime, received.utime, kCertifiersApartUs, kCertifiersApartUs) != Freshness::kFresh)
     return Refuse(channels_.status, "a heartbeat from another time");
   LookAtCharge();
   const Charge::State before = charge_.state(), its_state = ChargeOf(status->state);
@@ -182,6 +184,7 @@ void CertifierNode::StandBy() {
   LeaveWaiting();
   ForgetRobot();
   plans_.Clear();
+  robot_ = transitions_ = events_ = SoleSender(Microseconds(gate_->options().robot_timeout_ms));
   if (!std::exchange(has_begun_, false) || gate_->certifier().violation()) return;
   if (compaction_.valid()) compaction_.wait();  // it works on *gate_
   gate_ = std::make_unique<Gate>(config_);
@@ -215,7 +218,7 @@ void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
 void CertifierNode::OnObstacles(const Received& received) {
   LookAtCharge();
   if (!has_begun_) return;
-  const std::string error = gate_->UpdateObstacles(received.bytes, received.utime);
+  const std::string error = gate_->UpdateObstacles(received.bytes, received.utime, received.sender);
   LookForObstacles(received.utime);
   if (error.empty()) return;
   reporter_.counts.obstacles_refused = true;
@@ -239,6 +242,7 @@ void CertifierNode::ForgetRobot() {
 void CertifierNode::OnRobotState(const Received& received) {
   LookAtCharge();
   if (!has_begun_) return;
+  robot_.Hear(received.sender, received.utime);
   robot_state_t state;
   if (Decode(received.bytes, state) != DecodeStatus::kOk) return Refuse(channels_.robot_state, "not a robot_state_t");
   if (FaultOf(state, config_.problem->model->num_states()).empty()) {
@@ -248,9 +252,14 @@ void CertifierNode::OnRobotState(const Received& received) {
   const std::string error = gate_->CheckRobotState(state, received.utime);
   if (!error.empty()) return Refuse(channels_.robot_state, error);
   last_state_ = state;
-  if (is_in_charge() && !gate_->options().shadow) plans_.SeeRobot(state, clocks_.steady());
-  if (state.mode == robot_state_t::FINISHED) return ForgetRobot();
-  watch_.SeeRobot(received.utime);
+  const bool is_one = robot_.WhyTwo(received.utime).empty();  // of two, nobody knows which one executes a plan
+  if (is_in_charge() && is_one && !gate_->options().shadow) plans_.SeeRobot(state, clocks_.steady());
+  if (state.mode == robot_state_t::FINISHED)
+    ForgetRobot();
+  else
+    watch_.SeeRobot(received.utime);
+  LookAtRobot(received.utime);
+  if (state.mode == robot_state_t::FINISHED) return;
   if (!is_in_charge()) return;  // the robot may execute another's plans
   if (const auto departure = conformance_.Check(state)) Fail(SliceLeft(*departure));
   // In shadow mode another certifier decides which plans the robot executes.
@@ -258,12 +267,23 @@ void CertifierNode::OnRobotState(const Received& received) {
   if (stranger && !gate_->options().shadow) Fail(UncertifiedPlan(*stranger));
 }
 
+// What was seen of the robot counts if one sender sends it.
+void CertifierNode::LookAtRobot(std::int64_t now_us) {
+  const std::string why = gate_->options().needs_robot_state ? robot_.WhyNotAlone(now_us) : robot_.WhyTwo(now_us);
+  if (!why.empty()) watch_.Set(Watch::Need::kRobotState, "waits for " + channels_.robot_state + ": " + why);
+}
+
 void CertifierNode::OnTransition(const Received& received) {
   LookAtCharge();
   if (!has_begun_) return;
+  transitions_.Hear(received.sender, received.utime);
+  const std::string two = transitions_.WhyTwo(received.utime);
   const auto transition = Decoded<transition_t>(received.bytes);
   if (transition) last_transition_ = *transition;
-  if (gate_->options().learns) Learn(received.bytes);  // first, because a false declaration explains a left slice
+  if (!two.empty())
+    Refuse(channels_.transition, two);
+  else if (gate_->options().learns)
+    Learn(received.bytes);  // first, because a false declaration explains a left slice
   if (!transition || !is_in_charge()) return;
   if (const auto departure = conformance_.Check(*transition)) Fail(SliceLeft(*departure));
 }
@@ -283,9 +303,11 @@ void CertifierNode::Learn(Bytes transition) {
 // The robot answers a withdrawal. Its other events are for people and records.
 void CertifierNode::OnEvent(const Received& received) {
   LookAtCharge();
+  events_.Hear(received.sender, received.utime);
   const auto event = Decoded<execution_event_t>(received.bytes);
   if (!event) return Refuse(channels_.event, "not an execution_event_t");
   if (event->kind != execution_event_t::WITHDRAWN) return;
+  if (const std::string two = events_.WhyTwo(received.utime); !two.empty()) return Refuse(channels_.event, two);
   // A certifier before this one has counted its withdrawals from 0, too.
   if (const std::string error = gate_->CheckFresh(event->utime, received.utime); !error.empty())
     return Refuse(channels_.event, error);
@@ -472,6 +494,9 @@ void CertifierNode::TakeReload() {
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);
   watch_.Follow(OptionsOf(config_));
+  for (SoleSender* stream : {&robot_, &transitions_, &events_})
+    stream->Follow(Microseconds(gate_->options().robot_timeout_ms));
+  LookAtRobot(clocks_.wall());
   issued_.Follow(gate_->options());
   plans_.Follow(gate_->options());
   contradictions_.Follow(config_);

@@ -16,6 +16,10 @@ Every candidate is answered once. The newest is decided first. The others are an
 of more than `gate.queue` the oldest are rejected. Obstacles, the robot's state, executed transitions and commands take
 effect as they arrive.
 
+The robot's state, its transitions and its events are each the stream of one sender (lcmtypes/sole_sender.h). With two
+senders of its state nothing is certified, and with two of the others these do not count. What one of them reports as
+wrong counts from either.
+
 When obstacles, the task or the truth of the declaration change, the certified plans that may be executed are judged
 again before any waiting candidate. What no longer holds of them is sent on bus.channels.withdrawn until the robot
 answers.
@@ -56,6 +60,7 @@ that the plan was handed to the bus before. */
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "lcmtypes/sole_sender.h"
 
 namespace forereach {
 
@@ -110,6 +115,7 @@ class CertifierNode final : public Node {
 
   void OnObstacles(const Received& received);
   void OnRobotState(const Received& received);
+  void LookAtRobot(std::int64_t now_us);
   void OnTransition(const Received& received);
   void OnEvent(const Received& received);
   void OnCommand(const Received& received);
@@ -146,7 +152,8 @@ class CertifierNode final : public Node {
   Conformance conformance_;
   IssuedPlans issued_;
   PlansInForce plans_;
-  bool withdraws_more_ = false;  // than one tick sends
+  bool withdraws_more_ = false;              // than one tick sends
+  SoleSender robot_, transitions_, events_;  // who sends the robot's three streams
 
   CandidateQueue queue_;
   AdviceGiver advice_;

@@ -66,7 +66,7 @@ void StatusReporter::AddBusCounts(certifier_status_v3_t& status) const {
   status.refused_forged = refusals.forged;
   status.refused_foreign = refusals.foreign;
   status.is_unsigned = parts_.channels.keys ? 0 : 1;
-  status.refused_replayed = refusals.replayed;
+  status.refused_replayed = refusals.replayed + refusals.old + refusals.ahead;
 }
 
 certifier_status_v3_t StatusReporter::Report(const Gate& gate, std::int64_t now_us, std::int64_t steady_us) {

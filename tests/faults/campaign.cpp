@@ -21,6 +21,7 @@
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "bus/process.h"
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
 #include "forereach/advice_t.hpp"
@@ -394,6 +395,78 @@ class Campaign final {
         },
         options_.others);
   }
+
+  // While two senders are heard, and for the stream's timeout afterwards, every candidate is refused for that.
+  void DemandNoneFor(Row& row, Rig& rig, milliseconds time, std::int16_t cause, std::int64_t& told) {
+    const std::int64_t before = rig.witness().certificates();
+    const auto end = std::chrono::steady_clock::now() + time;
+    while (std::chrono::steady_clock::now() < end) {
+      const auto answer = CauseOfACandidate(rig);
+      Demand(row, answer == cause || answer == decision_t::CAUSE_FAULT || answer == decision_t::CAUSE_NOT_ARMED,
+             "a candidate was answered " + std::string(answer ? CauseName(*answer) : "nothing") + " with two senders");
+      told += answer == cause;
+      rig.Listen(milliseconds(20));
+    }
+    Demand(row, rig.witness().certificates() == before, "it certified while two senders were heard");
+  }
+
+  static constexpr milliseconds kTwoAreThere{2000}, kIsHeard{50};
+  static constexpr std::array<int, 3> kTimesTheRate{1, 3, 10};
+
+  // The second one was left running, and sees nothing.
+  void TwoPerceptions() {
+    std::int64_t told = 0;
+    ObstacleTries(
+        "Two senders of OBSTACLES with one key, the second sees nothing, at 1, 3 and 10 times the rate (signed)",
+        [&](Row& row, Rig& rig, int i) {
+          GateOptions faster = rig.config().gate;
+          faster.obstacles_timeout_ms /= kTimesTheRate[static_cast<std::size_t>(i) % kTimesTheRate.size()];
+          const Perception second(OpenBusOfAllRoles(rig.config().bus), rig.config().bus.obstacles, faster, {});
+          if (i % 2 == 1) rig.End(Rig::kCertifier, SIGKILL), rig.Start(Rig::kCertifier);
+          rig.Listen(i % 2 == 1 ? milliseconds(800) : kIsHeard);
+          DemandNoneFor(row, rig, kTwoAreThere, decision_t::CAUSE_NO_OBSTACLES, told);
+        });
+    Remark(rows_.back(), std::to_string(told) + " candidates answered no_obstacles while two were heard");
+  }
+
+  // The second one stands, at up to ten times the rate.
+  void TwoRobots() {
+    Rig rig(DemoTask());
+    Row& row = Begin("A second robot under the same name, at 1, 3 and 10 times the rate (signed)", options_.others);
+    std::int64_t told = 0, sequence = Witness::kFirstLie;
+    Tries(
+        row, rig,
+        [&](int i) {
+          const milliseconds period(150 / kTimesTheRate[static_cast<std::size_t>(i) % kTimesTheRate.size()]);
+          std::atomic<bool> ends = false;
+          std::thread second([&] {
+            const auto bus = OpenBusOfAllRoles(rig.config().bus);
+            for (; !ends; std::this_thread::sleep_for(period)) {
+              robot_state_t state = State(rig);
+              state.sequence = sequence++;
+              bus->Publish(rig.config().bus.robot_state, state);
+            }
+          });
+          rig.Listen(kIsHeard);
+          DemandNoneFor(row, rig, kTwoAreThere, decision_t::CAUSE_NOT_ARMED, told);
+          rig.Listen(kHeartbeat);
+          const auto& status = rig.witness().status();
+          Demand(row,
+                 status && (status->fault != 0 || GetText(status->message).find("two senders") != std::string::npos),
+                 "the heartbeat does not name two senders");
+          ends = true;
+          second.join();
+        },
+        options_.others);
+    Remark(row, std::to_string(told) + " candidates answered not_armed while two were heard");
+  }
+
+  void Senders() {
+    TwoPerceptions();
+    TwoRobots();
+    OldMessages();
+  }
+  void OldMessages();
 
   void StateDisks();
 
@@ -1051,10 +1124,74 @@ const std::vector<Campaign::Kind> Campaign::kKinds{
     {"latch", &Campaign::LatchedKills},  {"statedisk", &Campaign::StateDisks},
     {"strangers", &Campaign::Strangers}, {"obstacles", &Campaign::Obstacles},
     {"moving", &Campaign::Moving},       {"times", &Campaign::Times},
-    {"forgeries", &Campaign::Forgeries}, {"flood", &Campaign::Flood},
-    {"datagrams", &Campaign::Datagrams}, {"disks", &Campaign::Disks},
-    {"gone", &Campaign::Gone},           {"route", &Campaign::Routes},
-    {"reload", &Campaign::BadReload}};
+    {"senders", &Campaign::Senders},     {"forgeries", &Campaign::Forgeries},
+    {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
+    {"disks", &Campaign::Disks},         {"gone", &Campaign::Gone},
+    {"route", &Campaign::Routes},        {"reload", &Campaign::BadReload}};
+
+// Each channel's speaker has signed them: before the processes began, or ahead of their clocks. What was heard of the
+// processes before them is sent again as it was.
+void Campaign::OldMessages() {
+  Rig rig(DemoTask());
+  Row& row = Begin(
+      "On each signed channel: signed by its speaker before the start of certifier and robot, or while a clock was "
+      "ahead",
+      options_.others);
+  const BusOptions& channels = rig.config().bus;
+  const Speakers speakers = channels.speakers();
+  std::map<std::string, Sent> heard;
+  rig.open_bus().Subscribe(Bus::kEveryChannel, [&](const Received& r) {
+    if (speakers.contains(r.channel)) heard[r.channel].assign(r.raw.begin(), r.raw.end());
+  });
+  std::int64_t obeyed = 0, sent = 0, refused = 0;
+  const std::int64_t rig_began = WallClockUs();
+  rig.Hear(channels.event, [&](const Received& r) {
+    const auto event = Decoded<execution_event_t>(r.bytes);
+    obeyed +=
+        event &&
+        (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
+         (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
+  });
+  Tries(
+      row, rig,
+      [&](int) {
+        rig.Listen(milliseconds(700));
+        const std::map<std::string, Sent> recorded = heard;
+        auto harmful = HarmfulOf(rig, recorded);
+        transition_t contradiction =
+            heard.contains(channels.transition)
+                ? Decoded<transition_t>(WithoutSignature(heard.at(channels.transition))).value_or(transition_t{})
+                : transition_t{};
+        contradiction.next_state[0] += 1;
+        harmful[channels.transition] = Encode(contradiction);
+        for (const Rig::Role role : {Rig::kCertifier, Rig::kRobot}) rig.End(role), rig.Start(role);
+        rig.witness().Forget();
+        const auto begun = [&] { return rig.witness().status().has_value(); };
+        Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
+        rig.Listen(kHeartbeat);
+        const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+        const std::int64_t obeyed_before = obeyed, now = WallClockUs();
+        constexpr std::int64_t kHourUs = 3'600'000'000;
+        for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
+        for (const auto& [channel, message] : harmful)
+          for (const std::int64_t when : {now - kHourUs, rig_began - 5'000'000, now + 61'000'000, now + kHourUs})
+            rig.open_bus().Publish(
+                channel,
+                Bytes(Signer(rig.keys(), channels.bus_name()).Sign(speakers.at(channel), channel, message, when))),
+                ++sent;
+        rig.Listen(kHeartbeat);
+        const auto& status = rig.witness().status();
+        const auto refuses = [&] { return status && status->refused_replayed > before.refused_replayed; };
+        Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
+        Demand(row, !rig.witness().fault(), "a fault was believed or latched");
+        Demand(row, obeyed == obeyed_before, "the robot obeyed a fault, a reset or a certificate");
+        Demand(row, status && status->version == before.version, "a reload was obeyed");
+        if (status) refused += status->refused_replayed - before.refused_replayed;
+      },
+      options_.others);
+  Remark(row, std::to_string(sent) + " sent, " + std::to_string(refused) +
+                  " times the certifier refused one, on the channels that it hears");
+}
 
 // A small file system of its own for the log, filled, made read-only, and given back.
 void Campaign::Disks() {

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -23,9 +24,16 @@ constexpr std::chrono::milliseconds kLastWords{50};  // what a process sent befo
 constexpr std::chrono::seconds kDriveAtMost{6};      // at the next Heal; it takes ten, and a try and a Heal two each
 constexpr std::chrono::seconds kSilent{5};           // a robot whose clock went back waits until it is where it was
 constexpr std::size_t kTailBytes = 1000;
+constexpr std::int64_t kEndOfTime = std::numeric_limits<std::int64_t>::max();
 
 const std::array<std::string, Rig::kRoles> kPrograms{FOREREACH_LOGGER, FOREREACH_CERTIFIER, FOREREACH_PLANNER,
                                                      FOREREACH_ROBOT_SIM};
+
+// A receiver's clock for which nothing is old or ahead: it starts at 0, and then it is the end of time.
+struct AnyTime {
+  std::int64_t operator()() { return std::exchange(is_start, false) ? 0 : kEndOfTime; }
+  bool is_start = true;
+};
 
 std::string LastLine(std::string text) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
@@ -71,9 +79,9 @@ Rig::Rig(const std::string& task, const Options& options)
   config_.bus.key = key_path_;
   open_ = OpenBus(near_url_);
   signed_ = OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); });
-  // Clocks go back: it hears whatever is authentic, from whatever time.
+  // Where clocks go back and ahead it hears whatever is authentic, from whatever time.
   heard_ = OpenSignedBus(near_url_, LoadPublicKeys(key_path_), config_.bus.bus_name(), config_.bus.speakers(),
-                         [] { return 0; });
+                         options_.settable_clocks ? Clock(AnyTime{}) : Clock(WallClockUs));
   witness_ = std::make_unique<Witness>(*heard_, config_.bus, options_.relayed);
   if (config_.gate.obstacles == ObstaclesSource::kBus)
     perception_ = std::make_unique<Perception>(OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); }),

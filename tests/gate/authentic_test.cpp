@@ -15,13 +15,14 @@ namespace forereach {
 namespace authentic_test {
 
 constexpr std::int64_t kBegun = 1'000'000;
-constexpr std::int64_t kFar = std::numeric_limits<std::int64_t>::max() - 1000;
+constexpr std::int64_t kClock = kBegun + 1000;  // of the receiver
+constexpr std::int64_t kHour = 3'600'000'000;
 const std::string kBus = "bus";
 const std::vector<std::uint8_t> kMessage{10, 20, 30};
 // One channel of each role, named after it.
 const Speakers kSpeakers = [] {
   Speakers speakers;
-  for (const Role role : kAllRoles) speakers[std::string(RoleName(role))] = role;
+  for (const Role role : kAllRoles) speakers.emplace(RoleName(role), role);
   return speakers;
 }();
 
@@ -33,7 +34,7 @@ std::vector<std::uint8_t> Signed(std::int64_t now = kBegun + 1, const KeyRing& k
 
 Authenticity Judge(const std::vector<std::uint8_t>& bytes, const std::string& channel = "certifier",
                    const KeyRing& keys = TestKeys()) {
-  return Receiver(keys).Check(channel, bytes).first;
+  return Receiver(keys).Check(channel, bytes, kClock).first;
 }
 
 TEST(Authentic, TheMessageComesOutAsItWas) {
@@ -41,7 +42,7 @@ TEST(Authentic, TheMessageComesOutAsItWas) {
   EXPECT_EQ(bytes.size(), kMessage.size() + kTrailerBytes);
   EXPECT_EQ(kTrailerBytes, 112u);
   Authenticator authenticator = Receiver();
-  const auto [authenticity, message] = authenticator.Check("certifier", bytes);
+  const auto [authenticity, message] = authenticator.Check("certifier", bytes, kClock);
   EXPECT_EQ(authenticity, Authenticity::kAuthentic);
   EXPECT_TRUE(std::ranges::equal(message, kMessage));
   EXPECT_TRUE(std::ranges::equal(WithoutSignature(bytes), kMessage));
@@ -120,8 +121,9 @@ TEST(Authentic, HoldsForItsChannelItsRobotAndItsBus) {
       Signer(TestKeys(), "other bus", 1).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 1);
   EXPECT_EQ(Judge(of_other_bus), Authenticity::kForeign);
   Authenticator authenticator = Receiver();
-  EXPECT_EQ(authenticator.Check("certifier", of_other_bus).first, Authenticity::kForeign);
-  EXPECT_EQ(authenticator.Check("certifier", Signed()).first, Authenticity::kAuthentic) << "its counter is not used up";
+  EXPECT_EQ(authenticator.Check("certifier", of_other_bus, kClock).first, Authenticity::kForeign);
+  EXPECT_EQ(authenticator.Check("certifier", Signed(), kClock).first, Authenticity::kAuthentic)
+      << "its counter is not used up";
 }
 
 TEST(Authentic, ANameThatIsNotTheRobotsDoesNotPassWithItsKeys) {
@@ -137,7 +139,7 @@ TEST(Authentic, ACounterIsTakenOnce) {
   const auto first = sign(signer, kBegun + 1), second = sign(signer, kBegun + 1);
   Authenticator authenticator = Receiver();
   const auto judge = [&](const std::vector<std::uint8_t>& bytes) {
-    return authenticator.Check("certifier", bytes).first;
+    return authenticator.Check("certifier", bytes, kClock).first;
   };
   EXPECT_EQ(judge(second), Authenticity::kAuthentic);
   EXPECT_EQ(judge(second), Authenticity::kReplayed);
@@ -146,13 +148,91 @@ TEST(Authentic, ACounterIsTakenOnce) {
   EXPECT_EQ(judge(third), Authenticity::kAuthentic);
   EXPECT_EQ(judge(third), Authenticity::kReplayed) << "nor is a later one, once it was taken";
   EXPECT_EQ(judge(sign(other, kBegun + 1)), Authenticity::kAuthentic) << "each sender for itself";
-  EXPECT_EQ(judge(sign(signer, 0)), Authenticity::kAuthentic) << "a clock set back does not stop it";
+  EXPECT_EQ(judge(sign(signer, kBegun + 3 - Signer::kSetBackUs)), Authenticity::kAuthentic)
+      << "a clock set back a little does not stop it";
   EXPECT_EQ(authenticator.refusals().replayed, 3);
 }
 
 TEST(Authentic, RefusesMessagesFromBeforeTheReceiverBegan) {
-  EXPECT_EQ(Judge(Signed(kBegun)), Authenticity::kReplayed);
+  EXPECT_EQ(Judge(Signed(kBegun)), Authenticity::kOld);
   EXPECT_EQ(Judge(Signed(kBegun + 1)), Authenticity::kAuthentic);
+  EXPECT_EQ(Judge(Signed(-kHour)), Authenticity::kOld);
+}
+
+TEST(Authentic, NothingFromAheadOfTheReceiversClock) {
+  EXPECT_EQ(Judge(Signed(kClock + kClockErrorUs)), Authenticity::kAuthentic);
+  EXPECT_EQ(Judge(Signed(kClock + kClockErrorUs + 1)), Authenticity::kAhead);
+  EXPECT_EQ(Judge(Signed(std::numeric_limits<std::int64_t>::max())), Authenticity::kAhead);
+  Authenticator lenient(TestKeys(), kBus, {{"certifier", {Role::kCertifier, kHour}}}, kBegun);
+  EXPECT_EQ(lenient.Check("certifier", Signed(kClock + kHour + 1), kClock).first, Authenticity::kAhead);
+  EXPECT_EQ(lenient.Check("certifier", Signed(kClock + kHour), kClock).first, Authenticity::kAuthentic)
+      << "a channel may allow more";
+  EXPECT_EQ(lenient.refusals().ahead, 1);
+  EXPECT_EQ(lenient.refusals().all(), 1);
+}
+
+// Somebody keeps what was signed while a clock was ahead, for a receiver that starts later.
+TEST(Authentic, WhatWasSignedWhileAClockWasAheadCountsForNoReceiverThatStartsAfterwards) {
+  const auto kept = Signed(kBegun + kHour);
+  for (const std::int64_t start : {kBegun, kBegun + kHour / 2, kBegun + kHour - kClockErrorUs - 1}) {
+    Authenticator receiver(TestKeys(), kBus, kSpeakers, start);
+    EXPECT_EQ(receiver.Check("certifier", kept, start).first, Authenticity::kAhead);
+  }
+  Authenticator receiver(TestKeys(), kBus, kSpeakers, kBegun + kHour);
+  EXPECT_EQ(receiver.Check("certifier", kept, kBegun + kHour).first, Authenticity::kOld);
+}
+
+TEST(Authentic, WithoutAStartTheFirstMessageTellsIt) {
+  const auto receiver = [] { return Authenticator(TestKeys(), kBus, kSpeakers, std::nullopt); };
+  EXPECT_EQ(receiver().Check("certifier", Signed(kHour - kClockErrorUs), kHour).first, Authenticity::kOld);
+  EXPECT_EQ(receiver().Check("certifier", Signed(kHour - kClockErrorUs + 1), kHour).first, Authenticity::kAuthentic)
+      << "clocks may differ by so much";
+  Authenticator later = receiver();
+  EXPECT_EQ(later.Check("certifier", kMessage, kHour).first, Authenticity::kUnsigned);
+  EXPECT_EQ(later.Check("certifier", Signed(kHour - kClockErrorUs), kHour + kClockErrorUs).first, Authenticity::kOld)
+      << "the first of any kind";
+}
+
+TEST(Authentic, ASenderWhoseClockIsSetBackGoesOnAsAnother) {
+  Signer signer(TestKeys(), kBus, 1);
+  const auto sign = [&](std::int64_t now) { return signer.Sign(Role::kCertifier, "certifier", kMessage, now); };
+  Authenticator authenticator = Receiver();
+  EXPECT_EQ(SenderOf(sign(kClock)), 1u);
+  const auto ahead = sign(kClock + kHour);
+  EXPECT_EQ(SenderOf(ahead), 1u);
+  EXPECT_EQ(authenticator.Check("certifier", ahead, kClock).first, Authenticity::kAhead);
+  EXPECT_EQ(SenderOf(sign(kClock + kHour - Signer::kSetBackUs)), 1u);
+  const auto right_again = sign(kClock);
+  EXPECT_NE(SenderOf(right_again), 1u);
+  EXPECT_EQ(SenderOf(sign(kClock + 1)), SenderOf(right_again));
+  EXPECT_EQ(authenticator.Check("certifier", right_again, kClock).first, Authenticity::kAuthentic);
+}
+
+TEST(Authentic, AReceiverWhoseClockIsSetBackTakesThatForItsStart) {
+  Authenticator authenticator = Receiver();
+  Signer signer(TestKeys(), kBus, 1);
+  const auto judge = [&](std::int64_t now) {
+    return authenticator.Check("certifier", signer.Sign(Role::kCertifier, "certifier", kMessage, now), now).first;
+  };
+  EXPECT_EQ(judge(kBegun + 1), Authenticity::kAuthentic);
+  EXPECT_EQ(judge(kBegun - kHour), Authenticity::kAuthentic) << "all clocks were set back";
+  EXPECT_EQ(judge(kBegun - kHour + 1), Authenticity::kAuthentic);
+  const auto earlier =
+      Signer(TestKeys(), kBus, 2).Sign(Role::kCertifier, "certifier", kMessage, kBegun - kHour - kClockErrorUs);
+  EXPECT_EQ(authenticator.Check("certifier", earlier, kBegun - kHour + 2).first, Authenticity::kOld);
+}
+
+TEST(Authentic, TheSenderIsInTheTrailer) {
+  EXPECT_EQ(SenderOf(Signed()), 1u);
+  EXPECT_EQ(SenderOf(kMessage), std::nullopt);
+}
+
+TEST(Authentic, RefusalsAreSaidByTheirCause) {
+  EXPECT_EQ(DescribeRefusals({}), "");
+  EXPECT_EQ(DescribeRefusals({.unsigned_ones = 1, .forged = 2, .replayed = 3}), "6 (unsigned 1, forged 2, replayed 3)");
+  EXPECT_EQ(DescribeRefusals({.foreign = 1, .old = 2, .ahead = 3}),
+            "6 (unsigned 0, forged 0, replayed 0, signed before the start 2, signed ahead of the clock 3, of another "
+            "bus 1)");
 }
 
 TEST(Authentic, AnAlteredBodyDoesNotUseTheCounterUp) {
@@ -161,8 +241,8 @@ TEST(Authentic, AnAlteredBodyDoesNotUseTheCounterUp) {
   auto altered = bytes;
   altered[0] ^= 1;
   for (int i = 0; i + 1 < Authenticator::kMaxTries; ++i)
-    EXPECT_EQ(authenticator.Check("certifier", altered).first, Authenticity::kForged);
-  EXPECT_EQ(authenticator.Check("certifier", bytes).first, Authenticity::kAuthentic);
+    EXPECT_EQ(authenticator.Check("certifier", altered, kClock).first, Authenticity::kForged);
+  EXPECT_EQ(authenticator.Check("certifier", bytes, kClock).first, Authenticity::kAuthentic);
 }
 
 // Each such try costs an Ed25519: behind one trailer they end.
@@ -174,9 +254,9 @@ TEST(Authentic, ATrailerUnderManyAlteredBodiesIsRefusedAndNoOther) {
   auto altered = lost;
   altered[0] ^= 1;
   for (int i = 0; i < Authenticator::kMaxTries; ++i)
-    EXPECT_EQ(authenticator.Check("certifier", altered).first, Authenticity::kForged);
-  EXPECT_EQ(authenticator.Check("certifier", lost).first, Authenticity::kForged);
-  EXPECT_EQ(authenticator.Check("certifier", next).first, Authenticity::kAuthentic);
+    EXPECT_EQ(authenticator.Check("certifier", altered, kClock).first, Authenticity::kForged);
+  EXPECT_EQ(authenticator.Check("certifier", lost, kClock).first, Authenticity::kForged);
+  EXPECT_EQ(authenticator.Check("certifier", next, kClock).first, Authenticity::kAuthentic);
 }
 
 TEST(Authentic, RefusesAReplayOfASenderThatItHasForgotten) {
@@ -185,9 +265,10 @@ TEST(Authentic, RefusesAReplayOfASenderThatItHasForgotten) {
   for (std::size_t i = 0; i < 3 * Authenticator::kMaxSenders; ++i) {
     sent.push_back(Signer(TestKeys(), kBus, i)
                        .Sign(Role::kPlanner, "planner", kMessage, kBegun + 1 + static_cast<std::int64_t>(i)));
-    EXPECT_EQ(authenticator.Check("planner", sent.back()).first, Authenticity::kAuthentic) << i;
+    EXPECT_EQ(authenticator.Check("planner", sent.back(), kClock).first, Authenticity::kAuthentic) << i;
   }
-  for (const auto& bytes : sent) EXPECT_EQ(authenticator.Check("planner", bytes).first, Authenticity::kReplayed);
+  for (const auto& bytes : sent)
+    EXPECT_EQ(authenticator.Check("planner", bytes, kClock).first, Authenticity::kReplayed);
 }
 
 // Who holds the planner's secret and the group key can lock out planners. Nobody else's counters are touched.
@@ -196,27 +277,30 @@ TEST(Authentic, AStolenKeyCannotUseUpCountersOfAnotherRole) {
   Authenticator authenticator = Receiver();
   Signer certifier(TestKeys(), kBus, 1);
   const auto certified = [&] {
-    return authenticator.Check("certifier", certifier.Sign(Role::kCertifier, "certifier", kMessage, kBegun + 1)).first;
+    return authenticator.Check("certifier", certifier.Sign(Role::kCertifier, "certifier", kMessage, kBegun + 1), kClock)
+        .first;
   };
   EXPECT_EQ(certified(), Authenticity::kAuthentic);
   for (std::uint64_t sender = 0; sender < 4 * Authenticator::kMaxSenders; ++sender) {
-    EXPECT_EQ(
-        authenticator
-            .Check("planner", Signer(stolen, kBus, sender)
-                                  .Sign(Role::kPlanner, "planner", kMessage, kFar + static_cast<std::int64_t>(sender)))
-            .first,
-        Authenticity::kAuthentic);
-    EXPECT_EQ(
-        authenticator.Check("certifier", Signer(stolen, kBus, sender).Sign(Role::kPlanner, "certifier", kMessage, kFar))
-            .first,
-        Authenticity::kForged);
+    EXPECT_EQ(authenticator
+                  .Check("planner",
+                         Signer(stolen, kBus, sender)
+                             .Sign(Role::kPlanner, "planner", kMessage, kClock + static_cast<std::int64_t>(sender)),
+                         kClock)
+                  .first,
+              Authenticity::kAuthentic);
+    EXPECT_EQ(authenticator
+                  .Check("certifier", Signer(stolen, kBus, sender).Sign(Role::kPlanner, "certifier", kMessage, kClock),
+                         kClock)
+                  .first,
+              Authenticity::kForged);
   }
   EXPECT_EQ(certified(), Authenticity::kAuthentic) << "its own sender number was among those";
-  EXPECT_EQ(
-      authenticator
-          .Check("certifier", Signer(TestKeys(), kBus, 999).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 2))
-          .first,
-      Authenticity::kAuthentic)
+  EXPECT_EQ(authenticator
+                .Check("certifier",
+                       Signer(TestKeys(), kBus, 999).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 2), kClock)
+                .first,
+            Authenticity::kAuthentic)
       << "one that has just started";
 }
 
@@ -229,11 +313,12 @@ TEST(Authentic, PublicKeysAreEnoughToJudgeALog) {
   Authenticator authenticator(open, std::nullopt, kSpeakers, kBegun);
   auto altered = bytes;
   altered[0] ^= 1;
-  EXPECT_EQ(authenticator.Check("certifier", altered).first, Authenticity::kForged);
-  EXPECT_EQ(authenticator.Check("certifier", bytes).first, Authenticity::kAuthentic);
-  EXPECT_EQ(authenticator.Check("certifier", bytes).first, Authenticity::kReplayed);
+  EXPECT_EQ(authenticator.Check("certifier", altered, kClock).first, Authenticity::kForged);
+  EXPECT_EQ(authenticator.Check("certifier", bytes, kClock).first, Authenticity::kAuthentic);
+  EXPECT_EQ(authenticator.Check("certifier", bytes, kClock).first, Authenticity::kReplayed);
   const auto foreign = Signer(all, "other bus").Sign(Role::kCertifier, "certifier", kMessage, kBegun + 2);
-  EXPECT_EQ(authenticator.Check("certifier", foreign).first, Authenticity::kForeign) << "the first one's bus counts";
+  EXPECT_EQ(authenticator.Check("certifier", foreign, kClock).first, Authenticity::kForeign)
+      << "the first one's bus counts";
   EXPECT_THROW((void)Signer(open, kBus).Sign(Role::kCertifier, "certifier", kMessage, 1), std::logic_error);
 }
 

@@ -37,6 +37,8 @@ namespace signed_channels_test {
 
 using Message = std::vector<std::uint8_t>;
 
+constexpr std::int64_t kHour = 3'600'000'000;
+
 // A node on a signed bus of its own, a message that has an effect on it, and what the effect is seen in.
 struct Listener {
   std::unique_ptr<Bus> bus;
@@ -136,7 +138,7 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
   Listener listener_;
 };
 
-const std::map<std::string, Role> kSpeakers{
+const Speakers kSpeakers{
     {"PLAN_CANDIDATE", Role::kPlanner},   {"PLAN_DECISION", Role::kCertifier}, {"PLAN_CERTIFIED", Role::kCertifier},
     {"PLAN_WITHDRAWN", Role::kCertifier}, {"PLAN_ADVICE", Role::kCertifier},   {"ROBOT_STATE", Role::kRobot},
     {"OBSTACLES", Role::kPerception},     {"TRANSITION", Role::kRobot},        {"CERTIFIER_STATUS", Role::kCertifier},
@@ -236,11 +238,15 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
   });
 }
 
-TEST(SignedChannels, EveryChannelHasItsSpeaker) { EXPECT_EQ(BusOptions{}.speakers(), kSpeakers); }
+TEST(SignedChannels, AreTheseAndTheirSpeakers) {
+  EXPECT_EQ(BusOptions{}.speakers(), kSpeakers);
+  for (const auto& [channel, speaker] : BusOptions{}.speakers())
+    EXPECT_EQ(speaker.max_ahead_us, channel == "CERTIFIER_STATUS" ? kCertifiersApartUs : kClockErrorUs) << channel;
+}
 
 TEST_P(SignedChannelsTest, OnlyWhatItsSpeakerSignsNowHasAnEffect) {
   const std::string& channel = GetParam();
-  const Role speaker = kSpeakers.at(channel);
+  const Role speaker = kSpeakers.at(channel).role;
   const auto earlier = WallClockUs();
   listener_ = ListenerOn(channel);
   for (int i = 0; i < 4; ++i) Step();
@@ -266,10 +272,17 @@ TEST_P(SignedChannelsTest, OnlyWhatItsSpeakerSignsNowHasAnEffect) {
   altered[8] ^= 1;
   send_refused(altered);
   // Of an earlier session: genuine, and signed before this one began.
-  send_refused(
-      Signer(*keys_, config_.bus.bus_name()).Sign(speaker, channel, listener_.make(++number), earlier - 1'000'000));
+  for (const std::int64_t ago : {std::int64_t{1'000'000}, kHour})
+    send_refused(
+        Signer(*keys_, config_.bus.bus_name()).Sign(speaker, channel, listener_.make(++number), earlier - ago));
+  // Signed while a clock was ahead, by more than the minute that two certifiers may be apart.
+  for (const std::int64_t ahead : {kHour / 30, kHour})
+    send_refused(
+        Signer(*keys_, config_.bus.bus_name()).Sign(speaker, channel, listener_.make(++number), WallClockUs() + ahead));
   AwaitRefusals(refused);
   EXPECT_EQ(listener_.state(), before);
+  EXPECT_EQ(listener_.bus->refusals().old, 2);
+  EXPECT_EQ(listener_.bus->refusals().ahead, 2);
 
   Message genuine;
   for (int tries = 0; tries < 3 && listener_.state() == before; ++tries) {

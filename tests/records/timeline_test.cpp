@@ -73,7 +73,7 @@ class TimelineTest : public testing::Test {
   }
 
   // One of the task's own transitions is seen again.
-  void Transition() {
+  transition_t NextTransition() {
     const Transitions& known = config_.problem->transitions;
     const int n = config_.problem->model->num_states(), m = config_.problem->model->num_inputs();
     transition_t message{};
@@ -83,6 +83,10 @@ class TimelineTest : public testing::Test {
     message.num_inputs = static_cast<std::int16_t>(m);
     for (int k = 0; k < n; ++k) message.state[k] = known.z(0, k), message.next_state[k] = known.x_next(0, k);
     for (int k = 0; k < m; ++k) message.input[k] = known.z(0, n + k);
+    return message;
+  }
+  void Transition() {
+    const transition_t message = NextTransition();
     EXPECT_EQ(gate_->Learn(Encode(message)), "");
     Append(config_.bus.transition, message);
   }
@@ -111,6 +115,30 @@ class TimelineTest : public testing::Test {
     after->Inherit(*gate_);
     gate_ = std::move(after);
     Heartbeat(sequence, version);
+  }
+
+  // From now on senders are told apart, as on a signed bus.
+  template <class Message>
+  void AppendSigned(const std::string& channel, const Message& message, std::uint64_t sender) {
+    Signer signer(TestKeys(), "the bus", sender);
+    writer_->Append(now_, channel, signer.Sign(BusOptions{}.speakers().at(channel), channel, Encode(message), now_));
+    ASSERT_TRUE(writer_->Flush());
+  }
+  // @param is_taken by the certifier.
+  void ObstaclesBy(std::uint64_t sender, double x, bool is_taken) {
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
+    message.utime = ++now_;
+    message.sequence = obstacles_++;
+    EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_, sender).empty(), is_taken);
+    AppendSigned(config_.bus.obstacles, message, sender);
+  }
+  // @param is_learned by the certifier.
+  void TransitionBy(std::uint64_t sender, bool is_learned) {
+    const transition_t message = NextTransition();
+    if (is_learned) {
+      EXPECT_EQ(gate_->Learn(Encode(message)), "");
+    }
+    AppendSigned(config_.bus.transition, message, sender);
   }
 
   // Each user of the timeline finds the grounds that each decision names.
@@ -213,6 +241,48 @@ TEST_F(TimelineTest, ReconstructsADecisionMadeBeforeTheLatestObstaclesArrived) {
   Obstacles(60, false);
   Certify();
   Obstacles(70);
+  Certify();
+  ExpectAllAgree();
+}
+
+// On a signed bus the certifier goes by the sender, and so does who reads its log.
+TEST_F(TimelineTest, OfTwoObstacleSendersTheSecondIsNotTakenUntilTheFirstIsSilent) {
+  Restart();
+  ObstaclesBy(1, 80, true);
+  Certify();
+  ObstaclesBy(2, 60, false);
+  Certify();
+  now_ += 900'000;
+  ObstaclesBy(1, 70, true);
+  Certify();
+  now_ += 999'997;
+  ObstaclesBy(2, 60, false);
+  Certify();
+  ObstaclesBy(2, 60, true);
+  Certify();
+  Reload(1, 2);
+  ObstaclesBy(1, 90, false);
+  Certify();
+  Restart();
+  ObstaclesBy(1, 90, true);
+  Certify();
+  ExpectAllAgree();
+}
+
+TEST_F(TimelineTest, TransitionsOfTwoSendersAreNotLearned) {
+  Restart();
+  TransitionBy(1, true);
+  Certify();
+  TransitionBy(2, false);
+  Certify();
+  now_ += 999'000;
+  TransitionBy(1, false);
+  Certify();
+  now_ += 1'000;
+  TransitionBy(1, true);
+  Certify();
+  Restart();
+  TransitionBy(2, true);
   Certify();
   ExpectAllAgree();
 }

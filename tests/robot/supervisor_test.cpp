@@ -309,5 +309,63 @@ TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
   EXPECT_FALSE(supervisor.halted());
 }
 
+// Somebody has recorded what was signed earlier, or while a clock was ahead.
+TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNothingAndIsReported) {
+  constexpr std::int64_t kHour = 3'600'000'000;
+  SupervisorOptions options = TwoStates();
+  options.guard.keys = TestKeys();
+  options.guard.bus_name = "memq";
+  for (const auto& [off, cause] :
+       {std::pair(-kHour, "signed_before_the_start"), std::pair(-kClockErrorUs, "signed_before_the_start"),
+        std::pair(kClockErrorUs + 1, "signed_ahead"), std::pair(kHour, "signed_ahead")}) {
+    SCOPED_TRACE(off);
+    Supervisor supervisor(options, *this);
+    events_.clear();
+    const std::int64_t start = At(0) - 1000;
+    const auto signed_off = [&, off = off](Role role, const char* channel, Bytes message) {
+      return Signer(TestKeys(), "memq").Sign(role, channel, message, start + off);
+    };
+    fault_t fault{};
+    fault.utime = start + off;
+    fault.cause = fault_t::SLICE_LEFT;
+    supervisor.OnFault(signed_off(Role::kCertifier, "FAULT", Encode(fault)), start);
+    EXPECT_FALSE(supervisor.halted());
+    supervisor.OnCertified(signed_off(Role::kCertifier, "PLAN_CERTIFIED", Sealed(SmallPlan())), start);
+    withdrawal_t withdrawal{};
+    withdrawal.plan_id = SmallPlan().plan.plan_id;
+    supervisor.OnWithdrawn(signed_off(Role::kCertifier, "PLAN_WITHDRAWN", Encode(withdrawal)), start);
+    EXPECT_THAT(Events(), ElementsAre(kRefused, kRefused, kRefused));
+    for (const execution_event_t& event : events_)
+      EXPECT_THAT(GetText(event.message), testing::StartsWith(std::string(cause) + ": "));
+    command_t reload{};
+    reload.kind = command_t::RELOAD;
+    reload.utime = start;
+    const auto stale = signed_off(Role::kOperator, "COMMAND", Encode(reload));
+    EXPECT_THAT(supervisor.OnCommand(stale, start), HasSubstr("COMMAND was signed"));
+    EXPECT_EQ(reloads_, 0);
+    EXPECT_EQ(supervisor.counts().refused.at(cause), 4);
+  }
+}
+
+// A certifier that was started again sends its latched fault with the stamp of then, and signs it now.
+TEST_F(SupervisorTest, ALatchedFaultThatIsSentAgainHaltsARobotThatHasJustStarted) {
+  SupervisorOptions options = TwoStates();
+  options.guard.keys = TestKeys();
+  options.guard.bus_name = "memq";
+  Supervisor supervisor(options, *this);
+  fault_t fault{};
+  fault.utime = At(0) - 3'600'000'000;
+  fault.cause = fault_t::SLICE_LEFT;
+  supervisor.OnFault(Signer(TestKeys(), "memq").Sign(Role::kCertifier, "FAULT", Encode(fault), At(0)), At(0) + 100);
+  EXPECT_TRUE(supervisor.halted());
+  command_t reset{};
+  reset.kind = command_t::RESET;
+  reset.utime = At(1);
+  EXPECT_EQ(
+      supervisor.OnCommand(Signer(TestKeys(), "memq").Sign(Role::kOperator, "COMMAND", Encode(reset), At(1)), At(1)),
+      "");
+  EXPECT_FALSE(supervisor.halted());
+}
+
 }  // namespace supervisor_test
 }  // namespace forereach

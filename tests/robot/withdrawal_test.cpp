@@ -58,7 +58,7 @@ class GuardWithdrawTest : public testing::Test {
     EXPECT_TRUE(guard_.TryStart(kStart, kStart, kInside).ok());
   }
   int Withdraw(int valid_steps, std::int64_t plan_id = 7) {
-    const GuardWithdrawal answer = guard_.Withdraw(Encode(Withdrawal(SmallPlan(plan_id), valid_steps)));
+    const GuardWithdrawal answer = guard_.Withdraw(Encode(Withdrawal(SmallPlan(plan_id), valid_steps)), kNow);
     EXPECT_TRUE(answer.verdict.ok()) << answer.verdict.message;
     return answer.standing_steps;
   }
@@ -122,7 +122,7 @@ TEST_F(GuardWithdrawTest, AWithdrawalLeavesOtherPlansAlone) {
   EXPECT_NE(guard_.pending(), nullptr);
   certified_plan_v2_t namesake = SmallPlan(7);  // of another source
   namesake.plan.control[0][0] = 1;
-  EXPECT_TRUE(guard_.Withdraw(Encode(Withdrawal(namesake, 0))).verdict.ok());
+  EXPECT_TRUE(guard_.Withdraw(Encode(Withdrawal(namesake, 0)), kNow).verdict.ok());
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
 }
 
@@ -151,14 +151,14 @@ TEST_F(GuardWithdrawTest, ThePlanAfterAWithdrawnOneHasAllItsSteps) {
 TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate) {
   Start();
   withdrawal_t unknown = Withdrawal(SmallPlan(), 0, withdrawal_t::UNKNOWN_PLAN);
-  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 3);
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown), kNow).standing_steps, 3);
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
   const auto standing_after = [&](std::uint8_t(withdrawal_t::*digest)[32]) {
     Guard guard(TwoStates());
     EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
     withdrawal_t changed = unknown;
     SetDigest(changed.*digest, DigestOf("another"));
-    return guard.Withdraw(Encode(changed)).standing_steps;
+    return guard.Withdraw(Encode(changed), kNow).standing_steps;
   };
   EXPECT_EQ(standing_after(&withdrawal_t::config_digest), 0);
   EXPECT_EQ(standing_after(&withdrawal_t::model_digest), 0);
@@ -166,7 +166,7 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate
   EXPECT_EQ(standing_after(&withdrawal_t::observations_digest), 0) << "other ones may have been taken back";
   EXPECT_EQ(standing_after(&withdrawal_t::obstacles_digest), 0);
   unknown.cause = withdrawal_t::FALSIFIED;
-  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 0) << "only an unknown plan may stand";
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown), kNow).standing_steps, 0) << "only an unknown plan may stand";
 }
 
 // Of the observations of its certificate the guard asks which file they began with, and nothing else.
@@ -178,7 +178,7 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsWhateverWasLearnedAfterTheFile) {
     EXPECT_TRUE(guard.Accept(Sealed(plan), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
     withdrawal_t unknown = Withdrawal(plan, 0, withdrawal_t::UNKNOWN_PLAN);
     SetDigest(unknown.observations_digest, named);
-    return guard.Withdraw(Encode(unknown)).standing_steps;
+    return guard.Withdraw(Encode(unknown), kNow).standing_steps;
   };
   const Digest file = DigestOf("transitions");  // of SmallPlan
   const std::vector<std::uint8_t> row{1, 2, 3};
@@ -196,11 +196,11 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsWhateverWasLearnedAfterTheFile) {
 TEST_F(GuardWithdrawTest, AWithdrawalByACertifierOfAnotherTaskLeavesNoStep) {
   Start();
   withdrawal_t unknown = Withdrawal(SmallPlan(), 0, withdrawal_t::UNKNOWN_PLAN);
-  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 3);
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown), kNow).standing_steps, 3);
   withdrawal_t of_another = unknown;
   SetDigest(of_another.config_digest, DigestOf("another task"));
-  EXPECT_EQ(guard_.Withdraw(Encode(of_another)).standing_steps, 0);
-  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 0) << "the first task's is back";
+  EXPECT_EQ(guard_.Withdraw(Encode(of_another), kNow).standing_steps, 0);
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown), kNow).standing_steps, 0) << "the first task's is back";
   EXPECT_TRUE(guard_.control().empty());
 }
 
@@ -208,11 +208,11 @@ TEST_F(GuardWithdrawTest, BytesThatAreNoWithdrawalChangeNothing) {
   Start();
   std::vector<std::uint8_t> bytes = Encode(Withdrawal(SmallPlan(), 0));
   bytes.push_back(0);
-  EXPECT_EQ(guard_.Withdraw(bytes).verdict.cause, GuardCause::kTrailingBytes);
+  EXPECT_EQ(guard_.Withdraw(bytes, kNow).verdict.cause, GuardCause::kTrailingBytes);
   bytes.resize(bytes.size() - 2);
-  EXPECT_EQ(guard_.Withdraw(bytes).verdict.cause, GuardCause::kWrongLength);
+  EXPECT_EQ(guard_.Withdraw(bytes, kNow).verdict.cause, GuardCause::kWrongLength);
   bytes[0] ^= 1;
-  EXPECT_EQ(guard_.Withdraw(bytes).verdict.cause, GuardCause::kUnknownFingerprint);
+  EXPECT_EQ(guard_.Withdraw(bytes, kNow).verdict.cause, GuardCause::kUnknownFingerprint);
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
 }
 
@@ -225,9 +225,9 @@ TEST(GuardWithdrawKeys, OnlyTheCertifierWithdraws) {
   ASSERT_TRUE(guard.Accept(signer.Sign(Role::kCertifier, "PLAN_CERTIFIED", Sealed(SmallPlan()), kNow), kNow).ok());
   const auto message = Encode(Withdrawal(SmallPlan(), 0));
   const auto cause = [&](Signer& who, Role role, const char* channel = "PLAN_WITHDRAWN") {
-    return guard.Withdraw(who.Sign(role, channel, message, kNow)).verdict.cause;
+    return guard.Withdraw(who.Sign(role, channel, message, kNow), kNow).verdict.cause;
   };
-  EXPECT_EQ(guard.Withdraw(message).verdict.cause, GuardCause::kUnsigned);
+  EXPECT_EQ(guard.Withdraw(message, kNow).verdict.cause, GuardCause::kUnsigned);
   for (const Role role : kAllRoles)
     if (role != Role::kCertifier) {
       EXPECT_EQ(cause(signer, role), GuardCause::kForged) << RoleName(role);
@@ -237,9 +237,9 @@ TEST(GuardWithdrawKeys, OnlyTheCertifierWithdraws) {
   EXPECT_EQ(cause(elsewhere, Role::kCertifier), GuardCause::kForeign);
   ASSERT_NE(guard.pending(), nullptr) << "none of these counted";
   const auto good = signer.Sign(Role::kCertifier, "PLAN_WITHDRAWN", message, kNow);
-  EXPECT_TRUE(guard.Withdraw(good).verdict.ok());
+  EXPECT_TRUE(guard.Withdraw(good, kNow).verdict.ok());
   EXPECT_EQ(guard.pending(), nullptr);
-  EXPECT_EQ(guard.Withdraw(good).verdict.cause, GuardCause::kSignatureReplayed);
+  EXPECT_EQ(guard.Withdraw(good, kNow).verdict.cause, GuardCause::kSignatureReplayed);
 }
 
 enum : std::int16_t {
