@@ -132,7 +132,7 @@ TEST_F(KeyReplacement, TheOldKeyCountsOnlyWhereTheOldFilesAre) {
   const auto heard = [&](const std::string& reader, const std::string& sender, Role role) {
     const auto bytes = Signer(LoadKeys(sender, role), kBus).Sign(role, std::string(RoleName(role)), kSaid, kBegun + 1);
     const auto of = [&](const KeyRing& ring) {
-      return Authenticator(ring, kBus, speakers, kBegun).Check(std::string(RoleName(role)), bytes).first;
+      return Authenticator(ring, kBus, speakers, kBegun).Check(std::string(RoleName(role)), bytes, kBegun + 1).first;
     };
     const Authenticity live = of(LoadKeys(reader, Role::kLogger));
     EXPECT_EQ(live, of(LoadPublicKeys(reader + "/verify.pub")));

@@ -220,7 +220,7 @@ TEST_F(SignedLoggerTest, AMessageSignedLongBeforeMakesNoRow) {
   node.Tick(kStart);
   node.Stop();
   EXPECT_TRUE(ReadRows().gaps.empty());
-  EXPECT_EQ(node.recorder().interpreter().refusals().replayed, 1);
+  EXPECT_EQ(node.recorder().interpreter().refusals().old, 1);
 }
 
 TEST_F(LoggerNodeTest, RecordsAnOverflowOfItsQueueOnce) {
