@@ -216,7 +216,7 @@ class Adviser {
       case Outcome::kCertified:
       case Outcome::kNone: break;
     }
-    std::ranges::stable_partition(advices_, &Advice::turns);
+    std::stable_partition(advices_.begin(), advices_.end(), [](const Advice& advice) { return advice.turns; });
     return std::move(advices_);
   }
 

@@ -77,7 +77,8 @@ class Examination final {
     ExamineStops();
     ExamineSteps();
     Draw();
-    std::ranges::stable_partition(result_.findings, [](const Finding& finding) { return !finding.is_remark; });
+    std::stable_partition(result_.findings.begin(), result_.findings.end(),
+                          [](const Finding& finding) { return !finding.is_remark; });
     return std::move(result_);
   }
 

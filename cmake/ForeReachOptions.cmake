@@ -16,13 +16,6 @@ if(CCACHE)  # it keeps what was compiled with a precompiled header too, and find
     CCACHE_IGNOREOPTIONS=--param=* CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
 endif()
 
-# The files of a target are compiled together, some at a time: their headers are parsed once. So names in anonymous
-# namespaces are unique in a target. With the option off each file is compiled by itself.
-set(CMAKE_UNITY_BUILD ${FOREREACH_UNITY})
-if(NOT DEFINED CMAKE_UNITY_BUILD_BATCH_SIZE)
-  set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
-endif()
-
 # Precompiled headers hold no header of ours. clang's would hold the time at which they were made, and no cache would find
 # what was compiled with them.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
@@ -36,7 +29,7 @@ add_library(ForeReach::options ALIAS forereach_options)
 set_target_properties(forereach_options PROPERTIES EXPORT_NAME options)
 target_compile_options(forereach_options INTERFACE
   $<BUILD_INTERFACE:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Woverloaded-virtual>
-  $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:Clang>:-Wno-psabi;-Wno-bitwise-instead-of-logical>>  # lanes, and tests without a branch
+  $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:Clang>:-Wno-psabi;-Wno-bitwise-instead-of-logical;-fbracket-depth=1024>>  # lanes, tests without a branch, large models
   # g++ collects its garbage less often: the same code in less time, with up to 0.5 GB for each job.
   $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>>
   $<BUILD_INTERFACE:$<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${FOREREACH_UNITY}>>:-Wno-subobject-linkage>>  # it takes each file of several for a header

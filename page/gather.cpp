@@ -121,7 +121,8 @@ std::vector<std::vector<std::size_t>> LastDecisions(const PageRun& page, std::si
     std::ranges::stable_sort(places, {}, [&](std::size_t i) { return page.decisions[i].utime; });
   std::vector<std::vector<std::size_t>> chosen(page.parts.size());
   std::size_t count = 0;
-  for (const std::size_t i : places | std::views::reverse)
+  std::ranges::reverse(places);
+  for (const std::size_t i : places)
     if (count < most && is_wanted(page.decisions[i])) {
       chosen[part_of.at(i)].push_back(i);
       ++count;

@@ -348,7 +348,8 @@ TEST(LoadConfig, EachParameterOfANamedResidualMayBeSet) {
   const TaskFiles files;
   for (const ResidualText& text : NamedResiduals()) {
     if (text.name != "velocity_knee") continue;  // that of the task's model
-    for (const auto& [name, lower, upper] : text.parameters) {
+    for (const ModelText::Parameter& parameter : text.parameters) {
+      const std::string& name = parameter.name;
       const std::string begin = "residual: {name: " + text.name + ", " + name + ": ";
       const auto find = [&](const ParametricResidual& residual) {
         return *std::ranges::find(residual.names.parameters, name, &ModelText::Parameter::name);

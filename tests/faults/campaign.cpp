@@ -262,8 +262,8 @@ class Campaign final {
       Row& row = Begin("Datagrams: " + name, options_.others);
       Tries(
           row, rig,
-          [&](int) {
-            set(weather);
+          [&, now = weather](int) {
+            set(now);
             rig.Listen(milliseconds(1000));
             set({});
             rig.Listen(

@@ -189,7 +189,7 @@ TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
   const Digest good = DigestOf("good");
   for (const auto& [channel, speaker] : config_.bus.speakers()) {
     const std::int64_t now = WallClockUs();
-    const auto send = [&](const std::vector<std::uint8_t>& bytes) { open->Publish(channel, Bytes(bytes)); };
+    const auto send = [&, on = channel](const std::vector<std::uint8_t>& bytes) { open->Publish(on, Bytes(bytes)); };
     open->Publish(channel, Bytes(good));
     const auto genuine = all.Sign(speaker, channel, good, now);
     auto altered = genuine;

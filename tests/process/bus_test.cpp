@@ -13,6 +13,7 @@
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/process/process_fixture.h"
+#include "tests/sanitized.h"
 
 namespace forereach {
 namespace bus_test {
@@ -127,7 +128,7 @@ TEST(MemoryBusTest, DropsMessagesBeyondItsBoundOfBytes) {
 
 // Who handles a burst has it in memory twice, and keeps what was allocated last.
 TEST(MemoryBusTest, GivesTheMemoryOfABurstBack) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if FOREREACH_SANITIZED
   GTEST_SKIP() << "the sanitizer's heap is another";
 #endif
   const auto bus = OpenBus("memq://");

@@ -1448,7 +1448,7 @@ TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
        {std::pair{"bus: {channels: {decision: ELSEWHERE}}", "bus.channels"},
         std::pair{"realtime: {lock_memory: no}", "realtime"}, std::pair{"realtime: {fifo_priority: 3}", "realtime"}}) {
     const std::int64_t failed = status_.failed_reloads;
-    Copy([&](const std::string& text) { return text + "\n" + change + "\n"; });
+    Copy([changed = std::string(change)](const std::string& text) { return text + "\n" + changed + "\n"; });
     Reload(*node);
     EXPECT_EQ(status_.failed_reloads, failed + 1);
     EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what + std::string(" cannot change while")));
@@ -1461,8 +1461,8 @@ TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
         std::pair{"gate: {obstacles: task}\nbus: {delay_ms: 11}", "bus.delay_ms cannot change while"},
         std::pair{"gate: {}", "gate.obstacles: missing"}}) {
     const std::int64_t failed = status_.failed_reloads;
-    Copy([&](const std::string& text) {
-      return std::regex_replace(text, std::regex("gate: \\{obstacles: task\\}"), gate);
+    Copy([changed = std::string(gate)](const std::string& text) {
+      return std::regex_replace(text, std::regex("gate: \\{obstacles: task\\}"), changed);
     });
     Reload(*node);
     EXPECT_EQ(status_.failed_reloads, failed + 1);

@@ -93,10 +93,10 @@ class HostileDatagramsTest : public testing::TestWithParam<Attack> {
     return command;
   }
   std::string WriteKey() const { return MakeTestKeys(scratch_ / "keys"); }
-  static std::string FarTask() {  // the drive lasts for longer than the attacks
-    std::string task = PatientTask();
-    const std::string goal = "goal: [6, 0]";
-    return task.replace(task.find(goal), goal.size(), "goal: [18, 0]");
+  static std::string FarTask() {  // the drive has no end while the attacks last, however slow the machine is
+    std::string task = PatientTask(600);
+    const std::string goal = "goal: [6, 0]\n  goal_radius: 0.5";
+    return task.replace(task.find(goal), goal.size(), "goal: [18, 0]\n  goal_radius: 1e-9");
   }
   bool AllSpeak() {
     std::array<std::size_t, 4> before{};

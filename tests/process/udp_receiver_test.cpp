@@ -22,6 +22,7 @@
 #include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
+#include "tests/sanitized.h"
 
 namespace forereach {
 namespace udp_receiver_test {
@@ -168,7 +169,7 @@ TEST_F(UdpReceiverTest, NoDatagramMakesItsMemoryGrow) {
     return everything_came();
   });
   EXPECT_TRUE(everything_came());
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // a sanitizer's heap is another
+#if !FOREREACH_SANITIZED  // a sanitizer's heap is another
   EXPECT_LT(ResidentBytes(::getpid()) - before, 8 << 20);
 #endif
 }

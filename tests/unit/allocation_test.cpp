@@ -9,19 +9,14 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "tests/sanitized.h"
 #include "tests/worlds.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define FOREREACH_SANITIZED 1  // the sanitizers own malloc
-#else
-#define FOREREACH_SANITIZED 0
-#endif
 
 namespace {
 std::atomic<long> allocations{0};
 }
 
-#if !FOREREACH_SANITIZED
+#if !FOREREACH_SANITIZED  // the sanitizers own malloc
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

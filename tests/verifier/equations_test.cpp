@@ -71,7 +71,7 @@ TEST_P(Derivatives, AreThoseOfTheEquations) {
     SecondEntries second = SecondOf(*equations, z);
     for (int l = 0; l < variables; ++l) {
       const auto value = [&](int k) {
-        return [&, k](const std::vector<Real>& at) { return equations->Value(at)[static_cast<std::size_t>(k)]; };
+        return [k, of = equations](const std::vector<Real>& at) { return of->Value(at)[static_cast<std::size_t>(k)]; };
       };
       for (int k = 0; k < states; ++k) EXPECT_TRUE(Agree((first[{k, l}]), Slope(value(k), z, l))) << k << ", " << l;
     }
