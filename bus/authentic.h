@@ -68,6 +68,10 @@ using BusId = std::array<std::uint8_t, 8>;
 which are tighter. */
 inline constexpr std::int64_t kClockErrorUs = 1'000'000;
 
+/** The same on the channels of withdrawals and faults, which only ever stop a robot: a certifier whose clock is ahead
+must still be able to. */
+inline constexpr std::int64_t kStopsAheadUs = 60'000'000;
+
 /** The role that owns a channel. */
 struct Speaker {
   Role role;
@@ -139,8 +143,9 @@ struct Refusals {
 class Authenticator final {
  public:
   /** The number of senders that are remembered for each channel. If more appear, the one with the lowest counter is
-  forgotten, and no counter up to its last is accepted on that channel again. */
-  static constexpr std::size_t kMaxSenders = 16;
+  forgotten, and no counter up to its last is accepted on that channel again. So many starts of processes, and then a
+  clock that is set back, refuse every new sender until the clock has passed that counter. */
+  static constexpr std::size_t kMaxSenders = 256;
   /** The number of altered messages with one genuine trailer that are verified; then the trailer is refused. Otherwise
   a stranger could use the trailer of a message that this receiver lost to consume its time. */
   static constexpr int kMaxTries = 32;

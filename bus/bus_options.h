@@ -10,7 +10,8 @@
 namespace forereach {
 
 /** By how much the clocks of two certifiers on one bus may differ, microseconds: each has to hear that the other is
-there. */
+there. The one whose clock is ahead does not hear the other, whose heartbeats were signed before its start, until the
+other's clock has passed that time; the other hears it. */
 inline constexpr std::int64_t kCertifiersApartUs = 60'000'000;
 
 struct BusOptions {
@@ -38,12 +39,19 @@ struct BusOptions {
 
   /** The role that speaks on each channel where there are keys. */
   [[nodiscard]] Speakers speakers() const {
-    return {
-        {decision, Role::kCertifier},  {certified, Role::kCertifier},  {status, {Role::kCertifier, kCertifiersApartUs}},
-        {fault, Role::kCertifier},     {withdrawn, Role::kCertifier},  {advice, Role::kCertifier},
-        {candidate, Role::kPlanner},   {obstacles, Role::kPerception}, {robot_state, Role::kRobot},
-        {transition, Role::kRobot},    {event, Role::kRobot},          {command, Role::kOperator},
-        {logger_status, Role::kLogger}};
+    return {{decision, Role::kCertifier},
+            {certified, Role::kCertifier},
+            {status, {Role::kCertifier, kCertifiersApartUs}},
+            {advice, Role::kCertifier},
+            {fault, {Role::kCertifier, kStopsAheadUs}},
+            {candidate, Role::kPlanner},
+            {withdrawn, {Role::kCertifier, kStopsAheadUs}},
+            {command, Role::kOperator},
+            {obstacles, Role::kPerception},
+            {event, Role::kRobot},
+            {robot_state, Role::kRobot},
+            {transition, Role::kRobot},
+            {logger_status, Role::kLogger}};
   }
 
   /** `name`, or address and port of `url`: "239.255.76.67:7667"; "memq" for memq. @throws BusError if `url` is none. */

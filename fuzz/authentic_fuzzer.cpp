@@ -9,7 +9,7 @@
 namespace forereach {
 namespace {
 
-constexpr int kBegun = 1'000'000, kMaxSigners = 40;
+constexpr int kBegun = 1'000'000, kMaxSigners = 300;
 static_assert(kMaxSigners > Authenticator::kMaxSenders);
 
 const KeyRing& Keys(const char* robot) {

@@ -17,6 +17,7 @@ namespace forereach {
 namespace {
 
 constexpr std::size_t kMostExpected = 8;  // reloaded tasks without a plan yet
+constexpr Speaker kStarts{Role::kCertifier}, kStops{Role::kCertifier, kStopsAheadUs};
 constexpr int kMaxPlanStates = 16, kMaxPlanInputs = 8, kMaxPlanSteps = 128;
 
 // Empty without memory for it: a refusal keeps its cause.
@@ -222,8 +223,7 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
   authenticator_.emplace(*options_.keys, options_.bus_name,
-                         Speakers{{options_.channel, Role::kCertifier}, {options_.withdrawn, Role::kCertifier}},
-                         std::nullopt);
+                         Speakers{{options_.channel, kStarts}, {options_.withdrawn, kStops}}, std::nullopt);
 }
 
 void Guard::Halt() noexcept {
@@ -243,24 +243,26 @@ void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std:
 }
 
 // Checks and removes the signature.
-GuardVerdict Guard::Authenticated(const std::string& channel, Bytes& bytes, std::int64_t now_us) {
+GuardVerdict Guard::Authenticated(const std::string& channel, const Speaker& speaker, Bytes& bytes,
+                                  std::int64_t now_us) {
   if (!authenticator_) return {};
   const auto [authenticity, message] = authenticator_->Check(channel, bytes, now_us);
   bytes = message;
-  return VerdictOn(authenticity, channel, "certifier");
+  return VerdictOn(authenticity, channel, speaker);
 }
 
-GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, std::string_view speaker) {
+GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, const Speaker& speaker) {
   switch (authenticity) {
     case Authenticity::kAuthentic: return {};
     case Authenticity::kUnsigned: return Refuse(GuardCause::kUnsigned, channel + " is not signed");
     case Authenticity::kForged:
-      return Refuse(GuardCause::kForged, channel + " is not signed by this robot's " + std::string(speaker));
+      return Refuse(GuardCause::kForged, channel + " is not signed by this robot's " + std::string(RoleName(speaker)));
     case Authenticity::kForeign: return Refuse(GuardCause::kForeign, channel + " was signed for another bus");
     case Authenticity::kOld: return Refuse(GuardCause::kSignedBefore, channel + " was signed before this start");
     case Authenticity::kAhead:
-      return Refuse(GuardCause::kSignedAhead, channel + " was signed more than " + Milliseconds(kClockErrorUs, 0) +
-                                                  " ahead of this robot's clock");
+      return Refuse(
+          GuardCause::kSignedAhead,
+          channel + " was signed more than " + Milliseconds(speaker.max_ahead_us, 0) + " ahead of this robot's clock");
     case Authenticity::kReplayed: break;
   }
   return Refuse(GuardCause::kSignatureReplayed, "the signature on " + channel + " was used before");
@@ -274,7 +276,7 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
   GuardVerdict verdict;
   try {
     if (halted_) return Refuse(GuardCause::kHalted, "halted until a person resets it");
-    verdict = Authenticated(options_.channel, certified_plan_bytes, now_us);
+    verdict = Authenticated(options_.channel, kStarts, certified_plan_bytes, now_us);
     if (!verdict.ok()) return verdict;
     auto certified = std::make_unique<certified_plan_v2_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
@@ -325,7 +327,7 @@ bool RestsOn(const certified_plan_v2_t& certified, const Grounds& grounds) {
 GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes, std::int64_t now_us) noexcept {
   GuardWithdrawal answer;
   try {
-    answer.verdict = Authenticated(options_.withdrawn, withdrawal_bytes, now_us);
+    answer.verdict = Authenticated(options_.withdrawn, kStops, withdrawal_bytes, now_us);
     if (!answer.verdict.ok()) return answer;
     withdrawal_t message;
     const DecodeStatus status = Decode(withdrawal_bytes, message);
@@ -544,6 +546,11 @@ GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int
       static_cast<double>(*options_.max_jitter_us),
       Sentence("plan %" PRId64 ": the step before step %d lasted %" PRIu64 " us, at most %" PRIu64 " us are allowed",
                plan.plan_id, step, lasted, most));
+}
+
+bool Guard::IsOnSchedule(int step, std::int64_t now_us) const noexcept {
+  return !executing_ ||
+         (ExamineTime(executing_->plan, step, now_us).ok() && ExamineDuration(step, last_step_utime_, now_us).ok());
 }
 
 GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const {

@@ -53,7 +53,7 @@ enum class GuardCause {
   kForeign,            ///< With keys: the signature is for another bus.
   kSignatureReplayed,  ///< With keys: the signed message was received before.
   kSignedBefore,       ///< With keys: it was signed before this guard heard anything.
-  kSignedAhead,        ///< With keys: it was signed further ahead of this robot's clock than clocks may differ.
+  kSignedAhead,        ///< With keys: it was signed further ahead of this robot's clock than the channel allows.
   kWrongLength,
   kTrailingBytes,
   kUnknownFingerprint,
@@ -151,7 +151,7 @@ less. Microseconds. */
 [[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
 
 /** As Authenticator::Check's: the refusal of a message on a channel, kNone if it is authentic. */
-[[nodiscard]] GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, std::string_view speaker);
+[[nodiscard]] GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, const Speaker& speaker);
 
 class Guard final {
  public:
@@ -189,6 +189,10 @@ class Guard final {
   time pass in between. The state against X_0 and the hull of slice 0, or the hull of slice `step`; the time as Check
   does, with the step that has ended. After a refusal no plan is executing. Cost and allocations as Check. */
   [[nodiscard]] GuardVerdict CheckAgain(std::span<const double> measured_state, std::int64_t now_us) noexcept;
+
+  /** Whether Check of the same step and time would find them on schedule, whatever the state is: the step that ends has
+  lasted as long as a step may. True without max_jitter_us or an executing plan. */
+  [[nodiscard]] bool IsOnSchedule(int step, std::int64_t now_us) const noexcept;
 
   /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed
   it. A plan is meant if its certificate digest is the message's, or if the message names none and the plan_id is equal.
@@ -234,7 +238,8 @@ class Guard final {
     std::optional<Angles> angles;
   };
 
-  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes, std::int64_t now_us);
+  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, const Speaker& speaker, Bytes& bytes,
+                                           std::int64_t now_us);
   void Take(const withdrawal_t& message, GuardWithdrawal& answer);
   void TakeTaskOf(const certified_plan_v2_t& certified);
   void EndIfRefused(GuardVerdict& verdict) noexcept;

@@ -62,6 +62,8 @@ EventText TextOfException() noexcept {
   return text;
 }
 
+constexpr Speaker kFaults{Role::kCertifier, kStopsAheadUs}, kCommands{Role::kOperator};
+
 enum : std::size_t { kRobotState, kTransition, kEvent };  // indices of channels
 
 }  // namespace
@@ -75,12 +77,11 @@ Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
   step_began_at_.reserve(kMostStates);
   if (!options_.guard.keys) return;
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
-                         Speakers{{options_.fault, Role::kCertifier}, {options_.command, Role::kOperator}},
-                         std::nullopt);
+                         Speakers{{options_.fault, kFaults}, {options_.command, kCommands}}, std::nullopt);
 }
 
 // Takes off the trailer.
-GuardVerdict Supervisor::Authenticated(const std::string& channel, std::string_view speaker, Bytes& message,
+GuardVerdict Supervisor::Authenticated(const std::string& channel, const Speaker& speaker, Bytes& message,
                                        std::int64_t now_us) {
   if (!authenticator_) return {};
   const auto [authenticity, content] = authenticator_->Check(channel, message, now_us);
@@ -160,7 +161,7 @@ void Supervisor::OnFault(Bytes message, std::int64_t now_us) noexcept {
 }
 
 void Supervisor::TakeFault(Bytes message, std::int64_t now_us) {
-  const GuardVerdict verdict = Authenticated(options_.fault, "certifier", message, now_us);
+  const GuardVerdict verdict = Authenticated(options_.fault, kFaults, message, now_us);
   if (!verdict.ok()) {
     Measure();
     return ReportRefusal(now_us, verdict);
@@ -169,14 +170,22 @@ void Supervisor::TakeFault(Bytes message, std::int64_t now_us) {
   if (!fault || !StopsTheRobot(fault->cause)) return;
   // The certifier repeats a fault until it hears the reset, which the robot may have heard before.
   if (IsNotAfter(fault->utime, reset_utime_, now_us, options_.max_ahead_us)) return;
-  halted_utime_ = fault->utime;
+  halted_utime_ = guard_.halted() ? std::max(halted_utime_, fault->utime) : fault->utime;
   if (guard_.halted()) return;
   const std::int64_t plan_id = PlanId();
   const int step = Step();
   guard_.Halt();
-  Measure();
-  ReportEvent(now_us, execution_event_t::HALTED, plan_id, step, 0,
-              EventText() << "emergency stop: " << GetText(fault->message));
+  const auto report = [&] {
+    ReportEvent(now_us, execution_event_t::HALTED, plan_id, step, 0,
+                EventText() << "emergency stop: " << GetText(fault->message));
+  };
+  try {
+    Measure();
+  } catch (...) {  // a person has to know that it waits for a reset
+    report();
+    throw;
+  }
+  report();
 }
 
 std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) noexcept {
@@ -188,8 +197,9 @@ std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) noexcept {
 }
 
 std::string Supervisor::Obey(Bytes message, std::int64_t now_us) {
-  if (const GuardVerdict verdict = Authenticated(options_.command, "operator", message, now_us); !verdict.ok()) {
-    ++counts_.refused[std::string(GuardCauseName(verdict.cause))];
+  if (const GuardVerdict verdict = Authenticated(options_.command, kCommands, message, now_us); !verdict.ok()) {
+    Measure();
+    ReportRefusal(now_us, verdict);
     return verdict.message;
   }
   const auto command = Decoded<command_t>(message);
@@ -238,8 +248,8 @@ void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
   const std::int64_t plan_id = PlanId();
   const bool is_new = std::exchange(is_under_way_, false);
   if (is_new) {
-    ReportTransition(utime - options_.guard.step_us);
     ++step_;
+    if (guard_.IsOnSchedule(step_, now_us)) ReportTransition(utime - options_.guard.step_us);
   }
   const GuardVerdict verdict = is_new ? guard_.Check(step_, state_, now_us) : guard_.CheckAgain(state_, now_us);
   if (verdict.ok()) {

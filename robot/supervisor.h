@@ -13,7 +13,8 @@ call Boundary at every step boundary:
 Boundary does, in this order:
  1. FinishStep: if a plan is executing, sends the step that has ended as transition_t and checks the measured state
     against the certified slice: STEP_INSIDE, or STEP_OUTSIDE, an emergency stop. A step that is further off its
-    schedule than the guard's max_jitter_us is OFF_SCHEDULE, an emergency stop that needs no reset;
+    schedule than the guard's max_jitter_us is OFF_SCHEDULE, an emergency stop that needs no reset. No transition_t is
+    sent for it, wherever it ended: it did not last as long as the model's step, so it is no observation of that;
  2. a pending plan whose start_utime is this boundary takes over, in the middle of a plan or at rest: STARTED. If a
 check of the guard fails it is REFUSED, and the current plan goes on;
  3. otherwise the current plan goes on: TAIL_BEGUN where its braking tail begins, STANDING where it ends, with a hold;
@@ -41,6 +42,8 @@ executing is not affected by Expect.
 - If anything else throws (state, Hold, StepsToRest, Reload, an allocation), the plan ends and the robot holds:
   ERROR_STOP. The robot is not halted, and the next plan starts as any other. If Hold throws, each later call calls it
   again, and no plan starts until it returns.
+- A fault halts the robot before anything can throw. If the state cannot be measured then, HALTED has the one that was
+  measured last, and ERROR_STOP follows it.
 - A boundary whose state could not be measured sends no robot_state_t, and leaves out its sequence number.
 - Boundary checks state and time again if FinishStep was called before it. So a control is returned only if the guard
   has checked the state and the time of that call, whatever was called or threw before. The time is checked only with
@@ -53,8 +56,9 @@ If one of them calls anything else, this does nothing, and the robot holds as af
 
 With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command; and
 if they were signed since this robot's start and not ahead of its clock (bus/authentic.h): a fault recorded earlier
-halts no robot. The start is the first message of each of the two, guard and supervisor. What is refused is REFUSED.
-Messages that this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
+halts no robot. A withdrawal or a fault counts up to kStopsAheadUs ahead. The start is the first message of each of the
+two, guard and supervisor. What is refused is REFUSED. Messages that this class sends are not signed: sign them with
+bus/authentic.h's Signer, or with a bus that does.
 
 No clock, no bus, no thread, not thread-safe. It needs the guard and the message types only. All times are microseconds
 since the Unix epoch. */
@@ -157,7 +161,7 @@ class Supervisor final {
   void StopAfterException(std::int64_t utime) noexcept;
   [[nodiscard]] bool IsMisuse(bool may_be_sending) noexcept;
   void Measure();
-  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, std::string_view speaker, Bytes& message,
+  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, const Speaker& speaker, Bytes& message,
                                            std::int64_t now_us);
   [[nodiscard]] bool IsExecuting() const { return guard_.executing() != nullptr; }
   [[nodiscard]] std::int64_t PlanId() const;

@@ -22,29 +22,31 @@ void Conformance::Remember(const certified_plan_v2_t& certified, const Angles& a
   next_ = (next_ + 1) % kPlans;
 }
 
-std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
+std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state, SenderId sender) {
   const std::span<const double> measured(state.state, ToSize(state.num_states));
   const bool executing = state.mode == robot_state_t::EXECUTING;
   const StreamPosition position{state.sequence, state.utime};
   const Succession succession = order_.Compare(position, StreamOrder::kNoHorizon);
-  const bool follows =
-      succession == Succession::kNewer && order_.newest() && state.sequence - 1 == order_.newest()->sequence;
+  const bool follows = succession == Succession::kNewer && order_.newest() &&
+                       state.sequence - 1 == order_.newest()->sequence && last_.sender == sender;
   std::optional<Departure> departure;
   if (executing && follows && last_.plan_id >= 0) departure = Compare(last_.plan_id, last_.step + 1, measured);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured);
   // A late state does not tell where the robot is now.
   if (IsNews(succession) || succession == Succession::kRewound) {
     order_.Take(position, StreamOrder::kNoHorizon);
-    before_ = std::exchange(last_, {state.utime, executing ? state.executing_plan_id : -1, state.executing_step});
+    last_ = {state.utime, executing ? state.executing_plan_id : -1, state.executing_step, sender};
+    places_[next_place_] = last_;
+    next_place_ = (next_place_ + 1) % kPlaces;
   }
   return departure;
 }
 
-std::optional<Conformance::Departure> Conformance::Check(const transition_t& transition) const {
+std::optional<Conformance::Departure> Conformance::Check(const transition_t& transition, SenderId sender) const {
   if (transition.num_states < 0 || transition.num_states > static_cast<int>(std::size(transition.next_state)))
     return std::nullopt;
-  for (const Place& begin : {last_, before_})
-    if (begin.plan_id >= 0 && begin.utime == transition.utime)
+  for (const Place& begin : places_)
+    if (begin.plan_id >= 0 && begin.utime == transition.utime && begin.sender == sender)
       return Compare(begin.plan_id, begin.step + 1, {transition.next_state, ToSize(transition.num_states)});
   return std::nullopt;
 }

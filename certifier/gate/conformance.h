@@ -5,6 +5,7 @@ bound, or the measurement. The robot's guard makes the same test. The certifier 
 more under a false assumption. */
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -15,6 +16,7 @@ more under a false assumption. */
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/angle.h"
+#include "lcmtypes/sole_sender.h"
 #include "lcmtypes/stream_order.h"
 
 namespace forereach {
@@ -23,6 +25,9 @@ class Conformance final {
  public:
   static constexpr std::size_t kPlans =
       64;  ///< Number of remembered plans: the last certified ones and the executing one.
+  /** Number of remembered states. A second robot under the same name, at any usual rate, does not displace the begin of
+  a step before its end is reported. */
+  static constexpr std::size_t kPlaces = 32;
 
   struct Departure {
     std::int64_t plan_id;
@@ -39,18 +44,20 @@ class Conformance final {
 
   /** Tests a usable state against the slice of the step that it names. If the robot has advanced by one boundary while
   executing, it also tests the state against the slice of the plan that was executing before. Nothing if the state lies
-  in the slices, or if the plan is not remembered. Cost O(n). */
-  [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state);
+  in the slices, or if the plan is not remembered. @param sender of the message: only the same robot's states and
+  transitions are about one step. Cost O(n). */
+  [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state, SenderId sender = {});
 
-  /** Tests the end of a step that began at one of the last two received states against the slice after it. If the robot
-  ends its plan or its guard stops it, its later states name no slice, so only the transition shows the departure. The
-  transition may arrive after the state that reports the stop. */
-  [[nodiscard]] std::optional<Departure> Check(const transition_t& transition) const;
+  /** Tests the end of a step that began at one of the last kPlaces received states against the slice after it. If the
+  robot ends its plan or its guard stops it, its later states name no slice, so only the transition shows the departure.
+  The transition may arrive after the state that reports the stop. Cost O(n + kPlaces). */
+  [[nodiscard]] std::optional<Departure> Check(const transition_t& transition, SenderId sender = {}) const;
 
  private:
   struct Place {
     std::int64_t utime = -1, plan_id = -1;  // plan -1: not executing
     int step = -1;
+    SenderId sender = {};
   };
 
   struct Known {
@@ -64,7 +71,9 @@ class Conformance final {
   std::vector<Known> plans_;  // a ring
   std::size_t next_ = 0;
   StreamOrder order_;
-  Place last_, before_;  // from the newest received state and from the one before
+  Place last_;                           // from the newest received state
+  std::array<Place, kPlaces> places_{};  // that one and those before it: a ring
+  std::size_t next_place_ = 0;
 };
 
 }  // namespace forereach

@@ -53,6 +53,8 @@ withdrawal_t Judged(const Standing& standing, const Problem& problem) {
   return message;
 }
 
+int StepIn(int num_steps, const robot_state_t& state) { return std::clamp<int>(state.executing_step, 0, num_steps); }
+
 }  // namespace
 
 void PlansInForce::Follow(const GateOptions& gate) {
@@ -97,7 +99,10 @@ void PlansInForce::SeeRobot(const robot_state_t& state, std::int64_t steady_us) 
   const StreamPosition position{state.sequence, state.utime};
   if (!IsNews(states_.Compare(position, StreamOrder::kNoHorizon))) return;
   states_.Take(position, StreamOrder::kNoHorizon);
-  if (state.mode == robot_state_t::FINISHED) return plans_.clear();
+  if (state.mode == robot_state_t::FINISHED) {
+    std::erase_if(plans_, [](const Entry& entry) { return !entry.is_shared; });
+    return;
+  }
   const bool executes = state.mode == robot_state_t::EXECUTING;
   bool is_known = false;
   std::int64_t expires = INT64_MIN;  // the earliest expiry among the plans that may be the executing one
@@ -109,6 +114,7 @@ void PlansInForce::SeeRobot(const robot_state_t& state, std::int64_t steady_us) 
   }
   std::erase_if(plans_, [&](const Entry& entry) {
     if (executes && entry.plan_id == state.executing_plan_id) return false;
+    if (entry.is_shared) return entry.may_run_until_us < steady_us;
     const bool is_superseded = executes && entry.plan_id < state.executing_plan_id && entry.expires_utime <= expires;
     return entry.has_begun || is_superseded || entry.may_run_until_us < steady_us;
   });
@@ -118,7 +124,35 @@ void PlansInForce::SeeRobot(const robot_state_t& state, std::int64_t steady_us) 
 void PlansInForce::Begin(Entry& entry, const robot_state_t& state, std::int64_t steady_us) const {
   entry.has_begun = true;
   entry.may_run_until_us = steady_us + LongestRun(entry.num_steps);
-  entry.first_step = std::clamp<int>(state.executing_step, 0, entry.num_steps);
+  const int step = StepIn(entry.num_steps, state);
+  entry.first_step = entry.is_shared ? std::min(entry.first_step, step) : step;
+}
+
+// From now on it counts as one that has not begun, so that only kJudged of these are judged.
+void PlansInForce::Share(Entry& entry) {
+  entry.has_begun = false;
+  entry.is_shared = true;
+}
+
+void PlansInForce::SeeOneOfTwo(const robot_state_t& state, std::int64_t steady_us) {
+  if (state.mode != robot_state_t::EXECUTING) return;
+  bool is_known = false;
+  for (Entry& entry : plans_) {
+    if (entry.plan_id != state.executing_plan_id) continue;
+    Share(entry);
+    entry.may_run_until_us = std::max(entry.may_run_until_us, steady_us + LongestRun(entry.num_steps));
+    entry.first_step = std::min(entry.first_step, StepIn(entry.num_steps, state));
+    is_known = true;
+  }
+  if (is_known || IsFull()) return;
+  RememberStranger(state, steady_us);
+  Share(plans_.back());
+}
+
+void PlansInForce::RobotHasChanged() {
+  states_ = {};
+  for (Entry& entry : plans_)
+    if (entry.has_begun) Share(entry);
 }
 
 void PlansInForce::RememberStranger(const robot_state_t& state, std::int64_t steady_us) {
@@ -132,7 +166,7 @@ void PlansInForce::RememberStranger(const robot_state_t& state, std::int64_t ste
 
 void PlansInForce::TakeAnswer(const execution_event_t& event) {
   for (Entry& entry : plans_) {
-    if (entry.plan_id != event.plan_id || !entry.withdrawal) continue;
+    if (entry.plan_id != event.plan_id || !entry.withdrawal || entry.is_shared) continue;
     // Plans of two sources may have one plan_id: each is answered for itself.
     const auto is_answered = [&](std::int64_t sequence) { return static_cast<double>(sequence) == event.value; };
     if (std::ranges::none_of(entry.sent, is_answered)) continue;

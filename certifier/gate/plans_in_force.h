@@ -11,10 +11,16 @@ there were (docs/soundness.md, 3.13). If it contradicts the declaration, nothing
     Judge            after a change: how many controls of each plan stand (Gate::JudgeAgain); fewer: a withdrawal
     TakeDue          the withdrawals to send now: at once, then every kRepeatUs
     TakeAnswer       the robot has taken a withdrawal; it is not sent any more
+    SeeOneOfTwo      a state of one of two robots that are heard: what it executes may be executed for longer
+    RobotHasChanged  another robot is heard in the place of the one before, which may still execute its plan
 
 What was withdrawn never stands again. A plan leaves when it cannot be executed any more: it was executing and the robot
 reports another plan or none; the robot executes a plan with a larger plan_id whose certificate expires no earlier, so
 the guard accepts this one no more; it has expired, or should have ended.
+
+A robot that is not heard any more, or one of two, may execute a plan that the robot that is heard knows nothing of.
+Such a plan is shared: it leaves when its time is over, whatever is reported. It is judged from the first step that it
+was seen at, and no answer to its withdrawal counts, because the robot that executes it may not be the one that answers.
 
 Only the last kJudged plans that have not begun are judged, which bounds the work. Of an earlier one, all controls are
 withdrawn when something changes (NOT_JUDGED).
@@ -81,6 +87,11 @@ class PlansInForce final {
   void Add(const certified_plan_v2_t& certified, std::int64_t steady_us);
   /** Takes a usable state of the robot. Cost O(plans). */
   void SeeRobot(const robot_state_t& state, std::int64_t steady_us);
+  /** Takes a usable state of one of two robots that are heard. Nothing leaves. Cost O(plans). */
+  void SeeOneOfTwo(const robot_state_t& state, std::int64_t steady_us);
+  /** The next states are another robot's, and its messages have an order of their own. The plans that have begun become
+  shared. */
+  void RobotHasChanged();
   /** Takes the robot's answer to a withdrawal. @pre event.kind == execution_event_t::WITHDRAWN. */
   void TakeAnswer(const execution_event_t& event);
 
@@ -110,6 +121,7 @@ class PlansInForce final {
     std::unique_ptr<const candidate_plan_t> plan;  // null: it is not judged any more
     int num_steps = 0;
     bool has_begun = false;
+    bool is_shared = false;  // a robot that is not heard, or one of two, may execute it
     int first_step = 0;
     bool is_withdrawn = false;  // a part of it
     int standing_steps = 0;
@@ -126,6 +138,7 @@ class PlansInForce final {
 
   [[nodiscard]] std::int64_t LongestRun(int num_steps) const;
   void Begin(Entry& entry, const robot_state_t& state, std::int64_t steady_us) const;
+  static void Share(Entry& entry);
   void RememberStranger(const robot_state_t& state, std::int64_t steady_us);
   void DropOldest();
   void Judge(Entry& entry, Gate& gate);

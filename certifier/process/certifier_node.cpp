@@ -14,6 +14,7 @@
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/process/faults.h"
+#include "lcmtypes/freshness.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -242,7 +243,8 @@ void CertifierNode::ForgetRobot() {
 void CertifierNode::OnRobotState(const Received& received) {
   LookAtCharge();
   if (!has_begun_) return;
-  robot_.Hear(received.sender, received.utime);
+  if (robot_.Hear(received.sender, received.utime) == SoleSender::Place::kTakesOver) plans_.RobotHasChanged();
+  LookAtRobot(received.utime);  // a second one is there, whatever its message is
   robot_state_t state;
   if (Decode(received.bytes, state) != DecodeStatus::kOk) return Refuse(channels_.robot_state, "not a robot_state_t");
   if (FaultOf(state, config_.problem->model->num_states()).empty()) {
@@ -253,24 +255,41 @@ void CertifierNode::OnRobotState(const Received& received) {
   if (!error.empty()) return Refuse(channels_.robot_state, error);
   last_state_ = state;
   const bool is_one = robot_.WhyTwo(received.utime).empty();  // of two, nobody knows which one executes a plan
-  if (is_in_charge() && is_one && !gate_->options().shadow) plans_.SeeRobot(state, clocks_.steady());
-  if (state.mode == robot_state_t::FINISHED)
-    ForgetRobot();
-  else
+  if (is_in_charge() && !gate_->options().shadow) SeeWhatRobotExecutes(state, is_one);
+  if (state.mode != robot_state_t::FINISHED)
     watch_.SeeRobot(received.utime);
+  else if (is_one)
+    ForgetRobot();
   LookAtRobot(received.utime);
   if (state.mode == robot_state_t::FINISHED) return;
   if (!is_in_charge()) return;  // the robot may execute another's plans
-  if (const auto departure = conformance_.Check(state)) Fail(SliceLeft(*departure));
+  if (const auto departure = conformance_.Check(state, received.sender)) Fail(SliceLeft(*departure));
   // In shadow mode another certifier decides which plans the robot executes.
   const auto stranger = issued_.FindStranger(state, clocks_.steady());
   if (stranger && !gate_->options().shadow) Fail(UncertifiedPlan(*stranger));
+}
+
+void CertifierNode::SeeWhatRobotExecutes(const robot_state_t& state, bool is_one) {
+  if (is_one)
+    plans_.SeeRobot(state, clocks_.steady());
+  else
+    plans_.SeeOneOfTwo(state, clocks_.steady());
 }
 
 // What was seen of the robot counts if one sender sends it.
 void CertifierNode::LookAtRobot(std::int64_t now_us) {
   const std::string why = gate_->options().needs_robot_state ? robot_.WhyNotAlone(now_us) : robot_.WhyTwo(now_us);
   if (!why.empty()) watch_.Set(Watch::Need::kRobotState, "waits for " + channels_.robot_state + ": " + why);
+}
+
+// Where no robot is needed, what was wrong with one that was heard does not count for longer than it is heard.
+void CertifierNode::ForgetSilentRobot(std::int64_t now_us) {
+  if (gate_->options().needs_robot_state) return;
+  if (robot_.WhyTwo(now_us).empty()) watch_.Set(Watch::Need::kRobotState, "");
+  const std::int64_t timeout = Microseconds(gate_->options().robot_timeout_ms);
+  if (!robot_arrival_ || FreshnessOf(robot_arrival_->at_us, now_us, timeout, INT64_MAX) != Freshness::kStale) return;
+  robot_arrival_.reset();
+  LookAtStamps();
 }
 
 void CertifierNode::OnTransition(const Received& received) {
@@ -285,7 +304,7 @@ void CertifierNode::OnTransition(const Received& received) {
   else if (gate_->options().learns)
     Learn(received.bytes);  // first, because a false declaration explains a left slice
   if (!transition || !is_in_charge()) return;
-  if (const auto departure = conformance_.Check(*transition)) Fail(SliceLeft(*departure));
+  if (const auto departure = conformance_.Check(*transition, received.sender)) Fail(SliceLeft(*departure));
 }
 
 void CertifierNode::Learn(Bytes transition) {
@@ -307,7 +326,9 @@ void CertifierNode::OnEvent(const Received& received) {
   const auto event = Decoded<execution_event_t>(received.bytes);
   if (!event) return Refuse(channels_.event, "not an execution_event_t");
   if (event->kind != execution_event_t::WITHDRAWN) return;
-  if (const std::string two = events_.WhyTwo(received.utime); !two.empty()) return Refuse(channels_.event, two);
+  // Events are rare, so of two robots one alone may be heard here.
+  for (const SoleSender* stream : {&events_, &robot_})
+    if (const std::string two = stream->WhyTwo(received.utime); !two.empty()) return Refuse(channels_.event, two);
   // A certifier before this one has counted its withdrawals from 0, too.
   if (const std::string error = gate_->CheckFresh(event->utime, received.utime); !error.empty())
     return Refuse(channels_.event, error);
@@ -374,6 +395,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
   const bool was_idle = queue_.empty() && !withdraws_more_;
   LookAtCharge();
   LookForObstacles(now_us);
+  ForgetSilentRobot(now_us);
   if (reporter_.IsFirst() && is_in_charge()) Heartbeat(now_us);  // reports the state before the first decision
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
     // After the clock was set back, a plan may start later than allowed.

@@ -17,8 +17,10 @@ of more than `gate.queue` the oldest are rejected. Obstacles, the robot's state,
 effect as they arrive.
 
 The robot's state, its transitions and its events are each the stream of one sender (lcmtypes/sole_sender.h). With two
-senders of its state nothing is certified, and with two of the others these do not count. What one of them reports as
-wrong counts from either.
+senders of its state nothing is certified and no withdrawal is answered, and with two of the others these do not count.
+What one of them reports as wrong counts from either. A plan that one of two executes, or the one before that fell
+silent, stays in force for as long as it may run. Of two robots, the silence of one is no fault, and that one has
+finished says nothing of the other. With `gate.arming: none` a robot that was heard counts for gate.robot_timeout_ms.
 
 When obstacles, the task or the truth of the declaration change, the certified plans that may be executed are judged
 again before any waiting candidate. What no longer holds of them is sent on bus.channels.withdrawn until the robot
@@ -116,6 +118,8 @@ class CertifierNode final : public Node {
   void OnObstacles(const Received& received);
   void OnRobotState(const Received& received);
   void LookAtRobot(std::int64_t now_us);
+  void SeeWhatRobotExecutes(const robot_state_t& state, bool is_one);
+  void ForgetSilentRobot(std::int64_t now_us);
   void OnTransition(const Received& received);
   void OnEvent(const Received& received);
   void OnCommand(const Received& received);

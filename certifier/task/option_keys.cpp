@@ -24,12 +24,14 @@ void ReadRequireStop(const Document& file, const std::string& key, TaskDraft& dr
   if (!required) rest.clear();
 }
 
-// Three messages in obstacles_timeout_ms may make them known again.
+// A signed sender that restarts is known with its first message after one timeout alone, and it sends at least three in
+// that time. The rest is for a late one.
 void CheckGate(const Document& file, const std::string&, TaskDraft& draft) {
+  constexpr double kTimeouts = 1.5;
   const GateOptions& gate = draft.config.gate;
-  if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms < gate.obstacles_timeout_ms)
-    file.Fail("gate.obstacles_lost_ms", ToText(*gate.obstacles_lost_ms) + " is less than gate.obstacles_timeout_ms, " +
-                                            ToText(gate.obstacles_timeout_ms));
+  if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms < kTimeouts * gate.obstacles_timeout_ms)
+    file.Fail("gate.obstacles_lost_ms", ToText(*gate.obstacles_lost_ms) + " is less than " + ToText(kTimeouts) +
+                                            " times gate.obstacles_timeout_ms, " + ToText(gate.obstacles_timeout_ms));
 }
 
 std::vector<Key> GateKeys() {
@@ -80,7 +82,8 @@ std::vector<Key> GateKeys() {
                   "With `obstacles: bus`: the obstacles become unknown this long after the stamp of the last message. "
                   "Send the whole set at least three times in this period."),
       Optional(gate.Number("obstacles_lost_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_lost_ms,
-                           "Required with `obstacles: bus`, and not less than obstacles_timeout_ms. When the obstacles "
+                           "Required with `obstacles: bus`, and at least 1.5 times obstacles_timeout_ms, because with "
+                           "keys a sender that restarts counts only after obstacles_timeout_ms. When the obstacles "
                            "have been unknown for so long, the plans under way are withdrawn: the robot makes an "
                            "emergency stop, which no certificate covers. It is the time that a robot may drive among "
                            "obstacles that nobody sees."),

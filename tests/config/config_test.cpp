@@ -163,16 +163,16 @@ TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
   EXPECT_THAT(RefusalOnBus(unsaid),
               testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles_lost_ms: missing"),
                              testing::HasSubstr("`never`")));
-  EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: 400")), "");
-  EXPECT_EQ(load(", obstacles_lost_ms: 400").gate.obstacles_lost_ms, 400);
+  EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: 600")), "");
+  EXPECT_EQ(load(", obstacles_lost_ms: 600").gate.obstacles_lost_ms, 600);
   EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: never")), "");
   EXPECT_EQ(load(", obstacles_lost_ms: never").gate.obstacles_lost_ms, kNeverLost);
   try {
-    static_cast<void>(load(", obstacles_lost_ms: 399"));
+    static_cast<void>(load(", obstacles_lost_ms: 599"));
     ADD_FAILURE() << "it is taken";
   } catch (const ConfigError& error) {
-    EXPECT_THAT(error.what(),
-                testing::HasSubstr("gate.obstacles_lost_ms: 399 is less than gate.obstacles_timeout_ms, 400"));
+    EXPECT_THAT(error.what(), testing::HasSubstr(
+                                  "gate.obstacles_lost_ms: 599 is less than 1.5 times gate.obstacles_timeout_ms, 400"));
   }
 }
 

@@ -28,7 +28,7 @@ inline std::string DemoTaskWithGate(const std::string& gate) {
 
 /** The same with its obstacles taken out: they are on the bus only. @param more YAML of the gate that is added. */
 inline std::string DemoTaskOnTheBus(const std::string& more = "") {
-  std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1000" + more + "}");
+  std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1500" + more + "}");
   const std::size_t begin = task.find("  obstacles:\n"), end = task.find("\n\n", begin);
   return task.replace(begin, end - begin, "  obstacles: []");
 }

@@ -271,6 +271,21 @@ TEST(Authentic, RefusesAReplayOfASenderThatItHasForgotten) {
     EXPECT_EQ(authenticator.Check("planner", bytes, kClock).first, Authenticity::kReplayed);
 }
 
+// Sixteen starts of a process, then all clocks are set back.
+TEST(Authentic, AClockSetBackRefusesNoNewSenderUnlessTheMemoryIsFull) {
+  for (const std::size_t senders : {std::size_t{16}, Authenticator::kMaxSenders - 1, Authenticator::kMaxSenders}) {
+    Authenticator authenticator = Receiver();
+    const auto judge = [&](std::uint64_t id, std::int64_t now) {
+      return authenticator
+          .Check("planner", Signer(TestKeys(), kBus, id).Sign(Role::kPlanner, "planner", kMessage, now), now)
+          .first;
+    };
+    for (std::size_t id = 0; id < senders; ++id) ASSERT_EQ(judge(id, kClock + kHour), Authenticity::kAuthentic);
+    const bool has_room = senders < Authenticator::kMaxSenders;
+    EXPECT_EQ(judge(1000, kClock), has_room ? Authenticity::kAuthentic : Authenticity::kReplayed) << senders;
+  }
+}
+
 // Who holds the planner's secret and the group key can lock out planners. Nobody else's counters are touched.
 TEST(Authentic, AStolenKeyCannotUseUpCountersOfAnotherRole) {
   const KeyRing stolen = TestKeys();  // of which the thief uses the planner's secret only

@@ -140,17 +140,49 @@ TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheNextStateOvertookIt) {
   hear(1, -1, 200);
   EXPECT_TRUE(conformance.Check(Step(100, 100, 100)));
   EXPECT_FALSE(conformance.Check(Step(200, 100, 100))) << "it stood";
+  for (int i = 2; i < 34; ++i) hear(i, -1, 100 + 100 * i);
   hear(0, 7, 100);
-  hear(2, -1, 300);
   EXPECT_FALSE(conformance.Check(Step(100, 100, 100))) << "a state said again is not news, so the step is too long ago";
-  hear(0, 7, 400);
-  EXPECT_TRUE(conformance.Check(Step(400, 100, 100))) << "a robot that began anew counts anew";
-  hear(16, 7, 500);
+  hear(0, 7, 4000);
+  EXPECT_TRUE(conformance.Check(Step(4000, 100, 100))) << "a robot that began anew counts anew";
+  hear(16, 7, 5000);
   hear(1, 7, 30);
   EXPECT_FALSE(conformance.Check(Step(30, 100, 100))) << "late";
   hear(0, 7, 30);
   EXPECT_TRUE(conformance.Check(Step(30, 100, 100)))
       << "another message 0: it has begun anew, though its clock was set back";
+}
+
+TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughAFasterRobotIsHeardInBetween) {
+  for (const int states_between : {3, 31, 32}) {
+    Conformance conformance;
+    conformance.Remember(Plan(7));
+    robot_state_t begin = At(0, 7, 0, 0.5, 0.5);
+    begin.utime = 100;
+    EXPECT_FALSE(conformance.Check(begin));
+    for (int i = 0; i < states_between; ++i) {
+      robot_state_t other = At(100 + i, -1, -1, 0, 0);
+      other.utime = 101 + i;
+      EXPECT_FALSE(conformance.Check(other));
+    }
+    EXPECT_EQ(conformance.Check(Step(100, 100, 100)).has_value(), states_between < 32);
+  }
+}
+
+// Two robots under one name begin steps of different plans at one time.
+TEST(ConformanceTest, StatesAndTransitionsOfTwoSendersAreNotMixed) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  conformance.Remember(Plan(8));
+  robot_state_t one = At(4, 7, 0, 0.5, 0.5), other = At(5, 8, 2, 2.5, 2.5);
+  one.utime = other.utime = 100;
+  EXPECT_FALSE(conformance.Check(one, 1));
+  EXPECT_FALSE(conformance.Check(other, 2)) << "it does not follow the other one's step";
+  EXPECT_FALSE(conformance.Check(Step(100, 1.5, 1.5), 1));
+  EXPECT_FALSE(conformance.Check(Step(100, 3.5, 3.5), 2));
+  EXPECT_EQ(conformance.Check(Step(100, 3.5, 3.5), 1)->plan_id, 7);
+  EXPECT_EQ(conformance.Check(Step(100, 1.5, 1.5), 2)->plan_id, 8);
+  EXPECT_FALSE(conformance.Check(Step(100, 100, 100), 3));
 }
 
 TEST(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {

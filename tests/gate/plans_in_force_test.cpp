@@ -56,15 +56,16 @@ class PlansInForceTest : public testing::Test {
     narrower.grounds.config = DigestOf("narrower");
     return narrower;
   }
-  void SeeRobot(std::int64_t plan_id, int step) {
+  robot_state_t State(std::int64_t plan_id, int step) {
     robot_state_t state{};
     state.utime = now_;
     state.sequence = states_++;
     state.executing_plan_id = plan_id;
     state.executing_step = static_cast<std::int16_t>(step);
     state.mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
-    plans_.SeeRobot(state, now_);
+    return state;
   }
+  void SeeRobot(std::int64_t plan_id, int step) { plans_.SeeRobot(State(plan_id, step), now_); }
   void Answer(std::int64_t plan_id, int step, double value) {
     execution_event_t event{};
     event.kind = execution_event_t::WITHDRAWN;
@@ -339,6 +340,59 @@ TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
   for (int id = 2; id <= static_cast<int>(PlansInForce::kJudged) + 1; ++id) Certify(id);
   SeeWall(15);
   EXPECT_FALSE(Due());
+}
+
+// ---- Two robots under one name.
+
+TEST_F(PlansInForceTest, APlanThatTwoMayExecuteIsJudgedFromTheEarlierStepAndLeavesWithItsTime) {
+  const certified_plan_v2_t plan = Certify(1);
+  SeeRobot(1, 5);
+  plans_.SeeOneOfTwo(State(1, 2), now_);
+  SeeRobot(1, 6);
+  SeeWall(Reach(plan, 4) - 1e-9);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.first_step, 2);
+  EXPECT_EQ(message.valid_steps, 3);
+  Answer(1, 0, static_cast<double>(message.sequence));
+  SeeRobot(-1, -1);
+  SeeRobot(2, 0);
+  robot_state_t finished = State(-1, -1);
+  finished.mode = robot_state_t::FINISHED;
+  plans_.SeeRobot(finished, now_);
+  const std::int64_t run = 2 * 500'000 + kSteps * 150'000;
+  now_ += run;
+  EXPECT_EQ(Due().value().plan_id, 1) << "the other one may execute it still";
+  now_ += 1;
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 0u);
+}
+
+TEST_F(PlansInForceTest, OneOfTwoEndsNothing) {
+  Certify(1);
+  Certify(2);
+  SeeRobot(1, 3);
+  plans_.SeeOneOfTwo(State(-1, -1), now_);
+  plans_.SeeOneOfTwo(State(2, 0), now_);
+  EXPECT_EQ(plans_.size(), 2u);
+}
+
+TEST_F(PlansInForceTest, ThePlanOfTheRobotBeforeLeavesWithItsTimeAndAnothersStatesHaveTheirOwnOrder) {
+  Certify(1);
+  SeeRobot(1, 3);
+  plans_.RobotHasChanged();
+  states_ = 0;
+  const std::int64_t began = now_;
+  now_ -= 1000;  // by a clock that is a little behind
+  SeeRobot(77, 0);
+  EXPECT_EQ(plans_.size(), 2u);
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 1u) << "its own plan has ended, that of the other one has not";
+  now_ = began + 2 * 500'000 + kSteps * 150'000;
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 1u);
+  now_ += 1;
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 0u);
 }
 
 // ---- Obstacles that are lost.

@@ -1,4 +1,5 @@
 // Two processes under one key on one stream: the certifier certifies nothing on what either of them says.
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -229,6 +230,47 @@ class TwoRobotsTest : public TwoSendersTest {
     state.num_states = 4;
     robot.Say("ROBOT_STATE", state, now_us_);
   }
+  // At the first step of the plan. Of every second number, so that none of them follows another.
+  void Executes(Speaking& robot, std::int64_t number, std::int64_t plan_id) {
+    robot_state_t state{};
+    state.utime = now_us_;
+    state.sequence = 2 * number;
+    state.mode = robot_state_t::EXECUTING;
+    state.executing_plan_id = plan_id;
+    state.num_states = 4;
+    const candidate_plan_t plan = Candidate(plan_id);
+    std::ranges::copy(plan.initial_center, state.state);
+    robot.Say("ROBOT_STATE", state, now_us_);
+  }
+  // 20 states of one robot that stands; then a certified plan. @return its plan_id.
+  std::int64_t CertifyForOne(Speaking& robot) {
+    for (int i = 0; i < 20; ++i, now_us_ += 100'000) Stands(robot, i), Run();
+    EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+    return decisions_.back().plan_id;
+  }
+  // Says what makes every certificate void.
+  void ContradictTheDeclaration(Speaking& robot) {
+    transition_t false_one = Step();
+    false_one.next_state[2] = 1;
+    robot.Say("TRANSITION", false_one, now_us_);
+    Run();
+    EXPECT_EQ(node_->gate().Status(now_us_).learned, 1);
+  }
+  void Answer(Speaking& robot) {
+    execution_event_t event{};
+    event.utime = now_us_;
+    event.kind = execution_event_t::WITHDRAWN;
+    event.plan_id = withdrawals_.back().plan_id;
+    event.value = static_cast<double>(withdrawals_.back().sequence);
+    robot.Say("EXECUTION_EVENT", event, now_us_);
+    Run();
+  }
+  bool IsSentAgain() {
+    const std::size_t sent = withdrawals_.size();
+    now_us_ += 60'000;
+    Run();
+    return withdrawals_.size() > sent;
+  }
   transition_t Step() const {
     transition_t step{};
     step.utime = now_us_;
@@ -326,41 +368,181 @@ TEST_F(TwoRobotsTest, TransitionsOfTwoAreNotLearned) {
 // The plan stays withdrawn until the robot that has it answers.
 TEST_F(TwoRobotsTest, NeitherOfTwoAnswersAWithdrawal) {
   Speaking first = one(), second = other();
-  for (int i = 0; i < 20; ++i, now_us_ += 100'000) Stands(first, i), Run();
-  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  transition_t false_one = Step();
-  false_one.next_state[2] = 1;
-  first.Say("TRANSITION", false_one, now_us_);
-  Run();
+  CertifyForOne(first);
+  ContradictTheDeclaration(first);
   ASSERT_FALSE(withdrawals_.empty());
-  const auto answer = [&](Speaking& robot) {
-    execution_event_t event{};
-    event.utime = now_us_;
-    event.kind = execution_event_t::WITHDRAWN;
-    event.plan_id = withdrawals_.back().plan_id;
-    event.value = static_cast<double>(withdrawals_.back().sequence);
-    robot.Say("EXECUTION_EVENT", event, now_us_);
-  };
-  const auto is_sent_again = [&] {
-    const std::size_t sent = withdrawals_.size();
-    now_us_ += 60'000;
-    Run();
-    return withdrawals_.size() > sent;
-  };
   execution_event_t accepted{};
   accepted.kind = execution_event_t::ACCEPTED;
   first.Say("EXECUTION_EVENT", accepted, now_us_);
-  answer(second);
-  Run();
-  EXPECT_TRUE(is_sent_again());
-  answer(first);
-  Run();
-  EXPECT_TRUE(is_sent_again());
+  Answer(second);
+  EXPECT_TRUE(IsSentAgain());
+  Answer(first);
+  EXPECT_TRUE(IsSentAgain());
   now_us_ += kTimeout;
   Run();
-  answer(first);
+  Answer(first);
+  EXPECT_FALSE(IsSentAgain());
+}
+
+// Its events come rarely, so the other one's may be the only ones that are heard.
+TEST_F(TwoRobotsTest, NoneAnswersAWithdrawalWhileTheStatesOfTwoAreHeard) {
+  Speaking first = one(), second = other();
+  CertifyForOne(first);
+  Stands(second, 0);
+  ContradictTheDeclaration(first);
+  ASSERT_FALSE(withdrawals_.empty());
+  Answer(second);
+  EXPECT_TRUE(IsSentAgain());
+  now_us_ += kTimeout;
+  Stands(first, 100);
+  Answer(second);
+  EXPECT_FALSE(IsSentAgain()) << "now one is heard, and it answers";
+}
+
+// ---- The plan that one of two executes.
+
+TEST_F(TwoRobotsTest, APlanThatBeganWhileTwoWereHeardIsWithdrawnAsLongAsOneExecutesIt) {
+  constexpr std::int64_t kRun = 2'500'000;  // the longest run of the plan after a state in which it is executed
+  for (const std::int64_t after : {std::int64_t{0}, kRun, kRun + 1}) {
+    withdrawals_.clear();
+    faults_.clear();
+    Begin();
+    Speaking first = one(), second = other();
+    const std::int64_t plan = CertifyForOne(first);
+    for (int i = 100; i < 150; ++i, now_us_ += 100'000) {  // longer than it could be pending
+      Stands(second, i);
+      Executes(first, i, plan);
+      Run();
+    }
+    now_us_ += after - 100'000;
+    ContradictTheDeclaration(first);
+    EXPECT_EQ(withdrawals_.size(), after <= kRun ? 1u : 0u) << after;
+  }
+}
+
+TEST_F(TwoRobotsTest, APlanThatTheSilentOneMayStillExecuteIsWithdrawnAndNotAnsweredByTheOther) {
+  for (const std::int64_t silent : {kTimeout + 200'000, std::int64_t{2'500'000}, std::int64_t{2'500'001}}) {
+    withdrawals_.clear();
+    faults_.clear();
+    Begin();
+    Speaking first = one(), second = other();
+    const std::int64_t plan = CertifyForOne(first);
+    Executes(first, 100, plan);
+    Run();
+    const std::int64_t last = now_us_;
+    for (int i = 0; now_us_ < last + silent; ++i) {
+      Stands(second, i);
+      Run();
+      now_us_ = std::min(now_us_ + 100'000, last + silent);
+    }
+    ContradictTheDeclaration(second);
+    ASSERT_EQ(withdrawals_.size(), silent <= 2'500'000 ? 1u : 0u) << silent;
+    if (silent != kTimeout + 200'000) continue;
+    Answer(second);
+    EXPECT_TRUE(IsSentAgain()) << "the one that executes it has not answered";
+  }
+}
+
+// The one that stays is not the one that executes it.
+TEST_F(TwoRobotsTest, APlanThatTheOneThatFellSilentExecutesStaysThoughTheOtherStands) {
+  Speaking first = one(), second = other();
+  const std::int64_t plan = CertifyForOne(first);
+  Executes(first, 50, plan);
+  Executes(second, 0, plan);
   Run();
-  EXPECT_FALSE(is_sent_again());
+  for (int i = 101; i < 116; ++i, now_us_ += 100'000) Stands(first, i), Run();
+  ContradictTheDeclaration(first);
+  EXPECT_EQ(withdrawals_.size(), 1u);
+}
+
+TEST_F(TwoRobotsTest, APlanThatIsNotKnownIsWithdrawnThoughTwoAreHeard) {
+  Speaking first = one(), second = other();
+  Stands(second, 0);
+  Executes(first, 0, 77);
+  Run();
+  ASSERT_EQ(withdrawals_.size(), 1u);
+  EXPECT_EQ(withdrawals_[0].plan_id, 77);
+  EXPECT_EQ(withdrawals_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+}
+
+TEST_F(TwoRobotsTest, ThatOneHasFinishedSwitchesNoFaultOffForTheOther) {
+  for (const bool are_two : {true, false}) {
+    faults_.clear();
+    Begin();
+    Speaking first = one(), second = other();
+    for (int i = 0; i < 3; ++i, now_us_ += 100'000) {
+      Stands(first, i);
+      if (are_two) Stands(second, i);
+      Run();
+    }
+    robot_state_t finished{};
+    finished.utime = now_us_;
+    finished.sequence = 3;
+    finished.mode = robot_state_t::FINISHED;
+    finished.executing_plan_id = finished.executing_step = -1;
+    finished.num_states = 4;
+    (are_two ? second : first).Say("ROBOT_STATE", finished, now_us_);
+    Run();
+    now_us_ += kTimeout + 1;
+    Run();
+    ASSERT_EQ(faults_.size(), are_two ? 1u : 0u);
+    if (are_two) EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+  }
+}
+
+// A message of it was heard, whatever is in it.
+TEST_F(TwoRobotsTest, ASecondOneCountsThoughItsMessageCannotBeUsed) {
+  for (const bool is_stale : {true, false}) {
+    Begin();
+    Speaking first = one(), second = other();
+    CertifyForOne(first);
+    robot_state_t stale{};
+    stale.utime = now_us_ - 600'000;
+    stale.mode = robot_state_t::STANDING;
+    stale.num_states = 4;
+    if (is_stale)
+      second.Say("ROBOT_STATE", stale, now_us_);
+    else
+      second.Say("ROBOT_STATE", command_t{}, now_us_);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED) << is_stale;
+    EXPECT_THAT(GetText(decisions_.back().message), HasSubstr("two senders are heard"));
+  }
+}
+
+// ---- gate.arming none: a robot need not be there.
+
+TEST_F(TwoRobotsTest, WithoutArmingTwoThatWereHeardOnceAreForgotten) {
+  config_.gate.needs_robot_state = false;
+  Begin();
+  Speaking first = one(), second = other();
+  Stands(first, 0), Stands(second, 0);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+  now_us_ += kTimeout;
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+  now_us_ += 1;
+  Run();
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(TwoRobotsTest, WithoutArmingAStateOfAClockThatIsOffIsForgotten) {
+  config_.gate.max_clock_error_ms = 60;
+  for (const bool needs_robot : {false, true}) {
+    config_.gate.needs_robot_state = needs_robot;
+    Begin();
+    Speaking robot = one();
+    robot_state_t late{};
+    late.utime = now_us_ - 300'000;
+    late.mode = robot_state_t::STANDING;
+    late.executing_plan_id = late.executing_step = -1;
+    late.num_states = 4;
+    robot.Say("ROBOT_STATE", late, now_us_);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+    now_us_ += kTimeout;
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+    now_us_ += 1;
+    Run();
+    EXPECT_EQ(Ask().outcome == decision_t::CERTIFIED, !needs_robot);
+  }
 }
 
 // One that is left running may be the one that errs.

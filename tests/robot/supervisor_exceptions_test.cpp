@@ -674,6 +674,13 @@ TEST(SupervisorExceptions, AFaultHaltsARobotThatCanNeitherMeasureNorHold) {
   robot.supervisor.OnFault(Encode(fault), At(1));
   EXPECT_TRUE(robot.supervisor.halted());
   EXPECT_TRUE(robot.supervisor.control().empty());
+  const auto halted = std::ranges::find(robot.events, execution_event_t::HALTED, &execution_event_t::kind);
+  ASSERT_NE(halted, robot.events.end()) << "nobody else says that it needs a reset";
+  EXPECT_EQ(halted->plan_id, 7);
+  EXPECT_EQ(halted->step, 0);
+  EXPECT_EQ(halted->num_states, 2);
+  EXPECT_EQ(halted->state[0], 1) << "measured last";
+  EXPECT_EQ(robot.events.back().kind, execution_event_t::ERROR_STOP);
 }
 
 TEST(SupervisorExceptions, AStateOutsideItsSliceHaltsARobotWithoutMemory) {

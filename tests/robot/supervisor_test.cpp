@@ -124,6 +124,7 @@ TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
   EXPECT_EQ(events_.back().step, 2);
   EXPECT_EQ(events_.back().value, 3001);
   EXPECT_THAT(GetText(events_.back().message), HasSubstr("emergency stop: plan 7: step 2 was due at"));
+  EXPECT_EQ(transitions_.size(), 1u) << "the step that was too long is no observation of the model's step";
 
   certified_plan_v2_t next = SmallPlan(8);
   next.plan.start_utime = At(4);
@@ -137,6 +138,32 @@ TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
   EXPECT_EQ(supervisor.counts().refused.count("off_schedule"), 0u);
   (void)boundary(6, 3001);
   EXPECT_EQ(supervisor.counts().refused.at("off_schedule"), 1) << "it starts too late";
+}
+
+TEST_F(SupervisorTest, AStepWhoseEndsAreOffScheduleIsNoTransition) {
+  SupervisorOptions options = TwoStates();
+  struct {
+    std::optional<std::int64_t> jitter;
+    std::int64_t begin_late, end_late;
+    double x;
+    std::size_t sent;
+  } const cases[] = {{3000, 0, 3000, 1, 1},     {3000, 0, 3001, 1, 0},     {3000, 0, -3000, 1, 1},
+                     {3000, 0, -3001, 1, 0},    {3000, 0, 3001, 77, 0},    {3000, 0, 3000, 77, 1},
+                     {3000, -2000, 1000, 1, 1}, {3000, -2000, 1001, 1, 0}, {{}, 0, 30'000, 1, 1}};
+  for (const auto& [jitter, begin_late, end_late, x, sent] : cases) {
+    SCOPED_TRACE(std::to_string(begin_late) + " " + std::to_string(end_late));
+    options.guard.max_jitter_us = jitter;
+    Supervisor supervisor(options, *this);
+    transitions_.clear();
+    state_[0] = 1;
+    supervisor.OnCertified(Sealed(SmallPlan()), At(0) - 5000);
+    EXPECT_FALSE(supervisor.Boundary(At(0), At(0) + begin_late).empty());
+    state_[0] = x;
+    supervisor.FinishStep(At(1), At(1) + end_late);
+    EXPECT_EQ(transitions_.size(), sent);
+    EXPECT_EQ(supervisor.counts().steps, static_cast<std::int64_t>(sent));
+    EXPECT_EQ(supervisor.halted(), x == 77);
+  }
 }
 
 TEST_F(SupervisorTest, HoldsAtRestUntilACertifiedPlanStarts) {
@@ -189,6 +216,16 @@ TEST_F(SupervisorTest, ASecondFaultWhileHaltedNeedsAResetOfItsOwn) {
   EXPECT_TRUE(supervisor_.halted());
   EXPECT_EQ(ResetAt(At(2) + 1, At(3)), "");
   EXPECT_THAT(Events(), ElementsAre(kHalted, kReset));
+}
+
+TEST_F(SupervisorTest, AFaultThatWasStampedEarlierDoesNotMakeAnEarlierResetEnough) {
+  Fault(At(2), At(2));
+  Fault(At(0), At(2), fault_t::DECLARATION_FALSIFIED);
+  EXPECT_THAT(ResetAt(At(2), At(3)), HasSubstr("before the robot was halted"));
+  EXPECT_TRUE(supervisor_.halted());
+  EXPECT_EQ(ResetAt(At(2) + 1, At(3)), "");
+  Fault(At(2) + 2, At(4));
+  EXPECT_EQ(ResetAt(At(2) + 3, At(4)), "") << "what halted it before the reset does not count any more";
 }
 
 TEST_F(SupervisorTest, AResetOlderThanTheFaultIsRefusedAndARepeatedFaultIgnored) {
@@ -317,7 +354,7 @@ TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNoth
   options.guard.bus_name = "memq";
   for (const auto& [off, cause] :
        {std::pair(-kHour, "signed_before_the_start"), std::pair(-kClockErrorUs, "signed_before_the_start"),
-        std::pair(kClockErrorUs + 1, "signed_ahead"), std::pair(kHour, "signed_ahead")}) {
+        std::pair(std::int64_t{60'000'001}, "signed_ahead"), std::pair(kHour, "signed_ahead")}) {
     SCOPED_TRACE(off);
     Supervisor supervisor(options, *this);
     events_.clear();
@@ -343,7 +380,41 @@ TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNoth
     const auto stale = signed_off(Role::kOperator, "COMMAND", Encode(reload));
     EXPECT_THAT(supervisor.OnCommand(stale, start), HasSubstr("COMMAND was signed"));
     EXPECT_EQ(reloads_, 0);
+    EXPECT_THAT(Events(), ElementsAre(kRefused, kRefused, kRefused, kRefused)) << "that one is reported, too";
+    EXPECT_THAT(GetText(events_.back().message), testing::StartsWith(std::string(cause) + ": COMMAND was signed"));
     EXPECT_EQ(supervisor.counts().refused.at(cause), 4);
+  }
+}
+
+// A certifier whose clock is ahead stops the robot nevertheless. It starts nothing.
+TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
+  constexpr std::int64_t kMinute = 60'000'000;
+  SupervisorOptions options = TwoStates();
+  options.guard.keys = TestKeys();
+  options.guard.bus_name = "memq";
+  for (const std::int64_t ahead : {kClockErrorUs, kClockErrorUs + 1, kMinute, kMinute + 1}) {
+    SCOPED_TRACE(ahead);
+    Supervisor supervisor(options, *this);
+    events_.clear();
+    const bool plan_counts = ahead <= kClockErrorUs, stop_counts = ahead <= kMinute;
+    const auto say = [&](std::int64_t off, const char* channel, Bytes message) {
+      return Signer(TestKeys(), "memq").Sign(Role::kCertifier, channel, message, At(0) - 1000 + off);
+    };
+    supervisor.OnCertified(say(ahead, "PLAN_CERTIFIED", Sealed(SmallPlan())), At(0) - 1000);
+    EXPECT_EQ(events_.back().kind, plan_counts ? kAccepted : kRefused);
+    supervisor.OnCertified(say(0, "PLAN_CERTIFIED", Sealed(SmallPlan(8))), At(0) - 1000);
+    EXPECT_EQ(events_.back().kind, kAccepted);
+    withdrawal_t withdrawal{};
+    withdrawal.plan_id = 8;
+    supervisor.OnWithdrawn(say(ahead, "PLAN_WITHDRAWN", Encode(withdrawal)), At(0) - 1000);
+    EXPECT_EQ(events_.back().kind, stop_counts ? execution_event_t::WITHDRAWN : kRefused);
+    if (!stop_counts) EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
+    fault_t fault{};
+    fault.utime = At(0) + ahead;
+    fault.cause = fault_t::SLICE_LEFT;
+    supervisor.OnFault(say(ahead, "FAULT", Encode(fault)), At(0) - 1000);
+    EXPECT_EQ(supervisor.halted(), stop_counts);
+    if (!stop_counts) EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
   }
 }
 
