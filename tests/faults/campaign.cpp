@@ -1324,7 +1324,9 @@ void Campaign::Gone() {
       {"Log file deleted", [&](const std::string& directory) { remove_files(directory, ".lcmlog"); }},
       {"Log directory deleted", [](const std::string& directory) { std::filesystem::remove_all(directory); }},
       {"Database deleted", [&](const std::string& directory) { remove_files(directory, "decisions.sqlite"); }}};
-  for (const auto& [fault, take_away] : kinds) {
+  for (const auto& kind : kinds) {
+    const char* const fault = kind.first;
+    const auto& take_away = kind.second;
     const bool is_database = &take_away == &kinds.back().second;
     Rig rig(DemoTask(), {.takes_logs_away = true});
     Row& row = Begin(fault, options_.others);

@@ -62,6 +62,7 @@ SecondEntries SecondOf(const Equations& equations, const std::vector<Real>& z) {
 
 TEST_P(Derivatives, AreThoseOfTheEquations) {
   const auto& [name, equations, states, variables] = GetParam();
+  const Equations& of = *equations;
   Random random(71);
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 4; ++trial) {
@@ -71,7 +72,7 @@ TEST_P(Derivatives, AreThoseOfTheEquations) {
     SecondEntries second = SecondOf(*equations, z);
     for (int l = 0; l < variables; ++l) {
       const auto value = [&](int k) {
-        return [k, of = equations](const std::vector<Real>& at) { return of->Value(at)[static_cast<std::size_t>(k)]; };
+        return [k, &of](const std::vector<Real>& at) { return of.Value(at)[static_cast<std::size_t>(k)]; };
       };
       for (int k = 0; k < states; ++k) EXPECT_TRUE(Agree((first[{k, l}]), Slope(value(k), z, l))) << k << ", " << l;
     }
