@@ -486,7 +486,9 @@ TEST_F(TwoRobotsTest, ThatOneHasFinishedSwitchesNoFaultOffForTheOther) {
     now_us_ += kTimeout + 1;
     Run();
     ASSERT_EQ(faults_.size(), are_two ? 1u : 0u);
-    if (are_two) EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+    if (are_two) {
+      EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+    }
   }
 }
 

@@ -408,13 +408,17 @@ TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
     withdrawal.plan_id = 8;
     supervisor.OnWithdrawn(say(ahead, "PLAN_WITHDRAWN", Encode(withdrawal)), At(0) - 1000);
     EXPECT_EQ(events_.back().kind, stop_counts ? execution_event_t::WITHDRAWN : kRefused);
-    if (!stop_counts) EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
+    if (!stop_counts) {
+      EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
+    }
     fault_t fault{};
     fault.utime = At(0) + ahead;
     fault.cause = fault_t::SLICE_LEFT;
     supervisor.OnFault(say(ahead, "FAULT", Encode(fault)), At(0) - 1000);
     EXPECT_EQ(supervisor.halted(), stop_counts);
-    if (!stop_counts) EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
+    if (!stop_counts) {
+      EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
+    }
   }
 }
 
