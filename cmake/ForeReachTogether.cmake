@@ -21,12 +21,12 @@ endfunction()
 # Files with compile options or definitions of their own, and generated ones, stay alone.
 function(forereach_batches target directory)
   get_target_property(sources ${target} SOURCES)
-  list(LENGTH sources length)
-  if(length LESS 2)
-    return()
-  endif()
   get_target_property(binary ${target} BINARY_DIR)
   file(RELATIVE_PATH folder ${CMAKE_SOURCE_DIR} ${directory})
+  list(LENGTH sources length)
+  if(length LESS 2 OR folder MATCHES "^(tests/)?(research|bench)")  # the last two are built by few, and seldom
+    return()
+  endif()
   set(at_once 12)
   if(folder MATCHES "^tests")
     set(at_once 5)  # many programs are built by both cores at the end
