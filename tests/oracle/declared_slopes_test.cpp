@@ -123,7 +123,7 @@ TEST(DeclaredSlopes, OfRandomExpressionsBoundThemAndAreConfirmed) {
   SCOPED_TRACE(random.trace());
   const std::vector<std::string> leaves{"x", "y", "u", "c", "0.5", "2", "x", "y"};
   Count count;
-  for (int trial = 0; trial < 250; ++trial) Examine(random, AnyExpression(random, leaves, 4, true), 1, count);
+  for (int trial = 0; trial < 320; ++trial) Examine(random, AnyExpression(random, leaves, 4, true), 1, count);
   EXPECT_GT(count.bounded, 120);
   EXPECT_GT(count.checked, 80);
   EXPECT_GE(50 * count.confirmed, 49 * count.checked);

@@ -593,6 +593,7 @@ int main(int argc, char** argv) {
       const std::lock_guard lock(mutex);
       total.Add(counts);
     }
+    mpfr_free_cache();  // this thread's
   };
   std::vector<std::thread> threads;
   for (unsigned j = 0; j < jobs; ++j) threads.emplace_back(work);
