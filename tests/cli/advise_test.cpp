@@ -180,12 +180,12 @@ TEST_F(AdviseTest, SearchesAgainWhenKeptAdviceDoesNotMatchTheRun) {
   const nlohmann::json advice = {{"change", "observation"}, {"what", "w"}, {"amount", 1}, {"turns", true}};
   const auto with_place = [&](const nlohmann::json& place) {
     nlohmann::json forged = fitting;
-    forged[0]["advice"] = {advice};
+    forged[0]["advice"] = nlohmann::json::array({advice});
     forged[0]["advice"][0]["place"] = place;
     return forged;
   };
   EXPECT_EQ(advised_after(with_place({0, 0, 0, 0, 0, 0, 0, 0})).at(0)[0]["advice"][0]["what"], "w") << "it would fit";
-  for (const nlohmann::json& place : {nlohmann::json{1}, nlohmann::json{1, 2, 3, 4, 5, 6, 7, 8, 9}})
+  for (const nlohmann::json& place : {nlohmann::json::array({1}), nlohmann::json{1, 2, 3, 4, 5, 6, 7, 8, 9}})
     EXPECT_EQ(advised_after(with_place(place)).at(0), fitting) << place;
   EXPECT_EQ(advised_after(nlohmann::json::array({fitting[0]})).at(0), fitting) << "one is missing";
 }
