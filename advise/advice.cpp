@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "certifier/certify/explain.h"
-#include "certifier/certify/way_clear.h"
-#include "certifier/numerics/least.h"
-#include "certifier/numerics/size.h"
-#include "certifier/numerics/text.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/certify/explain.h"
+#include "forereach/certify/way_clear.h"
+#include "forereach/numerics/least.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 
 namespace forereach {
 namespace {

@@ -11,7 +11,7 @@ declaration, an obstacle has to be elsewhere. */
 #include <vector>
 
 #include "advise/case.h"
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 
 namespace forereach {
 

@@ -4,10 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "certifier/certify/decision.h"
-#include "certifier/certify/problem.h"
-#include "certifier/safety/obstacle.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/certify/decision.h"
+#include "forereach/certify/problem.h"
+#include "forereach/safety/obstacle.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

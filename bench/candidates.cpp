@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "certifier/task/canonical.h"
 #include "lcmtypes/codec.h"
+#include "task/canonical.h"
 
 namespace forereach::bench {
 

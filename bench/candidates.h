@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "bench/tasks.h"
-#include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
+#include "task/config.h"
 
 namespace forereach::bench {
 

@@ -20,7 +20,7 @@
 #include "bench/tasks.h"
 #include "bench/text_models.h"
 #include "bench/without_rounding.h"
-#include "certifier/certify/batch.h"
+#include "forereach/certify/batch.h"
 
 namespace forereach::bench {
 namespace {

@@ -12,7 +12,7 @@
 #include <boost/numeric/interval.hpp>
 
 #include "bench/tasks.h"
-#include "certifier/dynamics/models/kinematic_bicycle.h"
+#include "forereach/dynamics/models/kinematic_bicycle.h"
 
 namespace forereach::bench {
 namespace {

@@ -298,7 +298,7 @@ def os_name():
 def compiled_with(build):
     """Compiler and flags of the certifier library, as the build has them."""
     for entry in json.loads((build / "compile_commands.json").read_text()):
-        if entry["file"].endswith("certifier/certify/certifier.cpp"):
+        if entry["file"].endswith("forereach/certify/certifier.cpp"):
             words = entry["command"].split()
             compiler = next(word for word in words if word.endswith(("++", "g++-12", "clang++")))
             flags = [word for word in words if re.match(r"-(O|f|m|std|DNDEBUG)", word)]

@@ -6,7 +6,7 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/tasks.h"
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 
 namespace forereach::bench {
 

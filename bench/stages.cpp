@@ -11,12 +11,12 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/tasks.h"
-#include "certifier/reach/propagator.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/lipschitz_envelope.h"
-#include "certifier/residual/observation_store.h"
-#include "certifier/residual/observations.h"
-#include "certifier/safety/separation.h"
+#include "forereach/reach/propagator.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/lipschitz_envelope.h"
+#include "forereach/residual/observation_store.h"
+#include "forereach/residual/observations.h"
+#include "forereach/safety/separation.h"
 
 namespace forereach::bench {
 namespace {

@@ -13,7 +13,7 @@ an observation, residuals are computed once. It has no rounding control, so its 
 
 #include <Eigen/Core>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 
 namespace forereach::bench {
 

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 
 namespace forereach::bench {
 

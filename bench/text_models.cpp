@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/dynamics/text_model.h"
+#include "forereach/dynamics/text_model.h"
 
 namespace forereach::bench {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "bench/tasks.h"
-#include "certifier/dynamics/model_text.h"
+#include "forereach/dynamics/model_text.h"
 
 namespace forereach::bench {
 

@@ -7,11 +7,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "certifier/certify/explain.h"
-#include "certifier/numerics/parallel.h"
-#include "certifier/task/config_error.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/parallel.h"
 #include "planner_bridge/motion.h"
+#include "task/config_error.h"
 
 namespace forereach {
 

@@ -10,9 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/candidate_message.h"
-#include "certifier/task/files.h"
-#include "certifier/task/json_field.h"
-#include "certifier/task/json_text.h"
 #include "lcmtypes/names.h"
 #include "records/decision_json.h"
 #include "records/decision_record.h"
@@ -20,6 +17,9 @@
 #include "records/log_tasks.h"
 #include "records/run_logs.h"
 #include "records/timeline.h"
+#include "task/files.h"
+#include "task/json_field.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

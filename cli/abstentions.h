@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "advise/case.h"
-#include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/run_logs.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
@@ -15,6 +14,7 @@
 #include "lcmtypes/printable.h"
 #include "records/decision_record.h"
 #include "records/log_survey.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

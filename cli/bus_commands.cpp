@@ -11,14 +11,14 @@
 #include "bus/bus_options.h"
 #include "bus/keys.h"
 #include "bus/process.h"
-#include "certifier/task/config.h"
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/status_json.h"
+#include "task/config.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/explain.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/text.h"
 #include "records/decision_json.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -7,12 +7,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/limits.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/json_text.h"
+#include "advise/task_check.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
-#include "cli/task_check.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/text.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "records/check.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -9,16 +9,16 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/declare/slope_bound.h"
-#include "certifier/numerics/parallel.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
-#include "cli/cover_file.h"
-#include "cli/declare_between.h"
-#include "cli/declare_data.h"
 #include "cli/offline.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
+#include "forereach/declare/slope_bound.h"
+#include "forereach/numerics/parallel.h"
+#include "forereach/numerics/text.h"
+#include "identify/cover_file.h"
+#include "identify/declare_between.h"
+#include "identify/declare_data.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -21,9 +21,9 @@
 #include "bus/bus_options.h"
 #include "bus/process.h"
 #include "bus/udp_receiver.h"
-#include "certifier/task/config.h"
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
+#include "task/config.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -12,15 +12,15 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/parallel.h"
-#include "certifier/task/config.h"
 #include "cli/commands.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
+#include "forereach/numerics/parallel.h"
 #include "lcmtypes/bad_input.h"
 #include "records/finished_runs.h"
 #include "records/log_trust.h"
 #include "records/output_file.h"
 #include "records/run_logs.h"
+#include "task/config.h"
 
 namespace forereach {
 

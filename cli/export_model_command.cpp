@@ -5,11 +5,11 @@
 #include <memory>
 #include <stdexcept>
 
-#include "certifier/dynamics/equations_header.h"
-#include "certifier/task/config.h"
 #include "cli/commands.h"
 #include "cli/new_file.h"
 #include "cli/offline.h"
+#include "forereach/dynamics/equations_header.h"
+#include "task/config.h"
 
 namespace forereach {
 namespace {

@@ -7,15 +7,15 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/size.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/config.h"
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "command_line/nearest.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
 #include "identify/fit.h"
 #include "records/scatter.h"
+#include "task/config.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

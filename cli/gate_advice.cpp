@@ -4,7 +4,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacles_in_force.h"
-#include "certifier/numerics/text.h"
+#include "forereach/numerics/text.h"
 
 namespace forereach {
 namespace {

@@ -8,18 +8,18 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/size.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/config.h"
-#include "certifier/task/json_text.h"
-#include "certifier/task/number.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
-#include "cli/progress.h"
 #include "command_line/nearest.h"
+#include "command_line/progress.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
 #include "identify/import.h"
 #include "identify/units.h"
 #include "lcmtypes/printable.h"
+#include "task/config.h"
+#include "task/json_text.h"
+#include "task/number.h"
 
 namespace forereach {
 namespace {

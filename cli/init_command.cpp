@@ -9,18 +9,18 @@
 #include <string>
 #include <vector>
 
-#include "certifier/dynamics/expression.h"
-#include "certifier/numerics/limits.h"
-#include "certifier/numerics/size.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/config.h"
-#include "certifier/task/csv.h"
-#include "certifier/task/files.h"
-#include "certifier/task/model_file.h"
 #include "cli/commands.h"
 #include "cli/new_file.h"
 #include "cli/offline.h"
-#include "cli/task_template.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "task/config.h"
+#include "task/csv.h"
+#include "task/files.h"
+#include "task/model_file.h"
+#include "task/task_template.h"
 
 namespace forereach {
 namespace {

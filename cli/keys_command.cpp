@@ -1,7 +1,7 @@
 #include <iostream>
 
-#include "certifier/task/schema.h"
 #include "cli/commands.h"
+#include "task/schema.h"
 
 namespace forereach {
 

@@ -8,10 +8,10 @@
 #include "bus/log.h"
 #include "bus/node.h"
 #include "bus/process.h"
-#include "certifier/task/config.h"
 #include "cli/commands.h"
 #include "cli/live.h"
 #include "live/web_server.h"
+#include "task/config.h"
 
 namespace forereach {
 namespace {

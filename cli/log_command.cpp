@@ -3,11 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "cli/log_commands.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/log_edit.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -8,8 +8,8 @@
 #include <unistd.h>
 
 #include "bus/descriptor.h"
-#include "certifier/task/config_error.h"
-#include "certifier/task/files.h"
+#include "task/config_error.h"
+#include "task/files.h"
 
 namespace forereach {
 namespace {

@@ -9,8 +9,8 @@
 #include "bus/process.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/task/config.h"
 #include "cli/commands.h"
+#include "task/config.h"
 
 namespace forereach {
 namespace {

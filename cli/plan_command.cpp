@@ -4,12 +4,12 @@
 #include <limits>
 #include <sstream>
 
-#include "certifier/certify/explain.h"
-#include "certifier/task/config.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
+#include "forereach/certify/explain.h"
 #include "planner_bridge/certified_plan.h"
 #include "records/decision_json.h"
+#include "task/config.h"
 
 namespace forereach {
 namespace {

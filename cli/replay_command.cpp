@@ -6,7 +6,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/key_options.h"
@@ -18,6 +17,7 @@
 #include "records/log_tasks.h"
 #include "records/replay.h"
 #include "records/result_json.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

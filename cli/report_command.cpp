@@ -3,7 +3,6 @@
 #include <map>
 #include <optional>
 
-#include "certifier/task/config_error.h"
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
@@ -15,6 +14,7 @@
 #include "page/rows_json.h"
 #include "page/write.h"
 #include "records/report.h"
+#include "task/config_error.h"
 
 namespace forereach {
 namespace {

@@ -2,10 +2,10 @@
 
 #include "bus/process.h"
 #include "cli/commands.h"
-#include "cli/drive_counts.h"
-#include "cli/lockstep.h"
 #include "cli/offline.h"
 #include "logger/logger_node.h"
+#include "simulator/drive_counts.h"
+#include "simulator/lockstep.h"
 
 namespace forereach {
 namespace {

@@ -15,11 +15,11 @@
 #include "bus/bus_options.h"
 #include "bus/node.h"
 #include "bus/process.h"
-#include "certifier/task/config.h"
 #include "cli/log_commands.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "task/config.h"
 
 namespace forereach {
 namespace {

@@ -5,19 +5,19 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/numerics/parallel.h"
-#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/numerics/parallel.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/result_json.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -1,16 +1,16 @@
 # `cmake --install`: programs, headers, task files, and a CMake package: find_package(ForeReach), then link
-# ForeReach::certifier, and on the robot ForeReach::supervisor, or ForeReach::guard alone.
+# ForeReach::forereach, and on the robot ForeReach::supervisor, or ForeReach::guard alone.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim)
 install(TARGETS forereach-live forereach-offline DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
 
-set_target_properties(forereach_certifier PROPERTIES EXPORT_NAME certifier)
+set_target_properties(forereach_library PROPERTIES EXPORT_NAME forereach OUTPUT_NAME forereach)
 set_target_properties(forereach_guard PROPERTIES EXPORT_NAME guard)
 set_target_properties(forereach_supervisor PROPERTIES EXPORT_NAME supervisor)
 set_target_properties(forereach_lcmtypes PROPERTIES EXPORT_NAME lcmtypes)
 set_target_properties(forereach_signing PROPERTIES EXPORT_NAME signing)
-install(TARGETS forereach_options forereach_certifier forereach_lcmtypes forereach_signing forereach_guard
+install(TARGETS forereach_options forereach_library forereach_lcmtypes forereach_signing forereach_guard
   forereach_supervisor EXPORT ForeReachTargets)
 install(EXPORT ForeReachTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
@@ -20,16 +20,17 @@ install(TARGETS forereach_command_line forereach_bus forereach_process forereach
   forereach_certifier_node forereach_certifier_process EXPORT ForeReachProcessTargets)
 install(EXPORT ForeReachProcessTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
+# Users include <forereach/...>. In the tree the messages, too, are forereach/NAME_t.hpp; other folders stay folders.
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/forereach)
 foreach(floor numerics sets dynamics residual safety reach declare certify)
-  install(DIRECTORY certifier/${floor} DESTINATION ${headers}/certifier FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY forereach/${floor} DESTINATION ${headers} FILES_MATCHING PATTERN "*.h")
 endforeach()
 install(FILES certifier/process/certifier_process.h DESTINATION ${headers}/certifier/process)
 install(FILES lcmtypes/angle.h lcmtypes/bad_input.h lcmtypes/codec.h lcmtypes/freshness.h lcmtypes/names.h lcmtypes/seal.h
   lcmtypes/sole_sender.h DESTINATION ${headers}/lcmtypes)
 install(FILES bus/authentic.h bus/keys.h DESTINATION ${headers}/bus)
 install(FILES robot/brake.h robot/guard.h robot/report_queue.h robot/supervisor.h DESTINATION ${headers}/robot)
-install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach DESTINATION ${headers}/messages)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach/ DESTINATION ${headers})
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach/lcmtypes FILES_MATCHING PATTERN "*.lcm")
 install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach)
 

@@ -37,7 +37,8 @@ target_compile_options(forereach_options INTERFACE
 if(FOREREACH_WERROR)
   target_compile_options(forereach_options INTERFACE $<BUILD_INTERFACE:-Werror>)
 endif()
-target_compile_definitions(forereach_options INTERFACE FOREREACH_ROUNDS_EACH_OPERATION)  # certifier/numerics/compilation.h
+target_compile_definitions(forereach_options INTERFACE FOREREACH_ROUNDS_EACH_OPERATION)  # forereach/numerics/compilation.h
 target_compile_features(forereach_options INTERFACE cxx_std_20)
 target_include_directories(forereach_options INTERFACE
-  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/forereach>)
+  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/forereach>)

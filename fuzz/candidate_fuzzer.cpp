@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "certifier/gate/gate.h"
-#include "certifier/safety/clearance.h"
+#include "forereach/safety/clearance.h"
 #include "fuzz/candidates.h"
 #include "lcmtypes/seal.h"
 

@@ -1,7 +1,7 @@
 // Task files: any bytes are a task that the certifier can be made of, or refused with a ConfigError.
-#include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"
+#include "task/config.h"
 
 bool forereach::Try(Bytes data) {
   static MemoryFile file;

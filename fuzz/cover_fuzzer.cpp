@@ -1,8 +1,8 @@
 // Cover files: any bytes are a cover, which comes back the same once written and is confirmed or not, or refused with a
 // ConfigError.
-#include "cli/cover_file.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/json_mutator.h"
+#include "identify/cover_file.h"
 
 namespace forereach {
 namespace {

@@ -1,9 +1,9 @@
 // Transitions and plans: any bytes are finite numbers of the right shape, which come back to the last bit once written,
 // or refused with a ConfigError.
-#include "certifier/dynamics/text_model.h"
-#include "certifier/task/config.h"
+#include "forereach/dynamics/text_model.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"
+#include "task/config.h"
 
 static forereach::ModelText Text() {
   forereach::ModelText text;

@@ -1,12 +1,12 @@
 // Expressions: any text is an expression whose value does not change when every operation is put into parentheses, or
 // it is refused at a place inside it. The verifier's parser takes the same texts and gives them the same values.
-#include "certifier/dynamics/expression.h"
+#include "forereach/dynamics/expression.h"
 
 #include <bit>
 #include <charconv>
 #include <optional>
 
-#include "certifier/dynamics/jet.h"
+#include "forereach/dynamics/jet.h"
 #include "fuzz/fuzz.h"
 #include "verifier/expressions.h"
 #include "verifier/jet.h"

@@ -2,11 +2,11 @@
 // the domain or under one cause, or refused with a ConfigError. The first byte chooses how the log is read.
 #include <numeric>
 
-#include "certifier/dynamics/text_model.h"
-#include "certifier/task/config_error.h"
+#include "forereach/dynamics/text_model.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"
 #include "identify/import.h"
+#include "task/config_error.h"
 
 namespace forereach {
 namespace {

@@ -12,9 +12,9 @@
 #include <unsupported/Eigen/NonLinearOptimization>
 #include <unsupported/Eigen/NumericalDiff>
 
-#include "certifier/dynamics/text_model.h"
-#include "certifier/numerics/limits.h"
-#include "certifier/numerics/size.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach {
 namespace {

@@ -12,8 +12,8 @@ for derivatives. A better nominal model leaves a smaller residual; nothing about
 
 #include <Eigen/Core>
 
-#include "certifier/dynamics/model_text.h"
-#include "certifier/residual/transitions.h"
+#include "forereach/dynamics/model_text.h"
+#include "forereach/residual/transitions.h"
 
 namespace forereach {
 

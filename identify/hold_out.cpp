@@ -5,11 +5,11 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/numerics/size.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/lipschitz_row.h"
-#include "certifier/residual/observation_index.h"
-#include "certifier/residual/pairs.h"
+#include "forereach/numerics/size.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/lipschitz_row.h"
+#include "forereach/residual/observation_index.h"
+#include "forereach/residual/pairs.h"
 
 namespace forereach {
 namespace {

@@ -4,7 +4,7 @@ the first, third, ... to learn from and the others to judge by. */
 
 #include <vector>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 
 namespace forereach {
 

@@ -6,12 +6,12 @@
 #include <numbers>
 #include <span>
 
-#include "certifier/certify/learned.h"
-#include "certifier/numerics/limits.h"
-#include "certifier/numerics/size.h"
-#include "certifier/numerics/text.h"
-#include "certifier/reach/domain.h"
-#include "certifier/task/config_error.h"
+#include "forereach/certify/learned.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/reach/domain.h"
+#include "task/config_error.h"
 
 namespace forereach {
 namespace {

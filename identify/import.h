@@ -18,7 +18,7 @@ and t_i + dt, and the true input differs from u. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "identify/log_table.h"
 
 namespace forereach {

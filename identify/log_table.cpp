@@ -8,10 +8,10 @@
 
 #include <csv.h>
 
-#include "certifier/task/config_error.h"
-#include "certifier/task/line_reader.h"
-#include "certifier/task/number.h"
 #include "command_line/nearest.h"
+#include "task/config_error.h"
+#include "task/line_reader.h"
+#include "task/number.h"
 
 namespace forereach {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "identify/noise_floor.h"
 
 namespace forereach {

@@ -4,8 +4,8 @@ linear program that shares slopes out (smallest_row.h). */
 
 #include <vector>
 
-#include "certifier/residual/declaration.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/observations.h"
 
 namespace forereach {
 

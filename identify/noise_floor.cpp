@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "certifier/numerics/directed.h"
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach {
 namespace {

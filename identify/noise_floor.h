@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "certifier/residual/observations.h"
+#include "forereach/residual/observations.h"
 #include "identify/smallest_row.h"
 
 namespace forereach {

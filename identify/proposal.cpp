@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "certifier/numerics/size.h"
-#include "certifier/numerics/text.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
 #include "identify/slopes.h"
 
 namespace forereach {

@@ -9,8 +9,8 @@ do not count; a zero row stays zero. */
 #include <cstdint>
 #include <vector>
 
-#include "certifier/residual/declaration.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/observations.h"
 
 namespace forereach {
 

@@ -13,8 +13,8 @@ or exceeds. The program finds it, with the row where it is. This is a fact about
 
 #include <Eigen/Core>
 
-#include "certifier/residual/declaration.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/observations.h"
 
 namespace forereach {
 

@@ -4,8 +4,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "certifier/task/number.h"
 #include "command_line/nearest.h"
+#include "task/number.h"
 
 namespace forereach {
 

@@ -4,7 +4,7 @@
 #include <bitset>
 #include <span>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

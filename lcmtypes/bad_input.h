@@ -6,7 +6,7 @@ text in one line and exits with 2. */
 
 #include <stdexcept>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

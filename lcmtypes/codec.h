@@ -15,7 +15,7 @@ functions do not check values; the receiver of a message validates them. They ne
 #include <string_view>
 #include <vector>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

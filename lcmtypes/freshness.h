@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

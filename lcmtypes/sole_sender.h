@@ -27,7 +27,7 @@ back. */
 #include <string>
 #include <vector>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

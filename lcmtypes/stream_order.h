@@ -24,7 +24,7 @@ A restart with a clock that was set back, whose message 0 is lost, is kLate unti
 #include <limits>
 #include <optional>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

@@ -7,14 +7,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
-#include "certifier/sets/zonogon.h"
-#include "certifier/task/json_text.h"
 #include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certify/explain.h"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
+#include "forereach/sets/zonogon.h"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
@@ -22,6 +21,7 @@
 #include "page/drawing_json.h"
 #include "records/outlines.h"
 #include "records/status_json.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

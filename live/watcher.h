@@ -25,10 +25,9 @@ certificate. */
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "certifier/certify/certifier.h"
 #include "certifier/gate/obstacles_in_force.h"
-#include "certifier/task/config.h"
 #include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certify/certifier.h"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -36,6 +35,7 @@ certificate. */
 #include "records/interpreter.h"
 #include "records/log_authenticator.h"
 #include "records/undecided.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -2,8 +2,8 @@
 #include <memory>
 #include <string>
 
-#include "certifier/task/process.h"
 #include "logger/logger_node.h"
+#include "task/process.h"
 
 int main(int argc, char** argv) {
   using namespace forereach;

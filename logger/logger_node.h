@@ -19,8 +19,8 @@ have their number. Messages of other channels above the limit become gaps "unsig
 
 #include "bus/bus.h"
 #include "bus/node.h"
-#include "certifier/task/config.h"
 #include "logger/recorder.h"
+#include "task/config.h"
 
 namespace forereach {
 

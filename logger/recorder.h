@@ -42,13 +42,13 @@ deleted if that would not make enough room. */
 #include <vector>
 
 #include "bus/authentic.h"
-#include "certifier/task/config.h"
 #include "records/database.h"
 #include "records/event_log.h"
 #include "records/interpreter.h"
 #include "records/kept_tasks.h"
 #include "records/log_directory.h"
 #include "records/summary.h"
+#include "task/config.h"
 
 namespace forereach {
 

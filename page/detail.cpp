@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "certifier/certify/explain.h"
-#include "certifier/numerics/size.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/size.h"
 #include "records/outlines.h"
 
 namespace forereach {

@@ -3,10 +3,10 @@
 
 #include <string>
 
-#include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/task/config.h"
+#include "forereach/certify/certifier.h"
 #include "page/page_data.h"
+#include "task/config.h"
 
 namespace forereach {
 

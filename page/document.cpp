@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "certifier/task/json_text.h"
 #include "page/columns.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
-#include "certifier/certify/batch.h"
-#include "certifier/certify/explain.h"
+#include "forereach/certify/batch.h"
+#include "forereach/certify/explain.h"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/safety/obstacle.h"
+#include "forereach/safety/obstacle.h"
 #include "page/sketch.h"
 #include "records/event_log.h"
 #include "records/rows.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "certifier/numerics/directed.h"
+#include "forereach/numerics/directed.h"
 
 namespace forereach {
 namespace {

@@ -4,11 +4,11 @@
 #include <map>
 #include <utility>
 
-#include "certifier/task/json_text.h"
 #include "lcmtypes/printable.h"
 #include "page/columns.h"
 #include "page/document.h"
 #include "page/drawing_json.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

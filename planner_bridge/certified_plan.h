@@ -5,9 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/task/config.h"
+#include "forereach/certify/certifier.h"
 #include "planner_bridge/proposer.h"
+#include "task/config.h"
 
 namespace forereach {
 

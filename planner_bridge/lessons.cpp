@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach {
 

@@ -7,10 +7,10 @@
 
 #include <Eigen/Core>
 
-#include "certifier/certify/decision.h"
 #include "forereach/advice_t.hpp"
-#include "planner_bridge/planner_options.h"
+#include "forereach/certify/decision.h"
 #include "planner_bridge/proposer.h"
+#include "task/planner_options.h"
 
 namespace forereach {
 

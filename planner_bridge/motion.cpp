@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/numerics/size.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach {
 namespace {

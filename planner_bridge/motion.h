@@ -9,7 +9,7 @@ it (planner.stop and the keys beside it). */
 
 #include <Eigen/Core>
 
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -6,8 +6,8 @@
 
 #include <Eigen/Core>
 
-#include "certifier/safety/obstacle.h"
-#include "certifier/sets/box.h"
+#include "forereach/safety/obstacle.h"
+#include "forereach/sets/box.h"
 
 namespace forereach {
 

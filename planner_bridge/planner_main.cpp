@@ -1,5 +1,5 @@
-#include "certifier/task/process.h"
 #include "planner_bridge/planner_node.h"
+#include "task/process.h"
 
 int main(int argc, char** argv) {
   using namespace forereach;

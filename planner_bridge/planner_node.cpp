@@ -12,9 +12,9 @@
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/task/json_text.h"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -42,7 +42,6 @@ decisions on candidates of other planners; and advice that is not on the candida
 
 #include "bus/node.h"
 #include "certifier/gate/obstacles_in_force.h"
-#include "certifier/task/config.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -51,6 +50,7 @@ decisions on candidates of other planners; and advice that is not on the candida
 #include "planner_bridge/lessons.h"
 #include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -5,11 +5,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/limits.h"
-#include "certifier/task/config_error.h"
-#include "certifier/task/files.h"
-#include "certifier/task/json_field.h"
-#include "certifier/task/json_text.h"
+#include "forereach/numerics/limits.h"
+#include "task/config_error.h"
+#include "task/files.h"
+#include "task/json_field.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "planner_bridge/reference.h"
 
 namespace forereach {

@@ -11,7 +11,7 @@ The first one follows the arc to the goal. The next ones follow kFan steering an
 #include <optional>
 #include <vector>
 
-#include "certifier/safety/limit_values.h"
+#include "forereach/safety/limit_values.h"
 #include "planner_bridge/policy.h"
 #include "planner_bridge/proposer.h"
 

@@ -24,9 +24,9 @@
 #include <ompl/util/RandomNumbers.h>
 #include <Eigen/QR>
 
-#include "certifier/numerics/size.h"
-#include "certifier/safety/clearance.h"
-#include "certifier/safety/limit_values.h"
+#include "forereach/numerics/size.h"
+#include "forereach/safety/clearance.h"
+#include "forereach/safety/limit_values.h"
 #include "planner_bridge/navigation.h"
 #include "planner_bridge/reference.h"
 

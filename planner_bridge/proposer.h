@@ -9,9 +9,9 @@ guarantee; the certifier decides on it. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/problem.h"
-#include "certifier/task/config.h"
+#include "forereach/certify/problem.h"
 #include "planner_bridge/motion.h"
+#include "task/config.h"
 
 namespace forereach {
 

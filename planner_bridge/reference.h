@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "certifier/dynamics/model.h"
+#include "forereach/dynamics/model.h"
 
 namespace forereach {
 

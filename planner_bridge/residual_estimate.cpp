@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "certifier/numerics/limits.h"
+#include "forereach/numerics/limits.h"
 
 namespace forereach {
 namespace {

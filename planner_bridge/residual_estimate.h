@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 
 namespace forereach {
 

@@ -13,18 +13,18 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
-#include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/files.h"
-#include "certifier/task/json_text.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/text.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "records/database.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/timeline.h"
+#include "task/files.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

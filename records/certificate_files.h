@@ -6,11 +6,11 @@ decision database. It compares digests with the inputs; the verifier checks the 
 #include <string>
 #include <vector>
 
-#include "certifier/task/config.h"
 #include "records/decision_record.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/run_logs.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -9,8 +9,8 @@ changed. */
 #include <utility>
 #include <vector>
 
-#include "certifier/task/config.h"
 #include "records/log_trust.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -11,7 +11,7 @@
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/explain.h"
-#include "certifier/safety/separation.h"
-#include "certifier/sets/zonogon.h"
+#include "forereach/certify/explain.h"
+#include "forereach/safety/separation.h"
+#include "forereach/sets/zonogon.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {

@@ -5,8 +5,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/task/config.h"
+#include "forereach/certify/certifier.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -7,13 +7,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/explain.h"
-#include "certifier/safety/placement.h"
-#include "certifier/task/json_field.h"
-#include "certifier/task/json_text.h"
+#include "forereach/certify/explain.h"
 #include "forereach/decision_t.hpp"
+#include "forereach/safety/placement.h"
 #include "lcmtypes/names.h"
 #include "records/decision_json.h"
+#include "task/json_field.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

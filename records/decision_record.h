@@ -7,7 +7,7 @@ docs/decision.md. */
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "certifier/task/config.h"
+#include "task/config.h"
 #include "verifier/verifier.h"
 
 namespace forereach {

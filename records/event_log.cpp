@@ -13,8 +13,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "certifier/task/files.h"
 #include "records/event_record.h"
+#include "task/files.h"
 
 namespace forereach {
 namespace {

@@ -5,12 +5,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/text.h"
-#include "certifier/task/json_text.h"
+#include "forereach/numerics/text.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

@@ -9,11 +9,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/files.h"
-#include "certifier/task/json_text.h"
 #include "lcmtypes/codec.h"
 #include "records/database.h"
 #include "records/output_file.h"
+#include "task/files.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

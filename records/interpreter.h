@@ -15,13 +15,13 @@ With a key, messages that are not authentic (log_authenticator.h) make no rows a
 #include <utility>
 
 #include "bus/authentic.h"
-#include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
 #include "records/log_authenticator.h"
 #include "records/rows.h"
 #include "records/undecided.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -10,9 +10,9 @@
 #include <unistd.h>
 
 #include "bus/descriptor.h"
-#include "certifier/task/config.h"
-#include "certifier/task/files.h"
 #include "records/event_log.h"
+#include "task/config.h"
+#include "task/files.h"
 
 namespace forereach {
 namespace {

@@ -16,7 +16,7 @@ kept. */
 #include <string>
 #include <vector>
 
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 namespace forereach {
 

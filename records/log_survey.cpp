@@ -9,13 +9,13 @@
 #include <string_view>
 #include <utility>
 
-#include "certifier/task/files.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/heartbeat.h"
+#include "task/files.h"
 
 namespace forereach {
 namespace {

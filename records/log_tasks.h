@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "certifier/task/config.h"
 #include "records/log_survey.h"
 #include "records/log_trust.h"
+#include "task/config.h"
 
 namespace forereach {
 

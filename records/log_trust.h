@@ -8,7 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "bus/authentic.h"
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -8,7 +8,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
@@ -26,6 +25,7 @@
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

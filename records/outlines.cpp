@@ -9,8 +9,8 @@
 
 #include <Eigen/Geometry>
 
-#include "certifier/numerics/size.h"
-#include "certifier/sets/zonogon.h"
+#include "forereach/numerics/size.h"
+#include "forereach/sets/zonogon.h"
 
 namespace forereach {
 namespace {

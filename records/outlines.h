@@ -4,8 +4,8 @@ bounds. */
 
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/text_program.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/text_program.h"
 #include "records/picture.h"
 
 namespace forereach {
@@ -13,7 +13,7 @@ namespace forereach {
 /** The convex hull, counter-clockwise, of points in the plane, each with a disc of this radius: 16 corners. */
 [[nodiscard]] Picture::Polygon HullOf(const std::vector<Eigen::Vector2d>& points, double radius = 0);
 
-/** What the robot sweeps in each unit of a tube (certifier/certify/safety.h) up to `last`: a polygon for each part. For
+/** What the robot sweeps in each unit of a tube (forereach/certify/safety.h) up to `last`: a polygon for each part. For
 a point at the samples it is the projected slice. @pre p = 2. */
 [[nodiscard]] std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, const Tube& tube, int last);
 

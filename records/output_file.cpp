@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "certifier/task/files.h"
+#include "task/files.h"
 
 namespace forereach {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "certifier/task/config.h"
 #include "forereach/decision_t.hpp"
 #include "records/log_trust.h"
+#include "task/config.h"
 
 namespace forereach {
 

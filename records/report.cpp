@@ -15,16 +15,16 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/batch.h"
-#include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/task/json_text.h"
 #include "forereach/candidate_plan_t.hpp"
+#include "forereach/certify/batch.h"
+#include "forereach/certify/certifier.h"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "records/log_tasks.h"
 #include "records/outlines.h"
 #include "records/timeline.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

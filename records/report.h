@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "certifier/task/config.h"
 #include "records/picture.h"
 #include "records/summary.h"
+#include "task/config.h"
 
 namespace forereach {
 

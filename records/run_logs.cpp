@@ -7,10 +7,10 @@
 #include <system_error>
 #include <utility>
 
-#include "certifier/numerics/parallel.h"
-#include "certifier/task/config_error.h"
+#include "forereach/numerics/parallel.h"
 #include "records/log_directory.h"
 #include "records/log_survey.h"
+#include "task/config_error.h"
 
 namespace forereach {
 namespace {

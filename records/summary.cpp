@@ -7,7 +7,7 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/explain.h"
+#include "forereach/certify/explain.h"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/printable.h"
 #include "records/log_authenticator.h"

@@ -12,11 +12,11 @@
 #include <Eigen/Core>
 #include <nlohmann/json_fwd.hpp>
 
-#include "certifier/task/config.h"
 #include "records/database.h"
 #include "records/event_log.h"
 #include "records/interpreter.h"
 #include "records/log_trust.h"
+#include "task/config.h"
 
 namespace forereach {
 

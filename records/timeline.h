@@ -29,7 +29,6 @@ before the candidate; then the digests of the basis differ from those that the d
 
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/robot_messages.h"
-#include "certifier/task/config.h"
 #include "forereach/decision_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
@@ -40,6 +39,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "records/log_trust.h"
 #include "records/repeated_withdrawals.h"
 #include "records/undecided.h"
+#include "task/config.h"
 
 namespace forereach {
 

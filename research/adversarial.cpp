@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/residual/observations.h"
+#include "forereach/residual/observations.h"
 #include "identify/slopes.h"
 #include "research/experiment.h"
 #include "research/methods/envelope.h"

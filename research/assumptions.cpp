@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 #include "identify/slopes.h"
 #include "research/experiment.h"
 #include "research/methods/affine.h"

@@ -4,9 +4,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "certifier/numerics/text.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 #include "research/chunks/support.h"
 #include "research/evaluate.h"
 #include "research/methods/cp_sls.h"

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/models/residuals.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/declare/slope_bound.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 #include "research/equations_slopes.h"
 #include "research/experiment.h"
 #include "research/norm_ratio.h"

@@ -1,11 +1,11 @@
-/** The slopes of a residual that is compiled: a template over the scalar type (certifier/dynamics/models/residuals.h).
+/** The slopes of a residual that is compiled: a template over the scalar type (forereach/dynamics/models/residuals.h).
  */
 #pragma once
 
 #include <array>
 #include <span>
 
-#include "certifier/declare/residual_slopes.h"
+#include "forereach/declare/residual_slopes.h"
 #include "research/occurrence.h"
 
 namespace forereach {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "certifier/sets/zonogon.h"
+#include "forereach/sets/zonogon.h"
 
 namespace forereach::research {
 namespace {

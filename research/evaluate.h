@@ -2,7 +2,7 @@
 the answer is true of the target. */
 #pragma once
 
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 #include "research/membership.h"
 #include "research/scenarios.h"
 #include "research/truth.h"

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "certifier/dynamics/models/residuals.h"
-#include "certifier/residual/observations.h"
-#include "certifier/sets/zonogon.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "forereach/residual/observations.h"
+#include "forereach/sets/zonogon.h"
 #include "research/evaluate.h"
 #include "research/experiment.h"
 #include "research/limits/extremal.h"

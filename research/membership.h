@@ -4,7 +4,7 @@ In plain arithmetic and to a tolerance, so for figures, not for bounds. */
 
 #include <span>
 
-#include "certifier/sets/zonotope.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach::research {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/sets/zonogon.h"
+#include "forereach/sets/zonogon.h"
 #include "research/evaluate.h"
 #include "research/experiment.h"
 #include "research/membership.h"

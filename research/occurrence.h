@@ -4,7 +4,7 @@ arguments on which each output may depend. The derivatives by all other argument
 
 #include <cstdint>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

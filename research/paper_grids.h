@@ -3,7 +3,7 @@ replaced by its largest value there. In plain double arithmetic, so figures to c
 those are `forereach declare`'s, and lie a little below. */
 #pragma once
 
-#include "certifier/dynamics/models/residuals.h"
+#include "forereach/dynamics/models/residuals.h"
 
 namespace forereach::research {
 

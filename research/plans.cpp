@@ -8,12 +8,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "certifier/numerics/parallel.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/config.h"
+#include "forereach/numerics/parallel.h"
+#include "forereach/numerics/text.h"
 #include "research/experiment.h"
 #include "research/run_directory.h"
 #include "research/statistics.h"
+#include "task/config.h"
 
 namespace forereach::research {
 namespace {

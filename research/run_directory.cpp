@@ -6,12 +6,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/parallel.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/files.h"
-#include "certifier/task/json_text.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
+#include "forereach/numerics/parallel.h"
+#include "forereach/numerics/text.h"
 #include "research/statistics.h"
+#include "task/files.h"
+#include "task/json_text.h"
 
 namespace forereach::research {
 namespace {

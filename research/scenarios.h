@@ -18,9 +18,9 @@ random side. */
 
 #include <Eigen/Core>
 
-#include "certifier/residual/declaration.h"
-#include "certifier/residual/transitions.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/transitions.h"
+#include "forereach/sets/zonotope.h"
 #include "research/systems.h"
 
 namespace forereach::research {

@@ -5,10 +5,10 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "certifier/dynamics/models/kinematic_bicycle.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/models/point_mass.h"
-#include "certifier/dynamics/models/residuals.h"
+#include "forereach/dynamics/models/kinematic_bicycle.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/point_mass.h"
+#include "forereach/dynamics/models/residuals.h"
 #include "research/random.h"
 
 namespace forereach::research {

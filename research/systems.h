@@ -12,9 +12,9 @@ of X0 are not in its text. They are ours, and fitted with the scenarios: scenari
 
 #include <Eigen/Core>
 
-#include "certifier/dynamics/model.h"
-#include "certifier/reach/domain.h"
-#include "certifier/sets/box.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/reach/domain.h"
+#include "forereach/sets/box.h"
 
 namespace forereach::research {
 

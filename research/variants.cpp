@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models/kinematic_bicycle.h"
-#include "certifier/dynamics/models/point_mass.h"
-#include "certifier/dynamics/models/residuals.h"
-#include "certifier/numerics/text.h"
+#include "forereach/declare/slope_bound.h"
+#include "forereach/dynamics/equations_model.h"
+#include "forereach/dynamics/models/kinematic_bicycle.h"
+#include "forereach/dynamics/models/point_mass.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "forereach/numerics/text.h"
 #include "research/norm_ratio.h"
 
 namespace forereach::research {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 #include "research/experiment.h"
 #include "research/methods/envelope.h"
 #include "research/random.h"

@@ -11,7 +11,7 @@ exactly like this; a robot with a brake that is at least as strong may link it f
 #include <utility>
 #include <vector>
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

@@ -142,7 +142,7 @@ struct GuardOptions {
   std::vector<int> angles = {};
   /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, and no later than this
   after step_us from the last step, microseconds, not negative. It is half of the task's gate.max_clock_error_ms
-  (certifier/task/step_time.h): certificates assume it of obstacles that move, and of the motion between two samples. */
+  (task/step_time.h): certificates assume it of obstacles that move, and of the motion between two samples. */
   std::optional<std::int64_t> max_jitter_us = {};
 };
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/dynamics/model_text.h"
+#include "forereach/dynamics/model_text.h"
 
 namespace forereach {
 

@@ -15,8 +15,8 @@ All else is as `Problem` has it by default. A test changes what it is about. It 
 #include <memory>
 #include <utility>
 
-#include "certifier/certify/problem.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/certify/problem.h"
+#include "forereach/dynamics/models/named_models.h"
 
 namespace forereach {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "verifier/containment.h"
 #include "verifier/separation.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
 namespace {

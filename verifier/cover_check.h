@@ -9,9 +9,9 @@ is rederived by the verifier's own parser and rules of differentiation. */
 #include <functional>
 #include <string>
 
-#include "certifier/declare/cover.h"
-#include "certifier/dynamics/parametric_residual.h"
-#include "certifier/reach/domain.h"
+#include "forereach/declare/cover.h"
+#include "forereach/dynamics/parametric_residual.h"
+#include "forereach/reach/domain.h"
 #include "verifier/answer.h"
 #include "verifier/slopes.h"
 

@@ -5,8 +5,8 @@
 #include <tuple>
 #include <utility>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/numerics/size.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/size.h"
 #include "verifier/equations.h"
 #include "verifier/expressions.h"
 #include "verifier/functions.h"

@@ -7,8 +7,8 @@ table of named models; it reads them by its own parser, and derives them by the 
 #include <span>
 #include <vector>
 
-#include "certifier/dynamics/model.h"
-#include "certifier/dynamics/model_text.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/dynamics/model_text.h"
 #include "verifier/real.h"
 
 namespace forereach::verifier {
@@ -41,7 +41,7 @@ class Equations {
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
 };
 
-/** The equations of TextOf(model) (certifier/dynamics/models/named_models.h); null if there is no text.
+/** The equations of TextOf(model) (forereach/dynamics/models/named_models.h); null if there is no text.
 @throws ExpressionError (expressions.h) if it is not a model in the language. */
 [[nodiscard]] std::unique_ptr<Equations> EquationsOf(const NominalModel& model);
 

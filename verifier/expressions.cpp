@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
 namespace {

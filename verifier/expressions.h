@@ -1,4 +1,4 @@
-/** The verifier's own parser of expressions (certifier/dynamics/model_text.h; docs/expressions.md describes the
+/** The verifier's own parser of expressions (forereach/dynamics/model_text.h; docs/expressions.md describes the
 language). It shares no code with the certifier's. */
 #pragma once
 
@@ -7,7 +7,7 @@ language). It shares no code with the certifier's. */
 #include <string>
 #include <string_view>
 
-#include "certifier/dynamics/model_text.h"
+#include "forereach/dynamics/model_text.h"
 #include "verifier/tape.h"
 
 namespace forereach::verifier {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "verifier/expressions.h"
 #include "verifier/jet.h"
 

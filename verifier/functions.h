@@ -7,8 +7,8 @@ the verifier's own parser and arithmetic. */
 #include <utility>
 #include <vector>
 
-#include "certifier/dynamics/model.h"
-#include "certifier/dynamics/model_text.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/dynamics/model_text.h"
 #include "verifier/real.h"
 #include "verifier/tape.h"
 #include "verifier/tube.h"

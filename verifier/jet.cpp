@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "verifier/ranges.h"
 
 namespace forereach::verifier {

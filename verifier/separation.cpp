@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
 namespace {

@@ -8,7 +8,7 @@ doubles can separate. */
 
 #include <vector>
 
-#include "certifier/safety/obstacle.h"
+#include "forereach/safety/obstacle.h"
 #include "verifier/answer.h"
 #include "verifier/sweep.h"
 

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "verifier/jet.h"
 
 namespace forereach::verifier {

@@ -6,7 +6,7 @@ intervals. */
 #include <utility>
 #include <vector>
 
-#include "certifier/dynamics/parametric_residual.h"
+#include "forereach/dynamics/parametric_residual.h"
 #include "verifier/functions.h"
 #include "verifier/real.h"
 

@@ -18,7 +18,7 @@ finite bend is anywhere in its range over the slice's hull. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "verifier/functions.h"
 #include "verifier/real.h"
 #include "verifier/tube.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <tuple>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
 namespace {

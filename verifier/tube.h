@@ -13,7 +13,7 @@ r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "verifier/answer.h"
 #include "verifier/equations.h"
 #include "verifier/real.h"

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "verifier/claims.h"
 #include "verifier/expressions.h"
 

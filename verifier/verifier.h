@@ -14,7 +14,7 @@ Refuted: one of these is false. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "verifier/answer.h"
 #include "verifier/equations.h"
 #include "verifier/functions.h"

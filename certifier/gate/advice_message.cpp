@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "certifier/numerics/size.h"
-#include "certifier/safety/clearance.h"
+#include "forereach/numerics/size.h"
+#include "forereach/safety/clearance.h"
 
 namespace forereach {
 namespace {

@@ -7,9 +7,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "certifier/certify/way_clear.h"
 #include "forereach/advice_change_t.hpp"
 #include "forereach/advice_t.hpp"
+#include "forereach/certify/way_clear.h"
 
 namespace forereach {
 

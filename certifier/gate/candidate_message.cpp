@@ -4,8 +4,8 @@
 #include <stdexcept>
 
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/step_time.h"
+#include "forereach/numerics/text.h"
+#include "task/step_time.h"
 
 namespace forereach {
 

@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "certifier/certify/decision.h"
-#include "certifier/dynamics/model.h"
-#include "certifier/safety/body.h"
-#include "certifier/task/gate_options.h"
 #include "forereach/candidate_plan_t.hpp"
+#include "forereach/certify/decision.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/safety/body.h"
 #include "lcmtypes/codec.h"
+#include "task/gate_options.h"
 
 namespace forereach {
 

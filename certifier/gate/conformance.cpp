@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 
 namespace forereach {
 

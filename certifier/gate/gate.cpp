@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <exception>
 
-#include "certifier/certify/explain.h"
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/text.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/text.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach {

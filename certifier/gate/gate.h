@@ -13,20 +13,20 @@ not, the caller calls Refuse. */
 #include <string>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/standing.h"
-#include "certifier/certify/way_clear.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
-#include "certifier/task/config.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/standing.h"
+#include "forereach/certify/way_clear.h"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/grounds.h"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/limits.h"
+#include "forereach/numerics/limits.h"
 
 namespace forereach {
 

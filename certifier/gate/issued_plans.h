@@ -12,9 +12,9 @@ as long as such a plan may be executing. */
 #include <optional>
 #include <string>
 
-#include "certifier/task/gate_options.h"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "task/gate_options.h"
 
 namespace forereach {
 

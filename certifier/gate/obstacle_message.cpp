@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "lcmtypes/freshness.h"
 
 namespace forereach {

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "certifier/safety/obstacle.h"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/obstacles_v2_t.hpp"
+#include "forereach/safety/obstacle.h"
 
 namespace forereach {
 

@@ -7,8 +7,8 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/limits.h"
-#include "certifier/task/canonical.h"
+#include "forereach/numerics/limits.h"
+#include "task/canonical.h"
 
 namespace forereach {
 

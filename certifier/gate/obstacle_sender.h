@@ -12,11 +12,11 @@ A bus has one sender. A restarted sender begins at sequence 0, which receivers a
 #include <optional>
 #include <vector>
 
-#include "certifier/safety/obstacle.h"
-#include "certifier/task/config.h"
-#include "certifier/task/gate_options.h"
 #include "forereach/obstacles_v2_t.hpp"
+#include "forereach/safety/obstacle.h"
 #include "lcmtypes/codec.h"
+#include "task/config.h"
+#include "task/gate_options.h"
 
 namespace forereach {
 

@@ -5,10 +5,10 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/text.h"
-#include "certifier/task/canonical.h"
+#include "forereach/numerics/text.h"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/obstacles_v2_t.hpp"
+#include "task/canonical.h"
 
 namespace forereach {
 

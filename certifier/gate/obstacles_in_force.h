@@ -31,12 +31,12 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include <vector>
 
 #include "certifier/gate/stream_clock.h"
-#include "certifier/safety/obstacle.h"
-#include "certifier/task/config.h"
+#include "forereach/safety/obstacle.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
 #include "lcmtypes/sole_sender.h"
 #include "lcmtypes/stream_order.h"
+#include "task/config.h"
 
 namespace forereach {
 

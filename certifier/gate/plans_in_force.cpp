@@ -5,9 +5,9 @@
 #include <string>
 #include <utility>
 
-#include "certifier/certify/explain.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/limits.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/limits.h"
 
 namespace forereach {
 namespace {

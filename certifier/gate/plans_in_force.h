@@ -47,12 +47,12 @@ No bus, no clock. Times of a monotonic clock and of the wall clock in microsecon
 #include <string>
 
 #include "certifier/gate/gate.h"
-#include "certifier/task/gate_options.h"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/stream_order.h"
+#include "task/gate_options.h"
 
 namespace forereach {
 

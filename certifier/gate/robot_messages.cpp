@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "certifier/certify/learned.h"
+#include "forereach/certify/learned.h"
 
 namespace forereach {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "certifier/task/gate_options.h"
 #include "lcmtypes/freshness.h"
+#include "task/gate_options.h"
 
 namespace forereach {
 

@@ -3,7 +3,7 @@
 #include <cstdlib>
 
 #include "certifier/gate/stamp.h"
-#include "certifier/numerics/text.h"
+#include "forereach/numerics/text.h"
 
 namespace forereach {
 namespace {

@@ -19,7 +19,7 @@ No clock, no bus. */
 #include <optional>
 #include <string>
 
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 namespace forereach {
 

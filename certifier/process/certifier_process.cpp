@@ -7,7 +7,7 @@
 #include "bus/realtime.h"
 #include "certifier/process/certifier_node.h"
 #include "certifier/process/latch_file.h"
-#include "certifier/task/process.h"
+#include "task/process.h"
 
 namespace forereach {
 

@@ -1,8 +1,8 @@
-/** The certifier's process. A program of your own calls it from main, after UseCompiled (certifier/dynamics/
+/** The certifier's process. A program of your own calls it from main, after UseCompiled (forereach/dynamics/
 compiled_models.h), to certify with compiled equations. */
 #pragma once
 
-#include "certifier/numerics/compilation.h"
+#include "forereach/numerics/compilation.h"
 
 namespace forereach {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "certifier/residual/consistency.h"
+#include "forereach/residual/consistency.h"
 
 namespace forereach {
 namespace {

@@ -16,7 +16,7 @@ The declaration in force is the one that was passed to Follow last. No clock, no
 #include <vector>
 
 #include "certifier/process/latch_file.h"
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 namespace forereach {
 

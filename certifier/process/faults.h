@@ -6,8 +6,8 @@
 
 #include "certifier/gate/conformance.h"
 #include "certifier/gate/issued_plans.h"
-#include "certifier/residual/consistency.h"
 #include "forereach/fault_t.hpp"
+#include "forereach/residual/consistency.h"
 
 namespace forereach {
 

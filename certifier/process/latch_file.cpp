@@ -14,10 +14,10 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/numerics/limits.h"
-#include "certifier/task/files.h"
-#include "certifier/task/json_text.h"
+#include "forereach/numerics/limits.h"
 #include "lcmtypes/bad_input.h"
+#include "task/files.h"
+#include "task/json_text.h"
 
 namespace forereach {
 namespace {

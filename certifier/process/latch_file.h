@@ -14,8 +14,8 @@ A file that does not exist holds nothing: a person may delete it. No other damag
 #include <string>
 #include <vector>
 
-#include "certifier/residual/observations.h"
 #include "forereach/fault_t.hpp"
+#include "forereach/residual/observations.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {

@@ -5,9 +5,9 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
+#include "task/json_text.h"
 
 namespace forereach {
 

@@ -14,7 +14,7 @@ if its declaration is known to be contradicted. The file is read in a thread of 
 #include "bus/reloading.h"
 #include "certifier/gate/gate.h"
 #include "certifier/process/contradictions.h"
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 namespace forereach {
 

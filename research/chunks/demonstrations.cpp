@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "certifier/numerics/parallel.h"
+#include "forereach/numerics/parallel.h"
 
 namespace forereach::research {
 namespace {

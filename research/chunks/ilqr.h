@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 
-#include "certifier/dynamics/model.h"
-#include "certifier/sets/box.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/sets/box.h"
 
 namespace forereach::research {
 

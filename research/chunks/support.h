@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "certifier/residual/transitions.h"
+#include "forereach/residual/transitions.h"
 #include "research/scenarios.h"
 
 namespace forereach::research {

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <ostream>
 
-#include "certifier/dynamics/text_model.h"
-#include "certifier/residual/observations.h"
-#include "certifier/task/model_file.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/residual/observations.h"
 #include "identify/smallest_row.h"
 #include "research/drift/markdown.h"
 #include "research/random.h"
 #include "research/run_directory.h"
+#include "task/model_file.h"
 
 namespace forereach::research {
 namespace {

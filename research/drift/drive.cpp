@@ -6,12 +6,12 @@
 #include <iterator>
 #include <ostream>
 
-#include "certifier/task/config.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
 #include "research/drift/drift.h"
 #include "research/drift/markdown.h"
 #include "research/random.h"
 #include "research/run_directory.h"
+#include "task/config.h"
 
 namespace forereach::research {
 namespace {

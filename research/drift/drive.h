@@ -6,13 +6,13 @@
 #include <span>
 #include <string>
 
-#include "certifier/safety/body.h"
-#include "cli/drive_counts.h"
+#include "forereach/safety/body.h"
 #include "research/drift/single_track_drift.h"
+#include "simulator/drive_counts.h"
 
 namespace forereach::research {
 
-/** The drift model as the plant of a simulated robot (robot/target.h). Its first seven states are measured without
+/** The drift model as the plant of a simulated robot (simulator/target.h). Its first seven states are measured without
 error; the speeds of its wheels, with which it begins rolling, are known to nobody. */
 class DriftCar final {
  public:

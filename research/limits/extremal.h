@@ -12,10 +12,10 @@ the middle of what the observations leave. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/decision.h"
-#include "certifier/dynamics/model.h"
-#include "certifier/residual/declaration.h"
-#include "certifier/residual/observations.h"
+#include "forereach/certify/decision.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/observations.h"
 
 namespace forereach::research {
 

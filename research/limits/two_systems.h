@@ -10,8 +10,8 @@ zero outside the ball. */
 
 #include <Eigen/Core>
 
-#include "certifier/certify/decision.h"
-#include "certifier/dynamics/model.h"
+#include "forereach/certify/decision.h"
+#include "forereach/dynamics/model.h"
 #include "research/limits/smooth_residual.h"
 
 namespace forereach::research {

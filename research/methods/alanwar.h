@@ -17,7 +17,7 @@ min_i sum_l (L_kl + |M'_kl|) |z_l - z_il|. Where the two papers leave a choice:
 #include <memory>
 #include <vector>
 
-#include "certifier/numerics/interval.h"
+#include "forereach/numerics/interval.h"
 #include "research/methods/method.h"
 
 namespace forereach::research {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "certifier/numerics/interval.h"
+#include "forereach/numerics/interval.h"
 
 namespace forereach::research {
 

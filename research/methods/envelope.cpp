@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "certifier/residual/observation_store.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/observation_store.h"
+#include "forereach/residual/observations.h"
 #include "research/methods/samples.h"
 
 namespace forereach::research {

@@ -11,11 +11,11 @@ how a remainder is bounded.) */
 #include <span>
 #include <string>
 
-#include "certifier/dynamics/model.h"
-#include "certifier/reach/domain.h"
-#include "certifier/residual/declaration.h"
-#include "certifier/residual/enclosure.h"
-#include "certifier/residual/transitions.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/reach/domain.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/enclosure.h"
+#include "forereach/residual/transitions.h"
 
 namespace forereach::research {
 

@@ -9,8 +9,8 @@ matter. In plain arithmetic: these methods are not bounds to begin with. */
 
 #include <Eigen/Core>
 
-#include "certifier/numerics/interval.h"
-#include "certifier/residual/observations.h"
+#include "forereach/numerics/interval.h"
+#include "forereach/residual/observations.h"
 #include "research/methods/method.h"
 
 namespace forereach::research {

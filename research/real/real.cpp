@@ -5,11 +5,11 @@
 #include <cstdio>
 #include <ostream>
 
-#include "certifier/task/config.h"
-#include "certifier/task/config_error.h"
 #include "research/plot.h"
 #include "research/real/study.h"
 #include "research/run_directory.h"
+#include "task/config.h"
+#include "task/config_error.h"
 
 namespace forereach::research {
 namespace {

@@ -9,9 +9,9 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
-#include "certifier/numerics/size.h"
-#include "certifier/task/config_error.h"
+#include "forereach/numerics/size.h"
 #include "identify/import.h"
+#include "task/config_error.h"
 
 namespace forereach::research {
 namespace {

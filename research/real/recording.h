@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "identify/log_table.h"
 
 namespace forereach::research {

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/text_model.h"
-#include "certifier/numerics/limits.h"
-#include "certifier/numerics/size.h"
-#include "certifier/task/model_file.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
 #include "identify/hold_out.h"
 #include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
+#include "task/model_file.h"
 
 namespace forereach::research {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "identify/fit.h"
 #include "research/real/recording.h"
 

@@ -6,9 +6,9 @@
 #include <map>
 #include <string>
 
-#include "certifier/certify/explain.h"
-#include "certifier/numerics/size.h"
 #include "cli/gate_advice.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/size.h"
 #include "lcmtypes/names.h"
 #include "tests/advise/answered.h"
 #include "tests/oracle/problems.h"

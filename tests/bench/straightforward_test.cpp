@@ -9,7 +9,7 @@
 
 #include "bench/latencies.h"
 #include "bench/tasks.h"
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
 

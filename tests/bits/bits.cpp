@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/equations_model.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "own_model.h"
 
 using namespace forereach;

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/task/config.h"
+#include "forereach/certify/certifier.h"
+#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 

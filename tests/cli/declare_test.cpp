@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/config.h"
-#include "cli/cover_file.h"
+#include "identify/cover_file.h"
+#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/dynamics/model.h"
-#include "certifier/task/config.h"
+#include "forereach/dynamics/model.h"
+#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/config.h"
+#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"

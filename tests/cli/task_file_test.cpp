@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/dynamics/unbounded.h"
-#include "certifier/numerics/size.h"
-#include "certifier/task/config.h"
-#include "cli/task_template.h"
+#include "forereach/dynamics/unbounded.h"
+#include "forereach/numerics/size.h"
+#include "task/config.h"
+#include "task/task_template.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"

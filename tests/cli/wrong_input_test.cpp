@@ -10,12 +10,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/task/config.h"
 #include "forereach/decision_t.hpp"
 #include "records/database.h"
 #include "records/event_log.h"
 #include "records/kept_tasks.h"
 #include "records/log_directory.h"
+#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/scratch.h"

@@ -1,5 +1,5 @@
 // What a good task file means.
-#include "certifier/task/config.h"
+#include "task/config.h"
 
 #include <fstream>
 #include <regex>
@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_residuals.h"
-#include "certifier/dynamics/models/residuals.h"
-#include "certifier/task/schema.h"
+#include "forereach/dynamics/models/named_residuals.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "task/schema.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 

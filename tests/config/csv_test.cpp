@@ -1,5 +1,5 @@
 // CSV files, plans and transitions.
-#include "certifier/task/csv.h"
+#include "task/csv.h"
 
 #include <bit>
 #include <cstring>
@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/task/config.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "task/config.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {

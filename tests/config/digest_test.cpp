@@ -1,12 +1,12 @@
 // Digests: the same for the same data however it is written, another for other data.
-#include "certifier/task/canonical.h"
+#include "task/canonical.h"
 
 #include <cmath>
 #include <set>
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {

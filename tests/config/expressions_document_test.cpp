@@ -7,11 +7,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/equations_header.h"
-#include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/program.h"
-#include "certifier/numerics/limits.h"
 #include "command_line/nearest.h"
+#include "forereach/dynamics/equations_header.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/dynamics/program.h"
+#include "forereach/numerics/limits.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 

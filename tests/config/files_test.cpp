@@ -1,5 +1,5 @@
 // Input files: regular files are read, others are refused at once; and reloads that never end.
-#include "certifier/task/files.h"
+#include "task/files.h"
 
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -19,8 +19,8 @@
 #include <gtest/gtest.h>
 
 #include "bus/reloading.h"
-#include "certifier/task/config.h"
-#include "certifier/task/csv.h"
+#include "task/config.h"
+#include "task/csv.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 

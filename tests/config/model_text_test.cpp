@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/expression.h"
-#include "certifier/task/canonical.h"
+#include "forereach/dynamics/expression.h"
+#include "task/canonical.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {

@@ -1,4 +1,4 @@
-#include "certifier/task/number.h"
+#include "task/number.h"
 
 #include <clocale>
 #include <cmath>

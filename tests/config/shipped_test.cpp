@@ -6,12 +6,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/explain.h"
-#include "certifier/dynamics/text_model.h"
-#include "certifier/task/config.h"
-#include "certifier/task/schema.h"
-#include "robot/target.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
+#include "forereach/dynamics/text_model.h"
+#include "simulator/target.h"
+#include "task/config.h"
+#include "task/schema.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 

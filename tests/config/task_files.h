@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/task/config.h"
+#include "task/config.h"
 #include "tests/scratch.h"
 
 namespace forereach {

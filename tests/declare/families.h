@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/models/named_residuals.h"
+#include "forereach/declare/slope_bound.h"
+#include "forereach/dynamics/models/named_residuals.h"
 #include "tests/worlds.h"
 
 namespace forereach {

@@ -1,12 +1,12 @@
 // Jets: derivatives against difference quotients in extended precision, kinks, zeros that stay zero.
-#include "certifier/dynamics/jet.h"
+#include "forereach/dynamics/jet.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/saturation.h"
+#include "forereach/dynamics/saturation.h"
 
 namespace forereach {
 namespace jet_test {

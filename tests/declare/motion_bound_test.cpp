@@ -1,5 +1,5 @@
 // Bounds on the motion between two samples: known suprema, motions that come close to them, and what has no bound.
-#include "certifier/declare/motion_bound.h"
+#include "forereach/declare/motion_bound.h"
 
 #include <array>
 #include <cmath>
@@ -11,10 +11,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/declare/mean_value.h"
-#include "certifier/dynamics/models/kinematic_bicycle.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/declare/mean_value.h"
+#include "forereach/dynamics/models/kinematic_bicycle.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 
 namespace forereach {

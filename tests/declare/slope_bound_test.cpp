@@ -1,5 +1,5 @@
 // Suprema of slopes: known ones of made-up residuals, the paper's, over parameter boxes, over balls.
-#include "certifier/declare/slope_bound.h"
+#include "forereach/declare/slope_bound.h"
 
 #include <array>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/residuals.h"
+#include "forereach/dynamics/models/residuals.h"
 #include "research/equations_slopes.h"
 #include "tests/declare/families.h"
 

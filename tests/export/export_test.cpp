@@ -12,7 +12,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/config.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "records/certified_message.h"
@@ -24,6 +23,7 @@
 #include "records/message_json.h"
 #include "records/npz.h"
 #include "records/output_file.h"
+#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/logs.h"

@@ -23,7 +23,7 @@
 #include <unistd.h>
 #include "bus/process.h"
 #include "certifier/gate/candidate_message.h"
-#include "cli/progress.h"
+#include "command_line/progress.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/execution_event_t.hpp"

@@ -12,9 +12,9 @@ by a thread of its own, so nothing that is done with the answers delays the next
 #include <vector>
 
 #include "bus/bus.h"
-#include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
+#include "task/config.h"
 
 namespace forereach {
 

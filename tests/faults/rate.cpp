@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "bus/authentic.h"
-#include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
+#include "forereach/certify/certifier.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"

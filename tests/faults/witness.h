@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "bus/bus.h"
-#include "certifier/task/config.h"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -21,6 +20,7 @@
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "task/config.h"
 
 namespace forereach {
 

@@ -10,8 +10,8 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
-#include "certifier/task/step_time.h"
 #include "forereach/transition_t.hpp"
+#include "task/step_time.h"
 #include "tests/gate/small_task.h"
 
 namespace forereach {

@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/task/canonical.h"
 #include "lcmtypes/codec.h"
+#include "task/canonical.h"
 #include "tests/gate/small_task.h"
 
 namespace forereach {

@@ -10,9 +10,9 @@ outside the input domain. */
 #include <string_view>
 #include <vector>
 
-#include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "lcmtypes/codec.h"
+#include "task/config.h"
 #include "tests/worlds.h"
 
 namespace forereach {

@@ -105,7 +105,7 @@ TEST(Extensions, NothingElseKnowsAModelByName) {
   for (const auto& [file, text] : Sources()) {
     if (!std::regex_search(text, names)) continue;
     ++found;
-    EXPECT_TRUE(file.starts_with("certifier/dynamics/models/")) << file;
+    EXPECT_TRUE(file.starts_with("forereach/dynamics/models/")) << file;
   }
   EXPECT_GE(found, 4);
 }

@@ -27,18 +27,18 @@ Output CheckIncludes(const std::string& root) {
 class IncludesTest : public testing::Test {
  protected:
   IncludesTest() {
-    Write("certifier/numerics/interval.h", "#include <cmath>\n");
-    Write("certifier/sets/box.h", "#include <Eigen/Core>\n#include \"certifier/numerics/interval.h\"\n");
-    Write("certifier/gate/gate.h", "#include \"certifier/sets/box.h\"\n#include \"lcmtypes/codec.h\"\n");
+    Write("forereach/numerics/interval.h", "#include <cmath>\n");
+    Write("forereach/sets/box.h", "#include <Eigen/Core>\n#include \"forereach/numerics/interval.h\"\n");
+    Write("certifier/gate/gate.h", "#include \"forereach/sets/box.h\"\n#include \"lcmtypes/codec.h\"\n");
     Write("certifier/process/node.h", "#include \"certifier/gate/gate.h\"\n#include <fmt/core.h>\n");
     Write("lcmtypes/codec.h", "#include <cstdint>\n");
     Write("bus/bus.cpp", "#include \"lcmtypes/codec.h\"\n#include <lcm/lcm-cpp.hpp>\n");
     Write("robot/guard.h", "#include \"forereach/certified_plan_v2_t.hpp\"\n#include \"lcmtypes/codec.h\"\n");
     Write("robot/guard.cpp", "#include \"robot/guard.h\"\n");
-    Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"certifier/sets/box.h\"\n");
+    Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"forereach/sets/box.h\"\n");
     Write("records/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");
     Write("verifier/real.h", "#include <mpfi.h>\n");
-    Write("verifier/tube.cpp", "#include \"certifier/sets/box.h\"\n#include \"verifier/real.h\"\n");
+    Write("verifier/tube.cpp", "#include \"forereach/sets/box.h\"\n#include \"verifier/real.h\"\n");
     Write("tests/records/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
     Write("bench/gate_bench.cpp", "#include \"certifier/gate/gate.h\"\n#include <benchmark/benchmark.h>\n");
   }
@@ -85,26 +85,26 @@ TEST_F(IncludesTest, ATreeWithoutSourcesIsAnError) {
 }
 
 TEST_F(IncludesTest, ALayerMayIncludeLowerLayersOnly) {
-  Refuse("certifier/numerics/bad.h", "\"certifier/sets/box.h\"", "numerics may not include sets");
-  Refuse("certifier/sets/bad.cpp", "<certifier/gate/gate.h>", "sets may not include gate");
-  Refuse("certifier/certify/bad.cpp", "\"certifier/gate/gate.h\"", "certify may not include gate");
-  Refuse("certifier/task/bad.cpp", "\"certifier/gate/gate.h\"", "task may not include gate");
+  Refuse("forereach/numerics/bad.h", "\"forereach/sets/box.h\"", "numerics may not include sets");
+  Refuse("forereach/sets/bad.cpp", "<certifier/gate/gate.h>", "forereach may include Eigen");
+  Refuse("forereach/certify/bad.cpp", "\"certifier/gate/gate.h\"", "forereach may include Eigen");
+  Refuse("task/bad.cpp", "\"certifier/gate/gate.h\"", "task may not include certifier");
   Refuse("certifier/gate/bad.cpp", "\"certifier/process/node.h\"", "gate may not include process");
-  Refuse("certifier/attic/bad.cpp", "\"certifier/sets/box.h\"", "certifier has no floor attic");
+  Refuse("certifier/attic/bad.cpp", "\"forereach/sets/box.h\"", "certifier has no floor attic");
   ExpectRefused();
 }
 
 TEST_F(IncludesTest, TheLibraryMayIncludeEigenOnly) {
   for (const char* floor : {"numerics", "sets", "dynamics", "residual", "safety", "reach", "declare", "certify"}) {
-    const std::string file = std::string("certifier/") + floor + "/bad.cpp";
+    const std::string file = std::string("forereach/") + floor + "/bad.cpp";
     for (const char* include : {"\"lcmtypes/codec.h\"", "\"forereach/decision_t.hpp\"", "<fmt/core.h>", "<unistd.h>"})
-      Refuse(file, include, std::string("certifier/") + floor + " may include Eigen");
+      Refuse(file, include, "forereach may include Eigen");
   }
   ExpectRefused();
 }
 
 TEST_F(IncludesTest, AFolderMayIncludeItsListedFoldersOnly) {
-  Refuse("lcmtypes/bad.h", "\"certifier/sets/box.h\"", "lcmtypes may not include certifier");
+  Refuse("lcmtypes/bad.h", "\"forereach/sets/box.h\"", "lcmtypes may not include forereach");
   Refuse("certifier/process/bad.cpp", "\"records/database.h\"", "certifier may not include records");
   for (const char* other : {"planner_bridge", "logger", "robot", "cli", "bench"})
     Refuse("certifier/gate/bad.cpp", std::string("\"") + other + "/x.h\"",
@@ -114,35 +114,25 @@ TEST_F(IncludesTest, AFolderMayIncludeItsListedFoldersOnly) {
   Refuse("bench/bad.cpp", "\"logger/x.h\"", "bench may not include logger");
   Refuse("research/bad.cpp", "\"robot/x.h\"", "research may not include robot");
   Refuse("research/bad.cpp", "\"cli/commands.h\"",
-         "research may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
+         "research may not include cli");
   Refuse("research/bad.cpp", "\"planner_bridge/proposal.h\"",
-         "research may include certifier, identify, policies, cli/progress.h and cli/lockstep.h only");
+         "research may include the planner's policies only");
   Refuse("certifier/gate/bad.cpp", "\"research/x.h\"", "certifier may not include research");
   Refuse("logger/bad.cpp", "\"tests/records/logs.h\"", "logger may not include tests");
   ExpectRefused();
 }
 
-TEST_F(IncludesTest, OptionsArePlainAndForTheTasksReader) {
-  for (const char* include : {"\"certifier/sets/box.h\"", "\"lcmtypes/codec.h\"", "<Eigen/Core>"})
-    Refuse("robot/robot_options.h", include, "options may include the standard library only");
-  Refuse("certifier/gate/bad.cpp", "\"robot/robot_options.h\"", "certifier may not include robot");
-  ExpectRefused();
-  std::ofstream(root_ / "robot/robot_options.h") << "#include <string>\n";
-  std::ofstream(root_ / "certifier/gate/bad.cpp") << "";
-  Write("certifier/task/config.h", "#include \"robot/robot_options.h\"\n");
-  EXPECT_EQ(CheckIncludes(root_.string()).code, 0);
-}
-
-TEST_F(IncludesTest, GuardAndSupervisorIncludeLcmtypesAndBusOnly) {
-  for (const char* file : {"robot/guard.cpp", "robot/supervisor.h"})
-    for (const char* include : {"\"certifier/sets/box.h\"", "\"robot/target.h\"", "<Eigen/Core>", "<fmt/core.h>"})
-      Refuse(file, include, "guard and supervisor may include lcmtypes and bus only");
+TEST_F(IncludesTest, ARobotIncludesMessagesLcmtypesAndBusOnly) {
+  for (const char* include : {"<Eigen/Core>", "<fmt/core.h>"})
+    Refuse("robot/guard.cpp", include, "robot may include messages, lcmtypes and bus only");
+  for (const char* other : {"forereach", "task", "simulator"})
+    Refuse("robot/supervisor.h", std::string("\"") + other + "/x.h\"", std::string("robot may not include ") + other);
   ExpectRefused();
 }
 
 TEST_F(IncludesTest, TheVerifierSharesNoArithmetic) {
-  for (const char* include : {"\"certifier/numerics/interval.h\"", "\"certifier/gate/gate.h\""})
-    Refuse("verifier/bad.cpp", include, "the verifier may include the certifier's data only");
+  Refuse("verifier/bad.cpp", "\"forereach/numerics/interval.h\"", "the verifier may include the proof's data only");
+  Refuse("verifier/bad.cpp", "\"certifier/gate/gate.h\"", "verifier may not include certifier");
   Refuse("verifier/bad.cpp", "\"lcmtypes/codec.h\"", "verifier may not include lcmtypes");
   Refuse("certifier/gate/bad.cpp", "\"verifier/real.h\"", "certifier may not include verifier");
   Refuse("logger/bad.cpp", "\"verifier/real.h\"", "logger may not include verifier");
@@ -157,7 +147,7 @@ TEST_F(IncludesTest, OnlyItsOwnerMayIncludeTheHeadersOfALibrary) {
   Refuse("robot/bad.cpp", "<ompl/util/Console.h>", "OMPL belongs to planner_bridge/ alone");
   Refuse("cli/bad.cpp", "<sqlite3.h>", "SQLite belongs to records/ alone");
   Refuse("robot/bad.cpp", "<cairo.h>", "cairo belongs to records/ alone");
-  Refuse("cli/bad.cpp", "<yaml-cpp/yaml.h>", "yaml-cpp belongs to certifier/task/document.cpp alone");
+  Refuse("cli/bad.cpp", "<yaml-cpp/yaml.h>", "yaml-cpp belongs to task/document.cpp alone");
   Refuse("robot/bad.cpp", "<sodium.h>", "libsodium belongs to (bus/(authentic|keys)|lcmtypes/codec).cpp alone");
   ExpectRefused();
 }
@@ -165,7 +155,7 @@ TEST_F(IncludesTest, OnlyItsOwnerMayIncludeTheHeadersOfALibrary) {
 TEST_F(IncludesTest, PathsAreThoseFromTheRoot) {
   Refuse("robot/bad.cpp", "\"guard.h\"", "our headers are included by their path from the root");
   Refuse("robot/bad.cpp", "\"../certifier/sets/box.h\"", "our headers are included by their path from the root");
-  Refuse("robot/bad.cpp", "\"certifier/sets/none.h\"", "certifier/sets/none.h does not exist");
+  Refuse("robot/bad.cpp", "\"forereach/sets/none.h\"", "forereach/sets/none.h does not exist");
   ExpectRefused();
 }
 

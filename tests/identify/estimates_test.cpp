@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/residual/consistency.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/residual/consistency.h"
 #include "identify/binomial.h"
 #include "identify/hold_out.h"
 #include "identify/lone_slopes.h"

@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/text_model.h"
-#include "certifier/numerics/size.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/numerics/size.h"
 #include "tests/identify/seed.h"
 
 namespace forereach {

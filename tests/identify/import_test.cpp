@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/task/config_error.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "task/config_error.h"
 #include "tests/identify/seed.h"
 #include "tests/worlds.h"
 

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/task/config_error.h"
+#include "task/config_error.h"
 #include "tests/identify/seed.h"
 #include "tests/scratch.h"
 

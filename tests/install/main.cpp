@@ -1,8 +1,8 @@
 #include <iostream>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/explain.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
+#include "forereach/dynamics/models/named_models.h"
 
 int main() {
   using namespace forereach;

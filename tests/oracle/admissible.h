@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "certifier/certify/problem.h"
+#include "forereach/certify/problem.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"

@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "certifier/certify/decision.h"
-#include "certifier/certify/problem.h"
+#include "forereach/certify/decision.h"
+#include "forereach/certify/problem.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"

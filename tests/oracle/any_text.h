@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/text_model.h"
-#include "certifier/numerics/size.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/numerics/size.h"
 #include "tests/oracle/problems.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/expression.h"
+#include "forereach/dynamics/expression.h"
 #include "tests/declare/families.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"

@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
-#include "certifier/dynamics/expression.h"
 #include "command_line/command_line.h"
+#include "forereach/dynamics/expression.h"
 #include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/motions.h"

@@ -1,5 +1,5 @@
 // Directed rounding against exact rationals: never on the wrong side, and as close as the header says.
-#include "certifier/numerics/directed.h"
+#include "forereach/numerics/directed.h"
 
 #include <gtest/gtest.h>
 

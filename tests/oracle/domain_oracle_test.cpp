@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "certifier/reach/domain.h"
+#include "forereach/reach/domain.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

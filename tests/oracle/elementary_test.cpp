@@ -1,6 +1,6 @@
 // Elementary functions over intervals against values of 256 bits: the range contains the exact values, reaches little
 // beyond them, and is infinite where the function is undefined.
-#include "certifier/numerics/elementary.h"
+#include "forereach/numerics/elementary.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "certifier/dynamics/saturation.h"
+#include "forereach/dynamics/saturation.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

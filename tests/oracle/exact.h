@@ -11,8 +11,8 @@ floating point (MPFR) for what is not rational. */
 #include <span>
 #include <vector>
 
-#include "certifier/numerics/interval.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/numerics/interval.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach::exact {
 

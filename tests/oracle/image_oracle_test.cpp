@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/reach/propagator.h"
+#include "forereach/dynamics/equations_model.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -1,5 +1,5 @@
 // Interval arithmetic against exact ranges, and the trigonometric functions against 256-bit values.
-#include "certifier/numerics/interval.h"
+#include "forereach/numerics/interval.h"
 
 #include <gtest/gtest.h>
 

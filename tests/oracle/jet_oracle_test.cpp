@@ -1,5 +1,5 @@
 // Jets of the elementary functions against closed formulas for their derivatives in 256 bits.
-#include "certifier/dynamics/jet.h"
+#include "forereach/dynamics/jet.h"
 
 #include <gtest/gtest.h>
 

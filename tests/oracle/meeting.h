@@ -7,7 +7,7 @@ the certifier's and the planner's geometry. */
 #include <cstddef>
 #include <vector>
 
-#include "certifier/safety/obstacle.h"
+#include "forereach/safety/obstacle.h"
 #include "tests/oracle/exact.h"
 
 namespace forereach {

@@ -6,9 +6,9 @@
 #include <tuple>
 #include <vector>
 
-#include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/rounding.h"
+#include "forereach/dynamics/equations_model.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/rounding.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -18,9 +18,9 @@ it says still stands is followed in the same way. */
 #include <utility>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/standing.h"
-#include "certifier/numerics/size.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/standing.h"
+#include "forereach/numerics/size.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/exact.h"

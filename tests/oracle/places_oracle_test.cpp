@@ -1,8 +1,8 @@
 // Places at expressions, computed in plain arithmetic, against their values in 256 bits at points of slices.
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/expression.h"
-#include "certifier/safety/placement.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/safety/placement.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

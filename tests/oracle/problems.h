@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models/kinematic_bicycle.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/models/point_mass.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/models/kinematic_bicycle.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/point_mass.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/worlds.h"

@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/reach/propagator.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/worlds.h"

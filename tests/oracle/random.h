@@ -15,8 +15,8 @@ be run on fresh inputs; SCOPED_TRACE(random.trace()) prints what reproduces a fa
 
 #include <Eigen/Core>
 
-#include "certifier/numerics/interval.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/numerics/interval.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

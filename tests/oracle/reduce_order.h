@@ -1,6 +1,6 @@
 #pragma once
 
-#include "certifier/sets/zonotope.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/reach/propagator.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

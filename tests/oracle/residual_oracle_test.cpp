@@ -5,10 +5,10 @@
 #include <numbers>
 #include <vector>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/lipschitz_envelope.h"
-#include "certifier/residual/observations.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/lipschitz_envelope.h"
+#include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

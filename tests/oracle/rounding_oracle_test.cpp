@@ -1,6 +1,6 @@
 // The error bounds of the plain evaluation of the elementary functions, against evaluation in 256 bits of the same
 // program. Program.DerivativesAgreeWithThoseMadeByHand checks that a program has the right derivatives.
-#include "certifier/dynamics/rounding.h"
+#include "forereach/dynamics/rounding.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "certifier/dynamics/evaluate.h"
-#include "certifier/dynamics/program_model.h"
+#include "forereach/dynamics/evaluate.h"
+#include "forereach/dynamics/program_model.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

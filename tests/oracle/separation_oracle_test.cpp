@@ -1,5 +1,5 @@
 // Separation against exact geometry: never proven where slice and obstacle touch, always where they are apart.
-#include "certifier/safety/separation.h"
+#include "forereach/safety/separation.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "certifier/safety/projection.h"
+#include "forereach/safety/projection.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "certifier/sets/linear_map.h"
-#include "certifier/sets/zonogon.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/sets/linear_map.h"
+#include "forereach/sets/zonogon.h"
+#include "forereach/sets/zonotope.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/oracle/reduce_order.h"

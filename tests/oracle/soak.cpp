@@ -11,10 +11,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/explain.h"
-#include "certifier/safety/separation.h"
 #include "command_line/command_line.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
+#include "forereach/safety/separation.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
 

@@ -1,9 +1,9 @@
 // Functions from text over boxes and slices, against their values in 256 bits at points of these.
-#include "certifier/dynamics/text_enclosure.h"
+#include "forereach/dynamics/text_enclosure.h"
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/expression.h"
+#include "forereach/dynamics/expression.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -1,14 +1,14 @@
 // Models from text: the bits of the compiled models, and enclosures of values and derivatives, with and without stages.
-#include "certifier/dynamics/text_model.h"
+#include "forereach/dynamics/text_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "certifier/declare/flow.h"
-#include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/declare/flow.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "certifier/numerics/text.h"
+#include "forereach/numerics/text.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -2,9 +2,9 @@
 // doubles show.
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/verifier/record.h"

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/json_text.h"
 #include "page/columns.h"
 #include "page/detail.h"
 #include "page/gather.h"
@@ -13,6 +12,7 @@
 #include "page/write.h"
 #include "records/database.h"
 #include "records/interpreter.h"
+#include "task/json_text.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/scratch.h"

@@ -9,7 +9,7 @@
 #include "certifier/process/certifier_node.h"
 #include "forereach/execution_event_t.hpp"
 #include "planner_bridge/planner_node.h"
-#include "robot/sim_node.h"
+#include "simulator/sim_node.h"
 #include "tests/planner/tasks.h"
 
 namespace forereach {

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/dynamics/text_model.h"
 #include "planner_bridge/motion.h"
 #include "tests/planner/tasks.h"
 #include "tests/worlds.h"

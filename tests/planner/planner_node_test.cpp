@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/obstacle_message.h"
-#include "certifier/task/canonical.h"
 #include "forereach/withdrawal_t.hpp"
+#include "task/canonical.h"
 #include "tests/planner/tasks.h"
 
 namespace forereach {

@@ -12,7 +12,7 @@
 #include "planner_bridge/planner_node.h"
 #include "planner_bridge/policy_proposer.h"
 #include "planner_bridge/reference.h"
-#include "robot/sim_node.h"
+#include "simulator/sim_node.h"
 #include "tests/paths.h"
 #include "tests/planner/tasks.h"
 

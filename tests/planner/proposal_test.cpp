@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/safety/clearance.h"
+#include "forereach/safety/clearance.h"
 #include "tests/paths.h"
 #include "tests/planner/tasks.h"
 

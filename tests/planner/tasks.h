@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/task/config.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "task/config.h"
 #include "tests/paths.h"
 #include "tests/worlds.h"
 

@@ -12,7 +12,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "planner_bridge/planner_node.h"
-#include "robot/sim_node.h"
+#include "simulator/sim_node.h"
 #include "tests/planner/tasks.h"
 
 namespace forereach {

@@ -19,9 +19,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_residuals.h"
 #include "certifier/gate/obstacle_message.h"
-#include "robot/sim_node.h"
+#include "forereach/dynamics/models/named_residuals.h"
+#include "simulator/sim_node.h"
 #include "tests/gate/small_task.h"
 #include "tests/keys.h"
 #include "tests/paths.h"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "bus/bus.h"
-#include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
+#include "task/config.h"
 #include "tests/process/child_process.h"
 #include "tests/scratch.h"
 

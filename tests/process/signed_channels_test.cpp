@@ -26,7 +26,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "logger/logger_node.h"
 #include "planner_bridge/planner_node.h"
-#include "robot/sim_node.h"
+#include "simulator/sim_node.h"
 #include "tests/keys.h"
 #include "tests/planner/tasks.h"
 #include "tests/process/process_fixture.h"

@@ -13,7 +13,7 @@
 #include "certifier/process/certifier_node.h"
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
-#include "robot/sim_node.h"
+#include "simulator/sim_node.h"
 #include "tests/gate/small_task.h"
 
 namespace forereach {

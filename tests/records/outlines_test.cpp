@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
 namespace forereach {

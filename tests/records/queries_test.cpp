@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include "certifier/task/config.h"
 #include "records/database.h"
 #include "records/interpreter.h"
+#include "task/config.h"
 #include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"

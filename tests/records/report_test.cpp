@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/dynamics/models/named_models.h"
 #include "certifier/gate/obstacle_message.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/paths.h"

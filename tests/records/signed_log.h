@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "bus/authentic.h"
-#include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "records/event_log.h"
+#include "task/config.h"
 #include "tests/keys.h"
 #include "tests/scratch.h"
 

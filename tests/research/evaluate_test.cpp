@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 #include "research/cell.h"
 #include "research/methods/envelope.h"
 

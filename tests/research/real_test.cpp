@@ -15,11 +15,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/task/config.h"
-#include "certifier/task/config_error.h"
+#include "forereach/certify/certifier.h"
 #include "research/real/recording.h"
 #include "research/real/study.h"
+#include "task/config.h"
+#include "task/config_error.h"
 #include "tests/paths.h"
 #include "tests/scratch.h"
 #include "tests/shell.h"

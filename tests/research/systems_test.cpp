@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/observations.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/observations.h"
 #include "research/norm_ratio.h"
 #include "research/random.h"
 #include "research/scenarios.h"

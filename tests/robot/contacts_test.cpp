@@ -1,10 +1,10 @@
 // What the simulated robot touches between two samples, just inside and just outside of what the bounds admit.
-#include "robot/contacts.h"
+#include "simulator/contacts.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
 namespace forereach {

@@ -10,10 +10,10 @@
 
 #include "bus/log.h"
 #include "bus/process.h"
-#include "cli/drive_counts.h"
-#include "cli/lockstep.h"
-#include "cli/progress.h"
 #include "command_line/command_line.h"
+#include "command_line/progress.h"
+#include "simulator/drive_counts.h"
+#include "simulator/lockstep.h"
 
 namespace forereach {
 namespace {

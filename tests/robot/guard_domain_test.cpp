@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "certifier/gate/gate.h"
-#include "certifier/task/config.h"
 #include "robot/guard.h"
+#include "task/config.h"
 #include "tests/paths.h"
 
 namespace forereach {

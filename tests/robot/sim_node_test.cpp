@@ -1,4 +1,4 @@
-#include "robot/sim_node.h"
+#include "simulator/sim_node.h"
 
 #include <algorithm>
 #include <array>
@@ -11,14 +11,14 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/authentic_bus.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/models/named_residuals.h"
-#include "certifier/dynamics/text_model.h"
 #include "certifier/gate/obstacle_message.h"
-#include "certifier/residual/observations.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_residuals.h"
+#include "forereach/dynamics/text_model.h"
 #include "forereach/fault_t.hpp"
+#include "forereach/residual/observations.h"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"

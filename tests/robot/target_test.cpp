@@ -1,4 +1,4 @@
-#include "robot/target.h"
+#include "simulator/target.h"
 
 #include <array>
 #include <cmath>
@@ -11,10 +11,10 @@
 #include <gtest/gtest.h>
 #include <mpfr.h>
 
-#include "certifier/dynamics/models/named_residuals.h"
-#include "certifier/dynamics/models/residuals.h"
-#include "certifier/dynamics/text_model.h"
-#include "certifier/residual/consistency.h"
+#include "forereach/dynamics/models/named_residuals.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/residual/consistency.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 #include "tests/sanitized.h"
 #include "tests/worlds.h"
 

@@ -1,5 +1,5 @@
 // Which states are angles of a model's equations.
-#include "certifier/dynamics/angles.h"
+#include "forereach/dynamics/angles.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/text_model.h"
-#include "certifier/numerics/size.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/numerics/size.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 

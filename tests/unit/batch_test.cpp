@@ -1,5 +1,5 @@
 // A batch gives the same decisions as single calls, for every number of threads.
-#include "certifier/certify/batch.h"
+#include "forereach/certify/batch.h"
 
 #include <atomic>
 #include <map>

@@ -1,6 +1,6 @@
 // Algorithm 1: each outcome with every field of its witness, the order of the tests, closed boundaries, and what a
 // certifier refuses to be made of.
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include <thread>
 #include <vector>
 
-#include "certifier/certify/explain.h"
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/certify/explain.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

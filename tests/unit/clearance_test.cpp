@@ -1,12 +1,12 @@
 // The distances of a body's parts that planner and simulator use: against closed forms and against bounds from points
 // and directions of both sets.
-#include "certifier/safety/clearance.h"
+#include "forereach/safety/clearance.h"
 
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/text_model.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 
 namespace forereach {

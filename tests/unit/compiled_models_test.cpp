@@ -9,12 +9,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/compiled_models.h"
-#include "certifier/dynamics/equations_header.h"
-#include "certifier/dynamics/models/kinematic_bicycle.h"
-#include "certifier/dynamics/models/point_mass.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/compiled_models.h"
+#include "forereach/dynamics/equations_header.h"
+#include "forereach/dynamics/models/kinematic_bicycle.h"
+#include "forereach/dynamics/models/point_mass.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/paths.h"
 #include "tests/unit/exported_model.inc"
 #include "tests/worlds.h"

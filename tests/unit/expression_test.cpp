@@ -1,5 +1,5 @@
 // Texts as expressions: what each stands for, to the last bit, and what is said of those that are none.
-#include "certifier/dynamics/expression.h"
+#include "forereach/dynamics/expression.h"
 
 #include <numbers>
 #include <random>

@@ -5,8 +5,8 @@
 #include <limits>
 #include <memory>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
 namespace forereach {

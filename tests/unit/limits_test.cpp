@@ -1,5 +1,5 @@
 // Limits on functions of state and input: just inside and just outside, which samples count, what comes first.
-#include "certifier/certify/limits.h"
+#include "forereach/certify/limits.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/explain.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 

@@ -6,9 +6,9 @@
 #include <set>
 #include <vector>
 
-#include "certifier/residual/consistency.h"
-#include "certifier/residual/lipschitz_envelope.h"
-#include "certifier/residual/pairs.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/lipschitz_envelope.h"
+#include "forereach/residual/pairs.h"
 #include "tests/oracle/random.h"
 
 namespace forereach {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/residual/observation_store.h"
-#include "certifier/residual/retention.h"
+#include "forereach/residual/observation_store.h"
+#include "forereach/residual/retention.h"
 #include "tests/oracle/random.h"
 
 namespace {

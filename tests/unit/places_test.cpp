@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/certify/explain.h"
-#include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
+#include "forereach/dynamics/expression.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 

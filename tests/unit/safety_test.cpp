@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/safety/obstacle.h"
-#include "certifier/safety/placement.h"
-#include "certifier/safety/projection.h"
-#include "certifier/safety/separation.h"
+#include "forereach/safety/obstacle.h"
+#include "forereach/safety/placement.h"
+#include "forereach/safety/projection.h"
+#include "forereach/safety/separation.h"
 
 namespace forereach {
 namespace safety_test {

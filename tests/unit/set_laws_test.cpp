@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "certifier/sets/box.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/sets/box.h"
+#include "forereach/sets/zonotope.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 

@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "certifier/sets/box.h"
-#include "certifier/sets/linear_map.h"
-#include "certifier/sets/zonogon.h"
-#include "certifier/sets/zonotope.h"
+#include "forereach/sets/box.h"
+#include "forereach/sets/linear_map.h"
+#include "forereach/sets/zonogon.h"
+#include "forereach/sets/zonotope.h"
 #include "tests/oracle/random.h"
 #include "tests/oracle/reduce_order.h"
 #include "tests/worlds.h"

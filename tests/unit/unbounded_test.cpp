@@ -1,12 +1,12 @@
 // Which operation of a text meets its kink or pole.
-#include "certifier/dynamics/unbounded.h"
+#include "forereach/dynamics/unbounded.h"
 
 #include <array>
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/text_model.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 
 namespace forereach {

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/equations_model.h"
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/equations_model.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "verifier/equations.h"

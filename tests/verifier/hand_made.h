@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 #include "verifier/verifier.h"
 

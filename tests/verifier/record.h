@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <span>
 
-#include "certifier/certify/certifier.h"
-#include "certifier/safety/separation.h"
-#include "certifier/sets/zonogon.h"
+#include "forereach/certify/certifier.h"
+#include "forereach/safety/separation.h"
+#include "forereach/sets/zonogon.h"
 #include "verifier/verifier.h"
 
 namespace forereach {

@@ -2,7 +2,7 @@
 // false by a hair, and motions within the declared bounds that no proof of clearance may exclude.
 #include <cmath>
 
-#include "certifier/numerics/size.h"
+#include "forereach/numerics/size.h"
 #include "tests/oracle/random.h"
 #include "tests/verifier/hand_made.h"
 #include "verifier/separation.h"

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/text_model.h"
+#include "forereach/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/record.h"

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/equations_by_hand.h"

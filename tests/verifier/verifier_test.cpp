@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "tests/oracle/random.h"
 #include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"

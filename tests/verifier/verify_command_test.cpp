@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "cli/progress.h"
+#include "command_line/progress.h"
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "research/chunks/demonstrations.h"
 
 namespace forereach::research {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/certify/certifier.h"
+#include "forereach/certify/certifier.h"
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {

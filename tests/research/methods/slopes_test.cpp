@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/residual/consistency.h"
+#include "forereach/residual/consistency.h"
 #include "tests/research/methods/small_task.h"
 
 namespace forereach::research {

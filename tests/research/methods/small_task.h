@@ -5,9 +5,9 @@ from their true residuals. */
 #include <memory>
 #include <vector>
 
-#include "certifier/dynamics/models/named_models.h"
-#include "certifier/dynamics/models/residuals.h"
-#include "certifier/reach/propagator.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "forereach/reach/propagator.h"
 #include "research/methods/method.h"
 #include "tests/oracle/random.h"
 

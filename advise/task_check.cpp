@@ -1,0 +1,661 @@
+#include "advise/task_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <utility>
+
+#include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/no_nominal_value.h"
+#include "forereach/residual/observations.h"
+#include "forereach/safety/clearance.h"
+#include "planner_bridge/motion.h"
+#include "planner_bridge/reference.h"
+#include "records/decision_json.h"
+#include "records/outlines.h"
+#include "task/config.h"
+#include "task/document.h"
+#include "task/draft.h"
+
+namespace forereach {
+namespace {
+
+constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
+constexpr int kSamples = 2000;                 // of the domain, for the length of a step
+constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
+constexpr double kShareBeyond = 0.05;          // of the data's range
+
+std::string Up(double x) { return RoundedUp(x, 4); }
+std::string Down(double x) { return RoundedDown(x, 4); }
+std::string Count(Eigen::Index n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
+
+// Checks the keys, after which the document knows their places. @return the path of the transitions.
+std::string ReadKeys(Document& file) {
+  TaskDraft draft;
+  file.Check(draft.scope, [&](const Key& row, const std::string& key) {
+    try {
+      if (row.read) row.read(file, key, draft);
+    } catch (const std::invalid_argument& error) {
+      file.Fail(key, error.what());
+    }
+  });
+  return draft.transitions;
+}
+
+class Examination final {
+ public:
+  explicit Examination(const TaskCheckOptions& options)
+      : options_(options),
+        file_(options.config),
+        transitions_(ReadKeys(file_)),
+        config_(LoadConfig(options.config, TransitionsFile::kIgnore)),
+        problem_(*config_.problem),
+        model_(*config_.problem->model),
+        names_(model_.variable_names()) {
+    problem_.rest.clear();  // both are examined apart
+    problem_.limits.clear();
+    result_.states = model_.state_names();
+    result_.period = config_.period;
+  }
+
+  TaskCheck Run() {
+    ReadPlan();
+    ExamineKeys();
+    ReadTransitions();
+    if (result_.transitions > 0) ExamineData();
+    if (problem_.transitions.size() > 0) ExamineTube();
+    ExamineGoal();
+    ExamineRobotStart();
+    ExamineStops();
+    ExamineSteps();
+    Draw();
+    std::stable_partition(result_.findings.begin(), result_.findings.end(),
+                          [](const Finding& finding) { return !finding.is_remark; });
+    return std::move(result_);
+  }
+
+ private:
+  void Add(const std::string& key, std::string what, std::string advice, bool is_remark = false) {
+    result_.findings.push_back({file_.Place(key), std::move(what), std::move(advice), is_remark});
+  }
+  void Remark(const std::string& key, std::string what, std::string advice) {
+    Add(key, std::move(what), std::move(advice), true);
+  }
+
+  [[nodiscard]] const Box& BoxOf(std::size_t l) const {
+    return l < ToSize(model_.num_states()) ? problem_.domain.state : problem_.domain.input;
+  }
+  [[nodiscard]] Eigen::Index IndexIn(std::size_t l) const {
+    return static_cast<Eigen::Index>(l) - (l < ToSize(model_.num_states()) ? 0 : model_.num_states());
+  }
+  [[nodiscard]] double Lower(std::size_t l) const { return BoxOf(l).lower()[IndexIn(l)]; }
+  [[nodiscard]] double Upper(std::size_t l) const { return BoxOf(l).upper()[IndexIn(l)]; }
+  [[nodiscard]] std::string DomainKey(std::size_t l, const char* end) const {
+    return std::string("domain.") + (l < ToSize(model_.num_states()) ? "state." : "input.") + end;
+  }
+
+  void ReadPlan() {
+    if (!options_.plan.empty()) {
+      controls_ = LoadPlan(options_.plan, model_);
+    } else {
+      const PlannerOptions& planner = config_.planner;
+      const int steps =
+          options_.steps > 0 ? options_.steps : std::min(kMaxSteps, planner.progress_steps + planner.tail_steps);
+      const Box& box = problem_.domain.input;
+      controls_ = box.lower().cwiseMax(Eigen::VectorXd::Zero(box.dim()).cwiseMin(box.upper())).replicate(1, steps);
+    }
+    result_.planned_steps = static_cast<int>(controls_.cols());
+  }
+
+  [[nodiscard]] Plan PlanOf(int steps) const {
+    const auto inputs = static_cast<int>(controls_.rows());
+    return {controls_.data(), inputs, steps, inputs, ScheduleFromZero(config_, steps)};
+  }
+
+  // Keys without which a command or process refuses the task.
+  void ExamineKeys() {
+    try {
+      RequireForCertifying(config_);
+    } catch (const ConfigError&) {
+      Add("task.between", "missing: it is not said when a certificate has to hold",
+          "write `between: samples`, or bounds with which it holds at all times: `between: {acceleration: [...]}`");
+    }
+    if (config_.gate.obstacles == ObstaclesSource::kUnsaid)
+      Remark(
+          "gate.obstacles", "missing: no certifier starts on a bus with this task",
+          "write `gate: {obstacles: bus}` if a sender repeats the obstacles, or `task` if those of this file are all");
+    if (config_.gate.obstacles == ObstaclesSource::kBus && !config_.gate.obstacles_lost_ms)
+      Remark("gate.obstacles_lost_ms", "missing: no certifier starts on a bus with this task",
+             "write how long a plan may go on while the obstacles are unknown, in ms, or `never`");
+    if (config_.gate.obstacles == ObstaclesSource::kTask && config_.obstacles.empty())
+      Remark("gate.obstacles", "is `task`, and task.obstacles has none: every plan is clear of obstacles",
+             "list the obstacles, or write `bus`");
+  }
+
+  void ReadTransitions() {
+    result_.data = transitions_;
+    std::error_code error;
+    if (!std::filesystem::exists(result_.data, error)) {
+      Add("transitions", result_.data + " does not exist",
+          "record steps of the robot, or make some with the simulated one: forereach-robot-sim --config " +
+              options_.config + " --make-transitions " + result_.data + " --seed 1 --count 400");
+      return;
+    }
+    all_ = LoadTransitions(result_.data, model_);
+    result_.transitions = all_.size();
+  }
+
+  // ---- Data against the domain and the declaration.
+
+  void ExamineData() {
+    const auto n = ToSize(model_.num_variables());
+    for (std::size_t l = 0; l < n; ++l) {
+      const auto column = all_.z.col(static_cast<Eigen::Index>(l));
+      const bool matters = (problem_.declaration.lipschitz.col(static_cast<Eigen::Index>(l)).array() > 0).any();
+      result_.coordinates.push_back({names_[l], Lower(l), Upper(l), column.minCoeff(), column.maxCoeff(), matters});
+    }
+    KeepThoseInside();
+    for (std::size_t l = 0; l < n; ++l) ExamineRange(l);
+    if (rows_.empty()) return;
+    try {
+      const Observations observations = Observe(model_, problem_.transitions);
+      ExamineDeclaration(observations);
+    } catch (const AmbiguousAngle& error) {
+      Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
+          "the angle's unit has to be rad; a row of another unit, a lost step or a wrong model shows like this");
+      problem_.transitions = {};
+    } catch (const NoNominalValue& error) {
+      Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.text(),
+          "take such states out of the domain and the data, or change the model's equations or parameters");
+      problem_.transitions = {};
+    }
+  }
+
+  [[nodiscard]] std::string LineOf(Eigen::Index row) const { return result_.data + ":" + std::to_string(row + 2); }
+
+  void KeepThoseInside() {
+    std::vector<Eigen::Index> outside(problem_.domain.inequalities.size() + problem_.domain.balls.size(), 0);
+    std::vector<Eigen::Index> first = outside;
+    for (Eigen::Index i = 0; i < all_.z.rows(); ++i) {
+      std::array<Interval, kMaxVariables> point;
+      for (Eigen::Index l = 0; l < all_.z.cols(); ++l) point[ToSize(l)] = Interval(all_.z(i, l));
+      const DomainExit exit = FindExit(problem_.domain, {point.data(), ToSize(model_.num_variables())});
+      if (exit.kind == DomainExit::Kind::kNone) rows_.push_back(i);
+      const bool is_ball = exit.kind == DomainExit::Kind::kBall;
+      if (!is_ball && exit.kind != DomainExit::Kind::kInequality) continue;
+      const std::size_t which = ToSize(exit.index) + (is_ball ? problem_.domain.inequalities.size() : 0);
+      if (outside[which]++ == 0) first[which] = i;
+    }
+    for (std::size_t which = 0; which < outside.size(); ++which) {
+      if (outside[which] == 0) continue;
+      const std::size_t inequalities = problem_.domain.inequalities.size();
+      const std::string key = which < inequalities ? "domain.inequalities[" + std::to_string(which) + "]"
+                                                   : "domain.balls[" + std::to_string(which - inequalities) + "]";
+      Add(key, Count(outside[which], "transition") + " outside, the first in " + LineOf(first[which]), kWiden);
+    }
+    problem_.transitions = {all_.z(rows_, Eigen::all), all_.x_next(rows_, Eigen::all)};
+  }
+
+  void ExamineRange(std::size_t l) {
+    const auto column = all_.z.col(static_cast<Eigen::Index>(l));
+    Eigen::Index least = 0, largest = 0;
+    column.minCoeff(&least);
+    column.maxCoeff(&largest);
+    if (const Eigen::Index below = (column.array() < Lower(l)).count(); below > 0)
+      Add(DomainKey(l, "lower"),
+          names_[l] + ": " + Count(below, "transition") + " below " + ToText(Lower(l)) + ", the least is " +
+              ToText(column[least]) + " in " + LineOf(least),
+          kWiden);
+    if (const Eigen::Index above = (column.array() > Upper(l)).count(); above > 0)
+      Add(DomainKey(l, "upper"),
+          names_[l] + ": " + Count(above, "transition") + " above " + ToText(Upper(l)) + ", the largest is " +
+              ToText(column[largest]) + " in " + LineOf(largest),
+          kWiden);
+  }
+
+  void ExamineDeclaration(const Observations& observations) {
+    const Eigen::Index stride = 1 + (observations.size() - 1) / kMostCompared;
+    result_.all_pairs = stride == 1;
+    for (std::size_t k = 0; k < result_.states.size(); ++k) {
+      const auto c = static_cast<Eigen::Index>(k);
+      const Eigen::VectorXd residual = (observations.lower.col(c) + observations.upper.col(c)) / 2;
+      const Eigen::VectorXd bounds = problem_.declaration.lipschitz.row(c).transpose();
+      const double errors = 2 * problem_.declaration.ObservationError(c);
+      TaskCheck::Row row{result_.states[k], errors > 0 || (bounds.array() > 0).any(), 0, 0, 0};
+      for (Eigen::Index i = 0; i < observations.size(); i += stride)
+        for (Eigen::Index j = i + stride; j < observations.size(); j += stride) {
+          const double allowed = errors +
+                                 bounds.dot((observations.z.row(i) - observations.z.row(j)).cwiseAbs().transpose()) +
+                                 (observations.upper(i, c) - observations.lower(i, c)) +
+                                 (observations.upper(j, c) - observations.lower(j, c));
+          const double used = std::abs(residual[i] - residual[j]) / allowed;
+          if (used > row.used) row = {row.name, row.is_declared, used, FileLine(i), FileLine(j)};
+        }
+      result_.rows.push_back(row);
+    }
+  }
+
+  [[nodiscard]] int FileLine(Eigen::Index i) const { return static_cast<int>(rows_[ToSize(i)]) + 2; }
+
+  void RemarkOnSlack() {
+    std::string loose;
+    double most = 0;
+    for (const TaskCheck::Row& row : result_.rows) {
+      if (!row.is_declared) continue;
+      if (row.used > kTight)
+        Remark(RowKey(row.name),
+               row.name + ": the data use " + Up(100 * row.used) + " % of what is declared (lines " +
+                   std::to_string(row.first) + " and " + std::to_string(row.second) + " of " + result_.data +
+                   "): a new transition may contradict it, and stop the robot",
+               "declare more than the data show, unless the bound is proven");
+      if (row.used < kLoose) loose += (loose.empty() ? "" : ", ") + row.name, most = std::max(most, row.used);
+    }
+    if (most > 0)
+      Remark("declaration.lipschitz",
+             loose + ": the data use at most " + Up(100 * most) +
+                 " % of what is declared: if that is all there is, the tubes are wider than they have to be",
+             "declare less, if you have a reason beyond these data");
+  }
+
+  [[nodiscard]] std::string RowKey(const std::string& state) const {
+    const std::vector<std::string> rows = file_.KeysOf("declaration.lipschitz");
+    const bool is_named = std::ranges::find(rows, state) != rows.end();
+    return is_named ? "declaration.lipschitz." + state : "declaration.lipschitz";
+  }
+
+  // ---- The tube of the plan, and where it leads.
+
+  void ExamineTube() {
+    std::optional<Certifier> certifier;
+    const Zonotope initial_set = Zonotope::Enclose(config_.initial_set);
+    const Plan plan = PlanOf(result_.planned_steps);
+    try {
+      certifier.emplace(std::make_shared<const Problem>(problem_));
+      certifier->Require(plan, initial_set, config_.obstacles);
+    } catch (const std::invalid_argument& error) {
+      Add("task", error.what(), "correct it");
+      return;
+    }
+    if (certifier->violation()) {
+      ExplainViolation(*certifier->violation());
+      return;
+    }
+    RemarkOnSlack();
+    Tube tube;
+    const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
+    result_.tube = Explain(decision, certifier->problem(), plan, tube);
+    for (int t = 0; t <= tube.length(); ++t) {
+      const Zonotope& slice = tube.slice(t);
+      std::vector<double>& widths = result_.half_widths.emplace_back();
+      for (int k = 0; k < model_.num_states(); ++k) widths.push_back(slice.HalfWidthUpper(k));
+    }
+    ExamineEnd(decision, tube);
+    ExamineRest(tube);
+    ExamineLimits(plan, initial_set);
+    ExamineStart(*certifier, initial_set);
+    ExamineCoverage(tube);
+    if (problem_.projection.rows() == 2) AddTube(*certifier, tube);
+  }
+
+  // Of a pair that contradicts the declaration.
+  void ExplainViolation(const Violation& violation) {
+    const auto k = ToSize(violation.coordinate);
+    const std::string& name = result_.states[k];
+    const double sigma = problem_.declaration.noise_bound[violation.coordinate];
+    Add(RowKey(name),
+        name + ": lines " + std::to_string(FileLine(violation.first)) + " and " +
+            std::to_string(FileLine(violation.second)) + " of " + result_.data + " differ in the model's error by " +
+            Down(violation.difference) + ", and the declaration allows " + Up(violation.bound) +
+            ": it is false, and nothing can be certified",
+        "look at these lines, and whether model.dt is the step of the data. If they are right, declare more: "
+        "noise_bound of " +
+            name + " at least " + Up(sigma + (violation.difference - violation.bound) / 2) + ", or this row larger" +
+            (violation.bound > 0 ? " by a factor of " + Up(violation.difference / violation.bound) : std::string()));
+  }
+
+  // A plan of its own has to be certified as a whole; without one, its progress part.
+  [[nodiscard]] int StepsThatCount() const {
+    return options_.plan.empty() ? std::min(result_.planned_steps, config_.planner.progress_steps)
+                                 : result_.planned_steps;
+  }
+
+  void ExamineEnd(const Decision& decision, const Tube& tube) {
+    if (decision.outcome == Outcome::kCertified) return;
+    const bool is_remark = tube.length() >= StepsThatCount();
+    std::string key = "domain", advice = options_.plan.empty() ? "" : "change the plan, or ";
+    if (decision.cause == Cause::kNoFiniteEnclosure) {
+      key = "model";
+      advice +=
+          "keep the domain and task.initial_set away from where the equations have no bound (docs/expressions.md, "
+          "\"Kinks and poles\")";
+    } else {
+      if (decision.exit.kind == DomainExit::Kind::kLower || decision.exit.kind == DomainExit::Kind::kUpper)
+        key =
+            DomainKey(ToSize(decision.exit.index), decision.exit.kind == DomainExit::Kind::kLower ? "lower" : "upper");
+      advice += "widen the domain, if the declaration holds there" + NarrowerTube(tube);
+    }
+    Add(key,
+        "the tube of " + PlanName() + ", without obstacles, ends at step " + std::to_string(tube.length()) + ": " +
+            result_.tube,
+        advice, is_remark);
+  }
+
+  [[nodiscard]] std::string PlanName() const {
+    return options_.plan.empty() ? "the plan with the inputs closest to zero" : options_.plan;
+  }
+
+  // Which part of the residual's bounds is the widest, compared with the domain.
+  [[nodiscard]] std::string NarrowerTube(const Tube& tube) const {
+    if (tube.length() == 0) return "";
+    const ResidualBounds& bounds = tube.step(tube.length() - 1).envelope;
+    std::size_t widest = 0;
+    double share = 0, half = 0;
+    for (std::size_t k = 0; k < result_.states.size(); ++k) {
+      const double width = (bounds.upper[k] - bounds.lower[k]) / 2;
+      if (const double of = width / std::max(Upper(k) - Lower(k), 1e-300); of > share)
+        widest = k, share = of, half = width;
+    }
+    return share == 0 ? ""
+                      : "; or make the tube narrower: there the error of " + result_.states[widest] +
+                            " in one step is only known up to " + Up(half) +
+                            ", from a declaration that is too wide, or from data that are too far away";
+  }
+
+  void ExamineRest(const Tube& tube) {
+    for (const RestBound& bound : config_.problem->rest) {
+      const std::string name = result_.states[ToSize(bound.coordinate)];
+      for (int t = 0; t <= tube.length(); ++t) {
+        const double half = result_.half_widths[ToSize(t)][ToSize(bound.coordinate)];
+        if (half <= bound.tolerance) continue;
+        Add("task.rest",
+            name + " is known only up to " + Up(half) + " after " + Count(t, "step") + ", and standing is at most " +
+                ToText(bound.tolerance) + ": a plan of that length does not provably end at rest",
+            "raise the bound of " + name + ", if the robot's brakes take up what is left; or make the tube narrower",
+            t > StepsThatCount());
+        break;
+      }
+    }
+  }
+
+  void ExamineLimits(const Plan& plan, const Zonotope& initial_set) {
+    if (config_.problem->limits.empty()) return;
+    auto problem = std::make_shared<Problem>(problem_);
+    problem->limits = config_.problem->limits;
+    const Certifier certifier(problem);
+    Tube tube;
+    const Decision decision = certifier.Certify(plan, initial_set, {}, tube);
+    if (decision.cause == Cause::kLimit)
+      Add("task.limits[" + std::to_string(decision.coordinate) + "]",
+          "the tube of " + PlanName() + ": " + Explain(decision, *problem, plan, tube),
+          "change the start or the plan, raise the bound, or make the tube narrower",
+          decision.step >= StepsThatCount());
+  }
+
+  void ExamineStart(const Certifier& certifier, const Zonotope& initial_set) {
+    Tube tube;
+    for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
+      const Obstacle& obstacle = config_.obstacles[i];
+      const Decision decision = certifier.Certify(PlanOf(1), initial_set, {&obstacle, 1}, tube);
+      const std::string key = "task.obstacles[" + std::to_string(i) + "]";
+      if (decision.outcome == Outcome::kSafety && decision.step == 0)
+        Add(key,
+            "the robot may touch it at the start: the proven distance is " + Down(decision.margin) + " m, and " +
+                Up(decision.threshold) + " m are needed",
+            "move task.initial_set or the obstacle, or make them smaller");
+    }
+  }
+
+  // Where the plan leads to values on which the residual depends, and of which there are no data.
+  void ExamineCoverage(const Tube& tube) {
+    for (std::size_t l = 0; l < result_.coordinates.size(); ++l) {
+      const TaskCheck::Coordinate& coordinate = result_.coordinates[l];
+      if (!coordinate.matters) continue;
+      double farthest = 0, place = coordinate.least;
+      int step = 0;
+      for (int t = 0; t < tube.length(); ++t) {
+        const double value =
+            l < ToSize(model_.num_states()) ? tube.slice(t).center(static_cast<int>(l)) : controls_(IndexIn(l), t);
+        if (const double away = Beyond(coordinate, value); away > farthest) farthest = away, place = value, step = t;
+      }
+      RemarkOnData(coordinate, place, "transitions", "at step " + std::to_string(step) + " " + PlanName(),
+                   "record steps there");
+    }
+  }
+
+  [[nodiscard]] static double Beyond(const TaskCheck::Coordinate& data, double value) {
+    return std::max(data.least - value, value - data.largest);
+  }
+
+  // If `value` of a coordinate on which the residual depends is beyond its data.
+  void RemarkOnData(const TaskCheck::Coordinate& data, double value, const std::string& key, const std::string& what,
+                    const char* advice) {
+    if (!data.matters || !(Beyond(data, value) > kShareBeyond * (data.largest - data.least))) return;
+    Remark(key,
+           data.name + ": " + what + " is " + Up(Beyond(data, value)) + " beyond the data, which lie in [" +
+               Down(data.least) + ", " + Up(data.largest) + "]: the further, the wider the tube",
+           advice);
+  }
+
+  // ---- Goal, start, brakes, and the length of a step.
+
+  void ExamineRobotStart() {
+    const std::vector<double>& start = config_.robot.start;
+    if (start.empty()) return;
+    for (std::size_t k = 0; k < start.size(); ++k)
+      if (!model_.IsAngle(static_cast<int>(k)) && !(Lower(k) <= start[k] && start[k] <= Upper(k)))
+        Add("robot.start",
+            result_.states[k] + " begins at " + ToText(start[k]) + ", and the domain is [" + ToText(Lower(k)) + ", " +
+                ToText(Upper(k)) + "]: no plan is found from there",
+            "begin in the domain, or widen it, if the declaration holds there");
+    const BodyPlaces places(model_, problem_.projection, problem_.body);
+    const std::vector<BodyPart> parts = places.At({start.data(), start.size()});
+    for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
+      const Obstacle& obstacle = config_.obstacles[i];
+      const auto touches = [&](const BodyPart& part) { return !(ApproximateDistance(obstacle, part) > 0); };
+      if (!obstacle.motion() && std::ranges::any_of(parts, touches))
+        Add("robot.start", "the robot touches task.obstacles[" + std::to_string(i) + "] there",
+            "begin where the robot is clear, or move the obstacle");
+    }
+  }
+
+  void ExamineStops() {
+    if (config_.laws.stop.empty() || config_.planner.source != "ompl") return;
+    try {
+      ExamineStop(RobotMotion(config_, Braking::kPlanned), "planner.stop", config_.planner.tail_steps,
+                  " (planner.tail_steps): no plan is found from a robot that moves");
+      if (!config_.laws.emergency_stop.empty())
+        ExamineStop(RobotMotion(config_, Braking::kHardest), "planner.emergency_stop", kMaxSteps,
+                    ": no stop is found for a robot whose plan is withdrawn");
+    } catch (const ConfigError& error) {
+      Remark("planner.stop", std::string("no planner starts with this task: ") + error.what(), "correct it");
+    }
+  }
+
+  // Whether the robot stops from some state at least in which it does not rest, near or far from task.initial_set.
+  void ExamineStop(const RobotMotion& motion, const char* key, int most, const char* consequence) {
+    std::mt19937_64 random(1);
+    const Eigen::VectorXd center = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;
+    int samples = 0;
+    for (int sample = 1; sample <= kSamples; ++sample) {
+      std::array<double, kMaxVariables> z = StateAndInput(random, false);
+      for (int k = 0; k < model_.num_states(); ++k)
+        z[ToSize(k)] = center[k] + (z[ToSize(k)] - center[k]) * sample / kSamples;
+      const std::span<const double> x(z.data(), ToSize(model_.num_states()));
+      if (!problem_.domain.Contains({z.data(), ToSize(model_.num_variables())}) || motion.IsAtRest(x)) continue;
+      ++samples;
+      if (Stops(motion, x, most)) return;
+    }
+    if (samples > 0)
+      Add(key,
+          "from none of " + std::to_string(samples) +
+              " states in the domain it brings the robot to rest inside the domain within " + Count(most, "step") +
+              consequence,
+          "look whether the law has a value there and rest is in the domain; brake harder, allow more steps, or raise "
+          "planner.at_rest");
+  }
+
+  [[nodiscard]] bool Stops(const RobotMotion& motion, std::span<const double> x, int most) const {
+    Eigen::MatrixXd tail;
+    for (int way = 0; way < motion.num_tails(); ++way) {
+      if (!motion.Brake(x, way, most, tail)) continue;
+      const Eigen::MatrixXd states = Rollout(model_, Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x)), tail);
+      bool is_inside = true;
+      for (Eigen::Index t = 0; t < tail.cols(); ++t) {
+        Eigen::VectorXd z(model_.num_variables());
+        z << states.col(t + 1), tail.col(t);
+        is_inside = is_inside && problem_.domain.Contains({z.data(), ToSize(z.size())});
+      }
+      if (is_inside) return true;
+    }
+    return false;
+  }
+
+  // At random in the domain's ranges, or in a corner.
+  [[nodiscard]] std::array<double, kMaxVariables> StateAndInput(std::mt19937_64& random, bool in_corner) const {
+    std::uniform_real_distribution<double> uniform(0, 1);
+    std::array<double, kMaxVariables> z{};
+    for (std::size_t l = 0; l < ToSize(model_.num_variables()); ++l) {
+      const double at = in_corner ? std::round(uniform(random)) : uniform(random);
+      z[l] = Lower(l) + at * (Upper(l) - Lower(l));
+    }
+    return z;
+  }
+
+  void ExamineGoal() {
+    const std::vector<double>& goal = config_.planner.goal;
+    if (goal.empty()) return;
+    const Eigen::Map<const Eigen::VectorXd> place(goal.data(), std::ssize(goal));
+    for (Eigen::Index r = 0; r < problem_.projection.rows(); ++r) {
+      Eigen::Index state = 0;
+      const auto row = problem_.projection.row(r);
+      if (row.cwiseAbs().sum() != 1 || row.maxCoeff(&state) != 1) continue;
+      const auto k = ToSize(state);
+      if (!(goal[ToSize(r)] >= Lower(k) && goal[ToSize(r)] <= Upper(k)))
+        Add("planner.goal",
+            names_[k] + ": " + ToText(goal[ToSize(r)]) + " is outside [" + ToText(Lower(k)) + ", " + ToText(Upper(k)) +
+                "] of the domain: no certified plan gets there",
+            "move the goal, or widen the domain, if the declaration holds there");
+      if (k < result_.coordinates.size())  // none without data
+        RemarkOnData(result_.coordinates[k], goal[ToSize(r)], "planner.goal", ToText(goal[ToSize(r)]),
+                     "record steps on the way there");
+    }
+    for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
+      if (!config_.obstacles[i].motion() &&
+          -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
+        Add("planner.goal", "task.obstacles[" + std::to_string(i) + "] covers the goal", "move one of them");
+  }
+
+  // The longest way of a point of the body in one nominal step, of those tried; a lower bound.
+  [[nodiscard]] double LongestStep() const {
+    const BodyPlaces places(model_, problem_.projection, problem_.body);
+    std::mt19937_64 random(1);
+    const auto n = ToSize(model_.num_states()), all = ToSize(model_.num_variables());
+    double longest = 0;
+    for (int sample = 0; sample < kSamples; ++sample) {
+      const std::array<double, kMaxVariables> z = StateAndInput(random, sample % 2 == 1);
+      std::array<double, kMaxStates> next{};
+      if (!problem_.domain.Contains({z.data(), all})) continue;
+      model_.Evaluate({z.data(), all}, {next.data(), n});
+      const std::vector<BodyPart> before = places.At({z.data(), n}), after = places.At({next.data(), n});
+      for (std::size_t part = 0; part < before.size(); ++part)
+        for (std::size_t point = 0; point < before[part].points.size(); ++point) {
+          const double length = (after[part].points[point] - before[part].points[point]).norm();
+          if (length > longest && std::isfinite(length)) longest = length;
+        }
+    }
+    return longest;
+  }
+
+  [[nodiscard]] double LeastExtent(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) const {
+    double extent = upper[0] - lower[0];
+    for (Eigen::Index k = 1; k < problem_.projection.rows(); ++k) extent = std::min(extent, upper[k] - lower[k]);
+    return extent;
+  }
+
+  // The least extent along an axis of the largest part; of a part at expressions, its diameter.
+  [[nodiscard]] double BodyThickness() const {
+    double thickness = 0;
+    for (const BodyPart& part : problem_.body.parts) {
+      thickness = std::max(thickness, 2 * part.radius);
+      if (!part.places.empty()) continue;
+      Eigen::Vector3d lower = part.points.front(), upper = lower;
+      for (const Eigen::Vector3d& point : part.points) lower = lower.cwiseMin(point), upper = upper.cwiseMax(point);
+      thickness = std::max(thickness, LeastExtent(lower, upper) + 2 * part.radius);
+    }
+    return thickness;
+  }
+
+  void ExamineSteps() {
+    if (problem_.between) return;
+    const double step = LongestStep(), body = BodyThickness();
+    for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
+      const Obstacle& obstacle = config_.obstacles[i];
+      if (obstacle.kind() == Obstacle::Kind::kHalfSpace) continue;
+      const double thickness = LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
+      if (step <= thickness + body) continue;
+      Add("task.between",
+          "the robot moves by up to " + Up(step) + " m in one step of " + ToText(config_.period) +
+              " s, and task.obstacles[" + std::to_string(i) + "] is " + Down(thickness) +
+              " m thick: with certificates at the samples only it may pass through between two of them",
+          "declare bounds on the motion between samples, `between: {acceleration: [...]}`; or a smaller step or speed");
+      return;
+    }
+  }
+
+  // ---- The picture.
+
+  void AddTube(const Certifier& certifier, const Tube& tube) {
+    const int units = certifier.safety().NumUnits(tube);
+    if (units == 0) return;
+    for (std::vector<Picture::Polygon>& unit : Sweeps(certifier, tube, units - 1))
+      std::ranges::move(unit, std::back_inserter(result_.picture.expected));
+  }
+
+  void Draw() {
+    if (problem_.projection.rows() != 2) return;
+    result_.is_planar = true;
+    Picture& picture = result_.picture;
+    picture.title = "forereach check: " + std::filesystem::path(options_.config).filename().string();
+    for (const Obstacle& obstacle : config_.obstacles) AddObstacle(obstacle, picture);
+    for (Eigen::Index i = 0; i < all_.z.rows(); i += 1 + all_.z.rows() / kMostCompared)
+      picture.observations.emplace_back(problem_.projection * all_.z.row(i).head(model_.num_states()).transpose());
+    const Eigen::VectorXd center = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;
+    picture.bodies = BodyAt(problem_, center);
+    if (config_.planner.goal.size() == 2)
+      picture.goal = {{config_.planner.goal[0], config_.planner.goal[1]}, config_.planner.goal_radius};
+    picture.path = {Eigen::Vector2d(problem_.projection * center)};
+  }
+
+  static constexpr const char* kWiden =
+      "widen the domain, if the declaration holds there too; or leave these transitions out";
+
+  const TaskCheckOptions options_;
+  Document file_;
+  const std::string transitions_;
+  const Config config_;
+  Problem problem_;
+  const NominalModel& model_;
+  const std::vector<std::string> names_;
+  Eigen::MatrixXd controls_;  // a column a step
+  Transitions all_;
+  std::vector<Eigen::Index> rows_;  // of all_, those in the domain
+  TaskCheck result_;
+};
+
+}  // namespace
+
+bool TaskCheck::HasFindings() const {
+  return std::ranges::any_of(findings, [](const Finding& finding) { return !finding.is_remark; });
+}
+
+TaskCheck CheckTask(const TaskCheckOptions& options) { return Examination(options).Run(); }
+
+}  // namespace forereach

@@ -1,7 +1,0 @@
-#include "certifier/sets/eigen.h"
-
-namespace forereach::internal {
-
-const char FOREREACH_EIGEN = 0;
-
-}  // namespace forereach::internal

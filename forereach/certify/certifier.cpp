@@ -1,0 +1,250 @@
+#include "forereach/certify/certifier.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "forereach/numerics/arithmetic.h"
+#include "forereach/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+void RequireThat(bool good, const std::string& what) {
+  if (!good) throw std::invalid_argument(what);
+}
+
+// The place of the robot's frame has to be that of the configuration, however often an angle has turned. PlacementOf
+// requires it of places at expressions.
+void RequireSameAfterTurns(const Problem& problem) {
+  const NominalModel& model = *problem.model;
+  for (const int angle : model.angles())
+    RequireThat(angle >= problem.projection.cols() || problem.projection.col(angle).isZero(0),
+                "projection: depends on " + model.state_names()[ToSize(angle)] +
+                    ", which is an angle: how often it has turned is not known");
+}
+
+// What every certifier reads of a problem.
+const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
+  RequireExactArithmetic();
+  RequireThat(problem && problem->model, "problem: no model");
+  const int n = problem->model->num_states();
+  problem->domain.Validate(n, problem->model->num_inputs());
+  problem->declaration.ValidateDisturbance(n);
+  // A successor adds up to 2 n columns before it is reduced, a projection up to p.
+  const int highest_order = (kMaxGenerators - std::max(2 * n, kMaxSafetyDim)) / n;
+  RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
+              "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
+                  std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
+  RequireSameAfterTurns(*problem);
+  for (const RestBound& bound : problem->rest)
+    RequireThat(0 <= bound.coordinate && bound.coordinate < n && bound.tolerance >= 0 && bound.tolerance < kInfinity,
+                "rest: coordinate " + std::to_string(bound.coordinate) + " within " + std::to_string(bound.tolerance) +
+                    " is no state of the model, or negative or not finite");
+  return *problem;
+}
+
+// What the envelope is made of.
+void ValidateObservations(const Problem& problem) {
+  const int variables = problem.model->num_variables();
+  problem.declaration.Validate(problem.model->num_states(), variables);
+  RequireThat(problem.transitions.z.cols() == variables || problem.transitions.size() == 0,
+              "transitions: " + std::to_string(problem.transitions.z.cols()) + " columns, must be " +
+                  std::to_string(variables));
+  for (int i = 0; i < problem.transitions.size(); ++i) {
+    const Eigen::VectorXd z = problem.transitions.z.row(i);
+    RequireThat(problem.domain.Contains({z.data(), ToSize(z.size())}),
+                "transition " + std::to_string(i) + ": lies outside the certification domain");
+  }
+}
+
+// The domain's box over z = (x, u) envelops every query.
+ObservationStore MakeStore(const Problem& problem) {
+  ValidateObservations(problem);
+  const auto [lower, upper] = problem.domain.Corners();
+  StoreOptions options;
+  options.max_observations = ToSize(problem.max_observations);
+  options.envelope.max_leaf_visits = problem.max_leaf_visits;
+  options.envelope.instructions = problem.instructions;
+  return ObservationStore(problem.declaration, Observe(*problem.model, problem.transitions), lower, upper, options);
+}
+
+Decision Falsified(int step, int coordinate) {
+  Decision decision;
+  decision.outcome = Outcome::kFalsified;
+  decision.cause = Cause::kPairwise;
+  decision.step = step;
+  decision.coordinate = coordinate;
+  return decision;
+}
+
+Decision Falsified(const Violation& violation) {
+  Decision decision = Falsified(-1, violation.coordinate);
+  decision.first_observation = violation.first;
+  decision.second_observation = violation.second;
+  decision.margin = violation.difference;
+  decision.threshold = violation.bound;
+  return decision;
+}
+
+Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
+  Decision decision;
+  decision.outcome = Outcome::kDomain;
+  decision.step = step;
+  switch (result.status) {
+    case StepResult::Status::kDomainExit:
+      decision.cause = Cause::kDomainExit;
+      decision.exit = result.exit;
+      decision.coordinate = result.exit.index;
+      decision.margin = result.exit.value;
+      decision.threshold = result.exit.bound;
+      return decision;
+    case StepResult::Status::kInconsistent: {
+      const auto k = ToSize(result.coordinate);
+      decision = Falsified(step, result.coordinate);
+      decision.margin = record.envelope.lower[k];
+      decision.threshold = record.envelope.upper[k];
+      return decision;
+    }
+    case StepResult::Status::kNoFiniteEnclosure:
+    case StepResult::Status::kDone:  // of a step that was not stopped: not to be certified
+      decision.cause = Cause::kNoFiniteEnclosure;
+      decision.coordinate = result.coordinate;
+      decision.margin = decision.threshold = kInfinity;
+      return decision;
+  }
+  return decision;
+}
+
+}  // namespace
+
+Certifier::Observed::Observed(const Problem& problem) : store(MakeStore(problem)), known(store.snapshot()) {}
+
+Certifier::Certifier(std::shared_ptr<const Problem> problem)
+    : problem_((Validated(problem), std::move(problem))),
+      safety_(*problem_),
+      limits_(*problem_),
+      observed_(std::in_place, *problem_),
+      violation_(observed_->known.violation()),
+      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
+                  problem_->zonotope_order, problem_->method, problem_->instructions) {}
+
+Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
+    : problem_((Validated(problem), std::move(problem))),
+      safety_(*problem_),
+      limits_(*problem_),
+      propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
+                  problem_->zonotope_order, problem_->method, problem_->instructions) {}
+
+Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
+  Observations observed;
+  if (const Learned learned = Observe(*problem_, z, next, observed); learned != Learned::kAdded) return learned;
+  const auto entries = [](const Eigen::MatrixXd& one_row) {
+    return std::span<const double>(one_row.data(), ToSize(one_row.size()));
+  };
+  if (observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0)
+    return Learned::kOutsideDomain;
+  observed_->known = observed_->store.snapshot();
+  violation_ = observed_->known.violation();
+  return Learned::kAdded;
+}
+
+std::optional<Certifier::Misfit> Certifier::FindMisfit(const Plan& plan) const {
+  const NominalModel& model = *problem_->model;
+  const auto number = [](auto value) { return std::to_string(value); };
+  const auto size = [](const std::string& what) { return Misfit{Misfit::Kind::kSize, "plan: " + what}; };
+  if (plan.num_inputs != model.num_inputs())
+    return size(number(plan.num_inputs) + " inputs, the model has " + number(model.num_inputs()));
+  if (plan.stride < plan.num_inputs)
+    return size("stride " + number(plan.stride) + ", must be at least its " + number(plan.num_inputs) + " inputs");
+  if (plan.num_steps < 1 || plan.num_steps > kMaxSteps)
+    return size(number(plan.num_steps) + " steps, must be 1 to " + number(kMaxSteps));
+  if (plan.controls == nullptr) return size("no controls, its pointer is null");
+  const auto& [start, step, error] = plan.schedule;
+  constexpr std::int64_t kLatest = Schedule::kLatest, kLongest = Schedule::kLongest;
+  if (start < -kLatest || start > kLatest || step < 0 || step > kLongest || error < 0 || error > kLongest)
+    return size("its schedule starts at " + number(start) + " us with steps of " + number(step) +
+                " us and a clock error of " + number(error) + " us, must be within 2^60, [0, 2^40] and [0, 2^40]");
+  for (int t = 0; t < plan.num_steps; ++t)
+    for (std::size_t k = 0; k < plan.input(t).size(); ++k)
+      if (!std::isfinite(plan.input(t)[k]))
+        return Misfit{Misfit::Kind::kNumber, "plan: step " + number(t) + ": " + model.input_names()[k] + " is " +
+                                                 number(plan.input(t)[k]) + ", must be finite"};
+  return std::nullopt;
+}
+
+void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+  if (const auto misfit = FindMisfit(plan)) throw std::invalid_argument(misfit->what);
+  const bool moves =
+      std::ranges::any_of(obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
+  RequireThat(!moves || plan.schedule.step_us > 0, "plan: no schedule, and an obstacle moves");
+  Require(initial_set, obstacles);
+}
+
+void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+  const NominalModel& model = *problem_->model;
+  const auto number = [](auto value) { return std::to_string(value); };
+  RequireThat(initial_set.dim() == model.num_states(), "initial set: dimension " + number(initial_set.dim()) +
+                                                           ", the model has " + number(model.num_states()) + " states");
+  const int most = problem_->zonotope_order * model.num_states();
+  RequireThat(initial_set.num_generators() <= most, "initial set: " + number(initial_set.num_generators()) +
+                                                        " generators, must be at most " + number(most) +
+                                                        ", the zonotope order times the states");
+  for (std::size_t o = 0; o < obstacles.size(); ++o)
+    RequireThat(obstacles[o].dim() == projection().dim(),
+                "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +
+                    ", the projection has " + std::to_string(projection().dim()));
+}
+
+Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
+                            Tube& tube) const noexcept {
+  tube.length_ = 0;
+  tube.slices_[0].Assign(initial_set);
+  Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
+  if (violation()) return Falsified(*violation());
+  Decision decision = Propagate(plan, tube);
+  if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
+  if (decision.outcome == Outcome::kNone) decision = JudgeSafety(plan, obstacles, tube);
+  for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
+  return decision;
+}
+
+Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
+  for (int t = 0; t < plan.num_steps; ++t) {
+    const auto i = ToSize(t);
+    StepRecord& record = tube.steps_[i];
+    const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1],
+                                               tube.steps_[i + 1].half_width.data());
+    if (result.status != StepResult::Status::kDone) return Stopped(result, t, record);
+    tube.length_ = t + 1;
+  }
+  return {};
+}
+
+Decision Certifier::JudgeSafety(const Plan& plan, std::span<const Obstacle> obstacles, Tube& tube,
+                                int first) const noexcept {
+  const Decision limits = limits_.Judge(plan, tube, first);
+  const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
+  const bool is_touched_before = among_obstacles.outcome == Outcome::kSafety && among_obstacles.step < limits.step;
+  return limits.outcome == Outcome::kNone || is_touched_before ? among_obstacles : limits;
+}
+
+Decision Certifier::JudgeRest(const Tube& tube) const noexcept {
+  Decision decision;
+  for (const RestBound& bound : problem_->rest) {
+    const Interval reached = tube.hull(tube.length(), bound.coordinate);
+    const bool is_below = reached.upper <= bound.tolerance;
+    if (is_below && -bound.tolerance <= reached.lower) continue;
+    decision.outcome = Outcome::kDomain;
+    decision.cause = Cause::kNoStop;
+    decision.step = tube.length();
+    decision.coordinate = bound.coordinate;
+    decision.margin = is_below ? reached.lower : reached.upper;
+    decision.threshold = is_below ? -bound.tolerance : bound.tolerance;
+    break;
+  }
+  return decision;
+}
+
+}  // namespace forereach

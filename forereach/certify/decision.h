@@ -1,0 +1,105 @@
+/** The result for one plan: a certificate, or an abstention with its cause and a witness. */
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/interval.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/reach/propagator.h"
+#include "forereach/residual/consistency.h"
+#include "forereach/safety/motion.h"
+#include "forereach/safety/separation.h"
+#include "forereach/sets/zonotope.h"
+
+namespace forereach {
+
+/** The numbers are those of lcmtypes/decision_t.lcm. Zero is not a certificate. */
+enum class Outcome { kNone = 0, kCertified = 1, kFalsified = 2, kDomain = 3, kSafety = 4 };
+enum class Cause {
+  kNone = 0,
+  kPairwise = 1,
+  kDomainExit = 2,
+  kNoFiniteEnclosure = 3,
+  kObstacle = 4,
+  kNoStop = 5,
+  kLimit = 8
+};
+
+struct Decision {
+  Outcome outcome = Outcome::kNone;
+  Cause cause = Cause::kNone;
+  /** The first t at which X_t fails. S by kObstacle with Problem::between: the body may touch the obstacle between t
+  and t + 1. -1 for a certificate, and for F found before the first step. */
+  int step = -1;
+
+  /** @name Witness. A member that does not apply to the outcome is -1 or kNone. */
+  ///@{
+  DomainExit exit{};  ///< D by domain exit.
+  /** F: residual coordinate. D: coordinate of z, or state without a finite enclosure. S by kLimit: the limit. */
+  int coordinate = -1;
+  int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
+  int obstacle = -1;                                    ///< S by kObstacle, and certificate: the closest obstacle.
+  int part = -1;                                        ///< Likewise the part of the body.
+  /** Certificate: the step of the closest slice. If the problem has bounds between the samples: the step t after which
+  the body comes closest, before t + 1. */
+  int closest_step = -1;
+  ///@}
+
+  /** The deciding value and the value that it is compared with. Certificate and S by kObstacle: proven distance from
+  the body to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's
+  radius (m). S by kLimit: the value that the limit's function may reach, infinite if it has no bound, and the limit's
+  bound. D: extreme value of the hull, and the bound of the domain or of rest. F: difference of two residuals, and the
+  difference that the declaration allows. */
+  double margin = 0, threshold = 0;
+
+  /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than
+  necessary. */
+  bool capped = false;
+};
+
+/** A fixed open-loop control sequence u_0 .. u_{T-1}, stored step by step. It does not own the numbers. */
+struct Plan {
+  const double* controls = nullptr;
+  int num_inputs = 0, num_steps = 0;
+  int stride = 0;       ///< Doubles from one step to the next, at least num_inputs.
+  Schedule schedule{};  ///< Only needed where obstacles move.
+
+  [[nodiscard]] std::span<const double> input(int t) const {
+    return {controls + static_cast<std::ptrdiff_t>(t) * stride, ToSize(num_inputs)};
+  }
+};
+
+/** The computed part of the reachable tube: slices X_0 .. X_length and a record of each completed step. Construct it
+once and reuse it for every plan: it has room for the longest horizon, about 2.5 MB. */
+class Tube final {
+ public:
+  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1), places_(kMaxPieces) {}
+
+  /** Upper bounds on the half-widths of the hull of X_t, t <= length(). */
+  [[nodiscard]] std::span<const double> half_width(int t) const {
+    return {step(t).half_width.data(), ToSize(slice(t).dim())};
+  }
+  /** An interval that contains coordinate k of every point of X_t, rounded outward. Cost O(1). */
+  [[nodiscard]] Interval hull(int t, int k) const {
+    const double center = slice(t).center(k), r = half_width(t)[ToSize(k)];
+    return {SubDown(center, r), AddUp(center, r)};
+  }
+  /** Number of completed steps; X_0 .. X_length() are valid. */
+  [[nodiscard]] int length() const { return length_; }
+  [[nodiscard]] const Zonotope& slice(int t) const { return slices_[ToSize(t)]; }
+  [[nodiscard]] const StepRecord& step(int t) const { return steps_[ToSize(t)]; }
+
+ private:
+  friend class Certifier;
+  friend class SafetyTest;
+  std::vector<Zonotope> slices_;
+  std::vector<StepRecord> steps_;
+  std::vector<Zonotope> places_;  // scratch memory of SafetyTest
+  int length_ = 0;
+};
+
+}  // namespace forereach

@@ -1,0 +1,143 @@
+#include "forereach/certify/explain.h"
+
+#include <optional>
+#include <vector>
+
+#include <cmath>
+
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/unbounded.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+std::string VariableName(const NominalModel& model, int index) {
+  if (index < 0 || index >= model.num_variables()) return "coordinate " + std::to_string(index);
+  return model.variable_names()[ToSize(index)];
+}
+
+std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
+  using Exit = DomainExit::Kind;
+  // What is reached, away from the bound; the bound itself, towards it.
+  const bool below = exit.kind == Exit::kLower;
+  const std::string value = below ? RoundedDown(exit.value) : RoundedUp(exit.value);
+  const std::string bound = below ? RoundedUp(exit.bound) : RoundedDown(exit.bound);
+  switch (exit.kind) {
+    case Exit::kLower: return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
+    case Exit::kUpper: return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
+    case Exit::kInequality:
+      return "inequality " + std::to_string(exit.index) + " reaches " + value + ", above its bound " + bound;
+    case Exit::kBall:
+      return "ball " + std::to_string(exit.index) + ": distance reaches " + value + ", above its radius " + bound;
+    case Exit::kNone: break;
+  }
+  return "no constraint of the domain is violated";
+}
+
+std::string ExplainFalsified(const Decision& decision, const NominalModel& model) {
+  const std::string coordinate = VariableName(model, decision.coordinate);
+  if (decision.first_observation < 0)
+    return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
+           " agrees with all observations and the declaration";
+  return "abstain F: observations " + std::to_string(decision.first_observation) + " and " +
+         std::to_string(decision.second_observation) + " differ in " + coordinate + " by " +
+         RoundedDown(decision.margin) + ", the declaration allows " + RoundedUp(decision.threshold);
+}
+
+// A sample, or the time from it to the next.
+std::string TimeText(const Problem& problem, int step) {
+  if (!problem.between) return "at step " + std::to_string(step);
+  return "between steps " + std::to_string(step) + " and " + std::to_string(step + 1);
+}
+
+bool NamesPart(const Problem& problem, int part) { return problem.body.parts.size() > 1 && part >= 0; }
+
+std::string ExplainLimit(const Decision& decision, const Problem& problem) {
+  const auto i = ToSize(decision.coordinate);
+  const std::string name = i < problem.limits.size() ? problem.limits[i].name : "limit " + std::to_string(i);
+  const std::string where = "abstain S: at step " + std::to_string(decision.step) + " " + name;
+  const bool below = decision.margin < decision.threshold;
+  const std::string limit = below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold);
+  if (!std::isfinite(decision.margin)) return where + " has no finite bound, its limit is " + limit;
+  return where + " may reach " + (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) +
+         (below ? ", below its limit " : ", above its limit ") + limit;
+}
+
+std::string ExplainSafety(const Decision& decision, const Problem& problem) {
+  if (decision.cause == Cause::kLimit) return ExplainLimit(decision, problem);
+  const double clearance = SubDown(decision.margin, decision.threshold);
+  if (decision.outcome == Outcome::kCertified)
+    return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance});
+  const std::string who = NamesPart(problem, decision.part) ? "part " + std::to_string(decision.part) : "the robot";
+  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " may touch obstacle " +
+         std::to_string(decision.obstacle) + " (by " + RoundedUp(-clearance) + " m)";
+}
+
+std::string Sentence(const Decision& decision, const Problem& problem) {
+  const NominalModel& model = *problem.model;
+  switch (decision.outcome) {
+    case Outcome::kFalsified: return ExplainFalsified(decision, model);
+    case Outcome::kDomain: {
+      const std::string where = "abstain D: at step " + std::to_string(decision.step) + " ";
+      if (decision.cause == Cause::kDomainExit) return where + ExplainExit(decision.exit, model);
+      if (decision.cause == Cause::kNoStop) {
+        const bool below = decision.margin < decision.threshold;
+        return where + "the plan ends, and " + VariableName(model, decision.coordinate) + " reaches " +
+               (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) + "; standing is up to " +
+               (below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold));
+      }
+      return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
+    }
+    case Outcome::kSafety:
+    case Outcome::kCertified: return ExplainSafety(decision, problem);
+    case Outcome::kNone: break;
+  }
+  return "no decision";
+}
+
+// Why there is no finite enclosure; empty if it is not known.
+std::string ExplainUnbounded(const Decision& decision, const NominalModel& model, const Plan& plan, const Tube& tube) {
+  const int t = decision.step;
+  if (decision.cause != Cause::kNoFiniteEnclosure || t < 0 || t > tube.length() || t >= plan.num_steps) return "";
+  std::vector<Interval> box;
+  for (int k = 0; k < model.num_states(); ++k) box.push_back(tube.hull(t, k));
+  for (const double u : plan.input(t)) box.emplace_back(u);
+  const std::optional<Unbounded> found = FindUnbounded(model, box, decision.coordinate);
+  if (!found) return "";
+  std::string states;
+  for (const int k : found->states) states += (states.empty() ? "" : ", ") + VariableName(model, k);
+  const std::string place = model.text() == nullptr ? " of its equations"
+                                                    : " at line " + std::to_string(found->line) + ", column " +
+                                                          std::to_string(found->column) + " of the model";
+  return ": " + found->operation + place + " has a kink or a pole there; its argument" +
+         (states.empty() ? "" : ", a function of " + states + ",") + " may be anywhere in [" +
+         RoundedDown(found->argument.lower) + ", " + RoundedUp(found->argument.upper) + "]";
+}
+
+}  // namespace
+
+std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest) {
+  const std::string limits = problem.limits.empty() ? "" : "; within its limits at the sample instants";
+  if (closest.obstacle < 0) return "certified: no obstacle is there" + limits;
+  const std::string who = NamesPart(problem, closest.part) ? "part " + std::to_string(closest.part) + " " : "";
+  return std::string(problem.between ? "certified: the robot stays clear at all times"
+                                     : "certified at its sample instants only: the robot stays clear") +
+         (problem.declaration.IsDisturbed() ? " under the declared disturbance" : "") + ", closest " +
+         TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) + " m from obstacle " +
+         std::to_string(closest.obstacle) + limits;
+}
+
+const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }
+
+std::string Explain(const Decision& decision, const Problem& problem) {
+  return Sentence(decision, problem) + (decision.capped ? kCapped : "");
+}
+
+std::string Explain(const Decision& decision, const Problem& problem, const Plan& plan, const Tube& tube) {
+  return Sentence(decision, problem) + ExplainUnbounded(decision, *problem.model, plan, tube) +
+         (decision.capped ? kCapped : "");
+}
+
+}  // namespace forereach

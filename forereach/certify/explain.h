@@ -1,0 +1,40 @@
+/** Decisions as sentences. */
+#pragma once
+
+#include <string>
+
+#include "forereach/certify/decision.h"
+#include "forereach/certify/problem.h"
+
+namespace forereach {
+
+struct Plan;
+class Tube;
+
+/** One sentence with outcome, step, cause and witness by name, with values, bounds and units. Numbers have six digits
+and are rounded so that the sentence stays true: a clearance down, a depth up. */
+[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem);
+/** The same, where the plan and its tube are at hand. If the next state has no finite enclosure, it also names the
+operation of the model's text that meets its kink or pole (dynamics/unbounded.h). Not for the certify step. */
+[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem, const Plan& plan, const Tube& tube);
+
+/** The closest approach of a certified plan, as Decision has it. */
+struct ClosestApproach {
+  int step = -1;         ///< Decision::closest_step
+  int obstacle = -1;     ///< -1: no obstacle is there during the plan.
+  int part = -1;         ///< Named only if the body has several; -1: not known.
+  double clearance = 0;  ///< A lower bound on the distance, metres.
+};
+
+/** The sentence for a certificate, without kCapped. It says when the certificate holds: at all times with
+Problem::between, otherwise at the sample instants only; that it allows for a disturbance, if one is declared; and that
+the limits hold at the sample instants, if there are any. */
+[[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest);
+
+/** "all_times" or "samples": when a decision of the problem holds. */
+[[nodiscard]] const char* HoldsName(const Problem& problem);
+
+/** Appended to the sentence if Decision::capped. */
+inline constexpr const char* kCapped = "; a search met max_leaf_visits";
+
+}  // namespace forereach

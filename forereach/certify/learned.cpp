@@ -1,0 +1,39 @@
+#include "forereach/certify/learned.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace forereach {
+
+Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next,
+                Observations& observed) {
+  const auto finite = [](double value) { return std::isfinite(value); };
+  if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
+  if (!problem.domain.Contains(z)) return Learned::kOutsideDomain;
+  const auto row = [](std::span<const double> values) {
+    return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
+  };
+  try {
+    observed = Observe(*problem.model, {row(z), row(next)});
+  } catch (const AmbiguousAngle&) {
+    return Learned::kAmbiguousAngle;
+  } catch (const std::invalid_argument&) {
+    return Learned::kNoNominalValue;
+  }
+  return Learned::kAdded;
+}
+
+std::string Explain(Learned learned) {
+  switch (learned) {
+    case Learned::kAdded: break;
+    case Learned::kNotFinite: return "NaN or infinity in it";
+    case Learned::kOutsideDomain: return "it lies outside the certification domain";
+    case Learned::kNoNominalValue: return "the nominal model has no finite value there";
+    case Learned::kAmbiguousAngle:
+      return "an angle is more than a quarter of a turn away from the nominal model's, so its turns cannot be told";
+  }
+  return "";
+}
+
+}  // namespace forereach

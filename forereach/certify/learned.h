@@ -1,0 +1,29 @@
+/** Which executed transitions (z, x+) are observations of a problem's residual. */
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "forereach/certify/problem.h"
+#include "forereach/residual/observations.h"
+
+namespace forereach {
+
+/** The check that refused a transition, the first in this order; kAdded if none did. */
+enum class Learned {
+  kAdded,
+  kNotFinite,       ///< An entry is NaN or infinite.
+  kOutsideDomain,   ///< z is not proven to lie in the domain: the transition says nothing about the residual there.
+  kNoNominalValue,  ///< The nominal map has no finite enclosure at z.
+  kAmbiguousAngle,  ///< An angle departs from the nominal map's by more than a quarter of a turn (observations.h).
+};
+
+/** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. Without a fault `observed` gets
+the enclosure of its residual, one row. Cost: one evaluation of the model. */
+[[nodiscard]] Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next,
+                              Observations& observed);
+
+/** The refusal as a clause; empty for kAdded. */
+[[nodiscard]] std::string Explain(Learned learned);
+
+}  // namespace forereach

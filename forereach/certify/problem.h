@@ -1,0 +1,47 @@
+/** The inputs that stay fixed while a robot runs: nominal model, domain, declaration, observations and safety
+projection. */
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "forereach/dynamics/expansion.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/numerics/instruction_set.h"
+#include "forereach/reach/domain.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/transitions.h"
+#include "forereach/safety/body.h"
+#include "forereach/safety/limit.h"
+#include "forereach/safety/obstacle.h"
+#include "forereach/sets/box.h"
+#include "forereach/sets/eigen.h"
+
+namespace forereach {
+
+/** One condition of rest: |x_coordinate| <= tolerance, in the unit of that state. */
+struct RestBound {
+  int coordinate = 0;
+  double tolerance = 0;  ///< Not negative.
+};
+
+struct Problem {
+  std::shared_ptr<const NominalModel> model;  ///< f0
+  Domain domain;                              ///< Z_cert
+  Declaration declaration;                    ///< L, sigma and the disturbance
+  Transitions transitions;                    ///< D_N, all inside the domain
+  Eigen::MatrixXd projection;                 ///< P, p-by-n: the position of the robot's frame
+  Body body;                                  ///< By default the point P x
+  /** The bounds with which a certificate holds at all times; without them it holds at the samples only. */
+  std::optional<Between> between;
+  std::vector<Limit> limits;          ///< At most kMaxLimits, which hold at the samples
+  Method method = Method::kCentred;   ///< How the nominal remainder is bounded
+  int max_leaf_visits = 512;          ///< EnvelopeOptions: bounds the work of one search
+  int max_observations = 10'000'000;  ///< Above this number, observations that never attain the envelope are removed
+  int zonotope_order = 5;             ///< rho: at most rho * n generators after reduction
+  InstructionSet instructions = BestInstructionSet();  ///< Changes the computing time only, not a bit of the result
+  std::vector<RestBound> rest;  ///< X_T of a certified plan satisfies all of these; empty: no condition
+};
+
+}  // namespace forereach

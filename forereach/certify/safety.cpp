@@ -1,0 +1,408 @@
+#include "forereach/certify/safety.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "forereach/dynamics/angles.h"
+#include "forereach/dynamics/text_program.h"
+#include "forereach/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+Hull Shifted(Hull hull, const std::array<Interval, kMaxSafetyDim>& shift, int dim) noexcept {
+  for (std::size_t k = 0; k < ToSize(dim); ++k) {
+    const Interval center = Interval(hull.center[k]) - shift[k];
+    hull.center[k] = center.Middle();
+    hull.half_width[k] = AddUp(hull.half_width[k], center.DistanceUpper(hull.center[k]));
+  }
+  return hull;
+}
+
+// The closest approach found so far.
+struct Closest {
+  double clearance = kInfinity;
+  int step = -1, obstacle = -1, part = -1;
+  Separation separation{kInfinity, 0};
+
+  void Consider(const PartSeparation& found, int t, int o) noexcept {
+    Consider(found, found.separation.clearance(), t, o);
+  }
+  void Consider(const PartSeparation& found, double its_clearance, int t, int o) noexcept {
+    if (its_clearance < clearance) *this = {its_clearance, t, o, found.part, found.separation};
+  }
+};
+
+// A unit and an obstacle that are proven to be apart.
+struct Pair {
+  PartSeparation bound;
+  double clearance;
+  int step, obstacle;
+  bool is_direct;  // by the best of what is cheaper than a search
+
+  void Improve(const PartSeparation& found) noexcept {
+    bound = found;
+    clearance = found.separation.clearance();
+    is_direct = true;
+  }
+};
+
+// The pairs of least clearance, as many as there is room for.
+class Nearest {
+ public:
+  void Add(const Separation& found, int part, int t, int o, bool is_direct) noexcept {
+    const double clearance = found.clearance();
+    if (count_ == pairs_.size()) {
+      left_out_ = std::min(left_out_, std::max(pairs_[farthest_].clearance, clearance));
+      if (!(clearance < pairs_[farthest_].clearance)) return;
+    }
+    Pair* pair = &pairs_[count_ == pairs_.size() ? farthest_ : count_++];
+    // Member by member: a load that spans several stores waits for all of them.
+    pair->bound.separation = found;
+    pair->bound.part = part;
+    pair->clearance = clearance;
+    pair->step = t;
+    pair->obstacle = o;
+    pair->is_direct = is_direct;
+    if (count_ == pairs_.size())
+      farthest_ = ToSize(std::ranges::max_element(pairs_, {}, &Pair::clearance) - pairs_.begin());
+  }
+
+  /** The first of those with the least clearance; null if there is none. */
+  [[nodiscard]] Pair* Least() noexcept {
+    Pair* least = count_ > 0 ? pairs_.data() : nullptr;
+    for (Pair& pair : pairs()) {
+      if (pair.clearance > least->clearance) continue;
+      if (pair.clearance < least->clearance ||
+          std::tie(pair.step, pair.obstacle) < std::tie(least->step, least->obstacle))
+        least = &pair;
+    }
+    return least;
+  }
+  /** The least clearance for which there was no room. */
+  [[nodiscard]] double left_out() const { return left_out_; }
+  /** Keeps what is closer than `clearance`, but not `other`: by step, then by obstacle. */
+  [[nodiscard]] std::span<Pair> InOrder(double clearance, const Pair* other) noexcept {
+    std::size_t kept = 0;
+    for (const Pair& pair : pairs())
+      if (pair.clearance < clearance && &pair != other) pairs_[kept++] = pair;
+    count_ = kept;
+    std::ranges::sort(pairs(), [](const Pair& a, const Pair& b) {
+      return std::tie(a.step, a.obstacle) < std::tie(b.step, b.obstacle);
+    });
+    return pairs();
+  }
+
+ private:
+  [[nodiscard]] std::span<Pair> pairs() noexcept { return {pairs_.data(), count_}; }
+
+  std::array<Pair, 12> pairs_;
+  std::size_t count_ = 0, farthest_ = 0;  // the latter once all are in use
+  double left_out_ = kInfinity;
+};
+
+Decision Judged(Outcome outcome, const Closest& closest) {
+  Decision decision;
+  decision.outcome = outcome;
+  decision.obstacle = closest.obstacle;
+  decision.part = closest.part;
+  decision.closest_step = closest.step;
+  decision.margin = closest.separation.distance;
+  decision.threshold = closest.separation.threshold;
+  if (outcome == Outcome::kSafety) {
+    decision.cause = Cause::kObstacle;
+    decision.step = closest.step;
+  }
+  return decision;
+}
+
+bool IsBetter(const Separation& a, const Separation& b) noexcept {
+  return a.threshold == b.threshold ? a.distance > b.distance : a.clearance() > b.clearance();
+}
+
+// NaN goes on.
+double Larger(double a, double b) noexcept { return b <= a ? a : std::isnan(a) ? a : b; }
+
+Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
+  Eigen::Vector3d spatial = Eigen::Vector3d::Zero();
+  for (Eigen::Index k = 0; k < y.size(); ++k) spatial[k] = y[k];
+  return spatial;
+}
+
+// A bound for the whole body is one for its closest part.
+PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
+  if (IsBetter(by_parts.separation, other.separation)) return by_parts;
+  return {other.separation, other.part < 0 ? by_parts.part : other.part};
+}
+
+}  // namespace
+
+// What is known of a tube in one unit. Samples are observed and places enclosed when they are first needed, once for
+// each sample t, and kept in the half t % 2 of the memory.
+class SafetyTest::Unit {
+ public:
+  Unit(const SafetyTest& test, const Schedule& schedule, const Tube& tube, std::span<Zonotope> places) noexcept
+      : test_(test), schedule_(schedule), tube_(tube), places_(places) {}
+
+  void Enter(int t) noexcept {
+    first_ = t;
+    last_ = t + (placement().sweeps() ? 1 : 0);
+  }
+  void EncloseHulls() noexcept {
+    if (first_ == last_) return EncloseHull(first_, hull_);
+    if (first_ == hulls_until_)
+      hulls_[0] = hulls_[1];
+    else
+      EncloseHull(first_, hulls_[0]);
+    EncloseHull(last_, hulls_[1]);
+    hulls_until_ = last_;
+    hull_ = Join(hulls_[0], hulls_[1], placement().dim());
+  }
+
+  // By the interval hulls of the frame and a ball around the body: sound, not tight. @pre EncloseHulls.
+  [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
+    const Hull& seen = meeting.moves ? Seen(meeting) : hull_;
+    return SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach()));
+  }
+
+  // By one direction for each part, from its middle to the obstacle, or as given if that is better.
+  [[nodiscard]] PartSeparation ByDirections(const PartSeparation& by_hulls, const Obstacle& obstacle,
+                                            const Encounter& meeting) noexcept {
+    if (placement().is_at_frame()) return by_hulls;
+    const auto separate = [&](std::size_t i, double added) {
+      const Eigen::Vector3d d = Towards(obstacle, placement().parts()[i], meeting);
+      double support = -kInfinity;
+      for (int t = first_; t <= last_; ++t) support = Larger(support, Support(t, placement().parts()[i], d, meeting));
+      return Separation{DistanceLower(obstacle, d, support), AddUp(obstacle.radius(), added)};
+    };
+    return Better(ClosestPart(meeting, separate), by_hulls);
+  }
+
+  // The better of the bound by hulls and that of the best directions.
+  [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle,
+                                    const Encounter& meeting) noexcept {
+    const auto separate = [&](std::size_t i, double added) { return SeparatePart(i, obstacle, added, meeting); };
+    return Better(ClosestPart(meeting, separate), by_hulls);
+  }
+
+  // Valid until the next.
+  [[nodiscard]] const Encounter& MeetIn(const Obstacle& obstacle) noexcept {
+    static constexpr Encounter kStands;
+    return obstacle.motion() ? meeting_ = Meet(*obstacle.motion(), schedule_, first_, last_) : kStands;
+  }
+
+ private:
+  [[nodiscard]] const Placement& placement() const { return test_.placement_; }
+
+  // The least of separate(part, what its distance has to exceed the obstacle's radius by).
+  template <class Separate>
+  [[nodiscard]] PartSeparation ClosestPart(const Encounter& meeting, Separate separate) const noexcept {
+    const auto parts = placement().parts();
+    Separation closest = separate(0, AddUp(parts[0].radius, meeting.growth));
+    int part = 0;
+    for (std::size_t i = 1; i < parts.size(); ++i) {
+      const Separation found = separate(i, AddUp(parts[i].radius, meeting.growth));
+      if (!IsBetter(closest, found)) continue;
+      closest = found;
+      part = static_cast<int>(i);
+    }
+    return {closest, part};
+  }
+
+  void EncloseHull(int t, Hull& hull) noexcept {
+    if (placement().has_expressions()) return placement().EncloseHull(SampleAt(t), hull);
+    placement().EncloseHull(tube_.slice(t), tube_.half_width(t), hull);
+  }
+
+  // The hull of both samples, seen from the obstacle.
+  [[nodiscard]] Hull Seen(const Encounter& meeting) const noexcept {
+    const int p = placement().dim();
+    if (first_ == last_) return Shifted(hull_, meeting.shift[0], p);
+    return Join(Shifted(hulls_[0], meeting.shift[0], p), Shifted(hulls_[1], meeting.shift[1], p), p);
+  }
+
+  [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
+    const std::size_t half = ToSize(t % 2);
+    if (observed_[half] != t) placement().Observe(tube_.slice(t), tube_.half_width(t), samples_[half]);
+    observed_[half] = t;
+    return samples_[half];
+  }
+
+  [[nodiscard]] const Zonotope* PlacesAt(int t) noexcept {
+    const std::size_t half = ToSize(t % 2);
+    Zonotope* places = places_.data() + half * ToSize(placement().num_points());
+    if (placed_[half] != t) placement().Enclose(SampleAt(t), places, test_.instructions_);
+    placed_[half] = t;
+    return places;
+  }
+
+  // The gap between the boxes around the middles of a part's points and around the core; if they meet, from middle to
+  // middle. Any direction proves something; this one most of what there is, if the slices are small.
+  [[nodiscard]] Eigen::Vector3d Towards(const Obstacle& obstacle, const Placement::Part& part,
+                                        const Encounter& meeting) noexcept {
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return Spatial(obstacle.points()[0]);
+    std::array<double, kMaxSafetyDim> lower, upper;
+    lower.fill(kInfinity);
+    upper.fill(-kInfinity);
+    const auto p = ToSize(placement().dim());
+    for (int t = first_; t <= last_; ++t) {
+      const Placement::Sample& sample = SampleAt(t);
+      for (int i = part.first; i < part.first + part.count; ++i)
+        for (std::size_t k = 0; k < p; ++k) {
+          const double middle = placement().middle(sample, i, k) - meeting.shift[ToSize(t - first_)][k].lower;
+          lower[k] = std::min(lower[k], middle);
+          upper[k] = std::max(upper[k], middle);
+        }
+    }
+    Eigen::Vector3d gap = Eigen::Vector3d::Zero();
+    const auto set = [&](auto size) {
+      bool meets = true;
+      for (std::size_t k = 0; k < p; ++k) {
+        const auto i = static_cast<Eigen::Index>(k);
+        gap[i] = size(obstacle.lower()[i] - upper[k], obstacle.upper()[i] - lower[k]);
+        meets &= gap[i] == 0;
+      }
+      return !meets;
+    };
+    if (!set([](double below, double above) { return std::max(below, 0.0) + std::min(above, 0.0); }))
+      set(std::plus<>());
+    return gap;
+  }
+
+  // The support of a part at one sample along d, seen from the obstacle.
+  [[nodiscard]] double Support(int t, const Placement::Part& part, const Eigen::Vector3d& d,
+                               const Encounter& meeting) noexcept {
+    const double support = placement().SupportUpper(SampleAt(t), part, d, test_.instructions_);
+    if (!meeting.moves) return support;
+    Interval shifted(0);
+    for (int k = 0; k < placement().dim(); ++k)
+      shifted += Interval(d[k]) * meeting.shift[ToSize(t - first_)][ToSize(k)];
+    return SubUp(support, shifted.lower);
+  }
+
+  [[nodiscard]] Separation SeparatePart(std::size_t number, const Obstacle& obstacle, double added,
+                                        const Encounter& meeting) noexcept {
+    const Placement::Part& part = placement().parts()[number];
+    std::array<Piece, kMaxPieces> pieces;
+    std::size_t count = 0;
+    for (int t = first_; t <= last_; ++t) {
+      const Zonotope* places = PlacesAt(t);
+      for (int i = part.first; i < part.first + part.count; ++i)
+        pieces[count++] = {&places[i], placement().turn(i), meeting.shift[ToSize(t - first_)]};
+    }
+    return forereach::Separate({pieces.data(), count}, obstacle, added, test_.instructions_);
+  }
+
+  const SafetyTest& test_;
+  const Schedule& schedule_;
+  const Tube& tube_;
+  std::span<Zonotope> places_;
+  std::array<int, 2> observed_{-1, -1}, placed_{-1, -1};
+  std::array<Placement::Sample, 2> samples_;
+  int first_ = -1, last_ = -1, hulls_until_ = -1;
+  std::array<Hull, 2> hulls_{};  // at both samples, where there are two
+  Hull hull_;                    // of both
+  Encounter meeting_;
+};
+
+Placement PlacementOf(const Problem& problem) {
+  const NominalModel& model = *problem.model;
+  if (!model.angles().empty() && problem.body.HasPlaces()) {
+    const std::vector<ExpressionText> all = problem.body.Coordinates();
+    const ProgramDraft program = MakeProgram(NamesOf(model), all);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      RequireSameAfterTurns(program.View(), static_cast<int>(i), all[i], "body: the place " + all[i].text,
+                            model.angles(), model.state_names());
+  }
+  return {problem.projection, problem.body, problem.between, problem.model->num_states(),
+          problem.body.HasPlaces() ? NamesOf(*problem.model) : ExpressionNames{}};
+}
+
+SafetyTest::SafetyTest(const Problem& problem)
+    : placement_(PlacementOf(problem)), instructions_(problem.instructions) {}
+
+PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obstacle, const Schedule& schedule) const {
+  std::vector<Zonotope> places(2 * ToSize(placement_.num_points()));
+  Unit unit(*this, schedule, tube, places);
+  unit.Enter(t);
+  unit.EncloseHulls();
+  const Encounter& meeting = unit.MeetIn(obstacle);
+  if (!meeting.is_there) return {{kInfinity, 0}, -1};
+  return unit.Best(unit.ByDirections({unit.ByHulls(obstacle, meeting), -1}, obstacle, meeting), obstacle, meeting);
+}
+
+// Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
+// they leave as possibly closest, is settled by the best direction.
+Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
+                           int first) const noexcept {
+  Closest closest;
+  Nearest nearest;
+  Unit unit(*this, schedule, tube, tube.places_);
+  const int count = static_cast<int>(obstacles.size()), units = NumUnits(tube);
+  for (int t = first; t < units; ++t) {
+    unit.Enter(t);
+    unit.EncloseHulls();
+    for (int o = 0; o < count; ++o) {
+      const Obstacle& obstacle = obstacles[ToSize(o)];
+      const Encounter& meeting = unit.MeetIn(obstacle);
+      if (!meeting.is_there) continue;
+      const Separation by_hulls = unit.ByHulls(obstacle, meeting);
+      if (by_hulls.IsProven()) {
+        nearest.Add(by_hulls, -1, t, o, placement_.is_at_frame());
+        continue;
+      }
+      const PartSeparation direct = unit.ByDirections({by_hulls, -1}, obstacle, meeting);
+      if (direct.separation.IsProven()) {
+        nearest.Add(direct.separation, direct.part, t, o, true);
+        continue;
+      }
+      const PartSeparation best = unit.Best(direct, obstacle, meeting);
+      if (!best.separation.IsProven())
+        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation});
+      closest.Consider(best, t, o);
+    }
+  }
+  const auto is_closer = [&](const Pair* pair) { return pair != nullptr && pair->clearance < closest.clearance; };
+  const auto direct = [&](Pair& pair) {
+    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
+    unit.Enter(pair.step);
+    pair.Improve(unit.ByDirections(pair.bound, obstacle, unit.MeetIn(obstacle)));
+  };
+  const auto consider = [&](const Pair& pair) {
+    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
+    unit.Enter(pair.step);
+    closest.Consider(unit.Best(pair.bound, obstacle, unit.MeetIn(obstacle)), pair.step, pair.obstacle);
+  };
+  Pair* least = nearest.Least();
+  for (; is_closer(least) && !least->is_direct; least = nearest.Least()) direct(*least);
+  if (is_closer(least)) consider(*least);
+  // What no cheap bound proves has been considered above.
+  const auto consider_if_closer = [&](Pair& pair) {
+    if (is_closer(&pair) && !pair.is_direct) direct(pair);
+    if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);
+  };
+  if (nearest.left_out() >= closest.clearance) {
+    for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
+    return Judged(Outcome::kCertified, closest);
+  }
+  for (int t = first; t < units; ++t) {
+    unit.Enter(t);
+    unit.EncloseHulls();
+    for (int o = 0; o < count; ++o) {
+      const Encounter& meeting = unit.MeetIn(obstacles[ToSize(o)]);
+      if (!meeting.is_there) continue;
+      const Separation found = unit.ByHulls(obstacles[ToSize(o)], meeting);
+      Pair pair{{found, -1}, found.clearance(), t, o, placement_.is_at_frame()};
+      consider_if_closer(pair);
+    }
+  }
+  return Judged(Outcome::kCertified, closest);
+}
+
+}  // namespace forereach

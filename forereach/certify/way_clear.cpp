@@ -1,0 +1,107 @@
+#include "forereach/certify/way_clear.h"
+
+#include <algorithm>
+
+#include "forereach/numerics/least.h"
+#include "forereach/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+constexpr double kLeastDepth = 1e-6;  // m, where the search begins
+constexpr double kFarthest = 1e6;     // of these, where it ends
+
+class WayClearSearch final {
+ public:
+  WayClearSearch(const Certifier& certifier, const Plan& plan, Tube& tube, const SearchEffort& effort)
+      : certifier_(certifier), plan_(plan), tube_(tube), effort_(effort) {}
+
+  // The first step at which the obstacle may be touched, if there is one.
+  [[nodiscard]] std::optional<Decision> Touch(const Obstacle& obstacle) const {
+    const Decision alone = certifier_.JudgeSafety(plan_, {&obstacle, 1}, tube_);
+    return alone.cause == Cause::kObstacle ? std::optional(alone) : std::nullopt;
+  }
+
+  [[nodiscard]] bool GoesOn() { return goes_on_ = goes_on_ && effort_.goes_on(); }
+
+  std::optional<Eigen::VectorXd> LeastShift(const Obstacle& obstacle, const Decision& touch) {
+    const double depth = std::max(touch.threshold - touch.margin, kLeastDepth);
+    std::optional<double> least;
+    Eigen::VectorXd shift;
+    for (const Eigen::VectorXd& direction : DirectionsAway(obstacle, touch.step)) {
+      const auto amount = LeastFrom(depth, least.value_or(kFarthest * depth), effort_.halvings, [&](double distance) {
+        return GoesOn() && !Touch(Shifted(obstacle, distance * direction));
+      });
+      if (!goes_on_) return std::nullopt;
+      if (!amount || (least && *amount >= *least)) continue;
+      least = amount;
+      shift = *amount * direction;
+    }
+    return least ? std::optional(shift) : std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] std::vector<Eigen::VectorXd> DirectionsAway(const Obstacle& obstacle, int step) const {
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return {obstacle.points()[0].normalized()};
+    const Projection& projection = certifier_.projection();
+    const int p = projection.dim();
+    Zonotope place;
+    projection.Enclose(tube_.slice(step), tube_.half_width(step), place);
+    std::vector<Eigen::VectorXd> directions;
+    const Eigen::VectorXd outward = (obstacle.lower() + obstacle.upper()).head(p) / 2 - place.CenterVector();
+    if (outward.norm() > 0) directions.push_back(outward.normalized());
+    for (int k = 0; k < p; ++k)
+      for (const double sign : {-1.0, 1.0}) directions.push_back(sign * Eigen::VectorXd::Unit(p, k));
+    return directions;
+  }
+
+  const Certifier& certifier_;
+  const Plan& plan_;
+  Tube& tube_;
+  const SearchEffort& effort_;
+  bool goes_on_ = true;
+};
+
+}  // namespace
+
+std::optional<std::vector<GivingWay>> FindWayClear(const Certifier& certifier, const Plan& plan,
+                                                   std::span<const Obstacle> obstacles, Tube& tube,
+                                                   const SearchEffort& effort) {
+  WayClearSearch search(certifier, plan, tube, effort);
+  std::vector<GivingWay> ways;
+  for (std::size_t o = 0; o < obstacles.size(); ++o) {
+    if (!search.GoesOn()) return std::nullopt;
+    const std::optional<Decision> touch = search.Touch(obstacles[o]);
+    if (!touch) continue;
+    std::optional<Eigen::VectorXd> shift = search.LeastShift(obstacles[o], *touch);
+    if (!shift) return std::nullopt;
+    ways.push_back({static_cast<int>(o), touch->step, std::move(*shift)});
+  }
+  return ways;
+}
+
+Obstacle Shifted(const Obstacle& obstacle, const Eigen::VectorXd& by) {
+  const auto make = [&]() -> Obstacle {
+    const auto& points = obstacle.points();
+    switch (obstacle.kind()) {
+      case Obstacle::Kind::kCircle: return Obstacle::Circle(points[0] + by, obstacle.radius());
+      case Obstacle::Kind::kBox: return Obstacle::AxisBox(points[0] + by, points[1] + by);
+      case Obstacle::Kind::kPolygon: {
+        std::vector<Eigen::VectorXd> vertices;
+        for (const Eigen::VectorXd& vertex : points) vertices.push_back(vertex + by);
+        return Obstacle::Polygon(vertices);
+      }
+      case Obstacle::Kind::kHalfSpace: break;
+    }
+    return Obstacle::HalfSpace(points[0], obstacle.offset() + points[0].dot(by));
+  };
+  return obstacle.motion() ? make().Moving(*obstacle.motion()) : make();
+}
+
+std::vector<Obstacle> Shifted(std::span<const Obstacle> obstacles, const std::vector<GivingWay>& ways) {
+  std::vector<Obstacle> shifted(obstacles.begin(), obstacles.end());
+  for (const GivingWay& way : ways) shifted[ToSize(way.obstacle)] = Shifted(shifted[ToSize(way.obstacle)], way.shift);
+  return shifted;
+}
+
+}  // namespace forereach

@@ -1,0 +1,45 @@
+/** A nominal model whose step is an integrator's, with stages x_s between the state x and its successor:
+
+    midpoint:  k_1 = f(x, u),  x+ = x + dt f(x + dt/2 k_1, u);
+    rk4:       k_2 = f(x + dt/2 k_1, u),  k_3 = f(x + dt/2 k_2, u),  k_4 = f(x + dt k_3, u),
+               x+ = x + dt/6 (k_1 + 2 k_2 + 2 k_3 + k_4).
+
+The successor as one program would have the derivatives of each stage written out in those of the stages before. Here
+they are numbers instead. With F and F_j the first and second derivatives of f at a stage's argument x_s,
+
+    D k = F D x_s,    D^2 k_j = sum_l F_jl D^2 x_s,l + (D x_s)^T F_j (D x_s),
+
+by intervals: at a point for value and Jacobian, over a box for the Hessians. docs/soundness.md, 3.2. */
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "forereach/dynamics/interpreted_model.h"
+
+namespace forereach {
+
+class StagedModel final : public InterpretedModel {
+ public:
+  /** @param rates the program of f, with its derivatives. @param dt the step, s. The integrator is that of
+  `names.text`, which has to be midpoint or rk4; otherwise std::invalid_argument. */
+  StagedModel(std::shared_ptr<const ProgramDraft> rates, double dt, std::vector<Interval> parameters, ModelNames names);
+
+  void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept override;
+  void Linearize(std::span<const double> z, Linearization& out) const noexcept override;
+  void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept override;
+  /** Infinite: a step uses the enclosures above. */
+  [[nodiscard]] ExpansionError BoundError(std::span<const Interval> domain) const override;
+  /** No number. */
+  void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out,
+              InstructionSet instructions = BestInstructionSet()) const noexcept override;
+
+  class Stages;
+
+ private:
+  StagedModel(std::shared_ptr<const Stages> stages, std::vector<Interval> parameters, ModelNames names);
+
+  std::shared_ptr<const Stages> stages_;
+};
+
+}  // namespace forereach

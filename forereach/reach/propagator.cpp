@@ -1,0 +1,233 @@
+#include "forereach/reach/propagator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "forereach/numerics/size.h"
+#include "forereach/residual/lipschitz_row.h"
+
+namespace forereach {
+namespace {
+
+// Above the rounding of the few dozen operations that make up a slack.
+constexpr double kRelative = 0x1p-43, kSmallest = 0x1p-1050;
+
+// The plain expansion is used where its error, in the units of the state, is negligible everywhere in the domain.
+constexpr double kLargestError = 1e-6;
+
+bool IsNegligible(const StepError& error) {
+  const auto all_small = [](const auto& errors) {
+    return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; });
+  };
+  return all_small(error.value) && all_small(error.image) && all_small(error.remainder);
+}
+
+}  // namespace
+
+Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
+                       const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
+                       InstructionSet instructions)
+    : model_(model),
+      domain_(domain),
+      residual_(residual),
+      order_(zonotope_order),
+      method_(method),
+      instructions_(instructions) {
+  std::ranges::copy(disturbance, disturbance_.begin());
+  const std::vector<Interval> box = domain.Ranges();
+  // The hull of every slice that passes the domain check has at most half the domain's width.
+  std::vector<double> half_width(box.size(), 0.0);
+  for (std::size_t l = 0; l < ToSize(domain.state.dim()); ++l) half_width[l] = box[l].HalfWidthUpper();
+  error_ = BoundStepError(model.program(), model.BoundError(box), half_width);
+  plain_ = IsNegligible(error_);
+}
+
+void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept {
+  const double inflation = 1 + 2.0 * (slice.num_generators() + 4) * kUnitRoundoff;
+  for (int k = 0; k < slice.dim(); ++k) {
+    const std::span<const double> row = slice.padded_row(k);
+    Lanes sum = AllLanes(0);
+    for (std::size_t j = 0; j < row.size(); j += kLaneCount) sum += Abs(LoadLanes(&row[j]));
+    half_width[k] = (Sum(sum) + slice.slack(k)) * inflation;
+  }
+}
+
+void Propagator::ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull,
+                                   Expansion& expansion, ExpansionError& error) const noexcept {
+  Linearization nominal;
+  model_.Linearize(center, nominal);
+  for (std::size_t k = 0; k < ToSize(model_.num_states()); ++k) {
+    expansion.value[k] = nominal.value[k].Middle();
+    error.value[k] = nominal.value[k].DistanceUpper(expansion.value[k]);
+  }
+  for (std::size_t e = 0; e < ToSize(nominal.count); ++e) {
+    expansion.jacobian[e] = nominal.entries[e].value.Middle();
+    error.jacobian[e] = nominal.entries[e].value.DistanceUpper(expansion.jacobian[e]);
+    error.jacobian_size[e] = std::abs(expansion.jacobian[e]);
+  }
+  HessianEnclosure hessian;
+  std::array<Interval, kMaxVariables> box;
+  for (std::size_t l = 0; l < hull.size(); ++l) box[l] = Interval(NextDown(hull[l].lower), NextUp(hull[l].upper));
+  model_.EncloseHessian({box.data(), hull.size()}, hessian);
+  for (std::size_t e = 0; e < ToSize(hessian.count); ++e) {
+    const Interval& range = hessian.entries[e].second_derivative;
+    expansion.hessian[e] = {range.lower, range.upper};
+    error.hessian[e] = 0;
+  }
+}
+
+namespace {
+
+// A center and the hull around it.
+struct Surroundings {
+  std::array<double, kMaxVariables> center;
+  std::array<PlainInterval, kMaxVariables> hull;
+
+  FOREREACH_INLINE Surroundings(const Zonotope& slice, const double* half_width, std::span<const double> input) {
+    const auto n = ToSize(slice.dim());
+    for (std::size_t k = 0; k < n; k += kLaneCount) {
+      const Lanes c = LoadLanes(slice.centers() + k), r = LoadLanes(half_width + k), lower = c - r, upper = c + r;
+      StoreLanes(c, &center[k]);
+      StoreLanes(__builtin_shufflevector(lower, upper, 0, 4, 1, 5), &hull[k].lower);
+      StoreLanes(__builtin_shufflevector(lower, upper, 2, 6, 3, 7), &hull[k + 2].lower);
+    }
+    for (std::size_t l = 0; l < input.size(); ++l) {
+      center[n + l] = input[l];
+      hull[n + l] = {input[l], input[l]};
+    }
+  }
+};
+
+// Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
+// no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
+// @param box_half_width is set to half the residual's width plus the disturbance: one axis for both.
+FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, const StepRecord& record,
+                           const ImageSums& sums, const double* disturbance, Zonotope& next, double* box_half_width,
+                           double* next_half_width) noexcept {
+  const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
+  return HoldsForFirst(
+      ToSize(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
+        const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
+        const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
+        const Lanes disturbed = LoadLanes(disturbance + k);
+        const Lanes half = (upper - lower) * AllLanes(0.5) + disturbed;
+        const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
+        const Lanes added = Abs(lower) + Abs(upper) + Abs(moved) + disturbed;
+        const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kSmallest);
+        Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
+                       (added > AllLanes(0) ? rounding : AllLanes(0))) *
+                      AllLanes(1 + kRelative);
+        if constexpr (!kCountsRounding) slack = AllLanes(0);
+        const Lanes hull =
+            (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
+        StoreLanes(half, box_half_width + k);
+        StoreLanes(center, next.mutable_centers() + k);
+        StoreLanes(slack, next.mutable_slacks() + k);
+        StoreLanes(hull, next_half_width + k);
+        return (Abs(center) + hull < AllLanes(kInfinity)) & (lower <= upper);
+      });
+}
+
+// Adds slope * (x - c), x in the slice, to an image whose center is left alone: A G to the generators, and to the slack
+// |A| s and what rounding took, a sum of n products and one number in each entry.
+[[gnu::noinline]] void AddSlope(const ResidualBounds& bounds, const Zonotope& slice, Zonotope& next,
+                                ImageSums& sums) noexcept {
+  const int n = slice.dim();
+  for (int k = 0; k < n; ++k) {
+    const auto& slope = bounds.slope[ToSize(k)];
+    double* row = next.mutable_row(k);
+    double magnitude = 0, slack = next.slack(k), spread = 0;
+    for (int j = 0; j < slice.num_generators(); ++j) {
+      magnitude = AddUp(magnitude, std::abs(row[j]));
+      for (int l = 0; l < n; ++l) {
+        const double part = slope[ToSize(l)] * slice.generator(l, j);
+        magnitude = AddUp(magnitude, NextUp(std::abs(part)));
+        row[j] += part;
+      }
+      spread += std::abs(row[j]);
+    }
+    for (int l = 0; l < n; ++l) slack = AddUp(slack, MulUp(std::abs(slope[ToSize(l)]), slice.slack(l)));
+    next.mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
+    sums.row[ToSize(k)] = spread;
+  }
+  ScoreColumns(next, sums.scores);
+}
+
+// Why the successor could not be joined.
+[[gnu::noinline]] StepResult Failed(const StepRecord& record, const Zonotope& next,
+                                    const double* next_half_width) noexcept {
+  using Status = StepResult::Status;
+  for (int k = 0; k < next.dim(); ++k) {
+    const auto i = ToSize(k);
+    if (record.envelope.lower[i] > record.envelope.upper[i]) return {Status::kInconsistent, {}, k};
+    if (!(std::abs(next.center(k)) + next_half_width[i] < kInfinity)) return {Status::kNoFiniteEnclosure, {}, k};
+  }
+  return {Status::kNoFiniteEnclosure, {}, 0};
+}
+
+// The remainder that is not finite.
+[[gnu::noinline]] StepResult Failed(const Remainder& remainder) noexcept {
+  const auto* infinite = std::ranges::find_if_not(remainder.half_width, [](double x) { return std::isfinite(x); });
+  return {StepResult::Status::kNoFiniteEnclosure, {}, static_cast<int>(infinite - remainder.half_width.begin())};
+}
+
+}  // namespace
+
+StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
+                            double* next_half_width) const noexcept {
+  return Dispatch<&Propagator::StepInline>(instructions_, *this, slice, input, record, next, next_half_width);
+}
+
+StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                  Zonotope& next, double* next_half_width) const noexcept {
+  const double* half_width = record.half_width.data();
+  if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input);
+      exit.kind != DomainExit::Kind::kNone)
+    return {StepResult::Status::kDomainExit, exit, -1};
+  const Surroundings around(slice, half_width, input);
+  const std::size_t variables = ToSize(slice.dim()) + input.size();
+  const std::span<const double> center(around.center.data(), variables);
+  const std::span<const PlainInterval> hull(around.hull.data(), variables);
+  if (!plain_) return StepByIntervals(slice, input, center, hull, record, next, next_half_width);
+  Expansion expansion;
+  model_.Expand(center, hull, expansion, instructions_);
+  return Advance(slice, input, expansion, error_, record, next, next_half_width);
+}
+
+StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                       std::span<const double> center, std::span<const PlainInterval> hull,
+                                       StepRecord& record, Zonotope& next, double* next_half_width) const noexcept {
+  Expansion expansion;
+  ExpansionError error;
+  ExpandByIntervals(center, hull, expansion, error);
+  std::array<double, kMaxVariables> half_width{};
+  std::copy_n(record.half_width.begin(), slice.dim(), half_width.begin());
+  return Advance(slice, input, expansion, BoundStepError(model_.program(), error, half_width), record, next,
+                 next_half_width);
+}
+
+StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
+                               const StepError& error, StepRecord& record, Zonotope& next,
+                               double* next_half_width) const noexcept {
+  const auto n = ToSize(slice.dim());
+  const double* half_width = record.half_width.data();
+  model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(),
+                          record.remainder, instructions_);
+  const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
+    return Abs(LoadLanes(&record.remainder.half_width[k])) < AllLanes(kInfinity);
+  };
+  if (!HoldsForFirst(n, is_finite)) return Failed(record.remainder);
+
+  record.envelope.has_slope = false;
+  residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
+  ImageSums sums;
+  model_.Map(expansion, error, slice, next, sums, instructions_);
+  if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
+  std::array<double, kMaxStates> box_half_width;
+  if (!Join(expansion, error, record, sums, disturbance_.data(), next, box_half_width.data(), next_half_width))
+    return Failed(record, next, next_half_width);
+  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), box_half_width.data(), order_, instructions_);
+  return {};
+}
+
+}  // namespace forereach

@@ -1,0 +1,92 @@
+/** One step of the reachable tube, Eq. (propagation) and Eq. (order-reduction):
+
+    X_{t+1} = red < f0(c) + rho + mu, [(J + A) G, diag(q), diag(h + w^)] > + [-s', s'],
+
+with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder over Box(Z_t), and mu, h and A the
+middle, half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope).
+w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
+defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
+f0(c), J and (J + A) G. */
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "forereach/dynamics/expansion.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/dynamics/rounding.h"
+#include "forereach/numerics/instruction_set.h"
+#include "forereach/reach/domain.h"
+#include "forereach/residual/enclosure.h"
+#include "forereach/sets/zonotope.h"
+
+namespace forereach {
+
+/** Intermediate results of one step. */
+struct StepRecord {
+  std::array<double, kMaxStates> half_width;  ///< r: upper bounds on the half-widths of Box(X_t), n entries in use.
+  ResidualBounds envelope;                    ///< The residual's lower and upper bounds over Z_t.
+  Remainder remainder;                        ///< rho and q.
+};
+
+struct StepResult {
+  enum class Status {
+    kDone,
+    kDomainExit,         ///< Box(Z_t) is not proven to lie in Z_cert; `exit` names the constraint.
+    kNoFiniteEnclosure,  ///< Coordinate `coordinate` of the nominal map or of the residual has no finite bound.
+    kInconsistent        ///< No admissible residual exists over Z_t: lower > upper in coordinate `coordinate`.
+  };
+  Status status = Status::kDone;
+  DomainExit exit{};
+  int coordinate = -1;
+};
+
+/** Computes single steps. It is immutable, so any number of threads may use it at once. */
+class Propagator final {
+ public:
+  /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
+  slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
+  @param disturbance w^, n entries or none. @param instructions changes the computing time only. */
+  Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
+             const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
+             InstructionSet instructions = BestInstructionSet());
+
+  /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
+  is unspecified. It allocates nothing.
+  @param record the caller sets half_width (see HalfWidths); the step sets the other members.
+  @param next_half_width n entries: set to the half-widths of `next`, for the following step.
+  @pre order * n + 2 n <= kMaxGenerators, and `slice` has at most order * n generators.
+  Cost O(n m) for m generators, plus the residual enclosure and the reduction. */
+  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                Zonotope& next, double* next_half_width) const noexcept;
+
+  /** Writes n upper bounds on the half-widths of Box(slice). */
+  static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
+
+ private:
+  void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
+                         ExpansionError& error) const noexcept;
+  [[nodiscard, gnu::noinline]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                                          std::span<const double> center,
+                                                          std::span<const PlainInterval> hull, StepRecord& record,
+                                                          Zonotope& next, double* next_half_width) const noexcept;
+  // The step without model, envelope and reduction.
+  [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
+                                                       StepRecord& record, Zonotope& next,
+                                                       double* next_half_width) const noexcept;
+  [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input,
+                                                    const Expansion& expansion, const StepError& error,
+                                                    StepRecord& record, Zonotope& next,
+                                                    double* next_half_width) const noexcept;
+  const NominalModel& model_;
+  DomainTest domain_;
+  const ResidualEnclosure& residual_;
+  std::array<double, kMaxStates> disturbance_{};
+  int order_;
+  Method method_;
+  InstructionSet instructions_;
+  StepError error_;
+  bool plain_;
+};
+
+}  // namespace forereach

@@ -1,0 +1,43 @@
+#include "forereach/residual/declaration.h"
+
+#include <stdexcept>
+#include <string>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+void RequireBound(const std::string& name, double value) {
+  if (!(value >= 0 && value < kInfinity))
+    throw std::invalid_argument(name + ": " + ToText(value) + " must be finite and not negative");
+}
+
+}  // namespace
+
+double Declaration::ObservationError(Eigen::Index k) const { return AddUp(noise_bound[k], DisturbanceBound(k)); }
+
+void Declaration::Validate(int num_states, int num_variables) const {
+  if (lipschitz.rows() != num_states || lipschitz.cols() != num_variables || noise_bound.size() != num_states)
+    throw std::invalid_argument("declaration: lipschitz is " + std::to_string(lipschitz.rows()) + "-by-" +
+                                std::to_string(lipschitz.cols()) + " with " + std::to_string(noise_bound.size()) +
+                                " noise bounds, must be " + std::to_string(num_states) + "-by-" +
+                                std::to_string(num_variables) + " with " + std::to_string(num_states));
+  for (Eigen::Index k = 0; k < lipschitz.rows(); ++k) {
+    RequireBound("noise_bound " + std::to_string(k), noise_bound[k]);
+    for (Eigen::Index l = 0; l < lipschitz.cols(); ++l)
+      RequireBound("lipschitz " + std::to_string(k) + ", " + std::to_string(l), lipschitz(k, l));
+  }
+  ValidateDisturbance(num_states);
+}
+
+void Declaration::ValidateDisturbance(int num_states) const {
+  if (disturbance.size() != 0 && disturbance.size() != num_states)
+    throw std::invalid_argument("declaration: disturbance has " + std::to_string(disturbance.size()) +
+                                " entries, must have " + std::to_string(num_states) + " or none");
+  for (Eigen::Index k = 0; k < disturbance.size(); ++k)
+    RequireBound("disturbance " + std::to_string(k), disturbance[k]);
+}
+
+}  // namespace forereach

@@ -1,0 +1,33 @@
+/** The declared bounds on the true system x+ = f0(z) + r(z) + w, z = (x, u): Assumption 1, |r_k(z) - r_k(z')| <= sum_l
+L_kl |z_l - z'_l| for all z, z' in Z_cert, Eq. (regularity); the bound sigma on the observation error, Eq. (data); and a
+bound on the disturbance w, which the paper does not have (docs/soundness.md, 1). */
+#pragma once
+
+#include "forereach/sets/eigen.h"
+
+namespace forereach {
+
+struct Declaration {
+  Eigen::MatrixXd
+      lipschitz;  ///< L, n-by-d_z, not negative; unit of state k per unit of z_l. A zero row: r_k is constant.
+  Eigen::VectorXd noise_bound;  ///< sigma, n entries, not negative, in the units of the states.
+  /** w^: |w_k| <= w^_k in every step, by a value of its own in each step that may depend on everything before; n
+  entries, not negative, in the units of the states. No entries: zeros. */
+  Eigen::VectorXd disturbance = {};
+
+  /** Whether some w^_k is not zero. */
+  [[nodiscard]] bool IsDisturbed() const { return (disturbance.array() != 0).any(); }
+  /** w^_k. */
+  [[nodiscard]] double DisturbanceBound(Eigen::Index k) const { return disturbance.size() == 0 ? 0 : disturbance[k]; }
+  /** sigma_k + w^_k rounded up: how far an observed residual may lie from r_k, apart from the successor's last bit. It
+  is sigma_k itself if w^_k is zero. */
+  [[nodiscard]] double ObservationError(Eigen::Index k) const;
+
+  /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ has neither n nor none, or an
+  entry is negative or not finite; the message names the entry. */
+  void Validate(int num_states, int num_variables) const;
+  /** The same for w^ alone. */
+  void ValidateDisturbance(int num_states) const;
+};
+
+}  // namespace forereach

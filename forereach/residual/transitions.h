@@ -1,0 +1,15 @@
+/** The observed one-step transitions D_N = {(z_i, x_i+)}, z = (x, u). */
+#pragma once
+
+#include "forereach/sets/eigen.h"
+
+namespace forereach {
+
+struct Transitions {
+  Eigen::MatrixXd z;       ///< N-by-d_z: one row z_i each, the state and then the input, in the model's units.
+  Eigen::MatrixXd x_next;  ///< N-by-n: the observed successor x_i+ of each row.
+
+  [[nodiscard]] int size() const { return static_cast<int>(z.rows()); }
+};
+
+}  // namespace forereach

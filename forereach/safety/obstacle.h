@@ -1,0 +1,72 @@
+/** Unsafe sets O in the safety coordinates y = P x in R^p, in metres. All are closed and convex.
+
+An unsafe set is a core plus a ball. The core is the convex hull of points, or a half-space:
+    O = core + {y : |y|_2 <= radius}. */
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/safety/motion.h"
+#include "forereach/sets/eigen.h"
+
+namespace forereach {
+
+class Obstacle final {
+ public:
+  enum class Kind { kCircle = 1, kBox = 2, kPolygon = 3, kHalfSpace = 4 };  // as in lcmtypes/obstacle_t.lcm
+
+  /** @name Factories. Each throws std::invalid_argument with value and bound if a size is wrong, an entry is not
+  finite, the radius is negative, or lower > upper. */
+  ///@{
+  /** {y : |y - center|_2 <= radius}, p = 2. */
+  [[nodiscard]] static Obstacle Circle(const Eigen::VectorXd& center, double radius);
+  /** {y : lower <= y <= upper}, p = 1, 2 or 3. */
+  [[nodiscard]] static Obstacle AxisBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
+  /** The convex hull of 3 to 16 points in any order, p = 2. */
+  [[nodiscard]] static Obstacle Polygon(const std::vector<Eigen::VectorXd>& vertices);
+  /** {y : normal . y >= offset}, p = 1, 2 or 3. The normal points into the unsafe side and is not zero. */
+  [[nodiscard]] static Obstacle HalfSpace(const Eigen::VectorXd& normal, double offset);
+  /** This obstacle, moving: the points and the radius are those at the motion's stamp. A number that is not finite, a
+  negative growth or an empty window throws, too. */
+  [[nodiscard]] Obstacle Moving(const ObstacleMotion& motion) const;
+  ///@}
+
+  [[nodiscard]] Kind kind() const { return kind_; }
+  [[nodiscard]] int dim() const { return dim_; }
+  /** Nothing if the obstacle stands. */
+  [[nodiscard]] const std::optional<ObstacleMotion>& motion() const { return motion_; }
+  [[nodiscard]] double radius() const { return radius_; }
+  [[nodiscard]] double offset() const { return offset_; }
+  /** The defining vectors: a circle's center, a box's lower and upper corner, a polygon's vertices in the given order,
+  or a half-space's normal. */
+  [[nodiscard]] const std::vector<Eigen::VectorXd>& points() const { return points_; }
+  /** The points whose convex hull is the core; for a box its 2^p corners. Empty for a half-space. */
+  [[nodiscard]] const std::vector<Eigen::Vector3d>& hull() const { return hull_; }
+  /** @name The bounding box of the core. For a half-space it is all of R^p. Unused coordinates are zero. */
+  ///@{
+  [[nodiscard]] const Eigen::Vector3d& lower() const { return lower_; }
+  [[nodiscard]] const Eigen::Vector3d& upper() const { return upper_; }
+  ///@}
+
+ private:
+  Obstacle(Kind kind, int dim) : kind_(kind), dim_(dim) {}
+  void SetHull(std::vector<Eigen::Vector3d> hull);
+
+  Kind kind_;
+  int dim_;
+  double radius_ = 0, offset_ = 0;
+  std::vector<Eigen::VectorXd> points_;
+  std::optional<ObstacleMotion> motion_;
+  std::vector<Eigen::Vector3d> hull_;
+  Eigen::Vector3d lower_ = Eigen::Vector3d::Constant(-kInfinity), upper_ = Eigen::Vector3d::Constant(kInfinity);
+};
+
+/** The distance in metres from a point y (p entries) to the obstacle, negative inside, in plain arithmetic. A motion is
+ignored. Use it for planning, simulation and display, not for bounds. */
+[[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y);
+
+}  // namespace forereach

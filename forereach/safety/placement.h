@@ -1,0 +1,137 @@
+/** Where the points of the body are, over a slice.
+
+A place is the image of the slice under a map g: g_q(x) = P x + R(x_heading) q of a point in the robot's frame, or
+expressions of the state (body.h). It is enclosed as a step of a model is, to the second order around the center c of
+the slice, g(x) in g(c) + Dg(c) (x - c) + 1/2 (x - c)^T H (x - c),    H in D^2 g(Box(X)), so it stays correlated with
+the slice: a place is a zonotope with the generators Dg(c) G, not a box around a box. Where expressions have no finite
+H, it is the box of their ranges. */
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "forereach/dynamics/text_enclosure.h"
+#include "forereach/numerics/instruction_set.h"
+#include "forereach/safety/body.h"
+#include "forereach/safety/projection.h"
+#include "forereach/sets/zonotope.h"
+
+namespace forereach {
+
+class Placement final {
+ public:
+  /** @throws std::invalid_argument with the value and its bound unless P is as Projection requires, the heading is a
+  state and p >= 2 or there is none, there are 1 to kMaxBodyParts parts of together 1 to kMaxBodyPoints points, and all
+  numbers are finite, the radii and the bounds between samples not negative, the period positive. P may be zero only if
+  every part stands at expressions; each of these has p, of `names` but the inputs. @throws ExpressionError
+  (expression.h) if one is wrong. @param names only read if there are expressions. */
+  Placement(const Eigen::MatrixXd& projection, const Body& body, const std::optional<Between>& between, int num_states,
+            const ExpressionNames& names = {});
+
+  /** The points of a part are points[first .. first + count). */
+  struct Part {
+    int first, count;
+    double radius;  ///< metres
+  };
+
+  [[nodiscard]] const Projection& projection() const { return projection_; }
+  [[nodiscard]] int dim() const { return projection_.dim(); }
+  [[nodiscard]] std::span<const Part> parts() const { return parts_; }
+  [[nodiscard]] int num_points() const { return static_cast<int>(points_.size()); }
+  /** True if a certificate holds between the samples, too. */
+  [[nodiscard]] bool sweeps() const { return sweeps_; }
+
+  /** True if all points of the body are P x: it is a point or a ball around it. */
+  [[nodiscard]] bool is_at_frame() const { return is_at_frame_; }
+
+  /** An upper bound on the distance of any point of the body from P x or, of a part at expressions, from the places of
+  its points, and of the deviation of its path: metres. */
+  [[nodiscard]] double reach() const { return reach_; }
+  /** Whether some point stands at expressions. */
+  [[nodiscard]] bool has_expressions() const { return expressions_.has_value(); }
+  /** The largest deviation of point i from its chord because the body turns: |q| (w^2 + alpha) period^2 / 8, metres. */
+  [[nodiscard]] double turn(int i) const { return points_[ToSize(i)].turn; }
+
+  /** Sets `hull` to one that contains Box(P X) + [-e, e]. @param half_width n upper bounds on the half-widths of
+  Box(X). Cost O(nonzeros of P). @pre no point stands at expressions. */
+  void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
+
+  /** The linear map and what is left over of every g_i over one slice: what all bounds on places are made of. */
+  struct Sample {
+    struct Point {
+      // g_i(x) - P x, as offset + slope (x_heading - c_heading) +- spread. At expressions: g_i(x), as offset + slope of
+      // `linear` . (x - c) +- spread, and `slope` is zero
+      std::array<double, kMaxSafetyDim> offset, spread, slope;
+      double size;  // of what these are computed from
+    };
+
+    const Zonotope* slice;
+    std::span<const double> half_width;
+    std::array<double, kMaxSafetyDim> center, slack, size;  // of P X
+    std::array<Point, kMaxBodyPoints> points;
+    std::array<AffineEnclosure, ToSize(kMaxBodyPoints* kMaxSafetyDim)> linear;  // p for each point at expressions
+  };
+
+  /** About where point i is in the middle of the slice, coordinate k. */
+  [[nodiscard]] double middle(const Sample& sample, int i, std::size_t k) const {
+    const double offset = sample.points[ToSize(i)].offset[k];
+    return points_[ToSize(i)].linear < 0 ? sample.center[k] + offset : offset;
+  }
+
+  /** Sets `hull` to one that contains the places of all points and, if some are in the frame, Box(P X), all of it
+  widened by [-e, e]. Cost O(n) for each point at expressions. */
+  void EncloseHull(const Sample& sample, Hull& hull) const noexcept;
+
+  /** The sample of a slice, which has to stay as it is while the sample is in use. @param half_width as above. Cost
+  O(nonzeros of P) and O(1) for each point, a sine and a cosine if the body turns, and O(operations) of expressions. */
+  void Observe(const Zonotope& slice, std::span<const double> half_width, Sample& sample) const noexcept;
+
+  /** An upper bound on max {d . y : y in g_i(X) + [-e, e] + turn(i) ball, i a point of the part}: the support of what
+  Enclose gives, without making it. Infinite or NaN if there is no bound. @param d finite, its unused entries are 0.
+  @param instructions changes the computing time only, here and below. Cost O(m) for m generators for each point. */
+  [[nodiscard]] double SupportUpper(const Sample& sample, const Part& part, const Eigen::Vector3d& d,
+                                    InstructionSet instructions = BestInstructionSet()) const noexcept;
+
+  /** Sets places[i] to a zonotope that contains g_i(X) + [-e, e] for each point i. @param places num_points() sets.
+  Cost O(m) for m generators for each point. @pre X has at most
+  kMaxGenerators - p generators. */
+  void Enclose(const Sample& sample, Zonotope* places,
+               InstructionSet instructions = BestInstructionSet()) const noexcept;
+
+ private:
+  struct Point {
+    Eigen::Vector3d place;  // in the robot's frame
+    double length;          // |q| in the plane in which the body turns, from above
+    double turn;
+    double size;      // of these and the bulge
+    int linear = -1;  // at expressions: their place in Sample::linear
+  };
+
+  struct Rotation;
+
+  void OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept;
+  void OverSlice(Sample& sample, std::size_t i) const noexcept;
+  FOREREACH_INLINE double SupportInline(const Sample& sample, const Part& part,
+                                        const Eigen::Vector3d& d) const noexcept;
+  FOREREACH_INLINE void EncloseInline(const Sample& sample, Zonotope* places) const noexcept;
+  // Of a point that stands at expressions.
+  FOREREACH_INLINE double SupportAtExpressions(const Sample& sample, int i, const Eigen::Vector3d& d) const noexcept;
+  FOREREACH_INLINE void EncloseAtExpressions(const Sample& sample, std::size_t i, Zonotope& place) const noexcept;
+  [[nodiscard]] double Slack(const Sample& sample, std::size_t i, std::size_t k) const noexcept;
+
+  Projection projection_;
+  std::array<std::vector<MatrixEntry>, kMaxSafetyDim> rows_;  // of P
+  int heading_;
+  bool sweeps_, is_at_frame_ = true;
+  double reach_ = 0;
+  std::array<double, kMaxSafetyDim> bulge_{};  // e
+  std::vector<Part> parts_;
+  std::vector<Point> points_;
+  std::optional<TextEnclosure> expressions_;
+  int num_inputs_ = 0;      // that expressions could name
+  bool has_frame_ = false;  // some point is in the frame
+};
+
+}  // namespace forereach

@@ -1,0 +1,189 @@
+#include "identify/declare_between.h"
+
+#include <algorithm>
+#include <chrono>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "forereach/declare/motion_bound.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/safety/clearance.h"
+#include "task/config.h"
+#include "task/json_text.h"
+#include "task/step_time.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kMotionDigits = 6;
+
+// Neither the equations nor a second difference say how a disturbance acts between two samples.
+constexpr const char* kDisturbed =
+    "\ndeclaration.disturbance is a bound at the samples. What disturbs the robot accelerates it, too:\n"
+    "add the largest acceleration that the disturbance causes between two samples.";
+
+// One number of task.between.
+struct MotionRow {
+  std::string key, name, unit;
+  MotionBound bound;
+};
+
+struct MotionProposal {
+  std::vector<MotionRow> rows;
+  std::string source, remark;
+  double seconds = 0;
+};
+
+// The map to the robot's frame; zero if no part of the body stands there, so that nothing has to be said of it.
+Eigen::MatrixXd FrameOf(const Problem& problem) {
+  return HasFrame(problem.body) ? problem.projection
+                                : Eigen::MatrixXd::Zero(problem.projection.rows(), problem.projection.cols());
+}
+
+std::vector<MotionRow> RowsOf(const Config& config, const std::vector<MotionBound>& acceleration,
+                              const MotionBound& turn_rate, const MotionBound& turn_acceleration) {
+  const Problem& problem = *config.problem;
+  const std::vector<std::string>& states = problem.model->state_names();
+  const Eigen::MatrixXd frame = FrameOf(problem);
+  std::vector<MotionRow> rows;
+  for (std::size_t i = 0; i < acceleration.size(); ++i) {
+    std::string name;
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      const double weight = frame(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+      if (weight != 0) name += (name.empty() ? "" : " + ") + (weight == 1 ? "" : ToText(weight) + " ") + states[k];
+    }
+    if (!name.empty()) name += "''";
+    if (problem.body.HasPlaces()) name += (name.empty() ? "" : ", ") + ("places''[" + std::to_string(i) + "]");
+    rows.push_back({"acceleration", name, "m/s^2", acceleration[i]});
+  }
+  if (problem.body.heading < 0) return rows;
+  const std::string& heading = states[ToSize(problem.body.heading)];
+  rows.push_back({"turn_rate", heading + "'", "rad/s", turn_rate});
+  rows.push_back({"turn_acceleration", heading + "''", "rad/s^2", turn_acceleration});
+  return rows;
+}
+
+MotionProposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
+  const Problem& problem = *config.problem;
+  const std::vector<ExpressionText> places = problem.body.Coordinates();
+  const auto flow = MakeFlow(*problem.model, places);
+  if (!flow)
+    throw ConfigError(config.path + ": model: the equations of " + problem.model->name() +
+                      " in continuous time are not known; use --from positions");
+  Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
+  for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
+  const Eigen::MatrixXd frame = FrameOf(problem);
+  const auto begin = std::chrono::steady_clock::now();
+  const MotionBounds bounds =
+      BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading, rest}, search);
+  MotionProposal proposal;
+  proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
+  proposal.source = "equations";
+  proposal.remark = "Proven for the equations of " + problem.model->name() +
+                    ", for each motion with constant controls between two\nsamples that are in the domain" +
+                    (problem.rest.empty() ? ", and for the last step of a plan, which may leave the domain.\n"
+                                          : ", and for the last step of a plan, which ends at rest.\n") +
+                    "The residual is not included: it is a difference at the samples, and bounds no curvature between "
+                    "them. Add what\n"
+                    "the true robot does beyond the equations.";
+  return proposal;
+}
+
+MotionProposal FromPositions(const Config& config) {
+  const Problem& problem = *config.problem;
+  const MeasuredMotion measured =
+      MeasureMotion(*problem.model, problem.transitions, FrameOf(problem), problem.body, config.period);
+  if (measured.triples == 0)
+    throw ConfigError(
+        config.path +
+        ": transitions: none begins with the state in which the one before it ends, so there is no second "
+        "difference; use transitions that were recorded one after another");
+  const auto found = [](double value) { return MotionBound{value, value, 0, true}; };
+  std::vector<MotionBound> acceleration;
+  for (const double value : measured.acceleration) acceleration.push_back(found(value));
+  MotionProposal proposal;
+  proposal.rows = RowsOf(config, acceleration, found(measured.turn_rate), found(measured.turn_acceleration));
+  proposal.source = "positions";
+  proposal.remark = "Largest second differences in " + std::to_string(measured.triples) +
+                    " triples of logged samples. This proves nothing: the true motion curves at\n"
+                    "least as much. Errors of the measurement are included. Add a margin, and what was not driven.";
+  return proposal;
+}
+
+std::string Yaml(const std::vector<MotionRow>& rows) {
+  std::string acceleration, others;
+  for (const MotionRow& row : rows) {
+    const std::string value = RoundedUp(row.bound.upper, kMotionDigits);
+    if (row.key == "acceleration")
+      acceleration += (acceleration.empty() ? "" : ", ") + value;
+    else
+      others += ", " + row.key + ": " + value;
+  }
+  return "between: {acceleration: [" + acceleration + "]" + others + "}";
+}
+
+bool AllReached(const std::vector<MotionRow>& rows) {
+  return std::ranges::all_of(rows, [](const MotionRow& row) { return row.bound.reached; });
+}
+
+Json ToJson(const MotionProposal& proposal, const Config& config) {
+  Json document{{"source", proposal.source},
+                {"proven", proposal.source == "equations"},
+                {"reached", AllReached(proposal.rows)},
+                {"yaml", Yaml(proposal.rows)},
+                {"seconds", proposal.seconds},
+                {"entries", Json::array()},
+                {"digests", {{"config", ToHex(config.grounds.config)}, {"model", ToHex(config.grounds.model)}}}};
+  for (const MotionRow& row : proposal.rows)
+    document["entries"].push_back({{"key", row.key},
+                                   {"name", row.name},
+                                   {"unit", row.unit},
+                                   {"upper", row.bound.upper},
+                                   {"lower", row.bound.lower},
+                                   {"boxes", row.bound.boxes},
+                                   {"reached", row.bound.reached}});
+  return document;
+}
+
+void PrintForPeople(const MotionProposal& proposal, const Config& config) {
+  const bool proven = proposal.source == "equations";
+  std::ostringstream text;
+  text << std::left << "declare: motion between two samples, at most "
+       << RoundedUp(LongestPeriod(config), kMotionDigits) << " s apart, from the "
+       << (proven ? "equations of " + config.problem->model->name() : "logged positions")
+       << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
+  for (const MotionRow& row : proposal.rows) {
+    text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)
+         << (proven ? RoundedUp(row.bound.upper, kMotionDigits) : RoundedDown(row.bound.lower, kMotionDigits))
+         << std::setw(8) << row.unit;
+    if (proven)
+      text << "  largest found " << RoundedDown(row.bound.lower, kMotionDigits) << ", " << row.bound.boxes << " boxes";
+    text << "\n";
+  }
+  std::cout << text.str() << proposal.remark << (config.problem->declaration.IsDisturbed() ? kDisturbed : "")
+            << "\n\ntask:\n  " << Yaml(proposal.rows) << std::endl;
+}
+
+}  // namespace
+
+int DeclareBetween(const BetweenCommand& command) {
+  const Config config =
+      LoadConfig(command.config, command.from_positions ? TransitionsFile::kRead : TransitionsFile::kIgnore);
+  const MotionProposal proposal =
+      command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
+  if (command.json)
+    std::cout << JsonText(ToJson(proposal, config)) << std::endl;
+  else
+    PrintForPeople(proposal, config);
+  return AllReached(proposal.rows) ? 0 : 1;
+}
+
+}  // namespace forereach

@@ -1,0 +1,21 @@
+/** `forereach declare --between`. */
+#pragma once
+
+#include <string>
+
+#include "forereach/declare/slope_bound.h"
+
+namespace forereach {
+
+struct BetweenCommand {
+  std::string config;
+  bool from_positions = false;  ///< Otherwise from the model's equations.
+  bool json = false;
+  SlopeBoundOptions search;
+};
+
+/** Prints bounds for the key task.between of a task file, and what they rest on.
+@return the exit status: 1 if the search stopped before its gap. @throws ConfigError, std::runtime_error. */
+[[nodiscard]] int DeclareBetween(const BetweenCommand& command);
+
+}  // namespace forereach

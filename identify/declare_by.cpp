@@ -1,0 +1,84 @@
+#include "identify/declare_by.h"
+
+#include <algorithm>
+#include <numeric>
+#include <sstream>
+
+#include "command_line/nearest.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+int IndexOf(const std::string& name, const std::vector<std::string>& names) {
+  const auto at = std::ranges::find(names, name);
+  if (at == names.end()) throw ConfigError("--by: the model has no '" + name + "'; " + Suggestion(name, names));
+  return static_cast<int>(at - names.begin());
+}
+
+std::string List(const Eigen::VectorXd& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "[" : ", ") + ToText(value);
+  return text + "]";
+}
+
+}  // namespace
+
+std::vector<std::vector<int>> ColumnsBy(const std::vector<std::string>& by, const NominalModel& model) {
+  const std::vector<std::string>& states = model.state_names();
+  const std::vector<std::string> variables = model.variable_names();
+  std::vector<int> all(variables.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<std::vector<int>> columns(states.size(), all);
+  std::vector<bool> said(states.size(), false);
+  for (const std::string& text : by) {
+    const std::size_t at = text.find('=');
+    const bool for_one = at != std::string::npos;
+    std::vector<int> chosen;
+    std::istringstream names(for_one ? text.substr(at + 1) : text);
+    for (std::string name; std::getline(names, name, ',');) chosen.push_back(IndexOf(name, variables));
+    if (for_one) {
+      const auto k = ToSize(IndexOf(text.substr(0, at), states));
+      if (said[k]) throw ConfigError("--by: " + states[k] + " is given twice");
+      said[k] = true;
+      columns[k] = chosen;
+    } else {
+      for (std::size_t k = 0; k < states.size(); ++k)
+        if (!said[k]) columns[k] = chosen;
+    }
+  }
+  return columns;
+}
+
+std::string Explain(const Unexplained& found, const Config& config, const ProposalOptions& options) {
+  const NominalModel& model = *config.problem->model;
+  const std::vector<std::string> variables = model.variable_names();
+  std::string columns;
+  for (const int l : options.columns[ToSize(found.coordinate)])
+    columns += (columns.empty() ? "" : ", ") + variables[ToSize(l)];
+  return "no L is consistent: two transitions " +
+         (columns.empty() ? std::string("of a residual that may depend on nothing") : "agree in " + columns) +
+         ", and their residuals of " + model.state_names()[ToSize(found.coordinate)] + " differ by " +
+         RoundedDown(found.pair.difference, 4) +
+         " more than noise_bound and disturbance allow. Raise their sum by at least half of that (--noise estimated "
+         "proposes a noise_bound), or let the residual depend on more (--by)";
+}
+
+std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {
+  const std::vector<std::string>& states = model.state_names();
+  const std::vector<std::string> variables = model.variable_names();
+  std::string rows;
+  for (Eigen::Index k = 0; k < declaration.lipschitz.rows(); ++k) {
+    std::string row;
+    for (Eigen::Index l = 0; l < declaration.lipschitz.cols(); ++l)
+      if (const double slope = declaration.lipschitz(k, l); slope > 0)
+        row += (row.empty() ? "" : ", ") + variables[ToSize(l)] + ": " + ToText(slope);
+    if (!row.empty()) rows += (rows.empty() ? "" : ", ") + states[ToSize(k)] + ": {" + row + "}";
+  }
+  std::string text = "  lipschitz: {" + rows + "}\n  noise_bound: " + List(declaration.noise_bound) + "\n";
+  if (declaration.IsDisturbed()) text += "  disturbance: " + List(declaration.disturbance) + "\n";
+  return text;
+}
+
+}  // namespace forereach

@@ -1,0 +1,22 @@
+/** What both commands of declare_data.h say about columns and about transitions that nothing explains. */
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "identify/proposal.h"
+#include "task/config.h"
+
+namespace forereach {
+
+/** The columns for each state by the texts of --by. Without any, a state's residual may depend on every variable.
+@throws ConfigError for a name that the model does not have, or a state that is given twice. */
+[[nodiscard]] std::vector<std::vector<int>> ColumnsBy(const std::vector<std::string>& by, const NominalModel& model);
+
+/** Which two lines of the transitions disagree, and what to change. `first_line` of observation 0. */
+[[nodiscard]] std::string Explain(const Unexplained& found, const Config& config, const ProposalOptions& options);
+
+/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", a line each, indented by two. */
+[[nodiscard]] std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model);
+
+}  // namespace forereach

@@ -1,0 +1,222 @@
+#include "identify/declare_data.h"
+
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "command_line/progress.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/observations.h"
+#include "identify/declare_by.h"
+#include "identify/lone_slopes.h"
+#include "task/config.h"
+#include "task/json_text.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kTableDigits = 4;  // of a number in the table
+
+// A line of the transitions' file: its header is line 1.
+int LineOf(int observation) { return observation + 2; }
+
+std::string Listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+// ---- for people
+
+void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+  const std::vector<std::string> names = model.variable_names();
+  out << "  " << std::left << std::setw(12) << "row" << std::setw(12) << "column" << std::setw(12) << "smallest"
+      << std::setw(12) << "at least" << std::setw(12) << "proposed"
+      << "because of\n";
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k)
+    for (std::size_t l = 0; l < names.size(); ++l) {
+      const auto row = static_cast<Eigen::Index>(k), column = static_cast<Eigen::Index>(l);
+      const double proposed = proposal.declaration.lipschitz(row, column);
+      if (!(proposed > 0)) continue;
+      const ProposedRow& found = proposal.rows[k];
+      out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
+          << RoundedUp(found.smallest.slopes[column], kTableDigits) << std::setw(12)
+          << RoundedDown(found.least[column], kTableDigits) << std::setw(12) << ToText(proposed);
+      if (const auto& reason = found.smallest.reasons[l])
+        out << "lines " << LineOf(reason->first) << " and " << LineOf(reason->second);
+      out << "\n";
+    }
+  if (proposal.declaration.lipschitz.maxCoeff() == 0) out << "  no slopes are needed\n";
+}
+
+// Of each row, each column.
+using LoneSlopes = std::vector<std::vector<LoneSlope>>;
+
+void PrintLoneSlopes(const LoneSlopes& rows, const NominalModel& model, std::ostream& out) {
+  const std::vector<std::string> names = model.variable_names();
+  int flat = 0;
+  bool has_slopes = false;
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    for (std::size_t l = 0; l < names.size(); ++l) {
+      const LoneSlope& lone = rows[k][l];
+      if (lone.pairs > 0 && !(lone.slope > 0)) ++flat;
+      if (!(lone.slope > 0)) continue;
+      if (!has_slopes)
+        out << "\n  " << std::left << std::setw(12) << "row" << std::setw(12) << "column" << std::setw(12) << "alone"
+            << std::setw(12) << "pairs"
+            << "the largest in\n";
+      has_slopes = true;
+      out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
+          << RoundedDown(lone.slope, kTableDigits) << std::setw(12) << lone.pairs << "lines " << LineOf(lone.first)
+          << " and " << LineOf(lone.second) << "\n";
+    }
+  if (flat > 0)
+    out << (has_slopes ? "  " : "\n  ") << "In " << flat << (has_slopes ? " further" : "")
+        << (flat == 1 ? " entry" : " entries") << ", pairs that differ in one column alone show no slope.\n";
+}
+
+void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+  out << "\n  " << std::left << std::setw(12) << "row" << std::setw(12) << "noise_bound" << std::setw(12)
+      << "  repeated" << std::setw(12) << "  deviation" << std::setw(12) << "  Strongin"
+      << "  Knuth-Chou\n";
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
+    const ProposedRow& row = proposal.rows[k];
+    const double sigma = proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)];
+    out << "  " << std::setw(12) << model.state_names()[k] << std::setw(12) << ToText(sigma) << "  " << std::setw(10)
+        << RoundedDown(row.noise.repeated, kTableDigits) << "  " << std::setw(10)
+        << RoundedDown(row.noise.deviation, kTableDigits);
+    if (row.strongin > 0)
+      out << "  " << std::setw(10) << "x " + RoundedUp(row.strongin, 3) << "  x " << RoundedUp(row.knuth_chou, 3);
+    out << "\n";
+  }
+}
+
+// Rows whose declared error is below what the data show of it.
+std::vector<std::string> TooQuiet(const Proposal& proposal, const NominalModel& model) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k)
+    if (proposal.declaration.ObservationError(static_cast<Eigen::Index>(k)) < proposal.rows[k].noise.deviation)
+      names.push_back(model.state_names()[k]);
+  return names;
+}
+
+void PrintMeaning(const Proposal& proposal, const NominalModel& model, const DataCommand& command, std::ostream& out) {
+  std::vector<std::string> constant;
+  for (const int l : proposal.constant) constant.push_back(model.variable_names()[ToSize(l)]);
+  out << "\nsmallest: the slopes with the least sum, each weighed by its column's standard deviation, that no two "
+         "transitions\n  contradict. Every smaller sum is contradicted; the lines are a pair that needs the slope.\n"
+         "at least: no smaller slope is possible there, if the row's other slopes are at most the proposed ones.\n"
+         "alone: the largest slope of two transitions that differ in this column and by at most a fifth of that, in "
+         "standard\n  deviations, in each other one, after taking off noise_bound and disturbance. No bound: other "
+         "columns have a part in it.\n"
+         "proposed: "
+      << ToText(command.factor)
+      << " times the smallest (--factor). No two transitions contradict it.\n"
+         "repeated: half the largest difference of transitions that agree in all columns; the error is at least "
+         "that.\n"
+         "deviation: an estimate of the error's standard deviation from near neighbours (Gamma test).\n"
+         "Strongin, Knuth-Chou: what these estimators say of a row, as factors of the smallest. They ignore "
+         "noise_bound.\n"
+         "\nNothing of this is proven. Transitions can refute a declaration; they cannot show that it holds where "
+         "the robot\nhas not been. A slope of zero says that the residual does not depend on that column at all, and "
+         "it is proposed\nwherever no pair of transitions needs more. noise_bound and disturbance are "
+      << (command.estimate_noise ? "raised to what these transitions show.\n" : "taken from the task, not learned.\n");
+  if (!constant.empty())
+    out << "Never varied in these transitions, so that nothing is known of their slopes: " << Listed(constant) << ".\n";
+  if (const auto names = TooQuiet(proposal, model); !names.empty())
+    out << "The error that near neighbours show is larger than noise_bound and disturbance allow: " << Listed(names)
+        << ".\n  The slopes then explain noise. Declare the error that your sensors have, or use --noise estimated.\n";
+  out << "How often fresh transitions contradict such a declaration: --hold-out.\n";
+}
+
+// ---- for programs
+
+Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Config& config, const DataCommand& command) {
+  const NominalModel& model = *config.problem->model;
+  const std::vector<std::string> names = model.variable_names();
+  Json document{{"proven", false},
+                {"transitions", config.problem->transitions.size()},
+                {"factor", command.factor},
+                {"yaml", "declaration:\n" + DeclarationYaml(proposal.declaration, model)},
+                {"entries", Json::array()},
+                {"alone", Json::array()},
+                {"rows", Json::array()},
+                {"never_varied", Json::array()},
+                {"digests", {{"config", ToHex(config.grounds.config)}, {"model", ToHex(config.grounds.model)}}}};
+  for (const int l : proposal.constant) document["never_varied"].push_back(names[ToSize(l)]);
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
+    const ProposedRow& row = proposal.rows[k];
+    const auto at = static_cast<Eigen::Index>(k);
+    document["lipschitz"].push_back(Eigen::RowVectorXd(proposal.declaration.lipschitz.row(at)));
+    document["rows"].push_back({{"state", names[k]},
+                                {"noise_bound", proposal.declaration.noise_bound[at]},
+                                {"repeated", row.noise.repeated},
+                                {"deviation", row.noise.deviation},
+                                {"strongin", row.strongin},
+                                {"knuth_chou", row.knuth_chou}});
+    for (std::size_t l = 0; l < names.size(); ++l) {
+      const auto column = static_cast<Eigen::Index>(l);
+      const LoneSlope& lone = lone_slopes[k][l];
+      document["alone"].push_back(
+          {{"row", names[k]},
+           {"column", names[l]},
+           {"pairs", lone.pairs},
+           {"slope", lone.slope},
+           {"lines", lone.slope > 0 ? Json({LineOf(lone.first), LineOf(lone.second)}) : Json()}});
+      if (!(proposal.declaration.lipschitz(at, column) > 0)) continue;
+      Json entry{{"row", names[k]},
+                 {"column", names[l]},
+                 {"smallest", row.smallest.slopes[column]},
+                 {"at_least", row.least[column]},
+                 {"proposed", proposal.declaration.lipschitz(at, column)},
+                 {"lines", nullptr}};
+      if (const auto& reason = row.smallest.reasons[l])
+        entry["lines"] = {LineOf(reason->first), LineOf(reason->second)};
+      document["entries"].push_back(entry);
+    }
+  }
+  return document;
+}
+
+}  // namespace
+
+int DeclareFromData(const DataCommand& command) {
+  const Config config = LoadConfig(command.config);
+  const Problem& problem = *config.problem;
+  std::optional<Progress> progress(std::in_place, "parts of the work", 2 * ToSize(problem.model->num_states()));
+  const ProposalOptions options{command.factor, command.estimate_noise, ColumnsBy(command.by, *problem.model),
+                                [&] { progress->Advance(); }};
+  try {
+    const Observations observations = Observe(*problem.model, problem.transitions);
+    const Proposal proposal = Propose(problem.declaration, observations, options);
+    progress.reset();
+    LoneSlopes lone_slopes;
+    for (int k = 0; k < problem.model->num_states(); ++k)
+      lone_slopes.push_back(FindLoneSlopes(proposal.declaration, observations, k, options.columns[ToSize(k)]));
+    if (command.json) {
+      std::cout << JsonText(ToJson(proposal, lone_slopes, config, command)) << std::endl;
+      return 0;
+    }
+    std::ostringstream text;
+    text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
+    PrintSlopes(proposal, *problem.model, text);
+    PrintLoneSlopes(lone_slopes, *problem.model, text);
+    PrintErrors(proposal, *problem.model, text);
+    PrintMeaning(proposal, *problem.model, command, text);
+    std::cout << text.str() << "\ndeclaration:\n"
+              << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
+    return 0;
+  } catch (const Unexplained& found) {
+    progress.reset();
+    std::cerr << "forereach: " << config.path << ": lines " << LineOf(found.pair.first) << " and "
+              << LineOf(found.pair.second) << " of the transitions: " << Explain(found, config, options) << std::endl;
+    return 1;
+  }
+}
+
+}  // namespace forereach

@@ -1,0 +1,245 @@
+#include <algorithm>
+#include <iomanip>
+#include <iostream>
+#include <optional>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "command_line/progress.h"
+#include "forereach/certify/batch.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "identify/binomial.h"
+#include "identify/declare_by.h"
+#include "identify/declare_data.h"
+#include "identify/hold_out.h"
+#include "lcmtypes/angle.h"
+#include "records/chart.h"
+#include "records/decision_json.h"
+#include "task/config.h"
+#include "task/json_text.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kFactors[] = {1, 1.1, 1.25, 1.5, 2, 3, 5};
+
+// What one factor on the learned slopes gives on the held-out blocks.
+struct Trial {
+  double factor = 1;
+  Contradictions found;
+  double block_upper = 1;  // of the probability that the next block has a contradiction
+  int windows = 0, certified = 0;
+  int states = 0, inside = 0;  // recorded states of all windows, and those in their slice
+  double half_width = 0;       // median over the windows, of a position in the last slice; 0 if no tube is complete
+};
+
+// The recorded commands of a stretch of held-out transitions, from the state that was recorded there.
+struct Commands {
+  Eigen::MatrixXd controls;  // a column a step
+  Eigen::MatrixXd states;    // a column a sample, one more than steps
+};
+
+std::vector<Commands> CommandsOf(const Transitions& transitions, const Split& split, int steps) {
+  const Eigen::Index n = transitions.x_next.cols(), m = transitions.z.cols() - n;
+  std::vector<Commands> all;
+  for (const Window& window : WindowsOf(transitions, split, steps)) {
+    Commands& commands = all.emplace_back();
+    commands.controls = transitions.z.block(window.begin, n, steps, m).transpose();
+    commands.states.resize(n, steps + 1);
+    commands.states.leftCols(steps) = transitions.z.block(window.begin, 0, steps, n).transpose();
+    commands.states.col(steps) = transitions.x_next.row(window.begin + steps - 1);
+  }
+  return all;
+}
+
+// The largest half-width of a safety coordinate in slice t.
+double PositionHalfWidth(const Tube& tube, int t, const Eigen::MatrixXd& projection) {
+  const std::span<const double> half_width = tube.half_width(t);
+  const Eigen::Map<const Eigen::VectorXd> widths(half_width.data(), std::ssize(half_width));
+  return (projection.cwiseAbs() * widths).maxCoeff();
+}
+
+void CertifyWindows(const Config& config, const Declaration& declaration, const Split& split,
+                    const std::vector<Commands>& commands, unsigned jobs, Trial& trial) {
+  if (commands.empty()) return;
+  auto problem = std::make_shared<Problem>(*config.problem);
+  problem->declaration = declaration;
+  problem->transitions = RowsOf(config.problem->transitions, split.learn);
+  problem->rest.clear();  // recorded commands need not end at rest
+  const Certifier certifier(problem);
+  const int steps = static_cast<int>(commands.front().controls.cols()), inputs = problem->model->num_inputs();
+  const Schedule schedule = ScheduleFromZero(config, steps);
+  const Eigen::VectorXd half_width = (config.initial_set.upper() - config.initial_set.lower()) / 2;
+  std::vector<Plan> plans;
+  std::vector<Zonotope> initial_sets;
+  for (const Commands& each : commands) {
+    plans.push_back({each.controls.data(), inputs, steps, inputs, schedule});
+    initial_sets.push_back(Zonotope::FromBox(each.states.col(0), half_width));
+    certifier.Require(plans.back(), initial_sets.back(), config.obstacles);
+  }
+  std::vector<int> inside(plans.size(), 0);
+  std::vector<double> widths(plans.size(), kInfinity);
+  const auto decisions = CertifyAll(
+      certifier, plans, initial_sets, config.obstacles, jobs, [&](std::size_t i, const Decision&, const Tube& tube) {
+        for (int t = 1; t <= tube.length(); ++t) {
+          bool in = true;
+          for (int k = 0; k < problem->model->num_states(); ++k) {
+            const Interval hull = tube.hull(t, k);
+            const double x = commands[i].states(k, t), error = declaration.noise_bound[k];
+            in &= LiesWithin(x, hull.lower - error, hull.upper + error, problem->model->IsAngle(k));
+          }
+          inside[i] += in;
+        }
+        if (tube.length() == steps) widths[i] = PositionHalfWidth(tube, steps, problem->projection);
+      });
+  trial.windows = static_cast<int>(plans.size());
+  trial.certified = static_cast<int>(std::ranges::count(decisions, Outcome::kCertified, &Decision::outcome));
+  trial.states = trial.windows * steps;
+  for (const int count : inside) trial.inside += count;
+  const auto middle = widths.begin() + std::ssize(widths) / 2;
+  std::ranges::nth_element(widths, middle);
+  trial.half_width = *middle;
+}
+
+// ---- the outcome
+
+double Share(int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0; }
+
+std::string Percent(double value) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << value << " %";
+  return text.str();
+}
+
+void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command, const Split& split) {
+  const Trial& first = trials.front();
+  std::ostringstream out;
+  out << "hold-out: " << command.blocks << " blocks of time, learned from " << split.learn.size() << ", judged by "
+      << split.judge.size() << " with " << first.found.transitions << " transitions and " << first.windows
+      << " stretches of " << command.steps << " commands\n"
+      << std::left << "  " << std::setw(8) << "factor" << std::setw(17) << "contradicting" << std::setw(14)
+      << "per thousand" << std::setw(10) << "blocks" << std::setw(12) << "next block" << std::setw(11) << "certified"
+      << std::setw(9) << "inside"
+      << "half-width\n";
+  for (const Trial& trial : trials) {
+    const Contradictions& found = trial.found;
+    out << "  " << std::setw(8) << ToText(trial.factor) << std::setw(17)
+        << std::to_string(found.contradicting) + " of " + std::to_string(found.transitions) << std::setw(14)
+        << RoundedUp(1000.0 * found.contradicting / found.transitions, 3) << std::setw(10)
+        << std::to_string(found.blocks_contradicting) + " of " + std::to_string(found.blocks) << std::setw(12)
+        << "<= " + Percent(100 * trial.block_upper);
+    if (trial.windows > 0)
+      out << std::setw(11) << Percent(Share(trial.certified, trial.windows)) << std::setw(9)
+          << Percent(Share(trial.inside, trial.states)) << RoundedUp(trial.half_width, 3);
+    out << "\n";
+  }
+  std::cout
+      << out.str()
+      << "\nfactor: on the smallest slopes that the learning blocks do not contradict.\n"
+         "contradicting: held-out transitions that provably contradict one of the learning blocks.\n"
+         "next block: with "
+      << ToText(100 * command.confidence)
+      << " % confidence, at most so many of all further blocks contain a contradiction (Clopper & Pearson), if\n"
+         "  blocks are independent and alike: the same robot, driven alike, in the same places. Within a block they "
+         "need not be.\n"
+         "  It is no bound for other roads, other days, or a plan that goes where nobody has driven. It is of one row, "
+         "for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor of slopes "
+         "learned from all data.\n"
+         "certified, inside, half-width: the recorded commands of held-out stretches as plans, from task.initial_set's "
+         "half-widths\n  about the recorded state, among the task's obstacles; recorded states that lie in their "
+         "slice, "
+         "give or take noise_bound;\n  the median over the stretches of a position's half-width after "
+      << command.steps << " steps (inf: the tube leaves the domain before).\n"
+      << (first.windows == 0 ? "There is no stretch of so many transitions that follow one another: use fewer --steps "
+                               "or fewer --blocks.\n"
+                             : "")
+      << std::flush;
+}
+
+Json ToJson(const std::vector<Trial>& trials, const DataCommand& command) {
+  Json document{{"blocks", command.blocks},
+                {"steps", command.steps},
+                {"confidence", command.confidence},
+                {"factors", Json::array()}};
+  for (const Trial& trial : trials)
+    document["factors"].push_back({{"factor", trial.factor},
+                                   {"transitions", trial.found.transitions},
+                                   {"contradicting", trial.found.contradicting},
+                                   {"blocks", trial.found.blocks},
+                                   {"blocks_contradicting", trial.found.blocks_contradicting},
+                                   {"block_rate_at_most", trial.block_upper},
+                                   {"stretches", trial.windows},
+                                   {"certified", trial.certified},
+                                   {"states", trial.states},
+                                   {"states_inside", trial.inside},
+                                   {"half_width", trial.half_width}});
+  return document;
+}
+
+Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
+  Chart chart{.title = "What a factor on the slopes buys, and what it costs",
+              .x_name = "factor on the smallest slopes",
+              .y_name = "% of held-out data",
+              .x = {},
+              .series = {{"blocks with a contradiction", {}},
+                         {"their bound, " + ToText(100 * command.confidence) + " %", {}},
+                         {"stretches certified", {}},
+                         {"states inside their slice", {}}}};
+  for (const Trial& trial : trials) {
+    chart.x.push_back(trial.factor);
+    const double values[] = {Share(trial.found.blocks_contradicting, trial.found.blocks), 100 * trial.block_upper,
+                             Share(trial.certified, trial.windows), Share(trial.inside, trial.states)};
+    for (std::size_t s = 0; s < 4; ++s) chart.series[s].y.push_back(values[s]);
+  }
+  return chart;
+}
+
+}  // namespace
+
+int DeclareHoldOut(const DataCommand& command) {
+  const auto pictures = command.picture.empty() ? std::vector<std::string>() : PictureFiles(command.picture);
+  const Config config = LoadConfig(command.config);
+  const Problem& problem = *config.problem;
+  if (command.blocks > problem.transitions.size())
+    throw ConfigError("--blocks: " + std::to_string(command.blocks) + " is more than the task's " +
+                      std::to_string(problem.transitions.size()) + " transitions");
+  const Split split = SplitByTime(problem.transitions.size(), command.blocks);
+  std::optional<Progress> progress(std::in_place, "parts of the work",
+                                   2 * ToSize(problem.model->num_states()) + std::size(kFactors));
+  const ProposalOptions options{1, command.estimate_noise, ColumnsBy(command.by, *problem.model),
+                                [&] { progress->Advance(); }};
+  Proposal learned;
+  try {
+    learned = Propose(problem.declaration, Observe(*problem.model, RowsOf(problem.transitions, split.learn)), options);
+  } catch (const Unexplained& found) {
+    progress.reset();
+    std::cerr << "forereach: " << config.path << ": in the learning blocks: " << Explain(found, config, options)
+              << std::endl;
+    return 1;
+  }
+  const std::vector<Commands> commands = CommandsOf(problem.transitions, split, command.steps);
+  std::vector<Trial> trials;
+  for (const double factor : kFactors) {
+    Declaration declaration = learned.declaration;
+    declaration.lipschitz *= factor;
+    Trial& trial = trials.emplace_back();
+    trial.factor = factor;
+    trial.found = CountContradictions(problem, declaration, split);
+    trial.block_upper = ProbabilityUpper(trial.found.blocks_contradicting, trial.found.blocks, command.confidence);
+    CertifyWindows(config, declaration, split, commands, command.jobs, trial);
+    progress->Advance();
+  }
+  progress.reset();
+  if (command.json)
+    std::cout << JsonText(ToJson(trials, command)) << std::endl;
+  else
+    PrintForPeople(trials, command, split);
+  for (const std::string& file : pictures) DrawChart(ChartOf(trials, command), file);
+  return 0;
+}
+
+}  // namespace forereach

@@ -1,0 +1,67 @@
+#include "simulator/lockstep.h"
+
+#include <iostream>
+#include <utility>
+
+#include "bus/bus_options.h"
+#include "bus/process.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kClockStepUs = 1000;
+
+Config OnOneBus(Config config) {
+  config.bus.keys = AllKeysOf(config.bus);
+  config.bus.url = "memq://";
+  return config;
+}
+
+}  // namespace
+
+Lockstep::Lockstep(Config config, const Config& world, std::int64_t now_us, Plant plant)
+    : config_(OnOneBus(std::move(config))),
+      now_us_(now_us),
+      clock_([this] { return now_us_; }),
+      bus_(OpenBusOfAllRoles(config_.bus, clock_)),
+      certifier_(config_, *bus_, {clock_, clock_}),
+      planner_(config_, *bus_),
+      robot_(config_, *bus_, std::cout, std::move(plant)),
+      perception_(ObstacleSender::PeriodUs(config_.gate)) {
+  if (config_.gate.obstacles != ObstaclesSource::kBus) return;
+  RequireSendable(world);
+  perceived_ = BegunAt(now_us_, world.obstacles);
+}
+
+void Lockstep::Run(Node* last) {
+  certifier_.Tick(now_us_);  // as a process does before it hears anything
+  Deliver();
+  std::vector<Node*> nodes{&robot_, &planner_, &certifier_};
+  if (last != nullptr) nodes.push_back(last);
+  const auto end = now_us_ + static_cast<std::int64_t>((config_.robot.time_limit_s + 60) * 1e6);
+  const auto is_done = [&] { return robot_.done() || (last != nullptr && last->done()); };
+  for (; !is_done() && now_us_ < end; now_us_ += kClockStepUs) {
+    Perceive();
+    for (Node* node : nodes) {
+      node->Tick(now_us_);
+      Deliver();
+    }
+  }
+}
+
+void Lockstep::Stop() {
+  for (Node* node : std::initializer_list<Node*>{&planner_, &certifier_, &robot_}) node->Stop();
+}
+
+// This bus has no other sender of obstacles.
+void Lockstep::Perceive() {
+  if (config_.gate.obstacles == ObstaclesSource::kBus) perception_.Set(SeenBy(now_us_, perceived_));
+  if (const auto seen = perception_.Due(now_us_)) static_cast<void>(bus_->Publish(config_.bus.obstacles, *seen));
+}
+
+void Lockstep::Deliver() {
+  while (bus_->Dispatch(0) > 0) {
+  }
+}
+
+}  // namespace forereach

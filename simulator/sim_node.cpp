@@ -1,0 +1,296 @@
+#include "simulator/sim_node.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "bus/bus_options.h"
+#include "bus/log.h"
+#include "certifier/gate/stamp.h"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "task/json_text.h"
+#include "task/step_time.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kProgressUs = 1'000'000;
+
+std::optional<Config> Load(const std::string& path, const BusOptions& in_force) try {
+  Config config = LoadConfig(path);
+  const std::string why = WhyKeyCannotChange(in_force, config.bus, Role::kRobot);
+  if (!why.empty()) throw ConfigError(path + ": " + why);
+  return config;
+} catch (const std::exception& error) {
+  logging::Error("not reloaded: {}", error.what());
+  return std::nullopt;
+}
+
+GuardDomain DomainOf(const Config& config) {
+  const auto entries = [](const Eigen::VectorXd& bounds) { return std::vector<double>(bounds.begin(), bounds.end()); };
+  const Domain& domain = config.problem->domain;
+  return {entries(domain.state.lower()), entries(domain.state.upper()), entries(domain.input.lower()),
+          entries(domain.input.upper())};
+}
+
+SupervisorOptions OptionsOf(const Config& config) {
+  SupervisorOptions options;
+  options.guard.num_states = config.problem->model->num_states();
+  options.guard.num_inputs = config.problem->model->num_inputs();
+  options.guard.step_us = Microseconds(config.robot.step_period_ms);
+  options.guard.config_digest = config.grounds.config;
+  options.guard.model_digest = config.grounds.model;
+  options.guard.keys = KeysOf(config.bus, Role::kRobot);
+  options.guard.bus_name = config.bus.bus_name();
+  options.guard.channel = config.bus.certified;
+  options.guard.withdrawn = config.bus.withdrawn;
+  options.guard.domain = DomainOf(config);
+  options.guard.angles = config.problem->model->angles();
+  options.guard.max_jitter_us = MaxJitterUs(config.gate);
+  options.max_age_us = Microseconds(config.gate.max_age_ms);
+  options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
+  options.fault = config.bus.fault;
+  options.command = config.bus.command;
+  options.robot_state = config.bus.robot_state;
+  options.transition = config.bus.transition;
+  options.event = config.bus.event;
+  return options;
+}
+
+// Acts on the states that are zero while the robot stands. @throws ConfigError if nobody says which.
+Brake BrakeOf(const Config& config) {
+  const std::vector<std::string>& names = config.problem->model->state_names();
+  std::vector<double> declines(names.size(), 0.0);
+  for (const int k : HeldStates(config)) {
+    const auto rate = config.robot.emergency_stop.find(names[ToSize(k)]);
+    const bool is_gradual = rate != config.robot.emergency_stop.end();
+    declines[ToSize(k)] = is_gradual ? rate->second * config.period : kInfinity;
+  }
+  return Brake(std::move(declines));
+}
+
+Plant TargetOf(const Config& config) {
+  return [target = std::shared_ptr<const Target>(MakeTarget(config))](auto x, auto u, auto next) {
+    target->Step(x, u, next);
+  };
+}
+
+Config WithKeysOfRobot(Config config) {
+  config.bus = WithKeys(std::move(config.bus), Role::kRobot);
+  return config;
+}
+
+void RequireSize(const Config& config, const char* key, std::size_t size, std::int64_t expected) {
+  if (static_cast<std::int64_t>(size) != expected)
+    throw ConfigError(config.path + ": " + key + ": " + std::to_string(size) + " entries, it has to have " +
+                      std::to_string(expected));
+}
+
+}  // namespace
+
+RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Plant plant)
+    : config_(WithKeysOfRobot(config)),
+      bus_(bus),
+      out_(out),
+      plant_(plant ? std::move(plant) : TargetOf(config)),
+      places_(*config.problem->model, config.problem->projection, config.problem->body),
+      limits_(*config.problem->model, config.problem->limits),
+      disturbance_(config.problem->declaration, config.robot),
+      period_us_(Microseconds(config.robot.step_period_ms)),
+      brake_(BrakeOf(config_)),
+      reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
+      obstacles_(config),
+      state_(config.robot.start),
+      supervisor_(OptionsOf(config_), *this) {
+  RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
+  if (!config.planner.goal.empty())
+    RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
+  bus.Subscribe(config_.bus.certified,
+                [this](const Received& received) { supervisor_.OnCertified(received.raw, received.utime); });
+  bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) {
+    heard_utime_ = received.utime;
+    supervisor_.OnWithdrawn(received.raw, received.utime);
+  });
+  bus.Subscribe(config_.bus.fault, [this](const Received& received) {
+    heard_utime_ = received.utime;
+    supervisor_.OnFault(received.raw, received.utime);
+  });
+  bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
+  bus.Subscribe(config_.bus.command, [this](const Received& received) {
+    const std::string why = supervisor_.OnCommand(received.raw, received.utime);
+    if (!why.empty()) logging::Warn("{}: refused: {}", config_.bus.command, why);
+  });
+}
+
+void RobotSimNode::Tick(std::int64_t now_us) {
+  TakeReload();
+  if (!start_utime_) start_utime_ = now_us;
+  const auto next = [&] { return *start_utime_ + supervisor_.counts().boundaries * period_us_; };
+  while (!done() && next() <= now_us) Boundary(next(), now_us);
+}
+
+void RobotSimNode::Reload() {
+  if (!reload_.Ask()) logging::Error("not reloaded: the reloads before have not ended; it is read again once one has");
+}
+
+void RobotSimNode::TakeReload() {
+  const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
+  if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
+  if (!config) return;
+  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config),
+                     config->problem->model->angles());
+  logging::Info("plans certified under {} as it is now are accepted", config_.path);
+}
+
+void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
+  const std::span<const double> control = supervisor_.control();
+  const bool moves = !control.empty() || is_stopping_;
+  if (!control.empty()) {
+    is_stopping_ = false;
+    plant_(state_, control, state_);
+    disturbance_.Add(state_);
+  } else if (is_stopping_) {
+    BrakeUntil(utime);
+  }
+  if (moves)
+    for (const int k : config_.problem->model->angles())
+      state_[ToSize(k)] = std::remainder(state_[ToSize(k)], 2 * std::numbers::pi);
+  heard_utime_ = utime;
+  const std::vector<double> room = LimitRoom(control);
+  supervisor_.FinishStep(utime, now_us);
+  ReportContacts(utime, moves);
+  ReportLimits(utime, room);
+  state_before_ = state_;
+  ReportGoal(utime);
+  const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
+  if (supervisor_.Boundary(utime, now_us, ends).empty() && ends && !is_stopping_) ++finished_boundaries_;
+  LogProgress(utime);
+}
+
+void RobotSimNode::Hold() {
+  brake_.Apply(state_, 0, state_);
+  is_stopping_ = brake_.StepsToRest(state_, state_) > 0;
+  brakes_since_utime_ = heard_utime_;
+  if (!goal_reached_) ++stops_;
+}
+
+// The step that ends at a boundary, in which the robot comes to rest.
+void RobotSimNode::BrakeUntil(std::int64_t utime) {
+  const std::vector<double> before = state_;
+  const Box& inputs = config_.problem->domain.input;
+  const Eigen::VectorXd idle = inputs.lower().cwiseMax(0).cwiseMin(inputs.upper());
+  plant_(before, {idle.data(), ToSize(idle.size())}, state_);
+  disturbance_.Add(state_);
+  const double share = static_cast<double>(utime - brakes_since_utime_) / static_cast<double>(period_us_);
+  brake_.Apply(before, std::clamp(share, 0.0, 1.0), state_);
+  is_stopping_ = brake_.StepsToRest(state_, state_) > 0;
+}
+
+void RobotSimNode::Send(const std::string& channel, Bytes message) {
+  if (!bus_.Publish(channel, message)) throw std::runtime_error("the bus does not take it");
+}
+
+void RobotSimNode::LogProgress(std::int64_t utime) {
+  if (utime < next_progress_utime_) return;
+  next_progress_utime_ = utime + kProgressUs;
+  logging::Info("{} steps driven, {} inside their slices, {:.1f} m to the goal{}", supervisor_.counts().steps,
+                supervisor_.counts().steps_inside, DistanceToGoal(), supervisor_.control().empty() ? ", standing" : "");
+}
+
+void RobotSimNode::OnObstacles(const Received& received) {
+  // What it refuses is no news: the certifier reports it.
+  static_cast<void>(obstacles_.Update(received.bytes, received.utime, received.sender));
+}
+
+std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) const {
+  const Problem& problem = *config_.problem;
+  const Sample now{state_, utime};
+  if (!problem.between || state_before_.empty()) return FindContacts(places_, obstacles_.all(), now);
+  const Between standing{Eigen::VectorXd::Zero(problem.projection.rows()), 0, 0, problem.between->period};
+  return FindContacts(problem, places_, obstacles_.all(), {state_before_, utime - period_us_}, now,
+                      moved ? *problem.between : standing);
+}
+
+void RobotSimNode::ReportContacts(std::int64_t utime, bool moved) {
+  for (const Contact& contact : Contacts(utime, moved)) {
+    ++contacts_;
+    std::string text = "inside obstacle " + std::to_string(contact.obstacle);
+    if (config_.problem->body != Body())
+      text = "part " + std::to_string(contact.part) + " meets obstacle " + std::to_string(contact.obstacle);
+    if (config_.problem->between) text += ", " + ToText(contact.at) + " of a step after the last sample";
+    supervisor_.Report(utime, execution_event_t::CONTACT, contact.clearance, text);
+  }
+}
+
+// At this boundary, and of limits that use an input at the one before, where the control was applied first.
+std::vector<double> RobotSimNode::LimitRoom(std::span<const double> control) const {
+  std::vector<double> room(limits_.size()), before = room;
+  limits_.Room(state_, {}, room);
+  if (control.empty()) return room;
+  limits_.Room(state_before_, control, before);
+  for (std::size_t i = 0; i < room.size(); ++i)
+    if (limits_.UsesInput(i)) room[i] = before[i];
+  return room;
+}
+
+void RobotSimNode::ReportLimits(std::int64_t utime, std::span<const double> room) {
+  for (std::size_t i = 0; i < room.size(); ++i) {
+    if (room[i] >= 0) continue;
+    ++limits_exceeded_;
+    const std::string& name = limits_[i].name;
+    if (std::isfinite(room[i]))
+      supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, -room[i],
+                         name + " is " + ToText(-room[i]) + " beyond its bound");
+    else
+      supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, 0, name + " has no finite value");
+  }
+}
+
+void RobotSimNode::ReportGoal(std::int64_t utime) {
+  const double distance = DistanceToGoal();
+  if (goal_reached_ || !(distance <= config_.planner.goal_radius)) return;
+  goal_reached_ = true;
+  supervisor_.Report(
+      utime, execution_event_t::GOAL_REACHED, distance,
+      ToText(distance) + " m from the goal, it counts within " + ToText(config_.planner.goal_radius) + " m");
+}
+
+Eigen::VectorXd RobotSimNode::Position() const {
+  return config_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state_.data(), std::ssize(state_));
+}
+
+double RobotSimNode::DistanceToGoal() const {
+  const std::vector<double>& goal = config_.planner.goal;
+  if (goal.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return (Position() - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
+}
+
+void RobotSimNode::Stop() { out_ << Summary() << std::endl; }
+
+std::string RobotSimNode::Summary() const {
+  const Supervisor::Counts& counts = supervisor_.counts();
+  nlohmann::ordered_json summary;
+  summary["boundaries"] = counts.boundaries;
+  summary["steps_executed"] = counts.steps;
+  summary["steps_inside_slice"] = counts.steps_inside;
+  summary["contacts"] = contacts_;
+  summary["limits_exceeded"] = limits_exceeded_;
+  summary["goal_reached"] = goal_reached_;
+  summary["distance_to_goal"] = DistanceToGoal();  // NaN becomes null
+  summary["stops"] = stops_;
+  summary["emergency_stops"] = counts.emergency_stops;
+  summary["plans_accepted"] = counts.accepted;
+  summary["plans_started"] = counts.started;
+  summary["plans_refused"] = counts.refused;
+  summary["messages_not_sent"] = counts.reports_lost + static_cast<std::int64_t>(supervisor_.reports_waiting());
+  return JsonText(summary);
+}
+
+}  // namespace forereach

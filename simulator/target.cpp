@@ -1,0 +1,114 @@
+#include "simulator/target.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <utility>
+
+#include "forereach/dynamics/text_program.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+class ModelTarget final : public Target {
+ public:
+  ModelTarget(std::shared_ptr<const NominalModel> model, std::optional<TextFunction> residual)
+      : model_(std::move(model)), residual_(std::move(residual)) {}
+
+  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const override {
+    std::array<double, kMaxVariables> all;
+    std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), all.begin()));
+    const auto z = std::span<const double>(all).first(x.size() + u.size());
+    std::array<long double, kMaxStates> nominal{}, residual{};
+    model_->EvaluateWide(z, std::span(nominal).first(next.size()));
+    if (residual_) residual_->Evaluate(z, std::span(residual).first(next.size()));
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(nominal[k] + residual[k]);
+  }
+
+ private:
+  std::shared_ptr<const NominalModel> model_;
+  std::optional<TextFunction> residual_;
+};
+
+TextFunction FunctionOf(const ParametricResidual& residual, const NominalModel& model) {
+  if (residual.names.states != model.state_names() || residual.names.inputs != model.input_names() ||
+      residual.values.size() != residual.names.states.size())
+    throw std::invalid_argument("for other states or inputs than those of " + model.name());
+  return {residual.names, residual.values};
+}
+
+// std::uniform_real_distribution differs between libraries; this does not.
+double Uniform(std::mt19937_64& random, double lower, double upper) {
+  const double fraction = static_cast<double>(random() >> 11) * 0x1p-53;
+  return std::min(lower + (upper - lower) * fraction, upper);
+}
+
+std::vector<Interval> SampleBounds(const Problem& problem, const std::vector<SampleRange>& ranges) {
+  const std::vector<std::string> names = problem.model->variable_names();
+  std::vector<Interval> bounds = problem.domain.Ranges();
+  for (const SampleRange& range : ranges) {
+    const auto name = std::find(names.begin(), names.end(), range.name);
+    if (name == names.end()) throw std::invalid_argument("range: the model has no coordinate " + range.name);
+    Interval& bound = bounds[ToSize(name - names.begin())];
+    if (!(bound.lower <= range.lower && range.lower <= range.upper && range.upper <= bound.upper))
+      throw std::invalid_argument("range: " + range.name + " in [" + ToText(range.lower) + ", " + ToText(range.upper) +
+                                  "] is empty or not inside the domain's [" + ToText(bound.lower) + ", " +
+                                  ToText(bound.upper) + "]");
+    bound = {range.lower, range.upper};
+  }
+  return bounds;
+}
+
+std::vector<double> SampleInside(const Domain& domain, const std::vector<Interval>& bounds, std::mt19937_64& random) {
+  std::vector<double> z(bounds.size());
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    for (std::size_t l = 0; l < z.size(); ++l) z[l] = Uniform(random, bounds[l].lower, bounds[l].upper);
+    if (domain.Contains(z)) return z;
+  }
+  throw std::invalid_argument("ranges: no point inside the domain in 1000 samples");
+}
+
+}  // namespace
+
+std::unique_ptr<Target> MakeTarget(const Config& config) {
+  std::optional<TextFunction> residual;
+  try {
+    if (config.robot_residual) residual = FunctionOf(*config.robot_residual, *config.problem->model);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(config.path + ": robot.residual: " + config.robot_residual->name + ": " + error.what());
+  }
+  return std::make_unique<ModelTarget>(config.problem->model, std::move(residual));
+}
+
+Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,
+                            const std::vector<SampleRange>& ranges, const Eigen::VectorXd& noise_bound,
+                            Disturbance* disturbance) {
+  const int n = problem.model->num_states(), d = problem.model->num_variables();
+  if (count < 0) throw std::invalid_argument("count: " + std::to_string(count) + " is negative");
+  if (noise_bound.size() != 0 && noise_bound.size() != n)
+    throw std::invalid_argument("noise_bound: " + std::to_string(noise_bound.size()) + " entries for " +
+                                std::to_string(n) + " states");
+  const std::vector<Interval> bounds = SampleBounds(problem, ranges);
+  std::mt19937_64 random(seed);
+  Transitions transitions{Eigen::MatrixXd(count, d), Eigen::MatrixXd(count, n)};
+  std::vector<double> next(ToSize(n));
+  for (int i = 0; i < count; ++i) {
+    const std::vector<double> z = SampleInside(problem.domain, bounds, random);
+    const std::span<const double> point(z);
+    target.Step(point.first(next.size()), point.subspan(next.size()), next);
+    if (disturbance) disturbance->Add(next);
+    transitions.z.row(i) = Eigen::Map<const Eigen::RowVectorXd>(z.data(), d);
+    transitions.x_next.row(i) = Eigen::Map<const Eigen::RowVectorXd>(next.data(), n);
+    for (Eigen::Index k = 0; k < noise_bound.size(); ++k)
+      transitions.x_next(i, k) += Uniform(random, -noise_bound(k), noise_bound(k));
+  }
+  return transitions;
+}
+
+}  // namespace forereach

@@ -1,0 +1,101 @@
+#include "task/canonical.h"
+
+#include <bit>
+
+namespace forereach {
+namespace {
+
+void AppendLittleEndian(std::string& bytes, std::uint64_t word) {
+  for (int shift = 0; shift < 64; shift += 8) bytes.push_back(static_cast<char>(word >> shift & 0xff));
+}
+
+CanonicalBytes Begin(std::string_view kind, const NominalModel& model) {
+  CanonicalBytes bytes(kind);
+  bytes.Texts(model.state_names());
+  bytes.Texts(model.input_names());
+  return bytes;
+}
+
+}  // namespace
+
+void CanonicalBytes::Text(std::string_view text) {
+  Count(static_cast<std::int64_t>(text.size()));
+  bytes_ += text;
+}
+
+void CanonicalBytes::Texts(const std::vector<std::string>& texts) {
+  Count(static_cast<std::int64_t>(texts.size()));
+  for (const std::string& text : texts) Text(text);
+}
+
+void CanonicalBytes::Count(std::int64_t count) { AppendLittleEndian(bytes_, static_cast<std::uint64_t>(count)); }
+
+void CanonicalBytes::Number(double value) {
+  AppendLittleEndian(bytes_, std::bit_cast<std::uint64_t>(value == 0 ? 0.0 : value));
+}
+
+void CanonicalBytes::Numbers(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+  Count(matrix.rows());
+  Count(matrix.cols());
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) Number(matrix(i, j));
+}
+
+Digest TaskDigest(std::string_view task, std::string_view model) {
+  if (model.empty()) return DigestOf(task);
+  CanonicalBytes bytes("forereach task");
+  bytes.Text(task);
+  bytes.Text(model);
+  return bytes.digest();
+}
+
+Digest ModelDigest(const NominalModel& model) {
+  CanonicalBytes bytes = Begin("forereach model", model);
+  bytes.Text(model.description());
+  return bytes.digest();
+}
+
+Digest DeclarationDigest(const NominalModel& model, const Declaration& declaration) {
+  CanonicalBytes bytes = Begin("forereach declaration", model);
+  bytes.Numbers(declaration.lipschitz);
+  bytes.Numbers(declaration.noise_bound);
+  if (declaration.IsDisturbed()) {  // none and zeros declare the same
+    bytes.Text("disturbance");
+    bytes.Numbers(declaration.disturbance);
+  }
+  return bytes.digest();
+}
+
+Digest ObservationsDigest(const NominalModel& model, const Transitions& transitions) {
+  CanonicalBytes bytes = Begin("forereach observations", model);
+  bytes.Numbers(transitions.z);
+  bytes.Numbers(transitions.x_next);
+  return bytes.digest();
+}
+
+Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
+  CanonicalBytes bytes("forereach obstacles");
+  bytes.Count(static_cast<std::int64_t>(obstacles.size()));
+  for (const Obstacle& obstacle : obstacles) {
+    bytes.Count(static_cast<std::int64_t>(obstacle.kind()));
+    bytes.Count(static_cast<std::int64_t>(obstacle.points().size()));
+    for (const Eigen::VectorXd& point : obstacle.points()) bytes.Numbers(point);
+    bytes.Number(obstacle.radius());
+    bytes.Number(obstacle.offset());
+    if (!obstacle.motion()) continue;
+    const ObstacleMotion& motion = *obstacle.motion();
+    bytes.Text("motion");
+    bytes.Numbers(motion.velocity);
+    for (const double number : {motion.uncertainty, motion.growth, motion.growth_rate}) bytes.Number(number);
+    for (const std::int64_t time : {motion.stamp_us, motion.from_us, motion.until_us}) bytes.Count(time);
+  }
+  return bytes.digest();
+}
+
+Grounds GroundsOf(const Digest& config, const Problem& problem, const std::vector<Obstacle>& obstacles) {
+  const NominalModel& model = *problem.model;
+  return {config, ModelDigest(model), DeclarationDigest(model, problem.declaration),
+          ObservationsDigest(model, problem.transitions), ObstaclesDigest(obstacles)};
+}
+
+}  // namespace forereach

@@ -1,0 +1,216 @@
+#include "task/config.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/no_nominal_value.h"
+#include "forereach/residual/observations.h"
+#include "task/csv.h"
+#include "task/document.h"
+#include "task/draft.h"
+#include "task/key_rows.h"
+#include "task/step_time.h"
+
+namespace forereach {
+namespace {
+
+std::vector<std::string> TransitionColumns(const NominalModel& model) {
+  std::vector<std::string> columns = model.variable_names();
+  for (const std::string& state : model.state_names()) columns.push_back(state + "_next");
+  return columns;
+}
+
+Transitions ReadTransitions(const std::string& path, const NominalModel& model, const std::string& named_by) {
+  const Eigen::MatrixXd rows = ReadCsv(path, TransitionColumns(model), named_by,
+                                       "; `forereach import` makes transitions of a log with other columns");
+  if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
+  return {rows.leftCols(model.num_variables()), rows.rightCols(model.num_states())};
+}
+
+// What a transition violates, in the words of the task file.
+std::string Describe(const DomainExit& exit, const Domain& domain, const NominalModel& model) {
+  using Kind = DomainExit::Kind;
+  const std::vector<std::string> names = model.variable_names();
+  if (exit.kind == Kind::kLower || exit.kind == Kind::kUpper) {
+    const Eigen::Index l = exit.index, n = model.num_states();
+    const Box& box = l < n ? domain.state : domain.input;
+    const Eigen::Index k = l < n ? l : l - n;
+    return names[ToSize(l)] + ": " + ToText(exit.value) + " is outside " +
+           Range{box.lower()[k], box.upper()[k], false, false}.text() + " of domain." + (l < n ? "state" : "input");
+  }
+  std::string involved;
+  const auto involve = [&](Eigen::Index l) { involved += (involved.empty() ? "" : ", ") + names[ToSize(l)]; };
+  const std::string limit = ToText(exit.value) + " is outside (-inf, " + ToText(exit.bound) + "] of domain.";
+  if (exit.kind == Kind::kBall) {
+    for (const int l : domain.balls[ToSize(exit.index)].coordinates) involve(l);
+    return involved + ": distance " + limit + "balls[" + std::to_string(exit.index) + "]";
+  }
+  const Eigen::VectorXd& coefficients = domain.inequalities[ToSize(exit.index)].coefficients;
+  for (Eigen::Index l = 0; l < coefficients.size(); ++l)
+    if (coefficients[l] != 0) involve(l);
+  return involved + ": sum " + limit + "inequalities[" + std::to_string(exit.index) + "]";
+}
+
+void RequireInside(const std::string& path, const Transitions& transitions, const Domain& domain,
+                   const NominalModel& model) {
+  std::array<Interval, kMaxVariables> point;
+  const auto size = ToSize(model.num_variables());
+  for (Eigen::Index i = 0; i < transitions.z.rows(); ++i) {
+    for (Eigen::Index l = 0; l < transitions.z.cols(); ++l) point[ToSize(l)] = Interval(transitions.z(i, l));
+    const DomainExit exit = FindExit(domain, {point.data(), size});
+    if (exit.kind != DomainExit::Kind::kNone)
+      throw ConfigError(path + ":" + std::to_string(i + 2) + ": " + Describe(exit, domain, model));
+  }
+}
+
+// Where the nominal model has no value, or the turns of an angle cannot be told, the transition says nothing, and
+// something is wrong with it.
+void RequireObservable(const std::string& path, const Transitions& transitions, const NominalModel& model) try {
+  static_cast<void>(Observe(model, transitions));
+} catch (const AmbiguousAngle& error) {
+  throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.what());
+} catch (const NoNominalValue& error) {
+  throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.text() +
+                    "; change the model's equations or parameters, or take the state out of the domain and the data");
+}
+
+void ReadKeys(Document& file, TaskDraft& draft) {
+  file.Check(draft.scope, [&](const Key& row, const std::string& key) {
+    try {
+      if (row.read) row.read(file, key, draft);
+    } catch (const std::invalid_argument& error) {
+      file.Fail(key, error.what());
+    }
+  });
+}
+
+// What a task that defines rest need not say again.
+void FillStanding(TaskDraft& draft) {
+  constexpr double kShareOfRest = 0.1;  // of the nominal state, since the tube around it has to be at rest
+  const NominalModel& model = *draft.problem.model;
+  Config& config = draft.config;
+  if (!config.robot.hold && model.text() != nullptr && !draft.rest.empty()) {
+    config.robot.hold.emplace();
+    for (const RestBound& bound : draft.rest)
+      config.robot.hold->push_back(model.state_names()[ToSize(bound.coordinate)]);
+  }
+  if (config.laws.at_rest || draft.rest.empty()) return;
+  config.laws.at_rest = draft.rest;
+  for (RestBound& bound : *config.laws.at_rest) bound.tolerance *= kShareOfRest;
+}
+
+Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
+  Document file(path);
+  TaskDraft draft;
+  draft.model_file.path = instead.model;
+  ReadKeys(file, draft);
+  FillStanding(draft);
+  auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
+  const NominalModel& model = *problem.model;
+  if (!instead.transitions.empty()) transitions_path = instead.transitions;
+  if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;
+  if (transitions == TransitionsFile::kRead) {
+    problem.transitions = ReadTransitions(transitions_path, model, file.Place("transitions"));
+    RequireInside(transitions_path, problem.transitions, problem.domain, model);
+    RequireObservable(transitions_path, problem.transitions, model);
+  }
+  config.path = path;
+  config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
+  config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
+  if (problem.between) problem.between->period = LongestPeriod(config);
+  if (problem.between && config.robot.step_period_ms > config.period * 1e3)
+    file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
+                                          ToText(config.period * 1e3) +
+                                          " ms, the time in which task.between bounds the motion");
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  return std::move(config);
+}
+
+}  // namespace
+
+Config LoadConfig(const std::string& path, TransitionsFile transitions) { return Load(path, transitions, {}); }
+
+Config LoadConfig(const std::string& path, const NamedFiles& instead) {
+  return Load(path, TransitionsFile::kRead, instead);
+}
+
+NamedFiles FilesNamedBy(const std::string& path) {
+  Document file(path);
+  TaskDraft draft;
+  ReadKeys(file, draft);
+  return {draft.transitions, draft.config.planner.policy, draft.model_file.path};
+}
+
+void RequireForCertifying(const Config& config) {
+  if (config.says_between || config.problem->method == Method::kPaper) return;
+  throw ConfigError(
+      config.path +
+      ": task.between: missing. Write under `task:` the line `between: {acceleration: [...]}` with bounds "
+      "on the true motion from one sample to the next, which `forereach declare --between` proposes: a "
+      "certificate holds at all times. Or write `between: samples`: it holds at its sample instants only");
+}
+
+void RequireForCertifyingOnBus(const Config& config) {
+  RequireForCertifying(config);
+  if (config.gate.obstacles == ObstaclesSource::kUnsaid)
+    throw ConfigError(config.path +
+                      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last "
+                      "OBSTACLES message; nothing is certified before the first message or while there are none. "
+                      "`task`: the obstacles are those of this file");
+  if (config.gate.obstacles == ObstaclesSource::kBus && !config.gate.obstacles_lost_ms)
+    throw ConfigError(config.path +
+                      ": gate.obstacles_lost_ms: missing. With `gate.obstacles: bus`, plans under way are withdrawn, "
+                      "which is an emergency stop, once the obstacles have been unknown for this many milliseconds. "
+                      "`never`: the robot executes its plan to the end, through whatever has come there");
+  const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
+  if (moving != config.obstacles.end())
+    throw ConfigError(
+        config.path + ": task.obstacles[" + std::to_string(moving - config.obstacles.begin()) +
+        "].motion: its times begin with the plan, so it is for `forereach certify`. On a bus, write "
+        "`gate: {obstacles: bus}`, and send the obstacle of a file of its own with `forereach obstacles`");
+}
+
+std::vector<int> HeldStates(const Config& config) {
+  const NominalModel& model = *config.problem->model;
+  const NamedModel* const named = FindNamed(model);
+  if (!config.robot.hold && named == nullptr)
+    throw ConfigError(config.path +
+                      ": robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
+                      "text does not say which; by default they are those of task.rest, which is missing, too");
+  const std::vector<std::string> names =
+      config.robot.hold ? *config.robot.hold : std::vector<std::string>(named->standing.begin(), named->standing.end());
+  std::vector<int> held;
+  for (int k = 0; k < model.num_states(); ++k)
+    if (std::ranges::find(names, model.state_names()[ToSize(k)]) != names.end()) held.push_back(k);
+  return held;
+}
+
+Transitions LoadTransitions(const std::string& path, const NominalModel& model) {
+  return ReadTransitions(path, model, "");
+}
+
+void SaveTransitions(const std::string& path, const NominalModel& model, const Transitions& transitions) {
+  Eigen::MatrixXd rows(transitions.size(), model.num_variables() + model.num_states());
+  rows << transitions.z, transitions.x_next;
+  WriteCsv(path, TransitionColumns(model), rows);
+}
+
+Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model) {
+  const Eigen::MatrixXd rows = ReadCsv(path, model.input_names());
+  if (rows.rows() < 1 || rows.rows() > kMaxSteps)
+    throw ConfigError(path + ":" + std::to_string(std::min<Eigen::Index>(rows.rows(), kMaxSteps) + 2) + ": " +
+                      std::to_string(rows.rows()) + " steps are outside [1, " + std::to_string(kMaxSteps) + "]");
+  return rows.transpose();
+}
+
+void SavePlan(const std::string& path, const NominalModel& model, const Eigen::MatrixXd& controls) {
+  WriteCsv(path, model.input_names(), controls.transpose());
+}
+
+}  // namespace forereach

@@ -1,0 +1,113 @@
+// The rows of the planner's laws: how the robot brakes and steers, as expressions.
+#include <iterator>
+
+#include "task/key_rows.h"
+
+namespace forereach::key_rows {
+namespace {
+
+constexpr int kMostWays = 16;  // to stop
+
+Law ReadLaw(const Document& file, const std::string& key, const TaskDraft& draft) {
+  Law law;
+  for (const std::string& input : draft.problem.model->input_names()) {
+    if (!Has(file, key, input)) file.Fail(key + "." + input, "missing: a law has an expression for each input");
+    law.push_back(file.Expression(key + "." + input));
+  }
+  return law;
+}
+
+// A law, or a list of laws.
+std::vector<Key> WaysToStop(const std::string& path, std::vector<Law> Laws::*ways, std::string meaning,
+                            std::string meaning_of_list) {
+  const Key::Reader read = [ways](const Document& file, const std::string& key, TaskDraft& draft) {
+    (draft.config.laws.*ways).push_back(ReadLaw(file, key, draft));
+  };
+  const std::string of_control = "The control, which is clipped to domain.input.";
+  return {Map(path, std::move(meaning), read), Expression(path + ".<input>", of_control),
+          List(path, Between(1, kMostWays), std::move(meaning_of_list)), Map(path + "[]", "One way to stop.", read),
+          Expression(path + "[].<input>", of_control)};
+}
+
+void ReadDefinitions(const Document& file, const std::string& key, TaskDraft& draft) {
+  for (const std::string& name : file.KeysOf(key))
+    draft.config.laws.definitions.push_back({name, file.Expression(key + "." + name)});
+}
+
+void ReadAtRest(const Document& file, const std::string& key, TaskDraft& draft) {
+  const std::vector<std::string> states = draft.problem.model->state_names();
+  std::vector<RestBound> at_rest;
+  for (const std::string& name : file.KeysOf(key))
+    at_rest.push_back(
+        {static_cast<int>(std::ranges::find(states, name) - states.begin()), file.Number(key + "." + name)});
+  draft.config.laws.at_rest = std::move(at_rest);
+}
+
+}  // namespace
+
+void CheckLaws(const Document& file, const TaskDraft& draft) {
+  const NominalModel& model = *draft.problem.model;
+  const Laws& laws = draft.config.laws;
+  try {
+    for (const auto* ways : {&laws.stop, &laws.emergency_stop})
+      for (const Law& law : *ways) static_cast<void>(MakeStopLaw(model, laws, law));
+    if (laws.speed) static_cast<void>(MakeSpeed(model, laws));
+    static_cast<void>(MakeHints(model, laws));  // checks the definitions, too
+  } catch (const ExpressionError& error) {
+    FailAt(file.path(), error);
+  }
+}
+
+std::vector<Key> LawKeys() {
+  std::vector<Key> keys{
+      Map("planner.let", "Definitions for the expressions of the planner, which may use those before them.",
+          ReadDefinitions),
+      Expression("planner.let.<name>",
+                 "It may use states, parameters, definitions of the model, and what `planner.hints` may use. A "
+                 "definition is left out of the expressions that may not use what it uses."),
+  };
+  std::ranges::move(
+      WaysToStop("planner.stop", &Laws::stop,
+                 "How the robot brakes: a braking tail is what the nominal model does under this law, up to "
+                 "planner.at_rest. One expression for each input, of states, parameters and definitions. The planner "
+                 "requires it. [docs/planner.md](../docs/planner.md) has examples.",
+                 "Several ways to stop. A plan ends with the first whose tail is allowed."),
+      std::back_inserter(keys));
+  std::ranges::move(WaysToStop("planner.emergency_stop", &Laws::emergency_stop,
+                               "How the robot brakes when a plan is withdrawn. Default: planner.stop.",
+                               "Several ways. Each is sent to the certifier until one is certified."),
+                    std::back_inserter(keys));
+  std::ranges::move(
+      std::vector<Key>{
+          Map("planner.hints",
+              "A good control for driving in a direction. Where there is room a plan follows them "
+              "(planner.clearance_step), and a search tries them more often than others. One expression for each "
+              "input, "
+              "of what planner.stop may use, and of `desired_heading` (rad, the direction of travel in the plane of "
+              "the "
+              "first two safety coordinates; 0 or pi if there is one), `desired_speed` (m/s, in this plane) and "
+              "`desired_climb` (m/s, along the third safety coordinate). Without it the search finds controls by "
+              "chance.",
+              [](const Document& file, const std::string& key, TaskDraft& draft) {
+                draft.config.laws.hints = ReadLaw(file, key, draft);
+              }),
+          Expression("planner.hints.<input>", "The control, which is clipped to domain.input."),
+          Optional(Key(Of(Key::Type::kExpression, "planner.speed",
+                          "The robot's speed in m/s, negative in reverse, of what planner.stop may use. Plans neither "
+                          "drive in reverse nor faster than planner.cruise_speed, up to a few percent.",
+                          [](const Document& file, const std::string& key, TaskDraft& draft) {
+                            draft.config.laws.speed = file.Expression(key);
+                          })),
+                   "that of the safety coordinates, whatever its direction"),
+          Optional(Map("planner.at_rest",
+                       "Where a braking tail ends: the absolute value of each state named here is at most its bound. "
+                       "With `{}` a tail never ends: it has planner.tail_steps steps, for robots that cannot stand.",
+                       ReadAtRest),
+                   "a tenth of each bound of task.rest"),
+          Number("planner.at_rest.<state>", "of the state", kPositive, "Its bound."),
+      },
+      std::back_inserter(keys));
+  return keys;
+}
+
+}  // namespace forereach::key_rows

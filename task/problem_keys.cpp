@@ -1,0 +1,525 @@
+// The rows of a task file that say what is certified: domain, declaration, residual, task, certifier.
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <span>
+
+#include "forereach/certify/limits.h"
+#include "forereach/certify/safety.h"
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/size.h"
+#include "forereach/safety/clearance.h"
+#include "task/key_rows.h"
+
+namespace forereach::key_rows {
+namespace {
+
+using Size = Key::Size;
+
+constexpr Range kWithinDecades = Between(-1e9, 1e9);  // in microseconds within the bounds of a schedule
+
+int IndexOf(const std::vector<std::string>& names, const std::string& name) {
+  return static_cast<int>(std::ranges::find(names, name) - names.begin());
+}
+
+Box ReadBox(const Document& file, const std::string& key) {
+  const std::string lower_key = key + ".lower", upper_key = key + ".upper";
+  const Eigen::VectorXd lower = file.Vector(lower_key), upper = file.Vector(upper_key);
+  for (Eigen::Index k = 0; k < lower.size(); ++k)
+    RequireOrdered(file, lower[k], upper[k], Entry(lower_key, k), Entry(upper_key, k));
+  return Box(lower, upper);
+}
+
+// A matrix given by rows, all of one size.
+Eigen::MatrixXd ReadMatrix(const Document& file, const std::string& key) {
+  const std::vector<Eigen::VectorXd> rows = file.Vectors(key);
+  Eigen::MatrixXd matrix(std::ssize(rows), rows.front().size());
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) matrix.row(i) = rows[ToSize(i)].transpose();
+  return matrix;
+}
+
+void ReadBall(const Document& file, const std::string& key, TaskDraft& draft) {
+  Domain::Ball ball{{}, file.Vector(key + ".center"), file.Number(key + ".radius")};
+  const std::vector<std::string> variables = draft.scope.variables;
+  for (const std::string& name : file.Names(key + ".coordinates")) ball.coordinates.push_back(IndexOf(variables, name));
+  const auto size = std::ssize(ball.coordinates);
+  if (ball.center.size() != size)
+    file.Fail(key + ".center", "has " + std::to_string(ball.center.size()) + " entries, has to have " +
+                                   std::to_string(size) + ", as many as coordinates");
+  draft.problem.domain.balls.push_back(std::move(ball));
+}
+
+void ReadInequality(const Document& file, const std::string& key, TaskDraft& draft) {
+  const std::string sum = key + ".coefficients";
+  const std::vector<std::string> variables = draft.scope.variables;
+  Domain::Inequality inequality{Eigen::VectorXd::Zero(std::ssize(variables)), file.Number(key + ".bound")};
+  for (const std::string& name : file.KeysOf(sum))
+    inequality.coefficients[IndexOf(variables, name)] = file.Number(sum + "." + name);
+  if (inequality.coefficients.isZero(0)) file.Fail(sum, "are all zero, which bounds nothing");
+  draft.problem.domain.inequalities.push_back(std::move(inequality));
+}
+
+std::vector<Key> DomainKeys() {
+  return {
+      Required(
+          Map("domain",
+              "Z_cert: the set on which declaration and model hold. A plan whose tube leaves it is not certified.")),
+      Required(Map("domain.state", "The box of states.",
+                   [](const Document& file, const std::string& key, TaskDraft& draft) {
+                     draft.problem.domain.state = ReadBox(file, key);
+                   })),
+      Required(Vector("domain.state.lower", "of the state", kReal, Size::kStates, "Least value of each state.")),
+      Required(
+          Vector("domain.state.upper", "of the state", kReal, Size::kStates, "Largest value, at least the least.")),
+      Required(Map("domain.input", "The box of inputs.",
+                   [](const Document& file, const std::string& key, TaskDraft& draft) {
+                     draft.problem.domain.input = ReadBox(file, key);
+                   })),
+      Required(Vector("domain.input.lower", "of the input", kReal, Size::kInputs, "Least value of each input.")),
+      Required(
+          Vector("domain.input.upper", "of the input", kReal, Size::kInputs, "Largest value, at least the least.")),
+      Optional(List("domain.balls", Between(0, 1000),
+                    "Further bounds: the Euclidean distance of some coordinates from a center."),
+               "[]"),
+      Map("domain.balls[]", "One ball.", ReadBall),
+      Required(Names("domain.balls[].coordinates", Between(1, kMaxVariables), Size::kVariables,
+                     "The coordinates it bounds.")),
+      Required(
+          Vector("domain.balls[].center", "of the coordinates", kReal, Size::kAny, "One entry for each coordinate.")),
+      Required(Number("domain.balls[].radius", "of the coordinates", kNotNegative, "The largest distance.")),
+      Optional(List("domain.inequalities", Between(0, 1000), "Further bounds: a weighted sum of coordinates."), "[]"),
+      Map("domain.inequalities[]", "One inequality: sum of coefficient times coordinate <= bound.", ReadInequality),
+      Required(Map("domain.inequalities[].coefficients", "By name. The others are zero; at least one is not zero.")),
+      Number("domain.inequalities[].coefficients.<variable>", "", kReal, "The coefficient of this coordinate."),
+      Required(Number("domain.inequalities[].bound", "of the sum", kReal, "The largest admissible value of the sum.")),
+  };
+}
+
+void ReadLipschitzByNames(const Document& file, const std::string& key, TaskDraft& draft) {
+  const NominalModel& model = *draft.problem.model;
+  const std::vector<std::string> variables = draft.scope.variables;
+  Eigen::MatrixXd& lipschitz = draft.problem.declaration.lipschitz;
+  lipschitz.setZero(model.num_states(), model.num_variables());
+  for (const std::string& row : file.KeysOf(key))
+    for (const std::string& column : file.KeysOf(key + "." + row))
+      lipschitz(IndexOf(variables, row), IndexOf(variables, column)) = file.Number(key + "." + row + "." + column);
+}
+
+void ReadLipschitzMatrix(const Document& file, const std::string& key, TaskDraft& draft) {
+  const int states = draft.problem.model->num_states();
+  if (file.Count(key) != states)
+    file.Fail(key, "has " + std::to_string(file.Count(key)) + " rows, has to have " + std::to_string(states) +
+                       ", one a state");
+  draft.problem.declaration.lipschitz = ReadMatrix(file, key);
+}
+
+std::vector<Key> DeclarationKeys() {
+  return {
+      Required(Map("declaration", "The declared bounds on the residual.")),
+      Required(Map("declaration.lipschitz",
+                   "L by names: |r_k(z) - r_k(z')| <= sum over l of L_kl |z_l - z'_l|. What is not named is zero.",
+                   ReadLipschitzByNames)),
+      Map("declaration.lipschitz.<state>", "Row k: the residual of this state."),
+      Number("declaration.lipschitz.<state>.<variable>", "of the state per that of the coordinate", kNotNegative,
+             "L_kl: the largest change of the residual per unit of this coordinate."),
+      Required(Vectors("declaration.lipschitz", "of the state per that of the coordinate", kNotNegative,
+                       Between(1, kMaxStates), Size::kVariables,
+                       "L as a matrix: one row for each state, one entry for each state and input.",
+                       ReadLipschitzMatrix)),
+      Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
+                      "sigma: the largest error of a recorded successor, in addition to its last bit.",
+                      [](const Document& file, const std::string& key, TaskDraft& draft) {
+                        draft.problem.declaration.noise_bound = file.Vector(key);
+                      })),
+      Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
+                      "w: in each step the true successor differs from f0 + r by at most this, by any value, which may "
+                      "be another in each step. It is apart from noise_bound, the error of measurement.",
+                      [](const Document& file, const std::string& key, TaskDraft& draft) {
+                        draft.problem.declaration.disturbance = file.Vector(key);
+                      }),
+               "zeros"),
+      Required(Text("transitions",
+                    "CSV of observed one-step transitions, relative to this file: a column for each state, "
+                    "each input and each `<state>_next`, all inside the domain, at least one row.",
+                    [](const Document& file, const std::string& key, TaskDraft& draft) {
+                      draft.transitions = RelativeTo(file.path(), file.Text(key));
+                    })),
+  };
+}
+
+void ReadInitialSet(const Document& file, const std::string& key, TaskDraft& draft) {
+  const std::string center = key + ".center", half_width = key + ".half_width";
+  draft.config.initial_set = Box::FromCenter(file.Vector(center), file.Vector(half_width));
+  file.Read(center, draft.config.robot.start);
+  file.Read(half_width, draft.config.planner.initial_half_width);
+}
+
+void ReadRest(const Document& file, const std::string& key, TaskDraft& draft) {
+  std::vector<RestBound>& rest = draft.problem.rest;
+  for (const std::string& name : file.KeysOf(key))
+    rest.push_back({IndexOf(draft.scope.states, name), file.Number(key + "." + name)});
+  if (rest.empty()) file.Fail(key, "names no state, so everything would be standing");
+  std::ranges::sort(rest, {}, &RestBound::coordinate);
+  draft.rest = rest;
+}
+
+void SetProjection(const Document& file, const std::string& key, Eigen::MatrixXd projection, TaskDraft& draft) {
+  for (Eigen::Index i = 0; i < projection.rows(); ++i)
+    if (projection.row(i).isZero(0)) file.Fail(Entry(key, i), "is zero, which sees no state");
+  for (const int angle : draft.problem.model->angles())
+    if (!projection.col(angle).isZero(0))
+      file.Fail(key, "depends on " + draft.scope.states[ToSize(angle)] +
+                         ", which is one of model.angles: how often an angle has turned is not known");
+  draft.scope.safety_dim = static_cast<int>(projection.rows());
+  draft.problem.projection = std::move(projection);
+}
+
+Eigen::MatrixXd ProjectionTo(std::span<const std::string> names, const std::vector<std::string>& states) {
+  Eigen::MatrixXd projection = Eigen::MatrixXd::Zero(std::ssize(names), std::ssize(states));
+  for (Eigen::Index i = 0; i < projection.rows(); ++i) projection(i, IndexOf(states, names[ToSize(i)])) = 1;
+  return projection;
+}
+
+void ReadProjectionByNames(const Document& file, const std::string& key, TaskDraft& draft) {
+  SetProjection(file, key, ProjectionTo(file.Names(key), draft.scope.states), draft);
+}
+
+void ReadProjectionMatrix(const Document& file, const std::string& key, TaskDraft& draft) {
+  SetProjection(file, key, ReadMatrix(file, key), draft);
+}
+
+// @throws ConfigError unless `of` is the size of a part's point.
+void RequirePointSize(const Document& file, const std::string& key, Eigen::Index size, Eigen::Index of) {
+  if (size != of)
+    file.Fail(key, "has " + std::to_string(size) + " entries, has to have " + std::to_string(of) +
+                       ", as many as the first point of the body");
+}
+
+// The expressions of one point.
+std::vector<ExpressionText> ReadPlace(const Document& file, const std::string& key) {
+  std::vector<ExpressionText> place;
+  for (int k = 0; k < file.Count(key); ++k) place.push_back(file.Expression(Entry(key, k)));
+  return place;
+}
+
+// `size` is that of the body's points, 0 before the first.
+BodyPart ReadPart(const Document& file, const std::string& key, Eigen::Index& size) {
+  if (const std::size_t kinds = file.KeysOf(key).size(); kinds != 1)
+    file.Fail(key, "has " + std::to_string(kinds) + " keys, has to have one of disc, hull");
+  const bool is_disc = Has(file, key, "disc");
+  const std::string shape = key + (is_disc ? ".disc" : ".hull"), at = shape + (is_disc ? ".at" : ".points"),
+                    places = shape + (is_disc ? ".place" : ".places");
+  const bool has_points = Has(file, shape, is_disc ? "at" : "points");
+  if (has_points == Has(file, shape, is_disc ? "place" : "places"))
+    file.Fail(shape, has_points ? "has points in the robot's frame and at expressions; delete one of them"
+                                : std::string("missing: ") + (is_disc ? "at or place" : "points or places"));
+  BodyPart part{{}, Has(file, shape, "radius") ? file.Number(shape + ".radius") : 0, {}};
+  const auto add = [&](Eigen::Index entries, const std::string& which) {
+    if (size == 0) size = entries;
+    RequirePointSize(file, which, entries, size);
+  };
+  if (!has_points) {
+    for (int i = 0; i < (is_disc ? 1 : file.Count(places)); ++i) {
+      const std::string which = is_disc ? places : Entry(places, i);
+      part.places.push_back(ReadPlace(file, which));
+      add(std::ssize(part.places.back()), which);
+    }
+    return part;
+  }
+  const std::vector<Eigen::VectorXd> points = is_disc ? std::vector{file.Vector(at)} : file.Vectors(at);
+  for (const Eigen::VectorXd& point : points) {
+    add(point.size(), is_disc ? at : Entry(at, std::ssize(part.points)));
+    part.points.emplace_back(Eigen::Vector3d::Zero()).head(size) = point;
+  }
+  return part;
+}
+
+// A body without a point in the robot's frame needs no frame.
+void ReadPose(const Document& file, const std::string& key, Eigen::Index size, Body& body, TaskDraft& draft) {
+  const auto& states = draft.scope.states;
+  if (!Has(file, "task.body", "pose")) {
+    if (HasFrame(body)) file.Fail(key, "missing: the states that are the position of the robot's frame");
+    draft.scope.safety_dim = static_cast<int>(size);
+    draft.problem.projection = Eigen::MatrixXd::Zero(size, std::ssize(states));
+    return;
+  }
+  const std::vector<std::string> pose = file.Names(key);
+  if (const Eigen::Index names = std::ssize(pose); names == size + 1)
+    body.heading = IndexOf(states, pose.back());
+  else if (names != size)
+    file.Fail(key, "has " + std::to_string(names) + " entries, has to have " + std::to_string(size) +
+                       ", as many as the points of the body, or one more, the heading");
+  SetProjection(file, key, ProjectionTo(std::span(pose).first(ToSize(size)), states), draft);
+}
+
+void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
+  if (draft.scope.safety_dim != 0) file.Fail(key, "the task has task.projection too; delete one of them");
+  Body body{.heading = -1, .parts = {}};
+  Eigen::Index size = 0;
+  int points = 0;
+  for (int i = 0; i < file.Count(key + ".parts"); ++i)
+    points += body.parts.emplace_back(ReadPart(file, Entry(key + ".parts", i), size)).num_points();
+  if (points > kMaxBodyPoints)
+    file.Fail(key + ".parts",
+              "have " + std::to_string(points) + " points, which is outside " + Between(1, kMaxBodyPoints).text());
+  ReadPose(file, key + ".pose", size, body, draft);
+  draft.problem.body = std::move(body);
+}
+
+void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft) {
+  // Load lengthens the period by what the gate's options, which are not read yet, allow a step.
+  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = draft.config.period};
+  const bool turns = draft.problem.body.heading >= 0;
+  for (const auto& [name, member] :
+       {std::pair{".turn_rate", &forereach::Between::turn_rate}, {".turn_acceleration", &Between::turn_acceleration}}) {
+    const bool is_given = Has(file, key, name + 1);
+    if (turns != is_given)
+      file.Fail(key + name, turns ? "missing: task.body has a heading, so the bound is needed"
+                                  : "is for a body with a heading, the last name of task.body.pose");
+    if (is_given) between.*member = file.Number(key + name);
+  }
+  draft.problem.between = std::move(between);
+  draft.config.says_between = true;
+}
+
+// A row of an obstacle's kind: what `make` gives of the map at `key` is one of the task's obstacles.
+template <class Make>
+Key ObstacleKind(const char* name, const char* meaning, Make make) {
+  return Map(std::string("task.obstacles[].") + name, meaning,
+             [make](const Document& file, const std::string& key, TaskDraft& draft) {
+               draft.config.obstacles.push_back(make(file, key));
+             });
+}
+
+Obstacle ReadCircle(const Document& file, const std::string& key) {
+  return Obstacle::Circle(file.Vector(key + ".center"), file.Number(key + ".radius"));
+}
+
+Obstacle ReadAxisBox(const Document& file, const std::string& key) {
+  const Box box = ReadBox(file, key);
+  return Obstacle::AxisBox(box.lower(), box.upper());
+}
+
+Obstacle ReadPolygon(const Document& file, const std::string& key) {
+  return Obstacle::Polygon(file.Vectors(key + ".vertices"));
+}
+
+Obstacle ReadHalfPlane(const Document& file, const std::string& key) {
+  return Obstacle::HalfSpace(file.Vector(key + ".normal"), file.Number(key + ".offset"));
+}
+
+// Microseconds of a time in seconds; nothing is lost of a window between these two.
+std::int64_t MicrosecondsDown(double seconds) { return static_cast<std::int64_t>(std::floor(MulDown(seconds, 1e6))); }
+std::int64_t MicrosecondsUp(double seconds) { return static_cast<std::int64_t>(std::ceil(MulUp(seconds, 1e6))); }
+
+// The obstacle was read before.
+void ReadMotion(const Document& file, const std::string& key, TaskDraft& draft) {
+  ObstacleMotion motion;
+  motion.velocity.head(draft.scope.safety_dim) = file.Vector(key + ".velocity");
+  for (const auto& [name, member] : {std::pair{".uncertainty", &ObstacleMotion::uncertainty},
+                                     {".growth", &ObstacleMotion::growth},
+                                     {".growth_rate", &ObstacleMotion::growth_rate}})
+    if (Has(file, key, name + 1)) motion.*member = file.Number(key + name);
+  const std::string from = key + ".from", until = key + ".until";
+  if (Has(file, key, "from")) motion.from_us = MicrosecondsDown(file.Number(from));
+  if (Has(file, key, "until")) motion.until_us = MicrosecondsUp(file.Number(until));
+  if (Has(file, key, "from") && Has(file, key, "until"))
+    RequireOrdered(file, file.Number(from), file.Number(until), from, until);
+  Obstacle& obstacle = draft.config.obstacles.back();
+  obstacle = obstacle.Moving(motion);
+}
+
+void ReadObstacle(const Document& file, const std::string& key, TaskDraft& draft) {
+  const bool moves = Has(file, key, "motion");
+  if (const std::size_t kinds = file.KeysOf(key).size() - (moves ? 1 : 0); kinds != 1)
+    file.Fail(key,
+              "has " + std::to_string(kinds) + " keys of a shape, has to have one of circle, box, polygon, half_plane");
+  if (moves) ReadMotion(file, key + ".motion", draft);
+}
+
+// At least one of both bounds.
+void ReadLimit(const Document& file, const std::string& key, TaskDraft& draft) {
+  const std::string least = key + ".at_least", most = key + ".at_most";
+  const bool has_least = Has(file, key, "at_least"), has_most = Has(file, key, "at_most");
+  Limit limit{.name = file.Text(key + ".name"), .that = file.Expression(key + ".that")};
+  if (has_least) limit.at_least = file.Number(least);
+  if (has_most) limit.at_most = file.Number(most);
+  if (!has_least && !has_most) file.Fail(key, "bounds nothing, has to have at_most, at_least or both");
+  if (has_least && has_most) RequireOrdered(file, limit.at_least, limit.at_most, least, most);
+  std::vector<Limit>& limits = draft.problem.limits;
+  if (const auto other = std::ranges::find(limits, limit.name, &Limit::name); other != limits.end())
+    file.Fail(key + ".name", limit.name + " is the name of " + Entry("task.limits", other - limits.begin()) + ", too");
+  limits.push_back(std::move(limit));
+}
+
+void CheckTask(const Document& file, const std::string& key, TaskDraft& draft) {
+  const Problem& problem = draft.problem;
+  if (draft.scope.safety_dim == 0) file.Fail(key + ".projection", "missing: the task needs this key, or task.body");
+  // Numbers that are each in their range may still be too large together. @throws std::invalid_argument.
+  try {
+    static_cast<void>(PlacementOf(problem));
+    static_cast<void>(LimitTest(problem));
+  } catch (const ExpressionError& error) {
+    FailAt(file.path(), error);
+  }
+}
+
+std::vector<Key> TaskKeys() {
+  return {
+      Required(Map("task", "The certification task. It has either projection or body.", CheckTask)),
+      Required(Map("task.initial_set", "X0, the set of initial states. A candidate on the bus has its own.",
+                   ReadInitialSet)),
+      Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),
+      Required(Vector("task.initial_set.half_width", "of the state", kNotNegative, Size::kStates, "Half its width.")),
+      Map("task.rest",
+          "Definition of rest: the absolute value of each state named here is at most its bound. A plan that may end "
+          "outside these bounds gets abstention D (no_stop), unless gate.require_stop is false.",
+          ReadRest),
+      Number("task.rest.<state>", "of the state", kNotNegative,
+             "Its bound, which has to hold for the whole last slice. Choose it so small that the robot's hold mode can "
+             "stop the remaining motion."),
+      Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
+            "P: the 1 to 3 states that are the coordinates of obstacles, in metres. The robot is this point.",
+            ReadProjectionByNames),
+      Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
+              "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix),
+      Map("task.body", "The robot's body, the union of its parts. Obstacles are given in its position's coordinates.",
+          ReadBody),
+      Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
+            "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point of a part has "
+            "entries. One name more is the heading, in radians: the frame turns by it in the first two coordinates. "
+            "Without it the frame does not turn. Required if a part is in the frame. If none is: any states, those in "
+            "which planner.goal is given."),
+      Required(List(
+          "task.body.parts", Between(1, kMaxBodyParts),
+          "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +
+              " points in all. A part's points are fixed in the robot's frame, or stand where expressions of the state "
+              "say, as the joints of an arm do.")),
+      Map("task.body.parts[]", "One of disc and hull."),
+      Map("task.body.parts[].disc", "A disc, or a ball: the points within a radius of one point."),
+      Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint,
+             "Its center in the robot's frame. Required without `place`."),
+      List("task.body.parts[].disc.place", Between(2, kMaxSafetyDim),
+           "Instead of `at`, the safety coordinates of its center in metres, as expressions of states, parameters and "
+           "definitions of the model; see [docs/expressions.md](../docs/expressions.md)."),
+      Expression("task.body.parts[].disc.place[]", "One coordinate."),
+      Required(Number("task.body.parts[].disc.radius", "m", kNotNegative, "Its radius.")),
+      Map("task.body.parts[].hull", "The points within a radius of the convex hull of some points."),
+      Vectors("task.body.parts[].hull.points", "m", kReal, Between(1, kMaxBodyPoints), Size::kPoint,
+              "The points in the robot's frame, in any order. Required without `places`."),
+      List("task.body.parts[].hull.places", Between(1, kMaxBodyPoints),
+           "Instead of `points`, the points by expressions, as in `disc.place`."),
+      List("task.body.parts[].hull.places[]", Between(2, kMaxSafetyDim), "The coordinates of one point."),
+      Expression("task.body.parts[].hull.places[][]", "One coordinate."),
+      Optional(Number("task.body.parts[].hull.radius", "m", kNotNegative, "The radius."), "0"),
+      Optional(Word("task.between", {"samples"},
+                    "A certificate holds at its sample instants only, as in the paper. Only with `certifier.method: "
+                    "paper` may the key be absent: forereach-certifier and the commands that certify require it "
+                    "otherwise.",
+                    [](const Document&, const std::string&, TaskDraft& draft) { draft.config.says_between = true; }),
+               "samples with `certifier.method: paper`"),
+      Map("task.between",
+          "A certificate holds at all times. These are bounds on the true motion of the robot from one sample to the "
+          "next, at most model.dt and half of gate.max_clock_error_ms later. `forereach declare --between` proposes "
+          "them.",
+          ReadBetween),
+      Required(Vector("task.between.acceleration", "m/s^2", kNotNegative, Size::kSafety,
+                      "The largest absolute second derivative of each safety coordinate, of the robot's frame and of "
+                      "every point of the body that stands at expressions.")),
+      Number("task.between.turn_rate", "rad/s", kNotNegative,
+             "The largest absolute derivative of the heading. Required if task.body has a heading."),
+      Number("task.between.turn_acceleration", "rad/s^2", kNotNegative,
+             "The largest absolute second derivative of the heading. Required if task.body has a heading."),
+      Optional(List("task.limits", Between(0, kMaxLimits),
+                    "Bounds on functions of state and input: a lateral acceleration, a power, a region to keep in. A "
+                    "plan that may exceed one gets abstention S (limit). They hold at the sample instants; nothing is "
+                    "claimed between these."),
+               "[]"),
+      Map("task.limits[]", "One limit: a function with at_most, at_least or both.", ReadLimit),
+      Required(Text("task.limits[].name",
+                    "For messages, 1 to " + std::to_string(kMaxLimitName) + " printable characters of ASCII.")),
+      Required(Expression("task.limits[].that",
+                          "The function; see [docs/expressions.md](../docs/expressions.md). It may use states, inputs, "
+                          "parameters and definitions of the model. One that uses an input holds at every sample at "
+                          "which an input is applied: all but the last.")),
+      Number("task.limits[].at_most", "of the function", kReal, "Its largest value, for every state of the slice."),
+      Number("task.limits[].at_least", "of the function", kReal, "Its least value, likewise."),
+      Required(List(
+          "task.obstacles", Between(0, kMaxObstacles),
+          "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those received on the bus count too.")),
+      Map("task.obstacles[]", "One of circle, box, polygon and half_plane, and for an obstacle that moves motion.",
+          ReadObstacle),
+      ObstacleKind("circle", "A disc; the projection has to have 2 rows.", ReadCircle),
+      Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
+      Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),
+      ObstacleKind("box", "An axis-aligned box.", ReadAxisBox),
+      Required(Vector("task.obstacles[].box.lower", "m", kReal, Size::kSafety, "Its lower corner.")),
+      Required(Vector("task.obstacles[].box.upper", "m", kReal, Size::kSafety, "Its upper corner.")),
+      ObstacleKind("polygon", "The convex hull of points; the projection has to have 2 rows.", ReadPolygon),
+      Required(Vectors("task.obstacles[].polygon.vertices", "m", kReal, Between(3, kMaxObstaclePoints), Size::kSafety,
+                       "The points, in any order.")),
+      ObstacleKind("half_plane", "A half-space: unsafe where normal . y >= offset.", ReadHalfPlane),
+      Required(Vector("task.obstacles[].half_plane.normal", "", kReal, Size::kSafety,
+                      "Points into the unsafe side; not zero.")),
+      Required(Number("task.obstacles[].half_plane.offset", "m", kReal, "In metres if the normal has length 1.")),
+      Map("task.obstacles[].motion",
+          "How the obstacle moves; its shape is that at the start of the plan, or when `forereach obstacles` starts. "
+          "Times are seconds from there. At time t the obstacle has moved by velocity t, and lies within uncertainty + "
+          "growth |t| + growth_rate t^2 / 2 of there. Only for these two commands."),
+      Required(Vector("task.obstacles[].motion.velocity", "m/s", kReal, Size::kSafety, "Its velocity.")),
+      Optional(Number("task.obstacles[].motion.uncertainty", "m", kNotNegative, "How far off it may be at time 0."),
+               "0"),
+      Optional(Number("task.obstacles[].motion.growth", "m/s", kNotNegative, "How fast this grows."), "0"),
+      Optional(Number("task.obstacles[].motion.growth_rate", "m/s^2", kNotNegative, "How fast the growth grows."), "0"),
+      Optional(Number("task.obstacles[].motion.from", "s", kWithinDecades,
+                      "The obstacle is there from this time on. It is rounded down to microseconds."),
+               "always"),
+      Optional(Number("task.obstacles[].motion.until", "s", kWithinDecades,
+                      "The obstacle is there up to this time, and after it nowhere. It is rounded up to microseconds."),
+               "always"),
+  };
+}
+
+void CheckOrder(const Document& file, const std::string&, TaskDraft& draft) {
+  const int order = draft.problem.zonotope_order, states = draft.problem.model->num_states(),
+            largest = kMaxGenerators / states - 2;
+  if (order > largest)
+    file.Fail("certifier.zonotope_order", std::to_string(order) + " is outside [1, " + std::to_string(largest) +
+                                              "] for " + std::to_string(states) + " states");
+}
+
+std::vector<Key> CertifierKeys() {
+  const OptionRows<Problem> certifier("certifier", [](TaskDraft& draft) -> Problem& { return draft.problem; });
+  return {
+      Optional(Map("certifier", "Options of the certifier.", CheckOrder), "all defaults"),
+      certifier.Word<Method>(
+          "method", {{"centred", Method::kCentred}, {"paper", Method::kPaper}}, &Problem::method,
+          "paper: Algorithm 1 of the paper, with this project's conventions; it will not change. centred: the "
+          "same with a tighter bound on the nominal model's remainder."),
+      certifier.Integer(
+          "zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
+          "rho: a slice has at most rho generators for each state. (rho + 2) times the number of states may not "
+          "exceed " +
+              std::to_string(kMaxGenerators) + "."),
+      certifier.Integer(
+          "max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
+          "The number of groups of 32 observations that one search for the tightest bound may visit. Every subset of "
+          "the observations gives a sound bound. A decision whose search reached this cap says so."),
+      certifier.Integer("max_observations", Between(1, 100'000'000), &Problem::max_observations,
+                        "The largest number of stored observations. Above it, observations that never attain the "
+                        "envelope are removed."),
+  };
+}
+
+}  // namespace
+
+std::vector<Key> ProblemKeys() {
+  std::vector<Key> keys;
+  for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys})
+    std::ranges::move(part(), std::back_inserter(keys));
+  return keys;
+}
+
+}  // namespace forereach::key_rows
