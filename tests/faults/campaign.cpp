@@ -1527,35 +1527,29 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
   std::ostringstream text;
   text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
        << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
-       << (options.allow_untried ? " --allow-untried" : "") << "`. *Forbidden* counts tries with one of these:\n"
-       << "- the robot executed an uncertified plan, a control that is not of its plan, a control outside its "
-          "slice, or one that was withdrawn;\n"
-       << "- a candidate was answered twice, or was counted and not answered (not checked where messages are made to "
-          "be lost);\n"
-       << "- a process ended unexpectedly, or did not end properly within 5 s of SIGTERM;\n"
-       << "- the certifier did not latch a jump of its clock or a state outside its slice, certified before the reset, "
-          "forgot a\n"
-       << "  fault at a restart, or certified while it could not write faults;\n"
-       << "- a plan was certified under other obstacles than the perceived ones, or on states of a clock that is off;\n"
-       << "- a required refusal or message was missing;\n"
-       << "- the logs and the database disagreed at the end;\n"
-       << "- a process grew by 48 MB under raw datagrams.\n"
-       << "\n"
-       << "*Lost* counts events that the logger had confirmed and that its log does not hold, after each try; for a "
-          "logger that\n"
-       << "ended, after the next one has repaired its logs. Events that a full disk refuses are never confirmed. `-`: "
-          "no logger ran,\n"
-       << "or its logs were removed. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier "
-          "is OK, the\n"
-       << "robot executes a newly certified plan, and the logger records. *Said why*: a process that cannot start "
-          "exits with the\n"
-       << "reason.\n"
-       << "\n"
-       << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
-  for (const Row& row : rows)
+       << (options.allow_untried ? " --allow-untried" : "") << R"(`. *Forbidden* counts tries with one of these:
+- the robot executed an uncertified plan, or a control that is not of its plan, outside its slice, or withdrawn;
+- a candidate was answered twice, or not at all where the bus loses nothing;
+- a process ended unexpectedly, or not properly within 5 s of SIGTERM;
+- the certifier did not latch a jump of its clock or a state outside its slice, certified before the reset or while it
+  could not write faults, or forgot a fault at a restart;
+- a plan was certified under other obstacles than the perceived ones, or on states of a clock that is off;
+- a required refusal or message was missing, or the logs and the database disagreed at the end;
+- a process grew by 48 MB under raw datagrams.
+
+*Lost*: events that the logger had confirmed and that its repaired logs do not hold; `-`: no logger ran, or its logs
+were removed. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK, the robot executes
+a newly certified plan, and the logger records.
+
+| fault | tries | forbidden | lost | recovered | |
+|---|---|---|---|---|---|
+)";
+  for (const Row& row : rows) {
+    const std::string said = row.said_why == 0 ? "" : std::to_string(row.said_why) + " did not start and said why; ";
     text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | "
-         << (row.lost_by_logger ? std::to_string(*row.lost_by_logger) : "-") << " | " << row.recovered << " | "
-         << row.said_why << " | " << row.remark << " |\n";
+         << (row.lost_by_logger ? std::to_string(*row.lost_by_logger) : "-") << " | " << row.recovered << " | " << said
+         << row.remark << " |\n";
+  }
   return text.str();
 }
 
