@@ -1523,11 +1523,24 @@ void Campaign::ReloadOfNoFile(Rig& rig) {
       options_.others);
 }
 
+// What is not as in a clean row, then its remark.
+std::string OutcomeInWords(const Row& row) {
+  std::string text;
+  const auto add = [&text](const std::string& part) { text += (text.empty() ? "" : "; ") + part; };
+  if (row.forbidden > 0) add("FORBIDDEN in " + std::to_string(row.forbidden));
+  if (!row.lost_by_logger) add("no log to compare");
+  if (row.lost_by_logger.value_or(0) != 0) add(std::to_string(*row.lost_by_logger) + " LOST");
+  if (row.said_why > 0) add(std::to_string(row.said_why) + " did not start and said why");
+  if (row.recovered + row.said_why != row.tries) add("only " + std::to_string(row.recovered) + " RECOVERED");
+  if (!row.remark.empty()) add(row.remark);
+  return text;
+}
+
 std::string Table(const std::vector<Row>& rows, const Options& options) {
   std::ostringstream text;
   text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
        << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
-       << (options.allow_untried ? " --allow-untried" : "") << R"(`. *Forbidden* counts tries with one of these:
+       << (options.allow_untried ? " --allow-untried" : "") << R"(`. *Forbidden* is one of these:
 - the robot executed an uncertified plan, or a control that is not of its plan, outside its slice, or withdrawn;
 - a candidate was answered twice, or not at all where the bus loses nothing;
 - a process ended unexpectedly, or not properly within 5 s of SIGTERM;
@@ -1537,19 +1550,14 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
 - a required refusal or message was missing, or the logs and the database disagreed at the end;
 - a process grew by 48 MB under raw datagrams.
 
-*Lost*: events that the logger had confirmed and that its repaired logs do not hold; `-`: no logger ran, or its logs
-were removed. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK, the robot executes
-a newly certified plan, and the logger records.
+*Lost* is an event that the logger had confirmed and that its repaired logs do not hold. *Recovered*: within 20 s, after a
+reset where a fault was latched, the certifier is OK, the robot executes a newly certified plan, and the logger records.
+**Unless its row says otherwise, nothing forbidden happened in any try, nothing was lost, and all tries recovered.**
 
-| fault | tries | forbidden | lost | recovered | |
-|---|---|---|---|---|---|
+| fault | tries | |
+|---|---:|---|
 )";
-  for (const Row& row : rows) {
-    const std::string said = row.said_why == 0 ? "" : std::to_string(row.said_why) + " did not start and said why; ";
-    text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | "
-         << (row.lost_by_logger ? std::to_string(*row.lost_by_logger) : "-") << " | " << row.recovered << " | " << said
-         << row.remark << " |\n";
-  }
+  for (const Row& row : rows) text << "| " << row.fault << " | " << row.tries << " | " << OutcomeInWords(row) << " |\n";
   return text.str();
 }
 
