@@ -721,8 +721,8 @@ class Campaign final {
           }
         },
         options_.others, true);
-    Remark(row, "no process grew by more than " + std::to_string(std::lround(std::ceil(most_grown / (1 << 20)))) +
-                    " MB in a try");
+    if (const auto megabytes = std::lround(std::ceil(most_grown / (1 << 20))); megabytes > 1)
+      Remark(row, "a process grew by " + std::to_string(megabytes) + " MB in a try");
   }
 
   // Each of the first three ended LCM's own receiver, or took it memory by the gigabyte.
@@ -1548,7 +1548,7 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
   could not write faults, or forgot a fault at a restart;
 - a plan was certified under other obstacles than the perceived ones, or on states of a clock that is off;
 - a required refusal or message was missing, or the logs and the database disagreed at the end;
-- a process grew by 48 MB under raw datagrams.
+- a process grew by 48 MB under raw datagrams (its row says so if one grew by more than 1 MB).
 
 *Lost* is an event that the logger had confirmed and that its repaired logs do not hold. *Recovered*: within 20 s, after a
 reset where a fault was latched, the certifier is OK, the robot executes a newly certified plan, and the logger records.
