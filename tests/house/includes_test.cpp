@@ -78,6 +78,16 @@ TEST_F(IncludesTest, ATreeThatKeepsTheRulesPasses) {
   EXPECT_THAT(result.text, HasSubstr("14 files, 23 includes, 0 against the arrows"));
 }
 
+TEST_F(IncludesTest, TheDocumentHasEachFolderWithItsContentAndWhatItIncludes) {
+  const std::string table = Shell("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' --table").text;
+  EXPECT_THAT(table, HasSubstr("| `forereach` | the proof as a library"));
+  EXPECT_THAT(table, testing::Not(HasSubstr("| ? |")));
+  Write("docs/architecture.md", table);  // of another tree, which includes more
+  const Output result = CheckIncludes(root_.string());
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.text, HasSubstr("docs/architecture.md:1: the table of folders differs from the sources"));
+}
+
 TEST_F(IncludesTest, ATreeWithoutSourcesIsAnError) {
   std::filesystem::remove_all(root_);
   std::filesystem::create_directories(root_);
