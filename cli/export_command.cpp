@@ -69,6 +69,18 @@ void WriteTable(const ExportArguments& options, const std::vector<std::optional<
   JoinTables(options.what.format, parts, path);
 }
 
+// What a command that was killed left there, also files that it had not named yet (NAME.part-XXXXXX).
+void RemoveFilesOf(const fs::path& directory, const std::vector<std::string>& names) {
+  std::vector<fs::path> left;
+  for (const auto& entry : fs::directory_iterator(directory))
+    if (std::ranges::any_of(names, [file = entry.path().filename().string()](const std::string& name) {
+          return file == name || file.starts_with(name + ".part-");
+        }))
+      left.push_back(entry.path());
+  std::error_code error;
+  for (const fs::path& file : left) fs::remove(file, error);
+}
+
 void Write(const ExportArguments& options, const NamedRuns& named,
            const std::vector<std::optional<ExportResult>>& results) {
   if (!IsDirectory(options, named)) {
@@ -80,8 +92,8 @@ void Write(const ExportArguments& options, const NamedRuns& named,
   fs::create_directory(made, error);
   if (error) throw OutputError(made.string() + ": cannot be made: " + error.message());
   const std::vector<std::string> names = NamesOf(options, named);
+  RemoveFilesOf(made, names);
   for (std::size_t k = 0; k < names.size(); ++k) {
-    fs::remove(made / names[k], error);  // of a command that was killed
     if (options.is_table())
       WriteTable(options, results, k, (made / names[k]).string());
     else if (results[k])

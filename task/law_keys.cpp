@@ -23,7 +23,7 @@ std::vector<Key> WaysToStop(const std::string& path, std::vector<Law> Laws::*way
   const Key::Reader read = [ways](const Document& file, const std::string& key, TaskDraft& draft) {
     (draft.config.laws.*ways).push_back(ReadLaw(file, key, draft));
   };
-  const std::string of_control = "The control, which is clipped to domain.input.";
+  const std::string of_control = "The control, clipped to domain.input.";
   return {Map(path, std::move(meaning), read), Expression(path + ".<input>", of_control),
           List(path, Between(1, kMostWays), std::move(meaning_of_list)), Map(path + "[]", "One way to stop.", read),
           Expression(path + "[].<input>", of_control)};
@@ -60,48 +60,43 @@ void CheckLaws(const Document& file, const TaskDraft& draft) {
 
 std::vector<Key> LawKeys() {
   std::vector<Key> keys{
-      Map("planner.let", "Definitions for the expressions of the planner, which may use those before them.",
-          ReadDefinitions),
+      Map("planner.let", "Definitions for these expressions, which later ones may use.", ReadDefinitions),
       Expression("planner.let.<name>",
-                 "It may use states, parameters, definitions of the model, and what `planner.hints` may use. A "
-                 "definition is left out of the expressions that may not use what it uses."),
+                 "It may use states, parameters, definitions of the model, and what `planner.hints` may use. "
+                 "Expressions that may not use what it uses do not see it."),
   };
-  std::ranges::move(
-      WaysToStop("planner.stop", &Laws::stop,
-                 "How the robot brakes: a braking tail is what the nominal model does under this law, up to "
-                 "planner.at_rest. One expression for each input, of states, parameters and definitions. The planner "
-                 "requires it. [docs/planner.md](../docs/planner.md) has examples.",
-                 "Several ways to stop. A plan ends with the first whose tail is allowed."),
-      std::back_inserter(keys));
+  std::ranges::move(WaysToStop("planner.stop", &Laws::stop,
+                               "How the robot brakes: a braking tail is what the nominal model does under this law, up "
+                               "to planner.at_rest. One expression an input, of states, parameters and definitions. "
+                               "The planner requires it ([docs/planner.md](../docs/planner.md)).",
+                               "Several ways. A plan ends with the first whose tail is allowed."),
+                    std::back_inserter(keys));
   std::ranges::move(WaysToStop("planner.emergency_stop", &Laws::emergency_stop,
                                "How the robot brakes when a plan is withdrawn. Default: planner.stop.",
-                               "Several ways. Each is sent to the certifier until one is certified."),
+                               "Several ways. Each is sent until one is certified."),
                     std::back_inserter(keys));
   std::ranges::move(
       std::vector<Key>{
           Map("planner.hints",
-              "A good control for driving in a direction. Where there is room a plan follows them "
-              "(planner.clearance_step), and a search tries them more often than others. One expression for each "
-              "input, "
-              "of what planner.stop may use, and of `desired_heading` (rad, the direction of travel in the plane of "
-              "the "
-              "first two safety coordinates; 0 or pi if there is one), `desired_speed` (m/s, in this plane) and "
-              "`desired_climb` (m/s, along the third safety coordinate). Without it the search finds controls by "
-              "chance.",
+              "A good control for driving in a direction. Where there is room a plan follows it "
+              "(planner.clearance_step); a search tries it more often than others. One expression an input, of what "
+              "planner.stop may use and of `desired_heading` (rad, the direction of travel in the first two safety "
+              "coordinates; 0 or pi if there is one), `desired_speed` (m/s, there) and `desired_climb` (m/s, in the "
+              "third). Without it the search finds controls by chance.",
               [](const Document& file, const std::string& key, TaskDraft& draft) {
                 draft.config.laws.hints = ReadLaw(file, key, draft);
               }),
-          Expression("planner.hints.<input>", "The control, which is clipped to domain.input."),
+          Expression("planner.hints.<input>", "The control, clipped to domain.input."),
           Optional(Key(Of(Key::Type::kExpression, "planner.speed",
-                          "The robot's speed in m/s, negative in reverse, of what planner.stop may use. Plans neither "
-                          "drive in reverse nor faster than planner.cruise_speed, up to a few percent.",
+                          "In m/s, negative in reverse, of what planner.stop may use. Plans neither reverse nor exceed "
+                          "planner.cruise_speed by more than a few percent.",
                           [](const Document& file, const std::string& key, TaskDraft& draft) {
                             draft.config.laws.speed = file.Expression(key);
                           })),
                    "that of the safety coordinates, whatever its direction"),
           Optional(Map("planner.at_rest",
-                       "Where a braking tail ends: the absolute value of each state named here is at most its bound. "
-                       "With `{}` a tail never ends: it has planner.tail_steps steps, for robots that cannot stand.",
+                       "Where a braking tail ends: each state named here is at most its bound in absolute value. `{}`, "
+                       "for robots that cannot stand: a tail has planner.tail_steps steps.",
                        ReadAtRest),
                    "a tenth of each bound of task.rest"),
           Number("planner.at_rest.<state>", "of the state", kPositive, "Its bound."),

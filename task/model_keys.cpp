@@ -256,36 +256,35 @@ Key ParameterRange() {
 Key AnglesKey() {
   return Optional(
       Names(kAngles, Between(0, kMaxStates), Key::Size::kStates,
-            "The states that are angles: values that differ by 2 pi are the same. Transitions and measured states may "
-            "have any of them, wrapped or not. The equations must not tell them apart, and no step may turn an angle "
-            "by three quarters of a turn or more beyond what the model says; see "
-            "[docs/expressions.md](../docs/expressions.md#angles). Beside `model.file`: instead of the file's."),
+            "The states that are angles, which may come wrapped or not. The equations must not tell turns apart, and "
+            "no step may turn one by three quarters of a turn or more beyond the model "
+            "([docs/expressions.md](../docs/expressions.md#angles)). Beside `model.file`: instead of the file's."),
       "none");
 }
 
 // Of a model as text.
 std::vector<Key> TextKeys() {
   return {
-      Map("model.states", "The states of a model as text, 1 to 16 names with their units, in this order.", ReadStates),
+      Map("model.states", "1 to 16 names with their units, in this order.", ReadStates),
       Text("model.states.<name>", "Its unit, for people: `m`, `rad/s`; `1` for a pure number."),
-      Map("model.inputs", "Its inputs, 1 to 8 names with their units, in this order."),
+      Map("model.inputs", "1 to 8 names with their units, in this order."),
       Text("model.inputs.<name>", "Its unit."),
       Map("model.parameters",
-          "Its parameters, in the units of the equations. `dt` is required: the time from one control to the next, in "
-          "(0, 60] s. Beside `model.file`: those whose values differ from the file's."),
-      Number("model.parameters.<name>", "", kReal, "The value."),
+          "In the units of the equations. `dt`, the time from one control to the next, is required, in (0, 60] s. "
+          "Beside `model.file`: those whose values differ."),
+      Number("model.parameters.<name>", "", kReal, "The value, the same at all times."),
       ParameterRange(),
-      Map("model.let", "Intermediate definitions, which the expressions behind them may use."),
+      Map("model.let", "Definitions, which later expressions may use."),
       Expression("model.let.<name>",
-                 "See [docs/expressions.md](../docs/expressions.md). It may use states, inputs, parameters and the "
-                 "definitions before it."),
-      Map("model.next", "The states after a step. A model as text has either this or `model.rate`."),
-      Expression("model.next.<state>", "The state after a step. It may use all definitions too."),
-      Map("model.rate", "The derivatives of the states in continuous time."),
-      Expression("model.rate.<state>", "The derivative of the state, in its unit per second."),
+                 "It may use states, inputs, parameters and the definitions before it "
+                 "([docs/expressions.md](../docs/expressions.md))."),
+      Map("model.next", "The states after a step. A model as text has this or `model.rate`."),
+      Expression("model.next.<state>", "It may use all definitions."),
+      Map("model.rate", "The derivatives of the states."),
+      Expression("model.rate.<state>", "In the state's unit per second."),
       Word("model.integrator", NamesIn(Integrators()),
-           "The formula that makes the next state of the rates. The model is this formula, not the solution of the "
-           "differential equation: its error belongs to the residual. Required with `model.rate`."),
+           "How the rates give the next state. The model is this formula; its error belongs to the residual. Required "
+           "with `model.rate`."),
       AnglesKey(),
   };
 }
@@ -299,10 +298,7 @@ void FailAt(const std::string& file, const ExpressionError& error) {
 
 std::vector<Key> ModelKeys() {
   std::vector<Key> keys{
-      Required(
-          Map("model",
-              "The nominal model f0: `name`, one that is compiled in, or `file`, or `states` with their equations.",
-              ReadModel)),
+      Required(Map("model", "The nominal model f0: `name`, `file`, or `states` with their equations.", ReadModel)),
       Word("model.name", NamesIn(Models()), "A compiled model."),
       Number("model.dt", "s", kStep, "The time from one control to the next. Required with `model.name`."),
   };
@@ -311,10 +307,9 @@ std::vector<Key> ModelKeys() {
       keys.push_back(OnlyFor(std::string(model.name),
                              Required(Number("model." + std::string(parameter.name), std::string(parameter.unit),
                                              UpTo(parameter.most), std::string(parameter.meaning)))));
-  keys.push_back(
-      Text("model.file",
-           "A model file, relative to this file's directory or to the installed config directory, for example "
-           "`models/unicycle.yaml`. It has one map, `model`, with a model as text."));
+  keys.push_back(Text("model.file",
+                      "A model file, relative to this file or to the installed config directory: "
+                      "`models/unicycle.yaml`. It has one map, `model`, with a model as text."));
   std::ranges::move(TextKeys(), std::back_inserter(keys));
   return keys;
 }

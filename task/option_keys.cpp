@@ -38,74 +38,65 @@ std::vector<Key> GateKeys() {
   const OptionRows<GateOptions> gate("gate", [](TaskDraft& draft) -> GateOptions& { return draft.config.gate; });
   using Source = ObstaclesSource;
   return {
-      Optional(Map("gate", "What the certifier accepts from the bus.", CheckGate), "all defaults"),
+      Optional(Map("gate", "What the certifier accepts from the bus.", CheckGate), "{}"),
       gate.Number("max_age_ms", "ms", UpTo(kHourMs), &GateOptions::max_age_ms,
-                  "A candidate older than this is rejected as stale."),
+                  "An older candidate is rejected as stale."),
       gate.Number("max_ahead_ms", "ms", Between(0, kHourMs), &GateOptions::max_ahead_ms,
-                  "A candidate stamped further ahead of the certifier's clock is rejected as from the future."),
+                  "A candidate stamped further ahead of the certifier's clock is rejected."),
       gate.Number("certificate_lifetime_ms", "ms", UpTo(kHourMs), &GateOptions::certificate_lifetime_ms,
                   "Execution has to begin within this time of the certificate."),
       gate.Number("decision_budget_ms", "ms", Between(0, kHourMs), &GateOptions::decision_budget_ms,
-                  "The time budget of a decision, including its transport to the robot. A candidate that starts sooner "
-                  "is answered ABSTAIN_DEADLINE without being certified."),
+                  "For a decision and its transport to the robot. A candidate that starts sooner is answered "
+                  "ABSTAIN_DEADLINE without being certified."),
       gate.Integer("queue", Between(1, 65536), &GateOptions::queue,
-                   "The largest number of waiting candidates. Above it the oldest is rejected."),
+                   "Waiting candidates at most. Above it the oldest is rejected."),
       gate.Word<bool>("mode", {{"enforce", false}, {"shadow", true}}, &GateOptions::shadow,
-                      "shadow: decide and count as usual, but certify nothing. A plan that would be certified is "
-                      "rejected with cause shadow."),
+                      "shadow: decide and count, but certify nothing: plans are rejected with cause shadow."),
       gate.Word<bool>("advice", {{"none", false}, {"send", true}}, &GateOptions::advises,
-                      "send: after an abstention S or D, when there is nothing else to do, the certifier says on "
+                      "send: after an abstention S or D the certifier, if it has nothing else to do, says on "
                       "bus.channels.advice what would have helped, and the planner plans by it."),
       gate.Word<bool>("arming", {{"robot_state", true}, {"none", false}}, &GateOptions::needs_robot_state,
                       "robot_state: certify only while the robot's state is received, and latch a fault when it is "
                       "lost. none: for a certifier without a robot."),
       gate.Number("robot_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::robot_timeout_ms,
-                  "The robot's state counts as lost after this time without one."),
+                  "After this time without one the robot's state is lost."),
       gate.Number("max_clock_jump_ms", "ms", UpTo(kHourMs), &GateOptions::max_clock_jump_ms,
-                  "If the wall clock moves by more than this relative to the monotonic clock, a fault is latched."),
-      Optional(gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
-                           "How far step t of a plan may be from `start_utime` + t `step_us`, on the clock that stamps "
-                           "the obstacles. Half of it is for the robot: its guard stops a plan at a step that is "
-                           "further off on the robot's own clock, or that comes later than that after the step before. "
-                           "The other half is for the difference between the clocks of the robot and of the obstacles' "
-                           "sender. Moving obstacles need this key. With it, a robot's state or obstacles that arrive "
-                           "further than this from their stamp, less `bus.delay_ms`, keep the certifier from "
-                           "certifying until one arrives inside."),
-               "no obstacle may move"),
-      Optional(gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
-                                 "bus: the obstacles are task.obstacles and those of the last OBSTACLES message; "
-                                 "nothing is certified before the first message or while there are none. task: the "
-                                 "obstacles are task.obstacles, and OBSTACLES is refused. "
-                                 "forereach-certifier and `forereach run` do not start without this key."),
-               "not said"),
+                  "If the wall clock moves by more against the monotonic clock, a fault is latched."),
+      Optional(
+          gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
+                      "How far step t of a plan may be from `start_utime` + t `step_us`, on the clock that stamps the "
+                      "obstacles. Half is for the robot: its guard stops a plan at a step that is further off on its "
+                      "own clock or from the step before. Half is for the clocks of robot and obstacles' sender. "
+                      "Moving obstacles need this key. A robot's state or obstacles that arrive further from their "
+                      "stamp, less `bus.delay_ms`, keep the certifier from certifying until one arrives inside."),
+          "no obstacle may move"),
+      gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
+                        "bus: task.obstacles and those of the last OBSTACLES message; nothing is certified "
+                        "before the first one or while they are unknown. task: task.obstacles alone; "
+                        "OBSTACLES is refused. forereach-certifier and `forereach run` require this key."),
       gate.Number("obstacles_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_timeout_ms,
-                  "With `obstacles: bus`: the obstacles become unknown this long after the stamp of the last message. "
-                  "Send the whole set at least three times in this period."),
-      Optional(gate.Number("obstacles_lost_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_lost_ms,
-                           "Required with `obstacles: bus`, and at least 1.5 times obstacles_timeout_ms, because with "
-                           "keys a sender that restarts counts only after obstacles_timeout_ms. When the obstacles "
-                           "have been unknown for so long, the plans under way are withdrawn: the robot makes an "
-                           "emergency stop, which no certificate covers. It is the time that a robot may drive among "
-                           "obstacles that nobody sees."),
-               "not said"),
+                  "With `obstacles: bus`: they become unknown this long after the stamp of the last message. Send the "
+                  "whole set at least three times in this period."),
+      gate.Number("obstacles_lost_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_lost_ms,
+                  "Required with `obstacles: bus`, at least 1.5 times obstacles_timeout_ms. When the "
+                  "obstacles have been unknown for so long, plans under way are withdrawn: an emergency stop, "
+                  "which no certificate covers. For so long a robot may drive among obstacles that nobody sees."),
       Word("gate.obstacles_lost_ms", {"never"},
-           "A robot whose obstacles are unknown executes its plan to the end, through whatever has come there.",
+           "The robot executes its plan to the end, through whatever has come there.",
            [](const Document&, const std::string&, TaskDraft& draft) {
              draft.config.gate.obstacles_lost_ms = kNeverLost;
            }),
       gate.Word<bool>("learn", {{"executed", true}, {"none", false}}, &GateOptions::learns,
-                      "executed: transitions that the robot reports are added to the observations while it drives; "
-                      "declaration.noise_bound has to cover their errors, and declaration.disturbance what disturbs "
-                      "them. none: only the file's transitions are used."),
+                      "executed: transitions that the robot reports become observations; declaration.noise_bound and "
+                      "declaration.disturbance have to cover them. none: only the file's."),
       Optional(Word("gate.require_stop", {"true", "false"},
-                    "true: only plans that provably end at rest, by task.rest, are certified. false: a plan may end in "
-                    "motion.",
+                    "true: certify only plans that provably end at rest, by task.rest. false: they may end in motion.",
                     ReadRequireStop),
                "true with task.rest, otherwise false"),
-      gate.File("state", &GateOptions::state,
-                "The directory, relative to this file, that stores a latched fault and the transitions that contradict "
-                "a declaration across restarts. `--state` takes precedence. Each robot needs its own directory, on a "
-                "disk that keeps its content when the machine restarts."),
+      gate.File(
+          "state", &GateOptions::state,
+          "Directory, relative to this file, for what survives a restart: a latched fault, and transitions that "
+          "contradict a declaration. `--state` takes precedence. Each robot needs its own, on a disk that keeps it."),
   };
 }
 
@@ -114,13 +105,13 @@ std::vector<Key> RealtimeKeys() {
       "realtime", [](TaskDraft& draft) -> RealtimeOptions& { return draft.config.realtime; });
   using Lock = RealtimeOptions::Lock;
   return {
-      Optional(Map("realtime", "Real-time options of the certifier."), "all defaults"),
+      Optional(Map("realtime", "Real-time options of the certifier."), "{}"),
       realtime.Word<Lock>("lock_memory", {{"no", Lock::kNo}, {"try", Lock::kTry}, {"require", Lock::kRequire}},
                           &RealtimeOptions::lock_memory,
-                          "Keep its memory from being swapped out. try: continue with a warning if it is not allowed."),
-      realtime.Integer("fifo_priority", Between(0, 99), &RealtimeOptions::fifo_priority,
-                       "Priority under SCHED_FIFO; 0 does not change the scheduler. If the priority is not allowed, "
-                       "the certifier does not start."),
+                          "Keep memory from being swapped out. try: with a warning if it is not allowed."),
+      realtime.Integer(
+          "fifo_priority", Between(0, 99), &RealtimeOptions::fifo_priority,
+          "Priority under SCHED_FIFO; 0 keeps the scheduler. If it is not allowed, the certifier does not start."),
   };
 }
 
@@ -143,7 +134,7 @@ constexpr std::array kChannels{
     ChannelRow{"status", &BusOptions::status, "certifier_status_v3_t, the certifier's heartbeat."},
     ChannelRow{"event", &BusOptions::event, "execution_event_t, events of the robot's guard."},
     ChannelRow{"logger_status", &BusOptions::logger_status, "logger_status_t, the logger's heartbeat."},
-    ChannelRow{"fault", &BusOptions::fault, "fault_t, why the certifier has stopped certifying."},
+    ChannelRow{"fault", &BusOptions::fault, "fault_t, why nothing is certified."},
     ChannelRow{"command", &BusOptions::command, "command_t, from an operator: reset, reload."},
 };
 
@@ -159,26 +150,25 @@ std::vector<Key> BusKeys() {
   const OptionRows<BusOptions> channels("bus.channels",
                                         [](TaskDraft& draft) -> BusOptions& { return draft.config.bus; });
   std::vector<Key> keys{
-      Optional(Map("bus", "The bus and its channels."), "all defaults"),
-      bus.Text("url", &BusOptions::url,
-               "Address of the bus in LCM's form: multicast group and port, options `ttl` and `recv_buf_size`. "
-               "`--lcm-url` takes precedence."),
-      bus.Number(
-          "delay_ms", "ms", Between(0, kHourMs), &BusOptions::delay_ms,
-          "The longest time from a message's stamp to its arrival at the certifier if all clocks agree: what the "
-          "sender does between them, the network, and the wait for a processor. With gate.max_clock_error_ms, "
-          "what arrives later by more than that is taken for the message of a clock that is behind. A clock "
-          "that is behind by less than this may stay unnoticed, so declare no more than is needed."),
+      Optional(Map("bus", "The bus and its channels."), "{}"),
+      bus.Text(
+          "url", &BusOptions::url,
+          "In LCM's form: multicast group and port, options `ttl` and `recv_buf_size`. `--lcm-url` takes precedence."),
+      bus.Number("delay_ms", "ms", Between(0, kHourMs), &BusOptions::delay_ms,
+                 "The longest time from a message's stamp to its arrival at the certifier if all clocks agree. With "
+                 "gate.max_clock_error_ms, what arrives later by more than that is taken for that of a clock that "
+                 "is behind. One that is behind by less may stay unnoticed, so declare no more than is needed."),
       Optional(bus.Text("name", &BusOptions::name,
-                        "Name of the bus, which is part of every signature: a message signed for one bus is refused on "
-                        "another. All processes of a robot need the same name."),
+                        "Part of every signature: a message for one bus is refused on another. All processes of a "
+                        "robot need the same name."),
                "address and port of the URL"),
-      Optional(bus.File("key", &BusOptions::key,
-                        "Directory of keys, or one role's key file, relative to this file. With it, every message has "
-                        "to be signed by the role that owns its channel. `forereach keygen` makes the directory; "
-                        "`--key` takes precedence."),
-               "none, nothing is signed"),
-      Optional(Map("bus.channels", "Names of the channels, all different.", RequireDifferentChannels), "all defaults"),
+      Optional(
+          bus.File(
+              "key", &BusOptions::key,
+              "Directory of keys, or one role's file, relative to this file. Then every message has to be signed by "
+              "the role that owns its channel. `forereach keygen` makes the directory; `--key` takes precedence."),
+          "nothing is signed"),
+      Optional(Map("bus.channels", "Names of the channels, all different.", RequireDifferentChannels), "{}"),
   };
   for (const ChannelRow& channel : kChannels)
     keys.push_back(channels.Channel(channel.name, channel.member, channel.meaning));
@@ -201,43 +191,36 @@ std::vector<Key> PlannerKeys() {
   const OptionRows<PlannerOptions> planner("planner",
                                            [](TaskDraft& draft) -> PlannerOptions& { return draft.config.planner; });
   std::vector<Key> keys{
-      Optional(Map("planner", "The planner.", CheckPlanner), "all defaults"),
-      planner.OneOf("source", {"ompl", "policy"}, &PlannerOptions::source,
-                    "ompl: a search around the obstacles. policy: blocks of a learned policy of the bicycle, which "
-                    "ignores obstacles; algorithm, clearances and seed have no effect, progress_steps is at most the "
-                    "length of a block, and the speed is at most 10 m/s."),
-      planner.File("policy", &PlannerOptions::policy,
-                   "The policy's file, relative to this one; required for `source: policy`."),
+      Optional(Map("planner", "The planner.", CheckPlanner), "{}"),
+      planner.OneOf(
+          "source", {"ompl", "policy"}, &PlannerOptions::source,
+          "ompl: a search around the obstacles. policy: blocks of a learned policy of the bicycle, which ignores "
+          "obstacles, algorithm, clearances and seed; progress_steps is at most a block, the speed at most 10 m/s."),
+      planner.File("policy", &PlannerOptions::policy, "Its file, relative to this one; required for `source: policy`."),
       planner.OneOf("algorithm", {"kpiece", "est", "pdst", "rrt", "sst"}, &PlannerOptions::algorithm,
                     "The OMPL control planner."),
-      Optional(planner.Vector("goal", "m", kReal, Size::kSafety, &PlannerOptions::goal,
-                              "The robot's goal, in the safety coordinates."),
+      Optional(planner.Vector("goal", "m", kReal, Size::kSafety, &PlannerOptions::goal, "In the safety coordinates."),
                "no goal"),
       planner.Number("goal_radius", "m", kPositive, &PlannerOptions::goal_radius,
                      "Within this distance the goal is reached."),
       planner.Number("clearance", "m", kNotNegative, &PlannerOptions::clearance,
                      "Obstacles are grown by this for planning."),
-      planner.Number(
-          "clearance_step", "m", kNotNegative, &PlannerOptions::clearance_step,
-          "Added to it after each abstention S of one planning round. A plan that follows the hints keeps eight times "
-          "this more."),
+      planner.Number("clearance_step", "m", kNotNegative, &PlannerOptions::clearance_step,
+                     "Added after each abstention S of a planning round. A plan that follows the hints keeps eight "
+                     "times this more."),
       planner.Integer("progress_steps", Between(1, kMaxSteps), &PlannerOptions::progress_steps,
                       "Controls before the braking tail."),
       planner.Integer("tail_steps", Between(0, kMaxSteps), &PlannerOptions::tail_steps,
                       "Longest braking tail; with progress_steps at most " + std::to_string(kMaxSteps) + "."),
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
-                      "A candidate starts this many steps after the state it was planned from."),
-      planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates,
-                      "The largest number of candidates for one start."),
+                      "A candidate starts so many steps after the state it was planned from."),
+      planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates, "The most for one start."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
-                     "What the search expects of the robot's acceleration and deceleration."),
+                     "Acceleration and deceleration that the search expects of the robot."),
       planner.Number("time_limit_ms", "ms", UpTo(kHourMs), &PlannerOptions::time_limit_ms,
-                     "The time limit of one query of the planner, counted in steps of the model, 400 a millisecond. A "
-                     "query with a "
-                     "model that takes longer for a step takes longer."),
-      planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed,
-                      "The seed of the planner's random numbers."),
+                     "Of one query, counted in steps of the model, 400 a millisecond; slow models take longer."),
+      planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed, "Of the planner's random numbers."),
       Optional(planner.Vector("initial_half_width", "of the state", kNotNegative, Size::kStates,
                               &PlannerOptions::initial_half_width, "Half the width of each candidate's X0."),
                "as task.initial_set"),
@@ -248,9 +231,8 @@ std::vector<Key> PlannerKeys() {
 
 Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
   Key key = robot.OneOf("disturbance", {"none", "random", "adversarial"}, &RobotOptions::disturbance,
-                        "What disturbs each step, within declaration.disturbance. random: each state by a uniform "
-                        "value of its own. adversarial: each state by its bound, with signs that stay for 1 to 32 "
-                        "steps.");
+                        "In each step, within declaration.disturbance. random: of each state a uniform value. "
+                        "adversarial: of each state its bound, with signs that stay for 1 to 32 steps.");
   key.read = [read = key.read](const Document& file, const std::string& at, TaskDraft& draft) {
     read(file, at, draft);
     if (draft.config.robot.disturbance != "none" && !draft.problem.declaration.IsDisturbed())
@@ -292,36 +274,35 @@ std::string StandingOfNamedModels() {
 std::vector<Key> RobotKeys() {
   const OptionRows<RobotOptions> robot("robot", [](TaskDraft& draft) -> RobotOptions& { return draft.config.robot; });
   return {
-      Optional(Map("robot", "The simulated robot."), "all defaults"),
+      Optional(Map("robot", "The simulated robot."), "{}"),
       Optional(robot.Vector("start", "of the state", kReal, Size::kStates, &RobotOptions::start, "Its initial state."),
                "the center of task.initial_set"),
       Optional(
-          Names("robot.hold", Between(0, kMaxStates), Size::kStates,
-                "The states that are zero while the robot stands: it holds its position and sets these to zero. With "
-                "`[]`, for a robot that cannot stand, it keeps its state. "
-                "Planner and simulated robot require the key or task.rest with a model as text.",
-                [](const Document& file, const std::string& key, TaskDraft& draft) {
-                  draft.config.robot.hold = file.Names(key);
-                }),
+          Names(
+              "robot.hold", Between(0, kMaxStates), Size::kStates,
+              "The states that become zero while the robot stands and holds its position. `[]`, for one that cannot "
+              "stand: it keeps its state. Planner and simulated robot require this, or task.rest with a model as text.",
+              [](const Document& file, const std::string& key, TaskDraft& draft) {
+                draft.config.robot.hold = file.Names(key);
+              }),
           "those of task.rest with a model as text" + StandingOfNamedModels()),
       Optional(
           Map("robot.emergency_stop",
-              "How the robot comes to rest by itself, whatever its plan was. The guard computes from it how many "
-              "steps a stop takes, and begins one early enough to end within what a withdrawal leaves of a plan. "
-              "While it stops, the simulated robot follows its equations with inputs of zero. States of robot.hold "
-              "that are not named here are zero at once.",
+              "How the robot comes to rest by itself. The guard computes from it how many steps a stop takes, and "
+              "begins one early enough to end within what a withdrawal leaves. The simulated robot follows its "
+              "equations meanwhile, with inputs of zero. States of robot.hold that are not named are zero at once.",
               ReadEmergencyStop),
           "all states of robot.hold are zero at once, at any speed, as no real robot can"),
       Number("robot.emergency_stop.<state>", "of the state, per second of the model", kPositive,
-             "Its absolute value falls at least so fast. The state is one of robot.hold."),
+             "Its absolute value falls at least so fast. One of robot.hold."),
       robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
-                   "Wall-clock time of one step of the model. The certifier assumes that no step of a plan takes "
-                   "longer than this or model.dt."),
+                   "Wall-clock time of a step. The certifier takes steps to last no longer than this or model.dt; with "
+                   "bounds in task.between it is at most model.dt."),
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
-                   "The run ends after this time, even if the goal is not reached."),
+                   "The run ends after it, even without the goal."),
       RobotDisturbance(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
-                    "The seed of the disturbance's random numbers."),
+                    "Of its random numbers."),
   };
 }
 
@@ -336,28 +317,25 @@ std::vector<Key> LoggerKeys() {
   const OptionRows<LoggerOptions> logger("logger",
                                          [](TaskDraft& draft) -> LoggerOptions& { return draft.config.logger; });
   return {
-      Optional(Map("logger", "The logger.", CheckLogger), "all defaults"),
-      logger.File("directory", &LoggerOptions::directory,
-                  "The directory of the event logs and the database, relative to this file."),
+      Optional(Map("logger", "The logger.", CheckLogger), "{}"),
+      logger.File("directory", &LoggerOptions::directory, "For event logs and database, relative to this file."),
       logger.Integer("queue", Between(1, 1000000), &LoggerOptions::queue,
-                     "The largest number of messages that wait for writing. Messages above it are counted as a gap."),
+                     "The most messages that wait for writing. Those above are counted as a gap."),
       logger.Number("flush_ms", "ms", UpTo(60000), &LoggerOptions::flush_ms,
-                    "The period of flushes. A killed logger loses at most the messages of this period."),
+                    "A killed logger loses at most the messages of this period."),
       logger.Number("rotate_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::rotate_mb,
-                    "A log file ends, and a new one begins, before it exceeds this size."),
+                    "A log file ends, and a new one begins, before it exceeds this."),
       logger.Number("rotate_minutes", "min", UpTo(1e6), &LoggerOptions::rotate_minutes,
-                    "A log file ends, and a new one begins, after this time."),
+                    "A log file ends, too, after this time."),
       Optional(logger.Number("quota_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::quota_mb,
-                             "The largest size of all log files in the directory together, at least rotate_mb. Above "
-                             "it the oldest ended files are deleted; if that is not enough, recording pauses."),
-               "none is deleted"),
-      logger.Number(
-          "min_free_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::min_free_mb,
-          "If less is free on the disk, recording pauses. It resumes automatically when an eighth more is free."),
+                             "All log files of the directory together, at least rotate_mb. Above it the oldest ended "
+                             "files are deleted; if that is not enough, recording pauses."),
+               "no quota"),
+      logger.Number("min_free_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::min_free_mb,
+                    "With less free on the disk recording pauses, until an eighth more is free."),
       logger.Number("unsigned_kb_per_s", "kB/s", UpTo(1e6), &LoggerOptions::unsigned_kb_per_s,
-                    "With keys: the largest rate at which unsigned messages are recorded. These are refused messages, "
-                    "kept as evidence, and messages on channels that do not belong to ForeReach. The others are "
-                    "counted. Each message counts as its size plus 1 kB."),
+                    "With keys: the largest rate at which refused messages, and those on channels that are not "
+                    "ForeReach's, are recorded; each counts as its size plus 1 kB. The others are counted."),
   };
 }
 

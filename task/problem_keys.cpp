@@ -64,8 +64,7 @@ void ReadInequality(const Document& file, const std::string& key, TaskDraft& dra
 std::vector<Key> DomainKeys() {
   return {
       Required(
-          Map("domain",
-              "Z_cert: the set on which declaration and model hold. A plan whose tube leaves it is not certified.")),
+          Map("domain", "Z_cert, where declaration and model hold. A plan whose tube leaves it is not certified.")),
       Required(Map("domain.state", "The box of states.",
                    [](const Document& file, const std::string& key, TaskDraft& draft) {
                      draft.problem.domain.state = ReadBox(file, key);
@@ -80,20 +79,19 @@ std::vector<Key> DomainKeys() {
       Required(Vector("domain.input.lower", "of the input", kReal, Size::kInputs, "Least value of each input.")),
       Required(
           Vector("domain.input.upper", "of the input", kReal, Size::kInputs, "Largest value, at least the least.")),
-      Optional(List("domain.balls", Between(0, 1000),
-                    "Further bounds: the Euclidean distance of some coordinates from a center."),
-               "[]"),
+      Optional(
+          List("domain.balls", Between(0, 1000), "Bounds on the Euclidean distance of some coordinates from a center."),
+          "[]"),
       Map("domain.balls[]", "One ball.", ReadBall),
       Required(Names("domain.balls[].coordinates", Between(1, kMaxVariables), Size::kVariables,
                      "The coordinates it bounds.")),
-      Required(
-          Vector("domain.balls[].center", "of the coordinates", kReal, Size::kAny, "One entry for each coordinate.")),
+      Required(Vector("domain.balls[].center", "of the coordinates", kReal, Size::kAny, "One entry a coordinate.")),
       Required(Number("domain.balls[].radius", "of the coordinates", kNotNegative, "The largest distance.")),
-      Optional(List("domain.inequalities", Between(0, 1000), "Further bounds: a weighted sum of coordinates."), "[]"),
-      Map("domain.inequalities[]", "One inequality: sum of coefficient times coordinate <= bound.", ReadInequality),
-      Required(Map("domain.inequalities[].coefficients", "By name. The others are zero; at least one is not zero.")),
-      Number("domain.inequalities[].coefficients.<variable>", "", kReal, "The coefficient of this coordinate."),
-      Required(Number("domain.inequalities[].bound", "of the sum", kReal, "The largest admissible value of the sum.")),
+      Optional(List("domain.inequalities", Between(0, 1000), "Bounds on a weighted sum of coordinates."), "[]"),
+      Map("domain.inequalities[]", "Sum of coefficient times coordinate <= bound.", ReadInequality),
+      Required(Map("domain.inequalities[].coefficients", "By name; the others are zero. At least one is not zero.")),
+      Number("domain.inequalities[].coefficients.<variable>", "", kReal, "Of this coordinate."),
+      Required(Number("domain.inequalities[].bound", "of the sum", kReal, "The largest value of the sum.")),
   };
 }
 
@@ -117,7 +115,7 @@ void ReadLipschitzMatrix(const Document& file, const std::string& key, TaskDraft
 
 std::vector<Key> DeclarationKeys() {
   return {
-      Required(Map("declaration", "The declared bounds on the residual.")),
+      Required(Map("declaration", "The bounds on the residual.")),
       Required(Map("declaration.lipschitz",
                    "L by names: |r_k(z) - r_k(z')| <= sum over l of L_kl |z_l - z'_l|. What is not named is zero.",
                    ReadLipschitzByNames)),
@@ -125,24 +123,23 @@ std::vector<Key> DeclarationKeys() {
       Number("declaration.lipschitz.<state>.<variable>", "of the state per that of the coordinate", kNotNegative,
              "L_kl: the largest change of the residual per unit of this coordinate."),
       Required(Vectors("declaration.lipschitz", "of the state per that of the coordinate", kNotNegative,
-                       Between(1, kMaxStates), Size::kVariables,
-                       "L as a matrix: one row for each state, one entry for each state and input.",
+                       Between(1, kMaxStates), Size::kVariables, "L as a matrix: one row a state.",
                        ReadLipschitzMatrix)),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
-                      "sigma: the largest error of a recorded successor, in addition to its last bit.",
+                      "sigma: the largest error of a recorded successor, beside its last bit.",
                       [](const Document& file, const std::string& key, TaskDraft& draft) {
                         draft.problem.declaration.noise_bound = file.Vector(key);
                       })),
       Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
-                      "w: in each step the true successor differs from f0 + r by at most this, by any value, which may "
-                      "be another in each step. It is apart from noise_bound, the error of measurement.",
+                      "w: in each step the true successor differs from f0 + r by at most this. The difference may be "
+                      "another in each step. Errors of measurement belong to noise_bound.",
                       [](const Document& file, const std::string& key, TaskDraft& draft) {
                         draft.problem.declaration.disturbance = file.Vector(key);
                       }),
                "zeros"),
       Required(Text("transitions",
-                    "CSV of observed one-step transitions, relative to this file: a column for each state, "
-                    "each input and each `<state>_next`, all inside the domain, at least one row.",
+                    "CSV of observed steps, relative to this file: a column for each state, each input and each "
+                    "`<state>_next`, all inside the domain, at least one row.",
                     [](const Document& file, const std::string& key, TaskDraft& draft) {
                       draft.transitions = RelativeTo(file.path(), file.Text(key));
                     })),
@@ -368,116 +365,107 @@ void CheckTask(const Document& file, const std::string& key, TaskDraft& draft) {
 
 std::vector<Key> TaskKeys() {
   return {
-      Required(Map("task", "The certification task. It has either projection or body.", CheckTask)),
-      Required(Map("task.initial_set", "X0, the set of initial states. A candidate on the bus has its own.",
-                   ReadInitialSet)),
+      Required(Map("task", "What to certify. It has either projection or body.", CheckTask)),
+      Required(Map("task.initial_set", "X0, the initial states. A candidate on the bus has its own.", ReadInitialSet)),
       Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),
       Required(Vector("task.initial_set.half_width", "of the state", kNotNegative, Size::kStates, "Half its width.")),
       Map("task.rest",
-          "Definition of rest: the absolute value of each state named here is at most its bound. A plan that may end "
-          "outside these bounds gets abstention D (no_stop), unless gate.require_stop is false.",
+          "What rest is: each state named here is at most its bound in absolute value. A plan that may end outside "
+          "gets abstention D (no_stop), unless gate.require_stop is false.",
           ReadRest),
       Number("task.rest.<state>", "of the state", kNotNegative,
-             "Its bound, which has to hold for the whole last slice. Choose it so small that the robot's hold mode can "
-             "stop the remaining motion."),
+             "Its bound on the whole last slice, small enough that the robot's hold mode can stop what is left."),
       Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
-            "P: the 1 to 3 states that are the coordinates of obstacles, in metres. The robot is this point.",
+            "P: the states that are the coordinates of obstacles, in metres. The robot is this point.",
             ReadProjectionByNames),
       Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
-              "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix),
-      Map("task.body", "The robot's body, the union of its parts. Obstacles are given in its position's coordinates.",
-          ReadBody),
+              "P as a matrix: one row a safety coordinate.", ReadProjectionMatrix),
+      Map("task.body", "The union of its parts. Obstacles are in its position's coordinates.", ReadBody),
       Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
-            "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point of a part has "
-            "entries. One name more is the heading, in radians: the frame turns by it in the first two coordinates. "
-            "Without it the frame does not turn. Required if a part is in the frame. If none is: any states, those in "
-            "which planner.goal is given."),
-      Required(List(
-          "task.body.parts", Between(1, kMaxBodyParts),
-          "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +
-              " points in all. A part's points are fixed in the robot's frame, or stand where expressions of the state "
-              "say, as the joints of an arm do.")),
+            "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point has entries; "
+            "one name more is the heading, in radians, by which the frame turns in the first two coordinates. Required "
+            "if a part is in the frame. If none is: the states in which planner.goal is given."),
+      Required(
+          List("task.body.parts", Between(1, kMaxBodyParts),
+               "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +
+                   " points in all. A part's points are fixed in the robot's frame, or stand where expressions say, "
+                   "as an arm's joints.")),
       Map("task.body.parts[]", "One of disc and hull."),
-      Map("task.body.parts[].disc", "A disc, or a ball: the points within a radius of one point."),
+      Map("task.body.parts[].disc", "The points within a radius of one point: a disc or a ball."),
       Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint,
-             "Its center in the robot's frame. Required without `place`."),
+             "Its center in the frame. Required without `place`."),
       List("task.body.parts[].disc.place", Between(2, kMaxSafetyDim),
-           "Instead of `at`, the safety coordinates of its center in metres, as expressions of states, parameters and "
-           "definitions of the model; see [docs/expressions.md](../docs/expressions.md)."),
+           "Instead of `at`: the safety coordinates of its center in metres, as expressions of states, parameters and "
+           "definitions of the model ([docs/expressions.md](../docs/expressions.md))."),
       Expression("task.body.parts[].disc.place[]", "One coordinate."),
       Required(Number("task.body.parts[].disc.radius", "m", kNotNegative, "Its radius.")),
       Map("task.body.parts[].hull", "The points within a radius of the convex hull of some points."),
       Vectors("task.body.parts[].hull.points", "m", kReal, Between(1, kMaxBodyPoints), Size::kPoint,
-              "The points in the robot's frame, in any order. Required without `places`."),
+              "In the frame, in any order. Required without `places`."),
       List("task.body.parts[].hull.places", Between(1, kMaxBodyPoints),
-           "Instead of `points`, the points by expressions, as in `disc.place`."),
-      List("task.body.parts[].hull.places[]", Between(2, kMaxSafetyDim), "The coordinates of one point."),
+           "Instead of `points`: by expressions, as `disc.place`."),
+      List("task.body.parts[].hull.places[]", Between(2, kMaxSafetyDim), "One point."),
       Expression("task.body.parts[].hull.places[][]", "One coordinate."),
       Optional(Number("task.body.parts[].hull.radius", "m", kNotNegative, "The radius."), "0"),
       Optional(Word("task.between", {"samples"},
-                    "A certificate holds at its sample instants only, as in the paper. Only with `certifier.method: "
-                    "paper` may the key be absent: forereach-certifier and the commands that certify require it "
-                    "otherwise.",
+                    "Certificates hold at the sample instants only, as in the paper. forereach-certifier and "
+                    "the commands that certify require this key, in one of its forms, unless the method is `paper`.",
                     [](const Document&, const std::string&, TaskDraft& draft) { draft.config.says_between = true; }),
                "samples with `certifier.method: paper`"),
       Map("task.between",
-          "A certificate holds at all times. These are bounds on the true motion of the robot from one sample to the "
-          "next, at most model.dt and half of gate.max_clock_error_ms later. `forereach declare --between` proposes "
-          "them.",
+          "Certificates hold at all times. These bound the true motion from one sample to the next, at most model.dt "
+          "and half of gate.max_clock_error_ms later. `forereach declare --between` proposes them.",
           ReadBetween),
       Required(Vector("task.between.acceleration", "m/s^2", kNotNegative, Size::kSafety,
-                      "The largest absolute second derivative of each safety coordinate, of the robot's frame and of "
-                      "every point of the body that stands at expressions.")),
+                      "The largest absolute second derivative of each safety coordinate, of the frame and of every "
+                      "point at expressions.")),
       Number("task.between.turn_rate", "rad/s", kNotNegative,
-             "The largest absolute derivative of the heading. Required if task.body has a heading."),
+             "The largest absolute derivative of the heading; required if there is one."),
       Number("task.between.turn_acceleration", "rad/s^2", kNotNegative,
-             "The largest absolute second derivative of the heading. Required if task.body has a heading."),
+             "Its largest absolute second derivative, likewise."),
       Optional(List("task.limits", Between(0, kMaxLimits),
                     "Bounds on functions of state and input: a lateral acceleration, a power, a region to keep in. A "
-                    "plan that may exceed one gets abstention S (limit). They hold at the sample instants; nothing is "
-                    "claimed between these."),
+                    "plan that may exceed one gets abstention S (limit). They hold at the sample instants only."),
                "[]"),
-      Map("task.limits[]", "One limit: a function with at_most, at_least or both.", ReadLimit),
+      Map("task.limits[]", "With at_most, at_least or both.", ReadLimit),
       Required(Text("task.limits[].name",
                     "For messages, 1 to " + std::to_string(kMaxLimitName) + " printable characters of ASCII.")),
       Required(Expression("task.limits[].that",
-                          "The function; see [docs/expressions.md](../docs/expressions.md). It may use states, inputs, "
-                          "parameters and definitions of the model. One that uses an input holds at every sample at "
-                          "which an input is applied: all but the last.")),
-      Number("task.limits[].at_most", "of the function", kReal, "Its largest value, for every state of the slice."),
-      Number("task.limits[].at_least", "of the function", kReal, "Its least value, likewise."),
-      Required(List(
-          "task.obstacles", Between(0, kMaxObstacles),
-          "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those received on the bus count too.")),
-      Map("task.obstacles[]", "One of circle, box, polygon and half_plane, and for an obstacle that moves motion.",
-          ReadObstacle),
-      ObstacleKind("circle", "A disc; the projection has to have 2 rows.", ReadCircle),
+                          "The function, of states, inputs, parameters and definitions of the model "
+                          "([docs/expressions.md](../docs/expressions.md)). With an input it is bounded at every "
+                          "sample but the last.")),
+      Number("task.limits[].at_most", "of the function", kReal, "For every state of the slice."),
+      Number("task.limits[].at_least", "of the function", kReal, "Likewise."),
+      Required(List("task.obstacles", Between(0, kMaxObstacles),
+                    "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
+      Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves.", ReadObstacle),
+      ObstacleKind("circle", "A disc; for two safety coordinates.", ReadCircle),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
       Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),
       ObstacleKind("box", "An axis-aligned box.", ReadAxisBox),
       Required(Vector("task.obstacles[].box.lower", "m", kReal, Size::kSafety, "Its lower corner.")),
       Required(Vector("task.obstacles[].box.upper", "m", kReal, Size::kSafety, "Its upper corner.")),
-      ObstacleKind("polygon", "The convex hull of points; the projection has to have 2 rows.", ReadPolygon),
+      ObstacleKind("polygon", "The convex hull of points, for two safety coordinates.", ReadPolygon),
       Required(Vectors("task.obstacles[].polygon.vertices", "m", kReal, Between(3, kMaxObstaclePoints), Size::kSafety,
-                       "The points, in any order.")),
-      ObstacleKind("half_plane", "A half-space: unsafe where normal . y >= offset.", ReadHalfPlane),
+                       "In any order.")),
+      ObstacleKind("half_plane", "A half-space, unsafe where normal . y >= offset.", ReadHalfPlane),
       Required(Vector("task.obstacles[].half_plane.normal", "", kReal, Size::kSafety,
                       "Points into the unsafe side; not zero.")),
       Required(Number("task.obstacles[].half_plane.offset", "m", kReal, "In metres if the normal has length 1.")),
       Map("task.obstacles[].motion",
-          "How the obstacle moves; its shape is that at the start of the plan, or when `forereach obstacles` starts. "
-          "Times are seconds from there. At time t the obstacle has moved by velocity t, and lies within uncertainty + "
-          "growth |t| + growth_rate t^2 / 2 of there. Only for these two commands."),
+          "At time t it has moved by velocity t, and lies within uncertainty + growth |t| + growth_rate t^2 / 2 of "
+          "there. Times are seconds from the start of the plan or of the sender (`forereach obstacles`, `run "
+          "--obstacles`); a certifier on the bus refuses this key."),
       Required(Vector("task.obstacles[].motion.velocity", "m/s", kReal, Size::kSafety, "Its velocity.")),
       Optional(Number("task.obstacles[].motion.uncertainty", "m", kNotNegative, "How far off it may be at time 0."),
                "0"),
       Optional(Number("task.obstacles[].motion.growth", "m/s", kNotNegative, "How fast this grows."), "0"),
       Optional(Number("task.obstacles[].motion.growth_rate", "m/s^2", kNotNegative, "How fast the growth grows."), "0"),
       Optional(Number("task.obstacles[].motion.from", "s", kWithinDecades,
-                      "The obstacle is there from this time on. It is rounded down to microseconds."),
+                      "It is there from this time on, rounded down to microseconds."),
                "always"),
       Optional(Number("task.obstacles[].motion.until", "s", kWithinDecades,
-                      "The obstacle is there up to this time, and after it nowhere. It is rounded up to microseconds."),
+                      "It is there up to this time, rounded up, and then nowhere."),
                "always"),
   };
 }
@@ -493,23 +481,20 @@ void CheckOrder(const Document& file, const std::string&, TaskDraft& draft) {
 std::vector<Key> CertifierKeys() {
   const OptionRows<Problem> certifier("certifier", [](TaskDraft& draft) -> Problem& { return draft.problem; });
   return {
-      Optional(Map("certifier", "Options of the certifier.", CheckOrder), "all defaults"),
-      certifier.Word<Method>(
-          "method", {{"centred", Method::kCentred}, {"paper", Method::kPaper}}, &Problem::method,
-          "paper: Algorithm 1 of the paper, with this project's conventions; it will not change. centred: the "
-          "same with a tighter bound on the nominal model's remainder."),
+      Optional(Map("certifier", "Options of the certifier.", CheckOrder), "{}"),
+      certifier.Word<Method>("method", {{"centred", Method::kCentred}, {"paper", Method::kPaper}}, &Problem::method,
+                             "paper: Algorithm 1 of the paper; it will not change. centred: the same with a tighter "
+                             "bound on the model's remainder."),
       certifier.Integer(
           "zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
           "rho: a slice has at most rho generators for each state. (rho + 2) times the number of states may not "
           "exceed " +
               std::to_string(kMaxGenerators) + "."),
-      certifier.Integer(
-          "max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
-          "The number of groups of 32 observations that one search for the tightest bound may visit. Every subset of "
-          "the observations gives a sound bound. A decision whose search reached this cap says so."),
+      certifier.Integer("max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
+                        "How many groups of 32 observations one search for the tightest bound may visit. Every subset "
+                        "gives a sound bound; a decision that met this cap says so."),
       certifier.Integer("max_observations", Between(1, 100'000'000), &Problem::max_observations,
-                        "The largest number of stored observations. Above it, observations that never attain the "
-                        "envelope are removed."),
+                        "The most that are stored. Above it, observations that never attain the envelope are removed."),
   };
 }
 

@@ -107,9 +107,13 @@ ParametricResidual ReadResidual(const Document& file, const std::string& path, c
 
 // Rows for the map `path`, each parameter a number or, if `with_ranges`, an interval.
 std::vector<Key> Rows(const std::string& path, std::vector<std::string_view> names, bool with_ranges) {
+  const auto meaning_of = [&](const std::string& key, const std::string& meaning) {
+    return with_ranges ? meaning : "As `residual." + key + "`.";
+  };
   std::vector<Key> keys{Word(path + ".name", std::move(names),
-                             "A residual of the library, for each model that has the names that it uses: states and "
-                             "inputs of the paper's car for heading_saturation, of its point mass for velocity_knee.")};
+                             meaning_of("name",
+                                        "A residual of the library, for each model that has its names: those of the "
+                                        "paper's car for heading_saturation, of its point mass for velocity_knee."))};
   const auto add = [&](const Key& number) {
     keys.push_back(number);
     if (!with_ranges) return;
@@ -120,18 +124,23 @@ std::vector<Key> Rows(const std::string& path, std::vector<std::string_view> nam
   };
   for (const auto& [residual, name, unit, range, meaning] : kParameters) {
     ResidualText text = ResidualNamed(residual);
-    add(OnlyFor(residual,
-                Optional(Number(path + "." + name, unit, range, meaning), ToText(ParameterNamed(text, name).lower))));
+    add(OnlyFor(residual, Optional(Number(path + "." + name, unit, range, meaning_of(name, meaning)),
+                                   ToText(ParameterNamed(text, name).lower))));
   }
-  keys.push_back(Map(path + ".parameters", "Parameters of a residual as text, in the units of its expressions."));
-  add(Number(path + ".parameters.<name>", "", kReal, "The value."));
-  keys.push_back(Map(path + ".let", "Intermediate definitions, which the expressions behind them may use."));
   keys.push_back(
-      Expression(path + ".let.<name>",
-                 "See [docs/expressions.md](../docs/expressions.md). It may use states and inputs, the "
-                 "parameters and definitions of the model, these parameters, and the definitions before it."));
-  keys.push_back(Map(path + ".add", "A residual as text: what the states after a step have beyond the model's."));
-  keys.push_back(Expression(path + ".add.<state>", "What is added to this state. A state that is left out has zero."));
+      Map(path + ".parameters", meaning_of("parameters", "Of a residual as text, in the units of its expressions.")));
+  add(Number(path + ".parameters.<name>", "", kReal, "The value."));
+  keys.push_back(Map(path + ".let", meaning_of("let", "Definitions, which later expressions may use.")));
+  keys.push_back(Expression(
+      path + ".let.<name>",
+      meaning_of("let.<name>",
+                 "It may use states, inputs, parameters and definitions of the model, these parameters, and the "
+                 "definitions before it ([docs/expressions.md](../docs/expressions.md)).")));
+  keys.push_back(Map(path + ".add", meaning_of("add",
+                                               "A residual as text: what the states have beyond the model's "
+                                               "after a step.")));
+  keys.push_back(
+      Expression(path + ".add.<state>", meaning_of("add.<state>", "What is added to it; zero if it is left out.")));
   return keys;
 }
 
@@ -143,8 +152,7 @@ std::vector<Key> ResidualKeys() {
   keys.insert(
       keys.begin(),
       Map("residual",
-          "The residual's equations, as text or by name, with intervals for its parameters. `forereach declare` "
-          "derives the declaration from them. The certifier does not use this key.",
+          "The residual's equations, as text or by name, for `forereach declare`. The certifier does not use them.",
           [](const Document& file, const std::string& path, TaskDraft& draft) {
             draft.config.residual = ReadResidual(file, path, draft.problem);
           }));
@@ -156,9 +164,8 @@ std::vector<Key> RobotResidualKeys() {
   names.insert(names.begin(), kNone);
   std::vector<Key> keys = Rows("robot.residual", std::move(names), false);
   keys.insert(keys.begin(),
-              {Optional(Word("robot.residual", {kNone}, "none: the robot is the nominal model."), kNone),
-               Optional(Map("robot.residual",
-                            "The difference between the real robot and the nominal model, as text or by name.",
+              {Optional(Word("robot.residual", {kNone}, "The robot is the nominal model."), kNone),
+               Optional(Map("robot.residual", "What the real robot has beyond the nominal model, as text or by name.",
                             [](const Document& file, const std::string& path, TaskDraft& draft) {
                               if (Has(file, path, "name") && file.Text(path + ".name") == kNone) return;
                               draft.config.robot_residual = ReadResidual(file, path, draft.problem);

@@ -45,22 +45,30 @@ std::string TypeText(const Key& key) {
   return "";
 }
 
-// A bar would end the cell of a Markdown table.
-std::string Escaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) escaped += c == '|' ? "\\|" : std::string(1, c);
-  return escaped;
-}
-
-bool HasRange(const Key& key) {
+bool HasNumbers(const Key& key) {
   return key.type == Type::kNumber || key.type == Type::kInteger || key.type == Type::kVector ||
          key.type == Type::kVectors;
 }
 
+// " in [0, inf) m"; no range where any finite number is allowed.
+std::string RangeText(const Key& key) {
+  std::string text;
+  if (HasNumbers(key) && key.range.text() != kReal.text())
+    text = (key.size == Size::kAny ? " in " : ", in ") + key.range.text();
+  const bool is_of_each = key.size == Size::kStates || key.size == Size::kInputs;  // "numbers, one a state"
+  if (key.unit.empty() || (key.unit.starts_with("of ") && is_of_each)) return text;
+  return text + (key.unit.starts_with("of ") ? ", unit " : text.empty() ? ", " : " ") + key.unit;
+}
+
+// Whether a row is the second form of the number before it: the least and the largest value.
+bool IsRangeOf(const Key& number, const Key& key) {
+  return key.path == number.path && number.type == Type::kNumber && key.type == Type::kVector && key.count.upper == 2;
+}
+
 std::string DefaultText(const Key& key) {
-  if (key.required) return key.only.empty() ? "required" : "required for " + key.only;
-  if (!key.fallback.empty() && !key.only.empty()) return key.fallback + ", for " + key.only;
-  return key.fallback;
+  const std::string whose = key.only.empty() ? "" : " for " + key.only;
+  if (key.required) return ", required" + whose;
+  return key.fallback.empty() ? "" : ", default" + whose + ": " + key.fallback;
 }
 
 std::vector<Key> MakeSchema(std::initializer_list<std::vector<Key> (*)()> parts) {
@@ -90,19 +98,17 @@ std::string Range::text() const {
 std::string SchemaMarkdown() {
   std::string text =
       "## Keys\n\n"
-      "A dot leads one map down. `[]` means every entry of a list, `<state>` the name of a state, `<input>` that "
-      "of an input,\n"
-      "`<variable>` that of either, `<name>` any name. Lists of numbers are in the model's order. A range with `(` or "
-      "`)` does "
-      "not contain\n"
-      "its end. If the default is empty, the key may be left out and has no value.\n"
-      "\n"
-      "| Key | Type | Unit | Range | Default | Meaning |\n"
-      "| --- | --- | --- | --- | --- | --- |\n";
-  for (const Key& key : Schema()) {
-    if (key.path.empty()) continue;
-    text += "| `" + key.path + "` | " + TypeText(key) + " | " + key.unit + " | " +
-            (HasRange(key) ? key.range.text() : "") + " | " + DefaultText(key) + " | " + Escaped(key.meaning) + " |\n";
+      "A dot leads one map down. `[]` is every entry of a list, `<state>` the name of a state, `<input>` of an input,\n"
+      "`<variable>` of either, `<name>` any name. Lists of numbers are in the model's order, each in its variable's\n"
+      "unit. A range does not contain an end with `(` or `)`. `[least, largest]` is a list of two such numbers.\n";
+  const std::span<const Key> keys = Schema();
+  for (std::size_t i = 1; i < keys.size(); ++i) {  // the first is the file
+    const Key& key = keys[i];
+    if (IsRangeOf(keys[i - 1], key)) continue;
+    const bool may_be_range = i + 1 < keys.size() && IsRangeOf(key, keys[i + 1]);
+    if (key.path.find('.') == std::string::npos) text += "\n### " + key.path + "\n\n";
+    text += "- `" + key.path + "`: " + TypeText(key) + RangeText(key) + (may_be_range ? ", or [least, largest]" : "") +
+            DefaultText(key) + ". " + key.meaning + "\n";
   }
   return text;
 }

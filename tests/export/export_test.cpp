@@ -550,6 +550,15 @@ TEST_F(ManyRunsTest, GoesOnAfterAnInterruption) {
   EXPECT_LT(Read(scratch_ / "fourth.jsonl").size(), first.size());
 }
 
+TEST_F(ManyRunsTest, WhatAKilledCommandLeftIsNoPartOfTheNextOutput) {
+  std::filesystem::create_directory(scratch_ / "tables.part-out");
+  for (const char* left : {"decisions.csv", "decisions.csv.part-a1B2c3"})
+    scratch_.Write(std::string("tables.part-out/") + left, "half a row");
+  ASSERT_EQ(ExportTo("csv", "tables", scratch_ / "night").code, 1) << "two.lcmlog cannot be read";
+  EXPECT_EQ(FilesIn(scratch_ / "tables").size(), 5u);
+  EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 135u);
+}
+
 TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {
   const std::string command = "'" FOREREACH_PROGRAM "' export '" + (scratch_ / "night") + "' --config '" + kConfig +
                               "' --format csv -o '" + (scratch_ / "tables") + "'";

@@ -721,8 +721,8 @@ class Campaign final {
           }
         },
         options_.others, true);
-    Remark(row, "no process grew by more than " + std::to_string(std::lround(std::ceil(most_grown / (1 << 20)))) +
-                    " MB in a try");
+    if (const auto megabytes = std::lround(std::ceil(most_grown / (1 << 20))); megabytes > 1)
+      Remark(row, "a process grew by " + std::to_string(megabytes) + " MB in a try");
   }
 
   // Each of the first three ended LCM's own receiver, or took it memory by the gigabyte.
@@ -1523,39 +1523,41 @@ void Campaign::ReloadOfNoFile(Rig& rig) {
       options_.others);
 }
 
+// What is not as in a clean row, then its remark.
+std::string OutcomeInWords(const Row& row) {
+  std::string text;
+  const auto add = [&text](const std::string& part) { text += (text.empty() ? "" : "; ") + part; };
+  if (row.forbidden > 0) add("FORBIDDEN in " + std::to_string(row.forbidden));
+  if (!row.lost_by_logger) add("no log to compare");
+  if (row.lost_by_logger.value_or(0) != 0) add(std::to_string(*row.lost_by_logger) + " LOST");
+  if (row.said_why > 0) add(std::to_string(row.said_why) + " did not start and said why");
+  if (row.recovered + row.said_why != row.tries) add("only " + std::to_string(row.recovered) + " RECOVERED");
+  if (!row.remark.empty()) add(row.remark);
+  return text;
+}
+
 std::string Table(const std::vector<Row>& rows, const Options& options) {
   std::ostringstream text;
   text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
        << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
-       << (options.allow_untried ? " --allow-untried" : "") << "`. *Forbidden* counts tries with one of these:\n"
-       << "- the robot executed an uncertified plan, a control that is not of its plan, a control outside its "
-          "slice, or one that was withdrawn;\n"
-       << "- a candidate was answered twice, or was counted and not answered (not checked where messages are made to "
-          "be lost);\n"
-       << "- a process ended unexpectedly, or did not end properly within 5 s of SIGTERM;\n"
-       << "- the certifier did not latch a jump of its clock or a state outside its slice, certified before the reset, "
-          "forgot a\n"
-       << "  fault at a restart, or certified while it could not write faults;\n"
-       << "- a plan was certified under other obstacles than the perceived ones, or on states of a clock that is off;\n"
-       << "- a required refusal or message was missing;\n"
-       << "- the logs and the database disagreed at the end;\n"
-       << "- a process grew by 48 MB under raw datagrams.\n"
-       << "\n"
-       << "*Lost* counts events that the logger had confirmed and that its log does not hold, after each try; for a "
-          "logger that\n"
-       << "ended, after the next one has repaired its logs. Events that a full disk refuses are never confirmed. `-`: "
-          "no logger ran,\n"
-       << "or its logs were removed. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier "
-          "is OK, the\n"
-       << "robot executes a newly certified plan, and the logger records. *Said why*: a process that cannot start "
-          "exits with the\n"
-       << "reason.\n"
-       << "\n"
-       << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
-  for (const Row& row : rows)
-    text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | "
-         << (row.lost_by_logger ? std::to_string(*row.lost_by_logger) : "-") << " | " << row.recovered << " | "
-         << row.said_why << " | " << row.remark << " |\n";
+       << (options.allow_untried ? " --allow-untried" : "") << R"(`. *Forbidden* is one of these:
+- the robot executed an uncertified plan, or a control that is not of its plan, outside its slice, or withdrawn;
+- a candidate was answered twice, or not at all where the bus loses nothing;
+- a process ended unexpectedly, or not properly within 5 s of SIGTERM;
+- the certifier did not latch a jump of its clock or a state outside its slice, certified before the reset or while it
+  could not write faults, or forgot a fault at a restart;
+- a plan was certified under other obstacles than the perceived ones, or on states of a clock that is off;
+- a required refusal or message was missing, or the logs and the database disagreed at the end;
+- a process grew by 48 MB under raw datagrams (its row says so if one grew by more than 1 MB).
+
+*Lost* is an event that the logger had confirmed and that its repaired logs do not hold. *Recovered*: within 20 s, after a
+reset where a fault was latched, the certifier is OK, the robot executes a newly certified plan, and the logger records.
+**Unless its row says otherwise, nothing forbidden happened in any try, nothing was lost, and all tries recovered.**
+
+| fault | tries | |
+|---|---:|---|
+)";
+  for (const Row& row : rows) text << "| " << row.fault << " | " << row.tries << " | " << OutcomeInWords(row) << " |\n";
   return text.str();
 }
 

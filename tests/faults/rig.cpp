@@ -71,7 +71,8 @@ Rig::Rig(const std::string& task, const Options& options)
       next_directory_(scratch_ / "log"),
       state_(scratch_ / "state") {
   static int rigs = 0;
-  const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
+  // Below the ports that the kernel hands out by itself, above those of PrivateBusUrl.
+  const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 12'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
   near_url_ = options_.relayed ? "udpm://239.255.76.67:" + std::to_string(port + 1) + "?ttl=0" : far_url_;
   config_ = LoadConfig(task_path_);

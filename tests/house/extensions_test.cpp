@@ -1,4 +1,4 @@
-// docs/architecture.md, "Extensions": its lists of files are those that the sources give.
+// CONTRIBUTING.md, "Extensions": its lists of files are those that the sources give.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -45,8 +45,9 @@ std::string CodeOf(const std::string& text) {
 // The product's, by file.
 std::map<std::string, std::string> Sources() {
   std::map<std::string, std::string> sources;
-  for (const char* folder : {"advise", "bus", "certifier", "cli", "command_line", "identify", "lcmtypes", "live",
-                             "logger", "page", "planner_bridge", "records", "robot", "verifier"}) {
+  for (const char* folder :
+       {"advise", "bus", "certifier", "cli", "command_line", "forereach", "identify", "lcmtypes", "live", "logger",
+        "page", "planner_bridge", "records", "robot", "simulator", "task", "verifier"}) {
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension == ".h" || extension == ".cpp" || extension == ".lcm")
@@ -58,7 +59,7 @@ std::map<std::string, std::string> Sources() {
 
 // The first column of the table under "### title".
 std::set<std::string> Listed(const std::string& title) {
-  std::istringstream page(Read(kRoot / "docs/architecture.md"));
+  std::istringstream page(Read(kRoot / "CONTRIBUTING.md"));
   std::set<std::string> files;
   bool here = false;
   for (std::string line; std::getline(page, line);) {
@@ -76,7 +77,7 @@ std::set<std::string> Listed(const std::string& title) {
 // so the page lists it. A file that the page lists names at least one.
 void ExpectListed(const std::string& title, const std::vector<std::string>& kinds) {
   const std::set<std::string> listed = Listed(title);
-  ASSERT_GE(listed.size(), 3u) << "docs/architecture.md has no list under " << title;
+  ASSERT_GE(listed.size(), 3u) << "CONTRIBUTING.md has no list under " << title;
   const std::vector<std::regex> patterns(kinds.begin(), kinds.end());
   std::size_t with_all = 0;
   const auto sources = Sources();

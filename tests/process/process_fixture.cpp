@@ -14,8 +14,8 @@
 namespace forereach {
 
 std::string PrivateBusUrl() {
-  // Below the ports that the kernel hands out by itself.
-  return "udpm://239.255.76.67:" + std::to_string(10'000 + getpid() % 20'000) + "?ttl=0";
+  // Below the ports that the kernel hands out by itself and those of the campaign.
+  return "udpm://239.255.76.67:" + std::to_string(10'000 + getpid() % 10'000) + "?ttl=0";
 }
 
 double ResidentBytes(pid_t pid) {
