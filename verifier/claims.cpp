@@ -119,8 +119,8 @@ class SliceCheck {
     }
   }
 
-  // Some motion within task.between leads from a state of this slice to one of the next. Of the recorded hulls, which are
-  // those that the certifier tests: the derived slices may be narrower.
+  // Some motion within task.between leads from a state of this slice to one of the next. Of the recorded hulls, which
+  // are those that the certifier tests: the derived slices may be narrower.
   void CheckTurn() {
     const int heading = problem_.body.heading;
     if (!problem_.between || heading < 0 || certificate_.slices.empty() || recorded_.lower.size() == 0) return;

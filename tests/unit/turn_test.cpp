@@ -40,9 +40,7 @@ class Turn : public testing::Test {
     controls_ = {0, w};
     return {controls_.data(), 1, 2, 1, {}};
   }
-  static Zonotope StartWithin(double half_width) {
-    return Zonotope::FromBox(Vec({0, 0, 0}), Vec({0, 0, half_width}));
-  }
+  static Zonotope StartWithin(double half_width) { return Zonotope::FromBox(Vec({0, 0, 0}), Vec({0, 0, half_width})); }
 
   std::array<double, 2> controls_{};
   Problem problem_;
