@@ -211,7 +211,7 @@ class Adviser {
       case Outcome::kDomain:
         if (decision.cause == Cause::kDomainExit) AdviseDomain();
         if (decision.cause == Cause::kNoStop) AdviseRest();
-        AdviseTighterTube(options);
+        if (decision.cause != Cause::kBetween) AdviseTighterTube(options);
         break;
       case Outcome::kCertified:
       case Outcome::kNone: break;

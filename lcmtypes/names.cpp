@@ -51,6 +51,7 @@ std::string_view CauseName(std::int16_t cause) {
     case decision_t::CAUSE_NO_OBSTACLES: return "no_obstacles";
     case decision_t::CAUSE_SECOND_CERTIFIER: return "second_certifier";
     case decision_t::CAUSE_LATCH_UNWRITABLE: return "latch_unwritable";
+    case decision_t::CAUSE_BETWEEN: return "between";
     default: return "unknown";
   }
 }
@@ -120,6 +121,7 @@ std::string_view WithdrawalName(std::int16_t cause) {
     case withdrawal_t::UNKNOWN_PLAN: return "unknown_plan";
     case withdrawal_t::LIMIT: return "limit";
     case withdrawal_t::OBSTACLES_LOST: return "obstacles_lost";
+    case withdrawal_t::BETWEEN: return "between";
     default: return "unknown";
   }
 }

@@ -10,7 +10,7 @@ namespace forereach {
 void Lessons::Learn(const Decision& decision) {
   const auto limit = static_cast<std::size_t>(decision.coordinate);
   const double beyond = std::abs(decision.margin - decision.threshold);
-  if (decision.cause == Cause::kNoStop) return;
+  if (decision.cause == Cause::kNoStop || decision.cause == Cause::kBetween) return;
   if (decision.outcome == Outcome::kDomain) ++domain_exits_;
   if (decision.outcome == Outcome::kSafety && decision.cause != Cause::kLimit) clearance_ += step_;
   if (decision.cause == Cause::kLimit && limit < limit_margin_.size() && std::isfinite(beyond))

@@ -22,7 +22,8 @@ class Lessons final {
 
   /** An abstention S by an obstacle adds planner.clearance_step to the clearance, one by a limit adds what the tube may
   reach beyond it to the margin from this limit, and an abstention D adds to the margin from the domain's bounds. No
-  other outcome changes anything. Neither does the cause kNoStop: it says nothing about bounds and obstacles. */
+  other outcome changes anything. Neither do the causes kNoStop and kBetween: they say nothing about bounds and
+  obstacles. */
   void Learn(const Decision& decision);
 
   /** The same from the certifier's advice, in the place of Learn: from the obstacles that it names the clearance that

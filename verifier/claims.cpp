@@ -58,6 +58,7 @@ class SliceCheck {
     for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
     if (!failure_ && recorded_.has_generators) CheckGenerators();
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
+    if (step_ && !failure_) CheckTurn();
     if (!step_ && !certificate_.is_remainder) CheckRest();
     if (!failure_) CheckRadius();
     if (!failure_ && t_ >= certificate_.first_step) CheckLimits();
@@ -116,6 +117,28 @@ class SliceCheck {
       claims_.AtLeast(recorded_.remainder[k], half, half,
                       [&] { return "the recorded remainder covers that of " + name(k); });
     }
+  }
+
+  // Some motion within task.between leads from a state of this slice to one of the next. Of the recorded hulls, which
+  // are those that the certifier tests: the derived slices may be narrower.
+  void CheckTurn() {
+    const int heading = problem_.body.heading;
+    if (!problem_.between || heading < 0 || certificate_.slices.empty() || recorded_.lower.size() == 0) return;
+    const RecordedSlice& next = certificate_.slices[ToSize(t_ + 1)];
+    if (next.lower.size() == 0) return;
+    const Real lower = Real(next.lower[heading]) - Real(recorded_.upper[heading]);
+    const Real upper = Real(next.upper[heading]) - Real(recorded_.lower[heading]);
+    const auto least = [&](const Real& turns) { return max(lower - turns, turns - upper); };
+    Real turn = least(0.0);
+    if (problem_.model->IsAngle(heading)) {
+      const Real whole = Real(2.0) * Real::Pi();
+      if (!CertainlyAtMost(upper, whole) || !CertainlyAtMost(-whole, lower)) return;
+      turn = min(turn, min(least(whole), least(-whole)));
+    }
+    const Real most = Real(problem_.between->turn_rate) * Real(problem_.between->period);
+    claims_.AtMost(turn, most * Real(1 + 0x1p-40), most, [&] {
+      return "the least turn of " + name(heading) + " from the slice to the next is one that task.between allows";
+    });
   }
 
   // The last slice: both the derived and the recorded one are at rest.

@@ -16,6 +16,7 @@ claims are:
 - the recorded envelope and remainder contain the derived ones, the envelope is not empty, and the radius is no smaller;
 - X_t is disjoint from every obstacle, with at least the recorded clearance;
 - X_t keeps the problem's limits;
+- the heading can turn from the recorded hull of X_t to that of X_{t+1} within the declared turn rate;
 - X_T satisfies the problem's `rest`, and so does the recorded last slice.
 @param functions those of the problem. @pre the tube is complete and sizes agree. */
 [[nodiscard]] std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate,

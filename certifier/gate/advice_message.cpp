@@ -97,7 +97,8 @@ std::vector<advice_change_t> ChangesFor(const Abstained& abstained, Tube& tube, 
     case Cause::kNone:
     case Cause::kPairwise:
     case Cause::kNoFiniteEnclosure:
-    case Cause::kNoStop: return {};
+    case Cause::kNoStop:
+    case Cause::kBetween: return {};
   }
   return {};
 }

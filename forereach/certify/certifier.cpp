@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "forereach/dynamics/angles.h"
 #include "forereach/numerics/arithmetic.h"
 #include "forereach/numerics/size.h"
 
@@ -204,6 +205,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
   if (violation()) return Falsified(*violation());
   Decision decision = Propagate(plan, tube);
+  if (decision.outcome == Outcome::kNone) decision = JudgeBetween(tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeSafety(plan, obstacles, tube);
   for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
@@ -228,6 +230,39 @@ Decision Certifier::JudgeSafety(const Plan& plan, std::span<const Obstacle> obst
   const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
   const bool is_touched_before = among_obstacles.outcome == Outcome::kSafety && among_obstacles.step < limits.step;
   return limits.outcome == Outcome::kNone || is_touched_before ? among_obstacles : limits;
+}
+
+namespace {
+
+// The least |b - a - 2 pi i| over a and b in the intervals, from below; i is an integer for an angle and 0 otherwise.
+double LeastTurn(const Interval& a, const Interval& b, bool is_angle) noexcept {
+  const auto least = [](const Interval& difference) { return std::max(difference.lower, -difference.upper); };
+  const Interval difference = b - a;
+  if (!is_angle) return std::max(least(difference), 0.0);
+  // Below half a turn more than it can turn, or else more turns may be nearer: nothing is claimed then.
+  if (difference.lower < -kTurn.upper || kTurn.upper < difference.upper) return 0;
+  return std::max(std::min({least(difference), least(difference - kTurn), least(difference + kTurn)}), 0.0);
+}
+
+}  // namespace
+
+Decision Certifier::JudgeBetween(const Tube& tube) const noexcept {
+  Decision decision;
+  const int heading = problem_->body.heading;
+  if (!problem_->between || heading < 0) return decision;
+  const double most = MulUp(problem_->between->turn_rate, problem_->between->period);
+  for (int t = 0; t < tube.length(); ++t) {
+    const double least = LeastTurn(tube.hull(t, heading), tube.hull(t + 1, heading), problem_->model->IsAngle(heading));
+    if (!(least > most)) continue;
+    decision.outcome = Outcome::kDomain;
+    decision.cause = Cause::kBetween;
+    decision.step = t;
+    decision.coordinate = heading;
+    decision.margin = least;
+    decision.threshold = most;
+    break;
+  }
+  return decision;
 }
 
 Decision Certifier::JudgeRest(const Tube& tube) const noexcept {

@@ -97,9 +97,10 @@ class Certifier final {
   the problem's limits hold at the samples.
 
   The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
-  ends the run. After the horizon, the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then
-  S (JudgeSafety): the first sample or step t at which a limit or an obstacle fails. X_T is not tested against the
-  domain.
+  ends the run. After the horizon, the first step from whose slice no motion within the declared turn rate leads into
+  the next slice (D, kBetween): the bounds of `Problem::between` contradict the model there, and would prove what is not
+  so. Then the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then S (JudgeSafety): the
+  first sample or step t at which a limit or an obstacle fails. X_T is not tested against the domain.
   @param tube receives the slices. @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
   it, each with its own tube. */
@@ -108,6 +109,9 @@ class Certifier final {
 
  private:
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
+  /** Outcome kNone unless a step turns the heading by more than Between::turn_rate allows, whatever the states in its
+  two slices. */
+  [[nodiscard]] Decision JudgeBetween(const Tube& tube) const noexcept;
   /** Outcome kNone if the last slice is provably at rest. */
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
 

@@ -26,7 +26,8 @@ enum class Cause {
   kNoFiniteEnclosure = 3,
   kObstacle = 4,
   kNoStop = 5,
-  kLimit = 8
+  kLimit = 8,
+  kBetween = 30
 };
 
 struct Decision {
@@ -52,7 +53,8 @@ struct Decision {
   /** The deciding value and the value that it is compared with. Certificate and S by kObstacle: proven distance from
   the body to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's
   radius (m). S by kLimit: the value that the limit's function may reach, infinite if it has no bound, and the limit's
-  bound. D: extreme value of the hull, and the bound of the domain or of rest. F: difference of two residuals, and the
+  bound. D: extreme value of the hull, and the bound of the domain or of rest; by kBetween the least turn from X_t to
+  X_{t+1} and the largest that is declared (rad). F: difference of two residuals, and the
   difference that the declaration allows. */
   double margin = 0, threshold = 0;
 

@@ -88,6 +88,10 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
                (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) + "; standing is up to " +
                (below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold));
       }
+      if (decision.cause == Cause::kBetween)
+        return where + VariableName(model, decision.coordinate) + " turns by " + RoundedDown(decision.margin) +
+               " rad at least, and task.between declares " + RoundedUp(decision.threshold) +
+               " at most: one of the two is wrong";
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:
