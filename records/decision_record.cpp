@@ -115,7 +115,7 @@ class Reading {
     clearance.RequireCount(completed || !config_.problem->between ? config_.obstacles.size() : 0);
     for (std::size_t o = 0; o < clearance.Count(); ++o)
       recorded.clearance.push_back(clearance[o].json().is_null() ? kInfinity : clearance[o].Number());
-    recorded.radius = slice["radius"].Number();
+    if (!slice["radius"].json().is_null()) recorded.radius = slice["radius"].Number();  // null: above every double
     if (!completed) return recorded;
     const JsonField envelope = slice["envelope"];
     envelope.RequireFields({"lower", "upper"});

@@ -44,7 +44,8 @@ struct Decision {
   int coordinate = -1;
   int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
   int obstacle = -1;                                    ///< S by kObstacle, and certificate: the closest obstacle.
-  int part = -1;                                        ///< Likewise the part of the body.
+  /** Likewise the part of the body that the margin and the threshold are of; -1: they are of the whole body. */
+  int part = -1;
   /** Certificate: the step of the closest slice. If the problem has bounds between the samples: the step t after which
   the body comes closest, before t + 1. */
   int closest_step = -1;
@@ -52,9 +53,9 @@ struct Decision {
 
   /** The deciding value and the value that it is compared with. Certificate and S by kObstacle: proven distance from
   the body to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's
-  radius (m). S by kLimit: the value that the limit's function may reach, infinite if it has no bound, and the limit's
-  bound. D: extreme value of the hull, and the bound of the domain or of rest; by kBetween the least turn from X_t to
-  X_{t+1} and the largest that is declared (rad). F: difference of two residuals, and the
+  radius, or the reach of the whole body (m). S by kLimit: the value that the limit's function may reach, infinite if it
+  has no bound, and the limit's bound. D: extreme value of the hull, and the bound of the domain or of rest; by kBetween
+  the least turn from X_t to X_{t+1} and the largest that is declared (rad). F: difference of two residuals, and the
   difference that the declaration allows. */
   double margin = 0, threshold = 0;
 

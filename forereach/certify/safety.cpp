@@ -107,11 +107,12 @@ class Nearest {
   double left_out_ = kInfinity;
 };
 
-Decision Judged(Outcome outcome, const Closest& closest) {
+// A bound for the whole body is one for its only part.
+Decision Judged(Outcome outcome, const Closest& closest, std::size_t parts) {
   Decision decision;
   decision.outcome = outcome;
   decision.obstacle = closest.obstacle;
-  decision.part = closest.part;
+  decision.part = closest.part < 0 && closest.obstacle >= 0 && parts == 1 ? 0 : closest.part;
   decision.closest_step = closest.step;
   decision.margin = closest.separation.distance;
   decision.threshold = closest.separation.threshold;
@@ -135,10 +136,8 @@ Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
   return spatial;
 }
 
-// A bound for the whole body is one for its closest part.
 PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
-  if (IsBetter(by_parts.separation, other.separation)) return by_parts;
-  return {other.separation, other.part < 0 ? by_parts.part : other.part};
+  return IsBetter(by_parts.separation, other.separation) ? by_parts : other;
 }
 
 }  // namespace
@@ -364,7 +363,8 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
       }
       const PartSeparation best = unit.Best(direct, obstacle, meeting);
       if (!best.separation.IsProven())
-        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation});
+        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation},
+                      placement_.parts().size());
       closest.Consider(best, t, o);
     }
   }
@@ -389,7 +389,7 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
   };
   if (nearest.left_out() >= closest.clearance) {
     for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
-    return Judged(Outcome::kCertified, closest);
+    return Judged(Outcome::kCertified, closest, placement_.parts().size());
   }
   for (int t = first; t < units; ++t) {
     unit.Enter(t);
@@ -402,7 +402,7 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
       consider_if_closer(pair);
     }
   }
-  return Judged(Outcome::kCertified, closest);
+  return Judged(Outcome::kCertified, closest, placement_.parts().size());
 }
 
 }  // namespace forereach

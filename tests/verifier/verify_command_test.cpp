@@ -81,6 +81,49 @@ TEST_F(VerifyDecision, EveryShippedCertificateIsConfirmed) {
   }
 }
 
+// A robot that stands: `parts` of its body, the half-widths of its initial set, and an obstacle.
+class StandingDecision : public VerifyDecision {
+ protected:
+  void CertifyStanding(const std::string& parts, double half_width, const std::string& obstacle) {
+    scratch_.Write("data.csv", "x,y,th,u,x_next,y_next,th_next\n0,0,0,0,0,0,0\n");
+    scratch_.Write("plan.csv", "u\n0\n");
+    std::ostringstream task;
+    task
+        << "model: {states: {x: m, y: m, th: rad}, inputs: {u: '1'}, parameters: {dt: 0.1}, next: {x: x, y: y, th: "
+           "th}}\n"
+           "domain: {state: {lower: [-1e160, -1e160, -9], upper: [1e160, 1e160, 9]}, input: {lower: [0], upper: [0]}}\n"
+           "declaration: {lipschitz: {}, noise_bound: [0, 0, 0]}\ntransitions: data.csv\ntask:\n"
+           "  initial_set: {center: [0, 0, 0], half_width: ["
+        << half_width << ", " << half_width << ", 0]}\n  body: {pose: [x, y, th], parts: " << parts
+        << "}\n  between: samples\n  obstacles: [" << obstacle << "]\n";
+    WriteTask(task.str());
+    decision_ = Json::parse(
+        Forereach("certify --json --config " + scratch_ / "task.yaml --plan " + scratch_ / "plan.csv").text);
+    ASSERT_EQ(decision_["outcome"], "certified");
+  }
+};
+
+// The best bound is that of the whole body, or that of one of its parts: the threshold is of what the record names.
+TEST_F(StandingDecision, OfABodyOfTwoPartsIsConfirmed) {
+  const std::string parts = "[{disc: {at: [0, 2.7], radius: 0}}, {disc: {at: [0, 0], radius: 0}}]";
+  CertifyStanding(parts, 0, "{half_plane: {normal: [0, 1], offset: 5.1}}");
+  EXPECT_TRUE(decision_["part"].is_null()) << "the whole body reaches as far as its first part";
+  EXPECT_NEAR(decision_["threshold"].get<double>(), 2.7, 1e-9);
+  EXPECT_EQ(Verify().code, 0);
+  CertifyStanding(parts, 0, "{half_plane: {normal: [0, -1], offset: 2.8}}");
+  EXPECT_EQ(decision_["part"], 1);
+  EXPECT_EQ(decision_["threshold"], 0.0);
+  EXPECT_EQ(Verify().code, 0);
+  decision_["part"] = nullptr;
+  ExpectRefuted({"threshold"});
+}
+
+TEST_F(StandingDecision, WhoseRadiusIsAboveEveryDoubleIsConfirmed) {
+  CertifyStanding("[{disc: {at: [0, 0], radius: 0}}]", 1e155, "");
+  EXPECT_TRUE(decision_["tube"][0]["radius"].is_null());
+  EXPECT_EQ(Verify().code, 0);
+}
+
 // A certificate of the samples does not become one of all times, and no certificate gets other times.
 TEST_F(VerifyDecision, WithOtherWordsOfWhenItHoldsIsRefuted) {
   const Json before = decision_;
