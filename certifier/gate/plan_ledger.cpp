@@ -257,7 +257,7 @@ void PlanLedger::SeeRobot(const robot_state_t& state, std::int64_t steady_us) {
   const StreamPosition position{state.sequence, state.utime};
   if (!IsNews(states_.Compare(position, StreamOrder::kNoHorizon))) return;
   states_.Take(position, StreamOrder::kNoHorizon);
-  const bool executes = state.mode == robot_state_t::EXECUTING, is_finished = state.mode == robot_state_t::FINISHED;
+  const bool executes = state.mode == robot_state_t::EXECUTING;
   std::optional<std::int64_t> expires;  // the earliest expiry among the plans that may be the executing one
   for (Record& record : records_) {
     if (!executes || !record.force || record.plan_id != state.executing_plan_id) continue;
@@ -266,10 +266,11 @@ void PlanLedger::SeeRobot(const robot_state_t& state, std::int64_t steady_us) {
   }
   const auto has_left = [&](const Record& record) {
     if (executes && record.plan_id == state.executing_plan_id) return false;
-    const bool is_over = record.force->may_run_until_us < steady_us;
-    if (record.force->is_shared) return is_over;
+    if (state.mode == robot_state_t::FINISHED) return !record.force->is_shared;
+    if (record.force->may_run_until_us < steady_us) return true;
+    if (record.force->is_shared) return false;
     const bool is_superseded = expires && record.plan_id < state.executing_plan_id && record.expires_utime <= *expires;
-    return is_finished || record.force->has_begun || is_superseded || is_over;
+    return is_superseded || record.force->has_begun;
   };
   for (Record& record : records_)
     if (record.force && has_left(record)) record.force.reset();

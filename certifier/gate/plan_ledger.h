@@ -136,7 +136,7 @@ class PlanLedger final {
   have issued some, or the clock by which they begin was set. The constructor does the same. */
   void TolerateIssuedUntil(std::int64_t steady_us);
   /** The violation in the robot's report of the plan that it executes. Nothing if it executes none or an allowed one.
-  @param state usable and fresh (Gate::CheckRobotState). Cost O(plans), at most about 30 us. */
+  @param state usable and fresh (Gate::CheckRobotState). Cost O(plans), at most about 50 us. */
   [[nodiscard]] std::optional<Stranger> FindStranger(const robot_state_t& state, std::int64_t steady_us);
 
   // ---- Plans in force.
