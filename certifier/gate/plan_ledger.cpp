@@ -145,7 +145,7 @@ void PlanLedger::KeepSlices(Slices added) {
   }
   if (slices.size() == kSlices) {
     if (executing >= 0 && slices.front().certified->plan.plan_id == executing)
-      std::ranges::rotate(slices, slices.begin() + 1);
+      std::rotate(slices.begin(), slices.begin() + 1, slices.end());
     slices.pop_front();
   }
   slices.push_back(std::move(added));
