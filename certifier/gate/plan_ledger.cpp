@@ -76,7 +76,7 @@ void PlanLedger::Follow(const GateOptions& gate) {
 }
 
 void PlanLedger::Add(const certified_plan_v2_t& certified, std::int64_t steady_us, const Angles& angles) {
-  ForgetOver(steady_us);
+  ForgetEnded(steady_us);
   const auto whole = std::make_shared<const certified_plan_v2_t>(certified);
   KeepSlices({whole, angles});
   const candidate_plan_t& plan = whole->plan;
@@ -107,14 +107,14 @@ PlanLedger::Record& PlanLedger::Append(std::int64_t plan_id, int num_steps) {
   return records_.emplace_back(Record{plan_id, num_steps});
 }
 
-// Without a robot that is heard, nothing else makes room.
-void PlanLedger::ForgetOver(std::int64_t steady_us) {
+// Where no robot is heard, nothing else forgets them.
+void PlanLedger::ForgetEnded(std::int64_t steady_us) {
   for (Record& record : records_) {
     if (!record.force) continue;
     if (record.force->may_run_until_us >= steady_us) break;
     record.force.reset();
   }
-  while (!records_.empty() && IsOver(records_.front(), steady_us)) records_.pop_front();
+  while (!records_.empty() && HasEnded(records_.front(), steady_us)) records_.pop_front();
 }
 
 void PlanLedger::ForgetOldest() {
@@ -124,7 +124,7 @@ void PlanLedger::ForgetOldest() {
   records_.erase(oldest);
 }
 
-bool PlanLedger::IsOver(const Record& record, std::int64_t steady_us) {
+bool PlanLedger::HasEnded(const Record& record, std::int64_t steady_us) {
   return !record.force && record.ends_us < steady_us;
 }
 
@@ -274,7 +274,7 @@ void PlanLedger::SeeRobot(const robot_state_t& state, std::int64_t steady_us) {
   };
   for (Record& record : records_)
     if (record.force && has_left(record)) record.force.reset();
-  std::erase_if(records_, [&](const Record& record) { return IsOver(record, steady_us); });
+  std::erase_if(records_, [&](const Record& record) { return HasEnded(record, steady_us); });
   if (executes && !expires && !IsFull()) AppendUnknown(state, steady_us);
 }
 

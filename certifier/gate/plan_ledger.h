@@ -4,8 +4,9 @@
     FindStranger     Does the robot execute a plan that was not certified, or that it may not execute any more?
     Judge, TakeDue   Which plans may be executed, and how many of their controls still stand? What is withdrawn?
 
-Memory: at most kPlans records of some hundred bytes. The whole plan, 42 kB, is kept only for what needs it: the slices
-of the last kSlices plans, and the controls of the last kJudged plans that have not begun and of those that have.
+Memory: at most kPlans records, each of 0.3 kB while its plan is in force, and of 3 kB while a withdrawal is unanswered.
+A whole plan, 42 kB, is kept once, and only while something needs it: the slices of the last kSlices plans, the controls
+of the last kJudged plans that have not begun and of those that have. That is 4 MB.
 
 **Departures.** A state outside its certified slice refutes an assumption of the certificate: the model, the
 declaration, its noise bound, or the measurement. The robot's guard makes the same test. The certifier repeats it so
@@ -224,9 +225,9 @@ class PlanLedger final {
   [[nodiscard]] std::int64_t LongestRun(int num_steps) const;
   [[nodiscard]] std::int64_t LongestLife(int num_steps) const;
   Record& Append(std::int64_t plan_id, int num_steps);
-  void ForgetOver(std::int64_t steady_us);
+  void ForgetEnded(std::int64_t steady_us);
   void ForgetOldest();
-  [[nodiscard]] static bool IsOver(const Record& record, std::int64_t steady_us);
+  [[nodiscard]] static bool HasEnded(const Record& record, std::int64_t steady_us);
 
   void KeepSlices(Slices added);
   [[nodiscard]] std::deque<Slices>::const_iterator FindSlices(std::int64_t plan_id) const;
