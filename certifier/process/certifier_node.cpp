@@ -68,8 +68,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       watch_(OptionsOf(config)),
       charge_({clocks_.wall(), RandomInstance()}, listen_us),
       has_begun_(is_in_charge()),
-      issued_(config.gate, clocks_.steady()),
-      plans_(config.gate),
+      plans_(config.gate, clocks_.steady()),
       robot_(Microseconds(config.gate.robot_timeout_ms)),
       transitions_(robot_),
       events_(robot_),
@@ -168,7 +167,7 @@ std::string CertifierNode::WhyNotInCharge() const {
 void CertifierNode::TakeCharge() {
   logging::Info("in charge, as instance {:016x}", charge_.self().instance);
   has_begun_ = true;
-  issued_.TolerateFrom(clocks_.steady());
+  plans_.TolerateIssuedUntil(clocks_.steady());
   if (fault_of_other_)
     Fail(PlainFault(fault_of_other_->cause,
                     "latched by the certifier that was in charge before: " + fault_of_other_->why));
@@ -184,12 +183,11 @@ void CertifierNode::StandBy() {
   logging::Warn("{}", WhyNotInCharge());
   LeaveWaiting();
   ForgetRobot();
-  plans_.Clear();
+  plans_.StandBy();
   robot_ = transitions_ = events_ = SoleSender(Microseconds(gate_->options().robot_timeout_ms));
   if (!std::exchange(has_begun_, false) || gate_->certifier().violation()) return;
   if (compaction_.valid()) compaction_.wait();  // it works on *gate_
   gate_ = std::make_unique<Gate>(config_);
-  conformance_ = {};
   reporter_.Restart();
 }
 
@@ -263,9 +261,9 @@ void CertifierNode::OnRobotState(const Received& received) {
   LookAtRobot(received.utime);
   if (state.mode == robot_state_t::FINISHED) return;
   if (!is_in_charge()) return;  // the robot may execute another's plans
-  if (const auto departure = conformance_.Check(state, received.sender)) Fail(SliceLeft(*departure));
+  if (const auto departure = plans_.FindDeparture(state, received.sender)) Fail(SliceLeft(*departure));
   // In shadow mode another certifier decides which plans the robot executes.
-  const auto stranger = issued_.FindStranger(state, clocks_.steady());
+  const auto stranger = plans_.FindStranger(state, clocks_.steady());
   if (stranger && !gate_->options().shadow) Fail(UncertifiedPlan(*stranger));
 }
 
@@ -304,7 +302,7 @@ void CertifierNode::OnTransition(const Received& received) {
   else if (gate_->options().learns)
     Learn(received.bytes);  // first, because a false declaration explains a left slice
   if (!transition || !is_in_charge()) return;
-  if (const auto departure = conformance_.Check(*transition, received.sender)) Fail(SliceLeft(*departure));
+  if (const auto departure = plans_.FindDeparture(*transition, received.sender)) Fail(SliceLeft(*departure));
 }
 
 void CertifierNode::Learn(Bytes transition) {
@@ -399,7 +397,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
   if (reporter_.IsFirst() && is_in_charge()) Heartbeat(now_us);  // reports the state before the first decision
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
     // After the clock was set back, a plan may start later than allowed.
-    if (fault->cause == fault_t::CLOCK_JUMP) issued_.TolerateFrom(clocks_.steady());
+    if (fault->cause == fault_t::CLOCK_JUMP) plans_.TolerateIssuedUntil(clocks_.steady());
     Announce(PlainFault(fault->cause, fault->why).fault, *fault);
   }
   TakeReload();
@@ -476,9 +474,7 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
   sender_.Send(channels_.decision, answer.decision);
   if (answer.certified) {
     const NominalModel& model = *config_.problem->model;
-    conformance_.Remember(*answer.certified, AnglesOf(model.angles(), model.num_states()));
-    issued_.Add(*answer.certified, clocks_.steady());
-    plans_.Add(*answer.certified, clocks_.steady());
+    plans_.Add(*answer.certified, clocks_.steady(), AnglesOf(model.angles(), model.num_states()));
   }
   reporter_.CountDecision(elapsed.count());
   advice_.Note(candidate, answer.decision, gate_->options());
@@ -519,7 +515,6 @@ void CertifierNode::TakeReload() {
   for (SoleSender* stream : {&robot_, &transitions_, &events_})
     stream->Follow(Microseconds(gate_->options().robot_timeout_ms));
   LookAtRobot(clocks_.wall());
-  issued_.Follow(gate_->options());
   plans_.Follow(gate_->options());
   contradictions_.Follow(config_);
   LookForObstacles(clocks_.wall());

@@ -6,7 +6,8 @@ The node wires the classes that each answer one question; how they work is said 
     watch.h             whether anything may be certified now, and which fault is latched
     fault_latch.h       the latched fault as a message, and what outlives the process (latch_file.h)
     contradictions.h    which declarations are known to be false
-    plans_in_force.h    which certified plans may be executed, and what of them is withdrawn
+    plan_ledger.h       which plans were certified, which of them may be executed, what of them is withdrawn, and
+                        whether the robot keeps to them
     charge.h            which of several certifiers on one bus decides
     task_reload.h       which task is in force
     status_reporter.h   what the heartbeat reports, and when
@@ -46,10 +47,8 @@ that the plan was handed to the bus before. */
 
 #include "bus/node.h"
 #include "certifier/gate/charge.h"
-#include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
-#include "certifier/gate/issued_plans.h"
-#include "certifier/gate/plans_in_force.h"
+#include "certifier/gate/plan_ledger.h"
 #include "certifier/gate/watch.h"
 #include "certifier/process/advice_giver.h"
 #include "certifier/process/candidate_queue.h"
@@ -153,9 +152,7 @@ class CertifierNode final : public Node {
   Charge charge_;
   bool has_begun_ = false;                      // has been in charge, and no other since
   std::optional<Watch::Fault> fault_of_other_;  // of the one in charge, by its last heartbeat
-  Conformance conformance_;
-  IssuedPlans issued_;
-  PlansInForce plans_;
+  PlanLedger plans_;
   bool withdraws_more_ = false;              // than one tick sends
   SoleSender robot_, transitions_, events_;  // who sends the robot's three streams
 

@@ -14,7 +14,7 @@ FoundFault PlainFault(std::int16_t cause, std::string why) {
   return {fault, std::move(why)};
 }
 
-FoundFault SliceLeft(const Conformance::Departure& departure) {
+FoundFault SliceLeft(const PlanLedger::Departure& departure) {
   FoundFault found = PlainFault(
       fault_t::SLICE_LEFT,
       fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]", departure.plan_id,
@@ -28,7 +28,7 @@ FoundFault SliceLeft(const Conformance::Departure& departure) {
   return found;
 }
 
-FoundFault UncertifiedPlan(const IssuedPlans::Stranger& stranger) {
+FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger) {
   FoundFault found = PlainFault(fault_t::UNCERTIFIED_PLAN, stranger.why);
   found.fault.plan_id = stranger.plan_id;
   found.fault.step = static_cast<std::int16_t>(stranger.step);

@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "certifier/gate/conformance.h"
-#include "certifier/gate/issued_plans.h"
+#include "certifier/gate/plan_ledger.h"
 #include "forereach/fault_t.hpp"
 #include "forereach/residual/consistency.h"
 
@@ -21,9 +20,9 @@ struct FoundFault {
 /** A fault without a witness. @param cause a constant of fault_t. */
 [[nodiscard]] FoundFault PlainFault(std::int16_t cause, std::string why);
 /** SLICE_LEFT: a measured state lies outside its certified slice. */
-[[nodiscard]] FoundFault SliceLeft(const Conformance::Departure& departure);
+[[nodiscard]] FoundFault SliceLeft(const PlanLedger::Departure& departure);
 /** UNCERTIFIED_PLAN: the robot executes what no certifier has issued. */
-[[nodiscard]] FoundFault UncertifiedPlan(const IssuedPlans::Stranger& stranger);
+[[nodiscard]] FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger);
 /** DECLARATION_FALSIFIED: an executed transition, the pair's second observation, contradicts the declaration. */
 [[nodiscard]] FoundFault DeclarationFalsified(const Violation& violation);
 

@@ -1,5 +1,5 @@
-// A measured state against the slice of the step it is at.
-#include "certifier/gate/conformance.h"
+// The ledger of certified plans: a measured state against the slice of the step it is at.
+#include "certifier/gate/plan_ledger.h"
 
 #include <cmath>
 #include <limits>
@@ -33,64 +33,64 @@ robot_state_t At(std::int64_t sequence, std::int64_t plan_id, int step, double x
   return state;
 }
 
-TEST(ConformanceTest, TheSliceIsClosed) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
-  EXPECT_FALSE(conformance.Check(At(0, 7, 1, 1, 2)));
-  const auto above = conformance.Check(At(10, 7, 1, 1, std::nextafter(2.0, 3.0)));
+class ConformanceTest : public testing::Test {
+ protected:
+  PlanLedger ledger_{{}, 0};
+};
+
+TEST_F(ConformanceTest, TheSliceIsClosed) {
+  ledger_.Add(Plan(7), 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1, 2)));
+  const auto above = ledger_.FindDeparture(At(10, 7, 1, 1, std::nextafter(2.0, 3.0)));
   ASSERT_TRUE(above);
   EXPECT_EQ(above->plan_id, 7);
   EXPECT_EQ(above->step, 1);
   EXPECT_EQ(above->coordinate, 1);
   EXPECT_EQ(above->upper, 2);
-  EXPECT_EQ(conformance.Check(At(20, 7, 1, std::nextafter(1.0, 0.0), 1))->coordinate, 0);
-  EXPECT_TRUE(conformance.Check(At(30, 7, 1, std::numeric_limits<double>::quiet_NaN(), 1)));
+  EXPECT_EQ(ledger_.FindDeparture(At(20, 7, 1, std::nextafter(1.0, 0.0), 1))->coordinate, 0);
+  EXPECT_TRUE(ledger_.FindDeparture(At(30, 7, 1, std::numeric_limits<double>::quiet_NaN(), 1)));
 }
 
-TEST(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
+TEST_F(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
+  ledger_.Add(Plan(7), 0);
   certified_plan_v2_t next = Plan(8);
   next.slice_upper[0][0] = next.slice_upper[0][1] = 9;
-  conformance.Remember(next);
-  EXPECT_FALSE(conformance.Check(At(0, 7, 0, 0.5, 0.5)));
-  const auto departure = conformance.Check(At(1, 8, 0, 0.5, 1.5));
+  ledger_.Add(next, 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
+  const auto departure = ledger_.FindDeparture(At(1, 8, 0, 0.5, 1.5));
   ASSERT_TRUE(departure) << "inside slice 0 of plan 8, not inside slice 1 of plan 7";
   EXPECT_EQ(departure->plan_id, 7);
   EXPECT_EQ(departure->step, 1);
-  EXPECT_FALSE(conformance.Check(At(5, 8, 0, 0.5, 1.5))) << "with messages missing between, it cannot tell";
+  EXPECT_FALSE(ledger_.FindDeparture(At(5, 8, 0, 0.5, 1.5))) << "with messages missing between, it cannot tell";
 }
 
-TEST(ConformanceTest, StandingAndUnknownPlansAreNotJudged) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
-  EXPECT_FALSE(conformance.Check(At(0, 7, 2, 2.5, 2.5)));
-  EXPECT_FALSE(conformance.Check(At(1, -1, -1, 100, 100))) << "standing is a hold mode of the robot";
-  EXPECT_FALSE(conformance.Check(At(2, 99, 0, 100, 100)));
-  EXPECT_FALSE(conformance.Check(At(3, 7, 4, 100, 100))) << "past the horizon";
-  EXPECT_FALSE(conformance.Check(At(5, 7, -1, 100, 100)));
+TEST_F(ConformanceTest, StandingAndUnknownPlansAreNotJudged) {
+  ledger_.Add(Plan(7), 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 2, 2.5, 2.5)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(1, -1, -1, 100, 100))) << "standing is a hold mode of the robot";
+  EXPECT_FALSE(ledger_.FindDeparture(At(2, 99, 0, 100, 100)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(3, 7, 4, 100, 100))) << "past the horizon";
+  EXPECT_FALSE(ledger_.FindDeparture(At(5, 7, -1, 100, 100)));
 }
 
-TEST(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
-  EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::max(), 7, 0, 0.5, 0.5)));
-  EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::min(), 99, 0, 100, 100)));
+TEST_F(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
+  ledger_.Add(Plan(7), 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(std::numeric_limits<std::int64_t>::max(), 7, 0, 0.5, 0.5)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(std::numeric_limits<std::int64_t>::min(), 99, 0, 100, 100)));
 }
 
-TEST(ConformanceTest, AnAngleMayDifferByWholeTurns) {
+TEST_F(ConformanceTest, AnAngleMayDifferByWholeTurns) {
   constexpr double kTurn = 2 * std::numbers::pi;
-  Conformance conformance;
-  conformance.Remember(Plan(7), Angles(0b10));
-  EXPECT_FALSE(conformance.Check(At(0, 7, 1, 1.5, 1.5)));
-  EXPECT_FALSE(conformance.Check(At(10, 7, 1, 1.5, 1.5 + kTurn)));
-  EXPECT_FALSE(conformance.Check(At(20, 7, 1, 1.5, 1.5 - 3 * kTurn)));
-  EXPECT_EQ(conformance.Check(At(30, 7, 1, 1.5, 2.5 - kTurn))->coordinate, 1);
-  EXPECT_EQ(conformance.Check(At(40, 7, 1, 1.5 + kTurn, 1.5))->coordinate, 0) << "that state is no angle";
-  EXPECT_TRUE(conformance.Check(At(50, 7, 1, 1.5, 1 + kTurn))) << "at the end of the slice it cannot be told";
-  conformance.Remember(Plan(8));
-  EXPECT_TRUE(conformance.Check(At(60, 8, 1, 1.5, 1.5 + kTurn))) << "a plan of a task without angles";
-  conformance.Remember(Plan(8), Angles(0b10));
+  ledger_.Add(Plan(7), 0, Angles(0b10));
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1.5, 1.5)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(10, 7, 1, 1.5, 1.5 + kTurn)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(20, 7, 1, 1.5, 1.5 - 3 * kTurn)));
+  EXPECT_EQ(ledger_.FindDeparture(At(30, 7, 1, 1.5, 2.5 - kTurn))->coordinate, 1);
+  EXPECT_EQ(ledger_.FindDeparture(At(40, 7, 1, 1.5 + kTurn, 1.5))->coordinate, 0) << "that state is no angle";
+  EXPECT_TRUE(ledger_.FindDeparture(At(50, 7, 1, 1.5, 1 + kTurn))) << "at the end of the slice it cannot be told";
+  ledger_.Add(Plan(8), 0);
+  EXPECT_TRUE(ledger_.FindDeparture(At(60, 8, 1, 1.5, 1.5 + kTurn))) << "a plan of a task without angles";
+  ledger_.Add(Plan(8), 0, Angles(0b10));
 }
 
 transition_t Step(std::int64_t utime, double x, double y) {
@@ -102,14 +102,13 @@ transition_t Step(std::int64_t utime, double x, double y) {
   return transition;
 }
 
-TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
+TEST_F(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {
+  ledger_.Add(Plan(7), 0);
   const auto after = [&](std::int64_t sequence, int step, const transition_t& transition) {
     robot_state_t state = At(10 * sequence, 7, step, step + 0.5, step + 0.5);  // each is judged by itself
     state.utime = 100 * sequence;
-    EXPECT_FALSE(conformance.Check(state));
-    return conformance.Check(transition);
+    EXPECT_FALSE(ledger_.FindDeparture(state));
+    return ledger_.FindDeparture(transition);
   };
   EXPECT_FALSE(after(1, 0, Step(100, 1, 2)));
   const auto left = after(2, 0, Step(200, 1, std::nextafter(2.0, 3.0)));
@@ -124,98 +123,94 @@ TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {
   EXPECT_FALSE(after(6, 0, odd));
   robot_state_t standing = At(7, -1, -1, 0, 0);
   standing.utime = 700;
-  EXPECT_FALSE(conformance.Check(standing));
-  EXPECT_FALSE(conformance.Check(Step(700, 100, 100)));
+  EXPECT_FALSE(ledger_.FindDeparture(standing));
+  EXPECT_FALSE(ledger_.FindDeparture(Step(700, 100, 100)));
 }
 
-TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheNextStateOvertookIt) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
+TEST_F(ConformanceTest, TheEndOfAStepIsJudgedThoughTheNextStateOvertookIt) {
+  ledger_.Add(Plan(7), 0);
   const auto hear = [&](std::int64_t sequence, std::int64_t plan_id, std::int64_t utime) {
     robot_state_t state = At(sequence, plan_id, plan_id < 0 ? -1 : 0, 0.5, 0.5);
     state.utime = utime;
-    EXPECT_FALSE(conformance.Check(state));
+    EXPECT_FALSE(ledger_.FindDeparture(state));
   };
   hear(0, 7, 100);
   hear(1, -1, 200);
-  EXPECT_TRUE(conformance.Check(Step(100, 100, 100)));
-  EXPECT_FALSE(conformance.Check(Step(200, 100, 100))) << "it stood";
+  EXPECT_TRUE(ledger_.FindDeparture(Step(100, 100, 100)));
+  EXPECT_FALSE(ledger_.FindDeparture(Step(200, 100, 100))) << "it stood";
   for (int i = 2; i < 34; ++i) hear(i, -1, 100 + 100 * i);
   hear(0, 7, 100);
-  EXPECT_FALSE(conformance.Check(Step(100, 100, 100))) << "a state said again is not news, so the step is too long ago";
+  EXPECT_FALSE(ledger_.FindDeparture(Step(100, 100, 100)))
+      << "a state said again is not news, so the step is too long ago";
   hear(0, 7, 4000);
-  EXPECT_TRUE(conformance.Check(Step(4000, 100, 100))) << "a robot that began anew counts anew";
+  EXPECT_TRUE(ledger_.FindDeparture(Step(4000, 100, 100))) << "a robot that began anew counts anew";
   hear(16, 7, 5000);
   hear(1, 7, 30);
-  EXPECT_FALSE(conformance.Check(Step(30, 100, 100))) << "late";
+  EXPECT_FALSE(ledger_.FindDeparture(Step(30, 100, 100))) << "late";
   hear(0, 7, 30);
-  EXPECT_TRUE(conformance.Check(Step(30, 100, 100)))
+  EXPECT_TRUE(ledger_.FindDeparture(Step(30, 100, 100)))
       << "another message 0: it has begun anew, though its clock was set back";
 }
 
-TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughAFasterRobotIsHeardInBetween) {
+TEST_F(ConformanceTest, TheEndOfAStepIsJudgedThoughAFasterRobotIsHeardInBetween) {
   for (const int states_between : {3, 31, 32}) {
-    Conformance conformance;
-    conformance.Remember(Plan(7));
+    PlanLedger ledger({}, 0);
+    ledger.Add(Plan(7), 0);
     robot_state_t begin = At(0, 7, 0, 0.5, 0.5);
     begin.utime = 100;
-    EXPECT_FALSE(conformance.Check(begin));
+    EXPECT_FALSE(ledger.FindDeparture(begin));
     for (int i = 0; i < states_between; ++i) {
       robot_state_t other = At(100 + i, -1, -1, 0, 0);
       other.utime = 101 + i;
-      EXPECT_FALSE(conformance.Check(other));
+      EXPECT_FALSE(ledger.FindDeparture(other));
     }
-    EXPECT_EQ(conformance.Check(Step(100, 100, 100)).has_value(), states_between < 32);
+    EXPECT_EQ(ledger.FindDeparture(Step(100, 100, 100)).has_value(), states_between < 32);
   }
 }
 
 // Two robots under one name begin steps of different plans at one time.
-TEST(ConformanceTest, StatesAndTransitionsOfTwoSendersAreNotMixed) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
-  conformance.Remember(Plan(8));
+TEST_F(ConformanceTest, StatesAndTransitionsOfTwoSendersAreNotMixed) {
+  ledger_.Add(Plan(7), 0);
+  ledger_.Add(Plan(8), 0);
   robot_state_t one = At(4, 7, 0, 0.5, 0.5), other = At(5, 8, 2, 2.5, 2.5);
   one.utime = other.utime = 100;
-  EXPECT_FALSE(conformance.Check(one, 1));
-  EXPECT_FALSE(conformance.Check(other, 2)) << "it does not follow the other one's step";
-  EXPECT_FALSE(conformance.Check(Step(100, 1.5, 1.5), 1));
-  EXPECT_FALSE(conformance.Check(Step(100, 3.5, 3.5), 2));
-  EXPECT_EQ(conformance.Check(Step(100, 3.5, 3.5), 1)->plan_id, 7);
-  EXPECT_EQ(conformance.Check(Step(100, 1.5, 1.5), 2)->plan_id, 8);
-  EXPECT_FALSE(conformance.Check(Step(100, 100, 100), 3));
+  EXPECT_FALSE(ledger_.FindDeparture(one, 1));
+  EXPECT_FALSE(ledger_.FindDeparture(other, 2)) << "it does not follow the other one's step";
+  EXPECT_FALSE(ledger_.FindDeparture(Step(100, 1.5, 1.5), 1));
+  EXPECT_FALSE(ledger_.FindDeparture(Step(100, 3.5, 3.5), 2));
+  EXPECT_EQ(ledger_.FindDeparture(Step(100, 3.5, 3.5), 1)->plan_id, 7);
+  EXPECT_EQ(ledger_.FindDeparture(Step(100, 1.5, 1.5), 2)->plan_id, 8);
+  EXPECT_FALSE(ledger_.FindDeparture(Step(100, 100, 100), 3));
 }
 
-TEST(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {
-  Conformance conformance;
-  conformance.Remember(Plan(7));
+TEST_F(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {
+  ledger_.Add(Plan(7), 0);
   certified_plan_v2_t again = Plan(7);
   again.slice_upper[1][0] = 5;
-  EXPECT_FALSE(conformance.Check(At(0, 7, 0, 0.5, 0.5)));
-  conformance.Remember(again);
-  EXPECT_TRUE(conformance.Check(At(10, 7, 1, 4, 1))) << "the guard takes no plan_id twice";
-  EXPECT_FALSE(conformance.Check(At(20, -1, -1, 0, 0)));
-  conformance.Remember(again);
-  EXPECT_FALSE(conformance.Check(At(30, 7, 1, 4, 1)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
+  ledger_.Add(again, 0);
+  EXPECT_TRUE(ledger_.FindDeparture(At(10, 7, 1, 4, 1))) << "the guard takes no plan_id twice";
+  EXPECT_FALSE(ledger_.FindDeparture(At(20, -1, -1, 0, 0)));
+  ledger_.Add(again, 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(30, 7, 1, 4, 1)));
 }
 
-TEST(ConformanceTest, ThePlanThatIsExecutedIsNotForgotten) {
-  Conformance conformance;
-  const auto count = static_cast<std::int64_t>(Conformance::kPlans);
-  for (std::int64_t id = 0; id < count; ++id) conformance.Remember(Plan(id));
-  EXPECT_FALSE(conformance.Check(At(0, 0, 0, 0.5, 0.5)));
-  for (std::int64_t id = count; id < 3 * count; ++id) conformance.Remember(Plan(id));
-  EXPECT_TRUE(conformance.Check(At(10, 0, 1, 100, 100)));
-  EXPECT_TRUE(conformance.Check(At(20, 3 * count - 1, 0, 100, 100)));
-  EXPECT_FALSE(conformance.Check(At(30, 2 * count, 0, 100, 100))) << "the others are, in their order";
+TEST_F(ConformanceTest, ThePlanThatIsExecutedIsNotForgotten) {
+  const auto count = static_cast<std::int64_t>(PlanLedger::kSlices);
+  for (std::int64_t id = 0; id < count; ++id) ledger_.Add(Plan(id), 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 0, 0, 0.5, 0.5)));
+  for (std::int64_t id = count; id < 3 * count; ++id) ledger_.Add(Plan(id), 0);
+  EXPECT_TRUE(ledger_.FindDeparture(At(10, 0, 1, 100, 100)));
+  EXPECT_TRUE(ledger_.FindDeparture(At(20, 3 * count - 1, 0, 100, 100)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(30, 2 * count, 0, 100, 100))) << "the others are, in their order";
 }
 
-TEST(ConformanceTest, TheLastPlansAreRemembered) {
-  Conformance conformance;
-  const auto count = static_cast<std::int64_t>(Conformance::kPlans);
-  for (std::int64_t id = 0; id <= count; ++id) conformance.Remember(Plan(id));
-  EXPECT_FALSE(conformance.Check(At(0, 0, 0, 100, 100))) << "the first is forgotten";
-  EXPECT_TRUE(conformance.Check(At(10, 1, 0, 100, 100)));
-  EXPECT_TRUE(conformance.Check(At(20, count, 0, 100, 100)));
+TEST_F(ConformanceTest, TheLastPlansAreRemembered) {
+  const auto count = static_cast<std::int64_t>(PlanLedger::kSlices);
+  for (std::int64_t id = 0; id <= count; ++id) ledger_.Add(Plan(id), 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 0, 0, 100, 100))) << "the first is forgotten";
+  EXPECT_TRUE(ledger_.FindDeparture(At(10, 1, 0, 100, 100)));
+  EXPECT_TRUE(ledger_.FindDeparture(At(20, count, 0, 100, 100)));
 }
 
 }  // namespace conformance_test

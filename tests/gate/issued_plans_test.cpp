@@ -1,5 +1,5 @@
-// Which plans may be executing, at the boundaries of time and step.
-#include "certifier/gate/issued_plans.h"
+// The ledger of certified plans: which of them may be executing, at the boundaries of time and step.
+#include "certifier/gate/plan_ledger.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ class IssuedPlansTest : public testing::Test {
   }
 
   static constexpr std::int64_t kLater = kSteady + kLifetime + 2 * kAge + 128 * kStep + 1;  // nothing else is tolerated
-  IssuedPlans issued_{Gate(), kSteady};
+  PlanLedger issued_{Gate(), kSteady};
 };
 
 TEST_F(IssuedPlansTest, ToleratesUnknownPlansUntilThoseOfAnEarlierCertifierHaveEnded) {
@@ -83,7 +83,7 @@ TEST_F(IssuedPlansTest, RefusesAStepThatThePlanDoesNotHave) {
 TEST_F(IssuedPlansTest, RefusesAPlanThatBeganAfterItExpired) {
   const std::int64_t latest = kWall + kLifetime + kAge;
   for (const int step : {0, 9}) {
-    IssuedPlans issued(Gate(), kSteady);
+    PlanLedger issued(Gate(), kSteady);
     issued.Add(Plan(1), kLater);
     const auto late = issued.FindStranger(Executing(1, step, latest + 1 + step * kStep), kLater);
     ASSERT_TRUE(late);
@@ -105,13 +105,29 @@ TEST_F(IssuedPlansTest, SurvivesNumbersOfAnySize) {
 // What is pushed out by a flood of certificates may still be executing.
 TEST_F(IssuedPlansTest, ToleratesAPlanThatAFloodOfCertificatesPushedOut) {
   issued_.Add(Plan(1), kLater);
-  for (std::size_t i = 0; i < IssuedPlans::kPlans - 1; ++i) issued_.Add(Plan(1000, 20), kLater + 1);
+  for (std::size_t i = 0; i < PlanLedger::kPlans - 1; ++i) issued_.Add(Plan(1000, 20), kLater + 1);
   EXPECT_THAT(Judge(Executing(2, 0), kLater + 1), HasSubstr("not certified"));
   EXPECT_THAT(Judge(Executing(1, 10), kLater + 1), HasSubstr("step 10 of 10")) << "remembered";
+  EXPECT_TRUE(issued_.IsFull());
+  robot_state_t finished{};
+  finished.mode = robot_state_t::FINISHED;
+  issued_.SeeRobot(finished, kLater + 1);
+  EXPECT_FALSE(issued_.IsFull()) << "none of them will be executed any more, if the robot has a guard";
+  EXPECT_THAT(Judge(Executing(1, 10), kLater + 1), HasSubstr("step 10 of 10")) << "remembered still";
   issued_.Add(Plan(1000, 20), kLater + 1);
   EXPECT_EQ(Judge(Executing(1, 10), kLater + Life(10)), "") << "forgotten, so tolerated";
   EXPECT_EQ(Judge(Executing(2, 0), kLater + Life(10)), "") << "and nobody can tell it from any other";
   EXPECT_THAT(Judge(Executing(2, 0), kLater + Life(10) + 1), HasSubstr("not certified"));
+}
+
+TEST_F(IssuedPlansTest, AFloodOfCertificatesDoesNotPushOutThePlanThatIsExecuted) {
+  issued_.Add(Plan(1000), kLater);
+  for (std::size_t i = 0; i < PlanLedger::kPlans - 1; ++i) issued_.Add(Plan(1), kLater);
+  issued_.SeeRobot(Executing(1000, 0), kLater);
+  ASSERT_EQ(issued_.num_in_force(), 1u);
+  for (int i = 0; i < 3; ++i) issued_.Add(Plan(1001), kLater);
+  EXPECT_EQ(issued_.num_in_force(), 4u);
+  EXPECT_THAT(Judge(Executing(1000, 10), kLater + 1), HasSubstr("step 10 of 10")) << "remembered";
 }
 
 TEST_F(IssuedPlansTest, AnotherCertifierBeginsTheToleranceAnewAReloadDoesNot) {
@@ -119,10 +135,10 @@ TEST_F(IssuedPlansTest, AnotherCertifierBeginsTheToleranceAnewAReloadDoesNot) {
   longer.certificate_lifetime_ms += 1;
   issued_.Follow(longer);
   EXPECT_NE(Judge(Executing(1, 0), kLater), "");
-  issued_.TolerateFrom(kLater);
+  issued_.TolerateIssuedUntil(kLater);
   EXPECT_EQ(Judge(Executing(1, 0), kLater + Life(128) + 1000), "");
   EXPECT_NE(Judge(Executing(1, 0), kLater + Life(128) + 1001), "");
-  issued_.TolerateFrom(kLater - 1'000'000);
+  issued_.TolerateIssuedUntil(kLater - 1'000'000);
   EXPECT_EQ(Judge(Executing(1, 0), kLater + Life(128) + 1000), "") << "never for less than before";
 }
 

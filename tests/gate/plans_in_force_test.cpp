@@ -1,5 +1,5 @@
-// Certified plans that are judged again: how many controls stand, and when withdrawals are sent.
-#include "certifier/gate/plans_in_force.h"
+// The ledger of certified plans: they are judged again, how many controls stand, and when withdrawals are sent.
+#include "certifier/gate/plan_ledger.h"
 
 #include <cmath>
 #include <limits>
@@ -84,7 +84,7 @@ class PlansInForceTest : public testing::Test {
   std::int64_t now_ = kNow, sequence_ = 0, states_ = 0;
   Config config_ = SmallTaskOnTheBus();
   Gate gate_{config_};
-  PlansInForce plans_{config_.gate};
+  PlanLedger plans_{config_.gate, kNow};
 };
 
 TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt) {
@@ -105,7 +105,7 @@ TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt
     ASSERT_TRUE(just_inside);
     EXPECT_EQ(just_inside->step, t);
     EXPECT_EQ(just_inside->valid_steps, t - 1);
-    plans_.Clear();
+    plans_.StandBy();
     See({});
     plans_.Judge(gate_, now_);
   }
@@ -119,7 +119,7 @@ TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) 
   const double bulge = 8 * 0.15 * 0.15 / 8;
   for (int t = 1; t <= kSteps; ++t) {
     Gate gate(config_);
-    PlansInForce plans(config_.gate);
+    PlanLedger plans(config_.gate, now_);
     obstacles_t message = ToMessage({});
     message.utime = now_;
     const auto see = [&](double wall) {
@@ -159,7 +159,7 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
       return config;
     };
     Gate gate(with_period(0.15));
-    PlansInForce plans(config_.gate);
+    PlanLedger plans(config_.gate, now_);
     obstacles_t message = ToMessage({});
     message.utime = now_;
     message.sequence = sequence_++;
@@ -207,7 +207,7 @@ TEST_F(PlansInForceTest, DoesNotJudgeStepsThatArePast) {
   See({behind});
   plans_.Judge(gate_, now_);
   EXPECT_FALSE(Due());
-  plans_.Clear();
+  plans_.StandBy();
   See({});
   plans_.Judge(gate_, now_);
   Certify(2);
@@ -225,14 +225,14 @@ TEST_F(PlansInForceTest, RepeatsAWithdrawalUntilItIsAnswered) {
   SeeWall(1);
   const withdrawal_t first = Due().value();
   EXPECT_FALSE(Due());
-  now_ += PlansInForce::kRepeatUs - 1;
+  now_ += PlanLedger::kRepeatUs - 1;
   EXPECT_FALSE(Due());
   now_ += 1;
   const withdrawal_t second = Due().value();
   EXPECT_EQ(second.sequence, first.sequence + 1);
   EXPECT_EQ(second.valid_steps, first.valid_steps);
   EXPECT_EQ(plans_.withdrawals(), 1);
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   Answer(2, 0, 0);                      // another plan's
   Answer(1, first.valid_steps + 1, 0);  // the guard lets more stand
   Answer(1, first.valid_steps, -1);     // an answer to an earlier withdrawal
@@ -240,7 +240,7 @@ TEST_F(PlansInForceTest, RepeatsAWithdrawalUntilItIsAnswered) {
   Answer(1, first.valid_steps, std::nan(""));
   EXPECT_TRUE(Due());
   Answer(1, first.valid_steps, 1);
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   EXPECT_FALSE(Due());
 }
 
@@ -253,12 +253,12 @@ TEST_F(PlansInForceTest, PlansOfTwoSourcesWithOneIdAreAnsweredEachForItself) {
   const withdrawal_t lost = Due().value(), heard = Due().value();
   ASSERT_NE(GetDigest(lost.certificate_digest), GetDigest(heard.certificate_digest));
   Answer(1, 0, static_cast<double>(heard.sequence));
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   const withdrawal_t repeated = Due().value();
   EXPECT_EQ(GetDigest(repeated.certificate_digest), GetDigest(lost.certificate_digest));
   EXPECT_FALSE(Due());
   Answer(1, 0, static_cast<double>(repeated.sequence));
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   EXPECT_FALSE(Due());
 }
 
@@ -275,7 +275,7 @@ TEST_F(PlansInForceTest, NeverRestoresStepsAndWithdrawsAgainWhenFewerStand) {
   const withdrawal_t less = Due().value();
   EXPECT_EQ(less.valid_steps, 3);
   Answer(1, 3, 0);  // the late answer to the first
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   EXPECT_TRUE(Due());
 }
 
@@ -291,19 +291,19 @@ TEST_F(PlansInForceTest, WithdrawsNothingWhileThePlanStaysValid) {
 TEST_F(PlansInForceTest, APlanThatCannotBeExecutedAnyMoreIsForgotten) {
   Certify(1);
   Certify(2);
-  EXPECT_EQ(plans_.size(), 2u);
+  EXPECT_EQ(plans_.num_in_force(), 2u);
   SeeRobot(1, 0);
-  EXPECT_EQ(plans_.size(), 2u);
+  EXPECT_EQ(plans_.num_in_force(), 2u);
   SeeRobot(2, 0);
-  EXPECT_EQ(plans_.size(), 1u) << "the guard has left plan 1";
+  EXPECT_EQ(plans_.num_in_force(), 1u) << "the guard has left plan 1";
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 0u);
+  EXPECT_EQ(plans_.num_in_force(), 0u);
   Certify(3);
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 1u) << "it may be pending";
+  EXPECT_EQ(plans_.num_in_force(), 1u) << "it may be pending";
   now_ += 60'000'000;
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 0u) << "it has expired";
+  EXPECT_EQ(plans_.num_in_force(), 0u) << "it has expired";
 }
 
 TEST_F(PlansInForceTest, ALateStateChangesNothing) {
@@ -312,7 +312,7 @@ TEST_F(PlansInForceTest, ALateStateChangesNothing) {
   SeeRobot(1, 4);
   states_ = 3;
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 1u);
+  EXPECT_EQ(plans_.num_in_force(), 1u);
 }
 
 TEST_F(PlansInForceTest, AWithdrawalIsNotSentAfterThePlansEnd) {
@@ -324,7 +324,7 @@ TEST_F(PlansInForceTest, AWithdrawalIsNotSentAfterThePlansEnd) {
 }
 
 TEST_F(PlansInForceTest, OfManyPendingPlansTheNewestAreJudgedAndTheOthersWithdrawnWhole) {
-  const int many = static_cast<int>(PlansInForce::kJudged) + 1;
+  const int many = static_cast<int>(PlanLedger::kJudged) + 1;
   for (int id = 1; id <= many; ++id) Certify(id);
   SeeWall(15);  // none of them comes near
   const withdrawal_t message = Due().value();
@@ -337,7 +337,7 @@ TEST_F(PlansInForceTest, OfManyPendingPlansTheNewestAreJudgedAndTheOthersWithdra
 TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
   Certify(1);
   SeeRobot(1, 0);
-  for (int id = 2; id <= static_cast<int>(PlansInForce::kJudged) + 1; ++id) Certify(id);
+  for (int id = 2; id <= static_cast<int>(PlanLedger::kJudged) + 1; ++id) Certify(id);
   SeeWall(15);
   EXPECT_FALSE(Due());
 }
@@ -364,7 +364,7 @@ TEST_F(PlansInForceTest, APlanThatTwoMayExecuteIsJudgedFromTheEarlierStepAndLeav
   EXPECT_EQ(Due().value().plan_id, 1) << "the other one may execute it still";
   now_ += 1;
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 0u);
+  EXPECT_EQ(plans_.num_in_force(), 0u);
 }
 
 TEST_F(PlansInForceTest, OneOfTwoEndsNothing) {
@@ -373,7 +373,7 @@ TEST_F(PlansInForceTest, OneOfTwoEndsNothing) {
   SeeRobot(1, 3);
   plans_.SeeOneOfTwo(State(-1, -1), now_);
   plans_.SeeOneOfTwo(State(2, 0), now_);
-  EXPECT_EQ(plans_.size(), 2u);
+  EXPECT_EQ(plans_.num_in_force(), 2u);
 }
 
 TEST_F(PlansInForceTest, ThePlanOfTheRobotBeforeLeavesWithItsTimeAndAnothersStatesHaveTheirOwnOrder) {
@@ -384,15 +384,15 @@ TEST_F(PlansInForceTest, ThePlanOfTheRobotBeforeLeavesWithItsTimeAndAnothersStat
   const std::int64_t began = now_;
   now_ -= 1000;  // by a clock that is a little behind
   SeeRobot(77, 0);
-  EXPECT_EQ(plans_.size(), 2u);
+  EXPECT_EQ(plans_.num_in_force(), 2u);
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 1u) << "its own plan has ended, that of the other one has not";
+  EXPECT_EQ(plans_.num_in_force(), 1u) << "its own plan has ended, that of the other one has not";
   now_ = began + 2 * 500'000 + kSteps * 150'000;
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 1u);
+  EXPECT_EQ(plans_.num_in_force(), 1u);
   now_ += 1;
   SeeRobot(-1, -1);
-  EXPECT_EQ(plans_.size(), 0u);
+  EXPECT_EQ(plans_.num_in_force(), 0u);
 }
 
 // ---- Obstacles that are lost.
@@ -516,7 +516,7 @@ TEST_F(LostObstaclesTest, NothingStandsAgainWhenTheyReturn) {
   Answer(1, 0, static_cast<double>(lost.sequence));
   EXPECT_EQ(See({}), "");
   Judge();
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   EXPECT_FALSE(Due());
   EXPECT_EQ(plans_.withdrawals(), 1);
   Certify(2);
@@ -527,7 +527,7 @@ TEST_F(LostObstaclesTest, NothingStandsAgainWhenTheyReturn) {
 TEST_F(LostObstaclesTest, WhoStandsByForgetsSinceWhen) {
   SeeStaleWall();
   Judge();
-  plans_.Clear();
+  plans_.StandBy();
   now_ += kLostUs;
   SeeRobot(77, 4);
   Judge();
@@ -669,7 +669,7 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   learned.num_inputs = 2;
   EXPECT_EQ(restarted.Learn(Encode(learned)), "");
   Answer(77, 20, 0);  // it stands: the guard found equal grounds
-  now_ += PlansInForce::kRepeatUs;
+  now_ += PlanLedger::kRepeatUs;
   EXPECT_FALSE(Due());
   message = ToMessage({Obstacle::Circle(Eigen::Vector2d(9, 9), 1)});
   message.utime = now_;

@@ -8,7 +8,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
-#include "certifier/gate/plans_in_force.h"
+#include "certifier/gate/plan_ledger.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -83,7 +83,7 @@ class WithdrawnReplayTest : public ReplayTest {
     EventLogWriter log(path);
     const Config config = SmallTaskOnTheBus();
     Gate gate(config);
-    PlansInForce plans(config.gate);
+    PlanLedger plans(config.gate, kNow);
     std::int64_t sequence = 0;
     const auto see = [&](const std::vector<Obstacle>& obstacles) {
       obstacles_t message = ToMessage(obstacles);
@@ -109,9 +109,9 @@ class WithdrawnReplayTest : public ReplayTest {
     plans.Add(*answer.certified, kNow);
     see({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1.2)});
     send_due(kNow);
-    send_due(kNow + PlansInForce::kRepeatUs);
+    send_due(kNow + PlanLedger::kRepeatUs);
     see({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.8)});
-    send_due(kNow + PlansInForce::kRepeatUs);
+    send_due(kNow + PlanLedger::kRepeatUs);
     EXPECT_TRUE(log.Flush());
     return Replay({path}, {config});
   }

@@ -12,7 +12,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
-#include "certifier/gate/plans_in_force.h"
+#include "certifier/gate/plan_ledger.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -341,7 +341,7 @@ class VerifyWithdrawal : public VerifyObstacles {
   std::string Recorded(const std::function<void(withdrawal_t&)>& edit = {}) {
     const std::string path = Record();
     Gate gate(config_);
-    PlansInForce plans(config_.gate);
+    PlanLedger plans(config_.gate, kStart);
     EXPECT_EQ(gate.UpdateObstacles(Encode(Message(80, 0, kStart)), kStart + 1), "");
     plans.Judge(gate, kStart + 1);
     const auto certified = gate.Decide(Encode(candidate_), kStart + 3).certified.value();
