@@ -1,8 +1,8 @@
 /** The arrays of a zonotope, and how the kernels of the certify step write them in place. A user of zonotopes does not
 need this file.
 
-Row k of G, which holds coordinate k of every generator, is contiguous and padded with zeros to a multiple of kLaneCount,
-so a sum over generators reads four consecutive doubles at a time. These functions check nothing. */
+Row k of G, which holds coordinate k of every generator, is contiguous and padded with zeros to a multiple of
+kLaneCount, so a sum over generators reads four consecutive doubles at a time. These functions check nothing. */
 #pragma once
 
 #include <array>
