@@ -40,13 +40,7 @@ std::string Count(Eigen::Index n, const char* what) { return std::to_string(n) +
 // Checks the keys, after which the document knows their places. @return the path of the transitions.
 std::string ReadKeys(Document& file) {
   TaskDraft draft;
-  file.Check(draft.scope, [&](const Key& row, const std::string& key) {
-    try {
-      if (row.read) row.read(file, key, draft);
-    } catch (const std::invalid_argument& error) {
-      file.Fail(key, error.what());
-    }
-  });
+  file.Read(draft);
   return draft.transitions;
 }
 
@@ -266,9 +260,8 @@ class Examination final {
   }
 
   [[nodiscard]] std::string RowKey(const std::string& state) const {
-    const std::vector<std::string> rows = file_.KeysOf("declaration.lipschitz");
-    const bool is_named = std::ranges::find(rows, state) != rows.end();
-    return is_named ? "declaration.lipschitz." + state : "declaration.lipschitz";
+    const std::string key = "declaration.lipschitz";
+    return file_.root()["declaration"]["lipschitz"].Has(state) ? key + "." + state : key;
   }
 
   // ---- The tube of the plan, and where it leads.

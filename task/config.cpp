@@ -14,7 +14,6 @@
 #include "task/csv.h"
 #include "task/document.h"
 #include "task/draft.h"
-#include "task/key_rows.h"
 #include "task/step_time.h"
 
 namespace forereach {
@@ -80,16 +79,6 @@ void RequireObservable(const std::string& path, const Transitions& transitions, 
                     "; change the model's equations or parameters, or take the state out of the domain and the data");
 }
 
-void ReadKeys(Document& file, TaskDraft& draft) {
-  file.Check(draft.scope, [&](const Key& row, const std::string& key) {
-    try {
-      if (row.read) row.read(file, key, draft);
-    } catch (const std::invalid_argument& error) {
-      file.Fail(key, error.what());
-    }
-  });
-}
-
 // What a task that defines rest need not say again.
 void FillStanding(TaskDraft& draft) {
   constexpr double kShareOfRest = 0.1;  // of the nominal state, since the tube around it has to be at rest
@@ -109,7 +98,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   Document file(path);
   TaskDraft draft;
   draft.model_file.path = instead.model;
-  ReadKeys(file, draft);
+  file.Read(draft);
   FillStanding(draft);
   auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
   const NominalModel& model = *problem.model;
@@ -143,7 +132,7 @@ Config LoadConfig(const std::string& path, const NamedFiles& instead) {
 NamedFiles FilesNamedBy(const std::string& path) {
   Document file(path);
   TaskDraft draft;
-  ReadKeys(file, draft);
+  file.Read(draft);
   return {draft.transitions, draft.config.planner.policy, draft.model_file.path};
 }
 
