@@ -21,7 +21,7 @@ constexpr int kCornersOfDisc = 16;
 
 }  // namespace
 
-// Andrew's chain.
+// The corners of the convex hull, by Andrew's monotone chain.
 Picture::Polygon HullOf(const std::vector<Vector2d>& points, double radius) {
   Picture::Polygon all;
   for (const Vector2d& point : points) {

@@ -305,7 +305,7 @@ void ReadObstacle(const Field& at, TaskDraft& draft) {
   if (moves) ReadMotion(at["motion"], draft);
 }
 
-// At least one of both bounds.
+// A limit has at least one of both bounds.
 void ReadLimit(const Field& at, TaskDraft& draft) {
   const bool has_least = at.Has("at_least"), has_most = at.Has("at_most");
   Limit limit{.name = at["name"].Text(), .that = at["that"].Expression()};
