@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/certify/batch.h"
 #include "forereach/certify/explain.h"
 #include "forereach/fault_t.hpp"
@@ -354,7 +356,7 @@ std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::si
 }
 
 std::string EventName(const LogReference& event) {
-  return event.log_file + " event " + std::to_string(event.event_number);
+  return fmt::format("{} event {}", event.log_file, event.event_number);
 }
 
 PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,
@@ -408,7 +410,7 @@ PageRun EmptyPage(const std::vector<std::string>& inputs) {
   const FileKind kind = KindOf(inputs[0]);
   const bool is_log = kind != FileKind::kDirectory && kind != FileKind::kDatabase;
   const std::string name = is_log ? FileName(inputs[0]) : inputs[0];
-  page.name = inputs.size() == 1 ? name : name + " and " + std::to_string(inputs.size() - 1) + " more";
+  page.name = inputs.size() == 1 ? name : fmt::format("{} and {} more", name, inputs.size() - 1);
   page.files = inputs;
   return page;
 }

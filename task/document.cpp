@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -28,7 +30,7 @@ using Type = Key::Type;
 
 int LineOf(const YAML::Mark& mark) { return mark.line + 1; }
 
-std::string At(const std::string& path, int line) { return path + ":" + std::to_string(line) + ": "; }
+std::string At(const std::string& path, int line) { return fmt::format("{}:{}: ", path, line); }
 
 bool Contains(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
@@ -214,7 +216,7 @@ class Checker {
     }
   }
 
-  static std::string Index(std::size_t i) { return "[" + std::to_string(i) + "]"; }
+  static std::string Index(std::size_t i) { return fmt::format("[{}]", i); }
 
   static Node& AddEntry(Node& list, std::size_t i) {
     return *list.entries.emplace_back(
@@ -269,8 +271,7 @@ class Checker {
       const Key& row = ChildRow(at, entry.first, pattern);
       const auto [first, is_new] = seen.emplace(word, LineOf(entry.first.Mark()));
       if (!is_new)
-        Fail(at, entry.first, key,
-             "duplicate key, first in line " + std::to_string(first->second) + "; delete one of them");
+        Fail(at, entry.first, key, fmt::format("duplicate key, first in line {}; delete one of them", first->second));
       if (!row.only.empty() && row.only != kind)
         Fail(at, entry.first, key, "is for " + row.only + (kind.empty() ? "" : ", not for " + kind));
       children.emplace(&row, at.entries.emplace_back(new Node{at.document, key, word, entry.second}).get());
@@ -320,8 +321,7 @@ class Checker {
                "a name has letters, digits and underscores, and does not begin with a digit");
     if (word.size() > kLongestName)
       Fail(map, entry, at,
-           "...: the name has " + std::to_string(word.size()) + " letters, at most " + std::to_string(kLongestName) +
-               " are allowed");
+           fmt::format("...: the name has {} letters, at most {} are allowed", word.size(), kLongestName));
   }
 
   // In { }, a comma ends an expression, and YAML takes the rest for a key.
@@ -358,7 +358,7 @@ class Checker {
   void RequireSize(const Node& at, const Key& row) const {
     const auto require = [&](std::size_t size, const std::string& why) {
       if (size != 0 && at.yaml.size() != size)
-        Fail(at, "has " + std::to_string(at.yaml.size()) + " entries, has to have " + std::to_string(size) + why);
+        Fail(at, fmt::format("has {} entries, has to have {}{}", at.yaml.size(), size, why));
     };
     const auto one_each = [&](const std::vector<std::string>& names) { require(names.size(), ": " + Joined(names)); };
     switch (row.size) {
@@ -369,7 +369,7 @@ class Checker {
         return require(ToSize(scope_.safety_dim), ", one a safety coordinate (task.projection or task.body)");
       case Key::Size::kPoint:
         if (at.yaml.size() != 2 && at.yaml.size() != 3)
-          Fail(at, "has " + std::to_string(at.yaml.size()) + " entries, has to have 2 or 3");
+          Fail(at, fmt::format("has {} entries, has to have 2 or 3", at.yaml.size()));
         return;
       case Key::Size::kAny: return RequireCount(at, row);
     }
@@ -377,7 +377,7 @@ class Checker {
 
   static void RequireCount(const Node& at, const Key& row) {
     if (!row.count.Contains(static_cast<double>(at.yaml.size())))
-      Fail(at, "has " + std::to_string(at.yaml.size()) + " entries, which is outside " + row.count.text());
+      Fail(at, fmt::format("has {} entries, which is outside {}", at.yaml.size(), row.count.text()));
   }
 
   void CheckNames(const Node& at, const Key& row) const {
@@ -397,8 +397,8 @@ class Checker {
   void CheckText(const Node& at, const Key& row) {
     const std::string& text = at.yaml.Scalar();
     if (row.type == Type::kExpression && (expressions_ += text.size()) > kLargestExpressions)
-      Fail(at, "the expressions of this file, up to this one, have " + std::to_string(expressions_) +
-                   " bytes, at most " + std::to_string(kLargestExpressions) + " are allowed");
+      Fail(at, fmt::format("the expressions of this file, up to this one, have {} bytes, at most {} are allowed",
+                           expressions_, kLargestExpressions));
     if (text.empty() || text.find('\0') != std::string::npos) Fail(at, "is empty or not text");
     if (row.type == Type::kWord && std::find(row.words.begin(), row.words.end(), text) == row.words.end())
       Fail(at, Shown(at.yaml) + " is not known; " + Suggestion(text, {row.words.begin(), row.words.end()}));
@@ -436,7 +436,7 @@ std::string TabAdvice(const std::string& text, int line) {
   for (int i = 0; i <= line && std::getline(lines, at); ++i) {
     const std::string blank = at.substr(0, at.find_first_not_of(" \t"));
     if (blank.find('\t') != std::string::npos)
-      return "; line " + std::to_string(i + 1) + " is indented with a tab, write spaces";
+      return fmt::format("; line {} is indented with a tab, write spaces", i + 1);
   }
   return "";
 }

@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "command_line/nearest.h"
 #include "forereach/dynamics/compiled_models.h"
 #include "forereach/dynamics/expression.h"
@@ -90,7 +92,7 @@ class TextReader final {
   std::vector<Field> EntriesOf(const std::string& map, int least, int most) {
     std::vector<Field> entries = model_.Entries(map);
     if (const Range count = Between(least, most); !count.Contains(static_cast<double>(entries.size())))
-      model_.Fail(map, "has " + std::to_string(entries.size()) + " entries, which is outside " + count.text());
+      model_.Fail(map, fmt::format("has {} entries, which is outside {}", entries.size(), count.text()));
     for (const Field& entry : entries) Take(map, entry);
     return entries;
   }
@@ -109,7 +111,7 @@ class TextReader final {
     for (const Field& variable : EntriesOf(map, 1, most)) {
       const std::string unit = variable.Text();
       if (unit.size() > kLongestUnit || std::ranges::any_of(unit, [](unsigned char c) { return std::iscntrl(c) != 0; }))
-        variable.Fail("a unit has at most " + std::to_string(kLongestUnit) + " bytes and no control characters");
+        variable.Fail(fmt::format("a unit has at most {} bytes and no control characters", kLongestUnit));
       variables.push_back({variable.name(), unit});
     }
     if (&variables == &text_.states) return;

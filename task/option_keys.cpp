@@ -3,6 +3,8 @@
 #include <iterator>
 #include <set>
 
+#include <fmt/format.h>
+
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -191,9 +193,8 @@ void CheckPlanner(const Field& at, TaskDraft& draft) {
   if (planner.source == "policy" && planner.policy.empty())
     at.Fail("policy", "missing: a policy's file, for planner.source: policy");
   if (const int steps = planner.progress_steps + planner.tail_steps; steps > kMaxSteps)
-    at.Fail("tail_steps", std::to_string(planner.tail_steps) + " is outside [0, " +
-                              std::to_string(kMaxSteps - planner.progress_steps) + "]: with progress_steps " +
-                              std::to_string(steps) + " steps, a plan has at most " + std::to_string(kMaxSteps));
+    at.Fail("tail_steps", fmt::format("{} is outside [0, {}]: with progress_steps {} steps, a plan has at most {}",
+                                      planner.tail_steps, kMaxSteps - planner.progress_steps, steps, kMaxSteps));
 }
 
 std::vector<Key> PlannerKeys() {
@@ -223,7 +224,7 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("progress_steps", Between(1, kMaxSteps), &PlannerOptions::progress_steps,
                       "Controls before the braking tail."),
       planner.Integer("tail_steps", Between(0, kMaxSteps), &PlannerOptions::tail_steps,
-                      "Longest braking tail; with progress_steps at most " + std::to_string(kMaxSteps) + "."),
+                      fmt::format("Longest braking tail; with progress_steps at most {}.", kMaxSteps)),
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
                       "A candidate starts this many steps after the state it was planned from."),
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates,

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <span>
 
+#include <fmt/format.h>
+
 #include "forereach/certify/limits.h"
 #include "forereach/certify/safety.h"
 #include "forereach/numerics/directed.h"
@@ -47,8 +49,7 @@ void ReadBall(const Field& at, TaskDraft& draft) {
   for (const std::string& name : at["coordinates"].Names()) ball.coordinates.push_back(IndexOf(variables, name));
   const auto size = std::ssize(ball.coordinates);
   if (ball.center.size() != size)
-    at.Fail("center", "has " + std::to_string(ball.center.size()) + " entries, has to have " + std::to_string(size) +
-                          ", as many as coordinates");
+    at.Fail("center", fmt::format("has {} entries, has to have {}, as many as coordinates", ball.center.size(), size));
   draft.problem.domain.balls.push_back(std::move(ball));
 }
 
@@ -105,8 +106,7 @@ void ReadLipschitzByNames(const Field& at, TaskDraft& draft) {
 
 void ReadLipschitzMatrix(const Field& at, TaskDraft& draft) {
   const int states = draft.problem.model->num_states();
-  if (at.Count() != states)
-    at.Fail("has " + std::to_string(at.Count()) + " rows, has to have " + std::to_string(states) + ", one a state");
+  if (at.Count() != states) at.Fail(fmt::format("has {} rows, has to have {}, one a state", at.Count(), states));
   draft.problem.declaration.lipschitz = ReadMatrix(at);
 }
 
@@ -179,8 +179,7 @@ void ReadProjectionMatrix(const Field& at, TaskDraft& draft) { SetProjection(at,
 // @throws ConfigError unless `of` is the size of a part's point.
 void RequirePointSize(const Field& at, Eigen::Index size, Eigen::Index of) {
   if (size != of)
-    at.Fail("has " + std::to_string(size) + " entries, has to have " + std::to_string(of) +
-            ", as many as the first point of the body");
+    at.Fail(fmt::format("has {} entries, has to have {}, as many as the first point of the body", size, of));
 }
 
 // The expressions of one point.
@@ -192,7 +191,7 @@ std::vector<ExpressionText> ReadPlace(const Field& at) {
 
 // `size` is that of the body's points, 0 before the first.
 BodyPart ReadPart(const Field& at, Eigen::Index& size) {
-  if (at.Count() != 1) at.Fail("has " + std::to_string(at.Count()) + " keys, has to have one of disc, hull");
+  if (at.Count() != 1) at.Fail(fmt::format("has {} keys, has to have one of disc, hull", at.Count()));
   const bool is_disc = at.Has("disc");
   const Field shape = at[is_disc ? "disc" : "hull"];
   const std::string in_frame = is_disc ? "at" : "points", at_expressions = is_disc ? "place" : "places";
@@ -227,8 +226,9 @@ void ReadPose(const Field& at, Eigen::Index size, Body& body, TaskDraft& draft) 
   if (const Eigen::Index names = std::ssize(pose); names == size + 1)
     body.heading = IndexOf(states, pose.back());
   else if (names != size)
-    at.Fail("pose", "has " + std::to_string(names) + " entries, has to have " + std::to_string(size) +
-                        ", as many as the points of the body, or one more, the heading");
+    at.Fail("pose",
+            fmt::format("has {} entries, has to have {}, as many as the points of the body, or one more, the heading",
+                        names, size));
   SetProjection(at["pose"], ProjectionTo(std::span(pose).first(ToSize(size)), states), draft);
 }
 
@@ -239,8 +239,7 @@ void ReadBody(const Field& at, TaskDraft& draft) {
   int points = 0;
   for (const Field& part : at.Entries("parts")) points += body.parts.emplace_back(ReadPart(part, size)).num_points();
   if (points > kMaxBodyPoints)
-    at.Fail("parts",
-            "have " + std::to_string(points) + " points, which is outside " + Between(1, kMaxBodyPoints).text());
+    at.Fail("parts", fmt::format("have {} points, which is outside {}", points, Between(1, kMaxBodyPoints).text()));
   ReadPose(at, size, body, draft);
   draft.problem.body = std::move(body);
 }
@@ -301,7 +300,7 @@ void ReadMotion(const Field& at, TaskDraft& draft) {
 void ReadObstacle(const Field& at, TaskDraft& draft) {
   const bool moves = at.Has("motion");
   if (const std::size_t kinds = at.Keys().size() - (moves ? 1 : 0); kinds != 1)
-    at.Fail("has " + std::to_string(kinds) + " keys of a shape, has to have one of circle, box, polygon, half_plane");
+    at.Fail(fmt::format("has {} keys of a shape, has to have one of circle, box, polygon, half_plane", kinds));
   if (moves) ReadMotion(at["motion"], draft);
 }
 
@@ -315,7 +314,7 @@ void ReadLimit(const Field& at, TaskDraft& draft) {
   if (has_least && has_most) RequireOrdered(at["at_least"], at["at_most"]);
   std::vector<Limit>& limits = draft.problem.limits;
   if (const auto other = std::ranges::find(limits, limit.name, &Limit::name); other != limits.end())
-    at.Fail("name", limit.name + " is the name of task.limits[" + std::to_string(other - limits.begin()) + "], too");
+    at.Fail("name", fmt::format("{} is the name of task.limits[{}], too", limit.name, other - limits.begin()));
   limits.push_back(std::move(limit));
 }
 
@@ -357,11 +356,10 @@ std::vector<Key> TaskKeys() {
             "entries. One name more is the heading, in radians: the frame turns by it in the first two coordinates. "
             "Without it the frame does not turn. Required if a part is in the frame. If none is: any states, those in "
             "which planner.goal is given."),
-      Required(List(
-          "task.body.parts", Between(1, kMaxBodyParts),
-          "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +
-              " points in all. A part's points are fixed in the robot's frame, or stand where expressions of the state "
-              "say, as the joints of an arm do.")),
+      Required(List("task.body.parts", Between(1, kMaxBodyParts),
+                    fmt::format("Convex parts, with at most {} points in all. A part's points are fixed in the robot's "
+                                "frame, or stand where expressions of the state say, as the joints of an arm do.",
+                                kMaxBodyPoints))),
       Map("task.body.parts[]", "One of disc and hull."),
       Map("task.body.parts[].disc", "A disc, or a ball: the points within a radius of one point."),
       Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint,
@@ -404,7 +402,7 @@ std::vector<Key> TaskKeys() {
                "[]"),
       Map("task.limits[]", "One limit: a function with at_most, at_least or both.", ReadLimit),
       Required(Text("task.limits[].name",
-                    "For messages, 1 to " + std::to_string(kMaxLimitName) + " printable characters of ASCII.")),
+                    fmt::format("For messages, 1 to {} printable characters of ASCII.", kMaxLimitName))),
       Required(Expression("task.limits[].that",
                           "The function; see [docs/expressions.md](../docs/expressions.md). It may use states, inputs, "
                           "parameters and definitions of the model. One that uses an input holds at every sample at "
@@ -451,8 +449,7 @@ void CheckOrder(const Field& at, TaskDraft& draft) {
   const int order = draft.problem.zonotope_order, states = draft.problem.model->num_states(),
             largest = kMaxGenerators / states - 2;
   if (order > largest)
-    at.Fail("zonotope_order", std::to_string(order) + " is outside [1, " + std::to_string(largest) + "] for " +
-                                  std::to_string(states) + " states");
+    at.Fail("zonotope_order", fmt::format("{} is outside [1, {}] for {} states", order, largest, states));
 }
 
 std::vector<Key> CertifierKeys() {
@@ -463,11 +460,10 @@ std::vector<Key> CertifierKeys() {
           "method", {{"centred", Method::kCentred}, {"paper", Method::kPaper}}, &Problem::method,
           "paper: Algorithm 1 of the paper, with this project's conventions; it will not change. centred: the "
           "same with a tighter bound on the nominal model's remainder."),
-      certifier.Integer(
-          "zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
-          "rho: a slice has at most rho generators for each state. (rho + 2) times the number of states may not "
-          "exceed " +
-              std::to_string(kMaxGenerators) + "."),
+      certifier.Integer("zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
+                        fmt::format("rho: a slice has at most rho generators for each state. (rho + 2) times the "
+                                    "number of states may not exceed {}.",
+                                    kMaxGenerators)),
       certifier.Integer(
           "max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
           "The number of groups of 32 observations that one search for the tightest bound may visit. Every subset of "

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include <fmt/format.h>
+
 #include "command_line/nearest.h"
 #include "forereach/numerics/text.h"
 #include "task/config_error.h"
@@ -10,8 +12,8 @@
 namespace forereach::key_rows {
 
 void FailAt(const std::string& file, const ExpressionError& error) {
-  throw ConfigError(file + ":" + std::to_string(error.line()) + ":" + std::to_string(error.column()) + ": " +
-                    error.what() + (error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
+  throw ConfigError(fmt::format("{}:{}:{}: {}{}", file, error.line(), error.column(), error.what(),
+                                error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
 }
 
 std::string PathIn(const Field& at) { return (std::filesystem::path(at.file()).parent_path() / at.Text()).string(); }
