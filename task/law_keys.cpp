@@ -38,8 +38,7 @@ void ReadDefinitions(const Field& at, TaskDraft& draft) {
 void ReadAtRest(const Field& at, TaskDraft& draft) {
   const std::vector<std::string> states = draft.problem.model->state_names();
   std::vector<RestBound> at_rest;
-  for (const Field& bound : at.Entries())
-    at_rest.push_back({static_cast<int>(std::ranges::find(states, bound.name()) - states.begin()), bound.Number()});
+  for (const Field& bound : at.Entries()) at_rest.push_back({IndexOf(states, bound.name()), bound.Number()});
   draft.config.laws.at_rest = std::move(at_rest);
 }
 

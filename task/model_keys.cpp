@@ -207,8 +207,7 @@ std::shared_ptr<const NominalModel> ReadNamedModel(const Field& at) {
   const std::vector<std::string> states(model.states.begin(), model.states.end());
   RequireStates(at, states);
   std::vector<int> angles;
-  for (const std::string& name : ReadAngles(at))
-    angles.push_back(static_cast<int>(std::ranges::find(states, name) - states.begin()));
+  for (const std::string& name : ReadAngles(at)) angles.push_back(IndexOf(states, name));
   std::ranges::sort(angles);
   try {
     return model.make(parameters, std::move(angles));

@@ -25,10 +25,6 @@ using Size = Key::Size;
 
 constexpr Range kWithinDecades = Between(-1e9, 1e9);  // in microseconds within the bounds of a schedule
 
-int IndexOf(const std::vector<std::string>& names, const std::string& name) {
-  return static_cast<int>(std::ranges::find(names, name) - names.begin());
-}
-
 Box ReadBox(const Field& at) {
   const Field lower = at["lower"], upper = at["upper"];
   for (int k = 0; k < lower.Count(); ++k) RequireOrdered(lower[k], upper[k]);
@@ -349,6 +345,11 @@ std::vector<Key> TaskKeys() {
             ReadProjectionByNames),
       Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
               "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix),
+  };
+}
+
+std::vector<Key> BodyKeys() {
+  return {
       Map("task.body", "The robot's body, the union of its parts. Obstacles are given in its position's coordinates.",
           ReadBody),
       Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
@@ -377,6 +378,11 @@ std::vector<Key> TaskKeys() {
       List("task.body.parts[].hull.places[]", Between(2, kMaxSafetyDim), "The coordinates of one point."),
       Expression("task.body.parts[].hull.places[][]", "One coordinate."),
       Optional(Number("task.body.parts[].hull.radius", "m", kNotNegative, "The radius."), "0"),
+  };
+}
+
+std::vector<Key> BetweenKeys() {
+  return {
       Optional(Word("task.between", {"samples"},
                     "A certificate holds at its sample instants only, as in the paper. Only with `certifier.method: "
                     "paper` may the key be absent: forereach-certifier and the commands that certify require it "
@@ -395,6 +401,11 @@ std::vector<Key> TaskKeys() {
              "The largest absolute derivative of the heading. Required if task.body has a heading."),
       Number("task.between.turn_acceleration", "rad/s^2", kNotNegative,
              "The largest absolute second derivative of the heading. Required if task.body has a heading."),
+  };
+}
+
+std::vector<Key> LimitKeys() {
+  return {
       Optional(List("task.limits", Between(0, kMaxLimits),
                     "Bounds on functions of state and input: a lateral acceleration, a power, a region to keep in. A "
                     "plan that may exceed one gets abstention S (limit). They hold at the sample instants; nothing is "
@@ -409,6 +420,11 @@ std::vector<Key> TaskKeys() {
                           "which an input is applied: all but the last.")),
       Number("task.limits[].at_most", "of the function", kReal, "Its largest value, for every state of the slice."),
       Number("task.limits[].at_least", "of the function", kReal, "Its least value, likewise."),
+  };
+}
+
+std::vector<Key> ObstacleKeys() {
+  return {
       Required(List(
           "task.obstacles", Between(0, kMaxObstacles),
           "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those received on the bus count too.")),
@@ -478,7 +494,8 @@ std::vector<Key> CertifierKeys() {
 
 std::vector<Key> ProblemKeys() {
   std::vector<Key> keys;
-  for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys})
+  for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, BodyKeys, BetweenKeys, LimitKeys,
+                          ObstacleKeys, CertifierKeys})
     std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }

@@ -1,5 +1,6 @@
 #include "task/row_readers.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -17,6 +18,10 @@ void FailAt(const std::string& file, const ExpressionError& error) {
 }
 
 std::string PathIn(const Field& at) { return (std::filesystem::path(at.file()).parent_path() / at.Text()).string(); }
+
+int IndexOf(const std::vector<std::string>& names, const std::string& name) {
+  return static_cast<int>(std::ranges::find(names, name) - names.begin());
+}
 
 void RequireOrdered(const Field& lower, const Field& upper) {
   if (lower.Number() <= upper.Number()) return;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/model_text.h"
@@ -14,6 +15,9 @@ namespace forereach::key_rows {
 
 /** The path of a file that a task file names, relative to the task file's directory. */
 [[nodiscard]] std::string PathIn(const Field& at);
+
+/** The index of a name that is there. */
+[[nodiscard]] int IndexOf(const std::vector<std::string>& names, const std::string& name);
 
 /** @throws ConfigError unless lower <= upper, which are numbers. */
 void RequireOrdered(const Field& lower, const Field& upper);
