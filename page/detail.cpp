@@ -55,7 +55,7 @@ void AddBodies(const Problem& problem, const Tube& tube, PageDetail& detail) {
   if (auto sketch = MakeSketch(bodies)) detail.bodies = std::move(*sketch);
 }
 
-// Why there is no tube.
+// Adds the tube to the detail. @return why there is none; empty otherwise.
 std::string AddTube(const Certifier& certifier, const JudgedCandidate& judged, const Decision& again, const Tube& tube,
                     PageDetail& detail) {
   const bool is_certified = again.outcome == Outcome::kCertified;

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kNameDigits = 32;
 
-// Of a file of any size.
+// Reads the file in blocks: a log may be larger than the memory.
 std::string DigestOfFile(const std::string& path) {
   InputFile file(path, std::numeric_limits<std::int64_t>::max());
   std::vector<char> block(1 << 20);

@@ -118,7 +118,7 @@ Obstacle FromMessage(const obstacle_v2_t& piece, std::int64_t stamp, const std::
   return motion == standing ? shape : shape.Moving(motion);
 }
 
-// What no rule of a track can be applied to.
+// A piece without a window of time. The rules of a track compare windows, so this is checked before them.
 void RequireWindow(const obstacle_v2_t& piece) {
   if (piece.gone != 0 && piece.gone != 1)
     throw std::invalid_argument(fmt::format("gone {}, must be 0 or 1", piece.gone));

@@ -22,7 +22,7 @@ void RequireSameAfterTurns(const Problem& problem) {
                 ", which is an angle: how often it has turned is not known");
 }
 
-// What every certifier reads of a problem.
+// Checks what every certifier reads of a problem.
 const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   RequireExactArithmetic();  // what the proof assumes of the machine: docs/soundness.md, 1
   Require(problem && problem->model, "problem: no model");
@@ -42,7 +42,7 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   return *problem;
 }
 
-// What the envelope is made of.
+// Checks declaration and transitions, of which the envelope is made.
 void ValidateObservations(const Problem& problem) {
   const int variables = problem.model->num_variables();
   problem.declaration.Validate(problem.model->num_states(), variables);

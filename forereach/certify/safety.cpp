@@ -136,7 +136,7 @@ Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
   return spatial;
 }
 
-// A bound for the whole body is one for its closest part.
+// The better of two bounds. One without a part is for the whole body, so it holds for the closest part.
 PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
   if (IsBetter(by_parts.separation, other.separation)) return by_parts;
   return {other.separation, other.part < 0 ? by_parts.part : other.part};

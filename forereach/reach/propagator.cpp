@@ -170,7 +170,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
   return {Status::kNoFiniteEnclosure, {}, 0};
 }
 
-// The remainder that is not finite.
+// A remainder that is not finite: names its first such coordinate.
 [[gnu::noinline]] StepResult Failed(const Remainder& remainder) noexcept {
   const auto* infinite = std::ranges::find_if_not(remainder.half_width, [](double x) { return std::isfinite(x); });
   return {StepResult::Status::kNoFiniteEnclosure, {}, static_cast<int>(infinite - remainder.half_width.begin())};

@@ -9,7 +9,7 @@
 
 namespace forereach {
 
-// By plain arithmetic: it only chooses what to keep.
+// Plain arithmetic: scores only choose which columns stay, and every choice is sound (docs/soundness.md, 3.8).
 void ScoreColumns(const Zonotope& set, ColumnScores& scores) noexcept {
   ColumnScores::Writer writer(scores);
   for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
