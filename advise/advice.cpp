@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/certify/explain.h"
 #include "forereach/certify/way_clear.h"
 #include "forereach/numerics/least.h"
@@ -103,10 +105,10 @@ class Widening {
                   HowMuch(upper[ToSize(index)] - before_.Corners().second[ToSize(index)], index);
           break;
         case DomainExit::Kind::kInequality:
-          text += "inequality " + std::to_string(index) + " to " + RoundedUp(domain_.inequalities[ToSize(index)].bound);
+          text += fmt::format("inequality {} to {}", index, RoundedUp(domain_.inequalities[ToSize(index)].bound));
           break;
         case DomainExit::Kind::kBall:
-          text += "ball " + std::to_string(index) + " to the radius " + RoundedUp(domain_.balls[ToSize(index)].radius);
+          text += fmt::format("ball {} to the radius {}", index, RoundedUp(domain_.balls[ToSize(index)].radius));
           break;
         case DomainExit::Kind::kNone: break;
       }
@@ -260,9 +262,9 @@ class Adviser {
     for (const GivingWay& way : *ways) {
       const double distance = way.shift.norm();
       farthest = std::max(farthest, distance);
-      what += (what.empty() ? "" : ", ") + ("obstacle " + std::to_string(way.obstacle)) + " by " +
-              RoundedUp(distance, 4) + " m, to the side of " + Text(way.shift / distance) + " (first touched at step " +
-              std::to_string(way.step) + ")";
+      what +=
+          fmt::format("{}obstacle {} by {} m, to the side of {} (first touched at step {})", what.empty() ? "" : ", ",
+                      way.obstacle, RoundedUp(distance, 4), Text(way.shift / distance), way.step);
     }
     Add({.change = Change::kObstacles,
          .what = "if it passed farther away, or these stood farther away: " + what,
@@ -371,7 +373,7 @@ class Adviser {
       changed.controls = case_.controls.leftCols(steps);
       if (!Turns(changed)) continue;
       return Add({.change = Change::kHorizon,
-                  .what = "with its first " + std::to_string(steps) + " steps alone",
+                  .what = fmt::format("with its first {} steps alone", steps),
                   .amount = static_cast<double>(steps),
                   .after = {changed}});
     }
@@ -394,8 +396,7 @@ class Adviser {
         changed.progress_steps = static_cast<int>(begin);
         if (!Turns(changed)) continue;
         return Add({.change = Change::kTail,
-                    .what = "with a braking tail from step " + std::to_string(begin) + " on, of " +
-                            std::to_string(tail.cols()) + " steps",
+                    .what = fmt::format("with a braking tail from step {} on, of {} steps", begin, tail.cols()),
                     .amount = static_cast<double>(begin),
                     .after = {changed}});
       }
@@ -465,8 +466,9 @@ class Adviser {
       for (const Eigen::VectorXd& outcome : allowed.Outcomes())
         after.push_back(WithProblem(case_, [&](Problem& problem) { AddObservation(problem, z, outcome); }));
       if (!Turns(after.front())) continue;
-      std::string what = "if one more transition were observed at " + DescribePlace(*case_.problem, z) + " (step " +
-                         std::to_string(t) + "), where the declaration leaves";
+      std::string what =
+          fmt::format("if one more transition were observed at {} (step {}), where the declaration leaves",
+                      DescribePlace(*case_.problem, z), t);
       bool is_first = true;
       for (int k = 0; k < n; ++k) {
         if (!(allowed.upper[k] - allowed.lower[k] > 1e-12)) continue;
@@ -567,7 +569,7 @@ class Adviser {
       all.x_next.conservativeResize(all.x_next.rows() - 1, Eigen::NoChange);
     });
     Add({.change = Change::kOutlier,
-         .what = "without observation " + std::to_string(observation),
+         .what = fmt::format("without observation {}", observation),
          .amount = static_cast<double>(observation),
          .after = {changed}});
   }

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/limits.h"
@@ -35,18 +37,12 @@ constexpr double kShareBeyond = 0.05;          // of the data's range
 
 std::string Up(double x) { return RoundedUp(x, 4); }
 std::string Down(double x) { return RoundedDown(x, 4); }
-std::string Count(Eigen::Index n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
+std::string Count(Eigen::Index n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
 // Checks the keys, after which the document knows their places. @return the path of the transitions.
 std::string ReadKeys(Document& file) {
   TaskDraft draft;
-  file.Check(draft.scope, [&](const Key& row, const std::string& key) {
-    try {
-      if (row.read) row.read(file, key, draft);
-    } catch (const std::invalid_argument& error) {
-      file.Fail(key, error.what());
-    }
-  });
+  file.Read(draft);
   return draft.transitions;
 }
 
@@ -179,7 +175,7 @@ class Examination final {
     }
   }
 
-  [[nodiscard]] std::string LineOf(Eigen::Index row) const { return result_.data + ":" + std::to_string(row + 2); }
+  [[nodiscard]] std::string LineOf(Eigen::Index row) const { return fmt::format("{}:{}", result_.data, row + 2); }
 
   void KeepThoseInside() {
     std::vector<Eigen::Index> outside(problem_.domain.inequalities.size() + problem_.domain.balls.size(), 0);
@@ -197,8 +193,8 @@ class Examination final {
     for (std::size_t which = 0; which < outside.size(); ++which) {
       if (outside[which] == 0) continue;
       const std::size_t inequalities = problem_.domain.inequalities.size();
-      const std::string key = which < inequalities ? "domain.inequalities[" + std::to_string(which) + "]"
-                                                   : "domain.balls[" + std::to_string(which - inequalities) + "]";
+      const std::string key = which < inequalities ? fmt::format("domain.inequalities[{}]", which)
+                                                   : fmt::format("domain.balls[{}]", which - inequalities);
       Add(key, Count(outside[which], "transition") + " outside, the first in " + LineOf(first[which]), kWiden);
     }
     problem_.transitions = {all_.z(rows_, Eigen::all), all_.x_next(rows_, Eigen::all)};
@@ -252,9 +248,9 @@ class Examination final {
       if (!row.is_declared) continue;
       if (row.used > kTight)
         Remark(RowKey(row.name),
-               row.name + ": the data use " + Up(100 * row.used) + " % of what is declared (lines " +
-                   std::to_string(row.first) + " and " + std::to_string(row.second) + " of " + result_.data +
-                   "): a new transition may contradict it, and stop the robot",
+               fmt::format("{}: the data use {} % of what is declared (lines {} and {} of {}): a new transition may "
+                           "contradict it, and stop the robot",
+                           row.name, Up(100 * row.used), row.first, row.second, result_.data),
                "declare more than the data show, unless the bound is proven");
       if (row.used < kLoose) loose += (loose.empty() ? "" : ", ") + row.name, most = std::max(most, row.used);
     }
@@ -266,9 +262,8 @@ class Examination final {
   }
 
   [[nodiscard]] std::string RowKey(const std::string& state) const {
-    const std::vector<std::string> rows = file_.KeysOf("declaration.lipschitz");
-    const bool is_named = std::ranges::find(rows, state) != rows.end();
-    return is_named ? "declaration.lipschitz." + state : "declaration.lipschitz";
+    const std::string key = "declaration.lipschitz";
+    return file_.root()["declaration"]["lipschitz"].Has(state) ? key + "." + state : key;
   }
 
   // ---- The tube of the plan, and where it leads.
@@ -311,10 +306,10 @@ class Examination final {
     const std::string& name = result_.states[k];
     const double sigma = problem_.declaration.noise_bound[violation.coordinate];
     Add(RowKey(name),
-        name + ": lines " + std::to_string(FileLine(violation.first)) + " and " +
-            std::to_string(FileLine(violation.second)) + " of " + result_.data + " differ in the model's error by " +
-            Down(violation.difference) + ", and the declaration allows " + Up(violation.bound) +
-            ": it is false, and nothing can be certified",
+        fmt::format("{}: lines {} and {} of {} differ in the model's error by {}, and the declaration allows {}: it is "
+                    "false, and nothing can be certified",
+                    name, FileLine(violation.first), FileLine(violation.second), result_.data,
+                    Down(violation.difference), Up(violation.bound)),
         "look at these lines, and whether model.dt is the step of the data. If they are right, declare more: "
         "noise_bound of " +
             name + " at least " + Up(sigma + (violation.difference - violation.bound) / 2) + ", or this row larger" +
@@ -343,8 +338,7 @@ class Examination final {
       advice += "widen the domain, if the declaration holds there" + NarrowerTube(tube);
     }
     Add(key,
-        "the tube of " + PlanName() + ", without obstacles, ends at step " + std::to_string(tube.length()) + ": " +
-            result_.tube,
+        fmt::format("the tube of {}, without obstacles, ends at step {}: {}", PlanName(), tube.length(), result_.tube),
         advice, is_remark);
   }
 
@@ -393,7 +387,7 @@ class Examination final {
     Tube tube;
     const Decision decision = certifier.Certify(plan, initial_set, {}, tube);
     if (decision.cause == Cause::kLimit)
-      Add("task.limits[" + std::to_string(decision.coordinate) + "]",
+      Add(fmt::format("task.limits[{}]", decision.coordinate),
           "the tube of " + PlanName() + ": " + Explain(decision, *problem, plan, tube),
           "change the start or the plan, raise the bound, or make the tube narrower",
           decision.step >= StepsThatCount());
@@ -404,7 +398,7 @@ class Examination final {
     for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
       const Obstacle& obstacle = config_.obstacles[i];
       const Decision decision = certifier.Certify(PlanOf(1), initial_set, {&obstacle, 1}, tube);
-      const std::string key = "task.obstacles[" + std::to_string(i) + "]";
+      const std::string key = fmt::format("task.obstacles[{}]", i);
       if (decision.outcome == Outcome::kSafety && decision.step == 0)
         Add(key,
             "the robot may touch it at the start: the proven distance is " + Down(decision.margin) + " m, and " +
@@ -425,7 +419,7 @@ class Examination final {
             l < ToSize(model_.num_states()) ? tube.slice(t).center(static_cast<int>(l)) : controls_(IndexIn(l), t);
         if (const double away = Beyond(coordinate, value); away > farthest) farthest = away, place = value, step = t;
       }
-      RemarkOnData(coordinate, place, "transitions", "at step " + std::to_string(step) + " " + PlanName(),
+      RemarkOnData(coordinate, place, "transitions", fmt::format("at step {} {}", step, PlanName()),
                    "record steps there");
     }
   }
@@ -461,7 +455,7 @@ class Examination final {
       const Obstacle& obstacle = config_.obstacles[i];
       const auto touches = [&](const BodyPart& part) { return !(ApproximateDistance(obstacle, part) > 0); };
       if (!obstacle.motion() && std::ranges::any_of(parts, touches))
-        Add("robot.start", "the robot touches task.obstacles[" + std::to_string(i) + "] there",
+        Add("robot.start", fmt::format("the robot touches task.obstacles[{}] there", i),
             "begin where the robot is clear, or move the obstacle");
     }
   }
@@ -495,9 +489,8 @@ class Examination final {
     }
     if (samples > 0)
       Add(key,
-          "from none of " + std::to_string(samples) +
-              " states in the domain it brings the robot to rest inside the domain within " + Count(most, "step") +
-              consequence,
+          fmt::format("from none of {} states in the domain it brings the robot to rest inside the domain within {}{}",
+                      samples, Count(most, "step"), consequence),
           "look whether the law has a value there and rest is in the domain; brake harder, allow more steps, or raise "
           "planner.at_rest");
   }
@@ -550,7 +543,7 @@ class Examination final {
     for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
       if (!config_.obstacles[i].motion() &&
           -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
-        Add("planner.goal", "task.obstacles[" + std::to_string(i) + "] covers the goal", "move one of them");
+        Add("planner.goal", fmt::format("task.obstacles[{}] covers the goal", i), "move one of them");
   }
 
   // The longest way of a point of the body in one nominal step, of those tried; a lower bound.
@@ -602,9 +595,9 @@ class Examination final {
       const double thickness = LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
       if (step <= thickness + body) continue;
       Add("task.between",
-          "the robot moves by up to " + Up(step) + " m in one step of " + ToText(config_.period) +
-              " s, and task.obstacles[" + std::to_string(i) + "] is " + Down(thickness) +
-              " m thick: with certificates at the samples only it may pass through between two of them",
+          fmt::format("the robot moves by up to {} m in one step of {} s, and task.obstacles[{}] is {} m thick: with "
+                      "certificates at the samples only it may pass through between two of them",
+                      Up(step), ToText(config_.period), i, Down(thickness)),
           "declare bounds on the motion between samples, `between: {acceleration: [...]}`; or a smaller step or speed");
       return;
     }

@@ -17,6 +17,7 @@
 #include "forereach/residual/observation_store.h"
 #include "forereach/residual/observations.h"
 #include "forereach/safety/separation.h"
+#include "forereach/sets/order_reduction.h"
 
 namespace forereach::bench {
 namespace {

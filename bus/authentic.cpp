@@ -158,7 +158,7 @@ std::pair<std::uint64_t, std::int64_t> Signer::Next(std::int64_t now_us) {
     sender_ = FromBigEndian<std::uint64_t>(Bytes(DigestOf(NumbersOf(bus_, sender_, last_counter_))));
     last_counter_ = now_us - 1;
   }
-  last_counter_ = std::max(now_us, last_counter_ + 1);
+  last_counter_ = std::max(now_us, last_counter_ + 1);  // rises even if two messages share a microsecond
   return {sender_, last_counter_};
 }
 

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include <lcm/lcm-cpp.hpp>
 
 #include "bus/inbox.h"
@@ -139,9 +141,6 @@ std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock, const std::sha
   }
 }
 
-std::string BusVersion() {
-  return std::to_string(LCM_MAJOR_VERSION) + "." + std::to_string(LCM_MINOR_VERSION) + "." +
-         std::to_string(LCM_MICRO_VERSION);
-}
+std::string BusVersion() { return fmt::format("{}.{}.{}", LCM_MAJOR_VERSION, LCM_MINOR_VERSION, LCM_MICRO_VERSION); }
 
 }  // namespace forereach

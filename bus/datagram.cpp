@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include <fmt/format.h>
+
 namespace forereach {
 namespace {
 
@@ -47,7 +49,7 @@ void DatagramCounts::Count(DatagramKind kind) {
 std::string DescribeRefused(const DatagramCounts& counts) {
   std::string words;
   const auto add = [&words](std::int64_t count, const char* what) {
-    if (count > 0) words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + what;
+    if (count > 0) words += fmt::format("{}{} {}", words.empty() ? "" : ", ", count, what);
   };
   add(counts.fragments, "fragments of messages over 64 kB");
   add(counts.not_lcm, "not of LCM");

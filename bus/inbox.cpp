@@ -58,7 +58,7 @@ void Inbox::Put(std::string_view channel, Bytes raw, std::int64_t utime) noexcep
     (message ? admitted_ : refused_).Push(std::move(stored));
   }
   arrived_.notify_one();
-} catch (...) {
+} catch (...) {  // out of memory: the receive thread goes on without this message
   ++admitted_.dropped;
 }
 
@@ -85,6 +85,7 @@ int Inbox::HandOut(int timeout_ms) {
     refused.swap(refused_.messages);
     bytes = std::exchange(admitted_.bytes, 0) + std::exchange(refused_.bytes, 0);
   }
+  // Handlers run without the lock, so they may send, and messages may arrive. Both queues are merged by arrival.
   int calls = 0;
   std::exception_ptr failure;
   for (auto a = admitted.begin(), r = refused.begin(); a != admitted.end() || r != refused.end();) {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <iomanip>
 #include <iostream>
-#include <sstream>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -60,7 +60,7 @@ std::vector<MotionRow> RowsOf(const Config& config, const std::vector<MotionBoun
       if (weight != 0) name += (name.empty() ? "" : " + ") + (weight == 1 ? "" : ToText(weight) + " ") + states[k];
     }
     if (!name.empty()) name += "''";
-    if (problem.body.HasPlaces()) name += (name.empty() ? "" : ", ") + ("places''[" + std::to_string(i) + "]");
+    if (problem.body.HasPlaces()) name += fmt::format("{}places''[{}]", name.empty() ? "" : ", ", i);
     rows.push_back({"acceleration", name, "m/s^2", acceleration[i]});
   }
   if (problem.body.heading < 0) return rows;
@@ -112,9 +112,10 @@ MotionProposal FromPositions(const Config& config) {
   MotionProposal proposal;
   proposal.rows = RowsOf(config, acceleration, found(measured.turn_rate), found(measured.turn_acceleration));
   proposal.source = "positions";
-  proposal.remark = "Largest second differences in " + std::to_string(measured.triples) +
-                    " triples of logged samples. This proves nothing: the true motion curves at\n"
-                    "least as much. Errors of the measurement are included. Add a margin, and what was not driven.";
+  proposal.remark = fmt::format(
+      "Largest second differences in {} triples of logged samples. This proves nothing: the true motion curves "
+      "at\nleast as much. Errors of the measurement are included. Add a margin, and what was not driven.",
+      measured.triples);
   return proposal;
 }
 
@@ -155,20 +156,19 @@ Json ToJson(const MotionProposal& proposal, const Config& config) {
 
 void PrintForPeople(const MotionProposal& proposal, const Config& config) {
   const bool proven = proposal.source == "equations";
-  std::ostringstream text;
-  text << std::left << "declare: motion between two samples, at most "
-       << RoundedUp(LongestPeriod(config), kMotionDigits) << " s apart, from the "
-       << (proven ? "equations of " + config.problem->model->name() : "logged positions")
-       << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
+  std::string text = fmt::format("declare: motion between two samples, at most {} s apart, from the {}{}\n",
+                                 RoundedUp(LongestPeriod(config), kMotionDigits),
+                                 proven ? "equations of " + config.problem->model->name() : "logged positions",
+                                 AllReached(proposal.rows) ? "" : "; stopped at --max-boxes");
   for (const MotionRow& row : proposal.rows) {
-    text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)
-         << (proven ? RoundedUp(row.bound.upper, kMotionDigits) : RoundedDown(row.bound.lower, kMotionDigits))
-         << std::setw(8) << row.unit;
+    text += fmt::format(
+        "  {:<10} at {} {:<9}{:<8}", row.name, proven ? "most" : "least",
+        proven ? RoundedUp(row.bound.upper, kMotionDigits) : RoundedDown(row.bound.lower, kMotionDigits), row.unit);
     if (proven)
-      text << "  largest found " << RoundedDown(row.bound.lower, kMotionDigits) << ", " << row.bound.boxes << " boxes";
-    text << "\n";
+      text += fmt::format("  largest found {}, {} boxes", RoundedDown(row.bound.lower, kMotionDigits), row.bound.boxes);
+    text += "\n";
   }
-  std::cout << text.str() << proposal.remark << (config.problem->declaration.IsDisturbed() ? kDisturbed : "")
+  std::cout << text << proposal.remark << (config.problem->declaration.IsDisturbed() ? kDisturbed : "")
             << "\n\ntask:\n  " << Yaml(proposal.rows) << std::endl;
 }
 

@@ -54,7 +54,7 @@ void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostre
   if (proposal.declaration.lipschitz.maxCoeff() == 0) out << "  no slopes are needed\n";
 }
 
-// Of each row, each column.
+// By row of the Lipschitz matrix, then by column.
 using LoneSlopes = std::vector<std::vector<LoneSlope>>;
 
 void PrintLoneSlopes(const LoneSlopes& rows, const NominalModel& model, std::ostream& out) {

@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <iomanip>
 #include <iostream>
 #include <optional>
-#include <sstream>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -109,36 +109,33 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
 
 double Share(int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0; }
 
-std::string Percent(double value) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(1) << value << " %";
-  return text.str();
-}
+std::string Percent(double value) { return fmt::format("{:.1f} %", value); }
 
 void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command, const Split& split) {
   const Trial& first = trials.front();
-  std::ostringstream out;
-  out << "hold-out: " << command.blocks << " blocks of time, learned from " << split.learn.size() << ", judged by "
-      << split.judge.size() << " with " << first.found.transitions << " transitions and " << first.windows
-      << " stretches of " << command.steps << " commands\n"
-      << std::left << "  " << std::setw(8) << "factor" << std::setw(17) << "contradicting" << std::setw(14)
-      << "per thousand" << std::setw(10) << "blocks" << std::setw(12) << "next block" << std::setw(11) << "certified"
-      << std::setw(9) << "inside"
-      << "half-width\n";
+  std::string table = fmt::format(
+      "hold-out: {} blocks of time, learned from {}, judged by {} with {} transitions and {} stretches of {} "
+      "commands\n",
+      command.blocks, split.learn.size(), split.judge.size(), first.found.transitions, first.windows, command.steps);
+  const auto contradictions = [](const auto&... cells) {
+    return fmt::format("  {:<8}{:<17}{:<14}{:<10}{:<12}", cells...);
+  };
+  const auto plans = [](const auto&... cells) { return fmt::format("{:<11}{:<9}{}", cells...); };
+  table += contradictions("factor", "contradicting", "per thousand", "blocks", "next block") +
+           plans("certified", "inside", "half-width") + "\n";
   for (const Trial& trial : trials) {
     const Contradictions& found = trial.found;
-    out << "  " << std::setw(8) << ToText(trial.factor) << std::setw(17)
-        << std::to_string(found.contradicting) + " of " + std::to_string(found.transitions) << std::setw(14)
-        << RoundedUp(1000.0 * found.contradicting / found.transitions, 3) << std::setw(10)
-        << std::to_string(found.blocks_contradicting) + " of " + std::to_string(found.blocks) << std::setw(12)
-        << "<= " + Percent(100 * trial.block_upper);
+    table += contradictions(ToText(trial.factor), fmt::format("{} of {}", found.contradicting, found.transitions),
+                            RoundedUp(1000.0 * found.contradicting / found.transitions, 3),
+                            fmt::format("{} of {}", found.blocks_contradicting, found.blocks),
+                            "<= " + Percent(100 * trial.block_upper));
     if (trial.windows > 0)
-      out << std::setw(11) << Percent(Share(trial.certified, trial.windows)) << std::setw(9)
-          << Percent(Share(trial.inside, trial.states)) << RoundedUp(trial.half_width, 3);
-    out << "\n";
+      table += plans(Percent(Share(trial.certified, trial.windows)), Percent(Share(trial.inside, trial.states)),
+                     RoundedUp(trial.half_width, 3));
+    table += "\n";
   }
   std::cout
-      << out.str()
+      << table
       << "\nfactor: on the smallest slopes that the learning blocks do not contradict.\n"
          "contradicting: held-out transitions that provably contradict one of the learning blocks.\n"
          "next block: with "
@@ -205,8 +202,8 @@ int DeclareHoldOut(const DataCommand& command) {
   const Config config = LoadConfig(command.config);
   const Problem& problem = *config.problem;
   if (command.blocks > problem.transitions.size())
-    throw ConfigError("--blocks: " + std::to_string(command.blocks) + " is more than the task's " +
-                      std::to_string(problem.transitions.size()) + " transitions");
+    throw ConfigError(
+        fmt::format("--blocks: {} is more than the task's {} transitions", command.blocks, problem.transitions.size()));
   const Split split = SplitByTime(problem.transitions.size(), command.blocks);
   std::optional<Progress> progress(std::in_place, "parts of the work",
                                    2 * ToSize(problem.model->num_states()) + std::size(kFactors));

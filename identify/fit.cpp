@@ -7,6 +7,8 @@
 #include <span>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <unsupported/Eigen/NonLinearOptimization>
@@ -206,8 +208,8 @@ std::vector<std::size_t> PlacesOf(const ModelText& text, const std::vector<std::
 Fit FitParameters(const ModelText& text, const Transitions& transitions, const std::vector<std::string>& names) {
   const std::vector<std::size_t> places = PlacesOf(text, names);
   if (transitions.x_next.size() < std::ssize(names))
-    throw std::invalid_argument(std::to_string(transitions.x_next.size()) + " numbers cannot determine " +
-                                std::to_string(names.size()) + " parameters");
+    throw std::invalid_argument(
+        fmt::format("{} numbers cannot determine {} parameters", transitions.x_next.size(), names.size()));
   ModelText middle = text;
   for (ModelText::Parameter& parameter : middle.parameters)
     parameter.lower = parameter.upper = parameter.lower + (parameter.upper - parameter.lower) / 2;

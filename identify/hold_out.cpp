@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "forereach/numerics/size.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_row.h"
@@ -51,8 +53,8 @@ void Mark(const Declaration& declaration, const Observations& all, int first, in
 
 Split SplitByTime(int count, int blocks) {
   if (!(2 <= blocks && blocks <= count))
-    throw std::invalid_argument(std::to_string(blocks) + " blocks of " + std::to_string(count) +
-                                " transitions: there have to be between 2 and " + std::to_string(count));
+    throw std::invalid_argument(
+        fmt::format("{} blocks of {} transitions: there have to be between 2 and {}", blocks, count, count));
   Split split;
   const auto begin_of = [&](int b) { return static_cast<int>(static_cast<std::int64_t>(count) * b / blocks); };
   for (int b = 0; b < blocks; ++b) (b % 2 == 0 ? split.learn : split.judge).push_back({begin_of(b), begin_of(b + 1)});

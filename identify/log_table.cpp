@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <csv.h>
 
 #include "command_line/nearest.h"
@@ -16,15 +18,8 @@
 namespace forereach {
 namespace {
 
-constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 constexpr std::size_t kShown = 40;            // bytes of a field in a message
 constexpr std::size_t kLongestRow = 1 << 24;  // bytes, of a row that quotes spread over lines
-
-std::string_view Trim(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
 
 std::string Name(char delimiter) { return delimiter == '\t' ? "tab" : std::string(1, delimiter); }
 
@@ -47,7 +42,7 @@ class RowParser {
     else if (goes_on_)  // libcsv ends a row there, which may be one of another recorder, or a row that was cut off
       problem = "a carriage return inside a row";
     else if (bytes_ > kLongestRow)
-      problem = "longer than " + std::to_string(kLongestRow) + " bytes";
+      problem = fmt::format("longer than {} bytes", kLongestRow);
     if (problem.empty()) return "";
     csv_free(&parser_);
     Begin();
@@ -109,7 +104,6 @@ class Reader {
   template <class Condition>
   void ReadLines(const Condition& goes_on) {
     for (std::string line; goes_on() && lines_.Next(line);) {
-      if (lines_.line() == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
       if (IsRow(line)) Take(line);
     }
     if (parser_ && !parser_->is_complete()) Fail(first_line_, "a quoted field begins in this row and does not end");
@@ -118,14 +112,14 @@ class Reader {
   }
 
   [[noreturn]] void Fail(int line, const std::string& what) const {
-    throw ConfigError(table_.path + ":" + std::to_string(line) + ": " + what);
+    throw ConfigError(fmt::format("{}:{}: {}", table_.path, line, what));
   }
 
   // Whether the line is a row or a part of one, and not blank or a comment.
   bool IsRow(const std::string& line) {
     if (parser_ && !parser_->is_complete()) return true;
     first_line_ = lines_.line();
-    const std::string_view content = Trim(line);
+    const std::string_view content = Trimmed(line);
     if (!format_.comment.empty() && content.starts_with(format_.comment)) {
       table_.comments.Add(first_line_);
       return false;
@@ -171,7 +165,7 @@ class Reader {
         Fail(line, numbers ? "this line has numbers only, so no column has a name; give the names of the columns"
                            : "no column '" + name + "'; " + Suggestion(name, names));
       }
-      if (count > 1) Fail(line, std::to_string(count) + " columns are named '" + name + "'");
+      if (count > 1) Fail(line, fmt::format("{} columns are named '{}'", count, name));
       places_.push_back(static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()));
     }
     num_fields_ = names.size();
@@ -179,7 +173,7 @@ class Reader {
 
   void TakeRow(const std::vector<std::string>& fields) {
     if (fields.size() != num_fields_) {
-      Lose(std::to_string(fields.size()) + " fields, the header has " + std::to_string(num_fields_));
+      Lose(fmt::format("{} fields, the header has {}", fields.size(), num_fields_));
       return;
     }
     for (std::size_t j = 0; j < places_.size(); ++j) {

@@ -21,9 +21,9 @@ constexpr int kMostRounds = 500;
 constexpr double kTolerance = 1e-9;  // of the program, whose numbers are made to be about 1
 
 // The program: minimise sum_c y_c over y >= 0 with A y >= b, where y_c = s_l L_kl for the free columns l.
-class Program {
+class LinearProgram {
  public:
-  explicit Program(std::size_t columns) : columns_(columns) {
+  explicit LinearProgram(std::size_t columns) : columns_(columns) {
     clp_.setLogLevel(0);
     clp_.resize(0, static_cast<int>(columns));
     clp_.setPrimalTolerance(kTolerance);
@@ -52,10 +52,10 @@ class Program {
   ClpSimplex clp_;
 };
 
-class Search {
+class SmallestRowSearch {
  public:
-  Search(const Declaration& declaration, const Observations& observations, int coordinate,
-         const Eigen::RowVectorXd& scales)
+  SmallestRowSearch(const Declaration& declaration, const Observations& observations, int coordinate,
+                    const Eigen::RowVectorXd& scales)
       : declaration_(declaration), observations_(observations), k_(coordinate), scales_(scales) {
     for (Eigen::Index l = 0; l < scales.size(); ++l)
       if (scales[l] > 0) {
@@ -71,7 +71,7 @@ class Search {
     SmallestRow found;
     found.slopes = declaration_.lipschitz.row(k_);
     found.reasons.resize(ToSize(scales_.size()));
-    Program program(free_.size());
+    LinearProgram program(free_.size());
     for (; found.rounds < kMostRounds; ++found.rounds) {
       const std::vector<ObservedPair> violated = MostViolated();
       if (violated.empty()) break;
@@ -155,7 +155,7 @@ class Search {
     return pairs;
   }
 
-  void FindReasons(const Program& program, SmallestRow& found) const {
+  void FindReasons(const LinearProgram& program, SmallestRow& found) const {
     std::vector<double> largest(found.reasons.size(), 0);
     for (std::size_t p = 0; p < cuts_.size(); ++p)
       for (const Eigen::Index l : free_) {
@@ -195,7 +195,7 @@ class Search {
 
 SmallestRow FindSmallestRow(const Declaration& declaration, const Observations& observations, int coordinate,
                             const Eigen::RowVectorXd& scales) {
-  return Search(declaration, observations, coordinate, scales).Run();
+  return SmallestRowSearch(declaration, observations, coordinate, scales).Run();
 }
 
 SmallestRow FindSmallestEntry(const Declaration& declaration, const Observations& observations, int coordinate,

@@ -19,6 +19,7 @@
 #include "lcmtypes/printable.h"
 #include "page/detail.h"
 #include "page/drawing_json.h"
+#include "records/log_trust.h"
 #include "records/outlines.h"
 #include "records/status_json.h"
 #include "task/json_text.h"
@@ -420,7 +421,6 @@ Json Watcher::RobotJson() const {
 }
 
 Json Watcher::NowJson(std::int64_t now_us, const LiveLosses& losses) const {
-  const Refusals refused = authenticator_.refusals();
   Json json{{"utime", now_us},
             {"signed", keys_.has_value()},
             {"note", Printable(other_task_)},
@@ -436,13 +436,7 @@ Json Watcher::NowJson(std::int64_t now_us, const LiveLosses& losses) const {
               {"gaps", counts_.gaps},
               {"dropped", losses.dropped},
               {"datagrams_refused", losses.datagrams_refused}}},
-            {"refused",
-             {{"unsigned", refused.unsigned_ones},
-              {"forged", refused.forged},
-              {"replayed", refused.replayed},
-              {"signed_before_the_start", refused.old},
-              {"signed_ahead", refused.ahead},
-              {"of_another_bus", refused.foreign}}},
+            {"refused", forereach::ToJson(authenticator_.refusals())},
             {"certifier", Json()},
             {"logger", Json()}};
   if (status_) {

@@ -7,6 +7,8 @@
 #include <thread>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <civetweb.h>
 #include <nlohmann/json.hpp>
 
@@ -51,9 +53,10 @@ int Refuse(mg_connection* connection, int status) {
 class WebServer::Content {
  public:
   Content(const Watcher& watcher, int port) : watcher_(watcher), page_(LivePage().Html(watcher.Beginning())) {
-    page_head_ = "HTTP/1.1 200 OK\r\n" + std::string(kHeaders) + "Content-Security-Policy: " + LivePage().Policy() +
-                 "; frame-ancestors 'none'\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: " +
-                 std::to_string(page_.size()) + "\r\n\r\n";
+    page_head_ = fmt::format(
+        "HTTP/1.1 200 OK\r\n{}Content-Security-Policy: {}; frame-ancestors 'none'\r\nContent-Type: text/html; "
+        "charset=utf-8\r\nContent-Length: {}\r\n\r\n",
+        kHeaders, LivePage().Policy(), page_.size());
     mg_callbacks callbacks{};
     callbacks.begin_request = [](mg_connection* connection) {
       return static_cast<Content*>(mg_get_user_data(mg_get_context(connection)))->Serve(connection);
@@ -61,7 +64,7 @@ class WebServer::Content {
     callbacks.log_message = [](const mg_connection* connection, const char* message) {
       return static_cast<Content*>(mg_get_user_data(mg_get_context(connection)))->Note(message);
     };
-    const std::string address = "127.0.0.1:" + std::to_string(port), threads = std::to_string(kMostReaders + 4),
+    const std::string address = fmt::format("127.0.0.1:{}", port), threads = std::to_string(kMostReaders + 4),
                       patience = std::to_string(kWriteMs);
     const std::array<const char*, 17> options{"listening_ports",
                                               address.c_str(),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "certifier/gate/candidate_message.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/size.h"
 #include "records/outlines.h"
@@ -54,7 +55,7 @@ void AddBodies(const Problem& problem, const Tube& tube, PageDetail& detail) {
   if (auto sketch = MakeSketch(bodies)) detail.bodies = std::move(*sketch);
 }
 
-// Why there is no tube.
+// Adds the tube to the detail. @return why there is none; empty otherwise.
 std::string AddTube(const Certifier& certifier, const JudgedCandidate& judged, const Decision& again, const Tube& tube,
                     PageDetail& detail) {
   const bool is_certified = again.outcome == Outcome::kCertified;
@@ -85,9 +86,8 @@ void Describe(const Certifier& certifier, const JudgedCandidate& judged, const D
   detail.start_utime = judged.candidate.start_utime;
   detail.step_us = judged.candidate.step_us;
   detail.steps = judged.candidate.num_steps;
-  const bool is_same = static_cast<int>(again.outcome) == judged.outcome && again.step == judged.step;
-  detail.missing =
-      is_same ? AddTube(certifier, judged, again, tube, detail) : "this program decides it otherwise: replay it";
+  detail.missing = judged.IsAnsweredBy(again) ? AddTube(certifier, judged, again, tube, detail)
+                                              : "this program decides it otherwise: replay it";
 }
 
 }  // namespace forereach

@@ -3,19 +3,12 @@
 
 #include <string>
 
-#include "certifier/gate/candidate_message.h"
 #include "forereach/certify/certifier.h"
 #include "page/page_data.h"
+#include "records/certifier_follower.h"
 #include "task/config.h"
 
 namespace forereach {
-
-/** A candidate, and what was decided on it. */
-struct JudgedCandidate {
-  candidate_plan_t candidate;
-  Schedule schedule;
-  int outcome, step;  ///< decision_t's.
-};
 
 /** Why a candidate cannot be judged again under this task; empty if it can, as far as Certifier::Require agrees. */
 [[nodiscard]] std::string WhyNotJudged(const candidate_plan_t& candidate, const Config& task);

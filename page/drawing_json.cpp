@@ -16,10 +16,8 @@ Json ObstacleJson(const Obstacle& obstacle) {
     json["normal"] = std::vector(obstacle.points()[0].begin(), obstacle.points()[0].end());
     json["offset"] = obstacle.offset();
   } else {
-    std::vector<Eigen::Vector2d> corners;
-    for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
     Json points = Json::array();
-    for (const Eigen::Vector2d& corner : HullOf(corners)) points.push_back({corner.x(), corner.y()});
+    for (const Eigen::Vector2d& corner : CornersOf(obstacle)) points.push_back({corner.x(), corner.y()});
     json["points"] = std::move(points);
   }
   if (const auto& motion = obstacle.motion())

@@ -11,12 +11,14 @@
 #include <thread>
 #include <utility>
 
-#include "forereach/certify/batch.h"
+#include <fmt/format.h>
+
 #include "forereach/certify/explain.h"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
 #include "page/detail.h"
+#include "records/certifier_follower.h"
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/log_survey.h"
@@ -131,21 +133,10 @@ std::vector<std::vector<std::size_t>> LastDecisions(const PageRun& page, std::si
 }
 
 // Certifies the wanted candidates of logs again.
-class DetailMaker final : public TimelineUser {
+class DetailMaker final : public CertifierFollower {
  public:
   DetailMaker(const Wanted& wanted, const BusOptions& channels, std::size_t numbers, unsigned threads, PageRun& run)
-      : wanted_(wanted), channels_(channels), numbers_(numbers), threads_(threads), run_(run) {}
-
-  void OnStart(const Config& task) override {
-    CertifyAgain();
-    certifier_ = std::make_unique<Certifier>(task.problem);
-  }
-  void OnReload(const Config& task) override { OnStart(task); }
-  void OnObstacles(Bytes, std::int64_t, SenderId) override { CertifyAgain(); }
-  void OnTransition(const ExecutedTransition& transition, Bytes) override {
-    CertifyAgain();
-    static_cast<void>(certifier_->Learn(transition.z, transition.next));
-  }
+      : CertifierFollower(threads), wanted_(wanted), channels_(channels), numbers_(numbers), run_(run) {}
 
   void OnDecision(const RecordedDecision& recorded) override {
     const auto found = wanted_.find(recorded.event);
@@ -162,10 +153,7 @@ class DetailMaker final : public TimelineUser {
     detail.task = TaskIndex(task);
     detail.obstacles = ObstaclesIndex(recorded.basis);
     if (recorded.decision.outcome == decision_t::CERTIFIED) executing_[candidate->plan_id] = {place, &task};
-    obstacles_ = recorded.basis.obstacles;
-    pending_.push_back(
-        {{*candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome, recorded.decision.step}, place});
-    if (pending_.size() >= kBatch) CertifyAgain();
+    Put(*candidate, recorded, place);
   }
 
   void OnEvent(const LogEvent& event) override {
@@ -187,12 +175,6 @@ class DetailMaker final : public TimelineUser {
   void Finish() { CertifyAgain(); }
 
  private:
-  static constexpr std::size_t kBatch = 256;
-
-  struct Pending : JudgedCandidate {
-    std::size_t place;  // in PageRun::details
-  };
-
   static void Miss(PageDetail& detail, std::string why) { detail.missing = std::move(why); }
 
   int TaskIndex(const Config& task) {
@@ -216,41 +198,22 @@ class DetailMaker final : public TimelineUser {
     return true;
   }
 
-  // All that were decided on under the same obstacles and observations.
-  void CertifyAgain() {
-    if (pending_.empty()) return;
-    std::vector<Plan> plans;
-    std::vector<Zonotope> initial_sets;
-    std::vector<const Pending*> asked;
-    for (const Pending& each : pending_) try {
-        const Zonotope initial_set = InitialSetOf(each.candidate);
-        const Plan plan = PlanOf(each.candidate, each.schedule);
-        certifier_->Require(plan, initial_set, *obstacles_);
-        plans.push_back(plan);
-        initial_sets.push_back(initial_set);
-        asked.push_back(&each);
-      } catch (const std::invalid_argument& error) {
-        run_.details[each.place].missing = std::string("it cannot be judged again: ") + error.what();
-      }
-    const auto describe = [&](std::size_t i, const Decision& again, const Tube& tube) {
-      Describe(*certifier_, *asked[i], again, tube, run_.details[asked[i]->place]);
-    };
-    static_cast<void>(CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads_, describe));
-    for (const Pending* each : asked) {
-      PageDetail& detail = run_.details[each->place];
-      if (!TakeRoom(NumbersOf(detail))) LeaveOut(detail);
-    }
-    pending_.clear();
+  void Refuse(const JudgedCandidate& judged, const std::string& why) override {
+    Miss(run_.details[judged.place], "it cannot be judged again: " + why);
+  }
+  void Look(const JudgedCandidate& judged, const Certifier& certifier, const Decision& again,
+            const Tube& tube) override {
+    Describe(certifier, judged, again, tube, run_.details[judged.place]);
+  }
+  void Take(const JudgedCandidate& judged) override {
+    PageDetail& detail = run_.details[judged.place];
+    if (!TakeRoom(NumbersOf(detail))) LeaveOut(detail);
   }
 
   const Wanted& wanted_;
   const BusOptions channels_;
   std::size_t numbers_;  // for which there is room
-  const unsigned threads_;
   PageRun& run_;
-  std::unique_ptr<Certifier> certifier_;  // as the one of the log was when it decided on those below
-  std::vector<Pending> pending_;          // under the obstacles below, and not yet certified again
-  std::shared_ptr<const std::vector<Obstacle>> obstacles_;
   std::map<Digest, int> sets_;
   std::map<std::int64_t, std::pair<std::size_t, const Config*>> executing_;  // by plan
   std::set<std::pair<std::size_t, int>> steps_;                              // that have an executed state
@@ -354,7 +317,7 @@ std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::si
 }
 
 std::string EventName(const LogReference& event) {
-  return event.log_file + " event " + std::to_string(event.event_number);
+  return fmt::format("{} event {}", event.log_file, event.event_number);
 }
 
 PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,
@@ -408,7 +371,7 @@ PageRun EmptyPage(const std::vector<std::string>& inputs) {
   const FileKind kind = KindOf(inputs[0]);
   const bool is_log = kind != FileKind::kDirectory && kind != FileKind::kDatabase;
   const std::string name = is_log ? FileName(inputs[0]) : inputs[0];
-  page.name = inputs.size() == 1 ? name : name + " and " + std::to_string(inputs.size() - 1) + " more";
+  page.name = inputs.size() == 1 ? name : fmt::format("{} and {} more", name, inputs.size() - 1);
   page.files = inputs;
   return page;
 }

@@ -7,6 +7,8 @@
 #include <ostream>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/advice_message.h"
@@ -23,8 +25,8 @@ Eigen::VectorXd HalfWidth(const Config& config) {
   const std::vector<double>& given = config.planner.initial_half_width;
   const int n = config.problem->model->num_states();
   if (std::ssize(given) != n)
-    throw ConfigError(config.path + ": planner.initial_half_width: " + std::to_string(given.size()) +
-                      " entries, it has to have " + std::to_string(n));
+    throw ConfigError(
+        fmt::format("{}: planner.initial_half_width: {} entries, it has to have {}", config.path, given.size(), n));
   return Eigen::Map<const Eigen::VectorXd>(given.data(), n);
 }
 

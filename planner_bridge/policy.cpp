@@ -3,6 +3,8 @@
 #include <fstream>
 #include <iterator>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "forereach/numerics/limits.h"
@@ -27,7 +29,7 @@ void RequireText(const JsonField& field, const std::string& text) {
 std::vector<std::size_t> ReadSizes(const JsonField& field) {
   const std::size_t count = field.Count();
   if (count < 2 || count > kMostSizes)
-    field.Fail("has " + std::to_string(count) + " entries, has to have 2 to " + std::to_string(kMostSizes));
+    field.Fail(fmt::format("has {} entries, has to have 2 to {}", count, kMostSizes));
   std::vector<std::size_t> sizes;
   for (std::size_t i = 0; i < count; ++i) sizes.push_back(static_cast<std::size_t>(field[i].Integer(1, kLargestLayer)));
   return sizes;
@@ -60,8 +62,7 @@ Policy Read(const JsonField& file) {
   const auto outputs = static_cast<std::size_t>(policy.num_inputs * file["steps"].Integer(1, kMaxSteps));
   const std::vector<std::size_t> sizes = ReadSizes(file["sizes"]);
   if (sizes.back() != outputs)
-    file["sizes"].Fail("ends with " + std::to_string(sizes.back()) + ", has to end with inputs times steps, " +
-                       std::to_string(outputs));
+    file["sizes"].Fail(fmt::format("ends with {}, has to end with inputs times steps, {}", sizes.back(), outputs));
   policy.input = ReadScaling(file["input"], sizes.front());
   policy.output = ReadScaling(file["output"], outputs);
   const JsonField layers = file["layers"];

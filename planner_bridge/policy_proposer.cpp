@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/numerics/size.h"
 #include "planner_bridge/reference.h"
 
@@ -37,11 +39,11 @@ Policy Fitting(const Problem& problem, const PlannerOptions& options, Policy pol
   Require(problem.projection == Eigen::MatrixXd::Identity(2, problem.model->num_states()),
           "a policy goes to a point (x, y), task.projection has to be [x, y]");
   Require(policy.num_features() == kFeatures,
-          "has " + std::to_string(policy.num_features()) + " features, has to have " + std::to_string(kFeatures));
-  Require(policy.num_inputs == problem.model->num_inputs(), "has " + std::to_string(policy.num_inputs) + " inputs");
-  Require(options.progress_steps <= policy.num_steps(), "its blocks have " + std::to_string(policy.num_steps()) +
-                                                            " steps, planner.progress_steps is " +
-                                                            std::to_string(options.progress_steps));
+          fmt::format("has {} features, has to have {}", policy.num_features(), kFeatures));
+  Require(policy.num_inputs == problem.model->num_inputs(), fmt::format("has {} inputs", policy.num_inputs));
+  Require(options.progress_steps <= policy.num_steps(),
+          fmt::format("its blocks have {} steps, planner.progress_steps is {}", policy.num_steps(),
+                      options.progress_steps));
   return policy;
 }
 

@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "planner_bridge/policy_proposer.h"
 #include "planner_bridge/proposal.h"
 
@@ -19,16 +21,17 @@ std::unique_ptr<Proposer> MakeProposer(const Config& config) try {
 
 void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options) {
   if (options.goal.empty())
-    throw std::invalid_argument("planner.goal: missing: where to go, an entry for each of the " +
-                                std::to_string(problem.projection.rows()) + " safety coordinates");
+    throw std::invalid_argument(
+        fmt::format("planner.goal: missing: where to go, an entry for each of the {} safety coordinates",
+                    problem.projection.rows()));
   if (std::ssize(options.goal) != problem.projection.rows())
-    throw std::invalid_argument("planner.goal: " + std::to_string(options.goal.size()) + " entries, it has to have " +
-                                std::to_string(problem.projection.rows()));
+    throw std::invalid_argument(
+        fmt::format("planner.goal: {} entries, it has to have {}", options.goal.size(), problem.projection.rows()));
   if (problem.projection.isZero(0))
     throw std::invalid_argument("task.body.pose: missing: planner.goal is given in these states");
   if (options.progress_steps < 1 || options.tail_steps < 0 || options.progress_steps + options.tail_steps > kMaxSteps)
-    throw std::invalid_argument("planner.progress_steps + planner.tail_steps: more than " + std::to_string(kMaxSteps) +
-                                " steps, or none");
+    throw std::invalid_argument(
+        fmt::format("planner.progress_steps + planner.tail_steps: more than {} steps, or none", kMaxSteps));
 }
 
 }  // namespace forereach

@@ -1,7 +1,6 @@
 #include "records/certificate_files.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <iterator>
@@ -9,6 +8,8 @@
 #include <memory>
 #include <optional>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -54,7 +55,7 @@ verifier::KnownRows KnownRowsOf(const Basis& basis) {
 }
 
 RecordedCertificate DamagedLog(const std::string& log, std::int64_t places) {
-  return {log, {}, "the log is damaged in " + std::to_string(places) + " places", {}};
+  return {log, {}, fmt::format("the log is damaged in {} places", places), {}};
 }
 
 verifier::Certificate CertificateOf(const certified_plan_v2_t& certified, const std::vector<Obstacle>& obstacles) {
@@ -99,7 +100,7 @@ class CertificateReader final : public TimelineUser {
       certificate.missing = "not of this task's sizes";
       return;
     }
-    certificate.name += ", plan " + std::to_string(certified.plan.plan_id) + " of " + GetText(certified.plan.source);
+    certificate.name += fmt::format(", plan {} of {}", certified.plan.plan_id, GetText(certified.plan.source));
     if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
     certificate.missing = WhyNotBounded(certified.plan, task.problem->between, task.gate);
     if (!certificate.missing.empty()) return;
@@ -123,9 +124,8 @@ class CertificateReader final : public TimelineUser {
     if (withdrawal.valid_steps <= std::max<int>(withdrawal.first_step, 0)) return;  // nothing is claimed
     CertificateFile& file = FileOf(*recorded.basis.task);
     RecordedCertificate& certificate = file.certificates.emplace_back();
-    certificate.name = recorded.event + ", withdrawal of plan " + std::to_string(withdrawal.plan_id) + " of " +
-                       GetText(withdrawal.source) + ", its first " + std::to_string(withdrawal.valid_steps) +
-                       " controls";
+    certificate.name = fmt::format("{}, withdrawal of plan {} of {}, its first {} controls", recorded.event,
+                                   withdrawal.plan_id, GetText(withdrawal.source), withdrawal.valid_steps);
     certificate.certificate.is_remainder = true;
     const auto plan = std::ranges::find_if(of_plan_, [&](const auto& entry) {
       return GetDigest(entry.second.certified.certificate_digest) == GetDigest(withdrawal.certificate_digest);
@@ -137,7 +137,7 @@ class CertificateReader final : public TimelineUser {
     }
     const certified_plan_v2_t& certified = plan->second.certified;
     if (withdrawal.valid_steps > certified.plan.num_steps) {
-      certificate.missing = "its plan has " + std::to_string(certified.plan.num_steps) + " controls";
+      certificate.missing = fmt::format("its plan has {} controls", certified.plan.num_steps);
       return;
     }
     verifier::Certificate& derived = certificate.certificate;
@@ -213,7 +213,7 @@ class CertificateReader final : public TimelineUser {
     for (const DecisionRow& row : rows) {
       if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
       RecordedCertificate certificate;
-      certificate.name = row.event.log_file + " event " + std::to_string(row.event.event_number) + " in the database";
+      certificate.name = fmt::format("{} event {} in the database", row.event.log_file, row.event.event_number);
       const auto decision = certified.find(row.plan_digest);
       if (decision == certified.end()) {
         certificate.missing = "the log has no such certificate";
@@ -258,7 +258,7 @@ class CertificateReader final : public TimelineUser {
     const bool may_be_none =
         std::ranges::all_of(derived.obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
     if (decision.obstacle < (may_be_none ? -1 : 0) || decision.obstacle >= count)
-      return compare("obstacle", count == 0 ? "-1" : "0 to " + std::to_string(count - 1),
+      return compare("obstacle", count == 0 ? "-1" : fmt::format("0 to {}", count - 1),
                      std::to_string(decision.obstacle));
     double clearance = kInfinity;
     if (decision.obstacle >= 0) {
@@ -312,12 +312,10 @@ class CertificateReader final : public TimelineUser {
   // In records from before task.between. The oldest have the clearance rounded to nearest.
   static std::vector<std::string> OlderSentences(int step, int obstacle, double clearance) {
     if (obstacle < 0) return {"certified: no obstacles"};
-    char nearest[32];
-    std::snprintf(nearest, sizeof nearest, "%.6g", clearance);
     std::vector<std::string> sentences;
-    for (const std::string& distance : {RoundedDown(clearance), std::string(nearest)})
-      sentences.push_back("certified: every slice stays clear, closest at step " + std::to_string(step) + ", " +
-                          distance + " m from obstacle " + std::to_string(obstacle));
+    for (const std::string& distance : {RoundedDown(clearance), fmt::format("{:.6g}", clearance)})
+      sentences.push_back(fmt::format("certified: every slice stays clear, closest at step {}, {} m from obstacle {}",
+                                      step, distance, obstacle));
     return sentences;
   }
 

@@ -3,6 +3,8 @@
 #include <numeric>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/codec.h"
 #include "records/gate_follower.h"
@@ -55,8 +57,8 @@ class Comparer final : public GateFollower {
   void Lose(const RecordedDecision& recorded, const decision_t& after) {
     ++result_.lost[WhyNotOf(after)];
     if (result_.lost_plans.size() < Comparison::kLostPlans)
-      result_.lost_plans.push_back(recorded.event + ", plan " + std::to_string(after.plan_id) + " of " +
-                                   GetText(after.source) + ": " + GetText(after.message));
+      result_.lost_plans.push_back(fmt::format("{}, plan {} of {}: {}", recorded.event, after.plan_id,
+                                               GetText(after.source), GetText(after.message)));
   }
   void Refuse(const decision_t& before, const decision_t& after) {
     WhyNot then = WhyNotOf(before), now = WhyNotOf(after);

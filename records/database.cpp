@@ -8,6 +8,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
 
@@ -132,7 +134,7 @@ class Database::Statement final {
           type == SQLITE_FLOAT
               ? std::to_string(std::bit_cast<std::int64_t>(real))
               : std::string(bytes ? bytes : "", static_cast<std::size_t>(sqlite3_column_bytes(statement_, i)));
-      text += std::to_string(type) + " " + std::to_string(value.size()) + " " + value;
+      text += fmt::format("{} {} {}", type, value.size(), value);
     }
     return text;
   }
@@ -243,15 +245,16 @@ void Database::Migrate() {
   const auto number = [this](const char* sql) { return Select<std::int64_t>(sql).at(0); };
   const std::int64_t version = number("PRAGMA user_version");
   if (version > kSchemaVersion)
-    throw DatabaseError("schema version " + std::to_string(version) + ", this program knows versions up to " +
-                        std::to_string(kSchemaVersion) + ": use a newer program or another directory");
+    throw DatabaseError(
+        fmt::format("schema version {}, this program knows versions up to {}: use a newer program or another directory",
+                    version, kSchemaVersion));
   const bool fresh = number("SELECT count(*) FROM sqlite_master") == 0;
   if (version < 0 || (!fresh && number("PRAGMA application_id") != kApplicationId))
     throw DatabaseError("not a decision database: move it away or use another directory");
   for (std::size_t next = static_cast<std::size_t>(version); next < kMigrations.size(); ++next)
     Execute(kMigrations[next]);
-  Execute(("PRAGMA application_id = " + std::to_string(kApplicationId)).c_str());
-  Execute(("PRAGMA user_version = " + std::to_string(kSchemaVersion)).c_str());
+  Execute(fmt::format("PRAGMA application_id = {}", kApplicationId).c_str());
+  Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
   Execute("COMMIT");
 }
 

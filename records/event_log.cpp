@@ -8,6 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -199,8 +201,8 @@ void EventLogWriter::Recover(const std::string& path) {
 
 std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& channel, Bytes data) {
   if (channel.empty() || channel.size() > kMaxLogChannelBytes || data.size() > kMaxLogDataBytes)
-    throw std::invalid_argument("log: a channel has 1 to 63 bytes and a message at most 16777216, not " +
-                                std::to_string(channel.size()) + " and " + std::to_string(data.size()));
+    throw std::invalid_argument(fmt::format(
+        "log: a channel has 1 to 63 bytes and a message at most 16777216, not {} and {}", channel.size(), data.size()));
   PutRecord(buffer_, next_number_, std::max<std::int64_t>(utime, 0), channel, data);
   return next_number_++;
 }

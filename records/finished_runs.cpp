@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "lcmtypes/codec.h"
@@ -22,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kNameDigits = 32;
 
-// Of a file of any size.
+// Reads the file in blocks: a log may be larger than the memory.
 std::string DigestOfFile(const std::string& path) {
   InputFile file(path, std::numeric_limits<std::int64_t>::max());
   std::vector<char> block(1 << 20);
@@ -40,8 +42,8 @@ std::string DescribeTasks(const fs::path& directory) {
        file.increment(error)) {
     std::error_code none;
     const auto bytes = file->is_regular_file(none) ? file->file_size(none) : 0;
-    files.push_back(file->path().string() + " " + std::to_string(bytes) + " " +
-                    std::to_string(file->last_write_time(none).time_since_epoch().count()) + "\n");
+    files.push_back(fmt::format("{} {} {}\n", file->path().string(), bytes,
+                                file->last_write_time(none).time_since_epoch().count()));
   }
   std::ranges::sort(files);
   std::string text;

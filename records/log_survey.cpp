@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
@@ -158,7 +160,7 @@ LogSurvey SurveyRun(const std::vector<std::string>& logs) {
   if (survey.candidates == 0 && survey.decisions == 0 && survey.configs.empty())
     throw LogError(
         logs.front() + (logs.size() > 1 ? " and those behind it: " : ": ") +
-        (survey.events == 0 ? "is empty" : "holds " + std::to_string(survey.events) + " events") +
+        (survey.events == 0 ? "is empty" : fmt::format("holds {} events", survey.events)) +
         ", and neither a candidate nor a decision; nothing was proposed while it was recorded, or it is not of "
         "ForeReach");
   return survey;

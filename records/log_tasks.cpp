@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "records/kept_tasks.h"
 
 namespace forereach {
@@ -18,9 +20,9 @@ std::string DescribeTask(const LogSurvey& survey, const KeptTasks& kept) {
   for (std::size_t i = 0; i < std::min(survey.order.size(), kMaxNamed); ++i) {
     const Digest& digest = survey.order[i];
     const bool is_kept = std::filesystem::exists(kept.PathOf(digest));
-    text += (i > 0 ? "; " : "") + ToHex(digest) + " (" + std::to_string(survey.configs.at(digest).decisions) +
-            " decisions and certified plans" +
-            (is_kept ? ", kept in " + kept.PathOf(digest) : ", not kept next to the log") + ")";
+    text += fmt::format("{}{} ({} decisions and certified plans{})", i > 0 ? "; " : "", ToHex(digest),
+                        survey.configs.at(digest).decisions,
+                        (is_kept ? ", kept in " + kept.PathOf(digest) : ", not kept next to the log"));
   }
   return text + (survey.order.size() > kMaxNamed ? "; and others" : "");
 }

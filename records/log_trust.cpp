@@ -1,5 +1,7 @@
 #include "records/log_trust.h"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "records/log_authenticator.h"
@@ -25,20 +27,18 @@ std::string DescribePassedOver(const PassedOver& passed_over) {
   std::string text;
   if (!refused.empty()) text += "; not authentic and passed over: " + refused;
   if (passed_over.undecodable > 0)
-    text += "; no certified plan and passed over: " + std::to_string(passed_over.undecodable);
+    text += fmt::format("; no certified plan and passed over: {}", passed_over.undecodable);
   return text;
 }
 
+nlohmann::json ToJson(const Refusals& refused) {
+  return {{"unsigned", refused.unsigned_ones}, {"forged", refused.forged},
+          {"replayed", refused.replayed},      {"signed_before_the_start", refused.old},
+          {"signed_ahead", refused.ahead},     {"of_another_bus", refused.foreign}};
+}
+
 nlohmann::json ToJson(const PassedOver& passed_over) {
-  const Refusals& refused = passed_over.not_authentic;
-  return {{"not_authentic",
-           {{"unsigned", refused.unsigned_ones},
-            {"forged", refused.forged},
-            {"replayed", refused.replayed},
-            {"signed_before_the_start", refused.old},
-            {"signed_ahead", refused.ahead},
-            {"of_another_bus", refused.foreign}}},
-          {"undecodable", passed_over.undecodable}};
+  return {{"not_authentic", ToJson(passed_over.not_authentic)}, {"undecodable", passed_over.undecodable}};
 }
 
 }  // namespace forereach

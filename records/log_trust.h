@@ -38,5 +38,6 @@ struct PassedOver {
 /** The numbers as the end of a sentence; empty if nothing was skipped. */
 [[nodiscard]] std::string DescribePassedOver(const PassedOver& passed_over);
 [[nodiscard]] nlohmann::json ToJson(const PassedOver& passed_over);
+[[nodiscard]] nlohmann::json ToJson(const Refusals& refused);
 
 }  // namespace forereach

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <minizip/zip.h>
 
 namespace forereach {
@@ -24,9 +26,9 @@ std::size_t SpoolBytes(char kind) {
 // Magic, version 1.0, the length of the text behind it, and that text, padded so that the data begin at a multiple
 // of 64.
 std::string NpyHeader(char kind, std::int64_t rows, std::size_t width) {
-  const std::string type = kind == 'f' ? "<f8" : (kind == 'i' ? "<i8" : "|S" + std::to_string(width));
-  std::string text = "{'descr': '" + type + "', 'fortran_order': False, 'shape': (" + std::to_string(rows) + ", " +
-                     (kind == 'f' ? std::to_string(width) : "") + "), }";
+  const std::string type = kind == 'f' ? "<f8" : (kind == 'i' ? "<i8" : fmt::format("|S{}", width));
+  std::string text = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}, {}), }}", type, rows,
+                                 kind == 'f' ? std::to_string(width) : "");
   constexpr std::size_t before = 10;
   text.append(63 - (before + text.size()) % 64, ' ').push_back('\n');
   std::string header("\x93NUMPY\x01\x00", 8);

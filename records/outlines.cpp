@@ -21,7 +21,7 @@ constexpr int kCornersOfDisc = 16;
 
 }  // namespace
 
-// Andrew's chain.
+// The corners of the convex hull, by Andrew's monotone chain.
 Picture::Polygon HullOf(const std::vector<Vector2d>& points, double radius) {
   Picture::Polygon all;
   for (const Vector2d& point : points) {
@@ -130,17 +130,18 @@ std::vector<Picture::Polygon> PredictionOf(const Obstacle& obstacle) {
   return outlines;
 }
 
+Picture::Polygon CornersOf(const Obstacle& obstacle) {
+  std::vector<Vector2d> corners;
+  for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
+  return HullOf(corners);
+}
+
 void AddObstacle(const Obstacle& obstacle, Picture& picture) {
   const auto& points = obstacle.points();
   switch (obstacle.kind()) {
     case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
     case Obstacle::Kind::kBox:
-    case Obstacle::Kind::kPolygon: {
-      std::vector<Eigen::Vector2d> corners;
-      for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
-      picture.polygons.push_back(HullOf(corners));
-      break;
-    }
+    case Obstacle::Kind::kPolygon: picture.polygons.push_back(CornersOf(obstacle)); break;
     case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
   }
   std::ranges::move(PredictionOf(obstacle), std::back_inserter(picture.predictions));

@@ -40,6 +40,9 @@ class BodyOutlines final {
 one that stands and for a half-space. @pre p = 2. */
 [[nodiscard]] std::vector<Picture::Polygon> PredictionOf(const Obstacle& obstacle);
 
+/** The corners of an obstacle's core. @pre p = 2, and it is no half-space. */
+[[nodiscard]] Picture::Polygon CornersOf(const Obstacle& obstacle);
+
 /** Adds an obstacle's shape and its prediction to a picture. @pre p = 2. */
 void AddObstacle(const Obstacle& obstacle, Picture& picture);
 

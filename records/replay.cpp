@@ -5,6 +5,8 @@
 #include <iterator>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "bus/bus_options.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
@@ -17,7 +19,7 @@ namespace {
 std::string DescribeDecision(const decision_t& decision) {
   std::string text(OutcomeName(decision.outcome));
   text += ", cause " + std::string(CauseName(decision.cause));
-  return text + ", step " + std::to_string(decision.step);
+  return fmt::format("{}, step {}", text, decision.step);
 }
 
 // Empty if they agree.
@@ -116,20 +118,20 @@ class Replayer final : public GateFollower {
     if (standing.steps == withdrawal.valid_steps && static_cast<int>(verdict.cause) == withdrawal.cause &&
         verdict.step == withdrawal.step && verdict.obstacle == withdrawal.obstacle)
       return {};
-    return "withdrawn with " + std::to_string(withdrawal.valid_steps) + " steps that stand, cause " +
-           std::string(WithdrawalName(withdrawal.cause)) + "; replayed " + std::to_string(standing.steps) +
-           " steps, cause " + std::string(WithdrawalName(static_cast<std::int16_t>(verdict.cause)));
+    return fmt::format("withdrawn with {} steps that stand, cause {}; replayed {} steps, cause {}",
+                       withdrawal.valid_steps, WithdrawalName(withdrawal.cause), standing.steps,
+                       WithdrawalName(static_cast<std::int16_t>(verdict.cause)));
   }
 
   void Differ(const std::string& event, std::int64_t plan_id, const std::string& what) {
-    result_.differences.push_back(event + ", plan " + std::to_string(plan_id) + ": " + what);
+    result_.differences.push_back(fmt::format("{}, plan {}: {}", event, plan_id, what));
   }
 
   void Show(const std::string& event, const std::string& how, const decision_t& decision,
             const std::string& remark = "") {
     if (plan_digest_.empty() || !ToHex(GetDigest(decision.plan_digest)).starts_with(plan_digest_)) return;
-    result_.shown.push_back(event + ", plan " + std::to_string(decision.plan_id) + ": " + how + " " +
-                            DescribeDecision(decision) + remark + ": " + GetText(decision.message));
+    result_.shown.push_back(fmt::format("{}, plan {}: {} {}{}: {}", event, decision.plan_id, how,
+                                        DescribeDecision(decision), remark, GetText(decision.message)));
   }
 
   using Plan = std::pair<Digest, candidate_plan_t>;  // by its certificate

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <memory>
 #include <optional>
 #include <ostream>
 #include <set>
@@ -15,42 +14,30 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "certifier/gate/candidate_message.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certify/batch.h"
-#include "forereach/certify/certifier.h"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "records/certifier_follower.h"
 #include "records/log_tasks.h"
 #include "records/outlines.h"
-#include "records/timeline.h"
 #include "task/json_text.h"
 
 namespace forereach {
 namespace {
 
-constexpr std::size_t kBatch = 256;
 constexpr double kBetweenBodies = 4;  // metres of the path from one drawn body to the next
 
-class PictureMaker final : public TimelineUser {
+class PictureMaker final : public CertifierFollower {
  public:
-  explicit PictureMaker(const std::vector<Config>& tasks) : last_(tasks.back()), channels_(tasks.front().bus) {
+  explicit PictureMaker(const std::vector<Config>& tasks)
+      : CertifierFollower(std::max(1u, std::thread::hardware_concurrency())),
+        last_(tasks.back()),
+        channels_(tasks.front().bus) {
     for (const Config& task : tasks)
       if (const auto dim = task.problem->projection.rows(); dim != 2)
         throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}", dim));
     const std::vector<double>& goal = last_.planner.goal;
     if (goal.size() == 2) result_.picture.goal = Picture::Circle{{goal[0], goal[1]}, last_.planner.goal_radius};
-  }
-
-  void OnStart(const Config& task) override {
-    CertifyAgain();
-    certifier_ = std::make_unique<Certifier>(task.problem);
-  }
-  void OnReload(const Config& task) override { OnStart(task); }
-  void OnObstacles(Bytes, std::int64_t, SenderId) override { CertifyAgain(); }
-  void OnTransition(const ExecutedTransition& transition, Bytes) override {
-    CertifyAgain();
-    static_cast<void>(certifier_->Learn(transition.z, transition.next));
   }
 
   void OnDecision(const RecordedDecision& recorded) override {
@@ -63,10 +50,8 @@ class PictureMaker final : public TimelineUser {
       ++result_.disagreements;
       return;
     }
-    obstacles_ = recorded.basis.obstacles;
-    decided_.push_back(
-        {*candidate, ScheduleOf(*candidate, recorded.basis.task->gate), decision.outcome, decision.step});
-    if (decided_.size() >= kBatch) CertifyAgain();
+    outlines_.emplace_back();
+    Put(*candidate, recorded, outlines_.size() - 1);
   }
 
   void OnEvent(const LogEvent& event) override {
@@ -90,44 +75,22 @@ class PictureMaker final : public TimelineUser {
   }
 
  private:
-  struct Decided {
-    candidate_plan_t candidate;
-    Schedule schedule;
-    int outcome, step;
-  };
-
-  // All that were decided on under the obstacles in force; leaves out those whose answer is not the recorded one.
-  void CertifyAgain() {
-    if (decided_.empty()) return;
-    std::vector<Plan> plans;
-    std::vector<Zonotope> initial_sets;
-    std::vector<const Decided*> asked;
-    for (const Decided& decided : decided_) try {
-        const Zonotope initial_set = InitialSetOf(decided.candidate);
-        const Plan plan = PlanOf(decided.candidate, decided.schedule);
-        certifier_->Require(plan, initial_set, *obstacles_);
-        plans.push_back(plan);
-        initial_sets.push_back(initial_set);
-        asked.push_back(&decided);
-      } catch (const std::invalid_argument&) {
-        ++result_.disagreements;
-      }
-    std::vector<std::vector<std::vector<Picture::Polygon>>> outlines(asked.size());
-    const auto draw = [&](std::size_t i, const Decision& again, const Tube& tube) {
-      if (static_cast<int>(again.outcome) == asked[i]->outcome && again.step == asked[i]->step)
-        outlines[i] = Sweeps(*certifier_, tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
-    };
-    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    (void)CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads, draw);
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      if (outlines[i].empty())
-        ++result_.disagreements;
-      else if (asked[i]->outcome == decision_t::CERTIFIED)
-        tubes_[asked[i]->candidate.plan_id] = std::move(outlines[i]);
-      else
-        result_.picture.abstained.push_back(Joined(std::move(outlines[i])));
-    }
-    decided_.clear();
+  void Refuse(const JudgedCandidate&, const std::string&) override { ++result_.disagreements; }
+  void Look(const JudgedCandidate& judged, const Certifier& certifier, const Decision& again,
+            const Tube& tube) override {
+    if (judged.IsAnsweredBy(again))
+      outlines_[judged.place] =
+          Sweeps(certifier, tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
+  }
+  // Leaves out those whose answer is not the recorded one.
+  void Take(const JudgedCandidate& judged) override {
+    auto outlines = std::exchange(outlines_[judged.place], {});
+    if (outlines.empty())
+      ++result_.disagreements;
+    else if (judged.outcome == decision_t::CERTIFIED)
+      tubes_[judged.candidate.plan_id] = std::move(outlines);
+    else
+      result_.picture.abstained.push_back(Joined(std::move(outlines)));
   }
 
   // The last one is where it was found unsafe: with several parts, the last of them.
@@ -167,9 +130,7 @@ class PictureMaker final : public TimelineUser {
 
   const Config& last_;  // task
   const BusOptions channels_;
-  std::unique_ptr<Certifier> certifier_;  // as the one of the log was when it decided on those below
-  std::vector<Decided> decided_;          // under the obstacles below, and not yet certified again
-  std::shared_ptr<const std::vector<Obstacle>> obstacles_;
+  std::vector<std::vector<std::vector<Picture::Polygon>>> outlines_;  // of each decision, while it is judged again
   // Of certified plans, by plan_id: the polygons of each step.
   std::map<std::int64_t, std::vector<std::vector<Picture::Polygon>>> tubes_;
   std::optional<Eigen::Vector2d> last_body_;         // where one was drawn

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
 #include "lcmtypes/heartbeat.h"
@@ -66,7 +68,7 @@ void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
   if (!has_begun_) Start();
   damage_ += ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
     const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
-    Take(event, file + "event " + std::to_string(event.number));
+    Take(event, fmt::format("{}event {}", file, event.number));
   });
 }
 

@@ -46,7 +46,7 @@ class EventText final {
   std::size_t size_ = 0;
 };
 
-// Of the exception that is being handled.
+// Describes the exception that is being handled.
 EventText TextOfException() noexcept {
   EventText text;
   text << "emergency stop, not certified: the robot's program threw ";
@@ -80,7 +80,7 @@ Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
                          Speakers{{options_.fault, kFaults}, {options_.command, kCommands}}, std::nullopt);
 }
 
-// Takes off the trailer.
+// Checks the signature and takes it off.
 GuardVerdict Supervisor::Authenticated(const std::string& channel, const Speaker& speaker, Bytes& message,
                                        std::int64_t now_us) {
   if (!authenticator_) return {};

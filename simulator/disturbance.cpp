@@ -27,7 +27,7 @@ void Disturbance::Add(std::span<double> next) {
   }
 }
 
-// Of the bound, from -1 to 1.
+// The share of its bound by which state k is disturbed, from -1 to 1.
 double Disturbance::Share(std::size_t k) {
   if (adversarial_) return signs_[k];
   return static_cast<double>(random_() >> 11) * 0x1p-52 - 1;

@@ -53,7 +53,7 @@ void Lockstep::Stop() {
   for (Node* node : std::initializer_list<Node*>{&planner_, &certifier_, &robot_}) node->Stop();
 }
 
-// This bus has no other sender of obstacles.
+// Sends the obstacles as a perception would, since this bus has no other sender of them.
 void Lockstep::Perceive() {
   if (config_.gate.obstacles == ObstaclesSource::kBus) perception_.Set(SeenBy(now_us_, perceived_));
   if (const auto seen = perception_.Due(now_us_)) static_cast<void>(bus_->Publish(config_.bus.obstacles, *seen));

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
@@ -89,8 +91,7 @@ Config WithKeysOfRobot(Config config) {
 
 void RequireSize(const Config& config, const char* key, std::size_t size, std::int64_t expected) {
   if (static_cast<std::int64_t>(size) != expected)
-    throw ConfigError(config.path + ": " + key + ": " + std::to_string(size) + " entries, it has to have " +
-                      std::to_string(expected));
+    throw ConfigError(fmt::format("{}: {}: {} entries, it has to have {}", config.path, key, size, expected));
 }
 
 }  // namespace
@@ -221,9 +222,9 @@ std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) cons
 void RobotSimNode::ReportContacts(std::int64_t utime, bool moved) {
   for (const Contact& contact : Contacts(utime, moved)) {
     ++contacts_;
-    std::string text = "inside obstacle " + std::to_string(contact.obstacle);
+    std::string text = fmt::format("inside obstacle {}", contact.obstacle);
     if (config_.problem->body != Body())
-      text = "part " + std::to_string(contact.part) + " meets obstacle " + std::to_string(contact.obstacle);
+      text = fmt::format("part {} meets obstacle {}", contact.part, contact.obstacle);
     if (config_.problem->between) text += ", " + ToText(contact.at) + " of a step after the last sample";
     supervisor_.Report(utime, execution_event_t::CONTACT, contact.clearance, text);
   }

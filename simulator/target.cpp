@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -90,10 +92,9 @@ Transitions MakeTransitions(const Target& target, const Problem& problem, std::u
                             const std::vector<SampleRange>& ranges, const Eigen::VectorXd& noise_bound,
                             Disturbance* disturbance) {
   const int n = problem.model->num_states(), d = problem.model->num_variables();
-  if (count < 0) throw std::invalid_argument("count: " + std::to_string(count) + " is negative");
+  if (count < 0) throw std::invalid_argument(fmt::format("count: {} is negative", count));
   if (noise_bound.size() != 0 && noise_bound.size() != n)
-    throw std::invalid_argument("noise_bound: " + std::to_string(noise_bound.size()) + " entries for " +
-                                std::to_string(n) + " states");
+    throw std::invalid_argument(fmt::format("noise_bound: {} entries for {} states", noise_bound.size(), n));
   const std::vector<Interval> bounds = SampleBounds(problem, ranges);
   std::mt19937_64 random(seed);
   Transitions transitions{Eigen::MatrixXd(count, d), Eigen::MatrixXd(count, n)};

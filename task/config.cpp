@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -14,7 +16,6 @@
 #include "task/csv.h"
 #include "task/document.h"
 #include "task/draft.h"
-#include "task/key_rows.h"
 #include "task/step_time.h"
 
 namespace forereach {
@@ -49,12 +50,12 @@ std::string Describe(const DomainExit& exit, const Domain& domain, const Nominal
   const std::string limit = ToText(exit.value) + " is outside (-inf, " + ToText(exit.bound) + "] of domain.";
   if (exit.kind == Kind::kBall) {
     for (const int l : domain.balls[ToSize(exit.index)].coordinates) involve(l);
-    return involved + ": distance " + limit + "balls[" + std::to_string(exit.index) + "]";
+    return fmt::format("{}: distance {}balls[{}]", involved, limit, exit.index);
   }
   const Eigen::VectorXd& coefficients = domain.inequalities[ToSize(exit.index)].coefficients;
   for (Eigen::Index l = 0; l < coefficients.size(); ++l)
     if (coefficients[l] != 0) involve(l);
-  return involved + ": sum " + limit + "inequalities[" + std::to_string(exit.index) + "]";
+  return fmt::format("{}: sum {}inequalities[{}]", involved, limit, exit.index);
 }
 
 void RequireInside(const std::string& path, const Transitions& transitions, const Domain& domain,
@@ -65,7 +66,7 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
     for (Eigen::Index l = 0; l < transitions.z.cols(); ++l) point[ToSize(l)] = Interval(transitions.z(i, l));
     const DomainExit exit = FindExit(domain, {point.data(), size});
     if (exit.kind != DomainExit::Kind::kNone)
-      throw ConfigError(path + ":" + std::to_string(i + 2) + ": " + Describe(exit, domain, model));
+      throw ConfigError(fmt::format("{}:{}: {}", path, i + 2, Describe(exit, domain, model)));
   }
 }
 
@@ -74,20 +75,11 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
 void RequireObservable(const std::string& path, const Transitions& transitions, const NominalModel& model) try {
   static_cast<void>(Observe(model, transitions));
 } catch (const AmbiguousAngle& error) {
-  throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.what());
+  throw ConfigError(fmt::format("{}:{}: {}", path, error.row() + 2, error.what()));
 } catch (const NoNominalValue& error) {
-  throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.text() +
-                    "; change the model's equations or parameters, or take the state out of the domain and the data");
-}
-
-void ReadKeys(Document& file, TaskDraft& draft) {
-  file.Check(draft.scope, [&](const Key& row, const std::string& key) {
-    try {
-      if (row.read) row.read(file, key, draft);
-    } catch (const std::invalid_argument& error) {
-      file.Fail(key, error.what());
-    }
-  });
+  throw ConfigError(fmt::format(
+      "{}:{}: {}; change the model's equations or parameters, or take the state out of the domain and the data", path,
+      error.row() + 2, error.text()));
 }
 
 // What a task that defines rest need not say again.
@@ -109,7 +101,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   Document file(path);
   TaskDraft draft;
   draft.model_file.path = instead.model;
-  ReadKeys(file, draft);
+  file.Read(draft);
   FillStanding(draft);
   auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
   const NominalModel& model = *problem.model;
@@ -143,7 +135,7 @@ Config LoadConfig(const std::string& path, const NamedFiles& instead) {
 NamedFiles FilesNamedBy(const std::string& path) {
   Document file(path);
   TaskDraft draft;
-  ReadKeys(file, draft);
+  file.Read(draft);
   return {draft.transitions, draft.config.planner.policy, draft.model_file.path};
 }
 
@@ -170,10 +162,10 @@ void RequireForCertifyingOnBus(const Config& config) {
                       "`never`: the robot executes its plan to the end, through whatever has come there");
   const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
   if (moving != config.obstacles.end())
-    throw ConfigError(
-        config.path + ": task.obstacles[" + std::to_string(moving - config.obstacles.begin()) +
-        "].motion: its times begin with the plan, so it is for `forereach certify`. On a bus, write "
-        "`gate: {obstacles: bus}`, and send the obstacle of a file of its own with `forereach obstacles`");
+    throw ConfigError(fmt::format(
+        "{}: task.obstacles[{}].motion: its times begin with the plan, so it is for `forereach certify`. On a bus, "
+        "write `gate: {{obstacles: bus}}`, and send the obstacle of a file of its own with `forereach obstacles`",
+        config.path, moving - config.obstacles.begin()));
 }
 
 std::vector<int> HeldStates(const Config& config) {
@@ -204,8 +196,8 @@ void SaveTransitions(const std::string& path, const NominalModel& model, const T
 Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model) {
   const Eigen::MatrixXd rows = ReadCsv(path, model.input_names());
   if (rows.rows() < 1 || rows.rows() > kMaxSteps)
-    throw ConfigError(path + ":" + std::to_string(std::min<Eigen::Index>(rows.rows(), kMaxSteps) + 2) + ": " +
-                      std::to_string(rows.rows()) + " steps are outside [1, " + std::to_string(kMaxSteps) + "]");
+    throw ConfigError(fmt::format("{}:{}: {} steps are outside [1, {}]", path,
+                                  std::min<Eigen::Index>(rows.rows(), kMaxSteps) + 2, rows.rows(), kMaxSteps));
   return rows.transpose();
 }
 

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <system_error>
 
+#include <fmt/format.h>
+
 #include "command_line/nearest.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -16,23 +18,15 @@
 namespace forereach {
 namespace {
 
-constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-
 [[noreturn]] void FailAt(const std::string& path, int line, const std::string& what) {
-  throw ConfigError(path + ":" + std::to_string(line) + ": " + what);
-}
-
-std::string_view Trim(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+  throw ConfigError(fmt::format("{}:{}: {}", path, line, what));
 }
 
 void Split(std::string_view line, std::vector<std::string_view>& fields) {
   fields.clear();
   for (std::size_t comma; (comma = line.find(',')) != std::string_view::npos; line.remove_prefix(comma + 1))
-    fields.push_back(Trim(line.substr(0, comma)));
-  fields.push_back(Trim(line));
+    fields.push_back(Trimmed(line.substr(0, comma)));
+  fields.push_back(Trimmed(line));
 }
 
 // Fails if the header's fields are separated by something else.
@@ -76,15 +70,13 @@ class Reader {
     int blank = 0;  // the first of the blank lines that may end the file
     for (std::string text; in.Next(text);) {
       const int line = in.line();
-      if (line > 1 && Trim(text).empty()) {
+      if (line > 1 && Trimmed(text).empty()) {
         blank = blank == 0 ? line : blank;
         continue;
       }
       if (blank > 0) FailAt(path_, blank, "a blank line; only the end of the file may have some");
       ++rows;
-      std::string_view content = text;
-      if (line == 1 && content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
-      Split(content, fields);
+      Split(text, fields);
       if (line == 1) {
         order = ReadHeader(path_, fields, columns_, advice_);
       } else {
@@ -100,7 +92,7 @@ class Reader {
  private:
   void AddRow(int line, const std::vector<std::string_view>& fields, const std::vector<Eigen::Index>& order) {
     if (fields.size() != order.size())
-      FailAt(path_, line, std::to_string(fields.size()) + " fields, the header has " + std::to_string(order.size()));
+      FailAt(path_, line, fmt::format("{} fields, the header has {}", fields.size(), order.size()));
     const std::size_t row = numbers_.size();
     numbers_.resize(row + fields.size());
     for (std::size_t j = 0; j < fields.size(); ++j) {
@@ -124,10 +116,8 @@ class Reader {
 std::vector<std::string> CsvColumns(const std::string& path) {
   std::string text;
   if (!LineReader(path).Next(text)) throw ConfigError(path + ":1: the file is empty; it has to begin with a header");
-  std::string_view content = text;
-  if (content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
   std::vector<std::string_view> fields;
-  Split(content, fields);
+  Split(text, fields);
   RequireCommas(path, fields);
   std::vector<std::string> columns(fields.begin(), fields.end());
   for (const std::string& column : columns) {

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -25,11 +27,10 @@ namespace forereach {
 namespace {
 
 using Type = Key::Type;
-using Values = std::map<std::string, YAML::Node, std::less<>>;
 
 int LineOf(const YAML::Mark& mark) { return mark.line + 1; }
 
-std::string At(const std::string& path, int line) { return path + ":" + std::to_string(line) + ": "; }
+std::string At(const std::string& path, int line) { return fmt::format("{}:{}: ", path, line); }
 
 bool Contains(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
@@ -39,12 +40,6 @@ bool Contains(const std::vector<std::string>& words, std::string_view word) {
 std::string_view Leaf(std::string_view path) { return path.substr(path.rfind('.') + 1); }
 std::string_view Parent(std::string_view path) {
   const std::size_t end = path.rfind('.');
-  return path.substr(0, end == std::string_view::npos ? 0 : end);
-}
-
-// The path of the enclosing map, or list for an index.
-std::string_view Enclosing(std::string_view path) {
-  const std::size_t end = path.find_last_of(".[");
   return path.substr(0, end == std::string_view::npos ? 0 : end);
 }
 
@@ -117,8 +112,10 @@ std::string UnitOf(const Key& row) {
 // What a number has to be: "write a number in (0, 60], its unit is s".
 std::string Wanted(const Key& row) { return "write " + NumberName(row.type) + " in " + row.range.text() + UnitOf(row); }
 
-bool Reads(const std::string& token, Type type) {
-  return type == Type::kInteger ? ParseInteger(token).problem.empty() : ParseNumber(token).problem.empty();
+Parsed<double> Parse(const std::string& token, Type type) {
+  if (type != Type::kInteger) return ParseNumber(token);
+  const auto [value, problem] = ParseInteger(token);
+  return {static_cast<double>(value), problem};
 }
 
 std::string Without(std::string token, std::string_view letters) {
@@ -159,60 +156,82 @@ std::string Correction(const std::string& token, const Key& row) {
       {row.type == Type::kInteger ? AsInteger(token) : token, ""},
       {Leading(token), " alone" + UnitOf(row)}};
   for (const auto& [other, remark] : tries)
-    if (other != token && Reads(other, row.type)) return "write " + other + remark;
+    if (other != token && Parse(other, row.type).problem.empty()) return "write " + other + remark;
   return Wanted(row);
 }
 
+}  // namespace
+
+struct Field::Node {
+  const Document& document;
+  std::string key, name;
+  YAML::Node yaml;
+  double number = 0;                             // of a number, once it is checked
+  std::vector<std::unique_ptr<Node>> entries{};  // of a map or list, in the file's order
+
+  [[nodiscard]] int line() const { return LineOf(yaml.Mark()); }
+};
+
+namespace {
+
+// Checks the values of a document, and hands each to its row's reader.
 class Checker {
+  using Node = Field::Node;
+
  public:
-  Checker(const std::string& path, std::span<const Key> schema, const SchemaScope& scope,
-          const Document::Visitor& visit, Values& values)
-      : path_(path), schema_(schema), scope_(scope), visit_(visit), values_(values) {}
+  Checker(std::span<const Key> schema, TaskDraft& draft) : schema_(schema), scope_(draft.scope), draft_(draft) {}
 
-  // `pattern` is the path in the schema, `key` the same with names and indices filled in.
-  void Check(const YAML::Node& node, const std::string& pattern, const std::string& key) {
-    const Key& row = RowFor(node, pattern, key);
-    values_.insert_or_assign(key, node);
-    CheckValue(node, row, pattern, key);
-    visit_(row, key);
-  }
-
- private:
-  void CheckValue(const YAML::Node& node, const Key& row, const std::string& pattern, const std::string& key) {
-    switch (row.type) {
-      case Type::kMap: return CheckMap(node, pattern, key);
-      case Type::kList:
-        RequireCount(node, row, key);
-        for (std::size_t i = 0; i < node.size(); ++i) Check(node[i], pattern + "[]", key + Index(i));
-        return;
-      case Type::kNumber:
-      case Type::kInteger: return CheckNumber(node, row, key);
-      case Type::kVector: return CheckVector(node, row, key);
-      case Type::kVectors:
-        RequireCount(node, row, key);
-        for (std::size_t i = 0; i < node.size(); ++i) CheckVector(node[i], row, key + Index(i));
-        return;
-      case Type::kNames: return CheckNames(node, row, key);
-      case Type::kWord:
-      case Type::kText:
-      case Type::kExpression:
-      case Type::kChannel: return CheckText(node, row, key);
+  // `pattern` is the path in the schema, at.key the same with names and indices filled in.
+  void Check(Node& at, const std::string& pattern) {
+    const Key& row = RowFor(at, pattern);
+    CheckValue(at, row, pattern);
+    if (!row.read) return;
+    try {
+      row.read(Field(at), draft_);
+    } catch (const std::invalid_argument& error) {
+      Field(at).Fail(error.what());
     }
   }
 
-  struct Child {
-    std::string key;
-    YAML::Node value;
-  };
+ private:
+  void CheckValue(Node& at, const Key& row, const std::string& pattern) {
+    switch (row.type) {
+      case Type::kMap: return CheckMap(at, pattern);
+      case Type::kList:
+        RequireCount(at, row);
+        for (std::size_t i = 0; i < at.yaml.size(); ++i) Check(AddEntry(at, i), pattern + "[]");
+        return;
+      case Type::kNumber:
+      case Type::kInteger: return CheckNumber(at, row);
+      case Type::kVector: return CheckVector(at, row);
+      case Type::kVectors:
+        RequireCount(at, row);
+        for (std::size_t i = 0; i < at.yaml.size(); ++i) CheckVector(AddEntry(at, i), row);
+        return;
+      case Type::kNames: return CheckNames(at, row);
+      case Type::kWord:
+      case Type::kText:
+      case Type::kExpression:
+      case Type::kChannel: return CheckText(at, row);
+    }
+  }
 
-  static std::string Index(std::size_t i) { return std::string("[") + std::to_string(i) + "]"; }
+  static std::string Index(std::size_t i) { return fmt::format("[{}]", i); }
 
-  [[noreturn]] void Fail(const YAML::Node& node, const std::string& key, const std::string& what) const {
-    throw ConfigError(At(path_, LineOf(node.Mark())) + OneLine(key + (key.empty() ? "" : ": ") + what));
+  static Node& AddEntry(Node& list, std::size_t i) {
+    return *list.entries.emplace_back(
+        new Node{list.document, list.key + Index(i), Index(i), std::as_const(list.yaml)[i]});
+  }
+
+  [[noreturn]] static void Fail(const Node& at, const std::string& what) { Fail(at, at.yaml, at.key, what); }
+  // For what has no node of its own: a key, or an entry of a list of names.
+  [[noreturn]] static void Fail(const Node& in, const YAML::Node& yaml, const std::string& key,
+                                const std::string& what) {
+    throw ConfigError(At(in.document.path(), LineOf(yaml.Mark())) + OneLine(key + (key.empty() ? "" : ": ") + what));
   }
 
   // The row of a key whose value is a number or one of these words. Null if it is none of them.
-  const Key* WordRowFor(const YAML::Node& node, const std::string& pattern) const {
+  [[nodiscard]] const Key* WordRowFor(const YAML::Node& node, const std::string& pattern) const {
     const auto has_it = [&](const Key& row) {
       return row.path == pattern && row.type == Type::kWord &&
              std::ranges::find(row.words, node.Scalar()) != row.words.end();
@@ -221,7 +240,8 @@ class Checker {
     return row == schema_.end() ? nullptr : &*row;
   }
 
-  const Key& RowFor(const YAML::Node& node, const std::string& pattern, const std::string& key) const {
+  [[nodiscard]] const Key& RowFor(const Node& at, const std::string& pattern) const {
+    const YAML::Node& node = at.yaml;
     const Key* last = nullptr;
     std::string forms;
     for (const Key& row : schema_) {
@@ -237,45 +257,44 @@ class Checker {
     if (last && forms == FormName(last->type) && IsNumber(last->type)) return *last;
     // A list of a wrong kind is best explained entry by entry.
     if (last && node.IsSequence() && (last->type == Type::kVectors || last->type == Type::kNames)) return *last;
-    Fail(node, key, Shown(node) + " is not " + forms);
+    Fail(at, Shown(node) + " is not " + forms);
   }
 
-  void CheckMap(const YAML::Node& node, const std::string& pattern, const std::string& key) {
-    const YAML::Node name = node["name"];
+  void CheckMap(Node& at, const std::string& pattern) {
+    const YAML::Node name = std::as_const(at.yaml)["name"];  // otherwise yaml-cpp adds the key
     const std::string kind = name && name.IsScalar() ? name.Scalar() : "";
     std::map<std::string, int> seen;            // the line of each
-    std::multimap<const Key*, Child> children;  // in the schema's order, since its rows are in one array
-    for (const auto& entry : node) {
-      if (!entry.first.IsScalar()) Fail(entry.first, key, Shown(entry.first) + " is not a key");
-      const std::string word = entry.first.Scalar(), child = Below(key, word);
-      const Key& row = ChildRow(entry.first, pattern, key);
+    std::multimap<const Key*, Node*> children;  // in the schema's order, since its rows are in one array
+    for (const auto& entry : at.yaml) {
+      if (!entry.first.IsScalar()) Fail(at, entry.first, at.key, Shown(entry.first) + " is not a key");
+      const std::string word = entry.first.Scalar(), key = Below(at.key, word);
+      const Key& row = ChildRow(at, entry.first, pattern);
       const auto [first, is_new] = seen.emplace(word, LineOf(entry.first.Mark()));
       if (!is_new)
-        Fail(entry.first, child,
-             "duplicate key, first in line " + std::to_string(first->second) + "; delete one of them");
+        Fail(at, entry.first, key, fmt::format("duplicate key, first in line {}; delete one of them", first->second));
       if (!row.only.empty() && row.only != kind)
-        Fail(entry.first, child, "is for " + row.only + (kind.empty() ? "" : ", not for " + kind));
-      children.emplace(&row, Child{child, entry.second});
+        Fail(at, entry.first, key, "is for " + row.only + (kind.empty() ? "" : ", not for " + kind));
+      children.emplace(&row, at.entries.emplace_back(new Node{at.document, key, word, entry.second}).get());
     }
     // A row's reader relies on the rows before it.
     for (const Key& row : schema_) {
       if (!IsChild(row, pattern)) continue;
       if (row.required && (row.only.empty() || row.only == kind) && !seen.contains(std::string(Leaf(row.path))) &&
           !Leaf(row.path).starts_with('<'))
-        Fail(node, Below(key, Leaf(row.path)), "missing: " + row.meaning);
+        Fail(at, at.yaml, Below(at.key, Leaf(row.path)), "missing: " + row.meaning);
       const auto [begin, end] = children.equal_range(&row);
-      for (auto child = begin; child != end; ++child) Check(child->second.value, row.path, child->second.key);
+      for (auto child = begin; child != end; ++child) Check(*child->second, row.path);
     }
   }
 
-  const Key& ChildRow(const YAML::Node& entry, const std::string& pattern, const std::string& key) const {
+  [[nodiscard]] const Key& ChildRow(const Node& map, const YAML::Node& entry, const std::string& pattern) const {
     const std::string& word = entry.Scalar();
     std::vector<std::string> known;
     for (const Key& row : schema_) {
       if (!IsChild(row, pattern)) continue;
       const std::string leaf(Leaf(row.path));
       if (leaf == "<name>") {
-        RequireName(entry, key);
+        RequireName(map, entry);
         return row;
       }
       if (leaf.starts_with('<')) {
@@ -288,22 +307,21 @@ class Checker {
       }
     }
     if (const std::size_t colon = word.find(':'); colon != std::string::npos && Contains(known, word.substr(0, colon)))
-      Fail(entry, Below(key, word),
+      Fail(map, entry, Below(map.key, word),
            "unknown key; write a space after the colon: " + word.substr(0, colon) + ": " + word.substr(colon + 1));
-    Fail(entry, Below(key, word), "unknown key; " + CommaAdvice(word) + Suggestion(word, known));
+    Fail(map, entry, Below(map.key, word), "unknown key; " + CommaAdvice(word) + Suggestion(word, known));
   }
 
-  void RequireName(const YAML::Node& entry, const std::string& key) const {
+  static void RequireName(const Node& map, const YAML::Node& entry) {
     const std::string& word = entry.Scalar();
-    const std::string at = Below(key, word.substr(0, kLongestName));
+    const std::string at = Below(map.key, word.substr(0, kLongestName));
     if (!IsName(word))
-      Fail(entry, at,
+      Fail(map, entry, at,
            "is not a name; " + CommaAdvice(word) +
                "a name has letters, digits and underscores, and does not begin with a digit");
     if (word.size() > kLongestName)
-      Fail(entry, at,
-           "...: the name has " + std::to_string(word.size()) + " letters, at most " + std::to_string(kLongestName) +
-               " are allowed");
+      Fail(map, entry, at,
+           fmt::format("...: the name has {} letters, at most {} are allowed", word.size(), kLongestName));
   }
 
   // In { }, a comma ends an expression, and YAML takes the rest for a key.
@@ -313,35 +331,34 @@ class Checker {
 
   static constexpr std::size_t kLongestName = 64;
 
-  void CheckNumber(const YAML::Node& node, const Key& row, const std::string& key) {
+  static void CheckNumber(Node& at, const Key& row) {
+    const YAML::Node& node = at.yaml;
     const std::string not_one = " is not " + NumberName(row.type);
-    if (node.IsNull()) Fail(node, key, "has no value; " + Wanted(row));
-    if (!node.IsScalar()) Fail(node, key, Shown(node) + not_one + "; " + Wanted(row));
+    if (node.IsNull()) Fail(at, "has no value; " + Wanted(row));
+    if (!node.IsScalar()) Fail(at, Shown(node) + not_one + "; " + Wanted(row));
     const std::string& token = node.Scalar();
     if (!HasForm(node, Type::kNumber))
-      Fail(node, key,
-           "\"" + Shown(node) + "\" is " + (node.Tag() == "!" ? "quoted text" : "tagged " + node.Tag()) + ", not " +
-               NumberName(row.type) + "; " +
-               (Reads(token, row.type) ? "write " + token + (node.Tag() == "!" ? " without quotes" : " alone")
-                                       : Wanted(row)));
-    values_.insert_or_assign(key, node);
-    const Parsed<double> number = ParseNumber(token);
-    const std::string_view problem = row.type == Type::kInteger ? ParseInteger(token).problem : number.problem;
-    if (!problem.empty()) Fail(node, key, Shown(node) + " " + std::string(problem) + "; " + Correction(token, row));
-    if (!row.range.Contains(number.value)) Fail(node, key, token + " is outside " + row.range.text());
+      Fail(at, "\"" + Shown(node) + "\" is " + (node.Tag() == "!" ? "quoted text" : "tagged " + node.Tag()) + ", not " +
+                   NumberName(row.type) + "; " +
+                   (Parse(token, row.type).problem.empty()
+                        ? "write " + token + (node.Tag() == "!" ? " without quotes" : " alone")
+                        : Wanted(row)));
+    const auto [value, problem] = Parse(token, row.type);
+    if (!problem.empty()) Fail(at, Shown(node) + " " + std::string(problem) + "; " + Correction(token, row));
+    if (!row.range.Contains(value)) Fail(at, token + " is outside " + row.range.text());
+    at.number = value;
   }
 
-  void CheckVector(const YAML::Node& node, const Key& row, const std::string& key) {
-    if (!node.IsSequence()) Fail(node, key, Shown(node) + " is not a list of numbers");
-    values_.insert_or_assign(key, node);
-    RequireSize(node, row, key);
-    for (std::size_t i = 0; i < node.size(); ++i) CheckNumber(node[i], row, key + Index(i));
+  void CheckVector(Node& at, const Key& row) const {
+    if (!at.yaml.IsSequence()) Fail(at, Shown(at.yaml) + " is not a list of numbers");
+    RequireSize(at, row);
+    for (std::size_t i = 0; i < at.yaml.size(); ++i) CheckNumber(AddEntry(at, i), row);
   }
 
-  void RequireSize(const YAML::Node& node, const Key& row, const std::string& key) const {
+  void RequireSize(const Node& at, const Key& row) const {
     const auto require = [&](std::size_t size, const std::string& why) {
-      if (size != 0 && node.size() != size)
-        Fail(node, key, "has " + std::to_string(node.size()) + " entries, has to have " + std::to_string(size) + why);
+      if (size != 0 && at.yaml.size() != size)
+        Fail(at, fmt::format("has {} entries, has to have {}{}", at.yaml.size(), size, why));
     };
     const auto one_each = [&](const std::vector<std::string>& names) { require(names.size(), ": " + Joined(names)); };
     switch (row.size) {
@@ -351,53 +368,50 @@ class Checker {
       case Key::Size::kSafety:
         return require(ToSize(scope_.safety_dim), ", one a safety coordinate (task.projection or task.body)");
       case Key::Size::kPoint:
-        if (node.size() != 2 && node.size() != 3)
-          Fail(node, key, "has " + std::to_string(node.size()) + " entries, has to have 2 or 3");
+        if (at.yaml.size() != 2 && at.yaml.size() != 3)
+          Fail(at, fmt::format("has {} entries, has to have 2 or 3", at.yaml.size()));
         return;
-      case Key::Size::kAny: return RequireCount(node, row, key);
+      case Key::Size::kAny: return RequireCount(at, row);
     }
   }
 
-  void RequireCount(const YAML::Node& node, const Key& row, const std::string& key) const {
-    if (!row.count.Contains(static_cast<double>(node.size())))
-      Fail(node, key, "has " + std::to_string(node.size()) + " entries, which is outside " + row.count.text());
+  static void RequireCount(const Node& at, const Key& row) {
+    if (!row.count.Contains(static_cast<double>(at.yaml.size())))
+      Fail(at, fmt::format("has {} entries, which is outside {}", at.yaml.size(), row.count.text()));
   }
 
-  void CheckNames(const YAML::Node& node, const Key& row, const std::string& key) const {
-    RequireCount(node, row, key);
+  void CheckNames(const Node& at, const Key& row) const {
+    RequireCount(at, row);
     const std::vector<std::string> known = row.size == Key::Size::kStates ? scope_.states : scope_.variables;
     std::vector<std::string> seen;
-    for (std::size_t i = 0; i < node.size(); ++i) {
-      if (!node[i].IsScalar()) Fail(node[i], key + Index(i), Shown(node[i]) + " is not a name");
-      const std::string& name = node[i].Scalar();
-      if (Contains(seen, name)) Fail(node[i], key + Index(i), "duplicate name " + name);
+    for (std::size_t i = 0; i < at.yaml.size(); ++i) {
+      if (!at.yaml[i].IsScalar()) Fail(at, at.yaml[i], at.key + Index(i), Shown(at.yaml[i]) + " is not a name");
+      const std::string& name = at.yaml[i].Scalar();
+      if (Contains(seen, name)) Fail(at, at.yaml[i], at.key + Index(i), "duplicate name " + name);
       if (!known.empty() && !Contains(known, name))
-        Fail(node[i], key + Index(i), name + " is not a coordinate; " + Suggestion(name, known));
+        Fail(at, at.yaml[i], at.key + Index(i), name + " is not a coordinate; " + Suggestion(name, known));
       seen.push_back(name);
     }
   }
 
-  void CheckText(const YAML::Node& node, const Key& row, const std::string& key) {
-    const std::string& text = node.Scalar();
+  void CheckText(const Node& at, const Key& row) {
+    const std::string& text = at.yaml.Scalar();
     if (row.type == Type::kExpression && (expressions_ += text.size()) > kLargestExpressions)
-      Fail(node, key,
-           "the expressions of this file, up to this one, have " + std::to_string(expressions_) + " bytes, at most " +
-               std::to_string(kLargestExpressions) + " are allowed");
-    if (text.empty() || text.find('\0') != std::string::npos) Fail(node, key, "is empty or not text");
+      Fail(at, fmt::format("the expressions of this file, up to this one, have {} bytes, at most {} are allowed",
+                           expressions_, kLargestExpressions));
+    if (text.empty() || text.find('\0') != std::string::npos) Fail(at, "is empty or not text");
     if (row.type == Type::kWord && std::find(row.words.begin(), row.words.end(), text) == row.words.end())
-      Fail(node, key, Shown(node) + " is not known; " + Suggestion(text, {row.words.begin(), row.words.end()}));
+      Fail(at, Shown(at.yaml) + " is not known; " + Suggestion(text, {row.words.begin(), row.words.end()}));
     if (row.type == Type::kChannel &&
         (text.size() > 63 || text.find_first_not_of(kChannelLetters) != std::string::npos))
-      Fail(node, key, Shown(node) + " is not 1 to 63 letters, digits and underscores");
+      Fail(at, Shown(at.yaml) + " is not 1 to 63 letters, digits and underscores");
   }
 
   static constexpr const char* kChannelLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
 
-  const std::string& path_;
   const std::span<const Key> schema_;
   const SchemaScope& scope_;
-  const Document::Visitor& visit_;
-  Values& values_;
+  TaskDraft& draft_;
   std::size_t expressions_ = 0;  // bytes of those so far
 };
 
@@ -422,13 +436,13 @@ std::string TabAdvice(const std::string& text, int line) {
   for (int i = 0; i <= line && std::getline(lines, at); ++i) {
     const std::string blank = at.substr(0, at.find_first_not_of(" \t"));
     if (blank.find('\t') != std::string::npos)
-      return "; line " + std::to_string(i + 1) + " is indented with a tab, write spaces";
+      return fmt::format("; line {} is indented with a tab, write spaces", i + 1);
   }
   return "";
 }
 
 // Does not use YAML::LoadAll, which reads endless empty documents from a single comma.
-YAML::Node Parse(const std::string& path, const std::string& text) {
+YAML::Node ParseYaml(const std::string& path, const std::string& text) {
   try {
     std::istringstream in(text);
     YAML::Parser parser(in);
@@ -501,94 +515,106 @@ ExpressionText Laid(const std::string& scalar, const std::string& file, const YA
   return laid;
 }
 
-Eigen::VectorXd VectorOf(const YAML::Node& node) {
-  std::vector<double> entries;
-  for (const auto& entry : node) entries.push_back(ParseNumber(entry.Scalar()).value);
-  return Eigen::Map<const Eigen::VectorXd>(entries.data(), std::ssize(entries));
+// The entry of a node that is `key` or leads to it.
+const Field::Node* EntryTowards(const Field::Node& node, std::string_view key) {
+  for (const auto& entry : node.entries)
+    if (key.starts_with(entry->key) &&
+        (key.size() == entry->key.size() || key[entry->key.size()] == '.' || key[entry->key.size()] == '['))
+      return entry.get();
+  return nullptr;
 }
 
 }  // namespace
 
-struct Document::Tree {
-  YAML::Node root;
-  Values values;
+const std::string& Field::key() const { return node_->key; }
+const std::string& Field::name() const { return node_->name; }
+const std::string& Field::file() const { return node_->document.path(); }
 
-  const YAML::Node* Find(std::string_view key) const {
-    const auto found = values.find(key);
-    return found == values.end() ? nullptr : &found->second;
-  }
-  const YAML::Node& Get(std::string_view key) const {
-    if (const YAML::Node* node = Find(key)) return *node;
-    throw std::logic_error("read without a check that it is there: " + std::string(key));
-  }
-};
+const Field::Node* Field::Find(std::string_view name) const {
+  const auto found = std::ranges::find_if(node_->entries, [&](const auto& entry) { return entry->name == name; });
+  return found == node_->entries.end() ? nullptr : found->get();
+}
+
+Field Field::operator[](std::string_view name) const {
+  if (const Node* node = Find(name)) return Field(*node);
+  throw std::logic_error("read without a check that it is there: " + Below(key(), name));
+}
+
+Field Field::operator[](Eigen::Index i) const { return Field(*node_->entries.at(ToSize(i))); }
+
+int Field::Count() const { return static_cast<int>(node_->entries.size()); }
+
+std::vector<Field> Field::Entries() const {
+  std::vector<Field> fields;
+  for (const auto& entry : node_->entries) fields.emplace_back(*entry);
+  return fields;
+}
+
+std::vector<Field> Field::Entries(std::string_view name) const {
+  return Has(name) ? (*this)[name].Entries() : std::vector<Field>{};
+}
+
+std::vector<std::string> Field::Keys() const {
+  std::vector<std::string> keys;
+  for (const auto& entry : node_->entries) keys.push_back(entry->name);
+  return keys;
+}
+
+double Field::Number() const { return node_->number; }
+
+std::string Field::Text() const { return node_->yaml.Scalar(); }
+
+Eigen::VectorXd Field::Vector() const {
+  Eigen::VectorXd vector(Count());
+  for (Eigen::Index i = 0; i < vector.size(); ++i) vector[i] = (*this)[i].Number();
+  return vector;
+}
+
+std::vector<Eigen::VectorXd> Field::Vectors() const {
+  std::vector<Eigen::VectorXd> vectors;
+  for (const Field& entry : Entries()) vectors.push_back(entry.Vector());
+  return vectors;
+}
+
+std::vector<std::string> Field::Names() const {
+  std::vector<std::string> names;
+  for (const auto& entry : node_->yaml) names.push_back(entry.Scalar());
+  return names;
+}
+
+ExpressionText Field::Expression() const {
+  return Laid(node_->yaml.Scalar(), node_->document.text(), node_->yaml.Mark());
+}
+
+void Field::Read(std::vector<double>& value) const {
+  const Eigen::VectorXd vector = Vector();
+  value.assign(vector.begin(), vector.end());
+}
+
+std::string Field::Place() const { return At(file(), node_->line()) + key() + ": "; }
+
+void Field::Fail(const std::string& what) const { throw ConfigError(Place() + what); }
+
+void Field::Fail(std::string_view name, const std::string& what) const {
+  if (const Node* node = Find(name)) Field(*node).Fail(what);
+  throw ConfigError(At(file(), node_->line()) + Below(key(), name) + ": " + what);
+}
 
 Document::Document(const std::string& path, const std::string& named_by)
     : path_(path),
       text_(ReadWhole(path, kLargestTaskFile, named_by)),
-      tree_(std::make_unique<Tree>(Tree{Parse(path, text_), {}})) {}
+      root_(new Field::Node{*this, "", "", ParseYaml(path, text_)}) {}
 
 Document::~Document() = default;
 
-void Document::Check(const SchemaScope& scope, const Visitor& visit, std::span<const Key> schema) {
-  Checker(path_, schema, scope, visit, tree_->values).Check(tree_->root, "", "");
-}
+void Document::Read(TaskDraft& draft, std::span<const Key> schema) { Checker(schema, draft).Check(*root_, ""); }
 
-int Document::Count(std::string_view key) const {
-  const YAML::Node* node = tree_->Find(key);
-  return node ? static_cast<int>(node->size()) : 0;
-}
-
-std::vector<std::string> Document::KeysOf(std::string_view key) const {
-  std::vector<std::string> keys;
-  if (const YAML::Node* node = tree_->Find(key))
-    for (const auto& entry : *node) keys.push_back(entry.first.Scalar());
-  return keys;
-}
-
-double Document::Number(std::string_view key) const { return ParseNumber(tree_->Get(key).Scalar()).value; }
-
-std::string Document::Text(std::string_view key) const { return tree_->Get(key).Scalar(); }
-
-Eigen::VectorXd Document::Vector(std::string_view key) const { return VectorOf(tree_->Get(key)); }
-
-std::vector<Eigen::VectorXd> Document::Vectors(std::string_view key) const {
-  std::vector<Eigen::VectorXd> vectors;
-  for (const auto& entry : tree_->Get(key)) vectors.push_back(VectorOf(entry));
-  return vectors;
-}
-
-std::vector<std::string> Document::Names(std::string_view key) const {
-  std::vector<std::string> names;
-  for (const auto& entry : tree_->Get(key)) names.push_back(entry.Scalar());
-  return names;
-}
-
-ExpressionText Document::Expression(std::string_view key) const {
-  const YAML::Node& node = tree_->Get(key);
-  return Laid(node.Scalar(), text_, node.Mark());
-}
-
-void Document::Read(std::string_view key, double& value) const { value = Number(key); }
-
-void Document::Read(std::string_view key, int& value) const {
-  value = static_cast<int>(ParseInteger(tree_->Get(key).Scalar()).value);
-}
-
-void Document::Read(std::string_view key, std::string& value) const { value = Text(key); }
-
-void Document::Read(std::string_view key, std::vector<double>& value) const {
-  const Eigen::VectorXd vector = Vector(key);
-  value.assign(vector.begin(), vector.end());
-}
-
-void Document::Read(std::string_view key, std::optional<double>& value) const { value = Number(key); }
+Field Document::root() const { return Field(*root_); }
 
 std::string Document::Place(std::string_view key) const {
-  std::string_view known = key;
-  while (!known.empty() && tree_->Find(known) == nullptr) known = Enclosing(known);
-  const YAML::Node* node = tree_->Find(known);
-  return At(path_, node ? LineOf(node->Mark()) : 1) + std::string(key) + ": ";
+  const Field::Node* known = root_.get();
+  while (const Field::Node* entry = EntryTowards(*known, key)) known = entry;
+  return At(path_, known->line()) + std::string(key) + ": ";
 }
 
 void Document::Fail(std::string_view key, const std::string& what) const { throw ConfigError(Place(key) + what); }

@@ -11,6 +11,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "task/config_error.h"
 
 namespace forereach {
@@ -26,7 +28,7 @@ std::string KindOf(mode_t mode) {
 }
 
 std::string SizeText(std::int64_t bytes) {
-  return bytes % kMegabyte == 0 ? std::to_string(bytes / kMegabyte) + " MiB" : std::to_string(bytes) + " bytes";
+  return bytes % kMegabyte == 0 ? fmt::format("{} MiB", bytes / kMegabyte) : fmt::format("{} bytes", bytes);
 }
 
 }  // namespace
@@ -48,8 +50,7 @@ std::size_t InputFile::Read(char* to, std::size_t most) {
   ssize_t count;
   do count = ::read(descriptor_.get(), to, most);
   while (count < 0 && errno == EINTR);
-  if (count < 0)
-    Fail("reading failed after " + std::to_string(read_) + " bytes: " + std::generic_category().message(errno));
+  if (count < 0) Fail(fmt::format("reading failed after {} bytes: {}", read_, std::generic_category().message(errno)));
   RequireAtMost(read_ += count);
   return static_cast<std::size_t>(count);
 }

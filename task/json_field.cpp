@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "forereach/numerics/text.h"
@@ -23,9 +25,7 @@ JsonField JsonField::operator[](const std::string& name) const {
   return {file_, name_ + (name_.empty() ? "" : ".") + name, *found};
 }
 
-JsonField JsonField::operator[](std::size_t i) const {
-  return {file_, name_ + "[" + std::to_string(i) + "]", json_.at(i)};
-}
+JsonField JsonField::operator[](std::size_t i) const { return {file_, fmt::format("{}[{}]", name_, i), json_.at(i)}; }
 
 void JsonField::RequireFields(const std::set<std::string>& names) const {
   for (const std::string& name : names) static_cast<void>((*this)[name]);
@@ -39,7 +39,7 @@ std::size_t JsonField::Count() const {
 }
 
 void JsonField::RequireCount(std::size_t count) const {
-  if (Count() != count) Fail("has " + std::to_string(Count()) + " entries, has to have " + std::to_string(count));
+  if (Count() != count) Fail(fmt::format("has {} entries, has to have {}", Count(), count));
 }
 
 std::string JsonField::Text() const {
@@ -54,7 +54,7 @@ bool JsonField::Bool() const {
 
 int JsonField::Integer(int lower, int upper) const {
   if (!json_.is_number_integer() || json_ < lower || json_ > upper)
-    FailAs("no integer in [" + std::to_string(lower) + ", " + std::to_string(upper) + "]");
+    FailAs(fmt::format("no integer in [{}, {}]", lower, upper));
   return json_.get<int>();
 }
 

@@ -3,6 +3,8 @@
 #include <set>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 namespace forereach {
@@ -13,7 +15,7 @@ Json ParseJson(std::string_view text, int deepest) {
   std::vector<std::set<std::string>> keys;  // of the objects that are open
   return Json::parse(text, [&keys, deepest](int depth, Event event, Json& value) {
     if (depth > deepest)
-      throw Json::other_error::create(501, "nested deeper than " + std::to_string(deepest) + " levels", nullptr);
+      throw Json::other_error::create(501, fmt::format("nested deeper than {} levels", deepest), nullptr);
     if (event == Event::object_start) keys.emplace_back();
     if (event == Event::object_end) keys.pop_back();
     if (event == Event::key && !keys.back().insert(value.template get<std::string>()).second)

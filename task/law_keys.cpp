@@ -2,17 +2,19 @@
 #include <iterator>
 
 #include "task/key_rows.h"
+#include "task/row_readers.h"
+#include "task/schema_parts.h"
 
 namespace forereach::key_rows {
 namespace {
 
 constexpr int kMostWays = 16;  // to stop
 
-Law ReadLaw(const Document& file, const std::string& key, const TaskDraft& draft) {
+Law ReadLaw(const Field& at, const TaskDraft& draft) {
   Law law;
   for (const std::string& input : draft.problem.model->input_names()) {
-    if (!Has(file, key, input)) file.Fail(key + "." + input, "missing: a law has an expression for each input");
-    law.push_back(file.Expression(key + "." + input));
+    if (!at.Has(input)) at.Fail(input, "missing: a law has an expression for each input");
+    law.push_back(at[input].Expression());
   }
   return law;
 }
@@ -20,8 +22,8 @@ Law ReadLaw(const Document& file, const std::string& key, const TaskDraft& draft
 // A law, or a list of laws.
 std::vector<Key> WaysToStop(const std::string& path, std::vector<Law> Laws::*ways, std::string meaning,
                             std::string meaning_of_list) {
-  const Key::Reader read = [ways](const Document& file, const std::string& key, TaskDraft& draft) {
-    (draft.config.laws.*ways).push_back(ReadLaw(file, key, draft));
+  const Key::Reader read = [ways](const Field& at, TaskDraft& draft) {
+    (draft.config.laws.*ways).push_back(ReadLaw(at, draft));
   };
   const std::string of_control = "The control, clipped to domain.input.";
   return {Map(path, std::move(meaning), read), Expression(path + ".<input>", of_control),
@@ -29,23 +31,20 @@ std::vector<Key> WaysToStop(const std::string& path, std::vector<Law> Laws::*way
           Expression(path + "[].<input>", of_control)};
 }
 
-void ReadDefinitions(const Document& file, const std::string& key, TaskDraft& draft) {
-  for (const std::string& name : file.KeysOf(key))
-    draft.config.laws.definitions.push_back({name, file.Expression(key + "." + name)});
+void ReadDefinitions(const Field& at, TaskDraft& draft) {
+  for (const Field& let : at.Entries()) draft.config.laws.definitions.push_back({let.name(), let.Expression()});
 }
 
-void ReadAtRest(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadAtRest(const Field& at, TaskDraft& draft) {
   const std::vector<std::string> states = draft.problem.model->state_names();
   std::vector<RestBound> at_rest;
-  for (const std::string& name : file.KeysOf(key))
-    at_rest.push_back(
-        {static_cast<int>(std::ranges::find(states, name) - states.begin()), file.Number(key + "." + name)});
+  for (const Field& bound : at.Entries()) at_rest.push_back({IndexOf(states, bound.name()), bound.Number()});
   draft.config.laws.at_rest = std::move(at_rest);
 }
 
 }  // namespace
 
-void CheckLaws(const Document& file, const TaskDraft& draft) {
+void CheckLaws(const std::string& file, const TaskDraft& draft) {
   const NominalModel& model = *draft.problem.model;
   const Laws& laws = draft.config.laws;
   try {
@@ -54,7 +53,7 @@ void CheckLaws(const Document& file, const TaskDraft& draft) {
     if (laws.speed) static_cast<void>(MakeSpeed(model, laws));
     static_cast<void>(MakeHints(model, laws));  // checks the definitions, too
   } catch (const ExpressionError& error) {
-    FailAt(file.path(), error);
+    FailAt(file, error);
   }
 }
 
@@ -83,16 +82,12 @@ std::vector<Key> LawKeys() {
               "planner.stop may use and of `desired_heading` (rad, the direction of travel in the first two safety "
               "coordinates; 0 or pi if there is one), `desired_speed` (m/s, there) and `desired_climb` (m/s, in the "
               "third). Without it the search finds controls by chance.",
-              [](const Document& file, const std::string& key, TaskDraft& draft) {
-                draft.config.laws.hints = ReadLaw(file, key, draft);
-              }),
+              [](const Field& at, TaskDraft& draft) { draft.config.laws.hints = ReadLaw(at, draft); }),
           Expression("planner.hints.<input>", "The control, clipped to domain.input."),
           Optional(Key(Of(Key::Type::kExpression, "planner.speed",
                           "In m/s, negative in reverse, of what planner.stop may use. Plans neither reverse nor exceed "
                           "planner.cruise_speed by more than a few percent.",
-                          [](const Document& file, const std::string& key, TaskDraft& draft) {
-                            draft.config.laws.speed = file.Expression(key);
-                          })),
+                          [](const Field& at, TaskDraft& draft) { draft.config.laws.speed = at.Expression(); })),
                    "that of the safety coordinates, whatever its direction"),
           Optional(Map("planner.at_rest",
                        "Where a braking tail ends: each state named here is at most its bound in absolute value. `{}`, "

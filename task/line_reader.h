@@ -1,12 +1,16 @@
-/** Text files line by line: a file of ten million rows is larger than what is kept of it. */
+/** Text files of rows, line by line: a file of ten million rows is larger than what is kept of it. */
 #pragma once
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 #include "task/files.h"
 
 namespace forereach {
+
+/** Without the white space around it. */
+[[nodiscard]] std::string_view Trimmed(std::string_view text);
 
 class LineReader final {
  public:
@@ -14,7 +18,8 @@ class LineReader final {
   as InputFile does. */
   explicit LineReader(const std::string& path, const std::string& named_by = "");
 
-  /** Sets `text` to the next line, without its end. As with std::getline, the last line need not end. False at the end.
+  /** Sets `text` to the next line, without its end and without a byte order mark. As with std::getline, the last line
+  need not end. False at the end.
   @throws ConfigError if reading fails, or if a line is longer than a mebibyte, which no row of numbers is. */
   [[nodiscard]] bool Next(std::string& text);
 
@@ -22,6 +27,8 @@ class LineReader final {
   [[nodiscard]] int line() const { return line_; }
 
  private:
+  bool ReadLine(std::string& text);
+
   const std::string path_;
   InputFile file_;
   std::string chunk_;

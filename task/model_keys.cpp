@@ -8,15 +8,21 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "command_line/nearest.h"
 #include "forereach/dynamics/compiled_models.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
-#include "forereach/numerics/size.h"
-#include "task/config_error.h"
+#include "forereach/numerics/text.h"
+#include "task/document.h"
+#include "task/draft.h"
 #include "task/key_rows.h"
 #include "task/model_file.h"
+#include "task/named_values.h"
+#include "task/row_readers.h"
+#include "task/schema_parts.h"
 
 namespace forereach::key_rows {
 namespace {
@@ -28,18 +34,15 @@ constexpr int kMostNames = 1000;  // of parameters, and of definitions
 constexpr std::size_t kLongestUnit = 64;
 constexpr const char *kStepName = "dt", *kNextEnding = "_next";
 
-constexpr const char* kAngles = "model.angles";
-
-std::vector<std::string> ReadAngles(const Document& file) {
-  return Has(file, "model", "angles") ? file.Names(kAngles) : std::vector<std::string>{};
+std::vector<std::string> ReadAngles(const Field& model) {
+  return model.Has("angles") ? model["angles"].Names() : std::vector<std::string>{};
 }
 
-// @throws ConfigError if one is no state.
-void RequireStates(const Document& file, const std::vector<std::string>& angles,
-                   const std::vector<std::string>& states) {
-  for (const std::string& name : angles)
+// @throws ConfigError if one of the angles of `model` is no state.
+void RequireStates(const Field& model, const std::vector<std::string>& states) {
+  for (const std::string& name : ReadAngles(model))
     if (std::ranges::find(states, name) == states.end())
-      file.Fail(kAngles, name + " is no state; " + Suggestion(name, states));
+      model.Fail("angles", name + " is no state; " + Suggestion(name, states));
 }
 
 const std::vector<Named<const NamedModel*>>& Models() {
@@ -58,140 +61,130 @@ const std::vector<Named<Integrator>>& Integrators() {
 }
 
 // The step is a number in its range.
-ModelText::Parameter ReadModelParameter(const Document& file, const std::string& key, const std::string& name) {
-  ModelText::Parameter parameter = ReadParameter(file, key, name);
-  if (name != kStepName) return parameter;
-  if (file.Count(key) != 0) file.Fail(key, "is a list, has to be one number: the step is exact");
+ModelText::Parameter ReadModelParameter(const Field& at) {
+  ModelText::Parameter parameter = ReadParameter(at);
+  if (at.name() != kStepName) return parameter;
+  if (at.Count() != 0) at.Fail("is a list, has to be one number: the step is exact");
   if (!kStep.Contains(parameter.lower))
-    file.Fail(key, ToText(parameter.lower) + " is outside " + kStep.text() + ", its unit is s");
+    at.Fail(ToText(parameter.lower) + " is outside " + kStep.text() + ", its unit is s");
   return parameter;
 }
 
 // Reads the map `model` of a document as text. The document is a task file or a model file.
 class TextReader final {
  public:
-  explicit TextReader(const Document& file) : file_(file) {}
+  explicit TextReader(const Field& model) : model_(model) {}
 
   ModelText Read() {
-    text_.file = file_.path();
+    text_.file = model_.file();
     ReadVariables("states", kMaxStates, text_.states);
     ReadVariables("inputs", kMaxInputs, text_.inputs);
     ReadParameters();
-    ReadDefinitions();
+    for (const Field& let : EntriesOf("let", 0, kMostNames))
+      text_.definitions.push_back({let.name(), let.Expression()});
     ReadEquations();
-    text_.angles = ReadAngles(file_);
+    text_.angles = ReadAngles(model_);
     return std::move(text_);
   }
 
  private:
-  // The names of a map that is there.
-  std::vector<std::string> NamesOf(const std::string& map, int least, int most) {
-    const std::string key = "model." + map;
-    const std::vector<std::string> names = file_.KeysOf(key);
-    if (const Range count = Between(least, most); !count.Contains(static_cast<double>(names.size())))
-      file_.Fail(key, "has " + std::to_string(names.size()) + " entries, which is outside " + count.text());
-    for (const std::string& name : names) Take(map, name);
-    return names;
+  // The values of a map of the model, whose names get their meaning.
+  std::vector<Field> EntriesOf(const std::string& map, int least, int most) {
+    std::vector<Field> entries = model_.Entries(map);
+    if (const Range count = Between(least, most); !count.Contains(static_cast<double>(entries.size())))
+      model_.Fail(map, fmt::format("has {} entries, which is outside {}", entries.size(), count.text()));
+    for (const Field& entry : entries) Take(map, entry);
+    return entries;
   }
 
   // No name has two meanings.
-  void Take(const std::string& map, const std::string& name) {
-    const std::string key = "model." + map + "." + name;
+  void Take(const std::string& map, const Field& entry) {
+    const std::string& name = entry.name();
     if (IsReserved(name))
-      file_.Fail(key,
-                 name + (name == "pi" ? " is a number" : " is a function") + " of the language; choose another name");
+      entry.Fail(name + (name == "pi" ? " is a number" : " is a function") + " of the language; choose another name");
     const auto [other, is_new] = meanings_.emplace(name, map);
-    if (!is_new) file_.Fail(key, "is a name of model." + other->second + " already; choose another name");
+    if (!is_new) entry.Fail("is a name of model." + other->second + " already; choose another name");
   }
 
   void ReadVariables(const std::string& map, int most, std::vector<ModelText::Variable>& variables) {
-    if (!Has(file_, "model", map)) file_.Fail("model." + map, "missing: a model as text needs this key");
-    for (const std::string& name : NamesOf(map, 1, most)) {
-      const std::string key = "model." + map + "." + name, unit = file_.Text(key);
+    if (!model_.Has(map)) model_.Fail(map, "missing: a model as text needs this key");
+    for (const Field& variable : EntriesOf(map, 1, most)) {
+      const std::string unit = variable.Text();
       if (unit.size() > kLongestUnit || std::ranges::any_of(unit, [](unsigned char c) { return std::iscntrl(c) != 0; }))
-        file_.Fail(key, "a unit has at most " + std::to_string(kLongestUnit) + " bytes and no control characters");
-      variables.push_back({name, unit});
+        variable.Fail(fmt::format("a unit has at most {} bytes and no control characters", kLongestUnit));
+      variables.push_back({variable.name(), unit});
     }
     if (&variables == &text_.states) return;
     for (const ModelText::Variable& state : text_.states)  // a column of transitions
       if (const std::string next = state.name + kNextEnding; meanings_.contains(next))
-        file_.Fail("model." + meanings_[next] + "." + next,
-                   "is the column of the state " + state.name + " after a step; choose another name");
+        model_[meanings_[next]].Fail(next,
+                                     "is the column of the state " + state.name + " after a step; choose another name");
   }
 
   void ReadParameters() {
-    if (!Has(file_, "model", "parameters")) file_.Fail("model.parameters.dt", "missing: the step of the model, in s");
-    for (const std::string& name : NamesOf("parameters", 1, kMostNames))
-      text_.parameters.push_back(ReadModelParameter(file_, "model.parameters." + name, name));
-    if (!meanings_.contains(kStepName) || meanings_[kStepName] != "parameters")
-      file_.Fail("model.parameters.dt", "missing: the step of the model, in s");
-  }
-
-  void ReadDefinitions() {
-    for (const std::string& name : NamesOf("let", 0, kMostNames))
-      text_.definitions.push_back({name, file_.Expression("model.let." + name)});
+    if (!model_.Has("parameters")) model_.Fail("parameters.dt", "missing: the step of the model, in s");
+    for (const Field& parameter : EntriesOf("parameters", 1, kMostNames))
+      text_.parameters.push_back(ReadModelParameter(parameter));
+    if (!model_["parameters"].Has(kStepName))
+      model_["parameters"].Fail(kStepName, "missing: the step of the model, in s");
   }
 
   void ReadEquations() {
-    const bool is_rate = Has(file_, "model", "rate"), has_integrator = Has(file_, "model", "integrator");
-    if (is_rate == Has(file_, "model", "next"))
-      file_.Fail("model", is_rate ? "has both next and rate; delete one of them"
-                                  : "has neither next, the states after a step, nor rate, their derivatives");
+    const bool is_rate = model_.Has("rate"), has_integrator = model_.Has("integrator");
+    if (is_rate == model_.Has("next"))
+      model_.Fail(is_rate ? "has both next and rate; delete one of them"
+                          : "has neither next, the states after a step, nor rate, their derivatives");
     if (is_rate != has_integrator)
-      file_.Fail("model.integrator", is_rate ? "missing: how the rates give the next state, one of euler, midpoint, rk4"
-                                             : "is for model.rate; model.next is the next state itself");
-    if (is_rate) text_.integrator = ValueNamed(Integrators(), file_.Text("model.integrator"));
-    const std::string map = is_rate ? "model.rate" : "model.next";
+      model_.Fail("integrator", is_rate ? "missing: how the rates give the next state, one of euler, midpoint, rk4"
+                                        : "is for model.rate; model.next is the next state itself");
+    if (is_rate) text_.integrator = ValueNamed(Integrators(), model_["integrator"].Text());
+    const Field map = model_[is_rate ? "rate" : "next"];
     for (const ModelText::Variable& state : text_.states) {
-      if (!Has(file_, map, state.name)) file_.Fail(map + "." + state.name, "missing: each state needs its equation");
-      text_.equations.push_back(file_.Expression(map + "." + state.name));
+      if (!map.Has(state.name)) map.Fail(state.name, "missing: each state needs its equation");
+      text_.equations.push_back(map[state.name].Expression());
     }
   }
 
-  const Document& file_;
+  const Field model_;
   ModelText text_;
   std::map<std::string, std::string> meanings_;  // of each name the map that has it
 };
 
 // The parameters of a task file replace those of the model file that it includes.
-void Override(const Document& task, ModelText& text) {
-  const std::string map = "model.parameters";
+void Override(const Field& model, ModelText& text) {
   std::vector<std::string> known;
   for (const ModelText::Parameter& parameter : text.parameters) known.push_back(parameter.name);
-  for (const std::string& name : task.KeysOf(map)) {
-    const std::string key = map + "." + name;
-    const auto parameter = std::ranges::find(text.parameters, name, &ModelText::Parameter::name);
+  for (const Field& at : model.Entries("parameters")) {
+    const auto parameter = std::ranges::find(text.parameters, at.name(), &ModelText::Parameter::name);
     if (parameter == text.parameters.end())
-      task.Fail(key, "is not a parameter of " + text.file + "; " + Suggestion(name, known));
-    *parameter = ReadModelParameter(task, key, name);
+      at.Fail("is not a parameter of " + text.file + "; " + Suggestion(at.name(), known));
+    *parameter = ReadModelParameter(at);
   }
 }
 
 // The names that equations may use are those of the map `model` so far.
-void ReadStates(const Document& file, const std::string& key, TaskDraft& draft) {
-  draft.scope.states = file.KeysOf(key);
-}
+void ReadStates(const Field& at, TaskDraft& draft) { draft.scope.states = at.Keys(); }
 
-ModelText ReadModelFile(const Document& task, TaskDraft& draft) {
-  const std::string key = "model.file", name = task.Text(key), place = task.Place(key);
+ModelText ReadModelFile(const Field& model, TaskDraft& draft) {
+  const std::string name = model["file"].Text(), place = model["file"].Place();
   std::string& path = draft.model_file.path;
-  if (path.empty()) path = FindModelFile(task.path(), name, place);
+  if (path.empty()) path = FindModelFile(model.file(), name, place);
   ModelText text = LoadModelFile(path, place, &draft.model_file.bytes);
   text.name = std::filesystem::path(name).stem().string();
-  Override(task, text);
-  if (Has(task, "model", "angles")) {
+  Override(model, text);
+  if (model.Has("angles")) {
     std::vector<std::string> states;
     for (const ModelText::Variable& state : text.states) states.push_back(state.name);
-    text.angles = ReadAngles(task);
-    RequireStates(task, text.angles, states);
+    text.angles = ReadAngles(model);
+    RequireStates(model, states);
   }
   return text;
 }
 
 // Beside what says which model it is, `model` has only what belongs to it.
-void RequireOnly(const Document& file, const std::vector<std::string>& allowed, const std::string& why) {
-  for (const std::string& name : file.KeysOf("model"))
-    if (std::ranges::find(allowed, name) == allowed.end()) file.Fail("model." + name, why);
+void RequireOnly(const Field& model, const std::vector<std::string>& allowed, const std::string& why) {
+  for (const Field& at : model.Entries())
+    if (std::ranges::find(allowed, at.name()) == allowed.end()) at.Fail(why);
 }
 
 std::shared_ptr<const NominalModel> MakeFromText(const ModelText& text) {
@@ -202,44 +195,42 @@ std::shared_ptr<const NominalModel> MakeFromText(const ModelText& text) {
   }
 }
 
-std::shared_ptr<const NominalModel> ReadNamedModel(const Document& file) {
+std::shared_ptr<const NominalModel> ReadNamedModel(const Field& at) {
   std::vector<std::string> keys{"name", kStepName, "angles"};
   for (const NamedModel& model : NamedModels())
     for (const NamedModel::Parameter& parameter : model.parameters) keys.emplace_back(parameter.name);
-  RequireOnly(file, keys, "is for a model as text, this one has a name");
-  if (!Has(file, "model", kStepName)) file.Fail("model.dt", "missing: The time from one control to the next.");
-  const NamedModel& model = *ValueNamed(Models(), file.Text("model.name"));
-  std::vector<double> parameters{file.Number("model.dt")};
-  for (const NamedModel::Parameter& parameter : model.parameters)
-    parameters.push_back(file.Number("model." + std::string(parameter.name)));
+  RequireOnly(at, keys, "is for a model as text, this one has a name");
+  if (!at.Has(kStepName)) at.Fail(kStepName, "missing: The time from one control to the next.");
+  const NamedModel& model = *ValueNamed(Models(), at["name"].Text());
+  std::vector<double> parameters{at[kStepName].Number()};
+  for (const NamedModel::Parameter& parameter : model.parameters) parameters.push_back(at[parameter.name].Number());
   const std::vector<std::string> states(model.states.begin(), model.states.end());
-  RequireStates(file, ReadAngles(file), states);
+  RequireStates(at, states);
   std::vector<int> angles;
-  for (const std::string& name : ReadAngles(file))
-    angles.push_back(static_cast<int>(std::ranges::find(states, name) - states.begin()));
+  for (const std::string& name : ReadAngles(at)) angles.push_back(IndexOf(states, name));
   std::ranges::sort(angles);
   try {
     return model.make(parameters, std::move(angles));
   } catch (const std::invalid_argument& error) {  // the parameters are in their ranges
-    file.Fail(kAngles, error.what());
+    at.Fail("angles", error.what());
   }
 }
 
-std::shared_ptr<const NominalModel> ReadTextModel(const Document& file, TaskDraft& draft) {
-  if (Has(file, "model", "file")) {
-    RequireOnly(file, {"file", "parameters", "angles"}, "stands in the model file, not beside its name");
-    return MakeFromText(ReadModelFile(file, draft));
+std::shared_ptr<const NominalModel> ReadTextModel(const Field& at, TaskDraft& draft) {
+  if (at.Has("file")) {
+    RequireOnly(at, {"file", "parameters", "angles"}, "stands in the model file, not beside its name");
+    return MakeFromText(ReadModelFile(at, draft));
   }
-  if (Has(file, "model", kStepName)) file.Fail("model.dt", "is model.parameters.dt of a model as text");
-  ModelText text = TextReader(file).Read();
+  if (at.Has(kStepName)) at.Fail(kStepName, "is model.parameters.dt of a model as text");
+  ModelText text = TextReader(at).Read();
   text.name = "equations";
   return MakeFromText(text);
 }
 
-void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
-  const bool has_kind = Has(file, key, "name") || Has(file, key, "file") || Has(file, key, "states");
-  if (!has_kind) file.Fail(key, "has no model: write name, file, or states with their equations");
-  draft.problem.model = Has(file, key, "name") ? ReadNamedModel(file) : ReadTextModel(file, draft);
+void ReadModel(const Field& at, TaskDraft& draft) {
+  const bool has_kind = at.Has("name") || at.Has("file") || at.Has("states");
+  if (!has_kind) at.Fail("has no model: write name, file, or states with their equations");
+  draft.problem.model = at.Has("name") ? ReadNamedModel(at) : ReadTextModel(at, draft);
   const NominalModel& model = *draft.problem.model;
   draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
   draft.config.period = StepOf(model);
@@ -255,7 +246,7 @@ Key ParameterRange() {
 
 Key AnglesKey() {
   return Optional(
-      Names(kAngles, Between(0, kMaxStates), Key::Size::kStates,
+      Names("model.angles", Between(0, kMaxStates), Key::Size::kStates,
             "The states that are angles, which may come wrapped or not. The equations must not tell turns apart, and "
             "no step may turn one by three quarters of a turn or more beyond the model "
             "([docs/expressions.md](../docs/expressions.md#angles)). Beside `model.file`: instead of the file's."),
@@ -291,11 +282,6 @@ std::vector<Key> TextKeys() {
 
 }  // namespace
 
-void FailAt(const std::string& file, const ExpressionError& error) {
-  throw ConfigError(file + ":" + std::to_string(error.line()) + ":" + std::to_string(error.column()) + ": " +
-                    error.what() + (error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
-}
-
 std::vector<Key> ModelKeys() {
   std::vector<Key> keys{
       Required(Map("model", "The nominal model f0: `name`, `file`, or `states` with their equations.", ReadModel)),
@@ -327,14 +313,9 @@ namespace forereach {
 ModelText LoadModelFile(const std::string& path, const std::string& named_by, std::string* bytes) {
   Document file(path, named_by);
   TaskDraft draft;
-  file.Check(
-      draft.scope,
-      [&](const Key& row, const std::string& at) {
-        if (row.read) row.read(file, at, draft);
-      },
-      ModelFileSchema());
+  file.Read(draft, ModelFileSchema());
   if (bytes != nullptr) *bytes = file.text();
-  ModelText text = key_rows::TextReader(file).Read();
+  ModelText text = key_rows::TextReader(file.root()["model"]).Read();
   text.name = std::filesystem::path(path).stem().string();
   return text;
 }

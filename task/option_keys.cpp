@@ -3,10 +3,14 @@
 #include <iterator>
 #include <set>
 
+#include <fmt/format.h>
+
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "task/key_rows.h"
+#include "task/option_rows.h"
+#include "task/schema_parts.h"
 
 namespace forereach::key_rows {
 namespace {
@@ -17,21 +21,21 @@ constexpr double kHourMs = 3.6e6;
 constexpr double kMaxMegabytes = 1e9;
 
 // task.rest was read before.
-void ReadRequireStop(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadRequireStop(const Field& at, TaskDraft& draft) {
   std::vector<RestBound>& rest = draft.problem.rest;
-  const bool required = file.Text(key) == "true";
-  if (required && rest.empty()) file.Fail(key, "true, but task.rest does not say what standing is");
+  const bool required = at.Text() == "true";
+  if (required && rest.empty()) at.Fail("true, but task.rest does not say what standing is");
   if (!required) rest.clear();
 }
 
 // A signed sender that restarts is known with its first message after one timeout alone, and it sends at least three in
 // that time. The rest is for a late one.
-void CheckGate(const Document& file, const std::string&, TaskDraft& draft) {
+void CheckGate(const Field& at, TaskDraft& draft) {
   constexpr double kTimeouts = 1.5;
   const GateOptions& gate = draft.config.gate;
   if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms < kTimeouts * gate.obstacles_timeout_ms)
-    file.Fail("gate.obstacles_lost_ms", ToText(*gate.obstacles_lost_ms) + " is less than " + ToText(kTimeouts) +
-                                            " times gate.obstacles_timeout_ms, " + ToText(gate.obstacles_timeout_ms));
+    at.Fail("obstacles_lost_ms", ToText(*gate.obstacles_lost_ms) + " is less than " + ToText(kTimeouts) +
+                                     " times gate.obstacles_timeout_ms, " + ToText(gate.obstacles_timeout_ms));
 }
 
 std::vector<Key> GateKeys() {
@@ -83,9 +87,7 @@ std::vector<Key> GateKeys() {
                   "which no certificate covers. For so long a robot may drive among obstacles that nobody sees."),
       Word("gate.obstacles_lost_ms", {"never"},
            "The robot executes its plan to the end, through whatever has come there.",
-           [](const Document&, const std::string&, TaskDraft& draft) {
-             draft.config.gate.obstacles_lost_ms = kNeverLost;
-           }),
+           [](const Field&, TaskDraft& draft) { draft.config.gate.obstacles_lost_ms = kNeverLost; }),
       gate.Word<bool>("learn", {{"executed", true}, {"none", false}}, &GateOptions::learns,
                       "executed: transitions that the robot reports become observations; declaration.noise_bound and "
                       "declaration.disturbance have to cover them. none: only the file's."),
@@ -138,11 +140,11 @@ constexpr std::array kChannels{
     ChannelRow{"command", &BusOptions::command, "command_t, from an operator: reset, reload."},
 };
 
-void RequireDifferentChannels(const Document& file, const std::string& key, TaskDraft& draft) {
+void RequireDifferentChannels(const Field& at, TaskDraft& draft) {
   std::set<std::string> names;
   for (const ChannelRow& channel : kChannels)
     if (const std::string& name = draft.config.bus.*channel.member; !names.insert(name).second)
-      file.Fail(key + "." + channel.name, name + " is the name of another channel too");
+      at.Fail(channel.name, name + " is the name of another channel too");
 }
 
 std::vector<Key> BusKeys() {
@@ -175,16 +177,14 @@ std::vector<Key> BusKeys() {
   return keys;
 }
 
-void CheckPlanner(const Document& file, const std::string&, TaskDraft& draft) {
-  CheckLaws(file, draft);
+void CheckPlanner(const Field& at, TaskDraft& draft) {
+  CheckLaws(at.file(), draft);
   const PlannerOptions& planner = draft.config.planner;
   if (planner.source == "policy" && planner.policy.empty())
-    file.Fail("planner.policy", "missing: a policy's file, for planner.source: policy");
+    at.Fail("policy", "missing: a policy's file, for planner.source: policy");
   if (const int steps = planner.progress_steps + planner.tail_steps; steps > kMaxSteps)
-    file.Fail("planner.tail_steps", std::to_string(planner.tail_steps) + " is outside [0, " +
-                                        std::to_string(kMaxSteps - planner.progress_steps) + "]: with progress_steps " +
-                                        std::to_string(steps) + " steps, a plan has at most " +
-                                        std::to_string(kMaxSteps));
+    at.Fail("tail_steps", fmt::format("{} is outside [0, {}]: with progress_steps {} steps, a plan has at most {}",
+                                      planner.tail_steps, kMaxSteps - planner.progress_steps, steps, kMaxSteps));
 }
 
 std::vector<Key> PlannerKeys() {
@@ -211,7 +211,7 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("progress_steps", Between(1, kMaxSteps), &PlannerOptions::progress_steps,
                       "Controls before the braking tail."),
       planner.Integer("tail_steps", Between(0, kMaxSteps), &PlannerOptions::tail_steps,
-                      "Longest braking tail; with progress_steps at most " + std::to_string(kMaxSteps) + "."),
+                      fmt::format("Longest braking tail; with progress_steps at most {}.", kMaxSteps)),
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
                       "A candidate starts so many steps after the state it was planned from."),
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates, "The most for one start."),
@@ -233,16 +233,16 @@ Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
   Key key = robot.OneOf("disturbance", {"none", "random", "adversarial"}, &RobotOptions::disturbance,
                         "In each step, within declaration.disturbance. random: of each state a uniform value. "
                         "adversarial: of each state its bound, with signs that stay for 1 to 32 steps.");
-  key.read = [read = key.read](const Document& file, const std::string& at, TaskDraft& draft) {
-    read(file, at, draft);
+  key.read = [read = key.read](const Field& at, TaskDraft& draft) {
+    read(at, draft);
     if (draft.config.robot.disturbance != "none" && !draft.problem.declaration.IsDisturbed())
-      file.Fail(at, draft.config.robot.disturbance + ", and declaration.disturbance allows for none");
+      at.Fail(draft.config.robot.disturbance + ", and declaration.disturbance allows for none");
   };
   return key;
 }
 
 // robot.hold was read before.
-void ReadEmergencyStop(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadEmergencyStop(const Field& at, TaskDraft& draft) {
   RobotOptions& robot = draft.config.robot;
   const NominalModel& model = *draft.problem.model;
   const NamedModel* const named = FindNamed(model);
@@ -250,17 +250,18 @@ void ReadEmergencyStop(const Document& file, const std::string& key, TaskDraft& 
     return std::ranges::any_of(draft.rest,
                                [&](const RestBound& b) { return model.state_names()[ToSize(b.coordinate)] == name; });
   };
-  for (const std::string& name : file.KeysOf(key)) {
+  for (const Field& rate : at.Entries()) {
+    const std::string& name = rate.name();
     const bool is_held = robot.hold         ? std::ranges::find(*robot.hold, name) != robot.hold->end()
                          : named == nullptr ? is_at_rest(name)
                                             : std::ranges::find(named->standing, name) != named->standing.end();
-    if (!is_held) file.Fail(key + "." + name, "is not zero while the robot stands: robot.hold does not name it");
-    robot.emergency_stop[name] = file.Number(key + "." + name);
+    if (!is_held) rate.Fail("is not zero while the robot stands: robot.hold does not name it");
+    robot.emergency_stop[name] = rate.Number();
   }
-  if (robot.emergency_stop.empty()) file.Fail(key, "names no state, so nothing would be braked");
+  if (robot.emergency_stop.empty()) at.Fail("names no state, so nothing would be braked");
 }
 
-// As a sentence goes on: "; v and a of ...".
+// "; v and a of ...": what stands still in each model of the library, to go on with a sentence.
 std::string StandingOfNamedModels() {
   std::string text;
   for (const NamedModel& model : NamedModels()) {
@@ -282,9 +283,7 @@ std::vector<Key> RobotKeys() {
               "robot.hold", Between(0, kMaxStates), Size::kStates,
               "The states that become zero while the robot stands and holds its position. `[]`, for one that cannot "
               "stand: it keeps its state. Planner and simulated robot require this, or task.rest with a model as text.",
-              [](const Document& file, const std::string& key, TaskDraft& draft) {
-                draft.config.robot.hold = file.Names(key);
-              }),
+              [](const Field& at, TaskDraft& draft) { draft.config.robot.hold = at.Names(); }),
           "those of task.rest with a model as text" + StandingOfNamedModels()),
       Optional(
           Map("robot.emergency_stop",
@@ -306,11 +305,10 @@ std::vector<Key> RobotKeys() {
   };
 }
 
-void CheckLogger(const Document& file, const std::string&, TaskDraft& draft) {
+void CheckLogger(const Field& at, TaskDraft& draft) {
   const LoggerOptions& logger = draft.config.logger;
   if (logger.quota_mb && *logger.quota_mb < logger.rotate_mb)
-    file.Fail("logger.quota_mb",
-              ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
+    at.Fail("quota_mb", ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
 }
 
 std::vector<Key> LoggerKeys() {

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <span>
 
+#include <fmt/format.h>
+
 #include "forereach/certify/limits.h"
 #include "forereach/certify/safety.h"
 #include "forereach/numerics/directed.h"
@@ -12,6 +14,9 @@
 #include "forereach/numerics/size.h"
 #include "forereach/safety/clearance.h"
 #include "task/key_rows.h"
+#include "task/option_rows.h"
+#include "task/row_readers.h"
+#include "task/schema_parts.h"
 
 namespace forereach::key_rows {
 namespace {
@@ -20,44 +25,36 @@ using Size = Key::Size;
 
 constexpr Range kWithinDecades = Between(-1e9, 1e9);  // in microseconds within the bounds of a schedule
 
-int IndexOf(const std::vector<std::string>& names, const std::string& name) {
-  return static_cast<int>(std::ranges::find(names, name) - names.begin());
-}
-
-Box ReadBox(const Document& file, const std::string& key) {
-  const std::string lower_key = key + ".lower", upper_key = key + ".upper";
-  const Eigen::VectorXd lower = file.Vector(lower_key), upper = file.Vector(upper_key);
-  for (Eigen::Index k = 0; k < lower.size(); ++k)
-    RequireOrdered(file, lower[k], upper[k], Entry(lower_key, k), Entry(upper_key, k));
-  return Box(lower, upper);
+Box ReadBox(const Field& at) {
+  const Field lower = at["lower"], upper = at["upper"];
+  for (int k = 0; k < lower.Count(); ++k) RequireOrdered(lower[k], upper[k]);
+  return Box(lower.Vector(), upper.Vector());
 }
 
 // A matrix given by rows, all of one size.
-Eigen::MatrixXd ReadMatrix(const Document& file, const std::string& key) {
-  const std::vector<Eigen::VectorXd> rows = file.Vectors(key);
+Eigen::MatrixXd ReadMatrix(const Field& at) {
+  const std::vector<Eigen::VectorXd> rows = at.Vectors();
   Eigen::MatrixXd matrix(std::ssize(rows), rows.front().size());
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) matrix.row(i) = rows[ToSize(i)].transpose();
   return matrix;
 }
 
-void ReadBall(const Document& file, const std::string& key, TaskDraft& draft) {
-  Domain::Ball ball{{}, file.Vector(key + ".center"), file.Number(key + ".radius")};
+void ReadBall(const Field& at, TaskDraft& draft) {
+  Domain::Ball ball{{}, at["center"].Vector(), at["radius"].Number()};
   const std::vector<std::string> variables = draft.scope.variables;
-  for (const std::string& name : file.Names(key + ".coordinates")) ball.coordinates.push_back(IndexOf(variables, name));
+  for (const std::string& name : at["coordinates"].Names()) ball.coordinates.push_back(IndexOf(variables, name));
   const auto size = std::ssize(ball.coordinates);
   if (ball.center.size() != size)
-    file.Fail(key + ".center", "has " + std::to_string(ball.center.size()) + " entries, has to have " +
-                                   std::to_string(size) + ", as many as coordinates");
+    at.Fail("center", fmt::format("has {} entries, has to have {}, as many as coordinates", ball.center.size(), size));
   draft.problem.domain.balls.push_back(std::move(ball));
 }
 
-void ReadInequality(const Document& file, const std::string& key, TaskDraft& draft) {
-  const std::string sum = key + ".coefficients";
+void ReadInequality(const Field& at, TaskDraft& draft) {
   const std::vector<std::string> variables = draft.scope.variables;
-  Domain::Inequality inequality{Eigen::VectorXd::Zero(std::ssize(variables)), file.Number(key + ".bound")};
-  for (const std::string& name : file.KeysOf(sum))
-    inequality.coefficients[IndexOf(variables, name)] = file.Number(sum + "." + name);
-  if (inequality.coefficients.isZero(0)) file.Fail(sum, "are all zero, which bounds nothing");
+  Domain::Inequality inequality{Eigen::VectorXd::Zero(std::ssize(variables)), at["bound"].Number()};
+  for (const Field& coefficient : at.Entries("coefficients"))
+    inequality.coefficients[IndexOf(variables, coefficient.name())] = coefficient.Number();
+  if (inequality.coefficients.isZero(0)) at.Fail("coefficients", "are all zero, which bounds nothing");
   draft.problem.domain.inequalities.push_back(std::move(inequality));
 }
 
@@ -66,16 +63,12 @@ std::vector<Key> DomainKeys() {
       Required(
           Map("domain", "Z_cert, where declaration and model hold. A plan whose tube leaves it is not certified.")),
       Required(Map("domain.state", "The box of states.",
-                   [](const Document& file, const std::string& key, TaskDraft& draft) {
-                     draft.problem.domain.state = ReadBox(file, key);
-                   })),
+                   [](const Field& at, TaskDraft& draft) { draft.problem.domain.state = ReadBox(at); })),
       Required(Vector("domain.state.lower", "of the state", kReal, Size::kStates, "Least value of each state.")),
       Required(
           Vector("domain.state.upper", "of the state", kReal, Size::kStates, "Largest value, at least the least.")),
       Required(Map("domain.input", "The box of inputs.",
-                   [](const Document& file, const std::string& key, TaskDraft& draft) {
-                     draft.problem.domain.input = ReadBox(file, key);
-                   })),
+                   [](const Field& at, TaskDraft& draft) { draft.problem.domain.input = ReadBox(at); })),
       Required(Vector("domain.input.lower", "of the input", kReal, Size::kInputs, "Least value of each input.")),
       Required(
           Vector("domain.input.upper", "of the input", kReal, Size::kInputs, "Largest value, at least the least.")),
@@ -95,22 +88,20 @@ std::vector<Key> DomainKeys() {
   };
 }
 
-void ReadLipschitzByNames(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadLipschitzByNames(const Field& at, TaskDraft& draft) {
   const NominalModel& model = *draft.problem.model;
   const std::vector<std::string> variables = draft.scope.variables;
   Eigen::MatrixXd& lipschitz = draft.problem.declaration.lipschitz;
   lipschitz.setZero(model.num_states(), model.num_variables());
-  for (const std::string& row : file.KeysOf(key))
-    for (const std::string& column : file.KeysOf(key + "." + row))
-      lipschitz(IndexOf(variables, row), IndexOf(variables, column)) = file.Number(key + "." + row + "." + column);
+  for (const Field& row : at.Entries())
+    for (const Field& slope : row.Entries())
+      lipschitz(IndexOf(variables, row.name()), IndexOf(variables, slope.name())) = slope.Number();
 }
 
-void ReadLipschitzMatrix(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadLipschitzMatrix(const Field& at, TaskDraft& draft) {
   const int states = draft.problem.model->num_states();
-  if (file.Count(key) != states)
-    file.Fail(key, "has " + std::to_string(file.Count(key)) + " rows, has to have " + std::to_string(states) +
-                       ", one a state");
-  draft.problem.declaration.lipschitz = ReadMatrix(file, key);
+  if (at.Count() != states) at.Fail(fmt::format("has {} rows, has to have {}, one a state", at.Count(), states));
+  draft.problem.declaration.lipschitz = ReadMatrix(at);
 }
 
 std::vector<Key> DeclarationKeys() {
@@ -127,48 +118,41 @@ std::vector<Key> DeclarationKeys() {
                        ReadLipschitzMatrix)),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
                       "sigma: the largest error of a recorded successor, beside its last bit.",
-                      [](const Document& file, const std::string& key, TaskDraft& draft) {
-                        draft.problem.declaration.noise_bound = file.Vector(key);
-                      })),
+                      [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),
       Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
                       "w: in each step the true successor differs from f0 + r by at most this. The difference may be "
                       "another in each step. Errors of measurement belong to noise_bound.",
-                      [](const Document& file, const std::string& key, TaskDraft& draft) {
-                        draft.problem.declaration.disturbance = file.Vector(key);
-                      }),
+                      [](const Field& at, TaskDraft& draft) { draft.problem.declaration.disturbance = at.Vector(); }),
                "zeros"),
       Required(Text("transitions",
                     "CSV of observed steps, relative to this file: a column for each state, each input and each "
                     "`<state>_next`, all inside the domain, at least one row.",
-                    [](const Document& file, const std::string& key, TaskDraft& draft) {
-                      draft.transitions = RelativeTo(file.path(), file.Text(key));
-                    })),
+                    [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
   };
 }
 
-void ReadInitialSet(const Document& file, const std::string& key, TaskDraft& draft) {
-  const std::string center = key + ".center", half_width = key + ".half_width";
-  draft.config.initial_set = Box::FromCenter(file.Vector(center), file.Vector(half_width));
-  file.Read(center, draft.config.robot.start);
-  file.Read(half_width, draft.config.planner.initial_half_width);
+void ReadInitialSet(const Field& at, TaskDraft& draft) {
+  const Field center = at["center"], half_width = at["half_width"];
+  draft.config.initial_set = Box::FromCenter(center.Vector(), half_width.Vector());
+  center.Read(draft.config.robot.start);
+  half_width.Read(draft.config.planner.initial_half_width);
 }
 
-void ReadRest(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadRest(const Field& at, TaskDraft& draft) {
   std::vector<RestBound>& rest = draft.problem.rest;
-  for (const std::string& name : file.KeysOf(key))
-    rest.push_back({IndexOf(draft.scope.states, name), file.Number(key + "." + name)});
-  if (rest.empty()) file.Fail(key, "names no state, so everything would be standing");
+  for (const Field& bound : at.Entries()) rest.push_back({IndexOf(draft.scope.states, bound.name()), bound.Number()});
+  if (rest.empty()) at.Fail("names no state, so everything would be standing");
   std::ranges::sort(rest, {}, &RestBound::coordinate);
   draft.rest = rest;
 }
 
-void SetProjection(const Document& file, const std::string& key, Eigen::MatrixXd projection, TaskDraft& draft) {
+void SetProjection(const Field& at, Eigen::MatrixXd projection, TaskDraft& draft) {
   for (Eigen::Index i = 0; i < projection.rows(); ++i)
-    if (projection.row(i).isZero(0)) file.Fail(Entry(key, i), "is zero, which sees no state");
+    if (projection.row(i).isZero(0)) at[i].Fail("is zero, which sees no state");
   for (const int angle : draft.problem.model->angles())
     if (!projection.col(angle).isZero(0))
-      file.Fail(key, "depends on " + draft.scope.states[ToSize(angle)] +
-                         ", which is one of model.angles: how often an angle has turned is not known");
+      at.Fail("depends on " + draft.scope.states[ToSize(angle)] +
+              ", which is one of model.angles: how often an angle has turned is not known");
   draft.scope.safety_dim = static_cast<int>(projection.rows());
   draft.problem.projection = std::move(projection);
 }
@@ -179,103 +163,91 @@ Eigen::MatrixXd ProjectionTo(std::span<const std::string> names, const std::vect
   return projection;
 }
 
-void ReadProjectionByNames(const Document& file, const std::string& key, TaskDraft& draft) {
-  SetProjection(file, key, ProjectionTo(file.Names(key), draft.scope.states), draft);
+void ReadProjectionByNames(const Field& at, TaskDraft& draft) {
+  SetProjection(at, ProjectionTo(at.Names(), draft.scope.states), draft);
 }
 
-void ReadProjectionMatrix(const Document& file, const std::string& key, TaskDraft& draft) {
-  SetProjection(file, key, ReadMatrix(file, key), draft);
-}
+void ReadProjectionMatrix(const Field& at, TaskDraft& draft) { SetProjection(at, ReadMatrix(at), draft); }
 
 // @throws ConfigError unless `of` is the size of a part's point.
-void RequirePointSize(const Document& file, const std::string& key, Eigen::Index size, Eigen::Index of) {
+void RequirePointSize(const Field& at, Eigen::Index size, Eigen::Index of) {
   if (size != of)
-    file.Fail(key, "has " + std::to_string(size) + " entries, has to have " + std::to_string(of) +
-                       ", as many as the first point of the body");
+    at.Fail(fmt::format("has {} entries, has to have {}, as many as the first point of the body", size, of));
 }
 
 // The expressions of one point.
-std::vector<ExpressionText> ReadPlace(const Document& file, const std::string& key) {
+std::vector<ExpressionText> ReadPlace(const Field& at) {
   std::vector<ExpressionText> place;
-  for (int k = 0; k < file.Count(key); ++k) place.push_back(file.Expression(Entry(key, k)));
+  for (const Field& coordinate : at.Entries()) place.push_back(coordinate.Expression());
   return place;
 }
 
 // `size` is that of the body's points, 0 before the first.
-BodyPart ReadPart(const Document& file, const std::string& key, Eigen::Index& size) {
-  if (const std::size_t kinds = file.KeysOf(key).size(); kinds != 1)
-    file.Fail(key, "has " + std::to_string(kinds) + " keys, has to have one of disc, hull");
-  const bool is_disc = Has(file, key, "disc");
-  const std::string shape = key + (is_disc ? ".disc" : ".hull"), at = shape + (is_disc ? ".at" : ".points"),
-                    places = shape + (is_disc ? ".place" : ".places");
-  const bool has_points = Has(file, shape, is_disc ? "at" : "points");
-  if (has_points == Has(file, shape, is_disc ? "place" : "places"))
-    file.Fail(shape, has_points ? "has points in the robot's frame and at expressions; delete one of them"
-                                : std::string("missing: ") + (is_disc ? "at or place" : "points or places"));
-  BodyPart part{{}, Has(file, shape, "radius") ? file.Number(shape + ".radius") : 0, {}};
-  const auto add = [&](Eigen::Index entries, const std::string& which) {
+BodyPart ReadPart(const Field& at, Eigen::Index& size) {
+  if (at.Count() != 1) at.Fail(fmt::format("has {} keys, has to have one of disc, hull", at.Count()));
+  const bool is_disc = at.Has("disc");
+  const Field shape = at[is_disc ? "disc" : "hull"];
+  const std::string in_frame = is_disc ? "at" : "points", at_expressions = is_disc ? "place" : "places";
+  const bool has_points = shape.Has(in_frame);
+  if (has_points == shape.Has(at_expressions))
+    shape.Fail(has_points ? "has points in the robot's frame and at expressions; delete one of them"
+                          : "missing: " + in_frame + " or " + at_expressions);
+  BodyPart part{{}, shape.Has("radius") ? shape["radius"].Number() : 0, {}};
+  const Field points = shape[has_points ? in_frame : at_expressions];
+  for (const Field& which : is_disc ? std::vector{points} : points.Entries()) {
+    const Eigen::Index entries = which.Count();
     if (size == 0) size = entries;
-    RequirePointSize(file, which, entries, size);
-  };
-  if (!has_points) {
-    for (int i = 0; i < (is_disc ? 1 : file.Count(places)); ++i) {
-      const std::string which = is_disc ? places : Entry(places, i);
-      part.places.push_back(ReadPlace(file, which));
-      add(std::ssize(part.places.back()), which);
-    }
-    return part;
-  }
-  const std::vector<Eigen::VectorXd> points = is_disc ? std::vector{file.Vector(at)} : file.Vectors(at);
-  for (const Eigen::VectorXd& point : points) {
-    add(point.size(), is_disc ? at : Entry(at, std::ssize(part.points)));
-    part.points.emplace_back(Eigen::Vector3d::Zero()).head(size) = point;
+    RequirePointSize(which, entries, size);
+    if (has_points)
+      part.points.emplace_back(Eigen::Vector3d::Zero()).head(size) = which.Vector();
+    else
+      part.places.push_back(ReadPlace(which));
   }
   return part;
 }
 
 // A body without a point in the robot's frame needs no frame.
-void ReadPose(const Document& file, const std::string& key, Eigen::Index size, Body& body, TaskDraft& draft) {
+void ReadPose(const Field& at, Eigen::Index size, Body& body, TaskDraft& draft) {
   const auto& states = draft.scope.states;
-  if (!Has(file, "task.body", "pose")) {
-    if (HasFrame(body)) file.Fail(key, "missing: the states that are the position of the robot's frame");
+  if (!at.Has("pose")) {
+    if (HasFrame(body)) at.Fail("pose", "missing: the states that are the position of the robot's frame");
     draft.scope.safety_dim = static_cast<int>(size);
     draft.problem.projection = Eigen::MatrixXd::Zero(size, std::ssize(states));
     return;
   }
-  const std::vector<std::string> pose = file.Names(key);
+  const std::vector<std::string> pose = at["pose"].Names();
   if (const Eigen::Index names = std::ssize(pose); names == size + 1)
     body.heading = IndexOf(states, pose.back());
   else if (names != size)
-    file.Fail(key, "has " + std::to_string(names) + " entries, has to have " + std::to_string(size) +
-                       ", as many as the points of the body, or one more, the heading");
-  SetProjection(file, key, ProjectionTo(std::span(pose).first(ToSize(size)), states), draft);
+    at.Fail("pose",
+            fmt::format("has {} entries, has to have {}, as many as the points of the body, or one more, the heading",
+                        names, size));
+  SetProjection(at["pose"], ProjectionTo(std::span(pose).first(ToSize(size)), states), draft);
 }
 
-void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
-  if (draft.scope.safety_dim != 0) file.Fail(key, "the task has task.projection too; delete one of them");
+void ReadBody(const Field& at, TaskDraft& draft) {
+  if (draft.scope.safety_dim != 0) at.Fail("the task has task.projection too; delete one of them");
   Body body{.heading = -1, .parts = {}};
   Eigen::Index size = 0;
   int points = 0;
-  for (int i = 0; i < file.Count(key + ".parts"); ++i)
-    points += body.parts.emplace_back(ReadPart(file, Entry(key + ".parts", i), size)).num_points();
+  for (const Field& part : at.Entries("parts")) points += body.parts.emplace_back(ReadPart(part, size)).num_points();
   if (points > kMaxBodyPoints)
-    file.Fail(key + ".parts",
-              "have " + std::to_string(points) + " points, which is outside " + Between(1, kMaxBodyPoints).text());
-  ReadPose(file, key + ".pose", size, body, draft);
+    at.Fail("parts", fmt::format("have {} points, which is outside {}", points, Between(1, kMaxBodyPoints).text()));
+  ReadPose(at, size, body, draft);
   draft.problem.body = std::move(body);
 }
 
-void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadBetween(const Field& at, TaskDraft& draft) {
   // Load lengthens the period by what the gate's options, which are not read yet, allow a step.
-  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = draft.config.period};
+  forereach::Between between{.acceleration = at["acceleration"].Vector(), .period = draft.config.period};
   const bool turns = draft.problem.body.heading >= 0;
   for (const auto& [name, member] :
-       {std::pair{".turn_rate", &forereach::Between::turn_rate}, {".turn_acceleration", &Between::turn_acceleration}}) {
-    const bool is_given = Has(file, key, name + 1);
+       {std::pair{"turn_rate", &forereach::Between::turn_rate}, {"turn_acceleration", &Between::turn_acceleration}}) {
+    const bool is_given = at.Has(name);
     if (turns != is_given)
-      file.Fail(key + name, turns ? "missing: task.body has a heading, so the bound is needed"
-                                  : "is for a body with a heading, the last name of task.body.pose");
-    if (is_given) between.*member = file.Number(key + name);
+      at.Fail(name, turns ? "missing: task.body has a heading, so the bound is needed"
+                          : "is for a body with a heading, the last name of task.body.pose");
+    if (is_given) between.*member = at[name].Number();
   }
   draft.problem.between = std::move(between);
   draft.config.says_between = true;
@@ -285,81 +257,69 @@ void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft)
 template <class Make>
 Key ObstacleKind(const char* name, const char* meaning, Make make) {
   return Map(std::string("task.obstacles[].") + name, meaning,
-             [make](const Document& file, const std::string& key, TaskDraft& draft) {
-               draft.config.obstacles.push_back(make(file, key));
-             });
+             [make](const Field& at, TaskDraft& draft) { draft.config.obstacles.push_back(make(at)); });
 }
 
-Obstacle ReadCircle(const Document& file, const std::string& key) {
-  return Obstacle::Circle(file.Vector(key + ".center"), file.Number(key + ".radius"));
-}
+Obstacle ReadCircle(const Field& at) { return Obstacle::Circle(at["center"].Vector(), at["radius"].Number()); }
 
-Obstacle ReadAxisBox(const Document& file, const std::string& key) {
-  const Box box = ReadBox(file, key);
+Obstacle ReadAxisBox(const Field& at) {
+  const Box box = ReadBox(at);
   return Obstacle::AxisBox(box.lower(), box.upper());
 }
 
-Obstacle ReadPolygon(const Document& file, const std::string& key) {
-  return Obstacle::Polygon(file.Vectors(key + ".vertices"));
-}
+Obstacle ReadPolygon(const Field& at) { return Obstacle::Polygon(at["vertices"].Vectors()); }
 
-Obstacle ReadHalfPlane(const Document& file, const std::string& key) {
-  return Obstacle::HalfSpace(file.Vector(key + ".normal"), file.Number(key + ".offset"));
-}
+Obstacle ReadHalfPlane(const Field& at) { return Obstacle::HalfSpace(at["normal"].Vector(), at["offset"].Number()); }
 
 // Microseconds of a time in seconds; nothing is lost of a window between these two.
 std::int64_t MicrosecondsDown(double seconds) { return static_cast<std::int64_t>(std::floor(MulDown(seconds, 1e6))); }
 std::int64_t MicrosecondsUp(double seconds) { return static_cast<std::int64_t>(std::ceil(MulUp(seconds, 1e6))); }
 
 // The obstacle was read before.
-void ReadMotion(const Document& file, const std::string& key, TaskDraft& draft) {
+void ReadMotion(const Field& at, TaskDraft& draft) {
   ObstacleMotion motion;
-  motion.velocity.head(draft.scope.safety_dim) = file.Vector(key + ".velocity");
-  for (const auto& [name, member] : {std::pair{".uncertainty", &ObstacleMotion::uncertainty},
-                                     {".growth", &ObstacleMotion::growth},
-                                     {".growth_rate", &ObstacleMotion::growth_rate}})
-    if (Has(file, key, name + 1)) motion.*member = file.Number(key + name);
-  const std::string from = key + ".from", until = key + ".until";
-  if (Has(file, key, "from")) motion.from_us = MicrosecondsDown(file.Number(from));
-  if (Has(file, key, "until")) motion.until_us = MicrosecondsUp(file.Number(until));
-  if (Has(file, key, "from") && Has(file, key, "until"))
-    RequireOrdered(file, file.Number(from), file.Number(until), from, until);
+  motion.velocity.head(draft.scope.safety_dim) = at["velocity"].Vector();
+  for (const auto& [name, member] : {std::pair{"uncertainty", &ObstacleMotion::uncertainty},
+                                     {"growth", &ObstacleMotion::growth},
+                                     {"growth_rate", &ObstacleMotion::growth_rate}})
+    if (at.Has(name)) motion.*member = at[name].Number();
+  if (at.Has("from")) motion.from_us = MicrosecondsDown(at["from"].Number());
+  if (at.Has("until")) motion.until_us = MicrosecondsUp(at["until"].Number());
+  if (at.Has("from") && at.Has("until")) RequireOrdered(at["from"], at["until"]);
   Obstacle& obstacle = draft.config.obstacles.back();
   obstacle = obstacle.Moving(motion);
 }
 
-void ReadObstacle(const Document& file, const std::string& key, TaskDraft& draft) {
-  const bool moves = Has(file, key, "motion");
-  if (const std::size_t kinds = file.KeysOf(key).size() - (moves ? 1 : 0); kinds != 1)
-    file.Fail(key,
-              "has " + std::to_string(kinds) + " keys of a shape, has to have one of circle, box, polygon, half_plane");
-  if (moves) ReadMotion(file, key + ".motion", draft);
+void ReadObstacle(const Field& at, TaskDraft& draft) {
+  const bool moves = at.Has("motion");
+  if (const std::size_t kinds = at.Keys().size() - (moves ? 1 : 0); kinds != 1)
+    at.Fail(fmt::format("has {} keys of a shape, has to have one of circle, box, polygon, half_plane", kinds));
+  if (moves) ReadMotion(at["motion"], draft);
 }
 
-// At least one of both bounds.
-void ReadLimit(const Document& file, const std::string& key, TaskDraft& draft) {
-  const std::string least = key + ".at_least", most = key + ".at_most";
-  const bool has_least = Has(file, key, "at_least"), has_most = Has(file, key, "at_most");
-  Limit limit{.name = file.Text(key + ".name"), .that = file.Expression(key + ".that")};
-  if (has_least) limit.at_least = file.Number(least);
-  if (has_most) limit.at_most = file.Number(most);
-  if (!has_least && !has_most) file.Fail(key, "bounds nothing, has to have at_most, at_least or both");
-  if (has_least && has_most) RequireOrdered(file, limit.at_least, limit.at_most, least, most);
+// A limit has at least one of both bounds.
+void ReadLimit(const Field& at, TaskDraft& draft) {
+  const bool has_least = at.Has("at_least"), has_most = at.Has("at_most");
+  Limit limit{.name = at["name"].Text(), .that = at["that"].Expression()};
+  if (has_least) limit.at_least = at["at_least"].Number();
+  if (has_most) limit.at_most = at["at_most"].Number();
+  if (!has_least && !has_most) at.Fail("bounds nothing, has to have at_most, at_least or both");
+  if (has_least && has_most) RequireOrdered(at["at_least"], at["at_most"]);
   std::vector<Limit>& limits = draft.problem.limits;
   if (const auto other = std::ranges::find(limits, limit.name, &Limit::name); other != limits.end())
-    file.Fail(key + ".name", limit.name + " is the name of " + Entry("task.limits", other - limits.begin()) + ", too");
+    at.Fail("name", fmt::format("{} is the name of task.limits[{}], too", limit.name, other - limits.begin()));
   limits.push_back(std::move(limit));
 }
 
-void CheckTask(const Document& file, const std::string& key, TaskDraft& draft) {
+void CheckTask(const Field& at, TaskDraft& draft) {
   const Problem& problem = draft.problem;
-  if (draft.scope.safety_dim == 0) file.Fail(key + ".projection", "missing: the task needs this key, or task.body");
+  if (draft.scope.safety_dim == 0) at.Fail("projection", "missing: the task needs this key, or task.body");
   // Numbers that are each in their range may still be too large together. @throws std::invalid_argument.
   try {
     static_cast<void>(PlacementOf(problem));
     static_cast<void>(LimitTest(problem));
   } catch (const ExpressionError& error) {
-    FailAt(file.path(), error);
+    FailAt(at.file(), error);
   }
 }
 
@@ -380,16 +340,20 @@ std::vector<Key> TaskKeys() {
             ReadProjectionByNames),
       Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
               "P as a matrix: one row a safety coordinate.", ReadProjectionMatrix),
+  };
+}
+
+std::vector<Key> BodyKeys() {
+  return {
       Map("task.body", "The union of its parts. Obstacles are in its position's coordinates.", ReadBody),
       Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
             "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point has entries; "
             "one name more is the heading, in radians, by which the frame turns in the first two coordinates. Required "
             "if a part is in the frame. If none is: the states in which planner.goal is given."),
-      Required(
-          List("task.body.parts", Between(1, kMaxBodyParts),
-               "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +
-                   " points in all. A part's points are fixed in the robot's frame, or stand where expressions say, "
-                   "as an arm's joints.")),
+      Required(List("task.body.parts", Between(1, kMaxBodyParts),
+                    fmt::format("Convex parts, with at most {} points in all. A part's points are fixed in the robot's "
+                                "frame, or stand where expressions say, as an arm's joints.",
+                                kMaxBodyPoints))),
       Map("task.body.parts[]", "One of disc and hull."),
       Map("task.body.parts[].disc", "The points within a radius of one point: a disc or a ball."),
       Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint,
@@ -407,10 +371,15 @@ std::vector<Key> TaskKeys() {
       List("task.body.parts[].hull.places[]", Between(2, kMaxSafetyDim), "One point."),
       Expression("task.body.parts[].hull.places[][]", "One coordinate."),
       Optional(Number("task.body.parts[].hull.radius", "m", kNotNegative, "The radius."), "0"),
+  };
+}
+
+std::vector<Key> BetweenKeys() {
+  return {
       Optional(Word("task.between", {"samples"},
                     "Certificates hold at the sample instants only, as in the paper. forereach-certifier and "
                     "the commands that certify require this key, in one of its forms, unless the method is `paper`.",
-                    [](const Document&, const std::string&, TaskDraft& draft) { draft.config.says_between = true; }),
+                    [](const Field&, TaskDraft& draft) { draft.config.says_between = true; }),
                "samples with `certifier.method: paper`"),
       Map("task.between",
           "Certificates hold at all times. These bound the true motion from one sample to the next, at most model.dt "
@@ -423,19 +392,29 @@ std::vector<Key> TaskKeys() {
              "The largest absolute derivative of the heading; required if there is one."),
       Number("task.between.turn_acceleration", "rad/s^2", kNotNegative,
              "Its largest absolute second derivative, likewise."),
+  };
+}
+
+std::vector<Key> LimitKeys() {
+  return {
       Optional(List("task.limits", Between(0, kMaxLimits),
                     "Bounds on functions of state and input: a lateral acceleration, a power, a region to keep in. A "
                     "plan that may exceed one gets abstention S (limit). They hold at the sample instants only."),
                "[]"),
       Map("task.limits[]", "With at_most, at_least or both.", ReadLimit),
       Required(Text("task.limits[].name",
-                    "For messages, 1 to " + std::to_string(kMaxLimitName) + " printable characters of ASCII.")),
+                    fmt::format("For messages, 1 to {} printable characters of ASCII.", kMaxLimitName))),
       Required(Expression("task.limits[].that",
                           "The function, of states, inputs, parameters and definitions of the model "
                           "([docs/expressions.md](../docs/expressions.md)). With an input it is bounded at every "
                           "sample but the last.")),
       Number("task.limits[].at_most", "of the function", kReal, "For every state of the slice."),
       Number("task.limits[].at_least", "of the function", kReal, "Likewise."),
+  };
+}
+
+std::vector<Key> ObstacleKeys() {
+  return {
       Required(List("task.obstacles", Between(0, kMaxObstacles),
                     "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
       Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves.", ReadObstacle),
@@ -470,12 +449,11 @@ std::vector<Key> TaskKeys() {
   };
 }
 
-void CheckOrder(const Document& file, const std::string&, TaskDraft& draft) {
+void CheckOrder(const Field& at, TaskDraft& draft) {
   const int order = draft.problem.zonotope_order, states = draft.problem.model->num_states(),
             largest = kMaxGenerators / states - 2;
   if (order > largest)
-    file.Fail("certifier.zonotope_order", std::to_string(order) + " is outside [1, " + std::to_string(largest) +
-                                              "] for " + std::to_string(states) + " states");
+    at.Fail("zonotope_order", fmt::format("{} is outside [1, {}] for {} states", order, largest, states));
 }
 
 std::vector<Key> CertifierKeys() {
@@ -485,11 +463,10 @@ std::vector<Key> CertifierKeys() {
       certifier.Word<Method>("method", {{"centred", Method::kCentred}, {"paper", Method::kPaper}}, &Problem::method,
                              "paper: Algorithm 1 of the paper; it will not change. centred: the same with a tighter "
                              "bound on the model's remainder."),
-      certifier.Integer(
-          "zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
-          "rho: a slice has at most rho generators for each state. (rho + 2) times the number of states may not "
-          "exceed " +
-              std::to_string(kMaxGenerators) + "."),
+      certifier.Integer("zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
+                        fmt::format("rho: a slice has at most rho generators for each state. (rho + 2) times the "
+                                    "number of states may not exceed {}.",
+                                    kMaxGenerators)),
       certifier.Integer("max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
                         "How many groups of 32 observations one search for the tightest bound may visit. Every subset "
                         "gives a sound bound; a decision that met this cap says so."),
@@ -502,7 +479,8 @@ std::vector<Key> CertifierKeys() {
 
 std::vector<Key> ProblemKeys() {
   std::vector<Key> keys;
-  for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys})
+  for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, BodyKeys, BetweenKeys, LimitKeys,
+                          ObstacleKeys, CertifierKeys})
     std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }

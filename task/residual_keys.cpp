@@ -6,7 +6,11 @@
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/text_program.h"
+#include "forereach/numerics/text.h"
+#include "task/draft.h"
 #include "task/key_rows.h"
+#include "task/row_readers.h"
+#include "task/schema_parts.h"
 
 namespace forereach::key_rows {
 namespace {
@@ -48,27 +52,24 @@ ModelText::Parameter& ParameterNamed(ResidualText& residual, std::string_view na
 }
 
 // The map `path` as a residual: of the library, or as text. Its parameters may be intervals.
-ResidualText ReadText(const Document& file, const std::string& path) {
-  const bool has_name = Has(file, path, "name");
-  if (has_name == Has(file, path, "add"))
-    file.Fail(path, has_name ? "has both name and add; delete one of them"
-                             : "has neither add, what the next states have beyond the model's, nor name");
+ResidualText ReadText(const Field& at) {
+  const bool has_name = at.Has("name");
+  if (has_name == at.Has("add"))
+    at.Fail(has_name ? "has both name and add; delete one of them"
+                     : "has neither add, what the next states have beyond the model's, nor name");
   if (!has_name) {
     ResidualText text{"the residual", {}, {}, {}};
-    for (const std::string& name : file.KeysOf(path + ".parameters"))
-      text.parameters.push_back(ReadParameter(file, path + ".parameters." + name, name));
-    for (const std::string& name : file.KeysOf(path + ".let"))
-      text.definitions.push_back({name, file.Expression(path + ".let." + name)});
-    for (const std::string& state : file.KeysOf(path + ".add"))
-      text.values.emplace(state, file.Expression(path + ".add." + state));
+    for (const Field& parameter : at.Entries("parameters")) text.parameters.push_back(ReadParameter(parameter));
+    for (const Field& let : at.Entries("let")) text.definitions.push_back({let.name(), let.Expression()});
+    for (const Field& value : at.Entries("add")) text.values.emplace(value.name(), value.Expression());
     return text;
   }
-  ResidualText text = ResidualNamed(file.Text(path + ".name"));
-  for (const std::string& key : file.KeysOf(path)) {
-    if (key == "name") continue;
-    if (key == "parameters" || key == "let")
-      file.Fail(path + "." + key, "is for a residual as text, this one has a name");
-    ParameterNamed(text, key) = ReadParameter(file, path + "." + key, key);
+  ResidualText text = ResidualNamed(at["name"].Text());
+  for (const Field& value : at.Entries()) {
+    if (value.name() == "name") continue;
+    if (value.name() == "parameters" || value.name() == "let")
+      value.Fail("is for a residual as text, this one has a name");
+    ParameterNamed(text, value.name()) = ReadParameter(value);
   }
   return text;
 }
@@ -87,21 +88,21 @@ void RequireNoJump(const NominalModel& model, const Box& states, const Parametri
 }
 
 // The residual at `path`. Its expressions are parsed here for the first time.
-ParametricResidual ReadResidual(const Document& file, const std::string& path, const Problem& problem) {
+ParametricResidual ReadResidual(const Field& at, const Problem& problem) {
   const NominalModel& model = *problem.model;
-  const bool is_named = Has(file, path, "name");
-  const ResidualText text = ReadText(file, path);
+  const bool is_named = at.Has("name");
+  const ResidualText text = ReadText(at);
   try {
     const ParametricResidual residual = ResidualOf(model, text);
     const ProgramDraft program = MakeProgram(residual.names, residual.values);
     RequireNoJump(model, problem.domain.state, residual, program.View());
     return residual;
   } catch (const ExpressionError& error) {
-    if (!is_named) FailAt(file.path(), error);
-    if (error.word().empty()) file.Fail(path + ".name", error.what());
-    file.Fail(path + ".name", text.name + " uses " + error.word() + ", which " + model.name() + " does not have");
+    if (!is_named) FailAt(at.file(), error);
+    if (error.word().empty()) at.Fail("name", error.what());
+    at.Fail("name", text.name + " uses " + error.word() + ", which " + model.name() + " does not have");
   } catch (const std::invalid_argument& error) {
-    file.Fail(is_named ? path + ".name" : path, error.what());
+    (is_named ? at["name"] : at).Fail(error.what());
   }
 }
 
@@ -153,9 +154,7 @@ std::vector<Key> ResidualKeys() {
       keys.begin(),
       Map("residual",
           "The residual's equations, as text or by name, for `forereach declare`. The certifier does not use them.",
-          [](const Document& file, const std::string& path, TaskDraft& draft) {
-            draft.config.residual = ReadResidual(file, path, draft.problem);
-          }));
+          [](const Field& at, TaskDraft& draft) { draft.config.residual = ReadResidual(at, draft.problem); }));
   return keys;
 }
 
@@ -166,9 +165,9 @@ std::vector<Key> RobotResidualKeys() {
   keys.insert(keys.begin(),
               {Optional(Word("robot.residual", {kNone}, "The robot is the nominal model."), kNone),
                Optional(Map("robot.residual", "What the real robot has beyond the nominal model, as text or by name.",
-                            [](const Document& file, const std::string& path, TaskDraft& draft) {
-                              if (Has(file, path, "name") && file.Text(path + ".name") == kNone) return;
-                              draft.config.robot_residual = ReadResidual(file, path, draft.problem);
+                            [](const Field& at, TaskDraft& draft) {
+                              if (at.Has("name") && at["name"].Text() == kNone) return;
+                              draft.config.robot_residual = ReadResidual(at, draft.problem);
                             }),
                         kNone)});
   return keys;

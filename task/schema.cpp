@@ -6,6 +6,7 @@
 #include "command_line/nearest.h"
 #include "forereach/numerics/text.h"
 #include "task/key_rows.h"
+#include "task/schema_parts.h"
 
 namespace forereach {
 namespace {

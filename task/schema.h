@@ -13,7 +13,7 @@ Documents are checked and read by these rows (document.h). config/README.md is g
 
 namespace forereach {
 
-class Document;
+class Field;
 struct TaskDraft;
 
 /** An interval of admissible numbers. */
@@ -49,9 +49,9 @@ struct Key {
   };
   /** The number of entries of a vector, or of every vector of kVectors. kPoint: 2 or 3. */
   enum class Size { kAny, kStates, kInputs, kVariables, kSafety, kPoint };
-  /** Stores the checked value at `key`, with everything in it, in the draft.
+  /** Stores the checked value, with everything in it, in the draft.
   @throws ConfigError, std::invalid_argument if it contradicts values that were read before. */
-  using Reader = std::function<void(const Document& file, const std::string& key, TaskDraft& draft)>;
+  using Reader = std::function<void(const Field& at, TaskDraft& draft)>;
 
   std::string path = "";
   Type type = Type::kMap;

@@ -1,23 +1,18 @@
 #include "task/task_template.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
-#include <cstdio>
 #include <cstdlib>
 #include <limits>
+
+#include <fmt/format.h>
 
 #include "forereach/numerics/text.h"
 
 namespace forereach {
 namespace {
 
-// To three digits.
-std::string Rounded(double x) {
-  std::array<char, 32> text{};
-  static_cast<void>(std::snprintf(text.data(), text.size(), "%.3g", x));
-  return text.data();
-}
+std::string ToThreeDigits(double x) { return fmt::format("{:.3g}", x); }
 
 std::string List(const std::vector<std::string>& entries) {
   std::string text = "[";
@@ -147,7 +142,7 @@ std::string PlaceAt(double share, const TaskTemplate& task, const std::vector<st
   std::vector<std::string> place;
   for (const std::string& name : positions) {
     const auto state = std::ranges::find(task.states, name, &TemplateVariable::name);
-    place.push_back(Rounded(state->lower + share * (state->upper - state->lower)));
+    place.push_back(ToThreeDigits(state->lower + share * (state->upper - state->lower)));
   }
   return List(place);
 }
@@ -266,7 +261,8 @@ std::string PlannerKey(const TaskTemplate& task, const std::vector<std::string>&
       goal + "\n" + task.laws->lines;
   if (task.laws->has_at_rest) return text;
   std::string at_rest;
-  for (const auto& [name, bound] : rest) at_rest += (at_rest.empty() ? "" : ", ") + name + ": " + Rounded(bound / 10);
+  for (const auto& [name, bound] : rest)
+    at_rest += (at_rest.empty() ? "" : ", ") + name + ": " + ToThreeDigits(bound / 10);
   return text +
          "  # Where a plan ends, by the model. Less than task.rest, since what is not known of the robot comes on "
          "top.\n"
@@ -308,7 +304,7 @@ TemplateVariable RangeAround(const std::string& name, double least, double large
   const double more = largest > least ? (largest - least) / 10 : 0.1;
   const auto number = [](const std::string& text) { return std::strtod(text.c_str(), nullptr); };
   // The nearest decimal, unless the data are outside it.
-  const double near_lower = number(Rounded(least - more)), near_upper = number(Rounded(largest + more));
+  const double near_lower = number(ToThreeDigits(least - more)), near_upper = number(ToThreeDigits(largest + more));
   const double lower = near_lower <= least ? near_lower : number(RoundedDown(least - more, kTemplateDigits));
   const double upper = near_upper >= largest ? near_upper : number(RoundedUp(largest + more, kTemplateDigits));
   return {name, "", std::max(lower, -kLargest), std::min(upper, kLargest), true};

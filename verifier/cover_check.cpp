@@ -11,7 +11,7 @@
 namespace forereach::verifier {
 namespace {
 
-constexpr int kCoverBits = 128;
+constexpr int kCoverBits = 128;  // the width of a box, not rounding, decides how tight its bound is
 // A leaf's bound may take finer boxes here than it took there: at most so many halvings.
 constexpr int kMostCuts = 24;
 

@@ -96,7 +96,7 @@ class TextEquations final : public Equations {
     for (const auto& [lower, upper] : parameters_) ranges.push_back(Real::FromTo(lower, upper));
     return ranges;
   }
-  // That part of dt.
+  // dt times the fraction `part`, its numerator and denominator.
   [[nodiscard]] Real Length(const std::pair<int, int>& part) const {
     const auto& [lower, upper] = parameters_[ToSize(dt_)];
     return Real::FromTo(lower, upper) * Real::Integer(part.first) / Real::Integer(part.second);

@@ -164,7 +164,7 @@ class Rules {
   [[nodiscard]] Jet Derive(const Tape::Operation& operation, Real value, const Jet& a, const Jet& b) const;
 
  private:
-  // f(a): f' a_j, and f' a_ij + f'' a_i a_j.
+  // The chain rule for f(a): f' a_j, and f' a_ij + f'' a_i a_j.
   [[nodiscard]] Jet Chain(Real value, const Real& slope, const Real& bend, const Jet& a) const {
     Jet result{std::move(value), Scaled(slope, a.first), {}};
     if (!second_) return result;

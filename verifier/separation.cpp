@@ -14,7 +14,7 @@ namespace {
 
 using RealVector = std::vector<Real>;
 
-constexpr int kMostRounds = 1000;
+constexpr int kMostRounds = 1000;  // Wolfe's algorithm ends by itself, but for rounding
 
 Real Dot(const RealVector& a, const RealVector& b) {
   Real sum;

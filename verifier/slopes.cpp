@@ -10,7 +10,7 @@
 namespace forereach::verifier {
 namespace {
 
-// The entry with a key; null: none.
+// The entry with a key, or null.
 const Real* Find(const Sparse& entries, int key) {
   const auto found = std::ranges::lower_bound(entries, key, {}, &std::pair<int, Real>::first);
   return found != entries.end() && found->first == key ? &found->second : nullptr;

@@ -10,7 +10,7 @@ namespace {
 
 using RealVector = std::vector<Real>;
 
-// Below pi.
+// Less than pi. A slice that turns by less is a bend along an arc, one that turns by more along the whole circle.
 constexpr double kHalfTurn = 3.14159;
 
 RealVector Image(const Eigen::MatrixXd& projection, const RealVector& x) {
@@ -39,7 +39,7 @@ class Places {
  public:
   Places(const Problem& problem, bool sweeps) : problem_(problem), sweeps_(sweeps) {}
 
-  // By Taylor's theorem.
+  // R(theta) q = R(c) q + R'(c) q d - d^2 / 2 R(theta') q, by Taylor's theorem; the last term is the bend.
   [[nodiscard]] Place Of(const Eigen::Vector3d& point, const Slice& slice, int sample) const {
     Place place = OfFrame(slice, sample);
     for (std::size_t k = 2; k < place.center.size(); ++k) place.center[k] += Real(point[static_cast<int>(k)]);
@@ -193,7 +193,8 @@ Bend::Bend(const Real& theta, const Real& r, const Real& qx, const Real& qy) {
   is_circle_ = !CertainlyBelow(r, kHalfTurn);
 }
 
-// Of an arc shorter than a half turn, d is met inside if the arc runs towards d at its start and away at its end.
+// The point of the bend farthest along d: an end of the arc, or where the circle meets d. In an arc shorter than a half
+// turn, d is met inside if the arc runs towards d at its start and away at its end.
 Bend::Extreme Bend::Farthest(const std::vector<Real>& d) const {
   Extreme best;
   const auto consider = [&](const Real& value, const std::array<Real, 2>& point) {

@@ -203,7 +203,7 @@ Bounds MixedProduct(const Slice& slice, const std::vector<Real>& r, int i, int l
   return {-min(product, sqr(minus) / four), min(product, sqr(plus) / four)};
 }
 
-// max over 0 <= s <= r of a s^2 / 2 + b s, b >= 0.
+// max over 0 <= s <= r of a s^2 / 2 + b s, b >= 0: docs/soundness.md, 3.4.
 Real Peak(const Real& a, const Real& b, const Real& r) {
   const Real at_end = max(Real(), (Real(0.5) * a * r + b) * r);
   const bool rises_to_the_end = CertainlyAtMost(-a * r, b);
@@ -304,7 +304,6 @@ Real Slice::HalfWidth(int k) const {
   return sum;
 }
 
-// The bounds on r_k over one Z_t from data and declaration.
 std::vector<Eigen::VectorXd> Slice::RoundedColumns() const {
   std::vector<Eigen::VectorXd> rounded;
   for (const auto& column : columns) {
@@ -314,6 +313,7 @@ std::vector<Eigen::VectorXd> Slice::RoundedColumns() const {
   return rounded;
 }
 
+// The bounds on r_k over one Z_t from data and declaration.
 struct TubeMaker::Known {
   Bounds bounds;
   bool contradiction = false;  // one that doubles show too

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/text.h"
 #include "task/step_time.h"
@@ -27,28 +29,26 @@ std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& 
   if (!options.max_clock_error_ms) return {};
   const std::int64_t longest = std::min(Microseconds(options.longest_step_ms), Schedule::kLongest);
   if (candidate.step_us < 1 || candidate.step_us > longest)
-    return "step_us is " + std::to_string(candidate.step_us) + ", must be 1 to " + std::to_string(longest);
+    return fmt::format("step_us is {}, must be 1 to {}", candidate.step_us, longest);
   if (candidate.start_utime < -Schedule::kLatest || candidate.start_utime > Schedule::kLatest)
-    return "start_utime is " + std::to_string(candidate.start_utime) + ", must be within 2^60 of the epoch";
+    return fmt::format("start_utime is {}, must be within 2^60 of the epoch", candidate.start_utime);
   return {};
 }
 
 std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between,
                           const GateOptions& options) {
   if (!between) return {};
-  const std::string step = "step_us is " + std::to_string(candidate.step_us);
+  const std::string step = fmt::format("step_us is {}", candidate.step_us);
   if (candidate.step_us < 1) return step + ", must be at least 1";
   const std::int64_t longest = Microseconds(between->period * 1e3) - MaxJitterUs(options).value_or(0);
   if (candidate.step_us <= longest) return {};
-  return step + ", longer than model.dt, " + std::to_string(longest) +
-         " us: task.between bounds the motion in this time";
+  return fmt::format("{}, longer than model.dt, {} us: task.between bounds the motion in this time", step, longest);
 }
 
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {
   const int n = candidate.num_states;
   if (!(1 <= n && n <= kMaxStates))
-    throw std::invalid_argument("candidate: " + std::to_string(n) + " states, must be 1 to " +
-                                std::to_string(kMaxStates));
+    throw std::invalid_argument(fmt::format("candidate: {} states, must be 1 to {}", n, kMaxStates));
   return Zonotope::FromBox(Eigen::Map<const Eigen::VectorXd>(candidate.initial_center, n),
                            Eigen::Map<const Eigen::VectorXd>(candidate.initial_half_width, n));
 }

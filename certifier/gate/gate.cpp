@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <exception>
 
+#include <fmt/format.h>
+
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
@@ -105,7 +107,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   if (status != DecodeStatus::kOk)
     return Rejection{
         status == DecodeStatus::kTrailingBytes ? decision_t::CAUSE_TRAILING_BYTES : decision_t::CAUSE_WRONG_LENGTH,
-        std::to_string(bytes.size()) + " bytes, must be " + std::to_string(EncodedSize<candidate_plan_t>())};
+        fmt::format("{} bytes, must be {}", bytes.size(), EncodedSize<candidate_plan_t>())};
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
@@ -122,10 +124,9 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
   if (states != model.num_states() || candidate.progress_steps < 0 || candidate.progress_steps > steps ||
       (misfit && misfit->kind == Certifier::Misfit::Kind::kSize))
     return Rejection{decision_t::CAUSE_WRONG_DIMENSION,
-                     std::to_string(states) + " states, " + std::to_string(candidate.num_inputs) + " inputs, " +
-                         std::to_string(candidate.progress_steps) + " of " + std::to_string(steps) +
-                         " steps; the task has " + std::to_string(model.num_states()) + " and " +
-                         std::to_string(model.num_inputs()) + ", at most " + std::to_string(kMaxSteps) + " steps"};
+                     fmt::format("{} states, {} inputs, {} of {} steps; the task has {} and {}, at most {} steps",
+                                 states, candidate.num_inputs, candidate.progress_steps, steps, model.num_states(),
+                                 model.num_inputs(), kMaxSteps)};
   if (misfit) return Rejection{decision_t::CAUSE_NON_FINITE, misfit->what};
   try {
     initial_set = InitialSetOf(candidate);
@@ -162,13 +163,13 @@ std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candida
   switch (sources_.Admit(candidate, now_us)) {
     case Sources::Admission::kNew: return std::nullopt;
     case Sources::Admission::kUsed:
-      return Rejection{decision_t::CAUSE_DUPLICATE, "plan_id " + std::to_string(candidate.plan_id) +
-                                                        " was used by this source, or is too far below its highest, " +
-                                                        std::to_string(sources_.HighestPlanId(candidate))};
+      return Rejection{decision_t::CAUSE_DUPLICATE,
+                       fmt::format("plan_id {} was used by this source, or is too far below its highest, {}",
+                                   candidate.plan_id, sources_.HighestPlanId(candidate))};
     case Sources::Admission::kTooManySources: break;
   }
   return Rejection{decision_t::CAUSE_TOO_MANY_SOURCES,
-                   "more than " + std::to_string(Sources::kMaxSources) + " sources send candidates"};
+                   fmt::format("more than {} sources send candidates", Sources::kMaxSources)};
 }
 
 std::int64_t Gate::EarliestStart(std::int64_t now_us) const {
@@ -290,7 +291,7 @@ std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_u
 std::string Gate::Learn(Bytes bytes) {
   if (!options_.learns) return "the task has gate.learn: none";
   const auto message = Decoded<transition_t>(bytes);
-  if (!message) return "not a transition_t of " + std::to_string(EncodedSize<transition_t>()) + " bytes";
+  if (!message) return fmt::format("not a transition_t of {} bytes", EncodedSize<transition_t>());
   const ExecutedTransition transition = FromMessage(*message, *certifier_.problem().model);
   if (!transition.refusal.empty()) return transition.refusal;
   if (const Learned learned = certifier_.Learn(transition.z, transition.next); learned != Learned::kAdded)

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "forereach/numerics/size.h"
 #include "lcmtypes/freshness.h"
 
@@ -17,14 +19,13 @@ Eigen::VectorXd Point(const obstacle_t& message, int index) {
 
 void RequirePoints(const obstacle_t& message, int count) {
   if (message.num_points != count)
-    throw std::invalid_argument(std::to_string(message.num_points) + " points, must be " + std::to_string(count));
+    throw std::invalid_argument(fmt::format("{} points, must be {}", message.num_points, count));
 }
 
 Obstacle FromMessage(const obstacle_t& message) {
   if (message.dimension < 1 || message.dimension > kMaxSafetyDim || message.num_points < 1 ||
       message.num_points > kMaxObstaclePoints)
-    throw std::invalid_argument(std::to_string(message.num_points) + " points of dimension " +
-                                std::to_string(message.dimension));
+    throw std::invalid_argument(fmt::format("{} points of dimension {}", message.num_points, message.dimension));
   switch (message.kind) {
     case obstacle_t::CIRCLE: RequirePoints(message, 1); return Obstacle::Circle(Point(message, 0), message.value);
     case obstacle_t::BOX: RequirePoints(message, 2); return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
@@ -37,11 +38,11 @@ Obstacle FromMessage(const obstacle_t& message) {
     case obstacle_t::HALF_SPACE:
       RequirePoints(message, 1);
       return Obstacle::HalfSpace(Point(message, 0), message.value);
-    default: throw std::invalid_argument("unknown kind " + std::to_string(message.kind));
+    default: throw std::invalid_argument(fmt::format("unknown kind {}", message.kind));
   }
 }
 
-std::string At(std::int64_t us) { return std::to_string(us) + " us"; }
+std::string At(std::int64_t us) { return fmt::format("{} us", us); }
 
 // The pieces of one track, in the order of their windows.
 class Track final {
@@ -74,7 +75,7 @@ class Track final {
 
  private:
   [[noreturn]] void Refuse(const std::string& why) const {
-    throw std::invalid_argument("track " + std::to_string(number_) + " " + why);
+    throw std::invalid_argument(fmt::format("track {} {}", number_, why));
   }
 
   std::int64_t number_;
@@ -117,13 +118,13 @@ Obstacle FromMessage(const obstacle_v2_t& piece, std::int64_t stamp, const std::
   return motion == standing ? shape : shape.Moving(motion);
 }
 
-// What no rule of a track can be applied to.
+// A piece without a window of time. The rules of a track compare windows, so this is checked before them.
 void RequireWindow(const obstacle_v2_t& piece) {
   if (piece.gone != 0 && piece.gone != 1)
-    throw std::invalid_argument("gone " + std::to_string(piece.gone) + ", must be 0 or 1");
+    throw std::invalid_argument(fmt::format("gone {}, must be 0 or 1", piece.gone));
   if (piece.from_utime > piece.until_utime)
-    throw std::invalid_argument("track " + std::to_string(piece.track) + ": the window from " + At(piece.from_utime) +
-                                " until " + At(piece.until_utime) + " is empty");
+    throw std::invalid_argument(fmt::format("track {}: the window from {} until {} is empty", piece.track,
+                                            At(piece.from_utime), At(piece.until_utime)));
 }
 
 // Calls of(i) for each obstacle of a message. @throws std::invalid_argument with the number that was refused.
@@ -133,20 +134,18 @@ void ForEach(const Message& message, Of of) {
     try {
       of(i);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument("obstacle " + std::to_string(i) + ": " + error.what());
+      throw std::invalid_argument(fmt::format("obstacle {}: {}", i, error.what()));
     }
   }
 }
 
 void RequireCount(int count) {
   if (count < 0 || count > kMaxObstacles)
-    throw std::invalid_argument("obstacles: " + std::to_string(count) + ", must be 0 to " +
-                                std::to_string(kMaxObstacles));
+    throw std::invalid_argument(fmt::format("obstacles: {}, must be 0 to {}", count, kMaxObstacles));
 }
 
 Obstacle OfDimension(int dim, Obstacle obstacle) {
-  if (obstacle.dim() != dim)
-    throw std::invalid_argument("dimension " + std::to_string(obstacle.dim()) + ", must be " + std::to_string(dim));
+  if (obstacle.dim() != dim) throw std::invalid_argument(fmt::format("dimension {}, must be {}", obstacle.dim(), dim));
   return obstacle;
 }
 

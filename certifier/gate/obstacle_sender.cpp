@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/limits.h"
@@ -17,16 +19,15 @@ std::int64_t ObstacleSender::PeriodUs(const GateOptions& options) {
 }
 
 ObstacleSender::ObstacleSender(std::int64_t period_us) : period_us_(period_us) {
-  if (period_us <= 0) throw std::invalid_argument("period " + std::to_string(period_us) + " us, must be positive");
+  if (period_us <= 0) throw std::invalid_argument(fmt::format("period {} us, must be positive", period_us));
 }
 
 void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks) {
   if (obstacles.size() > kMaxObstacles)
-    throw std::invalid_argument("obstacles: " + std::to_string(obstacles.size()) + ", at most " +
-                                std::to_string(kMaxObstacles) + " fit into a message");
+    throw std::invalid_argument(
+        fmt::format("obstacles: {}, at most {} fit into a message", obstacles.size(), kMaxObstacles));
   if (!tracks.empty() && tracks.size() != obstacles.size())
-    throw std::invalid_argument(std::to_string(tracks.size()) + " tracks of " + std::to_string(obstacles.size()) +
-                                " obstacles");
+    throw std::invalid_argument(fmt::format("{} tracks of {} obstacles", tracks.size(), obstacles.size()));
   const Digest digest = ObstaclesDigest(obstacles);
   if (content_ && digest == content_->digest && tracks == content_->tracks) return;
   content_ = {obstacles, tracks, digest};

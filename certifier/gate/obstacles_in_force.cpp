@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/text.h"
@@ -35,18 +37,18 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId 
   }
   if (const auto moving = Decoded<obstacles_v2_t>(bytes)) return Take(*moving, now_us);
   if (const auto standing = Decoded<obstacles_t>(bytes)) return Take(*standing, now_us);
-  return Doubt("not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) +
-               " bytes, nor an obstacles_v2_t of " + std::to_string(EncodedSize<obstacles_v2_t>()));
+  return Doubt(fmt::format("not an obstacles_t of {} bytes, nor an obstacles_v2_t of {}", EncodedSize<obstacles_t>(),
+                           EncodedSize<obstacles_v2_t>()));
 }
 
 template <class Message>
 std::string ObstaclesInForce::Take(const Message& message, std::int64_t now_us) {
   const StreamPosition position{message.sequence, message.utime};
-  if (position.sequence < 0) return Doubt("sequence " + std::to_string(position.sequence) + " is negative");
+  if (position.sequence < 0) return Doubt(fmt::format("sequence {} is negative", position.sequence));
   const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(options_.max_ahead_ms));
   if (!IsNews(state_.order.Compare(position, horizon)))
-    return "sequence " + std::to_string(position.sequence) + " does not exceed the last, " +
-           std::to_string(state_.order.newest()->sequence) + ", nor does its stamp the last one's";
+    return fmt::format("sequence {} does not exceed the last, {}, nor does its stamp the last one's", position.sequence,
+                       state_.order.newest()->sequence);
   NoteOrder(position.sequence, now_us);
   if (const std::string fault = CheckStamp(position.utime, now_us, options_).fault; !fault.empty()) return Doubt(fault);
   try {
@@ -68,8 +70,8 @@ void ObstaclesInForce::RequireClock(const std::vector<Obstacle>& obstacles) cons
   if (options_.max_clock_error_ms) return;
   const auto moving = std::ranges::find_if(obstacles, [](const Obstacle& each) { return each.motion().has_value(); });
   if (moving != obstacles.end())
-    throw std::invalid_argument("obstacle " + std::to_string(moving - obstacles.begin()) +
-                                " moves, and the task has no gate.max_clock_error_ms");
+    throw std::invalid_argument(
+        fmt::format("obstacle {} moves, and the task has no gate.max_clock_error_ms", moving - obstacles.begin()));
 }
 
 // Of a message that is newer than the last one taken.
@@ -101,8 +103,7 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   const auto& last = state_.order.newest();
   if (!last) return "none has been heard yet";
   if (state_.unconfirmed > 0)
-    return "sequence " + std::to_string(last->sequence) +
-           " came out of order: messages were lost, or there are two senders";
+    return fmt::format("sequence {} came out of order: messages were lost, or there are two senders", last->sequence);
   if (clocks_ && state_.arrival)
     if (const std::string why = WhyOff(*state_.arrival, *clocks_); !why.empty())
       return "their sender's clock is " + why;

@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "forereach/certify/learned.h"
 
 namespace forereach {
 
 std::string FaultOf(const robot_state_t& state, int num_states) {
-  if (state.num_states != num_states)
-    return std::to_string(state.num_states) + " states, the task has " + std::to_string(num_states);
+  if (state.num_states != num_states) return fmt::format("{} states, the task has {}", state.num_states, num_states);
   if (!std::all_of(state.state, state.state + num_states, [](double value) { return std::isfinite(value); }))
     return "NaN or infinity in it";
   if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
-    return "unknown mode " + std::to_string(state.mode);
+    return fmt::format("unknown mode {}", state.mode);
   return {};
 }
 
@@ -21,8 +22,8 @@ ExecutedTransition FromMessage(const transition_t& message, const NominalModel& 
   const int n = model.num_states(), m = model.num_inputs();
   ExecutedTransition transition;
   if (message.num_states != n || message.num_inputs != m) {
-    transition.refusal = std::to_string(message.num_states) + " states and " + std::to_string(message.num_inputs) +
-                         " inputs, the task has " + std::to_string(n) + " and " + std::to_string(m);
+    transition.refusal =
+        fmt::format("{} states and {} inputs, the task has {} and {}", message.num_states, message.num_inputs, n, m);
     return transition;
   }
   transition.z.assign(message.state, message.state + n);

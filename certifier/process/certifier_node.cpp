@@ -356,7 +356,7 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
       reporter_.Hurry();
       return;
     case command_t::RELOAD: return Reload();
-    default: return Refuse(channels_.command, "unknown kind " + std::to_string(command.kind));
+    default: return Refuse(channels_.command, fmt::format("unknown kind {}", command.kind));
   }
 }
 

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -94,8 +96,7 @@ LatchFile::Content ContentOf(const std::string& text) {
   if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);
   if (json.at("version") != kVersion)
     throw Json::other_error::create(
-        501, "its version is " + JsonText(json["version"]) + ", this certifier knows " + std::to_string(kVersion),
-        nullptr);
+        501, fmt::format("its version is {}, this certifier knows {}", JsonText(json["version"]), kVersion), nullptr);
   if (json.at("digest") != ToHex(DigestOf(JsonText(json.at("content")))))
     throw Json::other_error::create(501, "its digest is not that of its content", nullptr);
   return ContentFrom(json["content"]);
@@ -195,15 +196,13 @@ std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   if (emptied_ && its.st_size == 0) return Content();
   if (!S_ISREG(its.st_mode)) return Fail(path() + ": is no regular file" + advice), std::nullopt;
   if (its.st_uid != ::geteuid() && its.st_uid != 0)
-    return Fail(path() + ": belongs to user " + std::to_string(its.st_uid) + ", has to belong to user " +
-                std::to_string(::geteuid()) + " or 0" + advice),
+    return Fail(fmt::format("{}: belongs to user {}, has to belong to user {} or 0{}", path(), its.st_uid, ::geteuid(),
+                            advice)),
            std::nullopt;
   if ((its.st_mode & (S_IWGRP | S_IWOTH)) != 0)
     return Fail(path() + ": others than its owner may write it" + advice), std::nullopt;
   if (its.st_size != static_cast<off_t>(kBytes))
-    return Fail(path() + ": has " + std::to_string(its.st_size) + " bytes, has to have " + std::to_string(kBytes) +
-                advice),
-           std::nullopt;
+    return Fail(fmt::format("{}: has {} bytes, has to have {}{}", path(), its.st_size, kBytes, advice)), std::nullopt;
   std::string text(kBytes, '\0');
   std::size_t taken = 0;
   while (taken < text.size()) {
@@ -241,8 +240,8 @@ bool LatchFile::Put(const Content& content) {
   if (content.contradictions.size() > kMostContradictions || text.size() != kBytes) {
     // A fault that cannot be stored must not look like "no fault" at the next start.
     if (file_ >= 0 && !holds_fault_) emptied_ = ::ftruncate(file_, 0) == 0;
-    return Fail(path() + ": holds at most " + std::to_string(kMostContradictions) +
-                " contradictions; once a declaration is true, delete the file");
+    return Fail(fmt::format("{}: holds at most {} contradictions; once a declaration is true, delete the file", path(),
+                            kMostContradictions));
   }
   if (file_ < 0 ? Create(text) : WriteAt(file_, text, 0)) {
     holds_fault_ = content.fault.has_value();

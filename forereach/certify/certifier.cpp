@@ -7,56 +7,53 @@
 
 #include "forereach/dynamics/angles.h"
 #include "forereach/numerics/arithmetic.h"
+#include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach {
 namespace {
-
-void RequireThat(bool good, const std::string& what) {
-  if (!good) throw std::invalid_argument(what);
-}
 
 // The place of the robot's frame has to be that of the configuration, however often an angle has turned. PlacementOf
 // requires it of places at expressions.
 void RequireSameAfterTurns(const Problem& problem) {
   const NominalModel& model = *problem.model;
   for (const int angle : model.angles())
-    RequireThat(angle >= problem.projection.cols() || problem.projection.col(angle).isZero(0),
-                "projection: depends on " + model.state_names()[ToSize(angle)] +
-                    ", which is an angle: how often it has turned is not known");
+    Require(angle >= problem.projection.cols() || problem.projection.col(angle).isZero(0),
+            "projection: depends on " + model.state_names()[ToSize(angle)] +
+                ", which is an angle: how often it has turned is not known");
 }
 
-// What every certifier reads of a problem.
+// Checks what every certifier reads of a problem.
 const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
-  RequireExactArithmetic();
-  RequireThat(problem && problem->model, "problem: no model");
+  RequireExactArithmetic();  // what the proof assumes of the machine: docs/soundness.md, 1
+  Require(problem && problem->model, "problem: no model");
   const int n = problem->model->num_states();
   problem->domain.Validate(n, problem->model->num_inputs());
   problem->declaration.ValidateDisturbance(n);
   // A successor adds up to 2 n columns before it is reduced, a projection up to p.
   const int highest_order = (kMaxGenerators - std::max(2 * n, kMaxSafetyDim)) / n;
-  RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
-              "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
-                  std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
+  Require(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
+          "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
+              std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
   RequireSameAfterTurns(*problem);
   for (const RestBound& bound : problem->rest)
-    RequireThat(0 <= bound.coordinate && bound.coordinate < n && bound.tolerance >= 0 && bound.tolerance < kInfinity,
-                "rest: coordinate " + std::to_string(bound.coordinate) + " within " + std::to_string(bound.tolerance) +
-                    " is no state of the model, or negative or not finite");
+    Require(0 <= bound.coordinate && bound.coordinate < n && bound.tolerance >= 0 && bound.tolerance < kInfinity,
+            "rest: coordinate " + std::to_string(bound.coordinate) + " within " + std::to_string(bound.tolerance) +
+                " is no state of the model, or negative or not finite");
   return *problem;
 }
 
-// What the envelope is made of.
+// Checks declaration and transitions, of which the envelope is made.
 void ValidateObservations(const Problem& problem) {
   const int variables = problem.model->num_variables();
   problem.declaration.Validate(problem.model->num_states(), variables);
-  RequireThat(problem.transitions.z.cols() == variables || problem.transitions.size() == 0,
-              "transitions: " + std::to_string(problem.transitions.z.cols()) + " columns, must be " +
-                  std::to_string(variables));
+  Require(problem.transitions.z.cols() == variables || problem.transitions.size() == 0,
+          "transitions: " + std::to_string(problem.transitions.z.cols()) + " columns, must be " +
+              std::to_string(variables));
   for (int i = 0; i < problem.transitions.size(); ++i) {
     const Eigen::VectorXd z = problem.transitions.z.row(i);
-    RequireThat(problem.domain.Contains({z.data(), ToSize(z.size())}),
-                "transition " + std::to_string(i) + ": lies outside the certification domain");
+    Require(problem.domain.Contains({z.data(), ToSize(z.size())}),
+            "transition " + std::to_string(i) + ": lies outside the certification domain");
   }
 }
 
@@ -179,23 +176,24 @@ void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span
   if (const auto misfit = FindMisfit(plan)) throw std::invalid_argument(misfit->what);
   const bool moves =
       std::ranges::any_of(obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
-  RequireThat(!moves || plan.schedule.step_us > 0, "plan: no schedule, and an obstacle moves");
+  forereach::Require(!moves || plan.schedule.step_us > 0, "plan: no schedule, and an obstacle moves");
   Require(initial_set, obstacles);
 }
 
 void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
   const NominalModel& model = *problem_->model;
   const auto number = [](auto value) { return std::to_string(value); };
-  RequireThat(initial_set.dim() == model.num_states(), "initial set: dimension " + number(initial_set.dim()) +
-                                                           ", the model has " + number(model.num_states()) + " states");
+  forereach::Require(initial_set.dim() == model.num_states(), "initial set: dimension " + number(initial_set.dim()) +
+                                                                  ", the model has " + number(model.num_states()) +
+                                                                  " states");
   const int most = problem_->zonotope_order * model.num_states();
-  RequireThat(initial_set.num_generators() <= most, "initial set: " + number(initial_set.num_generators()) +
-                                                        " generators, must be at most " + number(most) +
-                                                        ", the zonotope order times the states");
+  forereach::Require(initial_set.num_generators() <= most, "initial set: " + number(initial_set.num_generators()) +
+                                                               " generators, must be at most " + number(most) +
+                                                               ", the zonotope order times the states");
   for (std::size_t o = 0; o < obstacles.size(); ++o)
-    RequireThat(obstacles[o].dim() == projection().dim(),
-                "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +
-                    ", the projection has " + std::to_string(projection().dim()));
+    forereach::Require(obstacles[o].dim() == projection().dim(),
+                       "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +
+                           ", the projection has " + std::to_string(projection().dim()));
 }
 
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
@@ -203,6 +201,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   tube.length_ = 0;
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
+  // A contradiction precedes every other cause: no residual is admissible, so a tube would say nothing.
   if (violation()) return Falsified(*violation());
   Decision decision = Propagate(plan, tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeBetween(tube);
@@ -228,6 +227,7 @@ Decision Certifier::JudgeSafety(const Plan& plan, std::span<const Obstacle> obst
                                 int first) const noexcept {
   const Decision limits = limits_.Judge(plan, tube, first);
   const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
+  // The earlier failure is reported; of two at one step, the limit.
   const bool is_touched_before = among_obstacles.outcome == Outcome::kSafety && among_obstacles.step < limits.step;
   return limits.outcome == Outcome::kNone || is_touched_before ? among_obstacles : limits;
 }

@@ -46,7 +46,7 @@ std::string ExplainFalsified(const Decision& decision, const NominalModel& model
          RoundedDown(decision.margin) + ", the declaration allows " + RoundedUp(decision.threshold);
 }
 
-// A sample, or the time from it to the next.
+// "at step 3"; where a problem bounds the motion between samples, "between steps 3 and 4".
 std::string TimeText(const Problem& problem, int step) {
   if (!problem.between) return "at step " + std::to_string(step);
   return "between steps " + std::to_string(step) + " and " + std::to_string(step + 1);

@@ -50,7 +50,8 @@ std::optional<TextEnclosure> FunctionsOf(const Problem& problem) {
 LimitTest::LimitTest(const Problem& problem)
     : limits_(Validated(problem.limits)), num_inputs_(problem.model->num_inputs()), functions_(FunctionsOf(problem)) {}
 
-// After the last sample no input is applied.
+// Visits the range of each limit's function at sample t, until the visitor says that it is enough. After the last
+// sample no input is applied, so functions of an input have no value there.
 template <class Visit>
 void LimitTest::ForEach(const Plan& plan, const Tube& tube, int t, Visit visit) const noexcept {
   const Zonotope& slice = tube.slice(t);

@@ -123,11 +123,12 @@ Decision Judged(Outcome outcome, const Closest& closest, std::size_t parts) {
   return decision;
 }
 
+// With one threshold the distances are compared: clearances are rounded and may tie.
 bool IsBetter(const Separation& a, const Separation& b) noexcept {
   return a.threshold == b.threshold ? a.distance > b.distance : a.clearance() > b.clearance();
 }
 
-// NaN goes on.
+// The larger number, or NaN if there is one: NaN proves nothing and may not get lost.
 double Larger(double a, double b) noexcept { return b <= a ? a : std::isnan(a) ? a : b; }
 
 Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
@@ -136,6 +137,7 @@ Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
   return spatial;
 }
 
+// The better of two bounds. One without a part is for the whole body.
 PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
   return IsBetter(by_parts.separation, other.separation) ? by_parts : other;
 }
@@ -190,7 +192,7 @@ class SafetyTest::Unit {
     return Better(ClosestPart(meeting, separate), by_hulls);
   }
 
-  // Valid until the next.
+  // How the obstacle meets the unit; the reference is valid until the next call.
   [[nodiscard]] const Encounter& MeetIn(const Obstacle& obstacle) noexcept {
     static constexpr Encounter kStands;
     return obstacle.motion() ? meeting_ = Meet(*obstacle.motion(), schedule_, first_, last_) : kStands;
@@ -337,7 +339,8 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
 }
 
 // Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
-// they leave as possibly closest, is settled by the best direction.
+// they leave as possibly closest, is settled by the best direction. Any of these bounds proves a pair apart
+// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report.
 Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
                            int first) const noexcept {
   Closest closest;

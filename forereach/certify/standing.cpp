@@ -5,7 +5,8 @@
 namespace forereach {
 namespace {
 
-// Of a plan whose first failure is this verdict.
+// How many steps of a plan whose first failure is this verdict still stand (docs/soundness.md, 3.13). A swept unit t is
+// the time after sample t, so the t steps before it stand. A failure at sample t alone takes the step that ends there.
 int StandingSteps(const Decision& verdict, int num_steps, bool is_swept) {
   if (verdict.outcome == Outcome::kCertified || verdict.cause == Cause::kNoStop) return num_steps;
   if (verdict.outcome == Outcome::kDomain) return verdict.step;

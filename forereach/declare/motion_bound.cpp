@@ -79,7 +79,7 @@ class MotionSearch {
     pieces_.push({bound, pieces_pushed_++, cut, std::move(box)});
   }
 
-  // Whether there was any.
+  // Sets each argument in which the quantity is monotone to its better end, and says whether there was one.
   static bool MoveToBetterEnds(const RangeWithSlopes& range, Arguments& box) {
     bool moved = false;
     for (std::size_t i = 0; i < box.size(); ++i) {
@@ -177,13 +177,6 @@ RangeWithSlopes Negated(RangeWithSlopes range) {
   range.value = -range.value;
   for (Interval& slope : range.gradient) slope = -slope;
   return range;
-}
-
-Arguments BoxOf(const Domain& domain) {
-  Arguments box;
-  for (const Box* part : {&domain.state, &domain.input})
-    for (int k = 0; k < part->dim(); ++k) box.emplace_back(part->lower()[k], part->upper()[k]);
-  return box;
 }
 
 [[noreturn]] void FailWithoutBound() {
@@ -356,7 +349,7 @@ MotionBound BoundMagnitude(const Flow& flow, const std::vector<Quantity>& quanti
   return all;
 }
 
-// A row of P times x''.
+// The second derivative of a safety coordinate: a row of P times x''.
 Quantity AccelerationAlong(const Eigen::VectorXd& row) {
   return [row](const Flow::Derivatives& derivatives) {
     RangeWithSlopes sum;
@@ -437,7 +430,7 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   if (motion.projection.cols() != n || motion.rest.size() != n || motion.heading >= n)
     throw std::invalid_argument("motion: projection, rest or heading are not those of " + std::to_string(n) +
                                 " states");
-  const Arguments start = BoxOf(motion.domain), reachable = Reachable(motion, start);
+  const Arguments start = motion.domain.Ranges(), reachable = Reachable(motion, start);
   std::vector<Arguments> regions;
   for (const auto& end : {std::optional(start), EndsOfLastStep(motion, reachable)}) {
     const auto box = end ? BetweenSamples(motion, start, *end, reachable) : std::nullopt;

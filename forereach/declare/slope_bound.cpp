@@ -80,7 +80,7 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
 // A residual that may be undefined has no slope.
 Interval Slope(const Jet& residual) { return residual.value.IsFinite() ? residual.slope : Interval::Entire(); }
 
-// At least 0. NaN bounds nothing.
+// The larger of a bound and 0; infinity for NaN, which bounds nothing.
 double NonNegative(double bound) { return std::isnan(bound) ? kInfinity : std::max(0.0, bound); }
 
 // Of two numbers that are not negative, for comparisons only: positive where both are, and finite.
@@ -141,7 +141,7 @@ class SlopeSearch {
   }
 
  private:
-  // A box with at most this bound needs no further look.
+  // A box with at most this bound is good enough: it is not cut any further.
   [[nodiscard]] double Enough() const { return MulDown(AddDown(1, options_.gap), result_.lower); }
 
   // How far the gap is closed, by its logarithm.

@@ -13,7 +13,7 @@ using Winding = std::optional<double>;
 
 bool IsWhole(double x) { return x == std::floor(x) && std::isfinite(x); }
 
-// Nothing where the result is not a double.
+// How often the result of an operation on two windings winds. Nothing where that is not exactly a double.
 Winding SumOfWindings(double a, double b) {
   const double sum = a + b;
   return sum - a == b && sum - b == a ? Winding(sum) : std::nullopt;

@@ -29,7 +29,7 @@ std::string DoubleText(double number) {
 
 std::string NumberText(double number) { return "T(" + DoubleText(number) + ")"; }
 
-// No word of C++, and of no other name.
+// A variable's name in C++, which is no keyword and no name of another variable.
 std::string Variable(const std::string& name, std::size_t index) {
   const bool is_reserved = name.starts_with('_') || name.find("__") != std::string::npos;
   return is_reserved ? "v" + std::to_string(index) : "v_" + name;
@@ -54,7 +54,7 @@ class Writer final {
     for (const ModelText::Parameter& parameter : text.parameters) Add(parameter.name, false);
   }
 
-  // The lines of Step.
+  // The body of the struct's function Step, line by line.
   std::string Lines() {
     std::string lines;
     std::size_t k = 0;

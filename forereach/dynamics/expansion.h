@@ -6,6 +6,7 @@ rounding.h bounds the error of each number, once for the whole domain. */
 #include <array>
 
 #include "forereach/dynamics/program.h"
+#include "forereach/sets/order_reduction.h"
 #include "forereach/sets/zonotope.h"
 
 namespace forereach {

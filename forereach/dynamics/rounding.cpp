@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kHalfUlp = kUnitRoundoff, kSubnormal = 0x1p-1070;
 
-// One rounding of a result of this size, twice over: the size is that of the exact value.
+// Twice the error of one rounding, since `size` is that of the exact value. docs/soundness.md, 3.3, derives the bounds
+// of this file.
 double Rounding(double size) { return AddUp(MulUp(size, 2 * kHalfUlp), kSubnormal); }
 
 double FiniteOrInfinity(double error) { return error < kInfinity ? error : kInfinity; }

@@ -40,7 +40,7 @@ std::vector<std::string> NamesIn(const auto& all) {
   return names;
 }
 
-// x + dt x' from x'.
+// Replaces the rates x' by the next states x + dt x'.
 void AddEulerStep(const ModelText& text, ProgramDraft& program) {
   const auto dt = std::ranges::find(text.parameters, "dt", &ModelText::Parameter::name) - text.parameters.begin();
   const Symbol step = Symbol::Parameter(program, static_cast<int>(dt));

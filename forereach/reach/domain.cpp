@@ -92,7 +92,8 @@ DomainTest::DomainTest(const Domain& domain)
   std::ranges::copy(domain.input.upper(), input_upper_.begin());
 }
 
-// As for the box: true only if all of them hold, d_z entries each.
+// Whether inequalities and balls hold by more than the rounding of plain arithmetic; false leaves it open. d_z entries
+// each. docs/soundness.md, 2 and 3.2.
 bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_width) const noexcept {
   bool inside = true;
   for (const auto& [coefficients, bound] : domain_.inequalities) {

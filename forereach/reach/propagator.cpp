@@ -9,7 +9,7 @@
 namespace forereach {
 namespace {
 
-// Above the rounding of the few dozen operations that make up a slack.
+// Above the rounding of the operations that make up a slack, those of RowSlack among them: docs/soundness.md, 2, 3.7.
 constexpr double kRelative = 0x1p-43, kSmallest = 0x1p-1050;
 
 // The plain expansion is used where its error, in the units of the state, is negligible everywhere in the domain.
@@ -35,7 +35,8 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
       instructions_(instructions) {
   std::ranges::copy(disturbance, disturbance_.begin());
   const std::vector<Interval> box = domain.Ranges();
-  // The hull of every slice that passes the domain check has at most half the domain's width.
+  // The hull of every slice that passes the domain check has at most half the domain's width, so one table of errors
+  // holds for all steps: docs/soundness.md, 3.6.
   std::vector<double> half_width(box.size(), 0.0);
   for (std::size_t l = 0; l < ToSize(domain.state.dim()); ++l) half_width[l] = box[l].HalfWidthUpper();
   error_ = BoundStepError(model.program(), model.BoundError(box), half_width);
@@ -43,6 +44,7 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
 }
 
 void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept {
+  // An even multiple of the unit roundoff: the factor is a double. docs/soundness.md, 2, counts the roundings.
   const double inflation = 1 + 2.0 * (slice.num_generators() + 4) * kUnitRoundoff;
   for (int k = 0; k < slice.dim(); ++k) {
     const std::span<const double> row = slice.padded_row(k);
@@ -104,6 +106,7 @@ struct Surroundings {
 FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, const StepRecord& record,
                            const ImageSums& sums, const double* disturbance, Zonotope& next, double* box_half_width,
                            double* next_half_width) noexcept {
+  // With room for what the reduction, which comes later, adds by its own inflation: docs/soundness.md, 2.
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
   return HoldsForFirst(
       ToSize(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
@@ -113,6 +116,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
         const Lanes half = (upper - lower) * AllLanes(0.5) + disturbed;
         const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
         const Lanes added = Abs(lower) + Abs(upper) + Abs(moved) + disturbed;
+        // docs/soundness.md, 3.7. Where nothing is added to f0(c), nothing is rounded.
         const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kSmallest);
         Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
                        (added > AllLanes(0) ? rounding : AllLanes(0))) *
@@ -153,7 +157,8 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
   ScoreColumns(next, sums.scores);
 }
 
-// Why the successor could not be joined.
+// Why the successor could not be joined. An inverted envelope is a contradiction: its ends are bounds in real
+// arithmetic.
 [[gnu::noinline]] StepResult Failed(const StepRecord& record, const Zonotope& next,
                                     const double* next_half_width) noexcept {
   using Status = StepResult::Status;
@@ -165,7 +170,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
   return {Status::kNoFiniteEnclosure, {}, 0};
 }
 
-// The remainder that is not finite.
+// A remainder that is not finite: names its first such coordinate.
 [[gnu::noinline]] StepResult Failed(const Remainder& remainder) noexcept {
   const auto* infinite = std::ranges::find_if_not(remainder.half_width, [](double x) { return std::isfinite(x); });
   return {StepResult::Status::kNoFiniteEnclosure, {}, static_cast<int>(infinite - remainder.half_width.begin())};
@@ -181,6 +186,7 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
 StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
                                   Zonotope& next, double* next_half_width) const noexcept {
   const double* half_width = record.half_width.data();
+  // The domain comes first: error_ and the bounds of the envelope hold inside it only.
   if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input);
       exit.kind != DomainExit::Kind::kNone)
     return {StepResult::Status::kDomainExit, exit, -1};

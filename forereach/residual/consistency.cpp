@@ -19,7 +19,7 @@ std::optional<Violation> TestConstant(const Declaration& declaration, const Obse
                   static_cast<int>(std::max(highest, lowest)), k);
 }
 
-// Where plain arithmetic may overflow.
+// For values so large that the plain arithmetic of PairSearch may overflow.
 std::optional<Violation> TestAllPairs(const Declaration& declaration, const Observations& o, int k) {
   for (int i = 0; i < o.size(); ++i)
     for (int j = i + 1; j < o.size(); ++j)
@@ -27,7 +27,7 @@ std::optional<Violation> TestAllPairs(const Declaration& declaration, const Obse
   return std::nullopt;
 }
 
-// The first pair, given that there is one. None of the observations before its first has any partner.
+// The first contradicting pair, given that there is one: the least first observation, and of its partners the least.
 std::optional<Violation> FirstOf(const Declaration& declaration, const Observations& o, int k, const PairSearch& search,
                                  const ObservationIndex::Entries& entries) {
   std::optional<Violation> first;
@@ -41,7 +41,8 @@ std::optional<Violation> FirstOf(const Declaration& declaration, const Observati
   return first;
 }
 
-// By an index of these entries, or one that is built for it.
+// Tests coordinate k by the envelope's index of the same entries, or by an index that is built here if there is no
+// envelope.
 std::optional<Violation> TestRow(const Declaration& declaration, const Observations& o, int k,
                                  const LipschitzEnvelope* envelope) {
   const LipschitzRow row(declaration, k);
@@ -60,6 +61,8 @@ std::optional<Violation> TestRow(const Declaration& declaration, const Observati
 }  // namespace
 
 std::optional<Violation> TestPair(const Declaration& declaration, const Observations& o, int i, int j, int k) {
+  // The difference is rounded down and its bound up, so only a contradiction in real arithmetic is one. The bound has
+  // the errors of both observations.
   const double difference = std::max(SubDown(o.lower(i, k), o.upper(j, k)), SubDown(o.lower(j, k), o.upper(i, k)));
   double bound = MulUp(2, declaration.ObservationError(k));
   for (Eigen::Index l = 0; l < o.z.cols(); ++l) {

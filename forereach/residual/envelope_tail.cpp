@@ -42,6 +42,7 @@ void EnvelopeTail::Append(std::span<const double> z, std::span<const double> low
     row.negated_ceilings[entry] =
         entry == 0 ? negated_ceiling : std::max(negated_ceiling, row.negated_ceilings[entry - 1]);
   }
+  // Readers load the size with acquire: who sees the new size sees the whole entry.
   size_.store(static_cast<int>(entry) + 1, std::memory_order_release);
 }
 

@@ -34,7 +34,8 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
   }
 }
 
-// As the header says.
+// Sets row.error, E_k of the header. It bounds the rounding of every answer before there is a query, since a query's
+// hull lies in the domain; docs/soundness.md, 3.5, counts the a + 24 roundings and the products that may underflow.
 void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries,
                                     const Observations& observations, std::span<const double> domain_lower,
                                     std::span<const double> domain_upper) const {
@@ -155,6 +156,7 @@ void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail
     Sides best{-kInfinity, -kInfinity};
     if (std::isfinite(row.error))
       best = Search{row, options_, budget, tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(set);
+    // Infinite errors leave no bound. A cap on the search leaves a sound one: any subset of the observations gives one.
     bounds.lower[i] = best.floor - row.error;
     bounds.upper[i] = -(best.negated_ceiling - row.error);
     bounds.capped |= budget.capped;

@@ -9,7 +9,7 @@ namespace forereach {
 namespace {
 
 constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
-constexpr double kNothing = -std::numeric_limits<double>::max();
+constexpr double kNothing = -std::numeric_limits<double>::max();  // what a lane without a child holds
 constexpr std::size_t kFanout = kPackSize;
 
 }  // namespace
@@ -54,7 +54,7 @@ class ObservationIndex::Builder {
     Divide(first + left, count - left, child);
   }
 
-  // By a sample, which is enough to choose by.
+  // The coordinate of largest width over a sample of the entries. Any choice gives a correct tree.
   std::size_t WidestCoordinate(std::size_t first, std::size_t count) const {
     constexpr std::size_t kSample = 64;
     const std::size_t stride = count / kSample + 1;
@@ -135,7 +135,7 @@ class ObservationIndex::Builder {
     if (value > pack.at(i % kFanout)) pack.set(i % kFanout, value);
   }
 
-  // Where a side's max v stands.
+  // The pack of a node that holds the largest floor (side 0) or negated ceiling (side 1) below it.
   std::size_t MaxOf(std::size_t side) const {
     return index_.shape_ == Shape::kBoxed ? side
                                           : side * (2 * entries_.num_coordinates + 1) + 2 * entries_.num_coordinates;

@@ -172,9 +172,11 @@ void ObservationStore::Compact() {
     old = current_;
     merged = old->tail.size();
   }
+  // Built without the lock, so that others may insert. Generations are swapped under compacting_ alone, so `old` stays
+  // the one that they append to.
   std::shared_ptr<Generation> fresh = Build(old->All(merged));
   const std::lock_guard writing(writing_);
-  // What came in meanwhile.
+  // Entries that were inserted during Build.
   const int size = old->tail.size();
   const Observations& tail = old->in_tail.observations;
   for (int i = merged; i < size; ++i) {
@@ -201,7 +203,7 @@ class ObservationStore::PartnerSearch {
   }
 
  private:
-  // Only where the extremes leave it open, by a last bit, does it take looking at all.
+  // The extremes of a constant coordinate decide, except when they are within a last bit: then each pair is tested.
   bool TestConstant(int k) {
     const Point point = PointIn(k);
     const int size = generation_.tail.size();
@@ -275,7 +277,7 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
   std::unique_lock writing(writing_);
   while (!current_->HasRoom() || !current_->tail.Covers(lower, upper)) {
     const bool full = !current_->HasRoom();
-    writing.unlock();
+    writing.unlock();  // compacting_ is taken before writing_ everywhere
     if (full) {
       Compact();
       writing.lock();

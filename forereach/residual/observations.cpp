@@ -24,7 +24,8 @@ Interval ResidualOf(double x_next, double unit, const Interval& nominal) {
   return Interval(x_next) + Interval(-unit, unit) - nominal;
 }
 
-// Whatever whole number j the division gives: if the result is within a quarter of a turn, no other j is.
+// The residual for the number of turns that brings it next to zero. The division may be rounded: if the result is
+// within a quarter of a turn, no other number of turns gives such a result (docs/soundness.md, 3.14).
 Interval ResidualOfAngle(double x_next, const Interval& nominal) {
   const double turns = std::round((nominal.Middle() - x_next) / kTurn.lower);
   return ResidualOf(x_next, std::max(UlpOf(x_next), kAngleUnit), nominal) + Interval(turns) * kTurn;

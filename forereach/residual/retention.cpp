@@ -24,7 +24,8 @@ void Take(Gains& gains, std::size_t i, double gain, std::uint32_t other) {
   if (other != kNone) gains.instead[i].push_back(other);
 }
 
-// The first that is highest gains; the second highest says by how much.
+// For a constant coordinate: the first of the highest values alone makes the bound, and gains by its distance to the
+// next.
 void TakeConstant(Gains& gains, const std::vector<double>& values, double range) {
   std::size_t best = 0, second = values.size();
   for (std::size_t i = 1; i < values.size(); ++i) {

@@ -71,7 +71,7 @@ double HullDistance(const std::vector<Vector>& core, std::span<const Vector> poi
   return simplex.count == 4 ? 0 : nearest.norm();
 }
 
-// The distance from the hull of the points to the core.
+// The distance from the hull of the points to the obstacle's core, by plain arithmetic: for planners, no proof.
 double CoreDistance(const Obstacle& obstacle, std::span<const Vector> points) {
   if (obstacle.kind() != Obstacle::Kind::kHalfSpace) return HullDistance(obstacle.hull(), points);
   double least = kInfinity;

@@ -7,7 +7,7 @@
 namespace forereach {
 namespace {
 
-// Microseconds as seconds.
+// Encloses so many microseconds in seconds. A whole number beyond 2^53 may be rounded to a double.
 Interval Seconds(std::int64_t us) noexcept {
   const auto rounded = static_cast<double>(us);
   constexpr std::int64_t kExact = std::int64_t{1} << 53;
@@ -34,6 +34,7 @@ Encounter Meet(const ObstacleMotion& motion, const Schedule& schedule, int first
   const double tau = Seconds(std::max(before, after)).upper;  // the largest |tau|: not negative
   const double grown =
       AddUp(motion.uncertainty, AddUp(MulUp(motion.growth, tau), HalfUp(MulUp(motion.growth_rate, MulUp(tau, tau)))));
+  // A clock that is off by `error` moves the obstacle by at most its speed times that: docs/soundness.md, 3.9.
   encounter.growth = AddUp(grown, MulUp(SqrtUp(speed_square.upper), Seconds(error).upper));
   return encounter;
 }

@@ -66,7 +66,8 @@ void Validate(const Between& between, int dim) {
           "between: period " + ToText(between.period) + " is not positive or not finite");
 }
 
-// bound * period^2 / 8, rounded up.
+// bound * period^2 / 8, rounded up: how far a motion with this second derivative leaves the chord between two samples
+// (docs/soundness.md, 3.9).
 double Deviation(double bound, double period) { return MulUp(MulUp(bound, MulUp(period, period)), 0.125); }
 
 double LengthUpper(double x, double y, double z = 0) {
@@ -94,7 +95,7 @@ struct Placement::Rotation {
 };
 
 // With d = theta - c:  R(theta) q = R(c) q + R'(c) q d - d^2 / 2 R(theta') q,  and in each coordinate R(theta') q lies
-// within |R'(c) q| r + |q| r^2 / 2 of R(c) q.
+// within |R'(c) q| r + |q| r^2 / 2 of R(c) q: docs/soundness.md, 3.9, "A place".
 void Placement::OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept {
   const Eigen::Vector3d& q = point.place;
   const double r = rotation.half_width, length = point.length;

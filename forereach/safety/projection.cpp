@@ -20,7 +20,7 @@ Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(sta
 }
 
 void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
-  constexpr double kMargin = 0x1p-47;  // above the rounding of both sums
+  constexpr double kMargin = 0x1p-47;  // above the rounding of both sums: docs/soundness.md, 2
   hull = {};
   std::array<double, kMaxSafetyDim> size{};
   for (const MatrixEntry& entry : entries_) {

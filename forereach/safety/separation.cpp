@@ -14,7 +14,7 @@ namespace {
 using Vector = Eigen::Vector3d;  // unused coordinates are zero
 
 // The dual bound for a piece along a direction of unit length up to rounding, in plain arithmetic less a margin above
-// its rounding.
+// its rounding: docs/soundness.md, 3.9, bound 3.
 double PlainDistanceLower(const Piece& piece, const Obstacle& obstacle, const Vector& d) noexcept {
   const Zonotope& slice = *piece.set;
   constexpr double kMargin = 0x1p-45, kTiny = 0x1p-1000;
@@ -46,7 +46,7 @@ double PlainDistanceLower(const Piece& piece, const Obstacle& obstacle, const Ve
   return gap > 0 && gap < kInfinity ? SubDown(gap * (1 - kMargin), piece.ball) : -kInfinity;
 }
 
-// The dual bound for a piece along d, rounded against us.
+// The dual bound for a piece along d, each operation rounded to the safe side: docs/soundness.md, 3.9, bound 4.
 [[gnu::noinline]] double DistanceLower(const Piece& piece, const Obstacle& obstacle, const Vector& d) noexcept {
   const Zonotope& slice = *piece.set;
   double core = kInfinity;
@@ -72,7 +72,8 @@ double PlainDistanceLower(const Piece& piece, const Obstacle& obstacle, const Ve
 // Shorter vectors have squares that underflow, and no direction that could be trusted.
 bool IsSafeLength(double length) { return length > 0x1p-400 && length < kInfinity; }
 
-// Directions are compared by plain arithmetic on unit vectors.
+// Searches for a direction with a large bound, by plain arithmetic on unit vectors. Its values prove nothing: the bound
+// along the direction that it finds is computed again, so a poor choice costs tightness only.
 class Search {
  public:
   Search(std::span<const Piece> pieces, const Obstacle& obstacle) noexcept : pieces_(pieces), hull_(obstacle.hull()) {
@@ -253,7 +254,7 @@ void DescendInPlane(Search& search, const Effort& effort) noexcept {
   }
 }
 
-// The same with triangles.
+// DescendInPlane in three dimensions: the simplices are triangles.
 void DescendInSpace(Search& search, const Effort& effort) noexcept {
   Vector nearest = search.Offset(), kept[3] = {nearest, nearest, nearest};
   for (int step = 0; step < effort.steps; ++step) {
@@ -342,6 +343,7 @@ Hull Join(const Hull& a, const Hull& b, int dim) noexcept {
   return joined;
 }
 
+// docs/soundness.md, 3.9, bound 2. Lengths whose squares may underflow or overflow prove nothing.
 double DistanceLower(const Obstacle& obstacle, const Vector& d, double support) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
   double core = kInfinity, size = std::abs(support) + 0x1p-900;
@@ -359,6 +361,7 @@ double DistanceLower(const Obstacle& obstacle, const Vector& d, double support) 
   return distance > 0x1p-400 && distance < kInfinity && square > 0x1p-801 && square < 0x1p801 ? distance : -kInfinity;
 }
 
+// docs/soundness.md, 3.9, bound 1.
 Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle, double added) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
   const int p = obstacle.dim();

@@ -33,7 +33,7 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
     copies[k] = terms[k]++ == 0 && std::abs(weight) == 1;
   }
   for (std::size_t k = 0; k < ToSize(rows); ++k) {
-    if (copies[k] || magnitude[k] == 0) continue;
+    if (copies[k] || magnitude[k] == 0) continue;  // a row that copies a coordinate is exact
     const double underflow = static_cast<double>(m) * terms[k] * std::numeric_limits<double>::denorm_min();
     error[k] = AddUp(error[k], AddUp(DotErrorUpper(magnitude[k], terms[k]), underflow));
   }

@@ -9,7 +9,7 @@
 
 #include "forereach/dynamics/expression.h"
 #include "tests/declare/families.h"
-#include "tests/oracle/any_text.h"
+#include "tests/oracle/any_expression.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "verifier/cover_check.h"

@@ -22,6 +22,7 @@
 #include "tests/oracle/motions.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/text_problems.h"
 #include "tests/verifier/record.h"
 
 namespace forereach {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "forereach/sets/order_reduction.h"
 #include "forereach/sets/zonotope.h"
 
 namespace forereach {

@@ -12,6 +12,7 @@
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/text_in_high_precision.h"
 #include "tests/text_models.h"
 
 namespace forereach {
