@@ -59,7 +59,7 @@ std::vector<int> HighestTwo(const LipschitzRow& row, const Observations& o, cons
     take([&](int i) { return entries.ceilings[ToSize(i)]; });
   });
   std::ranges::sort(highest);
-  highest.erase(std::ranges::unique(highest).begin(), highest.end());
+  highest.erase(std::unique(highest.begin(), highest.end()), highest.end());
   return highest;
 }
 
