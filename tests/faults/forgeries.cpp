@@ -1,6 +1,7 @@
 // Messages that nobody, another role, another robot or an earlier process signed.
 #include <map>
 #include <set>
+#include <utility>
 
 #include "bus/authentic.h"
 #include "forereach/advice_t.hpp"
@@ -22,7 +23,7 @@ using std::chrono::milliseconds;
 using Sent = std::vector<std::uint8_t>;
 constexpr std::int64_t kForgedSequence = std::int64_t{1} << 40;
 
-// Keeps the last message of each signed channel as it came, and counts what the robot obeys that nobody may have told
+// Keeps the last message of each signed channel as it came, and notes what the robot obeys that nobody may have told
 // it: plans from a future that nobody certifies, withdrawals with the forged number, faults and resets.
 class Ear final {
  public:
@@ -33,22 +34,23 @@ class Ear final {
     });
     rig.Hear(channels.event, [this](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);
-      obeyed_ +=
-          event &&
+      if (event &&
           (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
            (event->kind == execution_event_t::WITHDRAWN && event->value == static_cast<double>(kForgedSequence)) ||
-           (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
+           (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31))))
+        obeyed_ += " " + std::to_string(event->kind) + ": " + GetText(event->message) + ";";
     });
   }
   Ear(const Ear&) = delete;
   Ear& operator=(const Ear&) = delete;
 
   [[nodiscard]] const std::map<std::string, Sent>& heard() const { return heard_; }
-  [[nodiscard]] std::int64_t obeyed() const { return obeyed_; }
+  /** The events since the last call: kind and text. */
+  [[nodiscard]] std::string TakeObeyed() { return std::exchange(obeyed_, {}); }
 
  private:
   std::map<std::string, Sent> heard_;
-  std::int64_t obeyed_ = 0;
+  std::string obeyed_;
 };
 
 class Forged final : Kind {
@@ -65,7 +67,7 @@ class Forged final : Kind {
         options_.others);
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
-    const Ear ear(rig);
+    Ear ear(rig);
     Signer all(rig.keys(), channels.bus_name()), other_robot(TestKeys("another-robot"), channels.bus_name()),
         other_bus(rig.keys(), "another bus");
     std::int64_t sent = 0;
@@ -75,7 +77,7 @@ class Forged final : Kind {
         [&](int) {
           rig.Listen(milliseconds(700));
           const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
-          const std::int64_t obeyed_before = ear.obeyed();
+          static_cast<void>(ear.TakeObeyed());
           const auto recorded = ear.heard();
           for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
             const Role speaker = speakers.at(channel);
@@ -101,7 +103,7 @@ class Forged final : Kind {
                    now->refused_forged > before.refused_forged && now->refused_replayed > before.refused_replayed;
           };
           Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
-          DemandNothingBelieved(row, rig, before, ear.obeyed() == obeyed_before);
+          DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
           Demand(row, now && now->messages_refused == before.messages_refused,
                  "the certifier looked into a message that nobody may send");
         },
@@ -127,7 +129,7 @@ class Forged final : Kind {
         options_.others);
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
-    const Ear ear(rig);
+    Ear ear(rig);
     std::int64_t sent = 0, refused = 0;
     const std::int64_t rig_began = WallClockUs();
     Tries(
@@ -148,11 +150,13 @@ class Forged final : Kind {
           Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
           rig.Listen(kHeartbeat);
           const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
-          const std::int64_t obeyed_before = ear.obeyed(), now = WallClockUs();
+          static_cast<void>(ear.TakeObeyed());
+          const std::int64_t now = WallClockUs();
           constexpr std::int64_t kHourUs = 3'600'000'000;
           for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
           for (const auto& [channel, message] : harmful)
-            for (const std::int64_t when : {now - kHourUs, rig_began - 5'000'000, now + 61'000'000, now + kHourUs})
+            for (const std::int64_t when :
+                 {now - kHourUs, rig_began - 5'000'000, now + kStopsAheadUs + 30'000'000, now + kHourUs})
               rig.open_bus().Publish(
                   channel,
                   Bytes(Signer(rig.keys(), channels.bus_name()).Sign(speakers.at(channel), channel, message, when))),
@@ -161,7 +165,7 @@ class Forged final : Kind {
           const auto& status = rig.witness().status();
           const auto refuses = [&] { return status && status->refused_replayed > before.refused_replayed; };
           Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
-          DemandNothingBelieved(row, rig, before, ear.obeyed() == obeyed_before);
+          DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
           if (status) refused += status->refused_replayed - before.refused_replayed;
         },
         options_.others);
@@ -190,7 +194,7 @@ class Forged final : Kind {
           Demand(row, why.empty(),
                  "it does not go on with a new key of the " + std::string(RoleName(role)) + ": " + why);
           const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
-          const std::int64_t obeyed_before = ear->obeyed();
+          static_cast<void>(ear->TakeObeyed());
 
           const BusOptions& channels = rig.config().bus;
           const Speakers speakers = channels.speakers();
@@ -207,7 +211,7 @@ class Forged final : Kind {
                    (!IsHeardByCertifier(role) || now->refused_forged > before.refused_forged);
           };
           Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
-          DemandNothingBelieved(row, rig, before, ear->obeyed() == obeyed_before);
+          DemandNothingBelieved(row, rig, before, ear->TakeObeyed());
           Demand(row, now && now->messages_refused == before.messages_refused,
                  "the certifier looked into a message of the old key");
           if (now) refused += now->refused_forged - before.refused_forged;
@@ -239,10 +243,12 @@ class Forged final : Kind {
   }
 
   // Neither by the certifier nor by the robot.
-  static void DemandNothingBelieved(Row& row, Rig& rig, const certifier_status_v3_t& before, bool robot_obeyed_none) {
+  static void DemandNothingBelieved(Row& row, Rig& rig, const certifier_status_v3_t& before,
+                                    const std::string& obeyed) {
     const auto& now = rig.witness().status();
     Demand(row, !rig.witness().fault(), "a fault was believed or latched");
-    Demand(row, robot_obeyed_none, "the robot obeyed a fault, a reset, a certificate or a withdrawal that nobody made");
+    Demand(row, obeyed.empty(),
+           "the robot obeyed a fault, a reset, a certificate or a withdrawal that nobody made:" + obeyed);
     Demand(row, now && now->version == before.version && now->failed_reloads == before.failed_reloads,
            "a reload was obeyed");
     Demand(row, now && GetDigest(now->obstacles_digest) == GetDigest(before.obstacles_digest),
