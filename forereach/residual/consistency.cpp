@@ -2,13 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
+#include "forereach/numerics/size.h"
 #include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/observation_index.h"
 #include "forereach/residual/pairs.h"
+#include "forereach/residual/retention.h"
 
 namespace forereach {
 namespace {
+
+constexpr std::size_t kSuspectsPerRow = 4;  // that are tested before rows at one location are taken together
 
 // A constant coordinate: only the largest lower end against the smallest upper end can be the worst pair.
 std::optional<Violation> TestConstant(const Declaration& declaration, const Observations& o, int k) {
@@ -27,18 +33,18 @@ std::optional<Violation> TestAllPairs(const Declaration& declaration, const Obse
   return std::nullopt;
 }
 
-// The first contradicting pair, given that there is one: the least first observation, and of its partners the least.
-std::optional<Violation> FirstOf(const Declaration& declaration, const Observations& o, int k, const PairSearch& search,
-                                 const ObservationIndex::Entries& entries) {
-  std::optional<Violation> first;
-  for (int i = 0; i < o.size() && !first; ++i)
-    search.AnyPartner(PointOf(entries, i), [&](std::uint32_t id) {
-      const int j = static_cast<int>(id);
-      if (j > i && (!first || j < first->second))
-        if (const auto violation = TestPair(declaration, o, i, j, k)) first = violation;
-      return false;
-    });
-  return first;
+// The rows that decide whether there is a pair at all. Of rows at one location, TestPair has one bound for each
+// partner, and its difference grows with the lower end and falls with the upper one: the highest lower end and the
+// lowest upper one contradict whatever any of these rows contradicts.
+std::vector<int> ExtremesOf(const LipschitzRow& row, const Observations& o, int k) {
+  std::vector<int> extremes;
+  ForEachLocation(row, o, [&](std::span<int> rows) {
+    const int highest = *std::ranges::max_element(rows, {}, [&](int i) { return o.lower(i, k); });
+    const int lowest = *std::ranges::min_element(rows, {}, [&](int i) { return o.upper(i, k); });
+    extremes.push_back(highest);
+    if (lowest != highest) extremes.push_back(lowest);
+  });
+  return extremes;
 }
 
 // Tests coordinate k by the envelope's index of the same entries, or by an index that is built here if there is no
@@ -50,12 +56,28 @@ std::optional<Violation> TestRow(const Declaration& declaration, const Observati
   const ObservationIndex::Entries entries = EntriesOf(row, declaration, o, k);
   const double margin = MarginUpper(row, entries, o);
   if (!std::isfinite(margin)) return TestAllPairs(declaration, o, k);
+  const auto contradict = [&](int i, int j) { return TestPair(declaration, o, i, j, k).has_value(); };
+
   const ObservationIndex built = envelope ? ObservationIndex() : ObservationIndex(entries);
   const PairSearch search(envelope ? envelope->index(k) : built, margin);
-  const bool violated = search.AnyPair([&](std::uint32_t i, std::uint32_t j) {
-    return TestPair(declaration, o, static_cast<int>(i), static_cast<int>(j), k).has_value();
+  std::size_t left = kSuspectsPerRow * ToSize(o.size());
+  const bool is_open = search.AnyPair([&](std::uint32_t i, std::uint32_t j) {
+    return --left == 0 || contradict(static_cast<int>(i), static_cast<int>(j));
   });
-  return violated ? FirstOf(declaration, o, k, search, entries) : std::nullopt;
+  if (!is_open) return std::nullopt;
+
+  // A contradiction, or many suspects, as of a robot that stands.
+  const std::vector<int> extremes = ExtremesOf(row, o, k);
+  const ObservationIndex few(EntriesOf(row, declaration, Select(o, extremes), k));
+  const PairSearch decisive(few, margin);
+  if (left == 0 &&
+      !decisive.AnyPair([&](std::uint32_t a, std::uint32_t b) { return contradict(extremes[a], extremes[b]); }))
+    return std::nullopt;
+  for (int i = 0; i < o.size(); ++i)
+    if (decisive.AnyPartner(PointOf(entries, i), [&](std::uint32_t a) { return contradict(i, extremes[a]); }))
+      for (int j = i + 1; j < o.size(); ++j)  // no earlier one has a partner
+        if (const auto violation = TestPair(declaration, o, i, j, k)) return violation;
+  return std::nullopt;
 }
 
 }  // namespace

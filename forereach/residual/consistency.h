@@ -28,7 +28,8 @@ any: the first pair in the order i < j, or the pair of largest difference if row
 provably violates the inequality, so rounding alone never falsifies a declaration. Plain arithmetic over an
 ObservationIndex finds suspects, and TestPair decides. Cost for each row of L with nonzero columns: construction of the
 index, then about N descents of its tree; 10^6 observations take a fraction of a second. Every pair within some units in
-the last place of its bound is tested exactly, so many such pairs cost more.
+the last place of its bound is tested exactly. Rows at one location, as of a robot that stands, count as their two
+extremes there, so only many such pairs between different locations cost more.
 @param envelope of these observations under this declaration, or null. Its indexes are used, and none is built. */
 [[nodiscard]] std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations,
                                                      const LipschitzEnvelope* envelope = nullptr);

@@ -194,16 +194,18 @@ void ObservationStore::Compact() {
 class ObservationStore::PartnerSearch {
  public:
   PartnerSearch(const ObservationStore& store, const Entry& entry, int id)
-      : store_(store), generation_(*store.current_), entry_(entry), id_(id) {}
+      : store_(store), generation_(*store.current_), entry_(entry), id_(id), is_consistent_(!store.Violated()) {}
 
   std::optional<Violation> FindPartner() {
     for (int k = 0; k < generation_.envelope.num_states(); ++k)
-      if (generation_.envelope.row(k).is_constant() ? TestConstant(k) : TestRow(k)) return found_;
+      if ((generation_.envelope.row(k).is_constant() ? TestConstant(k) : TestRow(k)) && found_) return found_;
     return std::nullopt;
   }
 
  private:
-  // The extremes of a constant coordinate decide, except when they are within a last bit: then each pair is tested.
+  // The tests below return whether nothing more has to be tested in coordinate k: there is a contradiction, or none.
+
+  // Only where the extremes leave it open, by a last bit, does it take looking at all.
   bool TestConstant(int k) {
     const Point point = PointIn(k);
     const int size = generation_.tail.size();
@@ -239,6 +241,7 @@ class ObservationStore::PartnerSearch {
   bool TestInTail(int j, int k) { return Test(generation_.in_tail, j, k); }
 
   bool Test(const Known& others, int j, int k) {
+    if (is_consistent_ && IsWithin(others.observations, j, k)) return true;
     Observations two = Select(others.observations, {j, j});
     entry_.WriteTo(two, 1);
     found_ = TestPair(store_.declaration_, two, 0, 1, k);
@@ -246,6 +249,15 @@ class ObservationStore::PartnerSearch {
     found_->first = others.ids[ToSize(j)];
     found_->second = id_;
     return true;
+  }
+
+  // Whether this entry contradicts only what observation j contradicts: it has the same location in the columns of the
+  // row, and a residual that contains j's.
+  [[nodiscard]] bool IsWithin(const Observations& o, int j, int k) const {
+    return entry_.lower[ToSize(k)] <= o.lower(j, k) && o.upper(j, k) <= entry_.upper[ToSize(k)] &&
+           std::ranges::all_of(generation_.envelope.row(k).columns(), [&](const LipschitzRow::Column& column) {
+             return entry_.z[ToSize(column.variable)] == o.z(j, column.variable);
+           });
   }
 
   using Point = PairSearch::Point;
@@ -263,6 +275,7 @@ class ObservationStore::PartnerSearch {
   const Generation& generation_;
   const Entry& entry_;
   int id_;
+  bool is_consistent_;  // no two of the others contradict each other
   std::optional<Violation> found_;
 };
 

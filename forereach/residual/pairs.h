@@ -6,11 +6,15 @@ has to test each of them rigorously. Two leaves of an ObservationIndex are compa
 are compared only if the bounds allow a pair. */
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "forereach/numerics/instruction_set.h"
+#include "forereach/numerics/size.h"
 #include "forereach/residual/lipschitz_row.h"
 #include "forereach/residual/observation_index.h"
 
@@ -84,7 +88,33 @@ class PairSearch final {
 [[nodiscard]] double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries,
                                  const Observations& observations);
 
+/** Calls take(rows) for each set of observations that have one location in the columns of `row`, which may be
+reordered; ascending. So what holds of a pair for its locations is asked once for all of them. Cost O(N log N). */
+template <class Take>
+void ForEachLocation(const LipschitzRow& row, const Observations& observations, const Take& take);
+
 [[nodiscard]] PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i);
+
+template <class Take>
+void ForEachLocation(const LipschitzRow& row, const Observations& o, const Take& take) {
+  const auto order = [&](int i, int j) {
+    for (const LipschitzRow::Column& column : row.columns())
+      if (const double a = o.z(i, column.variable), b = o.z(j, column.variable); a != b) return a < b ? -1 : 1;
+    return 0;
+  };
+  std::vector<int> rows(ToSize(o.size()));
+  std::iota(rows.begin(), rows.end(), 0);
+  std::ranges::sort(rows, [&](int i, int j) {
+    const int before = order(i, j);
+    return before < 0 || (before == 0 && i < j);
+  });
+  for (auto begin = rows.begin(); begin != rows.end();) {
+    const int first = *begin;
+    const auto end = std::find_if(begin, rows.end(), [&](int i) { return order(first, i) != 0; });
+    take(std::span<int>(begin, end));
+    begin = end;
+  }
+}
 
 template <class Test>
 bool PairSearch::AnyPair(const Test& test) const {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
+#include <utility>
 
 #include "forereach/numerics/size.h"
 #include "forereach/residual/pairs.h"
@@ -44,17 +46,37 @@ double Range(const ObservationIndex::Entries& entries) {
   return range > 0 && std::isfinite(range) ? range : 1;
 }
 
-void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o, int k) {
+// Ascending. Of rows at one location the highest of each side alone can gain, and the next one says by how much.
+std::vector<int> HighestTwo(const LipschitzRow& row, const Observations& o, const ObservationIndex::Entries& entries) {
+  std::vector<int> highest;
+  ForEachLocation(row, o, [&](std::span<int> rows) {
+    const std::size_t two = std::min<std::size_t>(rows.size(), 2);
+    const auto take = [&](const auto& value) {
+      std::ranges::partial_sort(rows, rows.begin() + static_cast<std::ptrdiff_t>(two),
+                                [&](int i, int j) { return std::pair(value(i), i) < std::pair(value(j), j); });
+      highest.insert(highest.end(), rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(two));
+    };
+    take([&](int i) { return -entries.floors[ToSize(i)]; });
+    take([&](int i) { return entries.ceilings[ToSize(i)]; });
+  });
+  std::ranges::sort(highest);
+  highest.erase(std::unique(highest.begin(), highest.end()), highest.end());
+  return highest;
+}
+
+void TakeRow(Gains& gains, const Declaration& declaration, const Observations& all, int k) {
   const LipschitzRow row(declaration, k);
-  ObservationIndex::Entries entries = EntriesOf(row, declaration, o, k);
+  ObservationIndex::Entries entries = EntriesOf(row, declaration, all, k);
   const double range = Range(entries);
   if (row.is_constant()) {
     TakeConstant(gains, entries.floors, range);
     for (double& ceiling : entries.ceilings) ceiling = -ceiling;
     return TakeConstant(gains, entries.ceilings, range);
   }
-  const double margin = MarginUpper(row, entries, o);
+  const double margin = MarginUpper(row, entries, all);
   if (!std::isfinite(margin)) return;  // values this large say nothing: any choice is sound
+  const std::vector<int> rows = HighestTwo(row, all, entries);
+  entries = EntriesOf(row, declaration, Select(all, rows), k);
   const ObservationIndex index(entries);
   const PairSearch search(index, margin);
   for (std::size_t b = 0; b < index.num_blocks();
@@ -66,7 +88,9 @@ void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o
       for (std::size_t side = 0; side < 2; ++side) {
         const double own = side == 0 ? point.floor : point.negated_ceiling;
         const PairSearch::Other other = search.BestOther(point, side, id, own);  // what is no gain need not be exact
-        Take(gains, id, other.id == kNone ? 1 : (own - other.value) / range, other.id);
+        const bool alone = other.id == kNone;
+        Take(gains, ToSize(rows[id]), alone ? 1 : (own - other.value) / range,
+             alone ? kNone : static_cast<std::uint32_t>(rows[other.id]));
       }
     }
 }

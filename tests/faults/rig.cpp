@@ -78,6 +78,11 @@ Rig::Rig(const std::string& task, const Options& options)
   config_ = LoadConfig(task_path_);
   config_.bus.url = near_url_;
   config_.bus.key = key_path_;
+  OpenBuses();
+  for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
+}
+
+void Rig::OpenBuses() {
   open_ = OpenBus(near_url_);
   signed_ = OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); });
   // Where clocks go back and ahead it hears whatever is authentic, from whatever time.
@@ -86,8 +91,13 @@ Rig::Rig(const std::string& task, const Options& options)
   witness_ = std::make_unique<Witness>(*heard_, config_.bus, options_.relayed);
   if (config_.gate.obstacles == ObstaclesSource::kBus)
     perception_ = std::make_unique<Perception>(OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); }),
-                                               config_.bus.obstacles, config_.gate, options.seen);
-  for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
+                                               config_.bus.obstacles, config_.gate, options_.seen);
+}
+
+void Rig::MakeKeyAgain(forereach::Role role) {
+  EndAll();
+  ReplaceKey("campaign", key_path_, role);
+  OpenBuses();
 }
 
 void Rig::StartSecondCertifier() {

@@ -47,6 +47,9 @@ class Rig final {
   }
   /** Ends all four, for Heal to start. */
   void EndAll();
+  /** The same, and the role has a new key, as `forereach keygen --again` gives it one. The buses and the witness are
+  new ones, so who listens has to subscribe again. */
+  void MakeKeyAgain(forereach::Role role);
   /** One line for each process that since the last call
       - ended by itself, and is no planner or robot that was at its goal or out of time;
       - ended with an exit status that is not 0, or by a signal that is not End's SIGKILL;
@@ -108,6 +111,7 @@ class Rig final {
     std::int64_t due = 0, lost = 0;  // events that have to be in them, and that were not
   };
 
+  void OpenBuses();
   [[nodiscard]] std::int64_t NowUs() const { return WallClockUs() + clock_offset_us_; }
   [[nodiscard]] std::vector<std::string> UnderClock(Role role);
   void LookAtEnd(Role role);

@@ -30,14 +30,31 @@ using testing::HasSubstr;
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
-// The gate decides as expected, and the log has what came and what went.
-void DecideAndLog(Gate& gate, const std::vector<std::uint8_t>& candidate, std::int16_t expected, const Config& config,
-                  EventLogWriter& log) {
-  const decision_t decision = gate.Decide(candidate, kNow).decision;
-  EXPECT_EQ(decision.outcome, expected);
-  log.Append(kNow, config.bus.candidate, candidate);
-  log.Append(kNow, config.bus.decision, Encode(decision));
-}
+// A gate and the log of what it hears and says.
+struct LoggedGate {
+  const Config& config;
+  EventLogWriter& log;
+  Gate gate{config};
+
+  void Hear(const std::vector<std::uint8_t>& obstacles) {
+    log.Append(kNow, config.bus.obstacles, obstacles);
+    EXPECT_EQ(gate.UpdateObstacles(obstacles, kNow), "");
+  }
+  void Say(const certifier_status_v3_t& status) { log.Append(kNow, config.bus.status, Encode(status)); }
+  /** Of `expected`, the outcome. */
+  void Decide(const candidate_plan_t& candidate, std::int16_t expected) {
+    const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
+    EXPECT_EQ(decision.outcome, expected);
+    Log(candidate, decision);
+  }
+  void RefuseForNoObstacles(const candidate_plan_t& candidate) {
+    Log(candidate, gate.Refuse(Encode(candidate), kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision);
+  }
+  void Log(const candidate_plan_t& candidate, const decision_t& decision) {
+    log.Append(kNow, config.bus.candidate, Encode(candidate));
+    log.Append(kNow, config.bus.decision, Encode(decision));
+  }
+};
 
 // Each decision of the log is made again.
 void ExpectAgreed(const std::string& path, const Config& config, int decisions) {
@@ -240,19 +257,18 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
   obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
   on_the_way.utime = kNow;
   for (const std::int64_t heartbeat : {0, 7}) {
-    Gate gate(config);
-    if (heartbeat > 0) {
-      EXPECT_EQ(gate.UpdateObstacles(Encode(on_the_way), kNow), "");
-    }
     certifier_status_v3_t status{};
     status.sequence = heartbeat;
     const std::string path = NewLog();
     {
       EventLogWriter writer(path);
-      writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
-      writer.Append(kNow, config.bus.status, Encode(status));
-      DecideAndLog(gate, Encode(Candidate(1)), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED,
-                   config, writer);
+      LoggedGate gate{config, writer};
+      if (heartbeat > 0)
+        gate.Hear(Encode(on_the_way));
+      else  // before this certifier's start
+        writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
+      gate.Say(status);
+      gate.Decide(Candidate(1), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
       EXPECT_TRUE(writer.Flush());
     }
     ExpectAgreed(path, config, 1);
@@ -265,20 +281,19 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
   config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
   obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
   far_away.utime = kNow;
-  Gate before(config), after(config);
   certifier_status_v3_t first{}, second{};
   second.sequence = 1;
   first.version = 1, second.version = 2;
   const std::string path = NewLog();
   {
     EventLogWriter writer(path);
-    writer.Append(kNow, config.bus.status, Encode(first));
-    writer.Append(kNow, config.bus.obstacles, Encode(far_away));
-    EXPECT_EQ(before.UpdateObstacles(Encode(far_away), kNow), "");
-    DecideAndLog(before, Encode(Candidate(1, kAccelerationIntoTheCircle)), decision_t::CERTIFIED, config, writer);
-    after.Inherit(before);
-    writer.Append(kNow, config.bus.status, Encode(second));
-    DecideAndLog(after, Encode(Candidate(2, kAccelerationIntoTheCircle)), decision_t::ABSTAIN_SAFETY, config, writer);
+    LoggedGate before{config, writer}, after{config, writer};
+    before.Say(first);
+    before.Hear(Encode(far_away));
+    before.Decide(Candidate(1, kAccelerationIntoTheCircle), decision_t::CERTIFIED);
+    after.gate.Inherit(before.gate);
+    after.Say(second);
+    after.Decide(Candidate(2, kAccelerationIntoTheCircle), decision_t::ABSTAIN_SAFETY);
     EXPECT_TRUE(writer.Flush());
   }
   ExpectAgreed(path, config, 2);
@@ -297,27 +312,22 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
     others.state = certifier_status_v3_t::STANDBY, others.instance = 2;
     std::int64_t id = 1;
     for (int start = 0; start < 2; ++start) {  // it is killed, and starts again
-      Gate gate(config);
+      LoggedGate gate{config, writer};
       mine.sequence = 0;
-      writer.Append(kNow, config.bus.status, Encode(mine));
-      const auto unknown = Encode(Candidate(id++));
-      writer.Append(kNow, config.bus.candidate, unknown);
-      writer.Append(kNow, config.bus.decision,
-                    Encode(gate.Refuse(unknown, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
+      gate.Say(mine);
+      gate.RefuseForNoObstacles(Candidate(id++));
       for (int i = 0; i < 12; ++i) {
         obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
                                                    : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
         message.utime = kNow + 100 * start + i;
         message.sequence = 20 * start + i;
-        writer.Append(kNow, config.bus.obstacles, Encode(message));
-        EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
+        gate.Hear(Encode(message));
         others.sequence = 3 + i % 5;
-        writer.Append(kNow, config.bus.status, Encode(others));
-        DecideAndLog(gate, Encode(Candidate(id++)), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED,
-                     config, writer);
+        gate.Say(others);
+        gate.Decide(Candidate(id++), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
         ++decided;
         ++mine.sequence;
-        writer.Append(kNow, config.bus.status, Encode(mine));
+        gate.Say(mine);
       }
     }
     EXPECT_TRUE(writer.Flush());
@@ -337,24 +347,19 @@ TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
     EventLogWriter writer(path);
     certifier_status_v3_t status{};
     status.state = certifier_status_v3_t::ARMED;
-    Gate gate(config);
-    writer.Append(kNow, config.bus.status, Encode(status));
+    LoggedGate gate{config, writer};
+    gate.Say(status);
     for (int i = 0; i < 6; ++i) {
       const bool is_late = i % 2 == 0;
       obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)});
       message.utime = kNow - (is_late ? 30'001 : 30'000);
       message.sequence = i;
-      writer.Append(kNow, config.bus.obstacles, Encode(message));
-      EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
-      EXPECT_EQ(gate.WhyObstaclesUnknown(kNow).empty(), !is_late);
-      const auto candidate = Encode(Candidate(i + 1));
-      if (!is_late) {
-        DecideAndLog(gate, candidate, decision_t::CERTIFIED, config, writer);
-        continue;
-      }
-      writer.Append(kNow, config.bus.candidate, candidate);
-      writer.Append(kNow, config.bus.decision,
-                    Encode(gate.Refuse(candidate, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
+      gate.Hear(Encode(message));
+      EXPECT_EQ(gate.gate.WhyObstaclesUnknown(kNow).empty(), !is_late);
+      if (is_late)
+        gate.RefuseForNoObstacles(Candidate(i + 1));
+      else
+        gate.Decide(Candidate(i + 1), decision_t::CERTIFIED);
     }
     EXPECT_TRUE(writer.Flush());
   }
@@ -373,8 +378,8 @@ TEST_F(ReplayTest, AgreesOnARunWithMovingObstacles) {
     EventLogWriter writer(path);
     certifier_status_v3_t status{};
     status.state = certifier_status_v3_t::ARMED;
-    Gate gate(config);
-    writer.Append(kNow, config.bus.status, Encode(status));
+    LoggedGate gate{config, writer};
+    gate.Say(status);
     for (int i = 0; i < 12; ++i) {
       ObstacleMotion motion;
       motion.stamp_us = kNow - 12 + i;
@@ -385,11 +390,8 @@ TEST_F(ReplayTest, AgreesOnARunWithMovingObstacles) {
       obstacles_t standing = ToMessage(seen);
       standing.utime = kNow + i;
       moving.sequence = standing.sequence = i;
-      const std::vector<std::uint8_t> bytes = is_old_type ? Encode(standing) : Encode(moving);
-      writer.Append(kNow, config.bus.obstacles, bytes);
-      EXPECT_EQ(gate.UpdateObstacles(bytes, kNow), "");
-      DecideAndLog(gate, Encode(Candidate(i + 1)), is_met ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
-                   writer);
+      gate.Hear(is_old_type ? Encode(standing) : Encode(moving));
+      gate.Decide(Candidate(i + 1), is_met ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
     }
     EXPECT_TRUE(writer.Flush());
   }

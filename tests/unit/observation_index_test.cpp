@@ -229,6 +229,66 @@ TEST(FindViolation, AgreesWithTryingAllPairs) {
   EXPECT_LT(found, tried - 50);
 }
 
+// Few locations and few residuals, many of them on the very edge of the declaration. Other columns differ.
+Data MakeOfFewPlaces(Random& random) {
+  const int count = random.Integer(1, 300), places = random.Integer(1, 6), active = random.Integer(1, 5);
+  Data data = Make(random, count, active, 1);
+  Observations& o = data.observations;
+  data.declaration.noise_bound[0] = random.Coin() ? 0 : 0.125;
+  const double unit = random.Coin() ? 0.125 : 0.1, edge = random.Sign();
+  for (int i = 0; i < count; ++i) {
+    for (int l = 0; l < kVariables; ++l)
+      if (data.declaration.lipschitz(0, l) > 0) o.z(i, l) = unit * random.Below(places);
+    o.lower(i, 0) = edge * data.declaration.lipschitz.row(0).dot(o.z.row(i));
+    o.lower(i, 0) += data.declaration.noise_bound[0] * random.Integer(-1, 1);
+    if (random.Coin(0.5 / count)) o.lower(i, 0) += std::ldexp(random.Sign(), -random.Integer(1, 54));
+    o.upper(i, 0) = o.lower(i, 0) + (random.Coin(0.2) ? unit : 0);
+  }
+  return data;
+}
+
+TEST(FindViolation, FindsTheFirstPairOfManyRowsAtFewLocations) {
+  Random random(774);
+  SCOPED_TRACE(random.trace());
+  int found = 0, late = 0;
+  constexpr int kTrials = 600;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Data data = MakeOfFewPlaces(random);
+    const LipschitzEnvelope envelope = EnvelopeOf(data, {});
+    const auto expected = TryAll(data);
+    for (const LipschitzEnvelope* known : {static_cast<const LipschitzEnvelope*>(nullptr), &envelope}) {
+      const auto violation = FindViolation(data.declaration, data.observations, known);
+      ASSERT_EQ(violation.has_value(), expected.has_value()) << trial;
+      if (!expected) continue;
+      ASSERT_EQ(violation->first, expected->first) << trial;
+      ASSERT_EQ(violation->second, expected->second) << trial;
+      ASSERT_EQ(violation->difference, expected->difference) << trial;
+      ASSERT_EQ(violation->bound, expected->bound) << trial;
+    }
+    if (!expected) continue;
+    ++found;
+    late += expected->first > 20;
+  }
+  EXPECT_GT(found, kTrials / 10);
+  EXPECT_LT(found, kTrials - kTrials / 10);
+  EXPECT_GT(late, 10);
+}
+
+// A robot that stands, with no noise declared: in the time that all pairs take, this test would not end.
+TEST(FindViolation, TakesManyRowsAtOneLocation) {
+  constexpr int kRows = 200'000;
+  const Declaration declaration{Eigen::MatrixXd::Constant(1, 2, 0.3), Eigen::VectorXd::Zero(1)};
+  Observations o{Eigen::MatrixXd::Constant(kRows, 2, 1.25), Eigen::MatrixXd::Constant(kRows, 1, 0.5), {}};
+  o.upper = o.lower;
+  EXPECT_FALSE(FindViolation(declaration, o));
+  o.z.bottomRows(2).setConstant(-50);
+  o.lower(kRows - 1, 0) = o.upper(kRows - 1, 0) = 0.25;
+  const auto violation = FindViolation(declaration, o);
+  ASSERT_TRUE(violation);
+  EXPECT_EQ(violation->first, kRows - 2);
+  EXPECT_EQ(violation->second, kRows - 1);
+}
+
 TEST(FindViolation, TakesManyObservationsThatAllContradictEachOther) {
   Random random(771);
   Data data = Make(random, 30000, 2, 1);

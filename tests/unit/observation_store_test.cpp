@@ -206,6 +206,35 @@ TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
   }
 }
 
+// As a robot that often stands records them, on the very edge of the noise bound, and here and there beyond it.
+TEST(ObservationStore, FindsWhatAllPairsOfRowsAtFewLocationsShow) {
+  Random random(815);
+  SCOPED_TRACE(random.trace());
+  int contradictions = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    const std::vector<Sample> places = Observe(random, random.Integer(1, 4));
+    std::vector<Sample> samples{places[0]};
+    ObservationStore store = StoreOf(samples, Options(random.Integer(1, 40)));
+    for (int i = 0; i < 60; ++i) {
+      Sample next = places[static_cast<std::size_t>(random.Below(static_cast<int>(places.size())))];
+      for (int k = 0; k < kStates; ++k) {
+        next.lower[k] = Truth(next.z, k) + 1e-3 * random.Integer(-1, 1);
+        if (random.Coin(0.003)) next.lower[k] += 1e-4 * random.Sign();
+      }
+      next.upper = next.lower;
+      if (random.Coin(0.3)) next.upper[random.Below(kStates)] += 1e-3;
+      samples.push_back(next);
+      const Observations all = Join(samples);
+      bool expected = false;
+      for (int j = 0; j <= i; ++j)
+        for (int k = 0; k < kStates; ++k) expected |= TestPair(MakeDeclaration(), all, j, i + 1, k).has_value();
+      ASSERT_EQ(Insert(store, next).violation.has_value(), expected) << "row " << i << " of trial " << trial;
+      contradictions += expected;
+    }
+  }
+  EXPECT_GT(contradictions, 20);
+}
+
 TEST(ObservationStore, TakesValuesFarAboveThoseItBeganWith) {
   Random random(804);
   std::vector<Sample> samples = Observe(random, 3);
