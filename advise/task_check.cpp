@@ -78,7 +78,7 @@ class Examination final {
     ExamineSteps();
     Draw();
     std::stable_partition(result_.findings.begin(), result_.findings.end(),
-                          [](const Finding& finding) { return !finding.is_remark; });
+                          [](const TaskFinding& finding) { return !finding.is_remark; });
     return std::move(result_);
   }
 
@@ -653,7 +653,7 @@ class Examination final {
 }  // namespace
 
 bool TaskCheck::HasFindings() const {
-  return std::ranges::any_of(findings, [](const Finding& finding) { return !finding.is_remark; });
+  return std::ranges::any_of(findings, [](const TaskFinding& finding) { return !finding.is_remark; });
 }
 
 TaskCheck CheckTask(const TaskCheckOptions& options) { return Examination(options).Run(); }

@@ -15,7 +15,7 @@ struct TaskCheckOptions {
 };
 
 /** One thing to change. */
-struct Finding {
+struct TaskFinding {
   std::string place;   ///< "file:line: key: "
   std::string what;    ///< Value and bound.
   std::string advice;  ///< What to do.
@@ -40,9 +40,9 @@ struct TaskCheck {
     int first = 0, second = 0;  ///< Lines of the data file.
   };
 
-  std::vector<Finding> findings;  ///< Remarks included.
-  std::string data;               ///< The transitions' file.
-  int transitions = 0;            ///< In it; 0 if there is none.
+  std::vector<TaskFinding> findings;  ///< Remarks included.
+  std::string data;                   ///< The transitions' file.
+  int transitions = 0;                ///< In it; 0 if there is none.
   std::vector<Coordinate> coordinates;
   std::vector<Row> rows;
   bool all_pairs = true;  ///< False: `rows` is of a sample of the transitions.

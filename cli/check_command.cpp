@@ -78,18 +78,18 @@ void PrintTube(const TaskCheck& check, const CheckArguments& options, std::ostre
 }
 
 void PrintFindings(const TaskCheck& check, std::ostream& out) {
-  const auto remarks = std::ranges::count_if(check.findings, &Finding::is_remark);
+  const auto remarks = std::ranges::count_if(check.findings, &TaskFinding::is_remark);
   const auto findings = std::ssize(check.findings) - remarks;
   out << (findings == 0 ? std::string("a plan could be certified")
                         : std::to_string(findings) + (findings == 1 ? " finding" : " findings"))
       << (remarks == 0 ? "" : ", " + std::to_string(remarks) + (remarks == 1 ? " remark" : " remarks")) << "\n";
-  for (const Finding& finding : check.findings)
+  for (const TaskFinding& finding : check.findings)
     out << finding.place << (finding.is_remark ? "remark: " : "") << finding.what << "\n    " << finding.advice << "\n";
 }
 
 Json ToJson(const TaskCheck& check) {
   Json findings = Json::array(), coordinates = Json::array(), rows = Json::array();
-  for (const Finding& finding : check.findings)
+  for (const TaskFinding& finding : check.findings)
     findings.push_back(
         {{"place", finding.place}, {"what", finding.what}, {"advice", finding.advice}, {"remark", finding.is_remark}});
   for (const TaskCheck::Coordinate& c : check.coordinates)

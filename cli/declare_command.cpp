@@ -220,14 +220,15 @@ int Declare(const DeclareArguments& options) {
 
 // ---- declare --check
 
-struct Finding {
+struct CoverFinding {
   verifier::Answer answer = verifier::Answer::kYes;
   std::string entry, what;
 };
 
 // The checks without mathematics: the record is complete, belongs to this task, and has each entry once.
-std::vector<Finding> CheckRecord(const CoverFile& file, const Config& config, const verifier::CoverChecker& checker) {
-  std::vector<Finding> findings;
+std::vector<CoverFinding> CheckRecord(const CoverFile& file, const Config& config,
+                                      const verifier::CoverChecker& checker) {
+  std::vector<CoverFinding> findings;
   const auto refute = [&](std::string entry, std::string what) {
     findings.push_back({verifier::Answer::kNo, std::move(entry), std::move(what)});
   };
@@ -246,10 +247,10 @@ std::vector<Finding> CheckRecord(const CoverFile& file, const Config& config, co
   return findings;
 }
 
-std::vector<Finding> CheckClaims(const CoverFile& file, const Config& config, const verifier::CoverChecker& checker,
-                                 unsigned jobs) {
+std::vector<CoverFinding> CheckClaims(const CoverFile& file, const Config& config,
+                                      const verifier::CoverChecker& checker, unsigned jobs) {
   const std::vector<std::string> names = ArgumentNames(config);
-  std::vector<Finding> findings(file.claims.size());
+  std::vector<CoverFinding> findings(file.claims.size());
   std::size_t leaves = 0;
   for (const auto& claim : file.claims)
     leaves += static_cast<std::size_t>(
@@ -267,21 +268,21 @@ int CheckCover(const DeclareArguments& options) {
   const Config config = LoadWithResidual(options.config);
   const CoverFile file = LoadCover(options.check, config);
   const verifier::CoverChecker checker(config.problem->domain, *config.residual);
-  std::vector<Finding> findings = CheckRecord(file, config, checker);
+  std::vector<CoverFinding> findings = CheckRecord(file, config, checker);
   std::ranges::move(CheckClaims(file, config, checker, options.jobs), std::back_inserter(findings));
-  std::erase_if(findings, [](const Finding& finding) { return finding.answer == verifier::Answer::kYes; });
+  std::erase_if(findings, [](const CoverFinding& finding) { return finding.answer == verifier::Answer::kYes; });
 
-  const bool refuted =
-      std::ranges::any_of(findings, [](const Finding& finding) { return finding.answer == verifier::Answer::kNo; });
+  const bool refuted = std::ranges::any_of(
+      findings, [](const CoverFinding& finding) { return finding.answer == verifier::Answer::kNo; });
   const std::string unknown = options.json ? "cannot_verify" : "cannot verify";
   const std::string verdict = refuted ? "refuted" : findings.empty() ? "confirmed" : unknown;
   if (options.json) {
     Json document{{"verdict", verdict}, {"entries", file.claims.size()}, {"failures", Json::array()}};
-    for (const Finding& finding : findings)
+    for (const CoverFinding& finding : findings)
       document["failures"].push_back({{"entry", finding.entry}, {"claim", finding.what}});
     std::cout << JsonText(document) << std::endl;
   } else {
-    for (const Finding& finding : findings)
+    for (const CoverFinding& finding : findings)
       std::cout << "  " << finding.entry << (finding.entry.empty() ? "" : ": ") << finding.what << "\n";
     std::cout << "check: " << verdict << ": " << file.claims.size() << " bounds of " << config.residual->name
               << std::endl;

@@ -1,7 +1,7 @@
 #include "lcmtypes/names.h"
 
 #include "forereach/advice_change_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -81,6 +81,10 @@ bool StopsTheRobot(std::int16_t cause) {
   return cause == fault_t::SLICE_LEFT || cause == fault_t::DECLARATION_FALSIFIED || cause == fault_t::UNCERTIFIED_PLAN;
 }
 
+bool IsInCharge(const certifier_status_t& status) {
+  return status.state != certifier_status_t::LISTENING && status.state != certifier_status_t::STANDBY;
+}
+
 std::string_view FaultName(std::int16_t cause) {
   switch (cause) {
     case fault_t::ROBOT_STATE_LOST: return "robot_state_lost";
@@ -135,37 +139,37 @@ std::string_view AdviceName(std::int16_t kind) {
 
 std::string_view LevelName(std::int16_t level) {
   switch (level) {
-    case certifier_status_v3_t::OK: return "OK";
-    case certifier_status_v3_t::STALE: return "STALE";
-    case certifier_status_v3_t::ERROR: return "ERROR";
+    case certifier_status_t::OK: return "OK";
+    case certifier_status_t::STALE: return "STALE";
+    case certifier_status_t::ERROR: return "ERROR";
     default: return "unknown";
   }
 }
 
 std::string_view StateName(std::int16_t state) {
   switch (state) {
-    case certifier_status_v3_t::DISARMED: return "disarmed";
-    case certifier_status_v3_t::ARMED: return "armed";
-    case certifier_status_v3_t::FAULT: return "fault";
-    case certifier_status_v3_t::LISTENING: return "listening";
-    case certifier_status_v3_t::STANDBY: return "standby";
+    case certifier_status_t::DISARMED: return "disarmed";
+    case certifier_status_t::ARMED: return "armed";
+    case certifier_status_t::FAULT: return "fault";
+    case certifier_status_t::LISTENING: return "listening";
+    case certifier_status_t::STANDBY: return "standby";
     default: return "unknown";
   }
 }
 
 std::string_view LatchName(std::int16_t latch) {
   switch (latch) {
-    case certifier_status_v3_t::NO_LATCH: return "none";
-    case certifier_status_v3_t::LATCH_WRITTEN: return "written";
-    case certifier_status_v3_t::LATCH_UNWRITABLE: return "unwritable";
+    case certifier_status_t::LATCH_NONE: return "none";
+    case certifier_status_t::LATCH_WRITTEN: return "written";
+    case certifier_status_t::LATCH_UNWRITABLE: return "unwritable";
     default: return "unknown";
   }
 }
 
 std::string_view ObstaclesSourceName(std::int16_t source) {
   switch (source) {
-    case certifier_status_v3_t::OBSTACLES_TASK: return "task";
-    case certifier_status_v3_t::OBSTACLES_BUS: return "bus";
+    case certifier_status_t::OBSTACLES_TASK: return "task";
+    case certifier_status_t::OBSTACLES_BUS: return "bus";
     default: return "unknown";
   }
 }

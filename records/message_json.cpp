@@ -11,16 +11,13 @@
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/obstacles_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -86,9 +83,8 @@ void Fields(const decision_t& m, To& to) {
   to.Text("message", m.message);
 }
 
-template <class Certified, class To>
-requires(std::same_as<Certified, certified_plan_t> ||
-         std::same_as<Certified, certified_plan_v2_t>) void Fields(const Certified& m, To& to) {
+template <class To>
+void Fields(const certified_plan_t& m, To& to) {
   to("utime", m.utime);
   to("sequence", m.sequence);
   to("expires_utime", m.expires_utime);
@@ -97,7 +93,7 @@ requires(std::same_as<Certified, certified_plan_t> ||
   to.Rows("slice_upper", m.slice_upper, m.plan.num_steps + 1, m.plan.num_states);
   to.Digest("plan_digest", m.plan_digest);
   GroundFields(m, to);
-  if constexpr (std::same_as<Certified, certified_plan_v2_t>) to.Digest("transitions_digest", m.transitions_digest);
+  to.Digest("transitions_digest", m.transitions_digest);
   to.Digest("certificate_digest", m.certificate_digest);
 }
 
@@ -210,7 +206,7 @@ void Fields(const command_t& m, To& to) {
 }
 
 template <class To>
-void Fields(const obstacle_t& m, To& to) {
+void Fields(const obstacle_shape_t& m, To& to) {
   to("kind", m.kind);
   to("dimension", m.dimension);
   to("num_points", m.num_points);
@@ -219,7 +215,7 @@ void Fields(const obstacle_t& m, To& to) {
 }
 
 template <class To>
-void Fields(const obstacle_v2_t& m, To& to) {
+void Fields(const obstacle_t& m, To& to) {
   to.Nested("shape", m.shape);
   to("track", m.track);
   to("utime", m.utime);
@@ -232,9 +228,8 @@ void Fields(const obstacle_v2_t& m, To& to) {
   to("gone", m.gone);
 }
 
-template <class Obstacles, class To>
-requires(std::same_as<Obstacles, obstacles_t> ||
-         std::same_as<Obstacles, obstacles_v2_t>) void Fields(const Obstacles& m, To& to) {
+template <class To>
+void Fields(const obstacles_t& m, To& to) {
   to("utime", m.utime);
   to("sequence", m.sequence);
   to("num_obstacles", m.num_obstacles);
@@ -259,26 +254,20 @@ void Fields(const logger_status_t& m, To& to) {
   to.Text("message", m.message);
 }
 
-template <class Status, class To>
-requires(std::same_as<Status, certifier_status_v2_t> ||
-         std::same_as<Status, certifier_status_v3_t>) void Fields(const Status& m, To& to) {
-  constexpr bool is_v3 = std::same_as<Status, certifier_status_v3_t>;
+template <class To>
+void Fields(const certifier_status_t& m, To& to) {
   to("utime", m.utime);
   to("sequence", m.sequence);
-  if constexpr (is_v3) {
-    to("instance", m.instance);
-    to("started_utime", m.started_utime);
-    to("other_instance", m.other_instance);
-  }
+  to("instance", m.instance);
+  to("started_utime", m.started_utime);
+  to("other_instance", m.other_instance);
   to.Code("level", m.level, LevelName);
   to.Code("state", m.state, StateName);
   to.Code("fault", m.fault, NoFaultName);
   to("shadow", m.shadow);
   to("fault_utime", m.fault_utime);
-  if constexpr (is_v3) {
-    to.Code("latch", m.latch, LatchName);
-    to("is_unsigned", m.is_unsigned);
-  }
+  to.Code("latch", m.latch, LatchName);
+  to("is_unsigned", m.is_unsigned);
   to("version", m.version);
   to("failed_reloads", m.failed_reloads);
   to("candidates", m.candidates);
@@ -289,19 +278,17 @@ requires(std::same_as<Status, certifier_status_v2_t> ||
   to("messages_refused", m.messages_refused);
   to("messages_not_sent", m.messages_not_sent);
   to("bus_dropped", m.bus_dropped);
-  if constexpr (is_v3) to("datagrams_refused", m.datagrams_refused);
+  to("datagrams_refused", m.datagrams_refused);
   to("refused_unsigned", m.refused_unsigned);
   to("refused_forged", m.refused_forged);
   to("refused_replayed", m.refused_replayed);
-  if constexpr (is_v3) {
-    to("refused_foreign", m.refused_foreign);
-    to.Code("obstacles_source", m.obstacles_source, ObstaclesSourceName);
-    to("obstacles_known", m.obstacles_known);
-    to("obstacles_in_force", m.obstacles_in_force);
-    to("obstacles_utime", m.obstacles_utime);
-    to("obstacles_age_us", m.obstacles_age_us);
-    to("obstacles_lost", m.obstacles_lost);
-  }
+  to("refused_foreign", m.refused_foreign);
+  to.Code("obstacles_source", m.obstacles_source, ObstaclesSourceName);
+  to("obstacles_known", m.obstacles_known);
+  to("obstacles_in_force", m.obstacles_in_force);
+  to("obstacles_utime", m.obstacles_utime);
+  to("obstacles_age_us", m.obstacles_age_us);
+  to("obstacles_lost", m.obstacles_lost);
   to("observations", m.observations);
   to("learned", m.learned);
   to("page_faults", m.page_faults);
@@ -433,9 +420,9 @@ struct Types {
   static std::vector<std::string_view> Names() { return {Messages::getTypeName()...}; }
 };
 
-using AllTypes = Types<advice_t, candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t,
-                       certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t,
-                       obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
+using AllTypes =
+    Types<advice_t, candidate_plan_t, certified_plan_t, certifier_status_t, command_t, decision_t, execution_event_t,
+          fault_t, logger_status_t, obstacles_t, robot_state_t, transition_t, withdrawal_t>;
 
 // Calls `use` with the decoded message.
 template <class Use>
@@ -462,10 +449,7 @@ requires(std::same_as<Answer, decision_t> || std::same_as<Answer, advice_t>) voi
   summary.plan = GetDigest(m.plan_digest);
   summary.is_of_plan = true;
 }
-template <class Certified>
-requires(std::same_as<Certified, certified_plan_t> ||
-         std::same_as<Certified, certified_plan_v2_t>) void Describe(const Certified& m, Bytes,
-                                                                     MessageSummary& summary) {
+void Describe(const certified_plan_t& m, Bytes, MessageSummary& summary) {
   summary.plan_id = m.plan.plan_id;
   summary.plan = GetDigest(m.plan_digest);
   summary.is_of_plan = true;

@@ -8,7 +8,7 @@
 
 namespace forereach {
 
-void Conformance::Remember(const certified_plan_v2_t& certified, const Angles& angles) {
+void Conformance::Remember(const certified_plan_t& certified, const Angles& angles) {
   if (const auto known = Find(certified.plan.plan_id); known != plans_.end()) {
     if (certified.plan.plan_id != last_.plan_id) plans_[ToSize(known - plans_.begin())] = {certified, angles};
     return;
@@ -59,7 +59,7 @@ std::optional<Conformance::Departure> Conformance::Compare(std::int64_t plan_id,
                                                            std::span<const double> state) const {
   const auto known = Find(plan_id);
   if (known == plans_.end()) return std::nullopt;
-  const certified_plan_v2_t& certified = known->certified;
+  const certified_plan_t& certified = known->certified;
   if (step < 0 || step > certified.plan.num_steps || std::ssize(state) != certified.plan.num_states)
     return std::nullopt;
   for (int k = 0; k < certified.plan.num_states; ++k) {

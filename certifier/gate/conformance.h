@@ -12,7 +12,7 @@ more under a false assumption. */
 #include <span>
 #include <vector>
 
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/angle.h"
@@ -40,7 +40,7 @@ class Conformance final {
   /** Remembers a certified plan. It replaces a plan of the same plan_id, unless that plan is executing: a guard does
   not accept the plan_id that it executes. @param angles the states that may differ by whole turns: those of the model
   that it was certified with. */
-  void Remember(const certified_plan_v2_t& certified, const Angles& angles = {});
+  void Remember(const certified_plan_t& certified, const Angles& angles = {});
 
   /** Tests a usable state against the slice of the step that it names. If the robot has advanced by one boundary while
   executing, it also tests the state against the slice of the plan that was executing before. Nothing if the state lies
@@ -61,7 +61,7 @@ class Conformance final {
   };
 
   struct Known {
-    certified_plan_v2_t certified;
+    certified_plan_t certified;
     Angles angles;
   };
 

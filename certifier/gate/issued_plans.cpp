@@ -28,7 +28,7 @@ std::int64_t IssuedPlans::LongestLife(int num_steps) const {
   return lifetime_us_ + 2 * delay_us_ + num_steps * step_us_;
 }
 
-void IssuedPlans::Add(const certified_plan_v2_t& certified, std::int64_t steady_us) {
+void IssuedPlans::Add(const certified_plan_t& certified, std::int64_t steady_us) {
   while (!issued_.empty() && issued_.front().may_run_until_us < steady_us) issued_.pop_front();
   if (issued_.size() == kPlans) {
     tolerates_until_us_ = std::max(tolerates_until_us_, issued_.front().may_run_until_us);

@@ -12,7 +12,7 @@ as long as such a plan may be executing. */
 #include <optional>
 #include <string>
 
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "task/gate_options.h"
 
@@ -38,7 +38,7 @@ class IssuedPlans final {
   void TolerateFrom(std::int64_t steady_us);
 
   /** Adds a plan that was certified and sent. Cost O(1) on average. */
-  void Add(const certified_plan_v2_t& certified, std::int64_t steady_us);
+  void Add(const certified_plan_t& certified, std::int64_t steady_us);
 
   /** The violation in the robot's report of the plan that it executes. Nothing if it executes none or an allowed one.
   @param state usable and fresh (Gate::CheckRobotState). Cost O(remembered plans), at most about 30 us. */

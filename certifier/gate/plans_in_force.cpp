@@ -69,7 +69,7 @@ void PlansInForce::Follow(const GateOptions& gate) {
 // The messages with its first and its last state may each be delayed.
 std::int64_t PlansInForce::LongestRun(int num_steps) const { return 2 * delay_us_ + num_steps * step_us_; }
 
-void PlansInForce::Add(const certified_plan_v2_t& certified, std::int64_t steady_us) {
+void PlansInForce::Add(const certified_plan_t& certified, std::int64_t steady_us) {
   while (!plans_.empty() && plans_.front().may_run_until_us < steady_us) plans_.pop_front();
   const candidate_plan_t& plan = certified.plan;
   Entry entry;

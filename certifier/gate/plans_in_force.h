@@ -47,7 +47,7 @@ No bus, no clock. Times of a monotonic clock and of the wall clock in microsecon
 #include <string>
 
 #include "certifier/gate/gate.h"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -84,7 +84,7 @@ class PlansInForce final {
   Gate::WhyObstaclesUnknown; empty: they are known. */
   void SeeObstacles(const std::string& why_unknown, std::int64_t steady_us);
   /** Adds a plan that was certified and sent. @pre not IsFull(). Cost: a copy of the candidate. */
-  void Add(const certified_plan_v2_t& certified, std::int64_t steady_us);
+  void Add(const certified_plan_t& certified, std::int64_t steady_us);
   /** Takes a usable state of the robot. Cost O(plans). */
   void SeeRobot(const robot_state_t& state, std::int64_t steady_us);
   /** Takes a usable state of one of two robots that are heard. Nothing leaves. Cost O(plans). */

@@ -28,7 +28,6 @@
 #include "forereach/command_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/obstacles_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -288,7 +287,7 @@ class Campaign final {
   // It executes the plan certified last, from a state outside its slice, by the least or by some metres.
   robot_state_t StateOutside(Rig& rig) {
     robot_state_t state = State(rig);
-    const certified_plan_v2_t& certified = *rig.witness().last_certified();
+    const certified_plan_t& certified = *rig.witness().last_certified();
     const int step = Below(certified.plan.num_steps), k = Below(state.num_states);
     state.mode = robot_state_t::EXECUTING;
     state.executing_plan_id = certified.plan.plan_id;
@@ -335,8 +334,7 @@ class Campaign final {
       const auto& said = rig.witness().fault();
       const auto& status = rig.witness().status();
       return said && said->cause == fault.cause && said->utime == fault.utime &&
-             GetText(said->message) == GetText(fault.message) && status &&
-             status->state == certifier_status_v3_t::FAULT;
+             GetText(said->message) == GetText(fault.message) && status && status->state == certifier_status_t::FAULT;
     };
     Demand(row, rig.ListenUntil(says_it, kStarts), "the next certifier does not say the fault again");
     rig.Listen(milliseconds(1000));
@@ -384,7 +382,7 @@ class Campaign final {
           robot_state_t state = State(rig);
           state.mode = robot_state_t::EXECUTING;
           state.sequence = sequence++;
-          const certified_plan_v2_t& last = *rig.witness().last_certified();
+          const certified_plan_t& last = *rig.witness().last_certified();
           state.executing_plan_id = i % 2 == 0 ? WallClockUs() : last.plan.plan_id;
           state.executing_step = i % 2 == 0 ? 0 : last.plan.num_steps;
           if (i % 2 != 0) std::copy_n(last.slice_lower[last.plan.num_steps], state.num_states, state.state);
@@ -514,7 +512,7 @@ class Campaign final {
     withdrawal_t withdrawal{};
     withdrawal.sequence = kForgedSequence;
     withdrawal.expires_utime = INT64_MAX;
-    if (const certified_plan_v2_t* certified = rig.witness().last_certified())
+    if (const certified_plan_t* certified = rig.witness().last_certified())
       withdrawal.plan_id = certified->plan.plan_id;
     harmful[channels.withdrawn] = Encode(withdrawal);
     advice_t advice{};  // the task asks for none
@@ -525,13 +523,13 @@ class Campaign final {
     nothing_there.utime = WallClockUs();
     nothing_there.sequence = kForgedSequence;
     harmful[channels.obstacles] = Encode(nothing_there);
-    if (const certified_plan_v2_t* certified = rig.witness().last_certified())
+    if (const certified_plan_t* certified = rig.witness().last_certified())
       harmful[channels.certified] = Encode(Widened(*certified));
     return harmful;
   }
 
   // What an attacker's certificate looks like: slices that nothing leaves, for a plan that starts soon.
-  static certified_plan_v2_t Widened(certified_plan_v2_t certified) {
+  static certified_plan_t Widened(certified_plan_t certified) {
     certified.utime = WallClockUs();
     certified.plan.plan_id += std::int64_t{1} << 32;
     certified.plan.start_utime = certified.utime + 200'000;
@@ -575,7 +573,7 @@ class Campaign final {
         row, rig,
         [&](int) {
           rig.Listen(milliseconds(700));
-          const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+          const auto before = rig.witness().status().value_or(certifier_status_t{});
           const std::int64_t obeyed_before = obeyed;
           const auto recorded = heard;
           for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
@@ -642,7 +640,7 @@ class Campaign final {
         [&](int i) {
           const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
           for (int j = 0; j < 20; ++j) {
-            certified_plan_v2_t certified = Widened(*rig.witness().last_certified());
+            certified_plan_t certified = Widened(*rig.witness().last_certified());
             certified.plan.plan_id += j;
             certified.plan.start_utime += 40'000 * j;
             SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
@@ -809,8 +807,8 @@ class Campaign final {
     ObstacleTries("OBSTACLES fall silent", [&](Row& row, Rig& rig, int) { FallSilent(row, rig); });
     ObstacleTries("OBSTACLES with gaps, NaN, wrong counts, from the future (signed)", [&](Row& row, Rig& rig, int i) {
       rig.perception().SetSilent(true);
-      rig.perception().SayNow([](obstacles_v2_t&) { return true; });
-      rig.perception().SayNow([&](obstacles_v2_t& message) {
+      rig.perception().SayNow([](obstacles_t&) { return true; });
+      rig.perception().SayNow([&](obstacles_t& message) {
         switch (i % 5) {
           case 0: return false;  // lost: the next one is a gap
           case 1: message.obstacle[0].shape.point[0][1] = std::numeric_limits<double>::quiet_NaN(); break;
@@ -820,7 +818,7 @@ class Campaign final {
         }
         return true;
       });
-      if (i % 5 == 0) rig.perception().SayNow([](obstacles_v2_t&) { return true; });
+      if (i % 5 == 0) rig.perception().SayNow([](obstacles_t&) { return true; });
       rig.Listen(milliseconds(50));
       DemandUnknown(row, rig, "after a message that was lost or refused");
       rig.perception().SetSilent(false);
@@ -863,9 +861,9 @@ class Campaign final {
   }
 
   // Of a piece of a prediction: each is refused as a whole message.
-  static void Garble(obstacles_v2_t& message, int way) {
+  static void Garble(obstacles_t& message, int way) {
     constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-    obstacle_v2_t& piece = message.obstacle[message.num_obstacles - 1];  // the one that moves
+    obstacle_t& piece = message.obstacle[message.num_obstacles - 1];  // the one that moves
     switch (way) {
       case 0: piece.from_utime = message.utime + 1; return;  // it appears from nowhere
       case 1: piece.from_utime = kMost, piece.until_utime = -kMost; return;
@@ -875,7 +873,7 @@ class Campaign final {
       case 5: piece.uncertainty = std::numeric_limits<double>::infinity(); return;
       case 6: piece.gone = 2; return;
       default:  // a gap between two pieces
-        obstacle_v2_t& next = message.obstacle[message.num_obstacles++];
+        obstacle_t& next = message.obstacle[message.num_obstacles++];
         next = piece;
         piece.until_utime = message.utime + 1'000'000;
         next.from_utime = message.utime + 1'000'001;
@@ -961,7 +959,7 @@ class Campaign final {
     rig.perception().See(with_wall);
     std::int64_t before = 0;
     for (int j = 0; j < 20 && !stopped(); ++j) {
-      rig.perception().SayNow([](obstacles_v2_t& message) {
+      rig.perception().SayNow([](obstacles_t& message) {
         message.utime -= 2'000'000;
         return true;
       });
@@ -1011,7 +1009,7 @@ class Campaign final {
     MovingTries("Moving OBSTACLES fall silent", [&](Row& row, Rig& rig, int, auto&) { FallSilent(row, rig); });
     MovingTries("Moving OBSTACLES come too late (signed)", [&](Row& row, Rig& rig, int, auto&) {
       rig.perception().SetSilent(true);
-      rig.perception().SayNow([](obstacles_v2_t& message) {
+      rig.perception().SayNow([](obstacles_t& message) {
         message.utime -= 600'000;  // gate.max_age_ms is 500
         return true;
       });
@@ -1025,7 +1023,7 @@ class Campaign final {
                   if (i % 9 == 8)
                     rig.bus().Publish(rig.config().bus.obstacles, transition_t{});
                   else
-                    rig.perception().SayNow([&](obstacles_v2_t& message) {
+                    rig.perception().SayNow([&](obstacles_t& message) {
                       Garble(message, i % 9);
                       return true;
                     });
@@ -1034,7 +1032,7 @@ class Campaign final {
                   rig.perception().SetSilent(false);
                 });
     MovingTries("A moving obstacle jumps in front of the robot, and away again", [&](Row&, Rig& rig, int, auto& seen) {
-      const certified_plan_v2_t* plan = rig.witness().last_certified();
+      const certified_plan_t* plan = rig.witness().last_certified();
       const double ahead = plan ? plan->plan.initial_center[0] + 8 + Below(12) : 20;
       const auto jump = [&](const Obstacle& to) {
         const Digest before = ObstaclesDigest(seen);
@@ -1077,7 +1075,7 @@ class Campaign final {
           const std::int64_t before = withdrawn;
           for (int walls = 0; walls < 5 && withdrawn == before; ++walls) {
             rig.Listen(milliseconds(1500));
-            const certified_plan_v2_t* plan = rig.witness().last_certified();
+            const certified_plan_t* plan = rig.witness().last_certified();
             std::vector<Obstacle> walled = seen;
             const double ahead = (plan ? plan->plan.initial_center[0] : 0) + 2 + Below(6);
             walled.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), ahead));
@@ -1169,7 +1167,7 @@ void Campaign::OldMessages() {
         const auto begun = [&] { return rig.witness().status().has_value(); };
         Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
         rig.Listen(kHeartbeat);
-        const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+        const auto before = rig.witness().status().value_or(certifier_status_t{});
         const std::int64_t obeyed_before = obeyed, now = WallClockUs();
         constexpr std::int64_t kHourUs = 3'600'000'000;
         for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
@@ -1264,8 +1262,7 @@ void Campaign::StateDisks() {
       rig.Start(Rig::kCertifier);
       const auto says_so = [&] {
         const auto& status = rig.witness().status();
-        return status && status->level == certifier_status_v3_t::ERROR &&
-               status->state == certifier_status_v3_t::DISARMED &&
+        return status && status->level == certifier_status_t::ERROR && status->state == certifier_status_t::DISARMED &&
                GetText(status->message).starts_with("no fault could be stored");
       };
       Demand(row, rig.ListenUntil(says_so, kStarts), why + ", and the certifier does not say so");
@@ -1453,7 +1450,7 @@ void Campaign::BadReload() {
   Tries(
       row, rig,
       [&](int i) {
-        const certifier_status_v3_t before = *rig.witness().status();
+        const certifier_status_t before = *rig.witness().status();
         const auto& now = rig.witness().status();
         std::ofstream(path) << Spoilt(good, i / 2);
         if (i % 2 == 0)
@@ -1500,7 +1497,7 @@ void Campaign::ReloadOfNoFile(Rig& rig) {
   Tries(
       row, rig,
       [&](int i) {
-        const certifier_status_v3_t before = *rig.witness().status();
+        const certifier_status_t before = *rig.witness().status();
         const auto& now = rig.witness().status();
         PutNoFile(path, i);
         rig.Signal(Rig::kRobot, SIGHUP);

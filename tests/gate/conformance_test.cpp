@@ -11,8 +11,8 @@ namespace forereach {
 namespace conformance_test {
 
 // Slices [t, t + 1] in both coordinates, T = 3.
-certified_plan_v2_t Plan(std::int64_t plan_id) {
-  certified_plan_v2_t plan{};
+certified_plan_t Plan(std::int64_t plan_id) {
+  certified_plan_t plan{};
   plan.plan.plan_id = plan_id;
   plan.plan.num_states = 2;
   plan.plan.num_steps = 3;
@@ -50,7 +50,7 @@ TEST(ConformanceTest, TheSliceIsClosed) {
 TEST(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
   Conformance conformance;
   conformance.Remember(Plan(7));
-  certified_plan_v2_t next = Plan(8);
+  certified_plan_t next = Plan(8);
   next.slice_upper[0][0] = next.slice_upper[0][1] = 9;
   conformance.Remember(next);
   EXPECT_FALSE(conformance.Check(At(0, 7, 0, 0.5, 0.5)));
@@ -188,7 +188,7 @@ TEST(ConformanceTest, StatesAndTransitionsOfTwoSendersAreNotMixed) {
 TEST(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {
   Conformance conformance;
   conformance.Remember(Plan(7));
-  certified_plan_v2_t again = Plan(7);
+  certified_plan_t again = Plan(7);
   again.slice_upper[1][0] = 5;
   EXPECT_FALSE(conformance.Check(At(0, 7, 0, 0.5, 0.5)));
   conformance.Remember(again);

@@ -11,7 +11,7 @@
 #include "certifier/gate/plans_in_force.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "records/event_log.h"
 #include "records/replay.h"
@@ -86,8 +86,7 @@ class WithdrawnReplayTest : public ReplayTest {
     PlansInForce plans(config.gate);
     std::int64_t sequence = 0;
     const auto see = [&](const std::vector<Obstacle>& obstacles) {
-      obstacles_t message = ToMessage(obstacles);
-      message.utime = kNow;
+      obstacles_t message = ToMessage(obstacles, kNow);
       message.sequence = sequence++;
       EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
       log.Append(kNow, config.bus.obstacles, Encode(message));
@@ -235,16 +234,14 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
 // the certifier itself began after them.
 TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
-  Config config = SmallTask();
-  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
-  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
-  on_the_way.utime = kNow;
+  const Config config = SmallTaskOnTheBus();
+  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}, kNow);
   for (const std::int64_t heartbeat : {0, 7}) {
     Gate gate(config);
     if (heartbeat > 0) {
       EXPECT_EQ(gate.UpdateObstacles(Encode(on_the_way), kNow), "");
     }
-    certifier_status_v3_t status{};
+    certifier_status_t status{};
     status.sequence = heartbeat;
     const std::string path = NewLog();
     {
@@ -261,24 +258,22 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
 
 // What was heard before a reload counts after it, beside the task's own.
 TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
-  Config config = SmallTask();
-  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
-  obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
-  far_away.utime = kNow;
+  const Config config = SmallTaskOnTheBus();
+  const obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}, kNow);
   Gate before(config), after(config);
-  certifier_status_v3_t first{}, second{};
+  certifier_status_t first{}, second{};
   second.sequence = 1;
   first.version = 1, second.version = 2;
   const std::string path = NewLog();
   {
     EventLogWriter writer(path);
     writer.Append(kNow, config.bus.status, Encode(first));
-    writer.Append(kNow, config.bus.obstacles, Encode(far_away));
-    EXPECT_EQ(before.UpdateObstacles(Encode(far_away), kNow), "");
-    DecideAndLog(before, Encode(Candidate(1, kAccelerationIntoTheCircle)), decision_t::CERTIFIED, config, writer);
+    DecideAndLog(before, Encode(Candidate(1)), decision_t::CERTIFIED, config, writer);
+    writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
+    EXPECT_EQ(before.UpdateObstacles(Encode(on_the_way), kNow), "");
     after.Inherit(before);
     writer.Append(kNow, config.bus.status, Encode(second));
-    DecideAndLog(after, Encode(Candidate(2, kAccelerationIntoTheCircle)), decision_t::ABSTAIN_SAFETY, config, writer);
+    DecideAndLog(after, Encode(Candidate(2)), decision_t::ABSTAIN_SAFETY, config, writer);
     EXPECT_TRUE(writer.Flush());
   }
   ExpectAgreed(path, config, 2);
@@ -292,9 +287,9 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
   int decided = 0;
   {
     EventLogWriter writer(path);
-    certifier_status_v3_t mine{}, others{};
-    mine.state = certifier_status_v3_t::ARMED, mine.instance = 1;
-    others.state = certifier_status_v3_t::STANDBY, others.instance = 2;
+    certifier_status_t mine{}, others{};
+    mine.state = certifier_status_t::ARMED, mine.instance = 1;
+    others.state = certifier_status_t::STANDBY, others.instance = 2;
     std::int64_t id = 1;
     for (int start = 0; start < 2; ++start) {  // it is killed, and starts again
       Gate gate(config);
@@ -306,8 +301,8 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
                     Encode(gate.Refuse(unknown, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
       for (int i = 0; i < 12; ++i) {
         obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
-                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
-        message.utime = kNow + 100 * start + i;
+                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)},
+                                        kNow + 100 * start + i);
         message.sequence = 20 * start + i;
         writer.Append(kNow, config.bus.obstacles, Encode(message));
         EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
@@ -335,14 +330,14 @@ TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
   const std::string path = NewLog();
   {
     EventLogWriter writer(path);
-    certifier_status_v3_t status{};
-    status.state = certifier_status_v3_t::ARMED;
+    certifier_status_t status{};
+    status.state = certifier_status_t::ARMED;
     Gate gate(config);
     writer.Append(kNow, config.bus.status, Encode(status));
     for (int i = 0; i < 6; ++i) {
       const bool is_late = i % 2 == 0;
-      obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)});
-      message.utime = kNow - (is_late ? 30'001 : 30'000);
+      obstacles_t message =
+          ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)}, kNow - (is_late ? 30'001 : 30'000));
       message.sequence = i;
       writer.Append(kNow, config.bus.obstacles, Encode(message));
       EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
@@ -364,28 +359,26 @@ TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
   EXPECT_EQ(result.circumstances, 3);
 }
 
-// Each message has other stamps; the sender changes its type between them.
+// Each message has other stamps; in some of them nothing moves.
 TEST_F(ReplayTest, AgreesOnARunWithMovingObstacles) {
   Config config = SmallTaskOnTheBus();
   config.gate.max_clock_error_ms = 20;
   const std::string path = NewLog();
   {
     EventLogWriter writer(path);
-    certifier_status_v3_t status{};
-    status.state = certifier_status_v3_t::ARMED;
+    certifier_status_t status{};
+    status.state = certifier_status_t::ARMED;
     Gate gate(config);
     writer.Append(kNow, config.bus.status, Encode(status));
     for (int i = 0; i < 12; ++i) {
       ObstacleMotion motion;
       motion.stamp_us = kNow - 12 + i;
       motion.velocity.y() = -1;
-      const bool is_met = i % 3 == 1, is_old_type = i % 3 == 2;
-      const std::vector<Obstacle> seen{Obstacle::Circle(Eigen::Vector2d(0.75, is_met ? 1.25 : 5), 0.2)};
-      obstacles_v2_t moving = ToMessageV2({seen[0].Moving(motion)}, kNow + i);
-      obstacles_t standing = ToMessage(seen);
-      standing.utime = kNow + i;
-      moving.sequence = standing.sequence = i;
-      const std::vector<std::uint8_t> bytes = is_old_type ? Encode(standing) : Encode(moving);
+      const bool is_met = i % 3 == 1, stands = i % 3 == 2;
+      const Obstacle seen = Obstacle::Circle(Eigen::Vector2d(0.75, is_met ? 1.25 : 5), 0.2);
+      obstacles_t message = ToMessage({stands ? seen : seen.Moving(motion)}, kNow + i);
+      message.sequence = i;
+      const std::vector<std::uint8_t> bytes = Encode(message);
       writer.Append(kNow, config.bus.obstacles, bytes);
       EXPECT_EQ(gate.UpdateObstacles(bytes, kNow), "");
       DecideAndLog(gate, Encode(Candidate(i + 1)), is_met ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
