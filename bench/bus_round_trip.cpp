@@ -3,7 +3,7 @@
 // Two processes answer candidates on loopback UDP multicast, each on a port of its own: the certifier's node with its
 // gate, and an echo that sends messages of the same sizes back without looking at what came. This process asks one,
 // then the other, and so on, so both see the same machine. Two questions: a plan that is certified (the answer is
-// decision_t and certified_plan_v2_t) and one that is not (decision_t alone).
+// decision_t and certified_plan_t) and one that is not (decision_t alone).
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -55,7 +55,7 @@ class EchoNode final : public Node {
   Bus& bus_;
   const bool certifies_;
   std::vector<std::vector<std::uint8_t>> waiting_;
-  const std::vector<std::uint8_t> certified_ = Encode(certified_plan_v2_t{}), decision_ = Encode(decision_t{});
+  const std::vector<std::uint8_t> certified_ = Encode(certified_plan_t{}), decision_ = Encode(decision_t{});
 };
 
 using MakeNode = std::function<std::unique_ptr<Node>(Bus& bus)>;
@@ -206,7 +206,7 @@ int main(int argc, char** argv) {
     const nlohmann::json abstained = Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2);
     std::cout << nlohmann::json{{"candidate_bytes", EncodedSize<candidate_plan_t>()},
                                 {"decision_bytes", EncodedSize<decision_t>()},
-                                {"certified_bytes", EncodedSize<certified_plan_v2_t>()},
+                                {"certified_bytes", EncodedSize<certified_plan_t>()},
                                 {"certified", certified},
                                 {"abstained", abstained}}
                      .dump(2)

@@ -68,7 +68,7 @@ void RunDigest(State& state) {
 }
 
 void RunCertificateDigest(State& state) {
-  certified_plan_v2_t certified{};
+  certified_plan_t certified{};
   certified.plan = MakeCandidate(TaskFor(decision_t::CERTIFIED));
   for (auto _ : state) benchmark::DoNotOptimize(CertificateDigest(certified));
 }
@@ -136,20 +136,20 @@ BENCHMARK(RunDecode)->Name("gate/decode_candidate");
 BENCHMARK(RunDigest)->Name("gate/digest_candidate");
 BENCHMARK(RunCertificateDigest)->Name("gate/certificate_digest");
 BENCHMARK_TEMPLATE(RunEncode, decision_t)->Name("gate/encode_decision");
-BENCHMARK_TEMPLATE(RunEncode, certified_plan_v2_t)->Name("gate/encode_certified");
+BENCHMARK_TEMPLATE(RunEncode, certified_plan_t)->Name("gate/encode_certified");
 BENCHMARK_TEMPLATE(RunSign, candidate_plan_t)->Name("gate/sign_candidate");
 BENCHMARK_TEMPLATE(RunCheck, candidate_plan_t)->Name("gate/check_candidate");
-BENCHMARK_TEMPLATE(RunSign, certified_plan_v2_t)->Name("gate/sign_certified");
-BENCHMARK_TEMPLATE(RunCheck, certified_plan_v2_t)->Name("gate/check_certified");
+BENCHMARK_TEMPLATE(RunSign, certified_plan_t)->Name("gate/sign_certified");
+BENCHMARK_TEMPLATE(RunCheck, certified_plan_t)->Name("gate/check_certified");
 BENCHMARK_TEMPLATE(RunFullCheck, candidate_plan_t)->Name("gate/full_check_candidate");
-BENCHMARK_TEMPLATE(RunFullCheck, certified_plan_v2_t)->Name("gate/full_check_certified");
+BENCHMARK_TEMPLATE(RunFullCheck, certified_plan_t)->Name("gate/full_check_certified");
 BENCHMARK_CAPTURE(RunRefuse, forged, Flood::kForgedTag, EncodedSize<candidate_plan_t>())
     ->Name("gate/check_forged_candidate");
 BENCHMARK_CAPTURE(RunRefuse, replayed, Flood::kReplayed, EncodedSize<candidate_plan_t>())
     ->Name("gate/check_replayed_candidate");
 BENCHMARK_CAPTURE(RunRefuse, foreign, Flood::kForeign, EncodedSize<candidate_plan_t>())
     ->Name("gate/check_foreign_candidate");
-BENCHMARK_CAPTURE(RunRefuse, forged_large, Flood::kForgedTag, EncodedSize<certified_plan_v2_t>())
+BENCHMARK_CAPTURE(RunRefuse, forged_large, Flood::kForgedTag, EncodedSize<certified_plan_t>())
     ->Name("gate/check_forged_certified");
 
 }  // namespace

@@ -47,7 +47,7 @@ class Treadmill final : public Node, private Supervisor::Robot {
                                .step_us = kPeriodUs}},
                     *this) {
     bus.Subscribe(config.bus.certified, [this](const Received& received) {
-      if (const auto certified = Decoded<certified_plan_v2_t>(received.bytes)) plan_ = *certified;
+      if (const auto certified = Decoded<certified_plan_t>(received.bytes)) plan_ = *certified;
       supervisor_.OnCertified(received.raw, received.utime);
     });
     bus.Subscribe(config.bus.withdrawn,
@@ -73,7 +73,7 @@ class Treadmill final : public Node, private Supervisor::Robot {
 
   Bus& bus_;
   std::vector<double> state_;
-  certified_plan_v2_t plan_{};
+  certified_plan_t plan_{};
   int step_ = 0;
   std::int64_t next_ = 0;
   Supervisor supervisor_;
@@ -150,8 +150,7 @@ class Driver {
 
  private:
   void See(const Task& task) {
-    obstacles_t message = ToMessage(task.obstacles);
-    message.utime = WallClockUs();
+    obstacles_t message = ToMessage(task.obstacles, WallClockUs());
     message.sequence = obstacles_++;
     bus_->Publish(channels_.obstacles, message);
   }

@@ -266,8 +266,6 @@ struct KeyFile {
 KeyFile Parse(const std::string& path, std::string_view text) {
   LineReader reader(path, text);
   const std::string_view format = reader.Line();
-  if (format.starts_with("forereach-key-1 "))
-    reader.Complain("is a key of an older format, which all roles shared; `forereach keygen` makes new ones");
   if (format != kKeyFormat && format != kVerifyFormat)
     reader.Complain("has to be " + std::string(kKeyFormat) + " or " + std::string(kVerifyFormat) +
                     "; `forereach keygen` makes keys");

@@ -12,7 +12,7 @@
 #include "bus/keys.h"
 #include "bus/process.h"
 #include "cli/commands.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/command_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
@@ -45,12 +45,12 @@ class CertifierConnection final {
       const Bytes message = channels_.keys ? received.bytes : WithoutSignature(received.raw);
       if (!channels_.keys && message.size() < received.raw.size() && !std::exchange(warned_, true))
         std::cerr << "forereach: warning: the heartbeat is signed; --key checks by whom" << std::endl;
-      if (const auto status = Decoded<certifier_status_v3_t>(message)) heard_.push_back(*status);
+      if (const auto status = Decoded<certifier_status_t>(message)) heard_.push_back(*status);
     });
   }
 
   // The first heartbeat from now on that `passes` accepts, or nothing.
-  std::optional<certifier_status_v3_t> Await(const std::function<bool(const certifier_status_v3_t&)>& passes) {
+  std::optional<certifier_status_t> Await(const std::function<bool(const certifier_status_t&)>& passes) {
     const std::int64_t end = SteadyClockUs() + kPatienceMs * 1000;
     for (heard_.clear(); SteadyClockUs() < end; bus_->Dispatch(50)) {
       const auto found = std::ranges::find_if(heard_, passes);
@@ -59,7 +59,7 @@ class CertifierConnection final {
     return std::nullopt;
   }
   // A heartbeat of the certifier in charge; if none arrives, of any certifier.
-  std::optional<certifier_status_v3_t> Await() {
+  std::optional<certifier_status_t> Await() {
     if (auto status = Await(IsInCharge)) return status;
     return heard_.empty() ? std::nullopt : std::optional(heard_.back());
   }
@@ -70,11 +70,11 @@ class CertifierConnection final {
  private:
   BusOptions channels_;
   std::unique_ptr<Bus> bus_;
-  std::vector<certifier_status_v3_t> heard_;
+  std::vector<certifier_status_t> heard_;
   bool warned_ = false;
 };
 
-void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
+void Print(const certifier_status_t& status, bool json, bool is_signed) {
   if (json) {
     std::cout << JsonText(ToJson(status, is_signed)) << std::endl;
     return;
@@ -82,9 +82,9 @@ void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
   if (const std::string message = GetText(status.message); !message.empty()) std::cout << ": " << message;
   if (status.fault != 0) std::cout << "\nwhat to do: " << FaultAdvice(status.fault);
-  if (status.latch == certifier_status_v3_t::LATCH_WRITTEN)
+  if (status.latch == certifier_status_t::LATCH_WRITTEN)
     std::cout << "\nthe fault is on disk: a restart does not clear it";
-  if (status.latch == certifier_status_v3_t::LATCH_UNWRITABLE)
+  if (status.latch == certifier_status_t::LATCH_UNWRITABLE)
     std::cout << "\ngate.state cannot be used: a fault is not on disk";
   std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these "
             << status.learned << " learned; " << status.candidates << " candidates:";
@@ -92,8 +92,7 @@ void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
     if (status.by_outcome[i] > 0) std::cout << " " << status.by_outcome[i] << " " << OutcomeName(i);
   std::cout << "\n"
             << status.obstacles_in_force << " obstacles in force, from the "
-            << (status.obstacles_source == certifier_status_v3_t::OBSTACLES_BUS ? "task file and the bus"
-                                                                                : "task file");
+            << (status.obstacles_source == certifier_status_t::OBSTACLES_BUS ? "task file and the bus" : "task file");
   if (status.obstacles_age_us >= 0)
     std::cout << "; the last message is " << status.obstacles_age_us / 1000 << " ms old";
   if (!status.obstacles_known) std::cout << "; not all are known";
@@ -111,7 +110,7 @@ int ShowStatus(const CommandArguments& options) {
   const auto status = certifier.Await();
   if (!status) return NoCertifierAnswers(certifier.channels());
   Print(*status, options.json, certifier.channels().keys.has_value());
-  return status->level == certifier_status_v3_t::OK ? 0 : 1;
+  return status->level == certifier_status_t::OK ? 0 : 1;
 }
 
 // Sends a command, and shows the heartbeat that answers it.
@@ -124,10 +123,10 @@ int Send(const CommandArguments& options, std::int16_t kind) {
   command.kind = kind;
   SetText(command.source, "forereach");
   certifier.Send(command);
-  const auto refused = [](const certifier_status_v3_t& status) {
+  const auto refused = [](const certifier_status_t& status) {
     return status.messages_refused + status.refused_unsigned + status.refused_forged + status.refused_replayed;
   };
-  const auto after = certifier.Await([&](const certifier_status_v3_t& status) {
+  const auto after = certifier.Await([&](const certifier_status_t& status) {
     if (status.instance != before->instance) return false;
     if (refused(status) > refused(*before)) return true;
     return kind == command_t::RESET
@@ -137,7 +136,7 @@ int Send(const CommandArguments& options, std::int16_t kind) {
   if (!after) return NoCertifierAnswers(certifier.channels());
   Print(*after, options.json, certifier.channels().keys.has_value());
   const bool done =
-      kind == command_t::RESET ? after->state != certifier_status_v3_t::FAULT : after->version > before->version;
+      kind == command_t::RESET ? after->state != certifier_status_t::FAULT : after->version > before->version;
   if (!done && refused(*after) > refused(*before))
     std::cerr << "forereach: the certifier refused the command; is it signed with the operator's key (--key)?"
               << std::endl;

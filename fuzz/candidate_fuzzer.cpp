@@ -42,7 +42,7 @@ bool IsProper(const candidate_plan_t& plan) {
 }
 
 // What rounds where the run is computed is far below this; a slice is as exact as its rounding outward.
-void RequireNominalRunInside(const certified_plan_v2_t& certified, const NominalModel& model) {
+void RequireNominalRunInside(const certified_plan_t& certified, const NominalModel& model) {
   constexpr double kSlack = 1e-9;
   const candidate_plan_t& plan = certified.plan;
   double z[6], next[4];
@@ -58,7 +58,7 @@ void RequireNominalRunInside(const certified_plan_v2_t& certified, const Nominal
 }
 
 // Of obstacles that stand, too.
-void RequireNominalRunClear(const certified_plan_v2_t& certified, const Config& task) {
+void RequireNominalRunClear(const certified_plan_t& certified, const Config& task) {
   if (!task.gate.max_clock_error_ms) return;
   const candidate_plan_t& plan = certified.plan;
   Require(1 <= plan.step_us && plan.step_us <= 150'000);
@@ -77,7 +77,7 @@ void RequireNominalRunClear(const certified_plan_v2_t& certified, const Config& 
 }
 
 void RequireCertificate(const GateAnswer& answer, Bytes bytes, const Config& task) {
-  const certified_plan_v2_t& certified = *answer.certified;
+  const certified_plan_t& certified = *answer.certified;
   Require(answer.decision.outcome == decision_t::CERTIFIED && answer.decision.cause == decision_t::CAUSE_NONE);
   Require(Encode(certified.plan) == std::vector(bytes.begin(), bytes.end()) && IsProper(certified.plan));
   Require(FindSealFaults(certified).empty());

@@ -26,7 +26,7 @@ class WitnessBus final : public Bus {
   bool Publish(const std::string& channel, Bytes bytes) override {
     if (channel == "PLAN_CERTIFIED") {
       Require(!certified_ && may_certify);
-      certified_ = Decoded<certified_plan_v2_t>(bytes);
+      certified_ = Decoded<certified_plan_t>(bytes);
       Require(certified_ && FindSealFaults(*certified_).empty());
       has_certified = true;
       standing_[GetDigest(certified_->certificate_digest)] = certified_->plan.num_steps + 1;
@@ -88,7 +88,7 @@ class WitnessBus final : public Bus {
   std::int64_t withdrawals_ = 0, advices_ = 0;
   std::optional<Digest> abstained_;  // the plan of the last decision, if it may be advised on
   std::map<Digest, int> unanswered_;
-  std::optional<certified_plan_v2_t> certified_;
+  std::optional<certified_plan_t> certified_;
 };
 
 command_t Command(std::int64_t now) {

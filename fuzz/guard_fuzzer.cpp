@@ -31,7 +31,7 @@ GuardOptions Options(bool with_key) {
 }
 
 // Makes something of it odd that a guard looks at.
-void Distort(FuzzedDataProvider& input, certified_plan_v2_t& certified) {
+void Distort(FuzzedDataProvider& input, certified_plan_t& certified) {
   candidate_plan_t& plan = certified.plan;
   const auto entry = [&](auto& slices) -> double& {
     return slices[input.ConsumeIntegralInRange(0, 4)][input.ConsumeIntegralInRange(0, 2)];
@@ -70,7 +70,7 @@ std::vector<std::uint8_t> AnyPlan(FuzzedDataProvider& input) {
   std::vector<std::uint8_t> bytes = sealed[input.ConsumeIntegralInRange<std::size_t>(0, sealed.size() - 1)];
   Damage(input, bytes);
   if (!input.ConsumeBool()) return bytes;
-  auto plan = Decoded<certified_plan_v2_t>(bytes);
+  auto plan = Decoded<certified_plan_t>(bytes);
   if (!plan) return bytes;
   for (int left = NumOdd(input); left > 0; --left) Distort(input, *plan);
   return Sealed(*plan);
@@ -119,7 +119,7 @@ class Session final {
   [[nodiscard]] int NumSteps() const { return guard_.executing() ? guard_.executing()->plan.num_steps : 0; }
 
   // Whatever has been learned.
-  static bool RestOnTheSame(certified_plan_v2_t one, const certified_plan_v2_t& other) {
+  static bool RestOnTheSame(certified_plan_t one, const certified_plan_t& other) {
     SetDigest(one.observations_digest, GetDigest(other.observations_digest));
     return GroundsOf(one) == GroundsOf(other) &&
            GetDigest(one.transitions_digest) == GetDigest(other.transitions_digest);
@@ -127,7 +127,7 @@ class Session final {
 
   // Of a plan that AnyPlan may have made, by its certificate or by its id alone.
   void Withdraw(FuzzedDataProvider& input) {
-    certified_plan_v2_t plan = SmallPlan(input.ConsumeIntegralInRange(1, 8));
+    certified_plan_t plan = SmallPlan(input.ConsumeIntegralInRange(1, 8));
     Seal(plan);
     withdrawal_t message{};
     message.plan_id = plan.plan.plan_id;
@@ -176,7 +176,7 @@ class Session final {
     const GuardVerdict verdict = guard_.Accept(message_.bytes, now);
     Require(verdict.ok() == verdict.message.empty() && verdict.cause != GuardCause::kInternalError);
     if (!verdict.ok()) return;
-    const certified_plan_v2_t& plan = *guard_.pending();
+    const certified_plan_t& plan = *guard_.pending();
     Require(!was_halted && message_.is_signed == with_key_);
     const Bytes inside = WithoutSignature(message_.bytes);
     Require(Encode(plan) == std::vector(inside.begin(), inside.end()) && FindSealFaults(plan).empty());
@@ -188,7 +188,7 @@ class Session final {
     if (with_key_) RequireInDomain(plan);
   }
 
-  static void RequireInDomain(const certified_plan_v2_t& plan) {
+  static void RequireInDomain(const certified_plan_t& plan) {
     for (int t = 0; t < plan.plan.num_steps; ++t) {
       Require(std::abs(plan.plan.control[t][0]) <= 3);
       Require(-12 <= plan.slice_lower[t][0] && plan.slice_upper[t][0] <= 12);
@@ -196,7 +196,7 @@ class Session final {
     }
   }
 
-  static void RequireSane(const certified_plan_v2_t& plan) {
+  static void RequireSane(const certified_plan_t& plan) {
     Require(plan.plan.num_states == 2 && plan.plan.num_inputs == 1 && 1 <= plan.plan.num_steps &&
             plan.plan.num_steps <= 128);
     for (int t = 0; t < plan.plan.num_steps; ++t) Require(std::isfinite(plan.plan.control[t][0]));
@@ -210,7 +210,7 @@ class Session final {
     const std::vector<double> state = State(input);
     const std::int64_t now = AnyInteger(input, kStart, 2 * kStepUs);
     if (!guard_.TryStart(boundary, now, state).ok()) return;
-    const certified_plan_v2_t* plan = guard_.executing();
+    const certified_plan_t* plan = guard_.executing();
     Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 &&
             now <= plan->expires_utime);
     RequireInSlice(*plan, 0, state);
@@ -232,14 +232,14 @@ class Session final {
     has_executed_ = true;
   }
 
-  static void RequireInSlice(const certified_plan_v2_t& plan, int step, const std::vector<double>& state) {
+  static void RequireInSlice(const certified_plan_t& plan, int step, const std::vector<double>& state) {
     Require(state.size() == 2 && step <= plan.plan.num_steps);
     for (std::size_t k = 0; k < 2; ++k)
       Require(plan.slice_lower[step][k] <= state[k] && state[k] <= plan.slice_upper[step][k]);
   }
 
   // In wider arithmetic. No time is later than the last one of 64 bits.
-  static bool IsOnTime(const certified_plan_v2_t& plan, int step, std::int64_t now) {
+  static bool IsOnTime(const certified_plan_t& plan, int step, std::int64_t now) {
     const __int128 due = plan.plan.start_utime + static_cast<__int128>(step) * plan.plan.step_us;
     const __int128 late = now - std::min<__int128>(due, INT64_MAX);
     return -kJitterUs <= late && late <= kJitterUs;

@@ -7,13 +7,13 @@
 
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -58,8 +58,8 @@ std::vector<std::uint8_t> DamagedOneOf(FuzzedDataProvider& input) {
 bool Try(Bytes data) {
   FuzzedDataProvider input(data.data(), data.size());
   const auto bytes =
-      DamagedOneOf<decision_t, candidate_plan_t, certified_plan_v2_t, certifier_status_v3_t, execution_event_t, fault_t,
-                   logger_status_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t, advice_t>(input);
+      DamagedOneOf<decision_t, candidate_plan_t, certified_plan_t, certifier_status_t, execution_event_t, fault_t,
+                   logger_status_t, obstacles_t, robot_state_t, transition_t, withdrawal_t, advice_t>(input);
   const std::optional<MessageJson> made = ToJsonMessage(bytes);
   const std::optional<MessageSummary> summary = Summarize(bytes);
   Require(made.has_value() == summary.has_value());

@@ -38,40 +38,43 @@ inline transition_t Transition(FuzzedDataProvider& input, std::int64_t now) {
   return transition;
 }
 
-inline obstacle_t AnyObstacle(FuzzedDataProvider& input) {
-  obstacle_t obstacle{};
-  obstacle.kind = input.ConsumeIntegralInRange<std::int16_t>(0, 5);
-  obstacle.dimension = input.ConsumeIntegralInRange<std::int16_t>(1, 3);
-  obstacle.num_points = input.ConsumeIntegralInRange<std::int16_t>(0, 16);
-  obstacle.value = AnyNumber(input);
-  for (int p = 0; p < obstacle.num_points; ++p)
-    for (double& coordinate : obstacle.point[p]) coordinate = AnyNumber(input);
-  return obstacle;
+inline obstacle_shape_t AnyShape(FuzzedDataProvider& input) {
+  obstacle_shape_t shape{};
+  shape.kind = input.ConsumeIntegralInRange<std::int16_t>(0, 5);
+  shape.dimension = input.ConsumeIntegralInRange<std::int16_t>(1, 3);
+  shape.num_points = input.ConsumeIntegralInRange<std::int16_t>(0, 16);
+  shape.value = AnyNumber(input);
+  for (int p = 0; p < shape.num_points; ++p)
+    for (double& coordinate : shape.point[p]) coordinate = AnyNumber(input);
+  return shape;
 }
 
 inline obstacles_t AnyObstacles(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {
-  obstacles_t obstacles = ToMessage({Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)});
-  obstacles.utime = now;
-  obstacles.sequence = AnyInteger(input, sequence, 8);
-  if (!input.ConsumeBool()) return obstacles;
-  obstacles.num_obstacles = input.ConsumeIntegralInRange<std::int16_t>(-1, 4);
-  for (int i = 0; i < obstacles.num_obstacles; ++i) obstacles.obstacle[i] = AnyObstacle(input);
-  return obstacles;
-}
-
-// Windows of one track in reach of the plan; garbage as asked.
-inline obstacles_v2_t AnyMoving(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {
-  ObstacleMotion motion;
-  motion.stamp_us = now;
-  motion.velocity.y() = 0.1;
-  const Obstacle circle = Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5);
-  obstacles_v2_t obstacles = ToMessageV2({circle.Moving(motion)}, now);
+  obstacles_t obstacles = ToMessage({Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)}, now);
   obstacles.sequence = AnyInteger(input, sequence, 8);
   if (!input.ConsumeBool()) return obstacles;
   obstacles.num_obstacles = input.ConsumeIntegralInRange<std::int16_t>(-1, 4);
   for (int i = 0; i < obstacles.num_obstacles; ++i) {
-    obstacle_v2_t& piece = obstacles.obstacle[i];
-    piece.shape = input.ConsumeBool() ? AnyObstacle(input) : obstacles.obstacle[0].shape;
+    obstacles.obstacle[i] = obstacles.obstacle[0];
+    obstacles.obstacle[i].track = i;
+    obstacles.obstacle[i].shape = AnyShape(input);
+  }
+  return obstacles;
+}
+
+// Windows of one track in reach of the plan; garbage as asked.
+inline obstacles_t AnyMoving(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {
+  ObstacleMotion motion;
+  motion.stamp_us = now;
+  motion.velocity.y() = 0.1;
+  const Obstacle circle = Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5);
+  obstacles_t obstacles = ToMessage({circle.Moving(motion)}, now);
+  obstacles.sequence = AnyInteger(input, sequence, 8);
+  if (!input.ConsumeBool()) return obstacles;
+  obstacles.num_obstacles = input.ConsumeIntegralInRange<std::int16_t>(-1, 4);
+  for (int i = 0; i < obstacles.num_obstacles; ++i) {
+    obstacle_t& piece = obstacles.obstacle[i];
+    piece.shape = input.ConsumeBool() ? AnyShape(input) : obstacles.obstacle[0].shape;
     piece.track = AnySmall(input, 2);
     piece.utime = AnyInteger(input, now, 1'000'000);
     piece.from_utime = AnyInteger(input, now, 1'000'000);

@@ -6,7 +6,7 @@
 
 #include "bus/log.h"
 #include "certifier/gate/gate.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -76,7 +76,7 @@ class Session final {
     switch (input.ConsumeIntegralInRange(0, 3)) {
       case 0: return Take("FAULT", Damaged(input, fault_t{}));
       case 1: return Take("PLAN_WITHDRAWN", Damaged(input, withdrawal_t{}));
-      case 2: return Take("CERTIFIER_STATUS", Damaged(input, certifier_status_v3_t{}));
+      case 2: return Take("CERTIFIER_STATUS", Damaged(input, certifier_status_t{}));
       case 3: return Take("LOGGER_STATUS", Damaged(input, logger_status_t{}));
     }
   }

@@ -31,7 +31,7 @@ inline constexpr std::array<NamedDigest, 5> kGrounds{{{"config", &Grounds::confi
                                                       {"observations", &Grounds::observations},
                                                       {"obstacles", &Grounds::obstacles}}};
 
-/** Of a message with the five fields: decision_t, certified_plan_v2_t, a certifier's heartbeat. */
+/** Of a message with the five fields: decision_t, certified_plan_t, a certifier's heartbeat. */
 template <class Message>
 [[nodiscard]] Grounds GroundsOf(const Message& message) {
   return {GetDigest(message.config_digest), GetDigest(message.model_digest), GetDigest(message.declaration_digest),

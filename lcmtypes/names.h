@@ -8,6 +8,8 @@
 
 namespace forereach {
 
+class certifier_status_t;
+
 /** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline",
 "abstain_obstacles"; "unknown" for any other number. */
 [[nodiscard]] std::string_view OutcomeName(std::int16_t outcome);
@@ -28,23 +30,26 @@ help. */
 /** True for faults that invalidate the executing plan's certificate: a robot stops. */
 [[nodiscard]] bool StopsTheRobot(std::int16_t cause);
 
+/** Whether the sender of a heartbeat decides: it neither listens for another certifier nor stands by. */
+[[nodiscard]] bool IsInCharge(const certifier_status_t& status);
+
 /** "falsified", "obstacle", ... as withdrawal_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view WithdrawalName(std::int16_t cause);
 
 /** "obstacle", "limit", "domain": the kind of advice_change_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view AdviceName(std::int16_t kind);
 
-/** "OK", "STALE", "ERROR": the level of certifier_status_v3_t; "unknown" for any other number. */
+/** "OK", "STALE", "ERROR": the level of certifier_status_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LevelName(std::int16_t level);
 
-/** "disarmed", "armed", "fault", "listening", "standby": the state of certifier_status_v3_t; "unknown" for any other
+/** "disarmed", "armed", "fault", "listening", "standby": the state of certifier_status_t; "unknown" for any other
 number. */
 [[nodiscard]] std::string_view StateName(std::int16_t state);
 
-/** "none", "written", "unwritable": the latch of certifier_status_v3_t; "unknown" for any other number. */
+/** "none", "written", "unwritable": the latch of certifier_status_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LatchName(std::int16_t latch);
 
-/** "task", "bus": the obstacles_source of certifier_status_v3_t; "unknown" for any other number. */
+/** "task", "bus": the obstacles_source of certifier_status_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view ObstaclesSourceName(std::int16_t source);
 
 }  // namespace forereach

@@ -8,7 +8,7 @@
 namespace forereach {
 namespace {
 
-using Slices = decltype(certified_plan_v2_t::slice_lower);
+using Slices = decltype(certified_plan_t::slice_lower);
 constexpr int kSlices = std::extent_v<Slices, 0>, kStates = std::extent_v<Slices, 1>;
 
 // Entries [t][k] with t < slices and k < states.
@@ -35,13 +35,15 @@ std::optional<SealFault> FindUnusedEntry(const char* name, const Slices& slices,
   return std::nullopt;
 }
 
-template <class Certified>
-Digest DigestOfSealed(const Certified& certified) {
+}  // namespace
+
+Digest CertificateDigest(const certified_plan_t& certified) {
   const InUse in_use = InUseBy(certified.plan);
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(EncodedSize<Certified>());
+  bytes.reserve(EncodedSize<certified_plan_t>());
   const auto append = [&bytes](const auto& part) { bytes.insert(bytes.end(), std::begin(part), std::end(part)); };
-  for (const std::int64_t number : {Certified::getHash(), certified.utime, certified.sequence, certified.expires_utime})
+  for (const std::int64_t number :
+       {certified_plan_t::getHash(), certified.utime, certified.sequence, certified.expires_utime})
     append(BigEndian(number));
   for (const Slices* slices : {&certified.slice_lower, &certified.slice_upper})
     for (int t = 0; t < in_use.slices; ++t)
@@ -52,12 +54,11 @@ Digest DigestOfSealed(const Certified& certified) {
   append(certified.declaration_digest);
   append(certified.observations_digest);
   append(certified.obstacles_digest);
-  if constexpr (requires { certified.transitions_digest; }) append(certified.transitions_digest);
+  append(certified.transitions_digest);
   return DigestOf(bytes);
 }
 
-template <class Certified>
-std::vector<SealFault> FaultsOf(const Certified& certified) {
+std::vector<SealFault> FindSealFaults(const certified_plan_t& certified) {
   std::vector<SealFault> faults;
   const auto hold = [&](SealFault::Kind kind, const char* field, const Digest& expected, const Digest& found) {
     if (expected != found) faults.push_back({kind, field, ToHex(expected), ToHex(found)});
@@ -71,13 +72,5 @@ std::vector<SealFault> FaultsOf(const Certified& certified) {
   if (unused) faults.push_back(*std::move(unused));
   return faults;
 }
-
-}  // namespace
-
-Digest CertificateDigest(const certified_plan_v2_t& certified) { return DigestOfSealed(certified); }
-Digest CertificateDigest(const certified_plan_t& certified) { return DigestOfSealed(certified); }
-
-std::vector<SealFault> FindSealFaults(const certified_plan_v2_t& certified) { return FaultsOf(certified); }
-std::vector<SealFault> FindSealFaults(const certified_plan_t& certified) { return FaultsOf(certified); }
 
 }  // namespace forereach

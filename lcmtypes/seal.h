@@ -15,14 +15,11 @@ The seal detects damage and mix-ups. It is not a signature: every writer of a me
 #include <vector>
 
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
 
 /** The correct value of `certificate_digest`. Cost: a digest of 256 bytes, plus 16 bytes for each slice and state. */
-[[nodiscard]] Digest CertificateDigest(const certified_plan_v2_t& certified);
-/** Of a recorded log: the same without `transitions_digest`, which the type has not. */
 [[nodiscard]] Digest CertificateDigest(const certified_plan_t& certified);
 
 /** A violation of a seal. */
@@ -38,7 +35,6 @@ struct SealFault {
 
 /** All violations, at most one of each kind, in the order of kinds. Empty if the seal holds. Call it before any use of
 a certified plan. Cost: two digests, and a test of every slice entry. */
-[[nodiscard]] std::vector<SealFault> FindSealFaults(const certified_plan_v2_t& certified);
 [[nodiscard]] std::vector<SealFault> FindSealFaults(const certified_plan_t& certified);
 
 }  // namespace forereach

@@ -9,7 +9,8 @@
 
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/certify/explain.h"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -159,7 +160,7 @@ bool Watcher::TakeMessage(const LogEvent& event) {
     return true;
   }
   if (event.channel == channels.certified) {
-    const auto certified = Decoded<certified_plan_v2_t>(event.message());
+    const auto certified = Decoded<certified_plan_t>(event.message());
     if (!certified) return false;
     certificates_.Add(GetDigest(certified->plan_digest), Copy(event.message()));
     return true;
@@ -205,7 +206,7 @@ bool Watcher::TakeState(const LogEvent& event) {
 }
 
 bool Watcher::TakeStatus(const LogEvent& event) {
-  const auto status = Decoded<certifier_status_v3_t>(event.message());
+  const auto status = Decoded<certifier_status_t>(event.message());
   if (!status) return false;
   const bool keeps = status_ && IsInCharge(status_->second) && event.utime - status_->first < kForgetsAfterUs;
   if (!IsInCharge(*status) && keeps) return true;  // another one stands by
@@ -330,7 +331,7 @@ void Watcher::Draw(const Decided& decided, PageDetail& detail) {
 
 // The interval hulls of a certificate, in the plane.
 void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
-  const auto certified = decided.certificate ? Decoded<certified_plan_v2_t>(*decided.certificate) : std::nullopt;
+  const auto certified = decided.certificate ? Decoded<certified_plan_t>(*decided.certificate) : std::nullopt;
   const Eigen::MatrixXd& projection = task_.problem->projection;
   if (!certified || projection.rows() != 2 || !HasSizes(certified->plan, *task_.problem->model)) return;
   std::vector<std::vector<Picture::Polygon>> units;

@@ -26,7 +26,7 @@ certificate. */
 #include <nlohmann/json_fwd.hpp>
 
 #include "certifier/gate/obstacles_in_force.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/certify/certifier.h"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
@@ -138,7 +138,7 @@ class Watcher final {
   std::vector<Decided> decided_;  // since the last tick
   std::int64_t skipped_ = 0;      // decisions of one tick that were too many to be shown
   std::deque<std::pair<std::int64_t, std::int64_t>> faults_, withdrawals_;  // which are repeated
-  std::optional<std::pair<std::int64_t, certifier_status_v3_t>> status_;    // and when it arrived
+  std::optional<std::pair<std::int64_t, certifier_status_t>> status_;       // and when it arrived
   std::optional<std::pair<std::int64_t, logger_status_t>> logger_;
   std::optional<std::pair<std::int64_t, robot_state_t>> state_;
   std::unique_ptr<Tube> tube_;

@@ -9,7 +9,8 @@
 
 #include "bus/bus_options.h"
 #include "bus/log.h"
-#include "lcmtypes/heartbeat.h"
+#include "forereach/certifier_status_t.hpp"
+#include "lcmtypes/names.h"
 
 namespace forereach {
 namespace {
@@ -260,9 +261,9 @@ void Recorder::KeepTasks() const {
 // A reload may change the transitions without the task file; then only the version changes.
 void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   if (task_path_.empty() || event.channel != channels_.status) return;
-  const auto heartbeat = ReadHeartbeat(event.message());
-  if (!heartbeat || !heartbeat->in_charge) return;
-  const std::pair heard{heartbeat->config_digest, heartbeat->version};
+  const auto heartbeat = Decoded<certifier_status_t>(event.message());
+  if (!heartbeat || !IsInCharge(*heartbeat)) return;
+  const std::pair heard{GetDigest(heartbeat->config_digest), heartbeat->version};
   if (heard == heard_task_) return;
   const bool is_first = !heard_task_ && !tasks_.empty() && tasks_.back().digest == heard.first;
   if (!is_first && !task_reading_.IsOver(now_us)) return;

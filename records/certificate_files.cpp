@@ -58,7 +58,7 @@ RecordedCertificate DamagedLog(const std::string& log, std::int64_t places) {
   return {log, {}, fmt::format("the log is damaged in {} places", places), {}};
 }
 
-verifier::Certificate CertificateOf(const certified_plan_v2_t& certified, const std::vector<Obstacle>& obstacles) {
+verifier::Certificate CertificateOf(const certified_plan_t& certified, const std::vector<Obstacle>& obstacles) {
   const candidate_plan_t& plan = certified.plan;
   const int n = plan.num_states;
   verifier::Certificate certificate;
@@ -91,7 +91,7 @@ class CertificateReader final : public TimelineUser {
   }
 
   void OnCertified(const RecordedPlan& recorded) override {
-    const certified_plan_v2_t& certified = recorded.certified.plan;
+    const certified_plan_t& certified = recorded.certified;
     const Config& task = *recorded.basis.task;
     CertificateFile& file = FileOf(task);
     RecordedCertificate& certificate = file.certificates.emplace_back();
@@ -107,12 +107,11 @@ class CertificateReader final : public TimelineUser {
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);
     certificate.certificate.known = KnownRowsOf(recorded.basis);
-    for (const SealFault& fault : recorded.certified.seal_faults)
+    for (const SealFault& fault : FindSealFaults(certified))
       certificate.mismatches.push_back({kAltered + fault.field, fault.expected, fault.found});
     CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(certified));
-    if (recorded.certified.names_transitions)
-      certificate.Compare(DigestOfInput("transitions of the task"), ToHex(task.grounds.observations),
-                          ToHex(GetDigest(certified.transitions_digest)));
+    certificate.Compare(DigestOfInput("transitions of the task"), ToHex(task.grounds.observations),
+                        ToHex(GetDigest(certified.transitions_digest)));
     if (!recorded.has_candidate) certificate.Compare("its candidate is in the log", "a candidate", "none");
     of_plan_.insert(
         {DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, task.problem.get(), certified}});
@@ -135,7 +134,7 @@ class CertificateReader final : public TimelineUser {
                                                    : "it was judged under a task that is not kept next to the log";
       return;
     }
-    const certified_plan_v2_t& certified = plan->second.certified;
+    const certified_plan_t& certified = plan->second.certified;
     if (withdrawal.valid_steps > certified.plan.num_steps) {
       certificate.missing = fmt::format("its plan has {} controls", certified.plan.num_steps);
       return;
@@ -190,7 +189,7 @@ class CertificateReader final : public TimelineUser {
     CertificateFile* file;
     std::size_t certificate;  // its place
     const Problem* problem;
-    certified_plan_v2_t certified;
+    certified_plan_t certified;
   };
 
   CertificateFile& FileOf(const Config& task) {
@@ -237,7 +236,7 @@ class CertificateReader final : public TimelineUser {
     const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
       certificate.Compare(kAltered + ("its decision's " + field), expected, found);
     };
-    const certified_plan_v2_t& certified = plan.certified;
+    const certified_plan_t& certified = plan.certified;
     const Grounds expected = GroundsOf(certified), found = GroundsOf(decision);
     for (const auto& [name, digest] : kGrounds)
       compare(std::string(name) + "_digest", ToHex(expected.*digest), ToHex(found.*digest));
@@ -300,23 +299,10 @@ class CertificateReader final : public TimelineUser {
     for (int t = 0; t <= steps; ++t)
       for (int part = -1; part < static_cast<int>(problem.body.parts.size()); ++part)
         if (is(ExplainCertificate(problem, {t, decision.obstacle, part, clearance}))) return;
-    if (!problem.between && problem.body == Body{})
-      for (int t = 0; t <= steps; ++t)
-        if (std::ranges::any_of(OlderSentences(t, decision.obstacle, clearance), is)) return;
     certificate.Compare(kAltered + std::string("its decision's message"),
                         ExplainCertificate(problem, {0, decision.obstacle, -1, clearance}) +
                             (decision.obstacle < 0 ? "" : ", or another step"),
                         found);
-  }
-
-  // In records from before task.between. The oldest have the clearance rounded to nearest.
-  static std::vector<std::string> OlderSentences(int step, int obstacle, double clearance) {
-    if (obstacle < 0) return {"certified: no obstacles"};
-    std::vector<std::string> sentences;
-    for (const std::string& distance : {RoundedDown(clearance), fmt::format("{:.6g}", clearance)})
-      sentences.push_back(fmt::format("certified: every slice stays clear, closest at step {}, {} m from obstacle {}",
-                                      step, distance, obstacle));
-    return sentences;
   }
 
   std::deque<CertificateFile> files_;             // references to them stay

@@ -28,7 +28,7 @@ void CheckEvents(EventLogReader& reader, const std::vector<LogReference>& refere
     const std::string digest = ToHex(DigestOf(event));
     for (; row != references.end() && row->event_number == event.number; ++row) {
       Seen& found = seen[static_cast<std::size_t>(row - references.begin())];
-      found = std::max(found, row->digest.empty() || row->digest == digest ? Seen::kSame : Seen::kOther);
+      found = std::max(found, row->digest == digest ? Seen::kSame : Seen::kOther);
     }
   });
 }
@@ -52,7 +52,7 @@ LogCheck Check(Database& database, const LogDirectory& directory, const RunRow& 
   }
   for (std::size_t i = 0; i < references.size(); ++i)
     if (seen[i] == Seen::kSame)
-      ++(references[i].digest.empty() ? check.unchecked : check.whole);
+      ++check.whole;
     else
       (seen[i] == Seen::kOther ? check.changed : check.missing).push_back(references[i].event_number);
   return check;
@@ -67,7 +67,6 @@ std::string DescribeCheck(const LogCheck& check) {
   const auto add = [&text](std::int64_t count, const char* what) {
     if (count > 0) text += fmt::format(", {} {}", count, what);
   };
-  add(check.unchecked, "unchecked");
   add(std::ssize(check.changed), "changed");
   add(std::ssize(check.missing), "missing");
   add(check.damage.places, "damaged places");
@@ -135,7 +134,6 @@ nlohmann::json ToJson(const std::vector<LogCheck>& checks) {
                     {"ended", check.ended},
                     {"as_recorded", check.whole_log()},
                     {"whole", check.whole},
-                    {"unchecked", check.unchecked},
                     {"changed", check.changed},
                     {"missing", check.missing},
                     {"damaged_tasks", check.damaged_tasks},

@@ -19,7 +19,6 @@ struct LogCheck {
   enum class Log { kThere, kMissing, kDeleted, kUnknown } log = Log::kThere;
   bool ended = true;
   std::int64_t whole = 0;               ///< Events that the log has with the digest of the row.
-  std::int64_t unchecked = 0;           ///< Events that the log has, whose rows are older than digests.
   std::vector<std::int64_t> changed{};  ///< Numbers of events for which the log has a different event.
   std::vector<std::int64_t> missing{};  ///< Numbers of events that the log lacks; all of them if there is no log.
   LogDamage damage{};                   ///< Of the log.

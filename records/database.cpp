@@ -23,11 +23,11 @@ constexpr int kApplicationId = 0x46524C47;  // "FRLG", so that no other program'
 // With a write-ahead log: the disk need not confirm a transaction before the next begins.
 constexpr const char* kLazily = "PRAGMA synchronous = NORMAL";
 
-// Entry k brings schema version k to k + 1. Entries are only ever added.
-constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
+constexpr const char* kSchema = R"sql(
   CREATE TABLE runs (
     log_file TEXT PRIMARY KEY, start_utime INTEGER NOT NULL, end_utime INTEGER,
-    events INTEGER NOT NULL DEFAULT 0, schema INTEGER NOT NULL, recovered TEXT NOT NULL DEFAULT '');
+    events INTEGER NOT NULL DEFAULT 0, recovered TEXT NOT NULL DEFAULT '', continues TEXT NOT NULL DEFAULT '',
+    log_deleted_utime INTEGER, robot TEXT NOT NULL DEFAULT '');
   CREATE TABLE decisions (
     log_file TEXT NOT NULL, event_number INTEGER NOT NULL,
     utime INTEGER NOT NULL, candidate_utime INTEGER NOT NULL, sequence INTEGER NOT NULL,
@@ -36,27 +36,17 @@ constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
     margin REAL, threshold REAL, elapsed_us REAL, latency_us REAL, message TEXT NOT NULL,
     plan_digest TEXT NOT NULL, config_digest TEXT NOT NULL, model_digest TEXT NOT NULL,
     declaration_digest TEXT NOT NULL, observations_digest TEXT NOT NULL, obstacles_digest TEXT NOT NULL,
-    UNIQUE (log_file, event_number));
+    event_digest TEXT NOT NULL, UNIQUE (log_file, event_number));
   CREATE TABLE execution_events (
     log_file TEXT NOT NULL, event_number INTEGER NOT NULL,
     utime INTEGER NOT NULL, sequence INTEGER NOT NULL, plan_id INTEGER, kind TEXT NOT NULL,
     step INTEGER, coordinate INTEGER, state TEXT NOT NULL, value REAL, message TEXT NOT NULL,
-    UNIQUE (log_file, event_number));
+    event_digest TEXT NOT NULL, UNIQUE (log_file, event_number));
   CREATE TABLE gaps (
     log_file TEXT NOT NULL, event_number INTEGER, channel TEXT NOT NULL, source TEXT NOT NULL,
     expected INTEGER, got INTEGER, lost INTEGER NOT NULL, utime INTEGER NOT NULL, reason TEXT NOT NULL,
-    UNIQUE (log_file, event_number, reason));
-)sql",
-                                                                        R"sql(
-  ALTER TABLE runs ADD COLUMN continues TEXT NOT NULL DEFAULT '';
-  ALTER TABLE runs ADD COLUMN log_deleted_utime INTEGER;
-  ALTER TABLE decisions ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
-  ALTER TABLE execution_events ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
-  ALTER TABLE gaps ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
-)sql",
-                                                                        R"sql(
-  ALTER TABLE runs ADD COLUMN robot TEXT NOT NULL DEFAULT '';
-)sql"};
+    event_digest TEXT NOT NULL, UNIQUE (log_file, event_number, reason));
+)sql";
 
 // A column that is NULL where the number is -1.
 template <class Number>
@@ -82,7 +72,7 @@ auto ColumnsOf(auto& row) {
                           std::tie(row.channel, row.source), std::tuple(OrNull{row.expected}, OrNull{row.got}),
                           std::tie(row.lost, row.utime, row.reason, row.event.digest));
   else if constexpr (std::is_same_v<Row, RunRow>)
-    return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.schema, row.recovered, row.continues,
+    return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.recovered, row.continues,
                     row.log_deleted_utime, row.robot);
   else if constexpr (std::is_same_v<Row, LogReference>)
     return std::tie(row.log_file, row.event_number, row.digest);
@@ -215,7 +205,7 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
   try {
     if (result != SQLITE_OK) throw DatabaseError(handle ? sqlite3_errmsg(handle) : "out of memory");
     sqlite3_busy_timeout(handle, 2000);
-    Migrate();
+    MakeOrCheck();
     // Where the file system allows no write-ahead log SQLite keeps its rollback journal, which is as safe and slower.
     Execute("PRAGMA journal_mode = WAL");
     Execute(kLazily);
@@ -240,21 +230,21 @@ void Database::Execute(const char* sql) {
     throw DatabaseError(sqlite3_errmsg(handle_.get()));
 }
 
-void Database::Migrate() {
+void Database::MakeOrCheck() {
   Execute("BEGIN IMMEDIATE");
   const auto number = [this](const char* sql) { return Select<std::int64_t>(sql).at(0); };
-  const std::int64_t version = number("PRAGMA user_version");
-  if (version > kSchemaVersion)
-    throw DatabaseError(
-        fmt::format("schema version {}, this program knows versions up to {}: use a newer program or another directory",
-                    version, kSchemaVersion));
-  const bool fresh = number("SELECT count(*) FROM sqlite_master") == 0;
-  if (version < 0 || (!fresh && number("PRAGMA application_id") != kApplicationId))
+  if (number("SELECT count(*) FROM sqlite_master") == 0) {
+    Execute(kSchema);
+    Execute(fmt::format("PRAGMA application_id = {}", kApplicationId).c_str());
+    Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
+  }
+  if (number("PRAGMA application_id") != kApplicationId)
     throw DatabaseError("not a decision database: move it away or use another directory");
-  for (std::size_t next = static_cast<std::size_t>(version); next < kMigrations.size(); ++next)
-    Execute(kMigrations[next]);
-  Execute(fmt::format("PRAGMA application_id = {}", kApplicationId).c_str());
-  Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
+  if (const std::int64_t version = number("PRAGMA user_version"); version != kSchemaVersion)
+    throw DatabaseError(
+        fmt::format("schema version {}, this program knows version {}: use the program that made it, or "
+                    "another directory",
+                    version, kSchemaVersion));
   Execute("COMMIT");
 }
 
@@ -320,8 +310,8 @@ void Database::RunDurably(const char* sql, const Values&... values) {
 
 void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues,
                         const std::string& robot) {
-  RunDurably("INSERT INTO runs (log_file, start_utime, schema, continues, robot) VALUES (?, ?, ?, ?, ?)", log_file,
-             start_utime, kSchemaVersion, continues, robot);
+  RunDurably("INSERT INTO runs (log_file, start_utime, continues, robot) VALUES (?, ?, ?, ?)", log_file, start_utime,
+             continues, robot);
 }
 
 void Database::EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered) {
@@ -333,7 +323,7 @@ void Database::MarkLogDeleted(const std::string& log_file, std::int64_t utime) {
 }
 
 std::vector<RunRow> Database::Runs() {
-  const std::vector<RunRow> runs = Select<RunRow>(R"sql(SELECT log_file, start_utime, end_utime, events, schema,
+  const std::vector<RunRow> runs = Select<RunRow>(R"sql(SELECT log_file, start_utime, end_utime, events,
       recovered, continues, log_deleted_utime, robot FROM runs ORDER BY rowid)sql");
   for (const RunRow& run : runs)
     for (const std::string& file : {run.log_file, run.continues})

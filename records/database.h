@@ -34,19 +34,18 @@ struct RunRow {
   std::int64_t start_utime = 0;
   std::optional<std::int64_t> end_utime;  ///< No value while the run lasts, or if its logger was killed.
   std::int64_t events = 0;                ///< The database has all rows of events with lower numbers.
-  int schema = 0;                         ///< The database's schema when the run began.
   std::string recovered;                  ///< The repairs by a later start; empty after a clean end.
   std::string continues;                  ///< The log file of the same run before this one; empty for the first.
   std::optional<std::int64_t> log_deleted_utime;  ///< When the log was deleted for the quota; its rows stay.
-  std::string robot;  ///< The name in the logger's keys; empty without keys, and in rows of schema versions 1 and 2.
+  std::string robot;                              ///< The name in the logger's keys; empty without keys.
 };
 
 class Database final {
  public:
-  static constexpr int kSchemaVersion = 3;  ///< PRAGMA user_version
+  static constexpr int kSchemaVersion = 4;  ///< PRAGMA user_version: another one after every change of the tables.
 
-  /** Creates the file, or opens it and migrates an older schema.
-  @throws DatabaseError if it cannot be opened, belongs to another program or has a newer schema. */
+  /** Creates the file, or opens it.
+  @throws DatabaseError if it cannot be opened, belongs to another program or has another schema. */
   explicit Database(const std::string& path);
   ~Database();
   Database(const Database&) = delete;
@@ -100,7 +99,7 @@ class Database final {
   void Execute(const char* sql);
   template <class... Values>
   void RunDurably(const char* sql, const Values&... values);
-  void Migrate();
+  void MakeOrCheck();
   int Insert(Statement& insert, const auto& row);
   template <class Row>
   std::vector<Row> Select(const char* sql, const auto&... values);

@@ -51,8 +51,6 @@ class Reading {
                                "digests",
                                "elapsed_us"};
     if (config_.problem->declaration.IsDisturbed()) keys.insert("disturbance");
-    if (document_.json().is_object() && !document_.json().contains("holds"))
-      document_.Fail("has no holds: it was made before a decision said when it holds. Certify its plan again");
     document_.RequireFields(keys);
     if (!(document_["elapsed_us"].Number() >= 0)) document_["elapsed_us"].Fail("is negative");
     ReadInputs();

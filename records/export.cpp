@@ -122,7 +122,7 @@ class NpzSink final : public Sink {
     AddBegins();
   }
 
-  void OnCertified(const certified_plan_v2_t& certified, const LogReference& event) override {
+  void OnCertified(const certified_plan_t& certified, const LogReference& event) override {
     const candidate_plan_t& plan = certified.plan;
     if (!HasCounts(plan)) {
       ++result.left_out;

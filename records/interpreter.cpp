@@ -6,17 +6,15 @@
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/obstacles_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
-#include "lcmtypes/heartbeat.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -81,26 +79,20 @@ std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std
     return {Stream{channel, GetText(candidate->source)}, StreamPosition{candidate->sequence, candidate->utime}};
   }
   if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
-  if (channel == channels_.certified) {
-    const auto position = PositionOf<certified_plan_v2_t>(bytes);
-    return {plain, position ? position : PositionOf<certified_plan_t>(bytes)};
-  }
+  if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
   if (channel == channels_.withdrawn) return {plain, PositionOf<withdrawal_t>(bytes)};
   if (channel == channels_.advice) return {plain, PositionOf<advice_t>(bytes)};
   if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
   if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};
   if (channel == channels_.status) {
-    const auto heartbeat = ReadHeartbeat(bytes);
-    if (!heartbeat || !heartbeat->in_charge) return {plain, std::nullopt};  // a second certifier counts for itself
+    const auto heartbeat = Decoded<certifier_status_t>(bytes);
+    if (!heartbeat || !IsInCharge(*heartbeat)) return {plain, std::nullopt};  // a second certifier counts for itself
     return {plain, StreamPosition{heartbeat->sequence, heartbeat->utime}};
   }
   if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
   if (channel == channels_.logger_status) return {plain, PositionOf<logger_status_t>(bytes)};
-  if (channel == channels_.obstacles) {
-    const auto position = PositionOf<obstacles_v2_t>(bytes);
-    return {plain, position ? position : PositionOf<obstacles_t>(bytes)};
-  }
+  if (channel == channels_.obstacles) return {plain, PositionOf<obstacles_t>(bytes)};
   return {plain, std::nullopt};
 }
 

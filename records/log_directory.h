@@ -25,7 +25,7 @@ class LogDirectory final {
   first one whose name no file has and for which `taken` is false. Names sort like their times. */
   [[nodiscard]] std::string FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const;
 
-  /** The files with such names, sorted. Names of older versions have no microseconds. */
+  /** The files with such names, sorted. */
   [[nodiscard]] std::vector<std::string> Logs() const;
 
   /** The bytes of all .lcmlog files except `except`. Cost: one call to the file system for each file. */

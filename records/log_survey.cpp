@@ -13,10 +13,10 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
-#include "lcmtypes/heartbeat.h"
+#include "lcmtypes/names.h"
 #include "task/files.h"
 
 namespace forereach {
@@ -67,14 +67,12 @@ class Surveyor final {
     if (const auto decision = Decoded<decision_t>(message)) {
       ++survey_.decisions;
       Record(GetDigest(decision->config_digest), GetDigest(decision->observations_digest));
-    } else if (const auto certified = Decoded<certified_plan_v2_t>(message)) {
+    } else if (const auto certified = Decoded<certified_plan_t>(message)) {
       Record(GetDigest(certified->config_digest), GetDigest(certified->observations_digest));
-    } else if (const auto old = Decoded<certified_plan_t>(message)) {
-      Record(GetDigest(old->config_digest), GetDigest(old->observations_digest));
     } else if (Decoded<candidate_plan_t>(message)) {
       ++survey_.candidates;
-    } else if (const auto heartbeat = ReadHeartbeat(message)) {
-      if (heartbeat->in_charge) log_.certifier.Take(heartbeat->sequence);
+    } else if (const auto heartbeat = Decoded<certifier_status_t>(message)) {
+      if (IsInCharge(*heartbeat)) log_.certifier.Take(heartbeat->sequence);
     } else if (const auto logger = Decoded<logger_status_t>(message)) {
       log_.logger.Take(logger->sequence);
     }

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "forereach/decision_t.hpp"
-#include "records/certified_message.h"
 #include "records/kept_tasks.h"
 
 namespace forereach {
@@ -57,8 +56,8 @@ void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
       candidate = std::make_unique<candidate_plan_t>(*decoded);
     candidates_.Add(DigestOf(event.message()), std::move(candidate));
   } else if (event.channel == channels_.certified) {
-    if (const auto certified = ReadCertified(event.message()))
-      user_.OnCertified(certified->plan, reference());
+    if (const auto certified = Decoded<certified_plan_t>(event.message()))
+      user_.OnCertified(*certified, reference());
     else
       ++undecodable_;
   } else if (event.channel == channels_.withdrawn) {

@@ -11,7 +11,7 @@ candidates without a decision, whatever the length of the logs. */
 
 #include "bus/bus_options.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "records/event_log.h"
 #include "records/interpreter.h"
@@ -35,7 +35,7 @@ class RecordUser {
   virtual void OnMessage(const LogEvent&) {}  ///< Every authentic message, before the calls that it causes.
   /** @param candidate null if the log lacks it, or it is no candidate_plan_t. */
   virtual void OnDecision(const DecisionRow&, const candidate_plan_t* /*candidate*/) {}
-  virtual void OnCertified(const certified_plan_v2_t&, const LogReference&) {}
+  virtual void OnCertified(const certified_plan_t&, const LogReference&) {}
   virtual void OnWithdrawn(const withdrawal_t&, const LogReference&) {}  ///< Without its repetitions.
   virtual void OnExecution(const EventRow&) {}
   virtual void OnGap(const GapRow&) {}

@@ -69,8 +69,8 @@ class Replayer final : public GateFollower {
   }
 
   void OnCertified(const RecordedPlan& recorded) override {
-    const certified_plan_v2_t& certified = recorded.certified.plan;
-    for (const SealFault& fault : recorded.certified.seal_faults)
+    const certified_plan_t& certified = recorded.certified;
+    for (const SealFault& fault : FindSealFaults(certified))
       Differ(recorded.event, certified.plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
     if (plans_.size() == kPlans) plans_.pop_front();

@@ -19,7 +19,7 @@ inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 struct LogReference {
   std::string log_file;  ///< File name without directory.
   std::int64_t event_number = -1;
-  std::string digest;  ///< DigestOf the event, in hexadecimal; empty without an event, and in rows of schema version 1.
+  std::string digest;  ///< DigestOf the event, in hexadecimal; empty without an event.
 };
 
 /** A decision_t with names in place of codes, and digests in hexadecimal. */

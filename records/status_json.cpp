@@ -7,11 +7,7 @@
 
 namespace forereach {
 
-bool IsInCharge(const certifier_status_v3_t& status) {
-  return status.state != certifier_status_v3_t::LISTENING && status.state != certifier_status_v3_t::STANDBY;
-}
-
-nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signed) {
+nlohmann::ordered_json ToJson(const certifier_status_t& status, bool is_signed) {
   nlohmann::ordered_json by_outcome, by_cause;
   for (std::int16_t i = 0; i < 16; ++i)
     if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];

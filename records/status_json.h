@@ -3,14 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 
 namespace forereach {
 
 /** @param is_signed whether it was authentic. Texts are as they were sent. */
-[[nodiscard]] nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signed);
-
-/** Whether its sender decides: it neither listens for another certifier nor stands by. */
-[[nodiscard]] bool IsInCharge(const certifier_status_v3_t& status);
+[[nodiscard]] nlohmann::ordered_json ToJson(const certifier_status_t& status, bool is_signed);
 
 }  // namespace forereach

@@ -8,7 +8,8 @@
 
 #include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
-#include "lcmtypes/heartbeat.h"
+#include "forereach/certifier_status_t.hpp"
+#include "lcmtypes/names.h"
 
 namespace forereach {
 namespace {
@@ -111,8 +112,8 @@ Timeline::Told Timeline::Heed(Count& count, const StreamPosition& message, const
 }
 
 void Timeline::TakeStatus(const LogEvent& event) {
-  const auto status = ReadHeartbeat(event.message());
-  if (!status || !status->in_charge) return;
+  const auto status = Decoded<certifier_status_t>(event.message());
+  if (!status || !IsInCharge(*status)) return;
   const bool is_first = !heartbeats_.order.newest();
   Told told = Heed(heartbeats_, {status->sequence, status->utime}, event);
   if (told == Told::kOld) return;
@@ -123,8 +124,9 @@ void Timeline::TakeStatus(const LogEvent& event) {
   const bool is_reload =
       std::exchange(version_, status->version) != status->version && !is_first && told == Told::kGoesOn;
   if (told != Told::kStarts && !is_reload) return;
-  const bool is_known = std::exchange(reloaded_ahead_, false) && now_->grounds.config == status->config_digest;
-  if (const Config* task = TaskOf(status->config_digest)) now_ = task;
+  const bool is_known =
+      std::exchange(reloaded_ahead_, false) && now_->grounds.config == GetDigest(status->config_digest);
+  if (const Config* task = TaskOf(GetDigest(status->config_digest))) now_ = task;
   if (told == Told::kStarts)
     Start();
   else if (!is_known)
@@ -250,15 +252,14 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
 }
 
 void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
-  const auto certified = ReadCertified(event.message());
+  const auto certified = Decoded<certified_plan_t>(event.message());
   if (!certified) {
     ++undecodable_;
     return;
   }
-  const certified_plan_v2_t& message = certified->plan;
-  if (Heed(certified_, {message.sequence, message.utime}, event) == Told::kStarts) Start();
-  const Digest plan = DigestOf(Encode(message.plan));
-  const Grounds named = GroundsOf(message);
+  if (Heed(certified_, {certified->sequence, certified->utime}, event) == Told::kStarts) Start();
+  const Digest plan = DigestOf(Encode(certified->plan));
+  const Grounds named = GroundsOf(*certified);
   const Config* task = TaskOf(named.config);
   RecordedPlan recorded{*certified, name, false, task != nullptr, {}};
   const RecordedCandidate* const waiting = undecided_.Find(plan);

@@ -29,11 +29,11 @@ before the candidate; then the digests of the basis differ from those that the d
 
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/robot_messages.h"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/stream_order.h"
-#include "records/certified_message.h"
 #include "records/event_log.h"
 #include "records/log_authenticator.h"
 #include "records/log_trust.h"
@@ -69,7 +69,7 @@ struct RecordedDecision {
 };
 
 struct RecordedPlan {
-  CertifiedMessage certified;
+  certified_plan_t certified;
   std::string event;
   bool has_candidate = false;  ///< Whether its candidate is in the log.
   bool is_of_known_task = true;

@@ -82,7 +82,7 @@ GuardVerdict CheckInitialSet(const candidate_plan_t& plan, const Angles& angles,
   return {};
 }
 
-GuardVerdict CheckSlice(const certified_plan_v2_t& certified, const Angles& angles, int step,
+GuardVerdict CheckSlice(const certified_plan_t& certified, const Angles& angles, int step,
                         std::span<const double> state) {
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
@@ -95,7 +95,7 @@ GuardVerdict CheckSlice(const certified_plan_v2_t& certified, const Angles& angl
   return {};
 }
 
-GuardVerdict CheckExpiry(const certified_plan_v2_t& certified, std::int64_t now_us) {
+GuardVerdict CheckExpiry(const certified_plan_t& certified, std::int64_t now_us) {
   if (now_us <= certified.expires_utime) return {};
   return Refuse(GuardCause::kExpired, Sentence("plan %" PRId64 " expired at %" PRId64 " us, now it is %" PRId64 " us",
                                                certified.plan.plan_id, certified.expires_utime, now_us));
@@ -110,7 +110,7 @@ GuardVerdict CheckDigest(GuardCause cause, const char* name, const Digest& carri
   return RefuseDigest(cause, name, ToHex(carried), ToHex(expected));
 }
 
-GuardVerdict CheckDigestsAreThere(const certified_plan_v2_t& certified) {
+GuardVerdict CheckDigestsAreThere(const certified_plan_t& certified) {
   for (const auto& [name, digest] : std::initializer_list<std::pair<const char*, const std::uint8_t(&)[32]>>{
            {"plan_digest", certified.plan_digest},
            {"config_digest", certified.config_digest},
@@ -124,7 +124,7 @@ GuardVerdict CheckDigestsAreThere(const certified_plan_v2_t& certified) {
   return {};
 }
 
-GuardVerdict CheckSeal(const certified_plan_v2_t& certified) {
+GuardVerdict CheckSeal(const certified_plan_t& certified) {
   const std::vector<SealFault> faults = FindSealFaults(certified);
   if (faults.empty()) return {};
   const SealFault& fault = faults.front();
@@ -278,9 +278,9 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     if (halted_) return Refuse(GuardCause::kHalted, "halted until a person resets it");
     verdict = Authenticated(options_.channel, kStarts, certified_plan_bytes, now_us);
     if (!verdict.ok()) return verdict;
-    auto certified = std::make_unique<certified_plan_v2_t>();
+    auto certified = std::make_unique<certified_plan_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
-    if (status != DecodeStatus::kOk) return RefuseDecode<certified_plan_v2_t>(status, certified_plan_bytes.size());
+    if (status != DecodeStatus::kOk) return RefuseDecode<certified_plan_t>(status, certified_plan_bytes.size());
     verdict = Examine(*certified, now_us);
     verdict.plan_id = certified->plan.plan_id;
     if (!verdict.ok()) return verdict;
@@ -296,7 +296,7 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
 }
 
 // Throws nothing: it moves what Expect has allocated.
-void Guard::TakeTaskOf(const certified_plan_v2_t& certified) {
+void Guard::TakeTaskOf(const certified_plan_t& certified) {
   const auto task = expected_.begin() + (FindExpected(certified) - expected_.cbegin());
   if (task == expected_.end()) return;
   options_.config_digest = task->config;
@@ -308,7 +308,7 @@ void Guard::TakeTaskOf(const certified_plan_v2_t& certified) {
 
 namespace {
 
-bool Names(const withdrawal_t& message, const certified_plan_v2_t& certified) {
+bool Names(const withdrawal_t& message, const certified_plan_t& certified) {
   const Digest named = GetDigest(message.certificate_digest);
   if (named == Digest{}) return message.plan_id == certified.plan.plan_id;
   return named == GetDigest(certified.certificate_digest);
@@ -316,7 +316,7 @@ bool Names(const withdrawal_t& message, const certified_plan_v2_t& certified) {
 
 // Whether a certifier that has not certified the plan has the grounds on which it was certified. Of the observations
 // these are the file's transitions: to forget learned ones takes nothing back (docs/soundness.md, 3.13).
-bool RestsOn(const certified_plan_v2_t& certified, const Grounds& grounds) {
+bool RestsOn(const certified_plan_t& certified, const Grounds& grounds) {
   Grounds of_plan = GroundsOf(certified);
   of_plan.observations = GetDigest(certified.transitions_digest);
   return of_plan == grounds;
@@ -342,7 +342,7 @@ GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes, std::int64_t now_us) noe
 }
 
 void Guard::Take(const withdrawal_t& message, GuardWithdrawal& answer) {
-  const auto counts = [&](const std::unique_ptr<certified_plan_v2_t>& plan) {
+  const auto counts = [&](const std::unique_ptr<certified_plan_t>& plan) {
     return plan && Names(message, *plan) &&
            !(message.cause == withdrawal_t::UNKNOWN_PLAN && RestsOn(*plan, GroundsOf(message)));
   };
@@ -386,13 +386,13 @@ GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
   return {};
 }
 
-std::vector<Guard::Task>::const_iterator Guard::FindExpected(const certified_plan_v2_t& certified) const {
+std::vector<Guard::Task>::const_iterator Guard::FindExpected(const certified_plan_t& certified) const {
   const Digest config = GetDigest(certified.config_digest), model = GetDigest(certified.model_digest);
   return std::ranges::find_if(expected_,
                               [&](const Task& task) { return task.config == config && task.model == model; });
 }
 
-GuardVerdict Guard::Examine(const certified_plan_v2_t& certified, std::int64_t now_us) const {
+GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
   const candidate_plan_t& plan = certified.plan;
   GuardVerdict verdict = ExamineSizes(plan);
   if (verdict.ok()) verdict = CheckDigestsAreThere(certified);
@@ -415,7 +415,7 @@ GuardVerdict Guard::Examine(const certified_plan_v2_t& certified, std::int64_t n
   return verdict;
 }
 
-GuardVerdict Guard::ExamineNumbers(const certified_plan_v2_t& certified) const {
+GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
   const candidate_plan_t& plan = certified.plan;
   for (int k = 0; k < options_.num_states; ++k) {
     const double center = plan.initial_center[k], half_width = plan.initial_half_width[k];
@@ -440,7 +440,7 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_v2_t& certified) const {
 }
 
 // Without the last slice: no step starts from it, so the certifier does not test it against the domain.
-GuardVerdict Guard::ExamineDomain(const certified_plan_v2_t& certified) const {
+GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
   const auto task = FindExpected(certified);
   const std::optional<GuardDomain>& domain = task != expected_.end() && task->domain ? task->domain : options_.domain;
   if (!domain) return {};

@@ -19,7 +19,7 @@ Check fails stops executing. If Check finds a state outside its slice, the guard
 the next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
 next one. Apply only what `control` returns.
 
-Check compares with interval hulls: a certified_plan_v2_t contains, for t = 0..T, the interval hull of the certified
+Check compares with interval hulls: a certified_plan_t contains, for t = 0..T, the interval hull of the certified
 slice X_t, rounded outward. X_t lies in its hull. So a state outside the hull has left X_t, and the certificate does not
 cover it. The guard uses hulls instead of zonotopes because 2n comparisons need no arithmetic. A state that is an angle
 may differ by whole turns (GuardOptions::angles); then it has to be inside by more than the rounding of the turns.
@@ -37,7 +37,7 @@ Plan ids of all sources are compared with each other, because a robot follows on
 #include <vector>
 
 #include "bus/authentic.h"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/angle.h"
 #include "lcmtypes/codec.h"
@@ -228,8 +228,8 @@ class Guard final {
   [[nodiscard]] std::optional<int> standing_steps() const { return executing_ ? standing_steps_ : std::nullopt; }
   /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or
   Halt. */
-  [[nodiscard]] const certified_plan_v2_t* executing() const { return executing_.get(); }
-  [[nodiscard]] const certified_plan_v2_t* pending() const { return pending_.get(); }
+  [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
+  [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
 
  private:
   struct Task {
@@ -241,13 +241,13 @@ class Guard final {
   [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, const Speaker& speaker, Bytes& bytes,
                                            std::int64_t now_us);
   void Take(const withdrawal_t& message, GuardWithdrawal& answer);
-  void TakeTaskOf(const certified_plan_v2_t& certified);
+  void TakeTaskOf(const certified_plan_t& certified);
   void EndIfRefused(GuardVerdict& verdict) noexcept;
-  [[nodiscard]] GuardVerdict Examine(const certified_plan_v2_t& certified, std::int64_t now_us) const;
-  [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_v2_t& certified) const;
+  [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
+  [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
-  [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_v2_t& certified) const;
-  [[nodiscard]] GuardVerdict ExamineDomain(const certified_plan_v2_t& certified) const;
+  [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
+  [[nodiscard]] GuardVerdict ExamineDomain(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
                                           std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
@@ -263,7 +263,7 @@ class Guard final {
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;  // plan_id
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
-  std::unique_ptr<certified_plan_v2_t> pending_, executing_;
+  std::unique_ptr<certified_plan_t> pending_, executing_;
   Angles pending_angles_, executing_angles_;
   int last_step_ = 0;                   // last checked step of the executing plan
   std::int64_t last_step_utime_ = 0;    // when it was checked

@@ -293,7 +293,7 @@ void Supervisor::ContinuePlan(std::int64_t utime) {
 bool Supervisor::MustStop() const {
   const std::optional<int> standing = guard_.standing_steps();
   if (!standing) return false;
-  const certified_plan_v2_t& plan = *guard_.executing();
+  const certified_plan_t& plan = *guard_.executing();
   const int next = step_ + 1, left = *standing - next;
   const auto states = static_cast<std::size_t>(plan.plan.num_states);
   if (left >= 0 && robot_.StepsToRest({plan.slice_lower[next], states}, {plan.slice_upper[next], states}) <= left)
@@ -303,7 +303,7 @@ bool Supervisor::MustStop() const {
 
 // Whether the pending plan starts within what stands, at a boundary that the guard takes for its start.
 bool Supervisor::TakesOver(int standing) const {
-  const certified_plan_v2_t* const next = guard_.pending();
+  const certified_plan_t* const next = guard_.pending();
   if (!next || next->plan.start_utime < step_utime_) return false;
   const std::uint64_t ahead =
       static_cast<std::uint64_t>(next->plan.start_utime) - static_cast<std::uint64_t>(step_utime_);

@@ -64,7 +64,7 @@ struct NamedFiles {
 @throws ConfigError as it does. */
 [[nodiscard]] Config LoadConfig(const std::string& path, const NamedFiles& instead);
 
-/** @name What LoadConfig does not require, so that logs recorded before these keys can be read again.
+/** @name What LoadConfig does not require, because not every command needs it.
 @throws ConfigError that says which line to add or to change. */
 ///@{
 /** What a command needs before it certifies anew: the task has task.between, or is of the paper's method. */

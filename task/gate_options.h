@@ -9,7 +9,7 @@ namespace forereach {
 
 /** The source of a task's obstacles. */
 enum class ObstaclesSource {
-  kUnsaid,  ///< The file's until OBSTACLES is heard. Only for replaying logs of tasks without gate.obstacles.
+  kUnsaid,  ///< The file's only. No certifier starts on a bus.
   kBus,     ///< The file's and those on OBSTACLES. Nothing is certified while no sender is heard.
   kTask,    ///< The file's only.
 };
@@ -34,7 +34,7 @@ struct GateOptions {
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
   /** Plans under way are withdrawn once the obstacles of the bus have been unknown for so long; kNeverLost: never.
-  Nothing: not said, only for logs of tasks without the key. */
+  Nothing: not said; no certifier starts with the obstacles of the bus. */
   std::optional<double> obstacles_lost_ms;
   bool learns = true;            ///< Adds executed transitions to the observations.
   std::string state = "state";   ///< The directory that keeps a latched fault across restarts.

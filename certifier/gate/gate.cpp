@@ -261,7 +261,7 @@ void Gate::DropIfLate(GateAnswer& answer, std::int64_t now_us) const {
                                        " ms, it may take " + ToText(options_.decision_budget_ms) + " ms");
 }
 
-void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_v2_t& certified) {
+void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified) {
   certified.utime = decision.utime;
   certified.sequence = certificates_;
   certified.expires_utime = decision.utime + Microseconds(options_.certificate_lifetime_ms);
@@ -301,14 +301,14 @@ std::string Gate::Learn(Bytes bytes) {
   return {};
 }
 
-certifier_status_v3_t Gate::Status(std::int64_t now_us) const {
-  certifier_status_v3_t status = counts_;
+certifier_status_t Gate::Status(std::int64_t now_us) const {
+  certifier_status_t status = counts_;
   status.utime = now_us;
   status.shadow = options_.shadow;
   status.candidates_lost = sources_.lost();
   status.observations = static_cast<std::int64_t>(certifier_.num_observations());
-  status.obstacles_source = options_.obstacles == ObstaclesSource::kBus ? certifier_status_v3_t::OBSTACLES_BUS
-                                                                        : certifier_status_v3_t::OBSTACLES_TASK;
+  status.obstacles_source = options_.obstacles == ObstaclesSource::kBus ? certifier_status_t::OBSTACLES_BUS
+                                                                        : certifier_status_t::OBSTACLES_TASK;
   status.obstacles_known = obstacles_.WhyUnknown(now_us).empty();
   status.obstacles_in_force = static_cast<std::int32_t>(obstacles_.all().size());
   status.obstacles_utime = obstacles_.stamp().value_or(0);

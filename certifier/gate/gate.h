@@ -17,8 +17,8 @@ not, the caller calls Refuse. */
 #include "certifier/gate/sources.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/standing.h"
 #include "forereach/certify/way_clear.h"
@@ -33,7 +33,7 @@ namespace forereach {
 /** A decision and, only with a certificate, the certified plan. */
 struct GateAnswer {
   decision_t decision{};
-  std::optional<certified_plan_v2_t> certified;
+  std::optional<certified_plan_t> certified;
 };
 
 class Gate final {
@@ -83,7 +83,7 @@ class Gate final {
   Both in microseconds since the Unix epoch. */
   [[nodiscard]] std::int64_t EarliestStart(std::int64_t now_us) const;
 
-  /** Replaces the obstacles by those of an obstacles_t or obstacles_v2_t, by the rules of obstacles_in_force.h. On an
+  /** Replaces the obstacles by those of an obstacles_t, by the rules of obstacles_in_force.h. On an
   error it changes nothing and returns the error's text; otherwise an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us, SenderId sender = {});
 
@@ -105,7 +105,7 @@ class Gate final {
   void Inherit(const Gate& before);
 
   /** A heartbeat with the counts so far and the grounds in force. The caller sets the other fields. */
-  [[nodiscard]] certifier_status_v3_t Status(std::int64_t now_us) const;
+  [[nodiscard]] certifier_status_t Status(std::int64_t now_us) const;
   /** The grounds in force, with everything received and learned so far. */
   [[nodiscard]] Grounds grounds() const;
 
@@ -127,7 +127,7 @@ class Gate final {
   void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);
   void DropIfLate(GateAnswer& answer, std::int64_t now_us) const;
   /** Sets all fields of a message of zeros, and its seal. */
-  void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_v2_t& certified);
+  void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
   void Count(const decision_t& decision);
 
   Certifier certifier_;
@@ -137,7 +137,7 @@ class Gate final {
   ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;
-  certifier_status_v3_t counts_{};
+  certifier_status_t counts_{};
   Tube tube_;
 };
 

@@ -13,29 +13,31 @@
 namespace forereach {
 namespace {
 
-Eigen::VectorXd Point(const obstacle_t& message, int index) {
+Eigen::VectorXd Point(const obstacle_shape_t& message, int index) {
   return Eigen::Map<const Eigen::VectorXd>(message.point[index], message.dimension);
 }
 
-void RequirePoints(const obstacle_t& message, int count) {
+void RequirePoints(const obstacle_shape_t& message, int count) {
   if (message.num_points != count)
     throw std::invalid_argument(fmt::format("{} points, must be {}", message.num_points, count));
 }
 
-Obstacle FromMessage(const obstacle_t& message) {
+Obstacle FromMessage(const obstacle_shape_t& message) {
   if (message.dimension < 1 || message.dimension > kMaxSafetyDim || message.num_points < 1 ||
       message.num_points > kMaxObstaclePoints)
     throw std::invalid_argument(fmt::format("{} points of dimension {}", message.num_points, message.dimension));
   switch (message.kind) {
-    case obstacle_t::CIRCLE: RequirePoints(message, 1); return Obstacle::Circle(Point(message, 0), message.value);
-    case obstacle_t::BOX: RequirePoints(message, 2); return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
-    case obstacle_t::POLYGON: {
+    case obstacle_shape_t::CIRCLE: RequirePoints(message, 1); return Obstacle::Circle(Point(message, 0), message.value);
+    case obstacle_shape_t::BOX:
+      RequirePoints(message, 2);
+      return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
+    case obstacle_shape_t::POLYGON: {
       std::vector<Eigen::VectorXd> vertices;
       vertices.reserve(ToSize(message.num_points));
       for (int i = 0; i < message.num_points; ++i) vertices.push_back(Point(message, i));
       return Obstacle::Polygon(vertices);
     }
-    case obstacle_t::HALF_SPACE:
+    case obstacle_shape_t::HALF_SPACE:
       RequirePoints(message, 1);
       return Obstacle::HalfSpace(Point(message, 0), message.value);
     default: throw std::invalid_argument(fmt::format("unknown kind {}", message.kind));
@@ -47,10 +49,10 @@ std::string At(std::int64_t us) { return fmt::format("{} us", us); }
 // The pieces of one track, in the order of their windows.
 class Track final {
  public:
-  Track(std::int64_t number, std::vector<const obstacle_v2_t*> pieces) : number_(number), pieces_(std::move(pieces)) {
-    std::ranges::stable_sort(pieces_, {}, &obstacle_v2_t::from_utime);
-    for (const obstacle_v2_t* piece : pieces_) end_ = std::max(end_, piece->until_utime);
-    ends_ = std::ranges::any_of(pieces_, [&](const obstacle_v2_t* piece) { return piece->gone != 0; });
+  Track(std::int64_t number, std::vector<const obstacle_t*> pieces) : number_(number), pieces_(std::move(pieces)) {
+    std::ranges::stable_sort(pieces_, {}, &obstacle_t::from_utime);
+    for (const obstacle_t* piece : pieces_) end_ = std::max(end_, piece->until_utime);
+    ends_ = std::ranges::any_of(pieces_, [&](const obstacle_t* piece) { return piece->gone != 0; });
   }
 
   // @throws std::invalid_argument if the windows do not cover all times from the stamp of the message on.
@@ -58,7 +60,7 @@ class Track final {
     if (const std::int64_t begin = pieces_.front()->from_utime; begin > stamp)
       Refuse("begins at " + At(begin) + ", after the message of " + At(stamp));
     std::int64_t covered = pieces_.front()->until_utime;
-    for (const obstacle_v2_t* piece : pieces_) {
+    for (const obstacle_t* piece : pieces_) {
       if (piece->from_utime > covered) Refuse("is nowhere between " + At(covered) + " and " + At(piece->from_utime));
       covered = std::max(covered, piece->until_utime);
       if (ends_ && piece->until_utime == end_ && piece->gone == 0)
@@ -68,10 +70,10 @@ class Track final {
     }
   }
 
-  [[nodiscard]] bool BeginsWith(const obstacle_v2_t& piece) const {
+  [[nodiscard]] bool BeginsWith(const obstacle_t& piece) const {
     return piece.from_utime == pieces_.front()->from_utime;
   }
-  [[nodiscard]] bool GoesOnAfter(const obstacle_v2_t& piece) const { return !ends_ && piece.until_utime == end_; }
+  [[nodiscard]] bool GoesOnAfter(const obstacle_t& piece) const { return !ends_ && piece.until_utime == end_; }
 
  private:
   [[noreturn]] void Refuse(const std::string& why) const {
@@ -79,13 +81,13 @@ class Track final {
   }
 
   std::int64_t number_;
-  std::vector<const obstacle_v2_t*> pieces_;
+  std::vector<const obstacle_t*> pieces_;
   std::int64_t end_ = INT64_MIN;
   bool ends_;
 };
 
-std::map<std::int64_t, Track> TracksOf(const obstacles_v2_t& message) {
-  std::map<std::int64_t, std::vector<const obstacle_v2_t*>> pieces;
+std::map<std::int64_t, Track> TracksOf(const obstacles_t& message) {
+  std::map<std::int64_t, std::vector<const obstacle_t*>> pieces;
   for (int i = 0; i < message.num_obstacles; ++i) pieces[message.obstacle[i].track].push_back(&message.obstacle[i]);
   std::map<std::int64_t, Track> tracks;
   for (auto& [number, of_track] : pieces) {
@@ -95,7 +97,7 @@ std::map<std::int64_t, Track> TracksOf(const obstacles_v2_t& message) {
   return tracks;
 }
 
-ObstacleMotion MotionOf(const obstacle_v2_t& piece, const Track& track) {
+ObstacleMotion MotionOf(const obstacle_t& piece, const Track& track) {
   ObstacleMotion motion;
   motion.stamp_us = piece.utime;
   for (int k = 0; k < piece.shape.dimension; ++k) motion.velocity[k] = piece.velocity[k];
@@ -108,7 +110,7 @@ ObstacleMotion MotionOf(const obstacle_v2_t& piece, const Track& track) {
   return motion;
 }
 
-Obstacle FromMessage(const obstacle_v2_t& piece, std::int64_t stamp, const std::map<std::int64_t, Track>& tracks) {
+Obstacle FromMessage(const obstacle_t& piece, std::int64_t stamp, const std::map<std::int64_t, Track>& tracks) {
   const Obstacle shape = FromMessage(piece.shape);
   if (const std::string why = WhyNotFresh(piece.utime, stamp, kFarthestStampUs, kFarthestStampUs); !why.empty())
     throw std::invalid_argument(why + ", from its message");
@@ -119,7 +121,7 @@ Obstacle FromMessage(const obstacle_v2_t& piece, std::int64_t stamp, const std::
 }
 
 // A piece without a window of time. The rules of a track compare windows, so this is checked before them.
-void RequireWindow(const obstacle_v2_t& piece) {
+void RequireWindow(const obstacle_t& piece) {
   if (piece.gone != 0 && piece.gone != 1)
     throw std::invalid_argument(fmt::format("gone {}, must be 0 or 1", piece.gone));
   if (piece.from_utime > piece.until_utime)
@@ -128,8 +130,8 @@ void RequireWindow(const obstacle_v2_t& piece) {
 }
 
 // Calls of(i) for each obstacle of a message. @throws std::invalid_argument with the number that was refused.
-template <class Message, class Of>
-void ForEach(const Message& message, Of of) {
+template <class Of>
+void ForEach(const obstacles_t& message, Of of) {
   for (int i = 0; i < message.num_obstacles; ++i) {
     try {
       of(i);
@@ -149,8 +151,8 @@ Obstacle OfDimension(int dim, Obstacle obstacle) {
   return obstacle;
 }
 
-obstacle_t ShapeOf(const Obstacle& from) {
-  obstacle_t to{};
+obstacle_shape_t ShapeOf(const Obstacle& from) {
+  obstacle_shape_t to{};
   to.kind = static_cast<std::int16_t>(from.kind());
   to.dimension = static_cast<std::int16_t>(from.dim());
   to.num_points = static_cast<std::int16_t>(from.points().size());
@@ -164,13 +166,6 @@ obstacle_t ShapeOf(const Obstacle& from) {
 
 std::vector<Obstacle> FromMessage(const obstacles_t& message, int dim) {
   RequireCount(message.num_obstacles);
-  std::vector<Obstacle> obstacles;
-  ForEach(message, [&](int i) { obstacles.push_back(OfDimension(dim, FromMessage(message.obstacle[i]))); });
-  return obstacles;
-}
-
-std::vector<Obstacle> FromMessage(const obstacles_v2_t& message, int dim) {
-  RequireCount(message.num_obstacles);
   ForEach(message, [&](int i) { RequireWindow(message.obstacle[i]); });
   const std::map<std::int64_t, Track> tracks = TracksOf(message);
   std::vector<Obstacle> obstacles;
@@ -180,21 +175,14 @@ std::vector<Obstacle> FromMessage(const obstacles_v2_t& message, int dim) {
   return obstacles;
 }
 
-obstacles_t ToMessage(const std::vector<Obstacle>& obstacles) {
-  obstacles_t message{};
-  message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
-  std::ranges::transform(obstacles, message.obstacle, ShapeOf);
-  return message;
-}
-
 bool Continues(const Obstacle& obstacle, const Obstacle& before) {
   return obstacle.motion() && before.motion() && obstacle.motion()->from_us != -ObstacleMotion::kAlways &&
          obstacle.motion()->from_us == before.motion()->until_us;
 }
 
-obstacles_v2_t ToMessageV2(const std::vector<Obstacle>& obstacles, std::int64_t utime,
-                           std::span<const std::int64_t> tracks) {
-  obstacles_v2_t message{};
+obstacles_t ToMessage(const std::vector<Obstacle>& obstacles, std::int64_t utime,
+                      std::span<const std::int64_t> tracks) {
+  obstacles_t message{};
   message.utime = utime;
   message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
   std::int64_t track = -1;
@@ -203,7 +191,7 @@ obstacles_v2_t ToMessageV2(const std::vector<Obstacle>& obstacles, std::int64_t 
     motion.stamp_us = utime;
     motion = obstacles[i].motion().value_or(motion);
     if (i == 0 || !Continues(obstacles[i], obstacles[i - 1])) track = static_cast<std::int64_t>(i);
-    obstacle_v2_t& to = message.obstacle[i];
+    obstacle_t& to = message.obstacle[i];
     to.shape = ShapeOf(obstacles[i]);
     to.track = tracks.empty() ? track : tracks[i];
     to.utime = motion.stamp_us;
@@ -215,7 +203,7 @@ obstacles_v2_t ToMessageV2(const std::vector<Obstacle>& obstacles, std::int64_t 
     to.growth_rate = motion.growth_rate;
   }
   for (int i = 0; i < message.num_obstacles; ++i) {
-    obstacle_v2_t& piece = message.obstacle[i];
+    obstacle_t& piece = message.obstacle[i];
     const bool goes_on = std::ranges::any_of(std::span(message.obstacle, obstacles.size()), [&](const auto& other) {
       return other.track == piece.track && other.until_utime > piece.until_utime;
     });

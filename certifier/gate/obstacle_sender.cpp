@@ -34,10 +34,10 @@ void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vect
   last_us_.reset();
 }
 
-std::optional<obstacles_v2_t> ObstacleSender::Due(std::int64_t now_us) {
+std::optional<obstacles_t> ObstacleSender::Due(std::int64_t now_us) {
   if (!content_ || (last_us_ && *last_us_ <= now_us && now_us < *last_us_ + period_us_)) return std::nullopt;
   last_us_ = now_us;
-  obstacles_v2_t due = ToMessageV2(content_->obstacles, now_us, content_->tracks);
+  obstacles_t due = ToMessage(content_->obstacles, now_us, content_->tracks);
   due.sequence = sequence_++;
   return due;
 }
@@ -74,7 +74,7 @@ void RequireSendable(const Config& config) try {
   for (const Obstacle& obstacle : config.obstacles)
     if (obstacle.motion()) changes.insert(std::max<std::int64_t>(obstacle.motion()->from_us, 0));
   for (const std::int64_t time_us : changes)
-    static_cast<void>(FromMessage(ToMessageV2(SeenBy(time_us, config.obstacles), time_us),
+    static_cast<void>(FromMessage(ToMessage(SeenBy(time_us, config.obstacles), time_us),
                                   static_cast<int>(config.problem->projection.rows())));
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": task.obstacles: " + error.what());

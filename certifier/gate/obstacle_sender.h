@@ -1,4 +1,4 @@
-/** The sending side of OBSTACLES, for a perception program. It repeats the whole set as obstacles_v2_t, so that
+/** The sending side of OBSTACLES, for a perception program. It repeats the whole set as obstacles_t, so that
 receivers know that perception is running. It uses no bus and no clock:
 
     ObstacleSender sender(ObstacleSender::PeriodUs(config.gate));
@@ -12,7 +12,7 @@ A bus has one sender. A restarted sender begins at sequence 0, which receivers a
 #include <optional>
 #include <vector>
 
-#include "forereach/obstacles_v2_t.hpp"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/safety/obstacle.h"
 #include "lcmtypes/codec.h"
 #include "task/config.h"
@@ -31,13 +31,13 @@ class ObstacleSender final {
 
   /** Sets all obstacles. If they differ from the last ones, the next message is due at once. Motions have the times of
   the clock that Due is called with.
-  @param tracks as of ToMessageV2, which also has the rules for tracks that receivers check.
+  @param tracks as of ToMessage, which also has the rules for tracks that receivers check.
   @throws std::invalid_argument for more than kMaxObstacles, or tracks of another number. */
   void Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks = {});
 
   /** The next message, if it is due, with the stamp `now_us` in microseconds since the Unix epoch. Nothing before the
   first Set. A clock that is set back does not delay a message. */
-  [[nodiscard]] std::optional<obstacles_v2_t> Due(std::int64_t now_us);
+  [[nodiscard]] std::optional<obstacles_t> Due(std::int64_t now_us);
 
  private:
   struct Content {
@@ -57,7 +57,7 @@ class ObstacleSender final {
 [[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
 
 /** Those of `obstacles` that perception has seen by `now_us`: not a track whose first window begins later. Its other
-windows are seen with the first, as predictions. Obstacles of one track follow each other, as for ToMessageV2. */
+windows are seen with the first, as predictions. Obstacles of one track follow each other, as for ToMessage. */
 [[nodiscard]] std::vector<Obstacle> SeenBy(std::int64_t now_us, const std::vector<Obstacle>& obstacles);
 
 /** Checks that receivers take what SeenBy gives of the task's obstacles, at every time from 0 on.

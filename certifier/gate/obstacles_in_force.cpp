@@ -8,8 +8,6 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/text.h"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
 #include "task/canonical.h"
 
 namespace forereach {
@@ -20,11 +18,11 @@ ObstaclesInForce::ObstaclesInForce(const Config& config)
       dim_(static_cast<int>(config.problem->projection.rows())),
       of_task_(config.obstacles),
       state_{SoleSender(Microseconds(config.gate.obstacles_timeout_ms)), {}, {}, {}, {}, {}, 0, 0} {
-  Put(true);
+  Put();
 }
 
 std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId sender) {
-  if (options_.obstacles == ObstaclesSource::kTask)
+  if (options_.obstacles != ObstaclesSource::kBus)
     return "gate.obstacles is task: those of the task file are all there are";
   switch (state_.sender.Hear(sender, now_us)) {
     case SoleSender::Place::kOther: return state_.sender.WhyTwo(now_us);
@@ -35,14 +33,11 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId 
       break;
     case SoleSender::Place::kGoesOn: break;
   }
-  if (const auto moving = Decoded<obstacles_v2_t>(bytes)) return Take(*moving, now_us);
-  if (const auto standing = Decoded<obstacles_t>(bytes)) return Take(*standing, now_us);
-  return Doubt(fmt::format("not an obstacles_t of {} bytes, nor an obstacles_v2_t of {}", EncodedSize<obstacles_t>(),
-                           EncodedSize<obstacles_v2_t>()));
+  if (const auto message = Decoded<obstacles_t>(bytes)) return Take(*message, now_us);
+  return Doubt(fmt::format("not an obstacles_t of {} bytes", EncodedSize<obstacles_t>()));
 }
 
-template <class Message>
-std::string ObstaclesInForce::Take(const Message& message, std::int64_t now_us) {
+std::string ObstaclesInForce::Take(const obstacles_t& message, std::int64_t now_us) {
   const StreamPosition position{message.sequence, message.utime};
   if (position.sequence < 0) return Doubt(fmt::format("sequence {} is negative", position.sequence));
   const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(options_.max_ahead_ms));
@@ -61,7 +56,7 @@ std::string ObstaclesInForce::Take(const Message& message, std::int64_t now_us) 
   state_.order.Take(position, horizon);
   state_.arrival = Arrival{position.utime, now_us};
   state_.doubt.clear();
-  Put(options_.obstacles != ObstaclesSource::kUnsaid);
+  Put();
   return {};
 }
 
@@ -132,11 +127,11 @@ std::optional<std::int64_t> ObstaclesInForce::stamp() const {
 void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {
   state_ = before.state_;
   state_.sender.Follow(Microseconds(options_.obstacles_timeout_ms));
-  Put(true);
+  Put();
 }
 
-void ObstaclesInForce::Put(bool of_task) {
-  all_ = of_task ? of_task_ : std::vector<Obstacle>();
+void ObstaclesInForce::Put() {
+  all_ = of_task_;
   all_.insert(all_.end(), state_.heard.begin(), state_.heard.end());
   digest_ = ObstaclesDigest(all_);
 }

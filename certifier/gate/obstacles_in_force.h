@@ -1,7 +1,7 @@
 /** The obstacles in force, and whether they are known to be complete. They depend on gate.obstacles of the task:
 
-`bus`: the obstacles of the task file and those of the last OBSTACLES message, an obstacles_t or an obstacles_v2_t. The
-messages of both types are one stream, of one sender (lcmtypes/sole_sender.h). An obstacle may move only if the task has
+`bus`: the obstacles of the task file and those of the last OBSTACLES message, an obstacles_t. The messages
+are one stream, of one sender (lcmtypes/sole_sender.h). An obstacle may move only if the task has
 gate.max_clock_error_ms; otherwise a message with it is refused. No message removes an obstacle of the file. The
 obstacles are known from the first usable message on, until one of these events:
 - The last message's stamp is older than gate.obstacles_timeout_ms.
@@ -17,10 +17,7 @@ After a gap, one message in order confirms it; after a repeated sequence number,
 with a later stamp is in order. If the last message of the old stream is still fresh, one more message in order is
 needed, because there may be a second sender.
 
-`task`: the obstacles of the task file. OBSTACLES is refused.
-
-Absent, in logs from before gate.obstacles: the obstacles of the file until the first message, then those of the last
-message.
+`task`, or not said: the obstacles of the task file. OBSTACLES is refused.
 
 A reload keeps the received obstacles. The class uses no bus and no clock. docs/bus.md has the rules as a table. */
 #pragma once
@@ -31,6 +28,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include <vector>
 
 #include "certifier/gate/stream_clock.h"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/safety/obstacle.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
@@ -45,7 +43,7 @@ class ObstaclesInForce final {
   /** Starts with the obstacles of the task. */
   explicit ObstaclesInForce(const Config& config);
 
-  /** Takes the bytes of an obstacles_t or an obstacles_v2_t that arrived at `now_us`, completely or not at all. Its
+  /** Takes the bytes of an obstacles_t that arrived at `now_us`, completely or not at all. Its
   stamp has to be fresh (stamp.h), and it has to be newer than the last message or from a restarted sender
   (stream_order.h). Returns the error, or an empty text. @param sender of its signature. */
   [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us, SenderId sender = {});
@@ -79,13 +77,12 @@ class ObstaclesInForce final {
   };
 
   [[nodiscard]] std::string Doubt(const std::string& why);
-  template <class Message>
-  [[nodiscard]] std::string Take(const Message& message, std::int64_t now_us);
+  [[nodiscard]] std::string Take(const obstacles_t& message, std::int64_t now_us);
   void RequireClock(const std::vector<Obstacle>& obstacles) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
   [[nodiscard]] Freshness FreshnessOfLast(std::int64_t now_us) const;
-  // Sets all_ to the task's obstacles, if of_task, and the received ones.
-  void Put(bool of_task);
+  // Sets all_ to the task's obstacles and the received ones.
+  void Put();
 
   GateOptions options_;
   std::optional<ClockBounds> clocks_;

@@ -76,9 +76,9 @@ void PlanLedger::Follow(const GateOptions& gate) {
   silence_us_ = gate.needs_robot_state ? std::optional(Microseconds(gate.robot_timeout_ms)) : std::nullopt;
 }
 
-void PlanLedger::Add(const certified_plan_v2_t& certified, std::int64_t steady_us, const Angles& angles) {
+void PlanLedger::Add(const certified_plan_t& certified, std::int64_t steady_us, const Angles& angles) {
   ForgetEnded(steady_us);
-  const auto whole = std::make_shared<const certified_plan_v2_t>(certified);
+  const auto whole = std::make_shared<const certified_plan_t>(certified);
   KeepSlices({whole, angles});
   const candidate_plan_t& plan = whole->plan;
   Record& record = Append(plan.plan_id, plan.num_steps);
@@ -192,7 +192,7 @@ std::optional<PlanLedger::Departure> PlanLedger::Compare(std::int64_t plan_id, i
                                                          std::span<const double> state) const {
   const auto slices = FindSlices(plan_id);
   if (slices == measured_.slices.end()) return std::nullopt;
-  const certified_plan_v2_t& certified = *slices->certified;
+  const certified_plan_t& certified = *slices->certified;
   if (step < 0 || step > certified.plan.num_steps || std::ssize(state) != certified.plan.num_states)
     return std::nullopt;
   for (int k = 0; k < certified.plan.num_states; ++k) {

@@ -66,7 +66,7 @@ No bus, no clock. Times of a monotonic clock (steady_us) and of the wall clock (
 #include <vector>
 
 #include "certifier/gate/gate.h"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
@@ -114,7 +114,7 @@ class PlanLedger final {
   /** Adds a plan that was certified and sent. Its slices replace those of a plan of the same plan_id, unless that plan
   is executing: a guard does not accept the plan_id that it executes. @param angles the states that may differ by whole
   turns: those of the model that it was certified with. @pre not IsFull(). Cost: a copy of the plan. */
-  void Add(const certified_plan_v2_t& certified, std::int64_t steady_us, const Angles& angles = {});
+  void Add(const certified_plan_t& certified, std::int64_t steady_us, const Angles& angles = {});
   /** Another certifier is in charge: no plan is in force, and slices and states are forgotten. It is still known which
   plans were certified. */
   void StandBy();
@@ -174,7 +174,7 @@ class PlanLedger final {
   [[nodiscard]] std::int64_t withdrawals() const { return withdrawals_; }
 
  private:
-  using Whole = std::shared_ptr<const certified_plan_v2_t>;
+  using Whole = std::shared_ptr<const certified_plan_t>;
 
   struct InForce {
     std::int64_t may_run_until_us = 0;      // by the monotonic clock

@@ -25,7 +25,7 @@ struct WatchOptions {
 
 class Watch final {
  public:
-  enum class State { kDisarmed = 1, kArmed = 2, kFault = 3 };  // certifier_status_v3_t's numbers
+  enum class State { kDisarmed = 1, kArmed = 2, kFault = 3 };  // certifier_status_t's numbers
   struct Fault {
     std::int16_t cause;  ///< fault_t's
     std::int64_t utime;

@@ -49,8 +49,8 @@ std::int64_t RandomInstance() {
 
 Charge::State ChargeOf(std::int16_t state) {
   switch (state) {
-    case certifier_status_v3_t::LISTENING: return Charge::State::kListening;
-    case certifier_status_v3_t::STANDBY: return Charge::State::kStandingBy;
+    case certifier_status_t::LISTENING: return Charge::State::kListening;
+    case certifier_status_t::STANDBY: return Charge::State::kStandingBy;
     default: return Charge::State::kInCharge;
   }
 }
@@ -103,7 +103,7 @@ CertifierNode::~CertifierNode() {
 // ---- Who is in charge.
 
 void CertifierNode::OnStatus(const Received& received) {
-  const auto status = Decoded<certifier_status_v3_t>(received.bytes);
+  const auto status = Decoded<certifier_status_t>(received.bytes);
   if (!status || status->instance == charge_.self().instance) return;
   // Two certifiers must see each other even if their clocks disagree. Messages of a replayed log must not count.
   if (FreshnessOf(status->utime, received.utime, kCertifiersApartUs, kCertifiersApartUs) != Freshness::kFresh)
@@ -117,13 +117,13 @@ void CertifierNode::OnStatus(const Received& received) {
 }
 
 // Notes the fault and the contradictions of the certifier in charge, for the case that this one takes over.
-void CertifierNode::Heed(const certifier_status_v3_t& status) {
+void CertifierNode::Heed(const certifier_status_t& status) {
   fault_of_other_.reset();
   if (status.fault != 0) fault_of_other_ = Watch::Fault{status.fault, status.fault_utime, GetText(status.message)};
   // Without a fault, ERROR means that data contradict its declaration or that it cannot store a fault.
   const bool is_false = status.fault == fault_t::DECLARATION_FALSIFIED ||
-                        (status.fault == 0 && status.level == certifier_status_v3_t::ERROR &&
-                         status.latch != certifier_status_v3_t::LATCH_UNWRITABLE);
+                        (status.fault == 0 && status.level == certifier_status_t::ERROR &&
+                         status.latch != certifier_status_t::LATCH_UNWRITABLE);
   if (is_false) contradictions_.AddReported(GetDigest(status.model_digest), GetDigest(status.declaration_digest));
 }
 
@@ -522,7 +522,7 @@ void CertifierNode::TakeReload() {
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
   latch_.Check();
-  const certifier_status_v3_t status = reporter_.Report(*gate_, now_us, clocks_.steady());
+  const certifier_status_t status = reporter_.Report(*gate_, now_us, clocks_.steady());
   // The fault is sent first, for a robot that has just started.
   if (latch_.IsDue(clocks_.steady())) SendFault();
   sender_.Send(channels_.status, status);

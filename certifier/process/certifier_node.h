@@ -57,7 +57,7 @@ that the plan was handed to the bus before. */
 #include "certifier/process/latch_file.h"
 #include "certifier/process/status_reporter.h"
 #include "certifier/process/task_reload.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -102,7 +102,7 @@ class CertifierNode final : public Node {
   [[nodiscard]] bool is_in_charge() const { return charge_.state() == Charge::State::kInCharge; }
   void OnCandidate(const Received& received);
   void OnStatus(const Received& received);
-  void Heed(const certifier_status_v3_t& status);
+  void Heed(const certifier_status_t& status);
   void OnFault(const Received& received);
   void LookAtCharge();
   void FollowCharge(Charge::State before);

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "bus/log.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -74,8 +74,8 @@ bool FaultLatch::Forget() {
 }
 
 std::int16_t FaultLatch::status() const {
-  if (!ready()) return certifier_status_v3_t::LATCH_UNWRITABLE;
-  return file_ && watch_.fault() ? certifier_status_v3_t::LATCH_WRITTEN : certifier_status_v3_t::NO_LATCH;
+  if (!ready()) return certifier_status_t::LATCH_UNWRITABLE;
+  return file_ && watch_.fault() ? certifier_status_t::LATCH_WRITTEN : certifier_status_t::LATCH_NONE;
 }
 
 }  // namespace forereach

@@ -41,7 +41,7 @@ class FaultLatch final {
   [[nodiscard]] bool ready() const { return !file_ || file_->ready(); }
   /** One sentence; empty if ready. */
   [[nodiscard]] std::string why_not() const { return file_ ? file_->why_not() : ""; }
-  /** certifier_status_v3_t's `latch`. */
+  /** certifier_status_t's `latch`. */
   [[nodiscard]] std::int16_t status() const;
 
   /** What was put last. */

@@ -24,8 +24,8 @@ bool StatusReporter::IsContradicted(const Gate& gate) const {
 
 std::int16_t StatusReporter::State() const {
   switch (parts_.charge.state()) {
-    case Charge::State::kListening: return certifier_status_v3_t::LISTENING;
-    case Charge::State::kStandingBy: return certifier_status_v3_t::STANDBY;
+    case Charge::State::kListening: return certifier_status_t::LISTENING;
+    case Charge::State::kStandingBy: return certifier_status_t::STANDBY;
     case Charge::State::kInCharge: break;
   }
   return static_cast<std::int16_t>(parts_.watch.state());
@@ -33,8 +33,8 @@ std::int16_t StatusReporter::State() const {
 
 std::int16_t StatusReporter::Level(const Gate& gate) const {
   if (IsInCharge() && (parts_.watch.fault() || IsContradicted(gate) || !parts_.latch.ready()))
-    return certifier_status_v3_t::ERROR;
-  return State() == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK : certifier_status_v3_t::STALE;
+    return certifier_status_t::ERROR;
+  return State() == certifier_status_t::ARMED ? certifier_status_t::OK : certifier_status_t::STALE;
 }
 
 std::string StatusReporter::WhyNotOk(const Gate& gate) const {
@@ -56,7 +56,7 @@ std::string StatusReporter::WhyNotOk(const Gate& gate) const {
                      counts.obstacles_refused ? "; " + parts_.channels.obstacles + " is refused" : "");
 }
 
-void StatusReporter::AddBusCounts(certifier_status_v3_t& status) const {
+void StatusReporter::AddBusCounts(certifier_status_t& status) const {
   status.messages_refused = counts.refused;
   status.messages_not_sent = parts_.sender.refused();
   status.bus_dropped = parts_.bus.dropped();
@@ -69,10 +69,10 @@ void StatusReporter::AddBusCounts(certifier_status_v3_t& status) const {
   status.refused_replayed = refusals.replayed + refusals.old + refusals.ahead;
 }
 
-certifier_status_v3_t StatusReporter::Report(const Gate& gate, std::int64_t now_us, std::int64_t steady_us) {
+certifier_status_t StatusReporter::Report(const Gate& gate, std::int64_t now_us, std::int64_t steady_us) {
   last_us_ = steady_us;
   next_us_ = last_us_ + (parts_.charge.state() == Charge::State::kListening ? kToOthersUs : kPeriodUs);
-  certifier_status_v3_t status = gate.Status(now_us);
+  certifier_status_t status = gate.Status(now_us);
   status.sequence = IsInCharge() ? reports_++ : reports_aside_++;
   status.instance = parts_.charge.self().instance;
   status.started_utime = parts_.charge.self().started_utime;
@@ -109,7 +109,7 @@ double StatusReporter::ElapsedPercentile(double fraction) const {
 }
 
 std::string StatusReporter::Summary(const Gate& gate) const {
-  const certifier_status_v3_t status = gate.Status(0);
+  const certifier_status_t status = gate.Status(0);
   const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
   return JsonText({{"candidates", status.candidates},
                    {"certified", count(decision_t::CERTIFIED)},

@@ -17,7 +17,7 @@ kToOthersUs while another certifier has to hear of this one. Of time it knows wh
 #include "certifier/process/contradictions.h"
 #include "certifier/process/fault_latch.h"
 #include "certifier/process/task_reload.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 
 namespace forereach {
 
@@ -66,7 +66,7 @@ class StatusReporter final {
   void CountPageFaults(std::int64_t count) { page_faults_ += decided_ > 0 ? count : 0; }
 
   /** The heartbeat to send now. */
-  [[nodiscard]] certifier_status_v3_t Report(const Gate& gate, std::int64_t now_us, std::int64_t steady_us);
+  [[nodiscard]] certifier_status_t Report(const Gate& gate, std::int64_t now_us, std::int64_t steady_us);
 
   /** All counts, as one JSON object. */
   [[nodiscard]] std::string Summary(const Gate& gate) const;
@@ -79,7 +79,7 @@ class StatusReporter final {
   [[nodiscard]] std::int16_t State() const;
   [[nodiscard]] std::int16_t Level(const Gate& gate) const;
   [[nodiscard]] std::string WhyNotOk(const Gate& gate) const;
-  void AddBusCounts(certifier_status_v3_t& status) const;
+  void AddBusCounts(certifier_status_t& status) const;
   [[nodiscard]] double ElapsedPercentile(double fraction) const;
 
   const Parts parts_;

@@ -17,7 +17,7 @@ namespace forereach {
 
 class Obstacle final {
  public:
-  enum class Kind { kCircle = 1, kBox = 2, kPolygon = 3, kHalfSpace = 4 };  // as in lcmtypes/obstacle_t.lcm
+  enum class Kind { kCircle = 1, kBox = 2, kPolygon = 3, kHalfSpace = 4 };  // as in lcmtypes/obstacle_shape_t.lcm
 
   /** @name Factories. Each throws std::invalid_argument with value and bound if a size is wrong, an entry is not
   finite, the radius is negative, or lower > upper. */

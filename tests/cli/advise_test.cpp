@@ -20,6 +20,7 @@
 #include "lcmtypes/names.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 
@@ -78,8 +79,8 @@ TEST_F(AdviseTest, FindsAChangeThatCertifiesForEachAbstentionOfACourse) {
   const Output output = Forereach("advise --json " + kCourse);
   EXPECT_EQ(output.code, 0);
   const auto document = nlohmann::json::parse(output.text);
-  EXPECT_EQ(document["certified"], 20);
-  EXPECT_EQ(document["abstentions"].size(), 47u);
+  EXPECT_EQ(document["certified"], kCourseCertified);
+  EXPECT_EQ(document["abstentions"].size(), std::size_t{kCourseAbstained});
   for (const auto& abstention : document["abstentions"]) {
     int turned = 0;
     for (const auto& advice : abstention["advice"]) turned += advice["turns"].get<bool>();
@@ -148,7 +149,7 @@ TEST_F(AdviseTest, GoesOnAfterAnInterruption) {
   const std::string command = "advise '" + (scratch_ / "night") + "' --config tests/data/course.yaml ";
   const std::string resume = command + "--resume '" + (scratch_ / "kept") + "' ";
   const std::string whole = Forereach(command + "--json 2>&1").text;
-  EXPECT_EQ(nlohmann::json::parse(whole)["abstentions"].size(), 94u);
+  EXPECT_EQ(nlohmann::json::parse(whole)["abstentions"].size(), std::size_t{2 * kCourseAbstained});
   EXPECT_EQ(Forereach(resume + "--json --jobs 1 2>&1").text, whole);
   std::vector<std::filesystem::path> kept;
   for (const auto& file : std::filesystem::directory_iterator(scratch_ / "kept")) kept.push_back(file.path());

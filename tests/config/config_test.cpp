@@ -159,7 +159,7 @@ TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
     return files.Load(std::string(kTask) + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
   };
   const Config unsaid = load("");
-  EXPECT_FALSE(unsaid.gate.obstacles_lost_ms) << "a log of before the key can be read";
+  EXPECT_FALSE(unsaid.gate.obstacles_lost_ms);
   EXPECT_THAT(RefusalOnBus(unsaid),
               testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles_lost_ms: missing"),
                              testing::HasSubstr("`never`")));
@@ -187,7 +187,7 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   const std::string task = std::string(kTask) + "gate: {obstacles: task}\n", line = "  between: samples\n";
   const Config unsaid = files.Load(Replaced(task, line, ""));
   EXPECT_FALSE(unsaid.says_between);
-  EXPECT_FALSE(unsaid.problem->between) << "as logs from before the key were recorded";
+  EXPECT_FALSE(unsaid.problem->between);
   const auto says = testing::AllOf(testing::StartsWith(unsaid.path + ": task.between: missing. Write "),
                                    testing::HasSubstr("`between: samples`"));
   EXPECT_THAT(Refusal(RequireForCertifying, unsaid), says);

@@ -76,8 +76,8 @@ TEST(DeclarationDigest, NoDisturbanceAndZerosAreTheSame) {
   EXPECT_NE(with("[0, 0, 0.01, 0.01]"), digest);
 }
 
-// What it was before disturbances: recorded logs and latched faults name it.
-TEST(DeclarationDigest, WithoutDisturbanceIsThatOfOlderRecords) {
+// Recorded logs and latched faults name it.
+TEST(DeclarationDigest, WithoutDisturbanceIsFixed) {
   const Declaration declaration{Eigen::MatrixXd::Ones(4, 6), Eigen::VectorXd::Zero(4)};
   EXPECT_EQ(ToHex(DeclarationDigest(*MakePointMass(0.15), declaration)),
             "13d8edfd9ab9f1a81d4d8912949996af9cff692d0ea4013b26bd69eb41059b6f");

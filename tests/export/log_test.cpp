@@ -10,6 +10,7 @@
 #include "records/log_edit.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 
@@ -56,10 +57,9 @@ TEST_F(LogTest, ListsAsJson) {
     if (line["type"] == "decision_t") {
       EXPECT_EQ(line["what"], "certified");
     }
-    others += line["type"] != "decision_t" && line["type"] != "candidate_plan_t" &&
-              line["type"] != "certified_plan_t" && line["type"] != "certified_plan_v2_t";
+    others += line["type"] != "decision_t" && line["type"] != "candidate_plan_t" && line["type"] != "certified_plan_t";
   }
-  EXPECT_EQ(decisions, 20);
+  EXPECT_EQ(decisions, kCourseCertified);
   EXPECT_EQ(others, 0);
 }
 
@@ -85,7 +85,7 @@ TEST_F(LogTest, ACutByOutcomeKeepsTheRest) {
   const std::string out = scratch_ / "out.lcmlog";
   EXPECT_EQ(Log("cut '" + kCourse + "' --outcome certified -o '" + out + "'").code, 0);
   const Output replay = Forereach("replay '" + out + "' --config tests/data/course.yaml 2>&1");
-  EXPECT_THAT(replay.text, HasSubstr("20 candidates"));
+  EXPECT_THAT(replay.text, HasSubstr(std::to_string(kCourseCertified) + " candidates"));
   const auto is_other = [](const LogEvent& event) {
     const auto summary = Summarize(event.message());
     return !summary || !summary->is_of_plan;
@@ -103,7 +103,7 @@ TEST_F(LogTest, AFilterKeepsTheChosenAlone) {
     ASSERT_TRUE(summary && summary->is_of_plan);
     decisions += summary->type == "decision_t";
   }
-  EXPECT_EQ(decisions, 20);
+  EXPECT_EQ(decisions, kCourseCertified);
 }
 
 TEST_F(LogTest, MergesByTime) {

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "forereach/command_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
@@ -150,7 +150,7 @@ class Clocked final : Kind {
     rig.perception().See(with_wall);
     std::int64_t before = 0;
     for (int j = 0; j < 20 && !stopped(); ++j) {
-      rig.perception().SayNow([](obstacles_v2_t& message) {
+      rig.perception().SayNow([](obstacles_t& message) {
         message.utime -= 2'000'000;
         return true;
       });

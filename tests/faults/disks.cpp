@@ -40,8 +40,8 @@ class Filled final : Kind {
         rig.Start(Rig::kCertifier);
         const auto says_so = [&] {
           const auto& status = rig.witness().status();
-          return status && status->level == certifier_status_v3_t::ERROR &&
-                 status->state == certifier_status_v3_t::DISARMED &&
+          return status && status->level == certifier_status_t::ERROR &&
+                 status->state == certifier_status_t::DISARMED &&
                  GetText(status->message).starts_with("no fault could be stored");
         };
         Demand(row, rig.ListenUntil(says_so, kStarts), why + ", and the certifier does not say so");

@@ -76,7 +76,7 @@ class Forged final : Kind {
         row, rig,
         [&](int) {
           rig.Listen(milliseconds(700));
-          const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+          const auto before = rig.witness().status().value_or(certifier_status_t{});
           static_cast<void>(ear.TakeObeyed());
           const auto recorded = ear.heard();
           for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
@@ -149,7 +149,7 @@ class Forged final : Kind {
           const auto begun = [&] { return rig.witness().status().has_value(); };
           Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
           rig.Listen(kHeartbeat);
-          const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+          const auto before = rig.witness().status().value_or(certifier_status_t{});
           static_cast<void>(ear.TakeObeyed());
           const std::int64_t now = WallClockUs();
           constexpr std::int64_t kHourUs = 3'600'000'000;
@@ -193,7 +193,7 @@ class Forged final : Kind {
           const std::string why = rig.Heal();
           Demand(row, why.empty(),
                  "it does not go on with a new key of the " + std::string(RoleName(role)) + ": " + why);
-          const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+          const auto before = rig.witness().status().value_or(certifier_status_t{});
           static_cast<void>(ear->TakeObeyed());
 
           const BusOptions& channels = rig.config().bus;
@@ -243,8 +243,7 @@ class Forged final : Kind {
   }
 
   // Neither by the certifier nor by the robot.
-  static void DemandNothingBelieved(Row& row, Rig& rig, const certifier_status_v3_t& before,
-                                    const std::string& obeyed) {
+  static void DemandNothingBelieved(Row& row, Rig& rig, const certifier_status_t& before, const std::string& obeyed) {
     const auto& now = rig.witness().status();
     Demand(row, !rig.witness().fault(), "a fault was believed or latched");
     Demand(row, obeyed.empty(),
@@ -274,7 +273,7 @@ class Forged final : Kind {
     withdrawal_t withdrawal{};
     withdrawal.sequence = kForgedSequence;
     withdrawal.expires_utime = INT64_MAX;
-    if (const certified_plan_v2_t* certified = rig.witness().last_certified())
+    if (const certified_plan_t* certified = rig.witness().last_certified())
       withdrawal.plan_id = certified->plan.plan_id;
     harmful[channels.withdrawn] = Encode(withdrawal);
     advice_t advice{};  // the task asks for none
@@ -285,13 +284,13 @@ class Forged final : Kind {
     nothing_there.utime = WallClockUs();
     nothing_there.sequence = kForgedSequence;
     harmful[channels.obstacles] = Encode(nothing_there);
-    if (const certified_plan_v2_t* certified = rig.witness().last_certified())
+    if (const certified_plan_t* certified = rig.witness().last_certified())
       harmful[channels.certified] = Encode(Widened(*certified));
     return harmful;
   }
 
   // What an attacker's certificate looks like: slices that nothing leaves, for a plan that starts soon.
-  static certified_plan_v2_t Widened(certified_plan_v2_t certified) {
+  static certified_plan_t Widened(certified_plan_t certified) {
     certified.utime = WallClockUs();
     certified.plan.plan_id += std::int64_t{1} << 32;
     certified.plan.start_utime = certified.utime + 200'000;
@@ -322,7 +321,7 @@ class Forged final : Kind {
         [&](int i) {
           const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
           for (int j = 0; j < 20; ++j) {
-            certified_plan_v2_t certified = Widened(*rig.witness().last_certified());
+            certified_plan_t certified = Widened(*rig.witness().last_certified());
             certified.plan.plan_id += j;
             certified.plan.start_utime += 40'000 * j;
             SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));

@@ -95,7 +95,7 @@ robot_state_t Kind::State(const Rig& rig) const {
 
 robot_state_t Kind::StateOutside(Rig& rig) {
   robot_state_t state = State(rig);
-  const certified_plan_v2_t& certified = *rig.witness().last_certified();
+  const certified_plan_t& certified = *rig.witness().last_certified();
   const int step = Below(certified.plan.num_steps), k = Below(state.num_states);
   state.mode = robot_state_t::EXECUTING;
   state.executing_plan_id = certified.plan.plan_id;
@@ -131,7 +131,7 @@ void Kind::DemandStillLatched(Row& row, Rig& rig, const fault_t& fault) {
     const auto& said = rig.witness().fault();
     const auto& status = rig.witness().status();
     return said && said->cause == fault.cause && said->utime == fault.utime &&
-           GetText(said->message) == GetText(fault.message) && status && status->state == certifier_status_v3_t::FAULT;
+           GetText(said->message) == GetText(fault.message) && status && status->state == certifier_status_t::FAULT;
   };
   Demand(row, rig.ListenUntil(says_it, kStarts), "the next certifier does not say the fault again");
   rig.Listen(milliseconds(1000));

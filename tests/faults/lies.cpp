@@ -65,7 +65,7 @@ class Lied final : Kind {
           robot_state_t state = State(rig);
           state.mode = robot_state_t::EXECUTING;
           state.sequence = sequence++;
-          const certified_plan_v2_t& last = *rig.witness().last_certified();
+          const certified_plan_t& last = *rig.witness().last_certified();
           state.executing_plan_id = i % 2 == 0 ? WallClockUs() : last.plan.plan_id;
           state.executing_step = i % 2 == 0 ? 0 : last.plan.num_steps;
           if (i % 2 != 0) std::copy_n(last.slice_lower[last.plan.num_steps], state.num_states, state.state);

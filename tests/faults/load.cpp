@@ -19,7 +19,7 @@ Load::Load(const Config& config, Make make)
     : config_(config), make_(std::move(make)), bus_(OpenBus(config.bus, Role::kPlanner)), base_id_(WallClockUs()) {
   bus_->Subscribe(config_.bus.decision, [this](const Received& r) { OnDecision(r); });
   bus_->Subscribe(config_.bus.status, [this](const Received& r) {
-    if (const auto status = Decoded<certifier_status_v3_t>(r.bytes)) status_ = *status;
+    if (const auto status = Decoded<certifier_status_t>(r.bytes)) status_ = *status;
   });
 }
 

@@ -13,7 +13,7 @@ by a thread of its own, so nothing that is done with the answers delays the next
 
 #include "bus/bus.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "task/config.h"
 
 namespace forereach {
@@ -51,7 +51,7 @@ class Load final {
   /** By how many microseconds the sender's thread woke up too late, each time since the last call: what the machine
   does to a thread that only sleeps. */
   [[nodiscard]] std::vector<double> TakeLateness();
-  [[nodiscard]] const certifier_status_v3_t& status() const { return status_; }
+  [[nodiscard]] const certifier_status_t& status() const { return status_; }
 
  private:
   void Send();
@@ -71,7 +71,7 @@ class Load final {
   std::vector<double> latencies_;
   std::mutex lateness_mutex_;
   std::vector<double> lateness_;
-  certifier_status_v3_t status_{};
+  certifier_status_t status_{};
   std::atomic<bool> stop_ = false;
   std::thread sender_;
 };

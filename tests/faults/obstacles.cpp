@@ -2,7 +2,7 @@
 #include <limits>
 #include <map>
 
-#include "forereach/obstacles_v2_t.hpp"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
@@ -34,8 +34,8 @@ class Obstructed final : Kind {
     ObstacleTries("OBSTACLES fall silent", [&](Row& row, Rig& rig, int) { FallSilent(row, rig); });
     ObstacleTries("OBSTACLES with gaps, NaN, wrong counts, from the future (signed)", [&](Row& row, Rig& rig, int i) {
       rig.perception().SetSilent(true);
-      rig.perception().SayNow([](obstacles_v2_t&) { return true; });
-      rig.perception().SayNow([&](obstacles_v2_t& message) {
+      rig.perception().SayNow([](obstacles_t&) { return true; });
+      rig.perception().SayNow([&](obstacles_t& message) {
         switch (i % 5) {
           case 0: return false;  // lost: the next one is a gap
           case 1: message.obstacle[0].shape.point[0][1] = std::numeric_limits<double>::quiet_NaN(); break;
@@ -45,7 +45,7 @@ class Obstructed final : Kind {
         }
         return true;
       });
-      if (i % 5 == 0) rig.perception().SayNow([](obstacles_v2_t&) { return true; });
+      if (i % 5 == 0) rig.perception().SayNow([](obstacles_t&) { return true; });
       rig.Listen(milliseconds(50));
       DemandUnknown(row, rig, "after a message that was lost or refused");
       rig.perception().SetSilent(false);
@@ -69,7 +69,7 @@ class Obstructed final : Kind {
     MovingTries("Moving OBSTACLES fall silent", [&](Row& row, Rig& rig, int, auto&) { FallSilent(row, rig); });
     MovingTries("Moving OBSTACLES come too late (signed)", [&](Row& row, Rig& rig, int, auto&) {
       rig.perception().SetSilent(true);
-      rig.perception().SayNow([](obstacles_v2_t& message) {
+      rig.perception().SayNow([](obstacles_t& message) {
         message.utime -= 600'000;  // gate.max_age_ms is 500
         return true;
       });
@@ -83,7 +83,7 @@ class Obstructed final : Kind {
                   if (i % 9 == 8)
                     rig.bus().Publish(rig.config().bus.obstacles, transition_t{});
                   else
-                    rig.perception().SayNow([&](obstacles_v2_t& message) {
+                    rig.perception().SayNow([&](obstacles_t& message) {
                       Garble(message, i % 9);
                       return true;
                     });
@@ -92,7 +92,7 @@ class Obstructed final : Kind {
                   rig.perception().SetSilent(false);
                 });
     MovingTries("A moving obstacle jumps in front of the robot, and away again", [&](Row&, Rig& rig, int, auto& seen) {
-      const certified_plan_v2_t* plan = rig.witness().last_certified();
+      const certified_plan_t* plan = rig.witness().last_certified();
       const double ahead = plan ? plan->plan.initial_center[0] + 8 + Below(12) : 20;
       const auto jump = [&](const Obstacle& to) {
         const Digest before = ObstaclesDigest(seen);
@@ -133,9 +133,9 @@ class Obstructed final : Kind {
   }
 
   // Of a piece of a prediction: each is refused as a whole message.
-  static void Garble(obstacles_v2_t& message, int way) {
+  static void Garble(obstacles_t& message, int way) {
     constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-    obstacle_v2_t& piece = message.obstacle[message.num_obstacles - 1];  // the one that moves
+    obstacle_t& piece = message.obstacle[message.num_obstacles - 1];  // the one that moves
     switch (way) {
       case 0: piece.from_utime = message.utime + 1; return;  // it appears from nowhere
       case 1: piece.from_utime = kMost, piece.until_utime = -kMost; return;
@@ -145,7 +145,7 @@ class Obstructed final : Kind {
       case 5: piece.uncertainty = std::numeric_limits<double>::infinity(); return;
       case 6: piece.gone = 2; return;
       default:  // a gap between two pieces
-        obstacle_v2_t& next = message.obstacle[message.num_obstacles++];
+        obstacle_t& next = message.obstacle[message.num_obstacles++];
         next = piece;
         piece.until_utime = message.utime + 1'000'000;
         next.from_utime = message.utime + 1'000'001;
@@ -178,7 +178,7 @@ class Obstructed final : Kind {
           const std::int64_t before = withdrawn;
           for (int walls = 0; walls < 5 && withdrawn == before; ++walls) {
             rig.Listen(milliseconds(1500));
-            const certified_plan_v2_t* plan = rig.witness().last_certified();
+            const certified_plan_t* plan = rig.witness().last_certified();
             std::vector<Obstacle> walled = seen;
             const double ahead = (plan ? plan->plan.initial_center[0] : 0) + 2 + Below(6);
             walled.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), ahead));

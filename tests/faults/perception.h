@@ -51,7 +51,7 @@ class Perception final {
     const std::lock_guard lock(mutex_);
     auto message = sender_.Due(--set_back_us_).value();  // due: each time the clock was set back, once more
     message.utime = WallClockUs();
-    for (obstacle_v2_t& obstacle : message.obstacle)
+    for (obstacle_t& obstacle : message.obstacle)
       if (obstacle.utime == set_back_us_) obstacle.utime = message.utime;  // it stands
     if (spoil(message)) bus_->Publish(channel_, message);
   }

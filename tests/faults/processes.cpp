@@ -47,7 +47,7 @@ class Hurt final : Kind {
     Tries(
         row, rig,
         [&](int i) {
-          const certifier_status_v3_t before = *rig.witness().status();
+          const certifier_status_t before = *rig.witness().status();
           const auto& now = rig.witness().status();
           std::ofstream(path) << Spoilt(good, i / 2);
           if (i % 2 == 0)
@@ -125,7 +125,7 @@ class Hurt final : Kind {
     Tries(
         row, rig,
         [&](int i) {
-          const certifier_status_v3_t before = *rig.witness().status();
+          const certifier_status_t before = *rig.witness().status();
           const auto& now = rig.witness().status();
           PutNoFile(path, i);
           rig.Signal(Rig::kRobot, SIGHUP);

@@ -37,7 +37,7 @@ struct Row {
   double asked = 0;
   std::int64_t sent = 0, answered = 0, again = 0, answers_lost = 0;
   double p50_us = 0, p99_us = 0, worst_us = 0;
-  certifier_status_v3_t status{};
+  certifier_status_t status{};
 };
 
 candidate_plan_t Standing(const Config& config, int steps) {
@@ -113,7 +113,7 @@ Row Measure(const Options& options, const std::string& name, Config config, int 
 }
 
 // Counted by cause.
-std::string OtherAnswers(const certifier_status_v3_t& status) {
+std::string OtherAnswers(const certifier_status_t& status) {
   std::string text;
   for (std::size_t cause = 1; cause < std::size(status.by_cause); ++cause)
     if (status.by_cause[cause] > 0)
@@ -136,7 +136,7 @@ std::string Table(const Options& options, int steps, const std::vector<Row>& row
        << "| worst us | gate p50 us | gate p99 us "
           "|\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Row& row : rows) {
-    const certifier_status_v3_t& status = row.status;
+    const certifier_status_t& status = row.status;
     const std::int64_t unaccounted = row.sent - row.answered - status.candidates_lost - row.answers_lost;
     text << "| " << row.name << " | " << row.sent << " | " << status.by_outcome[decision_t::CERTIFIED] << " | "
          << OtherAnswers(status) << " | " << row.again << " | " << status.candidates_lost << " | " << row.answers_lost
@@ -160,7 +160,7 @@ std::string FloodTable(const Options& options, const std::vector<Row>& rows) {
           "worst us |\n"
        << "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Row& row : rows) {
-    const certifier_status_v3_t& status = row.status;
+    const certifier_status_t& status = row.status;
     text << "| " << row.name << " | " << static_cast<std::int64_t>(row.flood_per_s) << " | "
          << status.refused_unsigned + status.refused_forged + status.refused_replayed << " | " << row.sent << " | "
          << status.by_outcome[decision_t::CERTIFIED] << " | " << OtherAnswers(status) << " | " << status.candidates_lost

@@ -242,14 +242,14 @@ std::string Rig::Heal() {
   const bool healed = ListenUntil(
       [&] {
         const auto& status = witness_->status();
-        if (status && status->state == certifier_status_v3_t::FAULT && std::chrono::steady_clock::now() >= next_reset) {
+        if (status && status->state == certifier_status_t::FAULT && std::chrono::steady_clock::now() >= next_reset) {
           Command(command_t::RESET);
           next_reset = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
         }
         const bool silent =
             std::chrono::steady_clock::now() - std::max(witness_->robot_heard(), drive_began_) > kSilent;
         if (silent || !IsAlive(kRobot) || !IsAlive(kPlanner)) DriveAnew();
-        return status && status->level == certifier_status_v3_t::OK && witness_->executed() > certificates_before &&
+        return status && status->level == certifier_status_t::OK && witness_->executed() > certificates_before &&
                witness_->logger_status() && witness_->logger_status()->state == logger_status_t::OK;
       },
       kRecovers);

@@ -144,7 +144,7 @@ class ThrowingRobot final : private Supervisor::Robot {
     Note(applied_ != nullptr, "a control goes out that is of no certified plan, or not from inside its slice");
   }
 
-  [[nodiscard]] bool IsInside(const certified_plan_v2_t& certified, std::int64_t step) const {
+  [[nodiscard]] bool IsInside(const certified_plan_t& certified, std::int64_t step) const {
     for (std::size_t k = 0; k < state_.size(); ++k)
       if (!(certified.slice_lower[step][k] <= state_[k] && state_[k] <= certified.slice_upper[step][k])) return false;
     return true;
@@ -209,7 +209,7 @@ class ThrowingRobot final : private Supervisor::Robot {
   State state_{};
   std::int64_t utime_ = kNow, next_id_ = 1, executing_ = 0, controls_ = 0;
   const double* applied_ = nullptr;  // the control, in certified_
-  std::map<std::int64_t, certified_plan_v2_t> certified_;
+  std::map<std::int64_t, certified_plan_t> certified_;
   std::map<std::string, std::vector<std::int64_t>> sent_;  // sequence numbers
   std::vector<std::string> violations_;
   Supervisor supervisor_;

@@ -153,7 +153,7 @@ std::string Soak::Table(const std::vector<std::string>& faults) const {
       text << "| " << intervals_[i].ended_min << " | " << intervals_[i].p50_us << " | " << intervals_[i].p99_us << " | "
            << intervals_[i].worst_us << " | " << intervals_[i].late_p99_us << " | " << intervals_[i].certifier_kb
            << " | " << intervals_[i].logger_kb << " |\n";
-  const certifier_status_v3_t& certifier = load_->status();
+  const certifier_status_t& certifier = load_->status();
   text << "\nSent " << load_->sent() << ", answered " << load_->answered() << ", of these twice "
        << load_->answered_again() << "; answers lost on the way " << load_->answers_lost() << ".\nThe certifier counts "
        << certifier.candidates << " decided on, " << certifier.candidates_lost << " lost on the way and "
@@ -175,7 +175,7 @@ std::vector<std::string> Soak::Judge() const {
   const auto equal = [&](std::int64_t a, std::int64_t b, const std::string& what) {
     demand(a == b, what + ": " + std::to_string(a) + " and " + std::to_string(b));
   };
-  const certifier_status_v3_t& certifier = load_->status();
+  const certifier_status_t& certifier = load_->status();
   std::int64_t outcomes = 0;
   for (const std::int64_t count : certifier.by_outcome) outcomes += count;
   demand(all_ran_, "a process ended before its time, or not well");

@@ -42,10 +42,9 @@ void Witness::OnDecision(const Received& received) {
 // One heartbeat is held against the last: what was counted then has been heard by now, what was heard then is counted
 // now. The certifier sends both from one thread, so a decision comes before the heartbeat that counts it.
 void Witness::OnStatus(const Received& received) {
-  const auto status = Decoded<certifier_status_v3_t>(received.bytes);
+  const auto status = Decoded<certifier_status_t>(received.bytes);
   // A certifier that is not in charge decides nothing.
-  if (!status || status->state == certifier_status_v3_t::LISTENING || status->state == certifier_status_v3_t::STANDBY)
-    return;
+  if (!status || status->state == certifier_status_t::LISTENING || status->state == certifier_status_t::STANDBY) return;
   status_ = status;
   if (spoiled_) return;
   if (status->sequence == 0) {  // a certifier's first sign of life
@@ -71,7 +70,7 @@ void Witness::OnFault(const Received& received) {
 }
 
 void Witness::OnCertified(const Received& received) {
-  const auto plan = Decoded<certified_plan_v2_t>(received.bytes);
+  const auto plan = Decoded<certified_plan_t>(received.bytes);
   if (!plan || !FindSealFaults(*plan).empty()) return;
   if (!world_.empty() && !world_.contains(GetDigest(plan->obstacles_digest)))
     Violate("plan " + std::to_string(plan->plan.plan_id) + " was certified under other obstacles than there are");
@@ -114,7 +113,7 @@ void Witness::OnTransition(const Received& received) {
   if (applied == applied_.end()) return;  // its state did not reach this listener
   const auto plan = plans_.find(applied->second.plan_id);
   if (plan == plans_.end()) return;  // said already
-  const certified_plan_v2_t& certified = plan->second.plan;
+  const certified_plan_t& certified = plan->second.plan;
   const int step = applied->second.step;
   const std::string which = "step " + std::to_string(step) + " of plan " + std::to_string(applied->second.plan_id);
   if (!std::equal(transition->input, transition->input + transition->num_inputs, certified.plan.control[step]))

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "bus/bus.h"
-#include "forereach/certified_plan_v2_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -59,7 +59,7 @@ class Witness final {
   [[nodiscard]] std::int64_t unjudged() const { return std::ssize(unjudged_); }
   /** Certified plans, signed and sealed. */
   [[nodiscard]] std::int64_t certificates() const { return certificates_; }
-  [[nodiscard]] const certified_plan_v2_t* last_certified() const { return last_certified_; }
+  [[nodiscard]] const certified_plan_t* last_certified() const { return last_certified_; }
   /** The newest of them that a robot has executed, counted from 1 in the order in which they came; 0 for none. */
   [[nodiscard]] std::int64_t executed() const { return executed_; }
   /** The last one that the certifier has latched, and the certificates heard since. */
@@ -67,7 +67,7 @@ class Witness final {
   [[nodiscard]] std::int64_t certificates_since_fault() const { return certificates_ - certificates_at_fault_; }
   /** The last time a state was heard. */
   [[nodiscard]] std::chrono::steady_clock::time_point robot_heard() const { return robot_heard_; }
-  [[nodiscard]] const std::optional<certifier_status_v3_t>& status() const { return status_; }
+  [[nodiscard]] const std::optional<certifier_status_t>& status() const { return status_; }
   [[nodiscard]] const std::optional<logger_status_t>& logger_status() const { return logger_status_; }
   void Forget() { status_.reset(), logger_status_.reset(), fault_.reset(); }
   void ForgetFault() { fault_.reset(); }
@@ -87,11 +87,11 @@ class Witness final {
   const BusOptions channels_;
   const bool spoiled_;
   struct Certified {
-    certified_plan_v2_t plan;
+    certified_plan_t plan;
     std::int64_t number;  // counts certificates from 1
   };
   std::map<std::int64_t, Certified> plans_;
-  const certified_plan_v2_t* last_certified_ = nullptr;  // in plans_
+  const certified_plan_t* last_certified_ = nullptr;  // in plans_
   struct Answer {
     Digest decision;  // of the message
     std::int16_t cause;
@@ -112,7 +112,7 @@ class Witness final {
   std::map<std::int64_t, Applied> applied_;      // by the boundary from which it is applied
   std::set<std::int64_t> unjudged_;              // plan ids
   std::set<Digest> world_;                       // empty: any
-  std::optional<certifier_status_v3_t> status_;
+  std::optional<certifier_status_t> status_;
   std::optional<logger_status_t> logger_status_;
   std::chrono::steady_clock::time_point robot_heard_{};
   std::optional<fault_t> fault_;

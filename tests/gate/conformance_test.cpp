@@ -11,8 +11,8 @@ namespace forereach {
 namespace conformance_test {
 
 // Slices [t, t + 1] in both coordinates, T = 3.
-certified_plan_v2_t Plan(std::int64_t plan_id) {
-  certified_plan_v2_t plan{};
+certified_plan_t Plan(std::int64_t plan_id) {
+  certified_plan_t plan{};
   plan.plan.plan_id = plan_id;
   plan.plan.num_states = 2;
   plan.plan.num_steps = 3;
@@ -53,7 +53,7 @@ TEST_F(ConformanceTest, TheSliceIsClosed) {
 
 TEST_F(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
   ledger_.Add(Plan(7), 0);
-  certified_plan_v2_t next = Plan(8);
+  certified_plan_t next = Plan(8);
   next.slice_upper[0][0] = next.slice_upper[0][1] = 9;
   ledger_.Add(next, 0);
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
@@ -185,7 +185,7 @@ TEST_F(ConformanceTest, StatesAndTransitionsOfTwoSendersAreNotMixed) {
 
 TEST_F(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {
   ledger_.Add(Plan(7), 0);
-  certified_plan_v2_t again = Plan(7);
+  certified_plan_t again = Plan(7);
   again.slice_upper[1][0] = 5;
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
   ledger_.Add(again, 0);

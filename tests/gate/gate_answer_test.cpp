@@ -102,7 +102,7 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
   ExpectDigestsOf(config_, decision);
 
   ASSERT_TRUE(answer.certified);
-  const certified_plan_v2_t& certified = *answer.certified;
+  const certified_plan_t& certified = *answer.certified;
   EXPECT_EQ(certified.utime, kNow);
   EXPECT_EQ(certified.expires_utime, kNow + 2'000'000);
   EXPECT_EQ(Encode(certified.plan), Encode(candidate));
@@ -192,7 +192,7 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
       EXPECT_EQ(answer.certified->sequence, certificates++);
     }
   }
-  const certifier_status_v3_t status = gate_.Status(kNow + 5);
+  const certifier_status_t status = gate_.Status(kNow + 5);
   EXPECT_EQ(status.utime, kNow + 5);
   EXPECT_EQ(status.candidates, 50);
   EXPECT_EQ(status.by_outcome[decision_t::CERTIFIED], 10);
@@ -298,7 +298,7 @@ TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheSeal) {
   for (std::size_t i = random() % 7; i < good.size(); i += 7) {
     std::vector<std::uint8_t> bytes = good;
     bytes[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
-    const auto tampered = Decoded<certified_plan_v2_t>(bytes);
+    const auto tampered = Decoded<certified_plan_t>(bytes);
     ASSERT_EQ(tampered.has_value(), i >= 8) << i;
     if (tampered) {
       ASSERT_THAT(FindSealFaults(*tampered), Not(IsEmpty())) << i;

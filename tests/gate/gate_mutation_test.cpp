@@ -159,8 +159,7 @@ TEST(GateMutationTest, ObstacleUpdatesApplyWholeOrNotAtAll) {
     Gate gate(SmallTaskOnTheBus());
     for (int i = 0; i < kBatch; ++i) {
       SCOPED_TRACE("batch " + std::to_string(batch) + ", message " + std::to_string(i));
-      obstacles_t message = ToMessage(obstacles);
-      message.utime = kNow;
+      obstacles_t message = ToMessage(obstacles, kNow);
       message.sequence = i;
       std::vector<std::uint8_t> bytes = Encode(message);
       mutator.Flip(bytes, mutator.Below(4), head);
@@ -183,8 +182,7 @@ TEST(GateMutationTest, ObstacleUpdatesApplyWholeOrNotAtAll) {
 
 TEST(GateReplayTest, TheSameBytesAndClockGiveTheSameAnswers) {
   Mutator mutator = Seeded();
-  obstacles_t begin = ToMessage({}), moved = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.1)});
-  begin.utime = moved.utime = kNow;
+  obstacles_t begin = ToMessage({}, kNow), moved = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.1)}, kNow);
   moved.sequence = 1;
   int certified = 0;
   for (int batch = 0; batch < 100; ++batch) {

@@ -25,8 +25,7 @@ const std::vector<Obstacle> kOnTheWay = {Obstacle::Circle(Eigen::Vector2d(0, 15)
                                          Obstacle::AxisBox(Eigen::Vector2d(1, -1), Eigen::Vector2d(2, 1))};
 
 obstacles_t Message(const std::vector<Obstacle>& obstacles, std::int64_t sequence) {
-  obstacles_t message = ToMessage(obstacles);
-  message.utime = kNow;
+  obstacles_t message = ToMessage(obstacles, kNow);
   message.sequence = sequence;
   return message;
 }
@@ -144,31 +143,25 @@ TEST(GateObstaclesClockTest, AReloadKeepsTheDoubt) {
   EXPECT_THAT(reloaded.WhyObstaclesUnknown(kNow + 50'001), HasSubstr("clock is behind"));
 }
 
-// As logs from before gate.obstacles were made.
-TEST(GateOldLogsTest, ObstaclesOfTheBusReplaceThoseOfATaskThatNamesNoSource) {
-  Config config = SmallTask();
-  config.gate.obstacles = ObstaclesSource::kUnsaid;
-  Gate gate(config);
-  EXPECT_EQ(gate.grounds().obstacles, config.grounds.obstacles);
-  EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 3)), kNow), "");
-  EXPECT_EQ(gate.grounds().obstacles, ObstaclesDigest(kFarAway));
-  EXPECT_NE(gate.UpdateObstacles({}, kNow), "");
-  EXPECT_EQ(gate.UpdateObstacles(Encode(Message({}, 7)), kNow), "");
-  EXPECT_EQ(gate.grounds().obstacles, ObstaclesDigest({}));
-  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
-}
-
 TEST(GateTaskObstaclesTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAll) {
   Gate gate(SmallTask());
   EXPECT_THAT(gate.UpdateObstacles(Encode(Message(kOnTheWay, 0)), kNow), HasSubstr("gate.obstacles is task"));
   EXPECT_THAT(gate.UpdateObstacles({}, kNow), HasSubstr("gate.obstacles is task"));
   EXPECT_EQ(gate.grounds().obstacles, SmallTask().grounds.obstacles);
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
-  const certifier_status_v3_t status = gate.Status(kNow);
-  EXPECT_EQ(status.obstacles_source, certifier_status_v3_t::OBSTACLES_TASK);
+  const certifier_status_t status = gate.Status(kNow);
+  EXPECT_EQ(status.obstacles_source, certifier_status_t::OBSTACLES_TASK);
   EXPECT_EQ(status.obstacles_known, 1);
   EXPECT_EQ(status.obstacles_in_force, 1);
   EXPECT_EQ(status.obstacles_age_us, -1);
+}
+
+TEST(GateTaskObstaclesTest, ATaskThatNamesNoSourceHasThemAllToo) {
+  Config config = SmallTask();
+  config.gate.obstacles = ObstaclesSource::kUnsaid;
+  Gate gate(config);
+  EXPECT_THAT(gate.UpdateObstacles(Encode(Message(kFarAway, 3)), kNow), HasSubstr("those of the task file"));
+  EXPECT_EQ(gate.grounds().obstacles, config.grounds.obstacles);
 }
 
 // ---- When all obstacles are known.
@@ -176,7 +169,7 @@ TEST(GateTaskObstaclesTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAll) {
 TEST_F(GateObstaclesTest, ObstaclesAreUnknownBeforeTheFirstMessage) {
   EXPECT_EQ(Why(), "none has been heard yet");
   EXPECT_EQ(gate_.Status(kNow).obstacles_known, 0);
-  EXPECT_EQ(gate_.Status(kNow).obstacles_source, certifier_status_v3_t::OBSTACLES_BUS);
+  EXPECT_EQ(gate_.Status(kNow).obstacles_source, certifier_status_t::OBSTACLES_BUS);
   Say(41);
   EXPECT_EQ(Why(), "") << "a certifier may start while somebody sends";
   EXPECT_EQ(gate_.Status(kNow + 7).obstacles_known, 1);
@@ -377,24 +370,24 @@ TEST_F(GateObstaclesTest, WrongContentNamesTheObstacle) {
   for (const std::int16_t count : Shorts{-1, 65, 32767})
     ExpectRefused(std::to_string(count) + ", must be 0 to 64", [count](auto& m) { m.num_obstacles = count; });
   for (const std::int16_t kind : Shorts{-1, 0, 5, 32767})
-    ExpectRefused("obstacle 1: unknown kind", [kind](auto& m) { m.obstacle[1].kind = kind; });
+    ExpectRefused("obstacle 1: unknown kind", [kind](auto& m) { m.obstacle[1].shape.kind = kind; });
   for (const std::int16_t dimension : Shorts{-1, 0, 4, 32767})
-    ExpectRefused("obstacle 1: ", [dimension](auto& m) { m.obstacle[1].dimension = dimension; });
-  ExpectRefused("obstacle 1: dimension 1, must be 2", [](auto& m) { m.obstacle[1].dimension = 1; });
+    ExpectRefused("obstacle 1: ", [dimension](auto& m) { m.obstacle[1].shape.dimension = dimension; });
+  ExpectRefused("obstacle 1: dimension 1, must be 2", [](auto& m) { m.obstacle[1].shape.dimension = 1; });
   for (const std::int16_t points : Shorts{-1, 0, 1, 3, 17, 32767})
-    ExpectRefused("obstacle 1: ", [points](auto& m) { m.obstacle[1].num_points = points; });
-  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].num_points = 0; });
-  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].num_points = 2; });
-  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].value = -1; });
-  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].value = kNaN; });
-  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].point[0][1] = kNaN; });
-  ExpectRefused("obstacle 1: ", [](auto& m) { m.obstacle[1].point[1][0] = 0; });  // upper below lower
+    ExpectRefused("obstacle 1: ", [points](auto& m) { m.obstacle[1].shape.num_points = points; });
+  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].shape.num_points = 0; });
+  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].shape.num_points = 2; });
+  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].shape.value = -1; });
+  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].shape.value = kNaN; });
+  ExpectRefused("obstacle 0: ", [](auto& m) { m.obstacle[0].shape.point[0][1] = kNaN; });
+  ExpectRefused("obstacle 1: ", [](auto& m) { m.obstacle[1].shape.point[1][0] = 0; });  // upper below lower
   ExpectRefused("obstacle 1: ", [](auto& m) {
-    m.obstacle[1].kind = obstacle_t::POLYGON;  // of two points
+    m.obstacle[1].shape.kind = obstacle_shape_t::POLYGON;  // of two points
   });
   ExpectRefused("obstacle 0: ", [](auto& m) {
-    m.obstacle[0].kind = obstacle_t::HALF_SPACE;
-    m.obstacle[0].point[0][1] = 0;  // a zero normal
+    m.obstacle[0].shape.kind = obstacle_shape_t::HALF_SPACE;
+    m.obstacle[0].shape.point[0][1] = 0;  // a zero normal
   });
 }
 
@@ -405,7 +398,7 @@ TEST_F(GateObstaclesTest, SixtyFourObstaclesFit) {
   EXPECT_EQ(Decide().obstacle, 64) << "behind the task's";
 }
 
-// ---- obstacles_v2_t.
+// ---- Obstacles that move.
 
 std::vector<Obstacle> Passing() {
   ObstacleMotion motion;
@@ -422,12 +415,12 @@ Config SmallTaskWithAClock() {
 
 std::vector<std::uint8_t> MovingMessage(std::int64_t sequence, std::int64_t utime = kNow,
                                         const std::vector<Obstacle>& obstacles = Passing()) {
-  obstacles_v2_t message = ToMessageV2(obstacles, utime);
+  obstacles_t message = ToMessage(obstacles, utime);
   message.sequence = sequence;
   return Encode(message);
 }
 
-TEST(GateMovingTest, BothMessageTypesBelongToOneStream) {
+TEST(GateMovingTest, WhatMovesAndWhatStandsIsOneStream) {
   Gate gate(SmallTaskWithAClock());
   const std::vector<Obstacle> of_task = SmallTask().obstacles;
   EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
@@ -453,11 +446,11 @@ TEST(GateMovingTest, RefusesMessagesThatAreStaleFromTheFutureOrMalformed) {
   Gate gate(SmallTaskWithAClock());
   std::vector<std::uint8_t> bytes = MovingMessage(0);
   bytes.pop_back();
-  EXPECT_THAT(gate.UpdateObstacles(bytes, kNow), HasSubstr("nor an obstacles_v2_t"));
+  EXPECT_THAT(gate.UpdateObstacles(bytes, kNow), HasSubstr("not an obstacles_t"));
   EXPECT_THAT(gate.WhyObstaclesUnknown(kNow), HasSubstr("the last message was refused"));
   EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
-  obstacles_v2_t nowhere = ToMessageV2(Passing(), kNow);
+  obstacles_t nowhere = ToMessage(Passing(), kNow);
   nowhere.sequence = 1;
   nowhere.obstacle[0].from_utime = kNow + 1;
   const Digest before = gate.grounds().obstacles;
@@ -546,7 +539,7 @@ TEST(GateMovingTest, APedestrianIsMetWhereItIsThen) {
   EXPECT_EQ(OutcomeAmong({walks(2.5, 1)}), decision_t::ABSTAIN_SAFETY) << "where it is, is not known well enough";
 }
 
-// The plan's times count only where an obstacle may move: logs of before have candidates with any step_us.
+// The plan's times count only where an obstacle may move.
 TEST(GateMovingTest, AScheduleOutOfItsBoundsIsRejected) {
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
   Gate gate(SmallTaskWithAClock()), without(SmallTaskOnTheBus());

@@ -24,8 +24,8 @@ class IssuedPlansTest : public testing::Test {
   static std::int64_t Life(int steps) { return kLifetime + 2 * kAge + steps * kStep; }
 
   // Certified at kWall, by the clock that nobody sets at kLater.
-  static certified_plan_v2_t Plan(std::int64_t plan_id, int steps = 10) {
-    certified_plan_v2_t certified{};
+  static certified_plan_t Plan(std::int64_t plan_id, int steps = 10) {
+    certified_plan_t certified{};
     certified.utime = kWall;
     certified.expires_utime = kWall + kLifetime;
     certified.plan.plan_id = plan_id;
@@ -95,7 +95,7 @@ TEST_F(IssuedPlansTest, RefusesAPlanThatBeganAfterItExpired) {
 }
 
 TEST_F(IssuedPlansTest, SurvivesNumbersOfAnySize) {
-  certified_plan_v2_t odd = Plan(1);
+  certified_plan_t odd = Plan(1);
   odd.plan.step_us = INT64_MIN;
   issued_.Add(odd, kLater);
   static_cast<void>(Judge(Executing(1, 9, INT64_MAX), kLater));

@@ -211,7 +211,6 @@ TEST_F(KeyFiles, AreReadLineByLine) {
   other = lines;
   other[3] = "secret " + std::string(64, '0');
   EXPECT_THAT(problem(other), HasSubstr("public planner: is not that of the secret in line 4"));
-  EXPECT_THAT(problem({"forereach-key-1 " + std::string(64, '0')}), HasSubstr("older format"));
   EXPECT_THAT(problem({std::string(5000, 'a')}), HasSubstr("line 1"));
   EXPECT_THAT(problem({""}), HasSubstr("line 1"));
 }

@@ -99,7 +99,7 @@ TEST(NamesTest, TheAdviceIsThatOfTheDocument) {
 TEST(NamesTest, EveryEventHasItsName) { ExpectNamed(ConstantsOf("execution_event_t"), EventName); }
 
 TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
-  Constants states = ConstantsOf("certifier_status_v3_t");
+  Constants states = ConstantsOf("certifier_status_t");
   for (const std::string level : {"OK", "STALE", "ERROR"}) {
     ASSERT_TRUE(states.contains(level));
     EXPECT_EQ(LevelName(static_cast<std::int16_t>(states[level])), level);
@@ -110,7 +110,7 @@ TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
     for (const auto& [constant, number] : Constants(states))
       if (constant.find(key) != std::string::npos) {
         states.erase(constant);
-        taken[constant == "NO_" + key ? "none" : constant.substr(key.size() + 1)] = number;
+        taken[constant.substr(key.size() + 1)] = number;
       }
     EXPECT_FALSE(taken.empty()) << name;
     return taken;
@@ -192,24 +192,22 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                                                {"SLICE_LEFT", 3},
                                                {"DECLARATION_FALSIFIED", 4},
                                                {"UNCERTIFIED_PLAN", 5}}));
-  EXPECT_EQ(ConstantsOf("certifier_status_v3_t"), (Constants{{"OK", 1},
-                                                             {"STALE", 2},
-                                                             {"ERROR", 3},
-                                                             {"DISARMED", 1},
-                                                             {"ARMED", 2},
-                                                             {"FAULT", 3},
-                                                             {"LISTENING", 4},
-                                                             {"STANDBY", 5},
-                                                             {"NO_LATCH", 0},
-                                                             {"LATCH_WRITTEN", 1},
-                                                             {"LATCH_UNWRITABLE", 2},
-                                                             {"OBSTACLES_TASK", 1},
-                                                             {"OBSTACLES_BUS", 2}}));
-  EXPECT_EQ(ConstantsOf("certifier_status_v2_t"),
-            (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3}}));
+  EXPECT_EQ(ConstantsOf("certifier_status_t"), (Constants{{"OK", 1},
+                                                          {"STALE", 2},
+                                                          {"ERROR", 3},
+                                                          {"DISARMED", 1},
+                                                          {"ARMED", 2},
+                                                          {"FAULT", 3},
+                                                          {"LISTENING", 4},
+                                                          {"STANDBY", 5},
+                                                          {"LATCH_NONE", 0},
+                                                          {"LATCH_WRITTEN", 1},
+                                                          {"LATCH_UNWRITABLE", 2},
+                                                          {"OBSTACLES_TASK", 1},
+                                                          {"OBSTACLES_BUS", 2}}));
   EXPECT_EQ(ConstantsOf("command_t"), (Constants{{"RESET", 1}, {"RELOAD", 2}}));
   EXPECT_EQ(ConstantsOf("robot_state_t"), (Constants{{"STANDING", 1}, {"EXECUTING", 2}, {"FINISHED", 3}}));
-  EXPECT_EQ(ConstantsOf("obstacle_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
+  EXPECT_EQ(ConstantsOf("obstacle_shape_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
 }
 
 }  // namespace names_test

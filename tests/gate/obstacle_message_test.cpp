@@ -28,7 +28,7 @@ TEST(ObstacleMessageTest, EveryKindGoesThroughTheBus) {
       Obstacle::AxisBox(Eigen::Vector2d(1, 2), Eigen::Vector2d(3, 4.5)),
       Obstacle::Polygon({Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0.5, 2), Eigen::Vector2d(0, 1)}),
       Obstacle::HalfSpace(Eigen::Vector2d(-1, 0.5), -7)};
-  const auto message = Decoded<obstacles_t>(Encode(ToMessage(obstacles)));
+  const auto message = Decoded<obstacles_t>(Encode(ToMessage(obstacles, kNow)));
   ASSERT_TRUE(message);
   const std::vector<Obstacle> back = FromMessage(*message, 2);
   EXPECT_EQ(ObstaclesDigest(back), ObstaclesDigest(obstacles));
@@ -39,40 +39,40 @@ TEST(ObstacleMessageTest, BoxesAndHalfSpacesExistInOneAndThreeDimensions) {
     const std::vector<Obstacle> obstacles = {
         Obstacle::AxisBox(Eigen::VectorXd::Constant(dim, -1), Eigen::VectorXd::Constant(dim, 2)),
         Obstacle::HalfSpace(Eigen::VectorXd::LinSpaced(dim, 1, 2), 3)};
-    EXPECT_EQ(ObstaclesDigest(FromMessage(ToMessage(obstacles), dim)), ObstaclesDigest(obstacles));
-    EXPECT_THROW((void)FromMessage(ToMessage(obstacles), 2), std::invalid_argument);
+    EXPECT_EQ(ObstaclesDigest(FromMessage(ToMessage(obstacles, kNow), dim)), ObstaclesDigest(obstacles));
+    EXPECT_THROW((void)FromMessage(ToMessage(obstacles, kNow), 2), std::invalid_argument);
   }
 }
 
-// ---- obstacles_v2_t.
+// ---- Predictions.
 
 // One piece that stands in its window.
-obstacle_v2_t Piece(std::int64_t from, std::int64_t until, std::int64_t track = 7) {
-  obstacle_v2_t piece = ToMessageV2({kCircle}, kNow).obstacle[0];
+obstacle_t Piece(std::int64_t from, std::int64_t until, std::int64_t track = 7) {
+  obstacle_t piece = ToMessage({kCircle}, kNow).obstacle[0];
   piece.track = track;
   piece.from_utime = from;
   piece.until_utime = until;
   return piece;
 }
 
-obstacle_v2_t Gone(obstacle_v2_t piece) {
+obstacle_t Gone(obstacle_t piece) {
   piece.gone = 1;
   return piece;
 }
 
-obstacles_v2_t Of(const std::vector<obstacle_v2_t>& pieces, std::int64_t utime = kNow) {
-  obstacles_v2_t message{};
+obstacles_t Of(const std::vector<obstacle_t>& pieces, std::int64_t utime = kNow) {
+  obstacles_t message{};
   message.utime = utime;
   message.num_obstacles = static_cast<std::int16_t>(pieces.size());
   std::ranges::copy(pieces, message.obstacle);
   return message;
 }
 
-std::vector<Obstacle> Taken(const std::vector<obstacle_v2_t>& pieces, std::int64_t utime = kNow) {
-  return FromMessage(*Decoded<obstacles_v2_t>(Encode(Of(pieces, utime))), 2);
+std::vector<Obstacle> Taken(const std::vector<obstacle_t>& pieces, std::int64_t utime = kNow) {
+  return FromMessage(*Decoded<obstacles_t>(Encode(Of(pieces, utime))), 2);
 }
 
-std::string WhyRefused(const obstacles_v2_t& message) {
+std::string WhyRefused(const obstacles_t& message) {
   try {
     (void)FromMessage(message, 2);
   } catch (const std::invalid_argument& error) {
@@ -80,7 +80,7 @@ std::string WhyRefused(const obstacles_v2_t& message) {
   }
   return "";
 }
-std::string WhyRefused(const std::vector<obstacle_v2_t>& pieces) { return WhyRefused(Of(pieces)); }
+std::string WhyRefused(const std::vector<obstacle_t>& pieces) { return WhyRefused(Of(pieces)); }
 
 std::pair<std::int64_t, std::int64_t> WindowOf(const Obstacle& obstacle) {
   if (!obstacle.motion()) return {-ObstacleMotion::kAlways, ObstacleMotion::kAlways};
@@ -100,11 +100,11 @@ TEST(ObstaclesV2Test, APieceWithoutMotionStandsAtAllTimes) {
 }
 
 TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
-  for (const auto& change : std::vector<std::function<void(obstacle_v2_t&)>>{
+  for (const auto& change : std::vector<std::function<void(obstacle_t&)>>{
            [](auto& piece) { piece.velocity[0] = 1e-300; }, [](auto& piece) { piece.velocity[1] = -1; },
            [](auto& piece) { piece.uncertainty = 0.1; }, [](auto& piece) { piece.growth = 0.2; },
            [](auto& piece) { piece.growth_rate = 0.3; }}) {
-    obstacle_v2_t piece = Piece(0, kMost);
+    obstacle_t piece = Piece(0, kMost);
     change(piece);
     const std::vector<Obstacle> taken = Taken({piece});
     ASSERT_TRUE(taken[0].motion());
@@ -115,7 +115,7 @@ TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
     EXPECT_EQ(motion.growth_rate, piece.growth_rate);
     EXPECT_EQ(motion.stamp_us, kNow);
   }
-  obstacle_v2_t third = Piece(0, kMost);
+  obstacle_t third = Piece(0, kMost);
   third.velocity[2] = 5;
   EXPECT_FALSE(Taken({third})[0].motion()) << "entries beyond the dimension are not read";
 }
@@ -128,8 +128,8 @@ TEST(ObstaclesV2Test, ATrackExtendsBackToTheBeginningOfTime) {
 }
 
 TEST(ObstaclesV2Test, ThePiecesOfATrackHaveToJoin) {
-  const obstacle_v2_t first = Piece(kNow - 10, kNow + 10), second = Piece(kNow + 10, kNow + 20),
-                      third = Piece(kNow + 15, kNow + 30);
+  const obstacle_t first = Piece(kNow - 10, kNow + 10), second = Piece(kNow + 10, kNow + 20),
+                   third = Piece(kNow + 15, kNow + 30);
   const std::vector<Obstacle> taken = Taken({third, first, second});
   ASSERT_EQ(taken.size(), 3u);
   EXPECT_EQ(WindowOf(taken[0]), std::pair(kNow + 15, kEnd)) << "in the order of the message";
@@ -146,7 +146,7 @@ TEST(ObstaclesV2Test, ThePiecesOfATrackHaveToJoin) {
 }
 
 TEST(ObstaclesV2Test, OnlyTheLastPieceOfATrackMayBeGone) {
-  const obstacle_v2_t first = Piece(kNow, kNow + 10), last = Piece(kNow + 10, kNow + 20);
+  const obstacle_t first = Piece(kNow, kNow + 10), last = Piece(kNow + 10, kNow + 20);
   EXPECT_THAT(WhyRefused({Gone(first), last}),
               HasSubstr("track 7 is gone at 1700000000000010 us and goes on until 1700000000000020 us"));
   EXPECT_THAT(WhyRefused({first, last, Gone(last)}), HasSubstr("only one of them is gone"));
@@ -160,8 +160,8 @@ TEST(ObstaclesV2Test, OnlyTheLastPieceOfATrackMayBeGone) {
 
 TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
-  const auto refused = [](const std::string& why, const std::function<void(obstacle_v2_t&)>& change) {
-    obstacles_v2_t message = Of({Piece(0, kMost, 1), Piece(0, kMost, 2)});
+  const auto refused = [](const std::string& why, const std::function<void(obstacle_t&)>& change) {
+    obstacles_t message = Of({Piece(0, kMost, 1), Piece(0, kMost, 2)});
     change(message.obstacle[1]);
     EXPECT_THAT(WhyRefused(message), HasSubstr("obstacle 1: " + why));
   };
@@ -189,18 +189,18 @@ TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
   for (const std::int64_t stamp : {kMost, kLeast, std::int64_t{0}})
     refused("stamped", [stamp](auto& piece) { piece.utime = stamp; });
   for (const std::int64_t away : {kFarthestStampUs, -kFarthestStampUs}) {
-    obstacle_v2_t piece = Piece(0, kMost);
+    obstacle_t piece = Piece(0, kMost);
     piece.utime += away;
     piece.growth = 1;
     EXPECT_EQ(Taken({piece})[0].motion()->stamp_us, kNow + away);
   }
   refused("unknown kind", [](auto& piece) { piece.shape.kind = 9; });
   refused("dimension 1, must be 2", [](auto& piece) {
-    piece.shape.kind = obstacle_t::HALF_SPACE;
+    piece.shape.kind = obstacle_shape_t::HALF_SPACE;
     piece.shape.dimension = 1;
   });
   for (const std::int16_t count : std::initializer_list<std::int16_t>{-1, 65, 32767}) {
-    obstacles_v2_t message = Of({Piece(0, kMost)});
+    obstacles_t message = Of({Piece(0, kMost)});
     message.num_obstacles = count;
     EXPECT_THAT(WhyRefused(message), HasSubstr(std::to_string(count) + ", must be 0 to 64"));
   }
@@ -209,13 +209,13 @@ TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
 TEST(ObstaclesV2Test, StampsOfAMessageBeyondASchedulesAreRefusedOrTaken) {
   for (const std::int64_t sign : {1, -1})
     for (const std::int64_t beyond : {0, 1}) {
-      obstacle_v2_t piece = Piece(kLeast, kMost);
+      obstacle_t piece = Piece(kLeast, kMost);
       piece.utime = sign * (Schedule::kLatest + beyond);
       piece.growth = 1;
       EXPECT_EQ(WhyRefused(Of({piece}, piece.utime)).empty(), beyond == 0);
     }
   for (const std::int64_t utime : {kMost, kLeast}) {
-    obstacle_v2_t piece = Piece(kLeast, kMost);
+    obstacle_t piece = Piece(kLeast, kMost);
     piece.utime = utime;
     EXPECT_EQ(WhyRefused(Of({piece}, utime)), "") << "it stands";
     piece.growth = 1;
@@ -235,17 +235,17 @@ TEST(ObstaclesV2Test, PredictionsGoThroughTheBus) {
   second.from_us = kNow + 1000;
   second.until_us = kNow + 2000;
   const std::vector<Obstacle> obstacles{kCircle, kCircle.Moving(first), kCircle.Moving(second), kCircle.Moving(first)};
-  const obstacles_v2_t message = ToMessageV2(obstacles, kNow);
+  const obstacles_t message = ToMessage(obstacles, kNow);
   EXPECT_EQ(message.obstacle[1].track, message.obstacle[2].track);
   EXPECT_NE(message.obstacle[2].track, message.obstacle[3].track);
   EXPECT_NE(message.obstacle[0].track, message.obstacle[1].track);
   EXPECT_EQ(message.obstacle[1].gone, 0);
   EXPECT_EQ(message.obstacle[2].gone, 1);
   EXPECT_EQ(message.obstacle[3].gone, 1);
-  EXPECT_EQ(ObstaclesDigest(FromMessage(*Decoded<obstacles_v2_t>(Encode(message)), 2)), ObstaclesDigest(obstacles));
+  EXPECT_EQ(ObstaclesDigest(FromMessage(*Decoded<obstacles_t>(Encode(message)), 2)), ObstaclesDigest(obstacles));
   const std::vector<std::int64_t> tracks{4, 3, 3, 1};
-  EXPECT_EQ(ToMessageV2(obstacles, kNow, tracks).obstacle[2].track, 3);
-  EXPECT_EQ(ToMessageV2(obstacles, kNow, tracks).obstacle[1].gone, 0);
+  EXPECT_EQ(ToMessage(obstacles, kNow, tracks).obstacle[2].track, 3);
+  EXPECT_EQ(ToMessage(obstacles, kNow, tracks).obstacle[1].gone, 0);
 }
 
 // Whatever is taken, every track is somewhere at all times from the message on, until it is gone.
@@ -256,14 +256,14 @@ TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
   const auto below = [&](int n) { return static_cast<std::int64_t>(random() % static_cast<unsigned>(n)); };
   int taken = 0, refused = 0;
   for (int trial = 0; trial < 20'000; ++trial) {
-    std::vector<obstacle_v2_t> pieces;
+    std::vector<obstacle_t> pieces;
     for (std::int64_t i = 1 + below(4); i > 0; --i) {
       const std::int64_t from = kNow - 2 + below(8);
-      obstacle_v2_t piece = Piece(from, from + below(5), below(2));
+      obstacle_t piece = Piece(from, from + below(5), below(2));
       piece.gone = static_cast<std::int16_t>(below(4) == 0);
       pieces.push_back(piece);
     }
-    const obstacles_v2_t message = Of(pieces);
+    const obstacles_t message = Of(pieces);
     if (!WhyRefused(message).empty()) {
       ++refused;
       continue;
@@ -273,7 +273,7 @@ TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
     for (std::int64_t track = 0; track < 2; ++track) {
       std::int64_t gone_at = kMost;
       bool is_there = false;
-      for (const obstacle_v2_t& piece : pieces) {
+      for (const obstacle_t& piece : pieces) {
         if (piece.track != track) continue;
         is_there = true;
         if (piece.gone != 0) gone_at = piece.until_utime;

@@ -27,8 +27,7 @@ class PlansInForceTest : public testing::Test {
   }
 
   std::string See(const std::vector<Obstacle>& obstacles) {
-    obstacles_t message = ToMessage(obstacles);
-    message.utime = now_;
+    obstacles_t message = ToMessage(obstacles, now_);
     message.sequence = sequence_++;
     return gate_.UpdateObstacles(Encode(message), now_);
   }
@@ -37,7 +36,7 @@ class PlansInForceTest : public testing::Test {
     EXPECT_EQ(See({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset)}), "");
     plans_.Judge(gate_, now_);
   }
-  certified_plan_v2_t Certify(std::int64_t plan_id, const char* source = "test") {
+  certified_plan_t Certify(std::int64_t plan_id, const char* source = "test") {
     candidate_plan_t candidate = Candidate(plan_id, kAccelerationThatCertifies, now_);
     SetText(candidate.source, source);
     const GateAnswer answer = gate_.Decide(Encode(candidate), now_);
@@ -46,7 +45,7 @@ class PlansInForceTest : public testing::Test {
     return *answer.certified;
   }
   // The task with a domain that the plan just leaves at a step.
-  Config NarrowerFrom(const certified_plan_v2_t& plan, int step) const {
+  Config NarrowerFrom(const certified_plan_t& plan, int step) const {
     Config narrower = config_;
     Problem problem = *config_.problem;
     Eigen::VectorXd upper = problem.domain.state.upper();
@@ -79,7 +78,7 @@ class PlansInForceTest : public testing::Test {
     return due ? std::optional(due->message) : std::nullopt;
   }
   // The greatest px of slice t of the plan, by its certificate.
-  static double Reach(const certified_plan_v2_t& certified, int t) { return certified.slice_upper[t][0]; }
+  static double Reach(const certified_plan_t& certified, int t) { return certified.slice_upper[t][0]; }
 
   std::int64_t now_ = kNow, sequence_ = 0, states_ = 0;
   Config config_ = SmallTaskOnTheBus();
@@ -89,7 +88,7 @@ class PlansInForceTest : public testing::Test {
 
 TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt) {
   for (int t = 1; t <= kSteps; ++t) {
-    const certified_plan_v2_t plan = Certify(t);
+    const certified_plan_t plan = Certify(t);
     // 1e-9: the separation's own rounding
     SeeWall(Reach(plan, t) + 1e-9);
     const auto just_outside = Due();
@@ -120,11 +119,9 @@ TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) 
   for (int t = 1; t <= kSteps; ++t) {
     Gate gate(config_);
     PlanLedger plans(config_.gate, now_);
-    obstacles_t message = ToMessage({});
-    message.utime = now_;
+    obstacles_t message = ToMessage({}, now_);
     const auto see = [&](double wall) {
-      message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)});
-      message.utime = now_;
+      message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)}, now_);
       message.sequence = sequence_++;
       EXPECT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
       plans.Judge(gate, now_);
@@ -160,8 +157,7 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
     };
     Gate gate(with_period(0.15));
     PlanLedger plans(config_.gate, now_);
-    obstacles_t message = ToMessage({});
-    message.utime = now_;
+    obstacles_t message = ToMessage({}, now_);
     message.sequence = sequence_++;
     ASSERT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
     plans.Judge(gate, now_);
@@ -179,7 +175,7 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
 }
 
 TEST_F(PlansInForceTest, AWithdrawalNamesThePlanTheWitnessAndWhatItRestsOn) {
-  const certified_plan_v2_t plan = Certify(3);
+  const certified_plan_t plan = Certify(3);
   now_ += 1000;
   SeeWall(Reach(plan, 6) - 1e-9);
   const withdrawal_t message = Due().value();
@@ -263,7 +259,7 @@ TEST_F(PlansInForceTest, PlansOfTwoSourcesWithOneIdAreAnsweredEachForItself) {
 }
 
 TEST_F(PlansInForceTest, NeverRestoresStepsAndWithdrawsAgainWhenFewerStand) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   SeeWall(Reach(plan, 6) - 1e-9);
   EXPECT_EQ(Due()->valid_steps, 5);
   Answer(1, 5, 0);
@@ -280,7 +276,7 @@ TEST_F(PlansInForceTest, NeverRestoresStepsAndWithdrawsAgainWhenFewerStand) {
 }
 
 TEST_F(PlansInForceTest, WithdrawsNothingWhileThePlanStaysValid) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   See({});
   plans_.Judge(gate_, now_);
   EXPECT_FALSE(Due());
@@ -345,7 +341,7 @@ TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
 // ---- Two robots under one name.
 
 TEST_F(PlansInForceTest, APlanThatTwoMayExecuteIsJudgedFromTheEarlierStepAndLeavesWithItsTime) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   SeeRobot(1, 5);
   plans_.SeeOneOfTwo(State(1, 2), now_);
   SeeRobot(1, 6);
@@ -409,8 +405,7 @@ class LostObstaclesTest : public PlansInForceTest {
   }
   // A wall is seen on the way of the plan, with a stamp that is 2 s old.
   void SeeStaleWall() {
-    obstacles_t message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1)});
-    message.utime = now_ - 2'000'000;
+    obstacles_t message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1)}, now_ - 2'000'000);
     message.sequence = sequence_++;
     EXPECT_THAT(gate_.UpdateObstacles(Encode(message), now_), HasSubstr("stamped 2000 ms ago"));
   }
@@ -422,7 +417,7 @@ class LostObstaclesTest : public PlansInForceTest {
 };
 
 TEST_F(LostObstaclesTest, WhatIsUnderWayIsWithdrawnWholeOnceTheyHaveBeenUnknownForSoLong) {
-  const certified_plan_v2_t executing = Certify(1), pending = Certify(2);
+  const certified_plan_t executing = Certify(1), pending = Certify(2);
   SeeRobot(1, 3);
   Judge();
   SeeStaleWall();
@@ -434,7 +429,7 @@ TEST_F(LostObstaclesTest, WhatIsUnderWayIsWithdrawnWholeOnceTheyHaveBeenUnknownF
   EXPECT_FALSE(Due()) << "a moment before";
   now_ += 1;
   Judge();
-  for (const certified_plan_v2_t& plan : {executing, pending}) {
+  for (const certified_plan_t& plan : {executing, pending}) {
     const withdrawal_t message = Due().value();
     EXPECT_EQ(message.plan_id, plan.plan.plan_id);
     EXPECT_EQ(message.cause, withdrawal_t::OBSTACLES_LOST);
@@ -466,7 +461,7 @@ TEST_F(LostObstaclesTest, ASenderThatFallsSilentLosesThemAfterBothTimes) {
 }
 
 TEST_F(LostObstaclesTest, ThatTheyAreKnownOnceInBetweenBeginsTheTimeAnew) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   SeeRobot(1, 0);
   const Obstacle beyond = Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, kSteps) + 0.1);
   for (int i = 0; i < 5; ++i) {
@@ -536,7 +531,7 @@ TEST_F(LostObstaclesTest, WhoStandsByForgetsSinceWhen) {
 
 // To contradict, not to be added, is what ends a certificate.
 TEST_F(PlansInForceTest, AnObservationThatContradictsNothingWithdrawsNothing) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
   transition_t transition{};
   transition.utime = now_;
@@ -568,7 +563,7 @@ TEST_F(PlansInForceTest, AFalsifiedDeclarationWithdrawsEveryStep) {
 }
 
 TEST_F(PlansInForceTest, JudgesThePlanUnderATaskThatWasReadAgain) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   Gate gate(NarrowerFrom(plan, 8));
   gate.Inherit(gate_);
   plans_.Judge(gate, now_);
@@ -580,7 +575,7 @@ TEST_F(PlansInForceTest, JudgesThePlanUnderATaskThatWasReadAgain) {
 
 // The task file is the same, its file of transitions is not.
 TEST_F(PlansInForceTest, JudgesThePlanAgainUnderOtherTransitionsOfTheTask) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
   EXPECT_FALSE(Due());
   Problem problem = *config_.problem;
@@ -596,7 +591,7 @@ TEST_F(PlansInForceTest, JudgesThePlanAgainUnderOtherTransitionsOfTheTask) {
 }
 
 TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   Config narrower = NarrowerFrom(plan, 8);
   narrower.obstacles.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, 4) - 1e-9));
   Gate gate(narrower);
@@ -624,7 +619,7 @@ TEST_F(PlansInForceTest, AnEndThatIsNotAtRestKeepsItsControls) {
 
 // It is exceeded first where the robot has come that far: the control that leads there does not stand.
 TEST_F(PlansInForceTest, ALimitOfANewTaskLeavesTheControlsBeforeIt) {
-  const certified_plan_v2_t plan = Certify(1);
+  const certified_plan_t plan = Certify(1);
   const auto judge = [&](double most) {
     Config limited = config_;
     Problem problem = *config_.problem;
@@ -653,8 +648,7 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   SeeRobot(77, 4);
   judge();
   EXPECT_FALSE(Due()) << "the obstacles are not known yet";
-  obstacles_t message = ToMessage({});
-  message.utime = now_;
+  obstacles_t message = ToMessage({}, now_);
   message.sequence = 1;
   ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
   judge();
@@ -671,8 +665,7 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   Answer(77, 20, 0);  // it stands: the guard found equal grounds
   now_ += PlanLedger::kRepeatUs;
   EXPECT_FALSE(Due());
-  message = ToMessage({Obstacle::Circle(Eigen::Vector2d(9, 9), 1)});
-  message.utime = now_;
+  message = ToMessage({Obstacle::Circle(Eigen::Vector2d(9, 9), 1)}, now_);
   message.sequence = 2;
   ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
   judge();

@@ -1,4 +1,4 @@
-// docs/bus.md documents every message, field, constant and channel.
+// docs/bus.md documents every message, field, constant and channel, with the tables that its types give.
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -11,8 +11,16 @@
 #include <gtest/gtest.h>
 
 #include "tests/paths.h"
+#include "tests/scratch.h"
+#include "tests/shell.h"
 
 namespace {
+
+using forereach::Output;
+using forereach::ScratchDirectory;
+using forereach::Shell;
+
+const std::string kFacts = FOREREACH_BINARY_DIR "/lcmtypes/forereach_message_facts ";
 
 std::string TextOf(const std::filesystem::path& path) {
   std::ifstream file(path);
@@ -58,12 +66,36 @@ std::string SectionOn(const std::string& type) {
 
 TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
   const auto types = Types();
-  EXPECT_EQ(types.size(), 19u);
+  EXPECT_EQ(types.size(), 16u);
   EXPECT_THAT(types.at("candidate_plan_t").fields,
               testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
                                    "num_inputs", "num_steps", "progress_steps", "initial_center", "initial_half_width",
                                    "control"));
   EXPECT_EQ(types.at("decision_t").constants.size(), 34u);
+}
+
+TEST(BusDocumentTest, ItsTablesAreThoseOfTheTypes) {
+  const ScratchDirectory scratch;
+  const std::string page = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md"), copy = scratch.Write("bus.md", page);
+  EXPECT_EQ(Shell(kFacts + "document " + copy + " " FOREREACH_SOURCE_DIR "/lcmtypes/*.lcm 2>&1").code, 0);
+  EXPECT_EQ(TextOf(copy), page) << "scripts/bus-tables writes them";
+  EXPECT_FALSE(std::regex_search(page, std::regex("\n\\| `[a-z][^|\n]*\\| *\\|\n"))) << "a field without a meaning";
+}
+
+// What is not understood is in no table and in no JSON, so it is an error.
+TEST(BusDocumentTest, RefusesALineOfATypeThatItDoesNotUnderstand) {
+  const ScratchDirectory scratch;
+  const auto refused = [&](const std::string& line) {
+    const std::string file =
+        scratch.Write("a_t.lcm", "struct a_t {\n    int64_t utime;  // [us] when\n" + line + "\n}\n");
+    const Output output = Shell(kFacts + "fields " + (scratch / "out") + " " + file + " 2>&1");
+    EXPECT_EQ(output.code == 0, std::filesystem::exists(scratch / "out"));
+    return output.code == 0 ? "" : output.text;
+  };
+  EXPECT_THAT(refused("    double x[3]  // no end"), testing::HasSubstr("a_t.lcm:3: neither a field"));
+  EXPECT_THAT(refused("    const int16_t A = 1;  // of no group"), testing::HasSubstr("a_t.lcm:3"));
+  EXPECT_THAT(refused("    double x[3][2];  // {num_x} of one count"), testing::HasSubstr("x: 1 counts"));
+  EXPECT_EQ(refused("    double x[3];  // {num_x} as it should be"), "");
 }
 
 TEST(BusDocumentTest, EveryFieldHasItsRow) {

@@ -33,7 +33,7 @@ class IncludesTest : public testing::Test {
     Write("certifier/process/node.h", "#include \"certifier/gate/gate.h\"\n#include <fmt/core.h>\n");
     Write("lcmtypes/codec.h", "#include <cstdint>\n");
     Write("bus/bus.cpp", "#include \"lcmtypes/codec.h\"\n#include <lcm/lcm-cpp.hpp>\n");
-    Write("robot/guard.h", "#include \"forereach/certified_plan_v2_t.hpp\"\n#include \"lcmtypes/codec.h\"\n");
+    Write("robot/guard.h", "#include \"forereach/certified_plan_t.hpp\"\n#include \"lcmtypes/codec.h\"\n");
     Write("robot/guard.cpp", "#include \"robot/guard.h\"\n");
     Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"forereach/sets/box.h\"\n");
     Write("records/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");

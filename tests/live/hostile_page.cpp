@@ -4,7 +4,7 @@ numbers are the largest there are. Prints its address, and ends with its standar
 #include <limits>
 #include <string>
 
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -29,12 +29,12 @@ void SendHostile(Watcher& watcher) {
   withdrawal_t withdrawal{};
   execution_event_t event{};
   candidate_plan_t candidate{};
-  certifier_status_v3_t status{};
+  certifier_status_t status{};
   logger_status_t logger{};
   SetText(decision.source, kEvil), SetText(decision.message, kEvil), SetText(fault.message, kEvil);
   SetText(withdrawal.message, kEvil), SetText(event.message, kEvil), SetText(candidate.source, kEvil);
   SetText(status.message, kEvil), SetText(logger.message, kEvil);
-  status.state = certifier_status_v3_t::ARMED, status.level = certifier_status_v3_t::ERROR;
+  status.state = certifier_status_t::ARMED, status.level = certifier_status_t::ERROR;
   for (std::int64_t sequence : {std::int64_t{0}, std::int64_t{7}, kMost}) {
     for (std::int16_t outcome : {0, 1, 2, 3, 4, 5, 6, 7, 99}) {
       decision.utime = decision.plan_id = decision.sequence = sequence;

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/live/live_fixture.h"
+#include "tests/records/course.h"
 #include "tests/tries.h"
 
 namespace forereach {
@@ -96,7 +97,8 @@ TEST_F(WebServerTest, SendsWhatTheWatcherTells) {
   reader.Send(kEvents);
   EXPECT_THAT(reader.Receive("\n\n"), HasSubstr("\"decisions\":0"));
   Play(CourseEvents(), watcher_);
-  EXPECT_THAT(reader.Receive("\"decisions\":67"), HasSubstr("\"outcome\":\"certified\""));
+  EXPECT_THAT(reader.Receive("\"decisions\":" + std::to_string(kCourseDecisions)),
+              HasSubstr("\"outcome\":\"certified\""));
 }
 
 TEST_F(WebServerTest, RefusesOtherHostsOriginsAndTargets) {

@@ -12,7 +12,6 @@
 #include <unistd.h>
 
 #include "forereach/obstacles_t.hpp"
-#include "forereach/obstacles_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/keys.h"
 #include "tests/logger/direct_bus.h"
@@ -124,7 +123,7 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
     return obstacles;
   }());
   bus_.Publish("OBSTACLES", [] {
-    obstacles_v2_t obstacles{};  // the count goes on in the other type
+    obstacles_t obstacles{};
     obstacles.sequence = 9;
     return obstacles;
   }());

@@ -15,6 +15,7 @@
 #include "task/json_text.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/scratch.h"
 #include "tests/tries.h"
 
@@ -225,21 +226,21 @@ TEST_F(DirectoryTest, HasTheRowsOfTheDatabaseAndTheTubesOfTheLog) {
 TEST_F(DirectoryTest, WithoutTheLogItHasTheRowsAlone) {
   std::filesystem::remove(log_);
   const PageRun run = GatherPage({directory_ / "decisions.sqlite"}, "", {}, {});
-  EXPECT_EQ(run.decisions.size(), 67u);
+  EXPECT_EQ(run.decisions.size(), std::size_t{kCourseDecisions});
   EXPECT_TRUE(run.details.empty());
   EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("the log is not in the database's directory")));
 }
 
 TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
   const PageRun run = GatherPage({directory_.path()}, "", {}, {});
-  EXPECT_EQ(run.decisions.size(), 67u);
+  EXPECT_EQ(run.decisions.size(), std::size_t{kCourseDecisions});
   EXPECT_TRUE(run.details.empty());
   EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not kept next to it")));
 }
 
 TEST_F(DirectoryTest, WithoutADatabaseItReadsTheLogs) {
   std::filesystem::remove(directory_ / "decisions.sqlite");
-  EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), 67u);
+  EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), std::size_t{kCourseDecisions});
   std::filesystem::remove(log_);
   EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kTask, {}, {})), BadInput);
 }
@@ -269,8 +270,8 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
   EXPECT_EQ(run.parts[0].robot, directory_ / "night/a");
   EXPECT_EQ(run.parts[1].robot, directory_ / "night/b");
   EXPECT_THAT(run.parts[1].replays.at("one.lcmlog"), HasSubstr(directory_ / "night/b/one.lcmlog"));
-  EXPECT_EQ(run.parts[1].decisions, 67u);
-  EXPECT_EQ(run.decisions.size(), 134u);
+  EXPECT_EQ(run.parts[1].decisions, std::size_t{kCourseDecisions});
+  EXPECT_EQ(run.decisions.size(), std::size_t{2 * kCourseDecisions});
   EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("two.lcmlog: is no LCM event log")));
   ASSERT_EQ(run.details.size(), 2 * one.details.size());
   EXPECT_EQ(run.obstacle_sets.size(), 2 * one.obstacle_sets.size());
@@ -278,7 +279,7 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
     const PageDetail &a = one.details[i], &b = run.details[one.details.size() + i];
     EXPECT_EQ(a.sketch.points, b.sketch.points);
     EXPECT_EQ(run.decisions[b.decision].plan_digest, one.decisions[a.decision].plan_digest);
-    EXPECT_GE(b.decision, 67u);
+    EXPECT_GE(b.decision, std::size_t{kCourseDecisions});
     EXPECT_EQ(b.obstacles, a.obstacles + static_cast<int>(one.obstacle_sets.size()));
     EXPECT_EQ(b.missing, "");
   }
@@ -290,7 +291,7 @@ TEST_F(ManyRunsTest, APageMadeAfterAnInterruptionIsTheSame) {
   const std::string resume = "--resume '" + (directory_ / "kept") + "'";
   const Output first = Report("first.html", resume);
   EXPECT_EQ(first.code, 0) << first.text;
-  EXPECT_THAT(first.text, HasSubstr("134 decisions"));
+  EXPECT_THAT(first.text, HasSubstr(std::to_string(2 * kCourseDecisions) + " decisions"));
   EXPECT_THAT(first.text, HasSubstr(", 2 runs"));
   EXPECT_THAT(first.text, HasSubstr("two.lcmlog: is no LCM event log"));
   const auto files =
@@ -336,7 +337,7 @@ TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
   const std::string page = directory / "a page.html", report = "report '" + kLog + "' --config '" + kTask + "' --out '";
   const Output first = Forereach(report + page + "' 2>&1");
   EXPECT_EQ(first.code, 0) << first.text;
-  EXPECT_THAT(first.text, HasSubstr("67 decisions"));
+  EXPECT_THAT(first.text, HasSubstr(std::to_string(kCourseDecisions) + " decisions"));
   EXPECT_THAT(Read(page), testing::StartsWith("<!DOCTYPE html>"));
   directory.Write("a page.html", "mine");
   const Output second = Forereach(report + page + "' 2>&1");

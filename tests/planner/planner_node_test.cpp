@@ -564,7 +564,7 @@ TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
   Config config = Bicycle();
   config.gate.obstacles = ObstaclesSource::kBus;
   Start(config);
-  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)});
+  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)}, now_);
   const auto see = [&] {
     message.utime = now_;
     ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
@@ -612,8 +612,10 @@ TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
 
 // As the gate does: else the planner would go on around the obstacles of before, and the gate refuse what it finds.
 TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
-  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)});
-  message.utime = now_;
+  Config config = Bicycle();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  Start(config);
+  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)}, now_);
   message.sequence = 7;
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // a repetition: ignored
@@ -627,14 +629,17 @@ TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
 }
 
 TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
+  Config config = Bicycle();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  config.gate.obstacles_timeout_ms = 10'000;
+  Start(config);
   config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
-  obstacles_t message = ToMessage(config_.obstacles);
-  message.utime = now_;
+  obstacles_t message = ToMessage(config_.obstacles, now_);
   message.sequence = 1;
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
   message.num_obstacles = 65;
-  message.sequence = 2;
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // cannot be: ignored
+  message.num_obstacles = 1;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
   Deliver();
   EXPECT_EQ(Summary()["messages_ignored"], 1);
   robot_state_t state = Standing();

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/process/certifier_node.h"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "planner_bridge/planner_node.h"
 #include "planner_bridge/policy_proposer.h"
 #include "planner_bridge/reference.h"
@@ -46,7 +46,7 @@ Traffic RunTask(const Config& config) {
   };
   keep(config.bus.candidate, candidate_plan_t{}, [&](const auto& plan) { traffic.candidates.push_back(plan); });
   keep(config.bus.decision, decision_t{}, [&](const auto& decision) { traffic.decisions.push_back(decision); });
-  keep(config.bus.certified, certified_plan_v2_t{},
+  keep(config.bus.certified, certified_plan_t{},
        [&](const auto& plan) { traffic.certified.insert(plan.plan.plan_id); });
   keep(config.bus.robot_state, robot_state_t{}, [&](const auto& state) {
     if (state.mode == robot_state_t::EXECUTING) traffic.executed.insert(state.executing_plan_id);

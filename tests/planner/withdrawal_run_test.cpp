@@ -49,8 +49,7 @@ class WithdrawalRunTest : public testing::Test {
     }
   }
   void SendObstacles() {
-    obstacles_t message = ToMessage(obstacles_);
-    message.utime = now_;
+    obstacles_t message = ToMessage(obstacles_, now_);
     message.sequence = sequence_++;
     bus_->Publish(config_.bus.obstacles, message);
   }

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/process.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -129,11 +129,11 @@ TEST_F(BusCommands, AForgedHeartbeatIsNoSignOfLife) {
   std::atomic<bool> stop = false;
   std::thread forging([&] {
     for (std::int64_t i = 0; !stop; ++i, std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
-      certifier_status_v3_t status{};
+      certifier_status_t status{};
       status.utime = WallClockUs();
       status.sequence = i;
-      status.level = certifier_status_v3_t::OK;
-      status.state = certifier_status_v3_t::ARMED;
+      status.level = certifier_status_t::OK;
+      status.state = certifier_status_t::ARMED;
       const auto bytes = Encode(status);
       open->Publish("CERTIFIER_STATUS", Bytes(bytes));
       open->Publish("CERTIFIER_STATUS",

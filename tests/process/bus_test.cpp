@@ -10,7 +10,7 @@
 #include <sched.h>
 #include <unistd.h>
 
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/process/process_fixture.h"
 #include "tests/sanitized.h"
@@ -200,7 +200,7 @@ TEST(MulticastBusTest, CarriesTheLargestMessageWholeAndInOrder) {
   const auto sender = OpenBus(url);
   std::vector<std::vector<std::uint8_t>> sent;
   for (int i = 0; i < 20; ++i) {
-    certified_plan_v2_t certified{};
+    certified_plan_t certified{};
     certified.sequence = i;
     for (int t = 0; t <= 128; ++t) certified.slice_upper[t][t % 16] = i + t;
     sent.push_back(Encode(certified));

@@ -51,11 +51,11 @@ class CertifierNodeTest : public testing::Test {
       order_ += 'd';
     });
     bus_->Subscribe("PLAN_CERTIFIED", [this](const Received& r) {
-      certified_.push_back(Decoded<certified_plan_v2_t>(r.bytes).value());
+      certified_.push_back(Decoded<certified_plan_t>(r.bytes).value());
       order_ += 'c';
     });
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v3_t>(r.bytes).value()); });
+                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_t>(r.bytes).value()); });
   }
 
   void Run() {
@@ -76,8 +76,8 @@ class CertifierNodeTest : public testing::Test {
   std::unique_ptr<Bus> bus_;
   std::unique_ptr<CertifierNode> node_;
   std::vector<decision_t> decisions_;
-  std::vector<certified_plan_v2_t> certified_;
-  std::vector<certifier_status_v3_t> status_;
+  std::vector<certified_plan_t> certified_;
+  std::vector<certifier_status_t> status_;
   std::string order_;
 };
 
@@ -190,8 +190,7 @@ TEST_F(AdvisingCertifierTest, DropsItsAdviceWhenTheObstaclesChange) {
   config_.gate.obstacles_lost_ms = kNeverLost;
   Begin(true);
   const auto see = [&](double x, int sequence) {
-    obstacles_t seen = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 0.5)});
-    seen.utime = now_us_;
+    obstacles_t seen = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 0.5)}, now_us_);
     seen.sequence = sequence;
     bus_->Publish("OBSTACLES", seen);
   };
@@ -339,7 +338,7 @@ TEST_F(CertifierNodeTest, BeatsTwiceASecondWithItsCounts) {
     EXPECT_EQ(status_[i].candidates, is_first ? 0 : 2);
     EXPECT_EQ(status_[i].by_outcome[decision_t::CERTIFIED], is_first ? 0 : 1);
     EXPECT_EQ(status_[i].by_cause[decision_t::CAUSE_OBSTACLE], is_first ? 0 : 1);
-    EXPECT_EQ(status_[i].level, certifier_status_v3_t::OK);
+    EXPECT_EQ(status_[i].level, certifier_status_t::OK);
     EXPECT_EQ(status_[i].elapsed_p50_us > 0, !is_first);
     EXPECT_GE(status_[i].elapsed_p99_us, status_[i].elapsed_p50_us);
     EXPECT_EQ(GetDigest(status_[i].config_digest), config_.grounds.config);
@@ -357,8 +356,7 @@ class ObstaclesNodeTest : public CertifierNodeTest {
   }
 
   obstacles_t Seen(const std::vector<Obstacle>& obstacles) {
-    obstacles_t message = ToMessage(obstacles);
-    message.utime = now_us_;
+    obstacles_t message = ToMessage(obstacles, now_us_);
     message.sequence = next_sequence_++;
     return message;
   }
@@ -376,8 +374,8 @@ class ObstaclesNodeTest : public CertifierNodeTest {
     EXPECT_THAT(GetText(decision.message), testing::HasSubstr("abstained: waits for OBSTACLES: " + why));
     now_us_ += CertifierNode::kHeartbeatUs;
     Run();
-    EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
-    EXPECT_EQ(status_.back().state, certifier_status_v3_t::DISARMED);
+    EXPECT_EQ(status_.back().level, certifier_status_t::STALE);
+    EXPECT_EQ(status_.back().state, certifier_status_t::DISARMED);
     EXPECT_EQ(status_.back().obstacles_known, 0);
     EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr("waits for OBSTACLES: " + why));
   }
@@ -478,12 +476,12 @@ TEST_F(ObstaclesNodeTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAllAndSaysS
   Restart();
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   EXPECT_EQ(GetText(status_.back().message), "gate.obstacles is task: the 1 of the task file are all there are");
-  EXPECT_EQ(status_.back().obstacles_source, certifier_status_v3_t::OBSTACLES_TASK);
+  EXPECT_EQ(status_.back().obstacles_source, certifier_status_t::OBSTACLES_TASK);
   Say(kOnTheWay);
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   now_us_ += CertifierNode::kHeartbeatUs;
   Run();
-  EXPECT_EQ(status_.back().level, certifier_status_v3_t::OK);
+  EXPECT_EQ(status_.back().level, certifier_status_t::OK);
   EXPECT_EQ(status_.back().messages_refused, 1);
   EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr("; OBSTACLES is refused"));
 }
@@ -539,10 +537,10 @@ class TwoCertifiersTest : public ObstaclesNodeTest {
           answers.push_back(*decision);
     return answers;
   }
-  certifier_status_v3_t Status(std::size_t i) const {
-    certifier_status_v3_t status{};
+  certifier_status_t Status(std::size_t i) const {
+    certifier_status_t status{};
     for (const auto& [channel, bytes] : buses_[i].sent)
-      if (const auto decoded = Decoded<certifier_status_v3_t>(bytes)) status = *decoded;
+      if (const auto decoded = Decoded<certifier_status_t>(bytes)) status = *decoded;
     return status;
   }
   std::array<Charge::State, 2> States() const { return {nodes_[0]->charge().state(), nodes_[1]->charge().state()}; }
@@ -598,12 +596,12 @@ TEST_F(TwoCertifiersTest, TheLaterOneRefusesToArmAndAnswersNobody) {
   }
   for (const auto& [channel, bytes] : buses_[1].sent) EXPECT_EQ(channel, "CERTIFIER_STATUS");
   Pass(600'000);
-  const certifier_status_v3_t first = Status(0), second = Status(1);
-  EXPECT_EQ(first.level, certifier_status_v3_t::OK);
+  const certifier_status_t first = Status(0), second = Status(1);
+  EXPECT_EQ(first.level, certifier_status_t::OK);
   EXPECT_EQ(first.other_instance, second.instance);
   EXPECT_THAT(GetText(first.message), testing::HasSubstr("another certifier"));
-  EXPECT_EQ(second.level, certifier_status_v3_t::STALE);
-  EXPECT_EQ(second.state, certifier_status_v3_t::STANDBY);
+  EXPECT_EQ(second.level, certifier_status_t::STALE);
+  EXPECT_EQ(second.state, certifier_status_t::STANDBY);
   EXPECT_EQ(second.other_instance, first.instance);
   EXPECT_EQ(second.candidates, 0);
   EXPECT_EQ(second.by_cause[decision_t::CAUSE_SECOND_CERTIFIER], 5);
@@ -632,7 +630,7 @@ TEST_F(TwoCertifiersTest, TheLaterOneTakesOverOnceTheFirstIsSilentAndItsOwnWorld
   EXPECT_TRUE(Answers().empty()) << "nobody is in charge";
   Pass(1'000'000);
   EXPECT_EQ(nodes_[1]->charge().state(), kInCharge);
-  EXPECT_EQ(Status(1).level, certifier_status_v3_t::OK);
+  EXPECT_EQ(Status(1).level, certifier_status_t::OK);
   EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_OBSTACLE);
   for (SharedBus& bus : buses_)
     for (const auto& [channel, bytes] : bus.sent) EXPECT_NE(channel, "PLAN_CERTIFIED");
@@ -703,7 +701,7 @@ TEST_F(TwoCertifiersTest, AFaultThatTheFirstHadLatchedIsTakenOver) {
   EXPECT_EQ(Status(1).fault, 0);
   nodes_[0].reset();
   Pass(3'000'000);
-  EXPECT_EQ(Status(1).state, certifier_status_v3_t::FAULT);
+  EXPECT_EQ(Status(1).state, certifier_status_t::FAULT);
   EXPECT_EQ(Status(1).fault, fault_t::DECLARATION_FALSIFIED);
   EXPECT_THAT(GetText(Status(1).message), testing::HasSubstr("latched by the certifier that was in charge before"));
   EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_FAULT);
@@ -747,7 +745,7 @@ TEST_F(TwoCertifiersTest, IgnoresARecordedHeartbeat) {
   for (SharedBus& bus : buses_) bus.clock = clock_;
   Start(0);
   Pass(1'000'000);
-  certifier_status_v3_t recorded = Status(0);
+  certifier_status_t recorded = Status(0);
   recorded.instance = 7;
   recorded.started_utime -= 3'600'000'000;
   recorded.utime -= 3'600'000'000;
@@ -808,7 +806,7 @@ class ArmedNodeTest : public CertifierNodeTest {
 
 TEST_F(ArmedNodeTest, CertifiesNothingBeforeItHasHeardTheRobot) {
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
-  EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
+  EXPECT_EQ(status_.back().level, certifier_status_t::STALE);
   robot_state_t bad = State();
   bad.state[1] = std::numeric_limits<double>::quiet_NaN();
   SayState(bad);
@@ -850,8 +848,7 @@ class RobotClockTest : public ArmedNodeTest {
     SayState(state);
   }
   void See(std::int64_t late_us) {
-    obstacles_t message = ToMessage({});
-    message.utime = now_us_ - late_us;
+    obstacles_t message = ToMessage({}, now_us_ - late_us);
     message.sequence = next_seen_++;
     bus_->Publish("OBSTACLES", message);
     Run();
@@ -862,8 +859,8 @@ class RobotClockTest : public ArmedNodeTest {
     EXPECT_THAT(GetText(decision.message), testing::HasSubstr(why));
     Pass(CertifierNode::kHeartbeatUs);
     Run();
-    EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
-    EXPECT_EQ(status_.back().state, certifier_status_v3_t::DISARMED);
+    EXPECT_EQ(status_.back().level, certifier_status_t::STALE);
+    EXPECT_EQ(status_.back().state, certifier_status_t::DISARMED);
     EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr(why));
   }
 
@@ -1027,7 +1024,7 @@ TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
   EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
   SayState(State());
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "that it is back does not clear it";
-  EXPECT_EQ(status_.back().level, certifier_status_v3_t::ERROR);
+  EXPECT_EQ(status_.back().level, certifier_status_t::ERROR);
   Reset();
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
   SayState(State());
@@ -1112,7 +1109,7 @@ TEST_F(ArmedNodeTest, HeartbeatsGoOnWhereTheClockJumpsToAndFro) {
 TEST_F(ArmedNodeTest, AStateOutsideItsSliceLatchesAndNamesTheTransition) {
   SayState(State());
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  const certified_plan_v2_t plan = certified_.back();
+  const certified_plan_t plan = certified_.back();
   for (const bool outside : {false, true}) {
     ++sequence_;  // a lost message between, so that each is judged by what it says itself
     robot_state_t state = State(plan.plan.plan_id, 1);
@@ -1210,7 +1207,7 @@ TEST_F(StrangerTest, LatchesWhenItsOwnPlanRunsBeyondItsEnd) {
   SayState(State());
   StandFor(kTolerated + 1);
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  const certified_plan_v2_t plan = certified_.back();
+  const certified_plan_t plan = certified_.back();
   const auto at = [&](int step) {
     ++sequence_;  // each is judged by itself
     robot_state_t state = State(plan.plan.plan_id, step);
@@ -1419,7 +1416,7 @@ class ReloadTest : public testing::Test {
     Copy([](const std::string& text) { return text; });
     auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+                    [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
     node->Tick(kNow);
     bus_->Dispatch(0);
     return node;
@@ -1429,7 +1426,7 @@ class ReloadTest : public testing::Test {
   const std::string path_ = scratch_ / "task.yaml";
   const Clock clock_ = [] { return kNow; };
   std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
-  certifier_status_v3_t status_{};
+  certifier_status_t status_{};
 };
 
 TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
@@ -1507,7 +1504,7 @@ TEST_F(ReloadTest, RefusesATaskWithAnotherKey) {
   with_key(keys);
   auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
   bus_->Subscribe("CERTIFIER_STATUS",
-                  [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+                  [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
   node->Tick(kNow);
   bus_->Dispatch(0);
   const auto refused = [&](const char* why) {
@@ -1537,7 +1534,7 @@ TEST_F(ReloadTest, AKeyThatTheCommandLineGaveStays) {
   config.bus.key_is_given = true;
   auto node = std::make_unique<CertifierNode>(config, *bus_, Clocks{clock_, clock_});
   bus_->Subscribe("CERTIFIER_STATUS",
-                  [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+                  [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
   node->Tick(kNow);
   bus_->Dispatch(0);
   Reload(*node);

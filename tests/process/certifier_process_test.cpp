@@ -14,8 +14,8 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/obstacle_message.h"
-#include "forereach/certified_plan_v2_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
@@ -123,16 +123,16 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   EXPECT_EQ(decisions.size(), expected_.size());
   EXPECT_EQ(causes, expected_);
 
-  const auto certified = probe_.Heard<certified_plan_v2_t>("PLAN_CERTIFIED");
+  const auto certified = probe_.Heard<certified_plan_t>("PLAN_CERTIFIED");
   ASSERT_EQ(certified.size(), 3u);
-  for (const certified_plan_v2_t& plan : certified) {
+  for (const certified_plan_t& plan : certified) {
     EXPECT_EQ(expected_.at(ToHex(DigestOf(Encode(plan.plan)))), "none");
     EXPECT_TRUE(FindSealFaults(plan).empty());
     EXPECT_EQ(GetDigest(plan.config_digest), config_.grounds.config);
   }
   EXPECT_TRUE(std::ranges::any_of(certified, [&](const auto& plan) { return Encode(plan.plan) == Encode(good); }));
 
-  const auto status = probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS");
+  const auto status = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
   ASSERT_FALSE(status.empty());
   EXPECT_EQ(status.back().candidates, 15);
   EXPECT_EQ(status.back().by_outcome[decision_t::CERTIFIED], 3);
@@ -190,10 +190,10 @@ class CertifierObstaclesTest : public testing::Test {
     }
     return now;
   }
-  [[nodiscard]] certifier_status_v3_t StatusOf(std::int64_t other_than) {
-    certifier_status_v3_t found{};
+  [[nodiscard]] certifier_status_t StatusOf(std::int64_t other_than) {
+    certifier_status_t found{};
     EXPECT_TRUE(probe_.WaitUntil([&] {
-      const auto all = probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS");
+      const auto all = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
       if (all.empty() || all.back().instance == other_than) return false;
       found = all.back();
       return true;
@@ -232,7 +232,7 @@ TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
   EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
   const std::int64_t instance = StatusOf(0).instance;
   auto second = StartCertifier("another state");
-  const certifier_status_v3_t other = StatusOf(instance);
+  const certifier_status_t other = StatusOf(instance);
   EXPECT_NE(other.instance, instance);
   ASSERT_TRUE(second->WaitForLog("is in charge on this bus: this one decides nothing")) << second->error();
   const std::size_t before = probe_.heard("PLAN_DECISION").size();
@@ -284,7 +284,7 @@ TEST_F(CertifierProcessTest, FiveHundredCandidatesInABurstAreAnsweredExactlyOnce
   EXPECT_EQ(overrun, 0u);
   EXPECT_EQ(certified, kCandidates / 2);
 #endif
-  EXPECT_EQ(probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
+  EXPECT_EQ(probe_.Heard<certifier_status_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
 }
 
 TEST_F(CertifierProcessTest, StopsInTheMiddleOfAFlood) {

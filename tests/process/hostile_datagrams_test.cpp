@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "bus/authentic.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "tests/keys.h"
@@ -140,7 +140,7 @@ TEST_P(HostileDatagramsTest, EveryProcessLivesOnAndWorks) {
   EXPECT_GT(probe_.Heard<logger_status_t>("LOGGER_STATUS").back().events_written, events_before);
   if (GetParam().refused) {
     const auto counted = [this] {
-      return probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS").back().datagrams_refused > 0;
+      return probe_.Heard<certifier_status_t>("CERTIFIER_STATUS").back().datagrams_refused > 0;
     };
     EXPECT_TRUE(probe_.WaitUntil(counted)) << "the certifier's heartbeat counts them";
   }

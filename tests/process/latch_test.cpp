@@ -65,7 +65,7 @@ class LatchTest : public testing::Test {
     bus_->Subscribe("PLAN_WITHDRAWN",
                     [this](const Received& r) { withdrawal_ = Decoded<withdrawal_t>(r.bytes).value(); });
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+                    [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
     node_ = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, clock_}, 0,
                                             std::make_unique<LatchFile>(directory_));
     Run();
@@ -137,9 +137,9 @@ class LatchTest : public testing::Test {
     EXPECT_EQ(decision_.outcome, decision_t::REJECTED);
     EXPECT_THAT(GetText(decision_.message), StartsWith("rejected: no fault could be stored: "));
     Heartbeat();
-    EXPECT_EQ(status_.state, certifier_status_v3_t::DISARMED);
-    EXPECT_EQ(status_.level, certifier_status_v3_t::ERROR);
-    EXPECT_EQ(status_.latch, certifier_status_v3_t::LATCH_UNWRITABLE);
+    EXPECT_EQ(status_.state, certifier_status_t::DISARMED);
+    EXPECT_EQ(status_.level, certifier_status_t::ERROR);
+    EXPECT_EQ(status_.latch, certifier_status_t::LATCH_UNWRITABLE);
     EXPECT_THAT(node_->watch().Lacks(Watch::Need::kLatch), HasSubstr(why));
     EXPECT_EQ(certified_, 0);
   }
@@ -147,8 +147,8 @@ class LatchTest : public testing::Test {
     Heartbeat();
     EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << GetText(decision_.message);
     Heartbeat();
-    EXPECT_EQ(status_.level, certifier_status_v3_t::OK) << GetText(status_.message);
-    EXPECT_EQ(status_.latch, certifier_status_v3_t::NO_LATCH);
+    EXPECT_EQ(status_.level, certifier_status_t::OK) << GetText(status_.message);
+    EXPECT_EQ(status_.latch, certifier_status_t::LATCH_NONE);
   }
 
   std::int64_t now_us_ = kNow;
@@ -160,7 +160,7 @@ class LatchTest : public testing::Test {
   std::unique_ptr<CertifierNode> node_;
   std::vector<fault_t> faults_;
   decision_t decision_{};
-  certifier_status_v3_t status_{};
+  certifier_status_t status_{};
   withdrawal_t withdrawal_{};
   int certified_ = 0;
   std::int64_t next_plan_id_ = 1, sequence_ = 0;
@@ -189,10 +189,10 @@ TEST_F(LatchTest, AFaultOutlivesTheProcessUntilAReset) {
     Heartbeat();
     EXPECT_GE(faults_.size(), 2u) << "and again";
     for (const fault_t& said : faults_) EXPECT_EQ(Encode(said), Encode(fault));
-    EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+    EXPECT_EQ(status_.state, certifier_status_t::FAULT);
     EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
     EXPECT_EQ(status_.fault_utime, fault.utime);
-    EXPECT_EQ(status_.latch, certifier_status_v3_t::LATCH_WRITTEN);
+    EXPECT_EQ(status_.latch, certifier_status_t::LATCH_WRITTEN);
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
     EXPECT_EQ(GetText(decision_.message), sentence);
     EXPECT_EQ(certified_, 0);
@@ -215,7 +215,7 @@ TEST_F(LatchTest, AResetMayComeAfterTheClockWasSetBack) {
   Fault();
   now_us_ -= 3'600'000'000;
   Begin();
-  EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+  EXPECT_EQ(status_.state, certifier_status_t::FAULT);
   Reset();
   Begin();
   EXPECT_TRUE(faults_.empty());
@@ -242,7 +242,7 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
     EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
     EXPECT_EQ(decision_.cause, decision_t::CAUSE_PAIRWISE);
     Heartbeat();
-    EXPECT_EQ(status_.level, certifier_status_v3_t::ERROR);
+    EXPECT_EQ(status_.level, certifier_status_t::ERROR);
     EXPECT_THAT(GetText(status_.message), HasSubstr("contradict"));
   }
   Declare(0.004);  // 0.01 is the difference, twice this is allowed
@@ -487,7 +487,7 @@ TEST_F(LatchTest, AFaultThatCannotBeWrittenIsNotForgottenByARestart) {
     Fault();
     ASSERT_EQ(faults_.size(), 1u) << "it is said all the same";
     Heartbeat();
-    EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+    EXPECT_EQ(status_.state, certifier_status_t::FAULT);
     EXPECT_THAT(GetText(status_.message), HasSubstr("not stored"));
     Reset();
     EXPECT_TRUE(node_->watch().fault()) << "nor can the reset be written";
@@ -522,7 +522,7 @@ TEST_F(LatchTest, AResetThatCannotBeWrittenClearsNothing) {
     EXPECT_EQ(status_.messages_refused, 1);
   }
   Begin();
-  EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+  EXPECT_EQ(status_.state, certifier_status_t::FAULT);
   Reset();
   Begin();
   ExpectArmed();

@@ -20,7 +20,7 @@
 
 #include "bus/authentic.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "records/event_log.h"
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
@@ -89,7 +89,7 @@ class PlainLcm final {
 class LcmInteroperationTest : public testing::Test {
  protected:
   static std::vector<Message> Sample() {
-    certified_plan_v2_t certified{};
+    certified_plan_t certified{};
     certified.sequence = 7;
     return {{"PLAN_CERTIFIED", Encode(certified)},
             {"EMPTY", {}},
@@ -261,8 +261,8 @@ TEST_F(LcmInteroperationTest, OurProcessesTakeWhatLcmLogplayerPlays) {
 }
 
 TEST_F(LcmInteroperationTest, OurLargestMessageFitsOneDatagramWithItsSignature) {
-  EXPECT_GT(EncodedSize<certified_plan_v2_t>(), EncodedSize<candidate_plan_t>());
-  EXPECT_TRUE(FitsOneDatagram(kMaxChannelBytes, EncodedSize<certified_plan_v2_t>() + kTrailerBytes));
+  EXPECT_GT(EncodedSize<certified_plan_t>(), EncodedSize<candidate_plan_t>());
+  EXPECT_TRUE(FitsOneDatagram(kMaxChannelBytes, EncodedSize<certified_plan_t>() + kTrailerBytes));
 }
 
 }  // namespace lcm_interoperation_test

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "tests/paths.h"
@@ -49,7 +49,7 @@ TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   }
   EXPECT_EQ(answers.size(), probe.heard("PLAN_CANDIDATE").size());
   for (const auto& [plan_id, count] : answers) EXPECT_EQ(count, 1) << plan_id;
-  for (const certified_plan_v2_t& plan : probe.Heard<certified_plan_v2_t>("PLAN_CERTIFIED"))
+  for (const certified_plan_t& plan : probe.Heard<certified_plan_t>("PLAN_CERTIFIED"))
     EXPECT_TRUE(certificates.contains(plan.plan.plan_id)) << plan.plan.plan_id;
   for (const execution_event_t& event : probe.Heard<execution_event_t>("EXECUTION_EVENT")) {
     if (event.kind == execution_event_t::STARTED) {

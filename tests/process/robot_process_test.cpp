@@ -28,7 +28,7 @@ class RobotProcessTest : public testing::Test {
   }
 
   // Certified by a gate with the robot's own task, to start at one of the robot's boundaries.
-  certified_plan_v2_t Certified(std::int64_t plan_id, int boundaries_ahead) {
+  certified_plan_t Certified(std::int64_t plan_id, int boundaries_ahead) {
     candidate_plan_t candidate = CandidateFor(config_, plan_id, Eigen::Vector2d(0.5, 0), kSteps);
     candidate.start_utime = Last().utime + boundaries_ahead * candidate.step_us;
     const GateAnswer answer = gate_.Decide(Encode(candidate), WallClockUs());
@@ -90,11 +90,11 @@ TEST_F(RobotProcessTest, StandsUntilACertifiedPlanComesThenDrivesItToItsEnd) {
 }
 
 TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {
-  const certified_plan_v2_t good = Certified(1, 20);
+  const certified_plan_t good = Certified(1, 20);
   probe_.bus().Publish("PLAN_CANDIDATE", good.plan);
   probe_.bus().Publish("PLAN_CERTIFIED", good.plan);  // a candidate where only certified plans belong
 
-  certified_plan_v2_t tampered = good;
+  certified_plan_t tampered = good;
   tampered.plan.control[0][0] = 2.9;
   probe_.bus().Publish("PLAN_CERTIFIED", tampered);  // another plan under an old certificate
   SetDigest(tampered.plan_digest, DigestOf(Encode(tampered.plan)));

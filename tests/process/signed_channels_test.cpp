@@ -68,7 +68,7 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
     Listener listener{BusOf(Role::kCertifier), nullptr, std::move(make), {}};
     auto node = std::make_unique<CertifierNode>(config_, *listener.bus);
     listener.state = [&node = *node] {
-      const certifier_status_v3_t status = node.gate().Status(WallClockUs());
+      const certifier_status_t status = node.gate().Status(WallClockUs());
       std::ostringstream text;
       text << status.candidates << ' ' << status.observations << ' ' << status.obstacles_in_force << ' '
            << node.watch().Lacks(Watch::Need::kRobotState) << ' ' << static_cast<int>(node.charge().state());
@@ -164,8 +164,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "OBSTACLES")
     return Certifier([](int number) {
-      obstacles_t message = ToMessage({Obstacle::Circle(Vec({9.0 + number, 9}), 0.5)});
-      message.utime = WallClockUs();
+      obstacles_t message = ToMessage({Obstacle::Circle(Vec({9.0 + number, 9}), 0.5)}, WallClockUs());
       message.sequence = number;
       return Encode(message);
     });
@@ -180,11 +179,11 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "CERTIFIER_STATUS")
     return Certifier([](int) {
-      certifier_status_v3_t status{};
+      certifier_status_t status{};
       status.utime = WallClockUs();
       status.started_utime = 1;
       status.instance = 1;
-      status.state = certifier_status_v3_t::ARMED;
+      status.state = certifier_status_t::ARMED;
       return Encode(status);
     });
   if (channel == "PLAN_DECISION")
@@ -201,7 +200,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "PLAN_CERTIFIED")
     return Robot([](int number) {
-      certified_plan_v2_t certified{};
+      certified_plan_t certified{};
       certified.plan.plan_id = certified.sequence = number;
       return Encode(certified);
     });

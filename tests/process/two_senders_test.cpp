@@ -42,7 +42,7 @@ class TwoSendersTest : public testing::Test {
     air_->Subscribe("PLAN_WITHDRAWN",
                     [this](const Received& r) { withdrawals_.push_back(Decoded<withdrawal_t>(r.bytes).value()); });
     air_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+                    [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
     air_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
     planner_.emplace(*air_, Role::kPlanner, 1);
   }
@@ -75,7 +75,7 @@ class TwoSendersTest : public testing::Test {
   std::vector<decision_t> decisions_;
   std::vector<withdrawal_t> withdrawals_;
   std::vector<fault_t> faults_;
-  certifier_status_v3_t status_{};
+  certifier_status_t status_{};
   std::int64_t next_plan_id_ = 1;
 };
 
@@ -174,8 +174,7 @@ TEST_P(PerceptionTest, ASecondOneWhoseClockIsBehindIsASecondOne) {
   Watching one(*air_, kTrueOne, Period(), {});
   For(2 * kTimeout, [&] { one.Tick(now_us_); });
   Speaking behind(*air_, Role::kPerception, kOldOne);
-  obstacles_t message = ToMessage(kWall);
-  message.utime = now_us_ - 1'500'000;
+  obstacles_t message = ToMessage(kWall, now_us_ - 1'500'000);
   behind.Say("OBSTACLES", message, now_us_ - 1'500'000);
   EXPECT_NE(Ask().outcome, decision_t::CERTIFIED);
   EXPECT_THAT(GetText(decisions_.back().message), HasSubstr("two senders are heard"));
@@ -302,7 +301,7 @@ TEST_F(TwoRobotsTest, TwoUnderOneNameGetNoCertificate) {
   const std::string why = "ROBOT_STATE: two senders are heard, 000000000000aaaa and 000000000000bbbb";
   EXPECT_THAT(GetText(decisions_.back().message), HasSubstr(why));
   EXPECT_THAT(GetText(status_.message), HasSubstr(why));
-  EXPECT_EQ(status_.state, certifier_status_v3_t::DISARMED);
+  EXPECT_EQ(status_.state, certifier_status_t::DISARMED);
   EXPECT_TRUE(faults_.empty());
   For(2 * kTimeout, [&] {
     if ((now_us_ - begin) % 100'000 == 0) Stands(first, sequence++);

@@ -74,8 +74,7 @@ class WithdrawnDriveTest : public testing::Test {
   void Begin() { certifier_ = std::make_unique<CertifierNode>(config_, lossy_, Clocks{clock_, clock_}); }
 
   void SendObstacles() {
-    obstacles_t message = ToMessage(obstacles_);
-    message.utime = now_ - stamps_late_us_;
+    obstacles_t message = ToMessage(obstacles_, now_ - stamps_late_us_);
     message.sequence = sequence_++;
     bus_->Publish("OBSTACLES", message);
   }
@@ -140,7 +139,7 @@ class WithdrawnDriveTest : public testing::Test {
   RobotSimNode robot_{config_, *bus_, out_};
   std::unique_ptr<CertifierNode> certifier_;
   std::vector<withdrawal_t> withdrawn_;
-  std::vector<certified_plan_v2_t> certified_;
+  std::vector<certified_plan_t> certified_;
   std::vector<decision_t> decisions_;
   std::vector<execution_event_t> events_;
   std::vector<robot_state_t> states_;
@@ -221,8 +220,7 @@ TEST_F(WithdrawnDriveTest, AMessageThatIsRefusedWithdrawsNothing) {
   Drive();
   RunFor(150'000);
   obstacles_ = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2)};
-  obstacles_t message = ToMessage(obstacles_);
-  message.utime = now_;
+  obstacles_t message = ToMessage(obstacles_, now_);
   message.sequence = sequence_++;
   message.num_obstacles = 2;  // the second has kind 0
   bus_->Publish("OBSTACLES", message);
@@ -424,8 +422,7 @@ class RestartedCertifierTest : public WithdrawnDriveTest {
     return learned;
   }
   void SendPlan(Gate& predecessor) {
-    obstacles_t message = ToMessage(obstacles_);
-    message.utime = now_;
+    obstacles_t message = ToMessage(obstacles_, now_);
     ASSERT_EQ(predecessor.UpdateObstacles(Encode(message), now_), "");
     RunFor(20'000);
     const auto plan = Plan(1, states_.front().utime + 3 * kStepUs, {0, 0, 1, 0}, kProgress);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "records/certificate_files.h"
-#include "records/certified_message.h"
 #include "records/event_log.h"
 
 namespace forereach {
@@ -26,7 +25,7 @@ inline candidate_plan_t FirstCertified(const std::string& log) {
   EventLogReader reader(log);
   LogEvent event;
   while (reader.Next(event) == LogStatus::kEvent)
-    if (const auto certified = ReadCertified(event.data)) return certified->plan.plan;
+    if (const auto certified = Decoded<certified_plan_t>(event.data)) return certified->plan;
   return {};
 }
 

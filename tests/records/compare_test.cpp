@@ -11,6 +11,7 @@
 #include "records/timeline.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 
@@ -34,10 +35,9 @@ class CompareTest : public testing::Test {
 TEST_F(CompareTest, TheSameTaskChangesNothing) {
   const Output output = CompareUnder(kConfig);
   EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_EQ(output.text,
-            "compare: had " + kConfig +
-                " been declared, 0 of 47 abstentions and rejections would have been certificates, and none of "
-                "the 20 certificates lost\n");
+  EXPECT_EQ(output.text, "compare: had " + kConfig + " been declared, 0 of " + std::to_string(kCourseAbstained) +
+                             " abstentions and rejections would have been certificates, and none of the " +
+                             std::to_string(kCourseCertified) + " certificates lost\n");
 }
 
 TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
@@ -45,8 +45,8 @@ TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
   Config free = task;
   free.obstacles.clear();
   const Comparison none = Compare({kLog}, free);
-  EXPECT_EQ(none.candidates, 67);
-  EXPECT_EQ(none.certificates, 20);
+  EXPECT_EQ(none.candidates, kCourseDecisions);
+  EXPECT_EQ(none.certificates, kCourseCertified);
   EXPECT_EQ(none.num_lost(), 0) << "without obstacles every certificate stands";
   std::int64_t safety = 0;
   class Counter final : public TimelineUser {
@@ -71,7 +71,7 @@ TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
   EXPECT_EQ(gained_of_safety, none.num_gained());
   std::int64_t otherwise = none.refused_alike;
   for (const auto& [whys, count] : none.otherwise) otherwise += count;
-  EXPECT_EQ(none.num_gained() + otherwise, 47);
+  EXPECT_EQ(none.num_gained() + otherwise, kCourseAbstained);
 }
 
 TEST_F(CompareTest, ACertificateThatIsLostIsNamed) {
@@ -89,16 +89,16 @@ TEST_F(CompareTest, ACertificateThatIsLostIsNamed) {
   Comparison twice = compared;
   twice += compared;
   EXPECT_EQ(twice.num_lost(), 2 * compared.num_lost());
-  EXPECT_EQ(twice.candidates, 134);
+  EXPECT_EQ(twice.candidates, 2 * kCourseDecisions);
 }
 
 TEST_F(CompareTest, PrintsJson) {
   const Output output = CompareUnder(kConfig, kLog, "--json");
   EXPECT_EQ(output.code, 0) << output.text;
   const auto document = nlohmann::json::parse(output.text);
-  EXPECT_EQ(document["candidates"], 67);
+  EXPECT_EQ(document["candidates"], kCourseDecisions);
   EXPECT_EQ(document["gained"], 0);
-  EXPECT_EQ(document["refused_alike"], 47);
+  EXPECT_EQ(document["refused_alike"], kCourseAbstained);
   EXPECT_TRUE(document["lost_by"].empty());
 }
 
@@ -114,8 +114,10 @@ TEST_F(CompareTest, ADirectoryIsReplayedAndCompared) {
   }
   const Output replay = Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1");
   EXPECT_EQ(replay.code, 0) << replay.text;
-  EXPECT_THAT(replay.text, HasSubstr("replay: 134 candidates, 134 decisions agree, 0 differ"));
-  EXPECT_THAT(CompareUnder(kConfig, directory).text, HasSubstr("none of the 40 certificates lost"));
+  EXPECT_THAT(replay.text, HasSubstr("replay: " + std::to_string(2 * kCourseDecisions) + " candidates, " +
+                                     std::to_string(2 * kCourseDecisions) + " decisions agree, 0 differ"));
+  EXPECT_THAT(CompareUnder(kConfig, directory).text,
+              HasSubstr("none of the " + std::to_string(2 * kCourseCertified) + " certificates lost"));
   std::filesystem::remove(directory + "/events-1.lcmlog");
   const Output missing = Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1");
   EXPECT_EQ(missing.code, 1);
@@ -133,13 +135,14 @@ TEST_F(CompareTest, ManyRobotsAreToldApart) {
   const auto document = nlohmann::json::parse(output.text);
   ASSERT_EQ(document["by_robot"].size(), 2u) << output.text;
   EXPECT_EQ(document["by_robot"][0]["robot"], scratch_ / "night/a");
-  EXPECT_EQ(document["by_robot"][1]["certificates"], 20);
-  EXPECT_EQ(document["candidates"], 134);
+  EXPECT_EQ(document["by_robot"][1]["certificates"], kCourseCertified);
+  EXPECT_EQ(document["candidates"], 2 * kCourseDecisions);
   const std::string options = "--resume '" + (scratch_ / "kept") + "'";
   const Output first = CompareUnder(kConfig, scratch_ / "night", options);
   const Output second = CompareUnder(kConfig, scratch_ / "night", options);
   EXPECT_EQ(first.text, second.text);
-  EXPECT_THAT(first.text, HasSubstr((scratch_ / "night/a") + ": 0 of 47 abstentions"));
+  EXPECT_THAT(first.text,
+              HasSubstr((scratch_ / "night/a") + ": 0 of " + std::to_string(kCourseAbstained) + " abstentions"));
 }
 
 TEST_F(CompareTest, RefusesToCompareWithoutOneTask) {

@@ -121,7 +121,6 @@ TEST(Database, KeepsRunsOverReopening) {
   EXPECT_EQ(runs[0].log_file, "a.lcmlog");
   EXPECT_EQ(runs[0].end_utime, 15);
   EXPECT_EQ(runs[0].events, 5);
-  EXPECT_EQ(runs[0].schema, Database::kSchemaVersion);
   EXPECT_EQ(runs[0].recovered, "mended");
   EXPECT_EQ(runs[1].end_utime, std::nullopt);
 }
@@ -156,73 +155,18 @@ TEST(Database, ReferencesAreThoseOfAllTables) {
   EXPECT_TRUE(database.References("b.lcmlog").empty());
 }
 
-// The first version's tables as that version made them, with a row in each.
-constexpr const char* kVersion1 = R"sql(
-  CREATE TABLE runs (
-    log_file TEXT PRIMARY KEY, start_utime INTEGER NOT NULL, end_utime INTEGER,
-    events INTEGER NOT NULL DEFAULT 0, schema INTEGER NOT NULL, recovered TEXT NOT NULL DEFAULT '');
-  CREATE TABLE decisions (
-    log_file TEXT NOT NULL, event_number INTEGER NOT NULL,
-    utime INTEGER NOT NULL, candidate_utime INTEGER NOT NULL, sequence INTEGER NOT NULL,
-    source TEXT NOT NULL, plan_id INTEGER NOT NULL, outcome TEXT NOT NULL, cause TEXT NOT NULL,
-    step INTEGER, coordinate INTEGER, obstacle INTEGER, first_observation INTEGER, second_observation INTEGER,
-    margin REAL, threshold REAL, elapsed_us REAL, latency_us REAL, message TEXT NOT NULL,
-    plan_digest TEXT NOT NULL, config_digest TEXT NOT NULL, model_digest TEXT NOT NULL,
-    declaration_digest TEXT NOT NULL, observations_digest TEXT NOT NULL, obstacles_digest TEXT NOT NULL,
-    UNIQUE (log_file, event_number));
-  CREATE TABLE execution_events (
-    log_file TEXT NOT NULL, event_number INTEGER NOT NULL,
-    utime INTEGER NOT NULL, sequence INTEGER NOT NULL, plan_id INTEGER, kind TEXT NOT NULL,
-    step INTEGER, coordinate INTEGER, state TEXT NOT NULL, value REAL, message TEXT NOT NULL,
-    UNIQUE (log_file, event_number));
-  CREATE TABLE gaps (
-    log_file TEXT NOT NULL, event_number INTEGER, channel TEXT NOT NULL, source TEXT NOT NULL,
-    expected INTEGER, got INTEGER, lost INTEGER NOT NULL, utime INTEGER NOT NULL, reason TEXT NOT NULL,
-    UNIQUE (log_file, event_number, reason));
-  PRAGMA application_id = 0x46524C47;
-  PRAGMA user_version = 1;
-  INSERT INTO runs VALUES ('a.lcmlog', 10, 20, 9, 1, 'mended');
-  INSERT INTO decisions VALUES ('a.lcmlog', 1, 2, 3, 4, 's', 5, 'certified', 'none', 6, 7, 8, 9, 10, 0.5, NULL, 1.5,
-    NULL, 'm', 'p', 'c', 'mo', 'd', 'ob', 'os');
-  INSERT INTO execution_events VALUES ('a.lcmlog', 2, 3, 4, 5, 'started', 6, 7, '[1.0]', 8.5, 'e');
-  INSERT INTO gaps VALUES ('a.lcmlog', 3, 'C', 's', 4, 6, 2, 7, 'bus');
-)sql";
-
-TEST(Database, BringsVersion1UpToDate) {
-  const ScratchDirectory scratch;
-  Sql(scratch / "d.sqlite", kVersion1);
-  { const Database migrates(scratch / "d.sqlite"); }
-  Database database(scratch / "d.sqlite");
-  ASSERT_EQ(database.Runs().size(), 1u);
-  const RunRow run = database.Runs()[0];
-  EXPECT_EQ(run.end_utime, 20);
-  EXPECT_EQ(run.recovered, "mended");
-  EXPECT_EQ(run.schema, 1);
-  EXPECT_EQ(run.continues, "");
-  EXPECT_EQ(run.log_deleted_utime, std::nullopt);
-  EXPECT_EQ(run.robot, "");
-  const Rows rows = database.Read();
-  ASSERT_EQ(rows.decisions.size(), 1u);
-  EXPECT_EQ(rows.decisions[0].plan_id, 5);
-  EXPECT_EQ(rows.decisions[0].grounds[4], "os");
-  EXPECT_EQ(rows.decisions[0].event.digest, "") << "nobody knows it any more";
-  ASSERT_EQ(rows.events.size(), 1u);
-  EXPECT_EQ(rows.events[0].state, std::vector<double>{1});
-  ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_EQ(rows.gaps[0].lost, 2);
-  EXPECT_EQ(database.References("a.lcmlog").size(), 3u);
-  EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
-}
-
-TEST(Database, RefusesANewerSchema) {
+TEST(Database, RefusesAnotherSchema) {
   const ScratchDirectory scratch;
   { const Database database(scratch / "d.sqlite"); }
-  Sql(scratch / "d.sqlite", "PRAGMA user_version = 99");
-  try {
-    const Database database(scratch / "d.sqlite");
-    FAIL() << "accepted";
-  } catch (const DatabaseError& error) {
-    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("99"), testing::HasSubstr("d.sqlite")));
+  for (const int version : {0, Database::kSchemaVersion - 1, Database::kSchemaVersion + 1}) {
+    Sql(scratch / "d.sqlite", ("PRAGMA user_version = " + std::to_string(version)).c_str());
+    try {
+      const Database database(scratch / "d.sqlite");
+      ADD_FAILURE() << version << " is accepted";
+    } catch (const DatabaseError& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("schema version " + std::to_string(version)),
+                                               testing::HasSubstr("d.sqlite")));
+    }
   }
 }
 

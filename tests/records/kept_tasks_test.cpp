@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "tests/config/task_files.h"
 #include "tests/logger/disk_fixture.h"
 #include "tests/paths.h"
@@ -34,7 +34,7 @@ class KeptTest : public DiskTest {
     node_->Tick(bus_.now_us += 1000);
   }
   void Heartbeat(const Digest& config, std::int64_t version) {
-    certifier_status_v2_t status{};
+    certifier_status_t status{};
     status.sequence = heartbeats_++;
     status.version = version;
     SetDigest(status.config_digest, config);

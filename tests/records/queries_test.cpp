@@ -12,6 +12,7 @@
 #include "records/interpreter.h"
 #include "task/config.h"
 #include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 
@@ -109,8 +110,8 @@ TEST_F(QueriesTest, TheFirstQueryCountsTheDecisionsOfTheLog) {
     decisions += std::stoi(row[2]);
     if (row[0] == "certified") certified = std::stoi(row[2]);
   }
-  EXPECT_EQ(decisions, 67);
-  EXPECT_EQ(certified, 20);
+  EXPECT_EQ(decisions, kCourseDecisions);
+  EXPECT_EQ(certified, kCourseCertified);
 }
 
 }  // namespace queries_test

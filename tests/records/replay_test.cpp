@@ -11,7 +11,7 @@
 #include "certifier/gate/plan_ledger.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "records/event_log.h"
 #include "records/replay.h"
@@ -40,7 +40,7 @@ struct LoggedGate {
     log.Append(kNow, config.bus.obstacles, obstacles);
     EXPECT_EQ(gate.UpdateObstacles(obstacles, kNow), "");
   }
-  void Say(const certifier_status_v3_t& status) { log.Append(kNow, config.bus.status, Encode(status)); }
+  void Say(const certifier_status_t& status) { log.Append(kNow, config.bus.status, Encode(status)); }
   /** Of `expected`, the outcome. */
   void Decide(const candidate_plan_t& candidate, std::int16_t expected) {
     const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
@@ -103,8 +103,7 @@ class WithdrawnReplayTest : public ReplayTest {
     PlanLedger plans(config.gate, kNow);
     std::int64_t sequence = 0;
     const auto see = [&](const std::vector<Obstacle>& obstacles) {
-      obstacles_t message = ToMessage(obstacles);
-      message.utime = kNow;
+      obstacles_t message = ToMessage(obstacles, kNow);
       message.sequence = sequence++;
       EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
       log.Append(kNow, config.bus.obstacles, Encode(message));
@@ -252,12 +251,10 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
 // the certifier itself began after them.
 TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
-  Config config = SmallTask();
-  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
-  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
-  on_the_way.utime = kNow;
+  const Config config = SmallTaskOnTheBus();
+  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}, kNow);
   for (const std::int64_t heartbeat : {0, 7}) {
-    certifier_status_v3_t status{};
+    certifier_status_t status{};
     status.sequence = heartbeat;
     const std::string path = NewLog();
     {
@@ -277,11 +274,9 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
 
 // What was heard before a reload counts after it, beside the task's own.
 TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
-  Config config = SmallTask();
-  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
-  obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
-  far_away.utime = kNow;
-  certifier_status_v3_t first{}, second{};
+  const Config config = SmallTaskOnTheBus();
+  const obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}, kNow);
+  certifier_status_t first{}, second{};
   second.sequence = 1;
   first.version = 1, second.version = 2;
   const std::string path = NewLog();
@@ -289,11 +284,11 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
     EventLogWriter writer(path);
     LoggedGate before{config, writer}, after{config, writer};
     before.Say(first);
-    before.Hear(Encode(far_away));
-    before.Decide(Candidate(1, kAccelerationIntoTheCircle), decision_t::CERTIFIED);
+    before.Decide(Candidate(1), decision_t::CERTIFIED);
+    before.Hear(Encode(on_the_way));
     after.gate.Inherit(before.gate);
     after.Say(second);
-    after.Decide(Candidate(2, kAccelerationIntoTheCircle), decision_t::ABSTAIN_SAFETY);
+    after.Decide(Candidate(2), decision_t::ABSTAIN_SAFETY);
     EXPECT_TRUE(writer.Flush());
   }
   ExpectAgreed(path, config, 2);
@@ -307,9 +302,9 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
   int decided = 0;
   {
     EventLogWriter writer(path);
-    certifier_status_v3_t mine{}, others{};
-    mine.state = certifier_status_v3_t::ARMED, mine.instance = 1;
-    others.state = certifier_status_v3_t::STANDBY, others.instance = 2;
+    certifier_status_t mine{}, others{};
+    mine.state = certifier_status_t::ARMED, mine.instance = 1;
+    others.state = certifier_status_t::STANDBY, others.instance = 2;
     std::int64_t id = 1;
     for (int start = 0; start < 2; ++start) {  // it is killed, and starts again
       LoggedGate gate{config, writer};
@@ -318,8 +313,8 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
       gate.RefuseForNoObstacles(Candidate(id++));
       for (int i = 0; i < 12; ++i) {
         obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
-                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
-        message.utime = kNow + 100 * start + i;
+                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)},
+                                        kNow + 100 * start + i);
         message.sequence = 20 * start + i;
         gate.Hear(Encode(message));
         others.sequence = 3 + i % 5;
@@ -345,14 +340,14 @@ TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
   const std::string path = NewLog();
   {
     EventLogWriter writer(path);
-    certifier_status_v3_t status{};
-    status.state = certifier_status_v3_t::ARMED;
+    certifier_status_t status{};
+    status.state = certifier_status_t::ARMED;
     LoggedGate gate{config, writer};
     gate.Say(status);
     for (int i = 0; i < 6; ++i) {
       const bool is_late = i % 2 == 0;
-      obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)});
-      message.utime = kNow - (is_late ? 30'001 : 30'000);
+      obstacles_t message =
+          ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)}, kNow - (is_late ? 30'001 : 30'000));
       message.sequence = i;
       gate.Hear(Encode(message));
       EXPECT_EQ(gate.gate.WhyObstaclesUnknown(kNow).empty(), !is_late);
@@ -369,28 +364,26 @@ TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
   EXPECT_EQ(result.circumstances, 3);
 }
 
-// Each message has other stamps; the sender changes its type between them.
+// Each message has other stamps; in some of them nothing moves.
 TEST_F(ReplayTest, AgreesOnARunWithMovingObstacles) {
   Config config = SmallTaskOnTheBus();
   config.gate.max_clock_error_ms = 20;
   const std::string path = NewLog();
   {
     EventLogWriter writer(path);
-    certifier_status_v3_t status{};
-    status.state = certifier_status_v3_t::ARMED;
+    certifier_status_t status{};
+    status.state = certifier_status_t::ARMED;
     LoggedGate gate{config, writer};
     gate.Say(status);
     for (int i = 0; i < 12; ++i) {
       ObstacleMotion motion;
       motion.stamp_us = kNow - 12 + i;
       motion.velocity.y() = -1;
-      const bool is_met = i % 3 == 1, is_old_type = i % 3 == 2;
-      const std::vector<Obstacle> seen{Obstacle::Circle(Eigen::Vector2d(0.75, is_met ? 1.25 : 5), 0.2)};
-      obstacles_v2_t moving = ToMessageV2({seen[0].Moving(motion)}, kNow + i);
-      obstacles_t standing = ToMessage(seen);
-      standing.utime = kNow + i;
-      moving.sequence = standing.sequence = i;
-      gate.Hear(is_old_type ? Encode(standing) : Encode(moving));
+      const bool is_met = i % 3 == 1, stands = i % 3 == 2;
+      const Obstacle seen = Obstacle::Circle(Eigen::Vector2d(0.75, is_met ? 1.25 : 5), 0.2);
+      obstacles_t message = ToMessage({stands ? seen : seen.Moving(motion)}, kNow + i);
+      message.sequence = i;
+      gate.Hear(Encode(message));
       gate.Decide(Candidate(i + 1), is_met ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
     }
     EXPECT_TRUE(writer.Flush());

@@ -101,17 +101,24 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
 }
 
 TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
+  Config config = PointMassConfig();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  auto see = [&, sequence = 0](const std::vector<Obstacle>& obstacles, std::int64_t utime) mutable {
+    obstacles_t message = ToMessage(obstacles, utime);
+    message.sequence = sequence++;
+    Append("OBSTACLES", message);
+  };
+  const std::vector<Obstacle> on_the_way = std::exchange(config.obstacles, {});
+  see(on_the_way, now_);
   Decide(Drive(0, true), decision_t::ABSTAIN_SAFETY, 6);
-  Append("OBSTACLES", ToMessage({Obstacle::AxisBox(Eigen::Vector2d(-2, 1), Eigen::Vector2d(2, 2)),
-                                 Obstacle::Polygon({Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(6, 5),
-                                                    Eigen::Vector2d(5, 6), Eigen::Vector2d(5.5, 5.5)}),
-                                 Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 10)}));
-  obstacles_t ahead = ToMessage({Obstacle::Circle(Eigen::Vector2d(3, 0), 0.5)});
-  ahead.sequence = 1;
-  ahead.utime = now_ + 1 + 50'001;  // gate.max_ahead_ms is 50: the gate refused it
-  Append("OBSTACLES", ahead);
+  see({Obstacle::AxisBox(Eigen::Vector2d(-2, 1), Eigen::Vector2d(2, 2)),
+       Obstacle::Polygon({Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(6, 5), Eigen::Vector2d(5, 6),
+                          Eigen::Vector2d(5.5, 5.5)}),
+       Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 10)},
+      now_);
+  see(on_the_way, now_ + 1 + 50'001);  // gate.max_ahead_ms is 50: the gate refused it
   Decide(Drive(1, true), decision_t::CERTIFIED, -1);
-  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {config});
   EXPECT_EQ(drawn.disagreements, 0);
   EXPECT_TRUE(drawn.picture.circles.empty());
   ASSERT_EQ(drawn.picture.polygons.size(), 2u);

@@ -11,7 +11,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
-#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/certifier_status_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
 #include "records/replay.h"
@@ -53,7 +53,7 @@ class TimelineTest : public testing::Test {
   }
 
   void Heartbeat(std::int64_t sequence, std::int64_t version) {
-    certifier_status_v3_t status{};
+    certifier_status_t status{};
     status.utime = ++now_;
     status.sequence = sequence;
     status.version = version;
@@ -63,8 +63,7 @@ class TimelineTest : public testing::Test {
 
   // @param is_heard the certifier receives them too.
   void Obstacles(double x, bool is_heard = true) {
-    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
-    message.utime = ++now_;
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, ++now_);
     message.sequence = obstacles_++;
     if (is_heard) {
       EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_), "");
@@ -126,8 +125,7 @@ class TimelineTest : public testing::Test {
   }
   // @param is_taken by the certifier.
   void ObstaclesBy(std::uint64_t sender, double x, bool is_taken) {
-    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
-    message.utime = ++now_;
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, ++now_);
     message.sequence = obstacles_++;
     EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_, sender).empty(), is_taken);
     AppendSigned(config_.bus.obstacles, message, sender);
@@ -152,7 +150,7 @@ class TimelineTest : public testing::Test {
       void OnCertified(const RecordedPlan& recorded) override {
         ++plans;
         EXPECT_TRUE(recorded.has_candidate);
-        EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.certified.plan)) << recorded.event;
+        EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.certified)) << recorded.event;
       }
       int decisions = 0, plans = 0;
     } comparer;

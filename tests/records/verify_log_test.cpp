@@ -1,7 +1,6 @@
 // `forereach verify` on event logs and decision databases: recorded ones, and ones with one message changed.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <regex>
@@ -14,8 +13,9 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/plan_ledger.h"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/text.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "tests/cli/program.h"
@@ -187,7 +187,7 @@ TEST(VerifyLog, DamageIsNoticed) {
   ScratchDirectory scratch;
   std::filesystem::copy(kLog, scratch / "damaged.lcmlog");
   std::fstream log(scratch / "damaged.lcmlog", std::ios::in | std::ios::out | std::ios::binary);
-  log.seekp(4000);
+  log.seekp(static_cast<std::streamoff>(Read(kLog).find("PLAN_CERTIFIED")) + 1000);
   log << std::string(300, 'x');
   log.close();
   const auto file = ReadCertificates(scratch / "damaged.lcmlog", kConfig);
@@ -206,25 +206,27 @@ class VerifyObstacles : public testing::Test {
   }
 
   [[nodiscard]] obstacles_t Message(double x, std::int64_t sequence, std::int64_t utime) const {
-    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
-    message.utime = utime;
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, utime);
     message.sequence = sequence;
     return message;
   }
+
+  // The number of the first obstacle behind those of the task.
+  [[nodiscard]] std::string OfTheBus() const { return std::to_string(config_.obstacles.size()); }
 
   // Obstacles, a candidate, and what the gate says of it. `edit` changes what is written, not what is decided on.
   std::string RecordWith(const std::function<void(decision_t&)>& edit) {
     edit_decision_ = edit;
     return Record();
   }
-  std::string Record(const std::function<void(obstacles_t&, certified_plan_v2_t&)>& edit = {}) {
+  std::string Record(const std::function<void(obstacles_t&, certified_plan_t&)>& edit = {}) {
     Gate gate(config_);
     obstacles_t obstacles = Message(80, 0, kStart);
     EXPECT_EQ(gate.UpdateObstacles(Encode(obstacles), kStart + 1), "");
     const auto bytes = Encode(candidate_);
     GateAnswer answer = gate.Decide(bytes, kStart + 3);
     EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
-    certified_plan_v2_t certified = answer.certified.value_or(certified_plan_v2_t{});
+    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
     if (edit) edit(obstacles, certified);
     if (edit_decision_) edit_decision_(answer.decision);
     const std::string path = scratch_ / "log.lcmlog";
@@ -249,30 +251,31 @@ TEST_F(VerifyObstacles, JudgesByTheObstaclesInForce) {
   const auto file = ReadCertificates(Record(), kConfig);
   ASSERT_EQ(file.certificates.size(), 1u);
   EXPECT_TRUE(file.certificates[0].mismatches.empty());
-  EXPECT_EQ(file.certificates[0].certificate.obstacles[0].points()[0][0], 80);
+  EXPECT_EQ(file.certificates[0].certificate.obstacles.back().points()[0][0], 80);
   EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
 }
 
 TEST_F(VerifyObstacles, NoticesAnObstacleMovedOntoThePath) {
-  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_v2_t& certified) {
-                                       obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
-                                       obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                                       obstacles.obstacle[0].shape.point[0][0] = certified.slice_lower[20][0];
+                                       obstacles.obstacle[0].shape.point[0][1] = certified.slice_lower[20][1];
                                      }),
                                      kConfig);
   ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
   EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("obstacles in force"));
-  EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle 0"));
+  EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle " + OfTheBus()));
 }
 
 TEST_F(VerifyObstacles, RefutesAnObstacleMovedOntoThePathAndResealed) {
-  const auto file =
-      ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_v2_t& certified) {
-                         obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
-                         obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
-                         SetDigest(certified.obstacles_digest, ObstaclesDigest(FromMessage(obstacles, 2)));
-                         SetDigest(certified.certificate_digest, CertificateDigest(certified));
-                       }),
-                       kConfig);
+  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                                       obstacles.obstacle[0].shape.point[0][0] = certified.slice_lower[20][0];
+                                       obstacles.obstacle[0].shape.point[0][1] = certified.slice_lower[20][1];
+                                       std::vector<Obstacle> all = config_.obstacles;
+                                       std::ranges::copy(FromMessage(obstacles, 2), std::back_inserter(all));
+                                       SetDigest(certified.obstacles_digest, ObstaclesDigest(all));
+                                       SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                                     }),
+                                     kConfig);
   for (const Mismatch& mismatch : file.certificates[0].mismatches)
     EXPECT_THAT(mismatch.what, HasSubstr("its decision's"));
   EXPECT_EQ(Judge(file, 0).status, Status::kRefuted);
@@ -280,7 +283,7 @@ TEST_F(VerifyObstacles, RefutesAnObstacleMovedOntoThePathAndResealed) {
 
 // The robot goes by them after a restart of the certifier.
 TEST_F(VerifyObstacles, NoticesOtherTransitionsOfTheTaskThatAreResealed) {
-  const auto file = ReadCertificates(Record([](obstacles_t&, certified_plan_v2_t& certified) {
+  const auto file = ReadCertificates(Record([](obstacles_t&, certified_plan_t& certified) {
                                        certified.transitions_digest[7] ^= 1;
                                        SetDigest(certified.certificate_digest, CertificateDigest(certified));
                                      }),
@@ -324,11 +327,9 @@ TEST_F(VerifyObstacles, AlteredDecisionsAreRefused) {
   // Consistent in itself, and more than there is.
   const auto [count, status] = mismatches([](decision_t& d) {
     d.margin += 1;
-    char number[32];
     std::string text(reinterpret_cast<const char*>(d.message));
     const std::size_t end = text.find(" m from"), begin = text.rfind(' ', end - 1) + 1;
-    std::snprintf(number, sizeof number, "%.6g", d.margin - d.threshold);
-    SetText(d.message, text.replace(begin, end - begin, number));
+    SetText(d.message, text.replace(begin, end - begin, RoundedDown(SubDown(d.margin, d.threshold))));
   });
   EXPECT_EQ(count, 0u);
   EXPECT_EQ(status, Status::kRefuted);
@@ -347,8 +348,8 @@ class VerifyWithdrawal : public VerifyObstacles {
     const auto certified = gate.Decide(Encode(candidate_), kStart + 3).certified.value();
     plans.Add(certified, kStart + 6);
     obstacles_t wall = Message(certified.slice_lower[12][0], 2, kStart + 7);
-    wall.obstacle[0].point[0][1] = certified.slice_lower[12][1];
-    wall.obstacle[0].value = 0.05;  // a post: the plan's end is clear of it
+    wall.obstacle[0].shape.point[0][1] = certified.slice_lower[12][1];
+    wall.obstacle[0].shape.value = 0.05;  // a post: the plan's end is clear of it
     EXPECT_EQ(gate.UpdateObstacles(Encode(wall), kStart + 7), "");
     plans.Judge(gate, kStart + 7);
     withdrawal_ = plans.TakeDue(kStart + 8, kStart + 8).value().message;
@@ -376,7 +377,7 @@ TEST_F(VerifyWithdrawal, WhatItLeavesIsClearOfTheNewObstacle) {
 TEST_F(VerifyWithdrawal, OneControlTooManyIsRefuted) {
   const auto file = ReadCertificates(Recorded([](withdrawal_t& message) { ++message.valid_steps; }), kConfig);
   EXPECT_EQ(Judge(file, 1).status, Status::kRefuted);
-  EXPECT_THAT(Judge(file, 1).failure.what, HasSubstr("clear of obstacle 0"));
+  EXPECT_THAT(Judge(file, 1).failure.what, HasSubstr("clear of obstacle " + OfTheBus()));
 }
 
 // A robot that is said to be past the obstacle is judged from its step on.
@@ -419,7 +420,7 @@ class VerifyMovingObstacles : public VerifyObstacles {
     text = std::regex_replace(text, std::regex("  obstacles:\n(    - [^\n]*\n)*"), "  obstacles: []\n");
     std::filesystem::copy(FOREREACH_SOURCE_DIR "/tests/data/course_transitions.csv",
                           scratch_ / "course_transitions.csv");
-    Load(text + "\ngate: {max_clock_error_ms: 20}\n");
+    Load(std::regex_replace(text, std::regex("gate: \\{"), "gate: {max_clock_error_ms: 20, "));
     motion_.stamp_us = kStart;
     motion_.velocity = {-1, 0.5, 0};
     motion_.uncertainty = 0.125;
@@ -432,8 +433,8 @@ class VerifyMovingObstacles : public VerifyObstacles {
     config_ = LoadConfig(task_);
   }
 
-  [[nodiscard]] static obstacles_v2_t Message(const Obstacle& obstacle) {
-    obstacles_v2_t message = ToMessageV2({obstacle}, kStart);
+  [[nodiscard]] static obstacles_t Message(const Obstacle& obstacle) {
+    obstacles_t message = ToMessage({obstacle}, kStart);
     message.sequence = 0;
     return message;
   }
@@ -447,7 +448,7 @@ class VerifyMovingObstacles : public VerifyObstacles {
     const auto bytes = Encode(candidate_);
     GateAnswer answer = gate.Decide(bytes, kStart + 3);
     EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
-    certified_plan_v2_t certified = answer.certified.value_or(certified_plan_v2_t{});
+    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
     const Digest digest = ObstaclesDigest(FromMessage(Message(logged), 2));
     SetDigest(answer.decision.obstacles_digest, digest);
     SetDigest(certified.obstacles_digest, digest);
@@ -508,13 +509,14 @@ TEST_F(VerifyMovingObstacles, TheDistanceToBeKeptIsThatOfAStep) {
 
 // The gate rejects such a plan. A certificate of one says nothing of the motion between its samples.
 TEST_F(VerifyMovingObstacles, AStepLongerThanTheBoundedTimeIsNotDerived) {
-  Load(std::regex_replace(Read(task_), std::regex("\ngate:.*"), ""));  // without a clock error, so nothing may move
+  Load(std::regex_replace(Read(task_), std::regex("max_clock_error_ms: 20, "),
+                          ""));  // without a clock error, so nothing may move
   const Obstacle standing = Obstacle::Circle(Eigen::Vector2d(80, 0), 1);
   ASSERT_EQ(Decide(standing, standing).certificates.size(), 1u);
   const auto missing = [&](std::int64_t step_us) {
     const std::string path = scratch_ / ("step" + std::to_string(step_us) + ".lcmlog");
     CopyLog(scratch_ / "log.lcmlog", path, [&](LogEvent& event) {
-      if (auto certified = Decoded<certified_plan_v2_t>(event.data)) {
+      if (auto certified = Decoded<certified_plan_t>(event.data)) {
         certified->plan.step_us = step_us;
         event.data = Encode(*certified);
       }
@@ -540,7 +542,7 @@ TEST_F(VerifyMovingObstacles, WhatIsNowhereDuringThePlanIsNotNamed) {
 
 TEST_F(VerifyObstacles, NoticesStaleObstaclesThatWereNeverInForce) {
   const auto file = ReadCertificates(
-      Record([](obstacles_t& obstacles, certified_plan_v2_t&) { obstacles.utime -= 10'000'000; }), kConfig);
+      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
   EXPECT_GE(file.certificates[0].mismatches.size(), 1u);
   EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
 }

@@ -36,19 +36,19 @@ GuardOptions TwoStates() {
   return options;
 }
 
-GuardCause AcceptedBy(const certified_plan_v2_t& certified, std::int64_t now = kNow) {
+GuardCause AcceptedBy(const certified_plan_t& certified, std::int64_t now = kNow) {
   Guard guard(TwoStates());
   return guard.Accept(Sealed(certified), now).cause;
 }
 
 // What a fresh guard says to starting `certified` at `boundary` in `state`.
-GuardVerdict Start(const certified_plan_v2_t& certified, const State& state, std::int64_t boundary = kStart) {
+GuardVerdict Start(const certified_plan_t& certified, const State& state, std::int64_t boundary = kStart) {
   Guard guard(TwoStates());
   EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kNone);
   return guard.TryStart(boundary, boundary, state);
 }
 
-Guard Executing(const certified_plan_v2_t& certified = SmallPlan()) {
+Guard Executing(const certified_plan_t& certified = SmallPlan()) {
   Guard guard(TwoStates());
   EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
   EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
@@ -68,7 +68,7 @@ TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
 TEST(GuardAccept, TakesPlansOfTheTaskThatItIsToldToExpect) {
   Guard guard(TwoStates());
   const auto cause = [&](std::int64_t plan_id, const char* config, const char* model) {
-    certified_plan_v2_t certified = SmallPlan();
+    certified_plan_t certified = SmallPlan();
     certified.plan.plan_id = plan_id;
     SetDigest(certified.config_digest, DigestOf(config));
     SetDigest(certified.model_digest, DigestOf(model));
@@ -87,7 +87,7 @@ TEST(GuardAccept, TakesPlansOfTheTaskThatItIsToldToExpect) {
 TEST(GuardAccept, EachTaskThatWasReadAgainMayBeTheOneInForce) {
   Guard guard(TwoStates());
   const auto cause = [&](std::int64_t plan_id, const char* config) {
-    certified_plan_v2_t certified = SmallPlan(plan_id);
+    certified_plan_t certified = SmallPlan(plan_id);
     SetDigest(certified.config_digest, DigestOf(config));
     return guard.Accept(Sealed(certified), kNow).cause;
   };
@@ -102,7 +102,7 @@ TEST(GuardAccept, EachTaskThatWasReadAgainMayBeTheOneInForce) {
 TEST(GuardAccept, APlanOfTheNewestTaskInvalidatesAllOlderOnesAtOnce) {
   Guard guard(TwoStates());
   const auto cause = [&](std::int64_t plan_id, const char* config) {
-    certified_plan_v2_t certified = SmallPlan(plan_id);
+    certified_plan_t certified = SmallPlan(plan_id);
     SetDigest(certified.config_digest, DigestOf(config));
     return guard.Accept(Sealed(certified), kNow).cause;
   };
@@ -141,7 +141,7 @@ TEST(GuardAccept, RefusesEveryWrongLengthAndEveryOtherType) {
 
 TEST(GuardAccept, RefusesAPlanForAnotherRobot) {
   const auto with = [](auto change) {
-    certified_plan_v2_t certified = SmallPlan();
+    certified_plan_t certified = SmallPlan();
     change(certified.plan);
     return AcceptedBy(certified);
   };
@@ -158,7 +158,7 @@ TEST(GuardAccept, RefusesAPlanForAnotherRobot) {
 }
 
 TEST(GuardAccept, RefusesWrongDigests) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   Seal(certified);
   certified.plan_digest[31] ^= 1;
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
@@ -186,7 +186,7 @@ TEST(GuardAccept, RefusesWrongDigests) {
 
 TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
   const auto altered = [](auto change) {
-    certified_plan_v2_t certified = SmallPlan();
+    certified_plan_t certified = SmallPlan();
     Seal(certified);
     change(certified);
     return Guard(TwoStates()).Accept(Encode(certified), kNow);
@@ -209,17 +209,17 @@ TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
 
 TEST(GuardAccept, RefusesNumbersThatAreNotFiniteAndEmptyBounds) {
   for (const double bad : {kNaN, kInf, -kInf}) {
-    for (const auto change : {+[](certified_plan_v2_t&c, double x) { c.plan.initial_center[1] = x; },
-                              +[](certified_plan_v2_t&c, double x) { c.plan.initial_half_width[0] = x; },
-                              +[](certified_plan_v2_t&c, double x) { c.plan.control[2][0] = x; },
-                              +[](certified_plan_v2_t&c, double x) { c.slice_lower[3][1] = x; },
-                              +[](certified_plan_v2_t&c, double x) { c.slice_upper[0][0] = x; }}) {
-      certified_plan_v2_t certified = SmallPlan();
+    for (const auto change : {+[](certified_plan_t&c, double x) { c.plan.initial_center[1] = x; },
+                              +[](certified_plan_t&c, double x) { c.plan.initial_half_width[0] = x; },
+                              +[](certified_plan_t&c, double x) { c.plan.control[2][0] = x; },
+                              +[](certified_plan_t&c, double x) { c.slice_lower[3][1] = x; },
+                              +[](certified_plan_t&c, double x) { c.slice_upper[0][0] = x; }}) {
+      certified_plan_t certified = SmallPlan();
       change(certified, bad);
       EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite) << bad;
     }
   }
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.plan.initial_half_width[1] = -1e-300;
   EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite);
   certified.plan.initial_half_width[1] = 0;
@@ -227,7 +227,7 @@ TEST(GuardAccept, RefusesNumbersThatAreNotFiniteAndEmptyBounds) {
 }
 
 TEST(GuardAccept, RefusesAnEmptySliceWithItsWitness) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.slice_lower[3][1] = certified.slice_upper[3][1] = 0.5;
   EXPECT_EQ(AcceptedBy(certified), GuardCause::kNone);
   certified.slice_lower[3][1] = Above(0.5);
@@ -262,7 +262,7 @@ TEST(GuardAccept, APlanIdIsAcceptedOnceAndOnlyUpwards) {
 TEST(GuardAccept, NoPlanIdKeepsLaterOnesOutForGood) {
   Guard guard(TwoStates());
   const auto accept = [&](std::int64_t plan_id, std::int64_t expires, std::int64_t now) {
-    certified_plan_v2_t certified = SmallPlan(plan_id);
+    certified_plan_t certified = SmallPlan(plan_id);
     certified.expires_utime = expires;
     return guard.Accept(Sealed(certified), now).cause;
   };
@@ -275,7 +275,7 @@ TEST(GuardAccept, NoPlanIdKeepsLaterOnesOutForGood) {
   Guard executing = Executing(SmallPlan(7));
   const std::int64_t expiry = SmallPlan().expires_utime;
   for (const std::int64_t plan_id : {7, 6}) {
-    certified_plan_v2_t certified = SmallPlan(plan_id);
+    certified_plan_t certified = SmallPlan(plan_id);
     certified.expires_utime = expiry + 100;
     EXPECT_EQ(executing.Accept(Sealed(certified), expiry + 1).cause,
               plan_id == 7 ? GuardCause::kReplayed : GuardCause::kNone);
@@ -285,7 +285,7 @@ TEST(GuardAccept, NoPlanIdKeepsLaterOnesOutForGood) {
 TEST(GuardAccept, ARefusedPlanLeavesPendingAndLastIdAlone) {
   Guard guard(TwoStates());
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(7)), kNow).ok());
-  certified_plan_v2_t expired = SmallPlan(100);
+  certified_plan_t expired = SmallPlan(100);
   expired.expires_utime = kNow - 1;
   EXPECT_EQ(guard.Accept(Sealed(expired), kNow).cause, GuardCause::kExpired);
   EXPECT_EQ(guard.pending()->plan.plan_id, 7);
@@ -316,7 +316,7 @@ TEST(GuardStart, X0IsComparedExactly) {
   };
   int on_the_edge = 0;
   for (int trial = 0; trial < 1000; ++trial) {
-    certified_plan_v2_t certified = SmallPlan();
+    certified_plan_t certified = SmallPlan();
     const double center = certified.plan.initial_center[0] = draw(60);
     const double half_width = certified.plan.initial_half_width[0] = std::abs(draw(60));
     for (int t = 0; t <= 3; ++t) {
@@ -335,7 +335,7 @@ TEST(GuardStart, X0IsComparedExactly) {
 }
 
 TEST(GuardStart, AFlatX0AdmitsOneStateOnly) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.plan.initial_half_width[0] = certified.plan.initial_half_width[1] = 0;
   EXPECT_TRUE(Start(certified, {1, -2}).ok());
   EXPECT_EQ(Start(certified, {Above(1), -2}).cause, GuardCause::kOutsideInitialSet);
@@ -352,7 +352,7 @@ TEST(GuardStart, RefusesStatesThatAreNoNumbersOrTooFew) {
 }
 
 TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.slice_upper[0][0] = 1.25;
   EXPECT_TRUE(Start(certified, {1.25, -2}).ok());
   const GuardVerdict verdict = Start(certified, {Above(1.25), -2});
@@ -366,7 +366,7 @@ TEST(GuardStart, HalfAStepOffIsOnTime) {
   EXPECT_TRUE(Start(SmallPlan(), {1, -2}, kStart + kStep / 2).ok());
   EXPECT_EQ(Start(SmallPlan(), {1, -2}, kStart - kStep / 2 - 1).cause, GuardCause::kTooEarly);
   EXPECT_EQ(Start(SmallPlan(), {1, -2}, kStart + kStep / 2 + 1).cause, GuardCause::kTooLate);
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.plan.start_utime = std::numeric_limits<std::int64_t>::min();
   EXPECT_EQ(Start(certified, {1, -2}).cause, GuardCause::kTooLate);
   certified.plan.start_utime = std::numeric_limits<std::int64_t>::max();
@@ -374,14 +374,14 @@ TEST(GuardStart, HalfAStepOffIsOnTime) {
 }
 
 TEST(GuardStart, ExpiryCountsAtTheBoundary) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.expires_utime = kStart;
   EXPECT_TRUE(Start(certified, {1, -2}, kStart).ok());
   EXPECT_EQ(Start(certified, {1, -2}, kStart + 1).cause, GuardCause::kExpired);
 }
 
 TEST(GuardStart, ARobotThatWasHeldUpDoesNotStartWhatHasExpiredMeanwhile) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.expires_utime = kStart + 10 * kStep;
   for (const std::int64_t late : {0, 1}) {
     Guard guard(TwoStates());
@@ -515,7 +515,7 @@ Guard OnTime(std::int64_t jitter_us = kJitter) {
   return Guard(options);
 }
 
-Guard ExecutingOnTime(const certified_plan_v2_t& certified = SmallPlan()) {
+Guard ExecutingOnTime(const certified_plan_t& certified = SmallPlan()) {
   Guard guard = OnTime();
   EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
   EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
@@ -616,7 +616,7 @@ TEST(GuardSchedule, TimesThatNoIntegerHoldsAreOffTheSchedule) {
     Guard guard = ExecutingOnTime();
     EXPECT_EQ(guard.Check(1, State{0, 0}, now).cause, GuardCause::kOffSchedule) << now;
   }
-  certified_plan_v2_t last = SmallPlan();
+  certified_plan_t last = SmallPlan();
   last.plan.start_utime = last.expires_utime = kMost - kStep;  // its second step is due after the last time of all
   Guard guard = OnTime();
   ASSERT_TRUE(guard.Accept(Sealed(last), kNow).ok());
@@ -679,31 +679,8 @@ TEST(GuardKey, TheKeyFileOfTheRobotIsEnough) {
   EXPECT_TRUE(guard.Accept(certifier.Sign(Role::kCertifier, "PLAN_CERTIFIED", Sealed(SmallPlan()), kNow), kNow).ok());
 }
 
-// It does not say which transitions its observations rest on.
-TEST(GuardAccept, RefusesAPlanOfTheOldMessageType) {
-  certified_plan_t old{};
-  const certified_plan_v2_t plan = SmallPlan();
-  old.expires_utime = plan.expires_utime;
-  old.plan = plan.plan;
-  std::memcpy(old.slice_lower, plan.slice_lower, sizeof old.slice_lower);
-  std::memcpy(old.slice_upper, plan.slice_upper, sizeof old.slice_upper);
-  SetGrounds(old, GroundsOf(plan));
-  Seal(old);
-  Guard guard(TwoStates());
-  GuardVerdict verdict = guard.Accept(Encode(old), kNow);
-  EXPECT_EQ(verdict.cause, GuardCause::kUnknownFingerprint);
-  EXPECT_EQ(verdict.message, "the 41808 bytes are not a certified_plan_v2_t");
-  std::vector<std::uint8_t> bytes = Encode(old);
-  std::ranges::copy(Bytes(Encode(certified_plan_v2_t{})).first(8), bytes.begin());
-  EXPECT_EQ(guard.Accept(bytes, kNow).cause, GuardCause::kWrongLength) << "under the new fingerprint";
-  bytes.insert(bytes.end() - sizeof(Digest), sizeof(Digest), 0);
-  EXPECT_EQ(guard.Accept(bytes, kNow).cause, GuardCause::kZeroDigest);
-  EXPECT_EQ(guard.pending(), nullptr);
-  EXPECT_TRUE(guard.Accept(Sealed(plan), kNow).ok());
-}
-
 TEST(GuardAccept, TheTransitionsAreUnderTheSeal) {
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   Seal(certified);
   SetDigest(certified.transitions_digest, DigestOf("another file"));
   Guard guard(TwoStates());
@@ -712,28 +689,28 @@ TEST(GuardAccept, TheTransitionsAreUnderTheSeal) {
 
 TEST(GuardAccept, ADigestOfZeroIsRefused) {
   const auto cause = [](auto zero) {
-    certified_plan_v2_t certified = SmallPlan();
+    certified_plan_t certified = SmallPlan();
     Seal(certified);
     zero(certified);
     Guard guard(TwoStates());
     return guard.Accept(Encode(certified), kNow);
   };
-  const auto zeroed = [&](std::uint8_t(certified_plan_v2_t::*digest)[32], const char* name, bool reseal) {
-    const GuardVerdict verdict = cause([&](certified_plan_v2_t& certified) {
+  const auto zeroed = [&](std::uint8_t(certified_plan_t::*digest)[32], const char* name, bool reseal) {
+    const GuardVerdict verdict = cause([&](certified_plan_t& certified) {
       SetDigest(certified.*digest, {});
       if (reseal) SetDigest(certified.certificate_digest, CertificateDigest(certified));
     });
     EXPECT_EQ(verdict.cause, GuardCause::kZeroDigest) << name;
     EXPECT_EQ(verdict.message, std::string(name) + " is zero");
   };
-  zeroed(&certified_plan_v2_t::plan_digest, "plan_digest", true);
-  zeroed(&certified_plan_v2_t::config_digest, "config_digest", true);
-  zeroed(&certified_plan_v2_t::model_digest, "model_digest", true);
-  zeroed(&certified_plan_v2_t::declaration_digest, "declaration_digest", true);
-  zeroed(&certified_plan_v2_t::observations_digest, "observations_digest", true);
-  zeroed(&certified_plan_v2_t::obstacles_digest, "obstacles_digest", true);
-  zeroed(&certified_plan_v2_t::transitions_digest, "transitions_digest", true);
-  zeroed(&certified_plan_v2_t::certificate_digest, "certificate_digest", false);
+  zeroed(&certified_plan_t::plan_digest, "plan_digest", true);
+  zeroed(&certified_plan_t::config_digest, "config_digest", true);
+  zeroed(&certified_plan_t::model_digest, "model_digest", true);
+  zeroed(&certified_plan_t::declaration_digest, "declaration_digest", true);
+  zeroed(&certified_plan_t::observations_digest, "observations_digest", true);
+  zeroed(&certified_plan_t::obstacles_digest, "obstacles_digest", true);
+  zeroed(&certified_plan_t::transitions_digest, "transitions_digest", true);
+  zeroed(&certified_plan_t::certificate_digest, "certificate_digest", false);
 }
 
 // SmallPlan's slices 0..2 and its X_0 fit into it exactly; slice 3, the last, does not.
@@ -743,7 +720,7 @@ TEST(GuardDomainTest, APlanThatLeavesItIsRefusedWithTheWitness) {
   GuardOptions options = TwoStates();
   options.domain = Around();
   const auto judge = [&](auto alter) {
-    certified_plan_v2_t certified = SmallPlan();
+    certified_plan_t certified = SmallPlan();
     alter(certified);
     Guard guard(options);
     return guard.Accept(Sealed(certified), kNow);
@@ -764,7 +741,7 @@ TEST(GuardDomainTest, APlanThatLeavesItIsRefusedWithTheWitness) {
   refused([](auto& c) { c.plan.control[0][0] = Below(0); }, 0, 2, Below(0), 0);
   refused([](auto& c) { c.plan.initial_half_width[0] = 11.5; }, 0, 0, 12.5, 12);
   EXPECT_TRUE(judge([](auto& c) { c.slice_upper[3][0] = 1e9; }).ok()) << "where the plan leads to is not in the domain";
-  certified_plan_v2_t wide = SmallPlan();
+  certified_plan_t wide = SmallPlan();
   for (int t = 0; t <= 3; ++t)
     for (int k = 0; k < 2; ++k) wide.slice_lower[t][k] = -1e9, wide.slice_upper[t][k] = 1e9;
   Guard guard(options);
@@ -775,7 +752,7 @@ TEST(GuardDomainTest, APlanThatLeavesItIsRefusedWithTheWitness) {
 TEST(GuardDomainTest, TheInitialSetIsComparedExactly) {
   GuardOptions options = TwoStates();
   options.domain = Around();
-  certified_plan_v2_t certified = SmallPlan();
+  certified_plan_t certified = SmallPlan();
   certified.plan.initial_center[0] = 12;
   certified.plan.initial_half_width[0] = 0;
   EXPECT_TRUE(Guard(options).Accept(Sealed(certified), kNow).ok());
@@ -790,7 +767,7 @@ TEST(GuardDomainTest, TheDomainChangesWithATaskThatIsReadAgain) {
   GuardDomain wider = Around();
   wider.state_upper[0] = 100;
   guard.Expect(DigestOf("another config"), DigestOf("another model"), wider);
-  certified_plan_v2_t certified = SmallPlan(8);
+  certified_plan_t certified = SmallPlan(8);
   certified.slice_upper[1][0] = 100;
   EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kOutsideDomain) << "of the task before";
   SetDigest(certified.config_digest, DigestOf("another config"));
@@ -802,8 +779,8 @@ TEST(GuardDomainTest, TheDomainChangesWithATaskThatIsReadAgain) {
 }
 
 // Coordinate 0 is an angle: X0 is 3 +- 0.5, slice t is [3, 3 + t / 8], which are across pi.
-certified_plan_v2_t TurningPlan(std::int64_t plan_id = 7) {
-  certified_plan_v2_t certified = SmallPlan(plan_id);
+certified_plan_t TurningPlan(std::int64_t plan_id = 7) {
+  certified_plan_t certified = SmallPlan(plan_id);
   certified.plan.initial_center[0] = 3;
   for (int t = 0; t <= 3; ++t) certified.slice_lower[t][0] = 2.5, certified.slice_upper[t][0] = 3.5 + t / 8.0;
   return certified;
@@ -876,14 +853,14 @@ TEST(GuardAngle, TheAnglesChangeWithATaskThatIsReadAgain) {
   EXPECT_THROW(guard.Expect(DigestOf("fifth"), DigestOf("model"), {}, std::vector{2}), std::invalid_argument);
   std::int64_t plan_id = 7;
   const auto starts = [&](const char* config) {
-    certified_plan_v2_t certified = TurningPlan(plan_id++);
+    certified_plan_t certified = TurningPlan(plan_id++);
     SetDigest(certified.config_digest, DigestOf(config));
     EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
     return guard.TryStart(kStart, kStart, State{3 - kTurn, -2}).ok();
   };
   EXPECT_FALSE(starts("config"));
   EXPECT_TRUE(starts("second"));
-  certified_plan_v2_t next = TurningPlan(plan_id++);
+  certified_plan_t next = TurningPlan(plan_id++);
   SetDigest(next.config_digest, DigestOf("third"));
   EXPECT_TRUE(guard.Accept(Sealed(next), kNow).ok());
   EXPECT_TRUE(guard.TryStart(kStart, kStart, State{3 - kTurn, -2}).ok()) << "nothing said: as before";

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/seal.h"
 
 namespace forereach {
@@ -20,8 +20,8 @@ inline constexpr std::int64_t kPlanStart = 1'000'000'000'000, kPlanStepUs = 40'0
 
 /** Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5]. Not
 sealed. */
-inline certified_plan_v2_t SmallPlan(std::int64_t plan_id = 7) {
-  certified_plan_v2_t certified{};
+inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
+  certified_plan_t certified{};
   candidate_plan_t& plan = certified.plan;
   plan.plan_id = plan_id;
   plan.start_utime = kPlanStart;
@@ -50,7 +50,7 @@ inline certified_plan_v2_t SmallPlan(std::int64_t plan_id = 7) {
   return certified;
 }
 
-inline std::vector<std::uint8_t> Sealed(certified_plan_v2_t certified) {
+inline std::vector<std::uint8_t> Sealed(certified_plan_t certified) {
   Seal(certified);
   return Encode(certified);
 }

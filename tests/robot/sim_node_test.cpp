@@ -71,9 +71,9 @@ Problem LargeBicycle(std::shared_ptr<const NominalModel> model) {
 }
 
 // Forward for half of the steps, then back to rest: the second half is the tail. X0 = `state` +- 0.1, slices anything.
-certified_plan_v2_t Plan(const Config& config, std::int64_t id, int start, const std::vector<double>& state,
-                         int steps = 4) {
-  certified_plan_v2_t certified{};
+certified_plan_t Plan(const Config& config, std::int64_t id, int start, const std::vector<double>& state,
+                      int steps = 4) {
+  certified_plan_t certified{};
   certified.utime = certified.plan.utime = BoundaryTime(0);
   certified.expires_utime = BoundaryTime(start) + kPeriod;
   candidate_plan_t& plan = certified.plan;
@@ -113,7 +113,7 @@ class Rig {
     Record(config_.bus.transition, transitions);
   }
 
-  void Send(const certified_plan_v2_t& certified) { bus_->Publish(config_.bus.certified, Bytes(Sealed(certified))); }
+  void Send(const certified_plan_t& certified) { bus_->Publish(config_.bus.certified, Bytes(Sealed(certified))); }
   void SendRaw(const std::string& channel, Bytes bytes) { bus_->Publish(channel, bytes); }
 
   /** Runs the process's loop until boundary j has been handled. */
@@ -173,8 +173,8 @@ class Rig {
 const std::vector<double> kOrigin{0, 0, 0, 0};
 
 // Its speed is 0.3 at the second step, and may be 0.2.
-certified_plan_v2_t PlanThatIsLeft(const Config& config) {
-  certified_plan_v2_t certified = Plan(config, 1, 1, kOrigin);
+certified_plan_t PlanThatIsLeft(const Config& config) {
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
   certified.slice_upper[2][2] = 0.2;
   return certified;
 }
@@ -199,7 +199,7 @@ TEST(RobotSim, ObeysNothingButACertifiedPlan) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
-  const certified_plan_v2_t good = Plan(config, 1, 3, kOrigin);
+  const certified_plan_t good = Plan(config, 1, 3, kOrigin);
 
   decision_t decision{};
   decision.outcome = decision_t::CERTIFIED;
@@ -211,11 +211,11 @@ TEST(RobotSim, ObeysNothingButACertifiedPlan) {
 
   rig.SendRaw(config.bus.certified, Encode(good.plan));
   rig.SendRaw(config.bus.certified, Encode(decision));
-  certified_plan_v2_t tampered = good;
+  certified_plan_t tampered = good;
   Seal(tampered);
   tampered.plan.control[0][0] = 2;
   rig.SendRaw(config.bus.certified, Encode(tampered));
-  certified_plan_v2_t elsewhere = good;
+  certified_plan_t elsewhere = good;
   SetDigest(elsewhere.model_digest, DigestOf("another model"));
   rig.Send(elsewhere);
   rig.RunTo(8);
@@ -300,7 +300,7 @@ TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
   config.robot.hold = std::vector<std::string>{"vx"};
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_v2_t first = Plan(config, 1, 1, kOrigin);
+  certified_plan_t first = Plan(config, 1, 1, kOrigin);
   first.plan.control[3][0] = -0.75;
   first.plan.control[3][1] = 0.1;
   rig.Send(first);
@@ -314,7 +314,7 @@ TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_v2_t first = Plan(config, 1, 1, kOrigin);
+  certified_plan_t first = Plan(config, 1, 1, kOrigin);
   first.plan.control[3][0] = -0.75;  // it ends near rest, not at it
   rig.Send(first);
   rig.RunTo(8);
@@ -543,7 +543,7 @@ TEST(RobotSim, WhatItsEmergencyStopDoesNotNameIsZeroAtOnce) {
   config.robot.start = {0, 0, 1, 0.5};
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_v2_t plan = Plan(config, 1, 1, config.robot.start);
+  certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   plan.slice_upper[1][0] = 0;
   rig.Send(plan);
   rig.RunTo(10);
@@ -558,7 +558,7 @@ TEST(RobotSim, AnEmergencyStopInTheMiddleOfAStepBrakesForTheRestOfIt) {
   config.robot.start = {0, 0, 1, 0};
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_v2_t plan = Plan(config, 1, 1, config.robot.start);
+  certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   Seal(plan);
   rig.Send(plan);
   rig.RunTo(2);
@@ -585,7 +585,7 @@ TEST(RobotSim, WhatItMeetsWhileItStopsIsAContact) {
   config.obstacles = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.4)};
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_v2_t plan = Plan(config, 1, 1, config.robot.start);
+  certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   plan.slice_upper[1][0] = 0;
   rig.Send(plan);
   rig.RunTo(2);
@@ -730,8 +730,7 @@ TEST(RobotSim, ReportsContactWithAnObstacleOfTheBusThatAppearsOnTheWay) {
   rig.RunTo(0);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(2);
-  obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)});
-  message.utime = BoundaryTime(2);
+  obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)}, BoundaryTime(2));
   rig.SendRaw("OBSTACLES", Bytes(Encode(message)));
   rig.RunTo(4);
   EXPECT_EQ(rig.Count(kContact), 2) << "as with one of the file";
@@ -758,7 +757,7 @@ TEST(RobotSim, BulgesBetweenItsSamplesWhileItMoves) {
 TEST(RobotSim, ALateTickGivesTheSameRun) {
   const Config config = PointMassTask();
   Rig prompt(config), late(config);
-  certified_plan_v2_t certified = Plan(config, 1, 1, kOrigin);
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
   certified.expires_utime = BoundaryTime(4);
   for (Rig* rig : {&prompt, &late}) {
     rig->RunTo(0);
@@ -805,7 +804,7 @@ TEST(RobotSim, APlanThatLeavesItsDomainIsRefused) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_v2_t certified = Plan(config, 1, 1, kOrigin);
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
   certified.slice_upper[1][0] = 1e9;
   rig.Send(certified);
   rig.RunTo(3);
@@ -873,8 +872,8 @@ Config TurningTask() {
 }
 
 // Slices of +- 1e-6 around the motion, in which the heading goes on beyond pi.
-certified_plan_v2_t TurningPlan(const Config& config, int steps) {
-  certified_plan_v2_t certified = Plan(config, 1, 1, config.robot.start, steps);
+certified_plan_t TurningPlan(const Config& config, int steps) {
+  certified_plan_t certified = Plan(config, 1, 1, config.robot.start, steps);
   certified.plan.progress_steps = static_cast<std::int16_t>(steps);
   std::array<double, 8> z{};
   std::ranges::copy(config.robot.start, z.begin());
@@ -894,7 +893,7 @@ certified_plan_v2_t TurningPlan(const Config& config, int steps) {
 TEST(RobotSim, WrapsItsAnglesAndStaysInItsSlices) {
   constexpr int kSteps = 30;
   const Config config = TurningTask();
-  const certified_plan_v2_t certified = TurningPlan(config, kSteps);
+  const certified_plan_t certified = TurningPlan(config, kSteps);
   ASSERT_GT(certified.slice_lower[kSteps][2], 4.5) << "it turns far beyond pi";
   Rig rig(config);
   rig.Send(certified);
@@ -926,8 +925,8 @@ TEST(RobotSim, WrapsItsAnglesAndStaysInItsSlices) {
 
 TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
   Config config = TurningTask();
-  const certified_plan_v2_t certified = TurningPlan(config, 30);
-  certified_plan_v2_t wrapped = certified;
+  const certified_plan_t certified = TurningPlan(config, 30);
+  certified_plan_t wrapped = certified;
   for (int t = 0; t <= 30; ++t)
     for (double* const end : {&wrapped.slice_lower[t][2], &wrapped.slice_upper[t][2]}) *end -= 2 * std::numbers::pi;
   wrapped.plan.initial_center[2] -= 2 * std::numbers::pi;

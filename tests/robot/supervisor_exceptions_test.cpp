@@ -82,8 +82,8 @@ SupervisorOptions OnTime() {
 }
 
 // The slices of all steps are (1 +- 0.1) x (-2 +- 0.1).
-certified_plan_v2_t NarrowPlan(std::int64_t plan_id = 7, std::int64_t start_utime = kPlanStart) {
-  certified_plan_v2_t certified = SmallPlan(plan_id);
+certified_plan_t NarrowPlan(std::int64_t plan_id = 7, std::int64_t start_utime = kPlanStart) {
+  certified_plan_t certified = SmallPlan(plan_id);
   certified.plan.start_utime = start_utime;
   certified.expires_utime = start_utime + kPlanStepUs;
   for (int t = 0; t <= 3; ++t)
@@ -223,7 +223,7 @@ class TroubledRobot final : public Supervisor::Robot {
   }
   void Certify(int j, bool is_for_now = true) {
     const std::int64_t id = next_id_++;
-    certified_plan_v2_t plan = NarrowPlan(id, At(j));
+    certified_plan_t plan = NarrowPlan(id, At(j));
     for (int t = 0; t < 3; ++t) plan.plan.control[t][0] = static_cast<double>(10 * id + t);
     plan.plan.progress_steps = 2;
     Seal(plan);
@@ -233,7 +233,7 @@ class TroubledRobot final : public Supervisor::Robot {
     Call([&](std::int64_t now) { supervisor_.OnCertified(bytes, now); }, At(j) - (is_for_now ? 1000 : kPlanStepUs));
   }
   void Withdraw(std::int64_t id, int valid, int j) {
-    const certified_plan_v2_t& plan = plans_.at(id);
+    const certified_plan_t& plan = plans_.at(id);
     withdrawal_t message{};
     message.utime = At(j);
     message.plan_id = id;
@@ -335,7 +335,7 @@ class TroubledRobot final : public Supervisor::Robot {
     ++controls_;
   }
 
-  std::map<std::int64_t, certified_plan_v2_t> plans_;
+  std::map<std::int64_t, certified_plan_t> plans_;
   std::map<std::int64_t, int> stands_;      // controls that were not withdrawn
   std::int64_t unmeasured_ = 0;             // boundaries that had no state to send
   std::optional<bool> decided_unmeasured_;  // when this call began to send
@@ -735,7 +735,7 @@ TEST(SupervisorExceptions, AStateOfAnotherSizeIsNotGivenToTheBrakeLaw) {
   robot.Start();
   const std::array<double, 1> one{1};
   robot.measure = [&]() -> std::span<const double> { return one; };
-  certified_plan_v2_t plan = NarrowPlan();
+  certified_plan_t plan = NarrowPlan();
   Seal(plan);
   withdrawal_t message{};
   message.plan_id = 7;

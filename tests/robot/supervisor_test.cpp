@@ -53,7 +53,7 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
   }
 
   static std::int64_t At(int boundary) { return kStart + boundary * kStep; }
-  void Accept(const certified_plan_v2_t& plan, int boundary) {
+  void Accept(const certified_plan_t& plan, int boundary) {
     supervisor_.OnCertified(Sealed(plan), At(boundary) - 1000);
   }
   std::span<const double> Boundary(int j) { return supervisor_.Boundary(At(j), At(j)); }
@@ -85,7 +85,7 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
 };
 
 TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
-  certified_plan_v2_t plan = SmallPlan();
+  certified_plan_t plan = SmallPlan();
   for (int t = 0; t < 3; ++t) plan.plan.control[t][0] = 10 + t;
   EXPECT_TRUE(Boundary(-1).empty());
   Accept(plan, 0);
@@ -126,7 +126,7 @@ TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
   EXPECT_THAT(GetText(events_.back().message), HasSubstr("emergency stop: plan 7: step 2 was due at"));
   EXPECT_EQ(transitions_.size(), 1u) << "the step that was too long is no observation of the model's step";
 
-  certified_plan_v2_t next = SmallPlan(8);
+  certified_plan_t next = SmallPlan(8);
   next.plan.start_utime = At(4);
   next.expires_utime = At(9);
   supervisor.OnCertified(Sealed(next), At(3));
@@ -263,7 +263,7 @@ TEST_F(SupervisorTest, AReloadWhileExecutingDoesNotDisturbThePlan) {
   EXPECT_FALSE(Boundary(1).empty());
   EXPECT_EQ(holds_, 0);
 
-  certified_plan_v2_t next = SmallPlan(8);
+  certified_plan_t next = SmallPlan(8);
   next.plan.start_utime = At(2);
   next.expires_utime = At(3);
   SetDigest(next.config_digest, DigestOf("another config"));
@@ -276,7 +276,7 @@ TEST_F(SupervisorTest, ExpectingANewTaskInvalidatesOlderOnesOnceItsFirstPlanCame
   supervisor_.Expect(DigestOf("second"), DigestOf("model"));
   supervisor_.Expect(DigestOf("third"), DigestOf("model"));
   const auto kind = [&](std::int64_t plan_id, const char* config) {
-    certified_plan_v2_t plan = SmallPlan(plan_id);
+    certified_plan_t plan = SmallPlan(plan_id);
     SetDigest(plan.config_digest, DigestOf(config));
     Accept(plan, 0);
     return events_.back().kind;
@@ -290,7 +290,7 @@ TEST_F(SupervisorTest, ExpectingANewTaskInvalidatesOlderOnesOnceItsFirstPlanCame
 
 TEST_F(SupervisorTest, APlanThatExpiresWhileTheRobotIsHeldUpIsRefused) {
   for (const bool expired : {false, true}) {
-    certified_plan_v2_t plan = SmallPlan(expired ? 9 : 8);
+    certified_plan_t plan = SmallPlan(expired ? 9 : 8);
     plan.plan.start_utime = At(expired ? 10 : 0);
     plan.expires_utime = At(expired ? 11 : 1);
     Accept(plan, expired ? 10 : 0);

@@ -33,8 +33,8 @@ GuardOptions TwoStates() {
 }
 
 // Of a plan of SmallPlan's kind.
-withdrawal_t Withdrawal(const certified_plan_v2_t& plan, int valid_steps, std::int16_t cause = withdrawal_t::OBSTACLE) {
-  certified_plan_v2_t sealed = plan;
+withdrawal_t Withdrawal(const certified_plan_t& plan, int valid_steps, std::int16_t cause = withdrawal_t::OBSTACLE) {
+  certified_plan_t sealed = plan;
   Seal(sealed);
   withdrawal_t message{};
   message.utime = kNow;
@@ -114,13 +114,13 @@ TEST_F(GuardWithdrawTest, APendingPlanIsDroppedHoweverManyStepsStand) {
 
 TEST_F(GuardWithdrawTest, AWithdrawalLeavesOtherPlansAlone) {
   Start(7);
-  certified_plan_v2_t next = SmallPlan(8);
+  certified_plan_t next = SmallPlan(8);
   next.plan.start_utime += 2 * kStep;
   EXPECT_TRUE(guard_.Accept(Sealed(next), kNow).ok());
   EXPECT_EQ(Withdraw(0, 6), 0);
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
   EXPECT_NE(guard_.pending(), nullptr);
-  certified_plan_v2_t namesake = SmallPlan(7);  // of another source
+  certified_plan_t namesake = SmallPlan(7);  // of another source
   namesake.plan.control[0][0] = 1;
   EXPECT_TRUE(guard_.Withdraw(Encode(Withdrawal(namesake, 0)), kNow).verdict.ok());
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
@@ -172,7 +172,7 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate
 // Of the observations of its certificate the guard asks which file they began with, and nothing else.
 TEST_F(GuardWithdrawTest, AnUnknownPlanStandsWhateverWasLearnedAfterTheFile) {
   const auto standing_steps = [](const Digest& observations, const Digest& named) {
-    certified_plan_v2_t plan = SmallPlan();
+    certified_plan_t plan = SmallPlan();
     SetDigest(plan.observations_digest, observations);
     Guard guard(TwoStates());
     EXPECT_TRUE(guard.Accept(Sealed(plan), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
@@ -278,14 +278,14 @@ class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot
     supervisor_.emplace(options, robot);
   }
   static std::int64_t At(int boundary) { return kStart + boundary * kStep; }
-  static certified_plan_v2_t PlanFrom(int boundary, std::int64_t plan_id) {
-    certified_plan_v2_t plan = SmallPlan(plan_id);
+  static certified_plan_t PlanFrom(int boundary, std::int64_t plan_id) {
+    certified_plan_t plan = SmallPlan(plan_id);
     plan.plan.start_utime = At(boundary);
     plan.expires_utime = At(boundary + 1);
     return plan;
   }
-  void Accept(const certified_plan_v2_t& plan) { supervisor_->OnCertified(Sealed(plan), kNow); }
-  void Withdraw(const certified_plan_v2_t& plan, int valid_steps, std::int64_t sequence = 4) {
+  void Accept(const certified_plan_t& plan) { supervisor_->OnCertified(Sealed(plan), kNow); }
+  void Withdraw(const certified_plan_t& plan, int valid_steps, std::int64_t sequence = 4) {
     withdrawal_t message = Withdrawal(plan, valid_steps);
     message.sequence = sequence;
     SetText(message.message, "a wall");
@@ -392,7 +392,7 @@ TEST_F(SupervisorWithdrawTest, APlanThatStartsBetweenTheBoundariesDoesNotTakeOve
     holds_ = 0;
     Accept(PlanFrom(0, 7));
     EXPECT_TRUE(Boundary(0));
-    certified_plan_v2_t next = PlanFrom(2, 8);
+    certified_plan_t next = PlanFrom(2, 8);
     next.plan.start_utime += off;
     Accept(next);
     Withdraw(PlanFrom(0, 7), 2);
