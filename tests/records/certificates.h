@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "forereach/certified_plan_t.hpp"
+#include "lcmtypes/codec.h"
 #include "records/certificate_files.h"
 #include "records/event_log.h"
 
