@@ -113,7 +113,9 @@ class Reading {
     clearance.RequireCount(completed || !config_.problem->between ? config_.obstacles.size() : 0);
     for (std::size_t o = 0; o < clearance.Count(); ++o)
       recorded.clearance.push_back(clearance[o].json().is_null() ? kInfinity : clearance[o].Number());
-    if (!slice["radius"].json().is_null()) recorded.radius = slice["radius"].Number();  // null: above every double
+    // Null: above every double, as the squares are of which it is the root.
+    const bool is_huge = std::ranges::any_of(recorded.half_width, [](double r) { return r > 1e150; });
+    if (!is_huge || !slice["radius"].json().is_null()) recorded.radius = slice["radius"].Number();
     if (!completed) return recorded;
     const JsonField envelope = slice["envelope"];
     envelope.RequireFields({"lower", "upper"});

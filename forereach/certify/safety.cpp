@@ -107,12 +107,11 @@ class Nearest {
   double left_out_ = kInfinity;
 };
 
-// A bound for the whole body is one for its only part.
-Decision Judged(Outcome outcome, const Closest& closest, std::size_t parts) {
+Decision Judged(Outcome outcome, const Closest& closest) {
   Decision decision;
   decision.outcome = outcome;
   decision.obstacle = closest.obstacle;
-  decision.part = closest.part < 0 && closest.obstacle >= 0 && parts == 1 ? 0 : closest.part;
+  decision.part = closest.part;
   decision.closest_step = closest.step;
   decision.margin = closest.separation.distance;
   decision.threshold = closest.separation.threshold;
@@ -137,9 +136,16 @@ Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
   return spatial;
 }
 
-// The better of two bounds. One without a part is for the whole body.
-PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
-  return IsBetter(by_parts.separation, other.separation) ? by_parts : other;
+// The better of two bounds. One for the whole body is told of its closest part: by the same clearance, against the
+// distance that this part has to keep. Without a part only where that would lose the proof by a last bit.
+PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other, std::size_t parts) noexcept {
+  if (IsBetter(by_parts.separation, other.separation)) return by_parts;
+  if (other.part >= 0) return other;
+  if (parts == 1) return {other.separation, by_parts.part};
+  const double kept = by_parts.separation.threshold;
+  const Separation of_part{AddDown(other.separation.clearance(), kept), kept};
+  if (of_part.IsProven() != other.separation.IsProven()) return other;
+  return {of_part, by_parts.part};
 }
 
 }  // namespace
@@ -182,14 +188,14 @@ class SafetyTest::Unit {
       for (int t = first_; t <= last_; ++t) support = Larger(support, Support(t, placement().parts()[i], d, meeting));
       return Separation{DistanceLower(obstacle, d, support), AddUp(obstacle.radius(), added)};
     };
-    return Better(ClosestPart(meeting, separate), by_hulls);
+    return Better(ClosestPart(meeting, separate), by_hulls, placement().parts().size());
   }
 
   // The better of the bound by hulls and that of the best directions.
   [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle,
                                     const Encounter& meeting) noexcept {
     const auto separate = [&](std::size_t i, double added) { return SeparatePart(i, obstacle, added, meeting); };
-    return Better(ClosestPart(meeting, separate), by_hulls);
+    return Better(ClosestPart(meeting, separate), by_hulls, placement().parts().size());
   }
 
   // How the obstacle meets the unit; the reference is valid until the next call.
@@ -366,8 +372,7 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
       }
       const PartSeparation best = unit.Best(direct, obstacle, meeting);
       if (!best.separation.IsProven())
-        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation},
-                      placement_.parts().size());
+        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation});
       closest.Consider(best, t, o);
     }
   }
@@ -392,7 +397,7 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
   };
   if (nearest.left_out() >= closest.clearance) {
     for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
-    return Judged(Outcome::kCertified, closest, placement_.parts().size());
+    return Judged(Outcome::kCertified, closest);
   }
   for (int t = first; t < units; ++t) {
     unit.Enter(t);
@@ -405,7 +410,7 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
       consider_if_closer(pair);
     }
   }
-  return Judged(Outcome::kCertified, closest, placement_.parts().size());
+  return Judged(Outcome::kCertified, closest);
 }
 
 }  // namespace forereach

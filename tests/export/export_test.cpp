@@ -240,6 +240,14 @@ TEST_F(ExportTest, AnMcapFileHasEveryMessage) {
   EXPECT_EQ(message["json"]["message"], GetText(Decoded<decision_t>(first->message())->message));
 }
 
+// JavaScript's numbers are doubles.
+json InDoubles(json value) {
+  if (value.is_number()) return value.get<double>();
+  for (json& part : value)
+    if (value.is_structured()) part = InDoubles(part);
+  return value;
+}
+
 // The reader of Foxglove.
 TEST_F(ExportTest, AnMcapFileIsReadByItsOwnLibrary) {
   if (!HasMcapCore()) GTEST_SKIP() << "scripts/test installs npm's @mcap/core, and could not";
@@ -252,7 +260,7 @@ TEST_F(ExportTest, AnMcapFileIsReadByItsOwnLibrary) {
     EXPECT_EQ(channel["type"], same["channels"][topic]["type"]);
     EXPECT_EQ(channel["count"], same["channels"][topic]["count"]);
     EXPECT_THAT(channel["robot"], testing::EndsWith("tests/data"));
-    EXPECT_EQ(found["first"][topic]["json"], same["first"][topic]["json"]);
+    EXPECT_EQ(InDoubles(found["first"][topic]["json"]), InDoubles(same["first"][topic]["json"]));
     EXPECT_EQ(found["first"][topic]["log"], std::to_string(same["first"][topic]["log"].get<std::int64_t>()));
   }
   McapWriter many{OutputFile(scratch_ / "many.mcap")};
@@ -557,7 +565,7 @@ TEST_F(ManyRunsTest, WhatAKilledCommandLeftIsNoPartOfTheNextOutput) {
     scratch_.Write(std::string("tables.part-out/") + left, "half a row");
   ASSERT_EQ(ExportTo("csv", "tables", scratch_ / "night").code, 1) << "two.lcmlog cannot be read";
   EXPECT_EQ(FilesIn(scratch_ / "tables").size(), 5u);
-  EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 135u);
+  EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 2u * kCourseDecisions + 1);
 }
 
 TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {

@@ -103,12 +103,13 @@ class StandingDecision : public VerifyDecision {
   }
 };
 
-// The best bound is that of the whole body, or that of one of its parts: the threshold is of what the record names.
+// Also where the best bound is that of the whole body, the threshold is of the part that the record names.
 TEST_F(StandingDecision, OfABodyOfTwoPartsIsConfirmed) {
   const std::string parts = "[{disc: {at: [0, 2.7], radius: 0}}, {disc: {at: [0, 0], radius: 0}}]";
   CertifyStanding(parts, 0, "{half_plane: {normal: [0, 1], offset: 5.1}}");
-  EXPECT_TRUE(decision_["part"].is_null()) << "the whole body reaches as far as its first part";
-  EXPECT_NEAR(decision_["threshold"].get<double>(), 2.7, 1e-9);
+  EXPECT_EQ(decision_["part"], 0);
+  EXPECT_EQ(decision_["threshold"], 0.0);
+  EXPECT_NEAR(decision_["margin"].get<double>(), 5.1 - 2.7, 1e-9);
   EXPECT_EQ(Verify().code, 0);
   CertifyStanding(parts, 0, "{half_plane: {normal: [0, -1], offset: 2.8}}");
   EXPECT_EQ(decision_["part"], 1);
