@@ -1,14 +1,9 @@
 // A measured state against the slice of the step it is at.
 #include "certifier/gate/conformance.h"
 
-#include <cmath>
-#include <limits>
-#include <numbers>
+#include "tests/test.h"
 
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace conformance_test {
+namespace forereach::conformance_test {
 
 // Slices [t, t + 1] in both coordinates, T = 3.
 certified_plan_v2_t Plan(std::int64_t plan_id) {
@@ -218,5 +213,4 @@ TEST(ConformanceTest, TheLastPlansAreRemembered) {
   EXPECT_TRUE(conformance.Check(At(20, count, 0, 100, 100)));
 }
 
-}  // namespace conformance_test
-}  // namespace forereach
+}  // namespace forereach::conformance_test

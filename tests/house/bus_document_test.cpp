@@ -1,18 +1,11 @@
 // docs/bus.md documents every message, field, constant and channel.
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <regex>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
 
-namespace {
+namespace forereach::bus_document_test {
 
 std::string TextOf(const std::filesystem::path& path) {
   std::ifstream file(path);
@@ -93,4 +86,4 @@ TEST(BusDocumentTest, EveryChannelIsListed) {
     EXPECT_TRUE(std::regex_search(document, std::regex("\n\\| `" + std::string(channel) + "` \\|"))) << channel;
 }
 
-}  // namespace
+}  // namespace forereach::bus_document_test

@@ -1,23 +1,10 @@
 // scripts/check-includes: the sources keep to the arrows, and the script sees when they do not.
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
-namespace {
-
-using forereach::Output;
-using forereach::Shell;
-using testing::HasSubstr;
+namespace forereach::includes_test {
 
 Output CheckIncludes(const std::string& root) {
   return Shell("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' '" + root + "' 2>&1");
@@ -60,7 +47,7 @@ class IncludesTest : public testing::Test {
     for (const std::string& message : expected_) EXPECT_THAT(result.text, HasSubstr(message));
   }
 
-  const forereach::ScratchDirectory scratch_;
+  const ScratchDirectory scratch_;
   const std::filesystem::path root_ = scratch_.path();
   std::map<std::string, int> lines_;
   std::vector<std::string> expected_;
@@ -113,10 +100,8 @@ TEST_F(IncludesTest, AFolderMayIncludeItsListedFoldersOnly) {
   Refuse("records/bad.cpp", "\"logger/x.h\"", "records may not include logger");
   Refuse("bench/bad.cpp", "\"logger/x.h\"", "bench may not include logger");
   Refuse("research/bad.cpp", "\"robot/x.h\"", "research may not include robot");
-  Refuse("research/bad.cpp", "\"cli/commands.h\"",
-         "research may not include cli");
-  Refuse("research/bad.cpp", "\"planner_bridge/proposal.h\"",
-         "research may include the planner's policies only");
+  Refuse("research/bad.cpp", "\"cli/commands.h\"", "research may not include cli");
+  Refuse("research/bad.cpp", "\"planner_bridge/proposal.h\"", "research may include the planner's policies only");
   Refuse("certifier/gate/bad.cpp", "\"research/x.h\"", "certifier may not include research");
   Refuse("logger/bad.cpp", "\"tests/records/logs.h\"", "logger may not include tests");
   ExpectRefused();
@@ -159,4 +144,4 @@ TEST_F(IncludesTest, PathsAreThoseFromTheRoot) {
   ExpectRefused();
 }
 
-}  // namespace
+}  // namespace forereach::includes_test

@@ -255,7 +255,7 @@ class TextInHighPrecision {
   }
 
   /** @param z states, then inputs. */
-  [[nodiscard]] std::vector<exact::Real> operator()(const std::vector<exact::Real>& z) const {
+  [[nodiscard]] std::vector<Real> operator()(const std::vector<Real>& z) const {
     using Integrator = ModelText::Integrator;
     using exact::Real;
     const Real dt = parameters_[ToSize(std::ranges::find(text_.parameters, "dt", &ModelText::Parameter::name) -
@@ -285,11 +285,11 @@ class TextInHighPrecision {
   }
 
  private:
-  [[nodiscard]] std::vector<exact::Real> Values(const std::vector<exact::Real>& z) const {
-    std::vector<exact::Real> known = z, values;
+  [[nodiscard]] std::vector<Real> Values(const std::vector<Real>& z) const {
+    std::vector<Real> known = z, values;
     known.insert(known.end(), parameters_.begin(), parameters_.end());
     const auto value = [&](const Expression& expression) {
-      return Evaluate<exact::Real>(expression, known, [](double number) { return exact::Real(number); });
+      return Evaluate<Real>(expression, known, [](double number) { return Real(number); });
     };
     for (const Expression& definition : definitions_) known.push_back(value(definition));
     for (const Expression& equation : equations_) values.push_back(value(equation));
@@ -297,7 +297,7 @@ class TextInHighPrecision {
   }
 
   ModelText text_;
-  std::vector<exact::Real> parameters_;
+  std::vector<Real> parameters_;
   std::vector<std::string> names_;
   std::vector<Expression> definitions_, equations_;
 };
@@ -328,7 +328,7 @@ inline std::shared_ptr<Problem> AnyTextProblem(Random& random, const ModelText& 
     if (attempts > 20 * count) return nullptr;
     Eigen::VectorXd z(variables), next(n);
     for (int l = 0; l < variables; ++l) z[l] = (l < n ? kTextReach : 1) * random.Uniform(-0.9, 0.9);
-    const std::vector<exact::Real> exact_z(z.begin(), z.end()), value = nominal(exact_z);
+    const std::vector<Real> exact_z(z.begin(), z.end()), value = nominal(exact_z);
     for (int k = 0; k < n; ++k)
       next[k] = (value[static_cast<std::size_t>(k)] + residual(exact_z, k) +
                  declaration.noise_bound[k] * random.Uniform(-1, 1))
