@@ -55,9 +55,8 @@ void SendHostile(Watcher& watcher) {
     watcher.Take(EventOf("LOGGER_STATUS", logger));
   }
   for (const double far : {1e308, -1e308, 1e12, 1.0}) {
-    robot_state_t state{};
-    state.num_states = static_cast<std::int16_t>(CourseTask().problem->model->num_states());
-    state.mode = robot_state_t::EXECUTING;
+    robot_state_t state{.mode = robot_state_t::EXECUTING,
+                        .num_states = static_cast<std::int16_t>(CourseTask().problem->model->num_states())};
     state.executing_plan_id = state.sequence = kMost;
     std::fill_n(state.state, state.num_states, far);
     watcher.Take(EventOf("ROBOT_STATE", state));

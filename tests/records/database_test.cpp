@@ -1,15 +1,12 @@
 #include "records/database.h"
 
-#include <cmath>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sqlite3.h>
+
+#include "tests/test.h"
 
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace database_test {
+namespace forereach::database_test {
 
 void Sql(const std::string& path, const char* sql) {
   sqlite3* handle = nullptr;
@@ -218,12 +215,8 @@ TEST(Database, RefusesANewerSchema) {
   const ScratchDirectory scratch;
   { const Database database(scratch / "d.sqlite"); }
   Sql(scratch / "d.sqlite", "PRAGMA user_version = 99");
-  try {
-    const Database database(scratch / "d.sqlite");
-    FAIL() << "accepted";
-  } catch (const DatabaseError& error) {
-    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("99"), testing::HasSubstr("d.sqlite")));
-  }
+  EXPECT_THAT([&] { const Database database(scratch / "d.sqlite"); },
+              ThrowsMessage<DatabaseError>(testing::AllOf(testing::HasSubstr("99"), testing::HasSubstr("d.sqlite"))));
 }
 
 TEST(Database, RefusesAnotherProgramsFile) {
@@ -247,5 +240,4 @@ TEST(Database, WritesAllOrNothing) {
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
 }
 
-}  // namespace database_test
-}  // namespace forereach
+}  // namespace forereach::database_test
