@@ -8,7 +8,6 @@
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/key_options.h"
 #include "cli/offline.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
@@ -193,13 +192,11 @@ Command AdviseCommand() {
           "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach advise run/log\n"
           "  forereach advise season --resume season.advice",
-      .options =
-          {Required(
-               {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
-                "The abstentions: a decision (the output of certify --json), or logs, databases and directories, as in "
-                "forereach replay"}),
-           {"--config", &options->config, "FILE", kTaskOfRecords},
-           JsonFlag(options->json)},
+      .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
+                            "The abstentions: a decision (the output of certify --json), or logs, databases and "
+                            "directories, as in forereach replay"}),
+                  {"--config", &options->config, "FILE", kTaskOfRecords},
+                  JsonFlag(options->json)},
       .run = [options] { return RunAdvise(*options); }};
   options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, options->key);

@@ -207,13 +207,12 @@ Command KeygenCommand() {
       .purpose = "Make the keys of one robot: a directory with one key file for each role",
       .footer =
           "Examples:\n  forereach keygen --robot alpha keys\n  forereach keygen --robot alpha keys --again planner\n"
-          "Then give --key keys to every process, or set bus.key "
-          "in the task file. On another machine a process needs only its own role's file, as in\n"
-          "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub contains no secret; "
-          "report, replay and verify check logs with it.\n\nIf the machine of a role is lost, --again "
-          "gives that role a new key and keeps the others'. It prints which machine needs which file; a machine "
-          "without its new file still believes the lost key, and refuses the new one. Keep a copy of verify.pub if "
-          "there are logs from before.",
+          "Then give --key keys to every process, or set bus.key in the task file. On another machine a process needs "
+          "only its own role's file, as in\n"
+          "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub contains no secret; report, "
+          "replay and verify check logs with it.\n\nIf the machine of a role is lost, --again gives that role a new "
+          "key and keeps the others'. It prints which machine needs which file; a machine without its new file still "
+          "believes the lost key, and refuses the new one. Keep a copy of verify.pub if there are logs from before.",
       .options = {Required({"--robot", &options->robot, "NAME",
                             "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature"}),
                   Required({"directory", &options->directory, "DIR",

@@ -46,6 +46,8 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command AdviseCommand();
 [[nodiscard]] Command ReportCommand();
 [[nodiscard]] Command CheckLogCommand();
+[[nodiscard]] Command ExportCommand();
+[[nodiscard]] Command LogCommand();
 [[nodiscard]] Command RunCommand();
 [[nodiscard]] Command ObstaclesCommand();
 [[nodiscard]] Command DoctorCommand();
@@ -55,6 +57,7 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command ReloadCommand();
 [[nodiscard]] Command KeygenCommand();
 [[nodiscard]] Command LiveCommand();
+[[nodiscard]] Command TailCommand();
 
 /** Runs the one of the commands that the command line chooses. @return the program's exit code. */
 [[nodiscard]] int RunCommands(std::vector<Command> commands, int argc, char** argv);

@@ -102,12 +102,11 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))
         box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) +
                ", " + RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
-      throw std::runtime_error(
-          "no finite bound for the slope of " + NameOf(bound, names) + ": " + config.residual->name +
-          " has none over " + box + ", found after " + std::to_string(bound.boxes) +
-          " boxes; take this box out of `domain` in " + config.path +
-          " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, or raise --max-boxes "
-          "if the box is wide");
+      throw std::runtime_error("no finite bound for the slope of " + NameOf(bound, names) + ": " +
+                               config.residual->name + " has none over " + box + ", found after " +
+                               std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " + config.path +
+                               " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, "
+                               "or raise --max-boxes if the box is wide");
     }
     if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
       throw ConfigError(config.path + ": domain: no point of its box satisfies its inequalities and balls");
@@ -301,15 +300,13 @@ Command DeclareCommand() {
           "In the task file, `add` is what the next state has beyond the model's. Each parameter is a number or an "
           "interval:\n"
           "  residual: {parameters: {c: [0.1, 0.2]}, add: {v: -c*v*abs(v)}}\n"
-          "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
-          "found.\n"
+          "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope found.\n"
           "Copy the last line of the output into the task file.\n\n"
           "--between needs no residual. It bounds how far the robot's path curves from one sample to the next, for the "
           "key\n"
           "task.between.\n\n"
           "--from-data needs no residual either. It proposes a declaration from the task's transitions, and proves "
-          "nothing; "
-          "see\n"
+          "nothing; see\n"
           "docs/data.md. With --hold-out it shows how often fresh transitions contradict what the others propose.\n\n"
           "Examples:\n"
           "  forereach declare --config config/bicycle.yaml\n"
@@ -317,8 +314,8 @@ Command DeclareCommand() {
           "  forereach declare --config config/bicycle.yaml --check cover.json\n"
           "  forereach declare --config config/demo.yaml --between\n"
           "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha\n"
-          "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha "
-          "--hold-out --picture trade_off",
+          "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha --hold-out "
+          "--picture trade_off",
       .options = {TaskOption(options->config, "Task file (YAML) with a section `residual`"),
                   {"--gap", &options->search.gap, "",
                    "Stop when no bound exceeds the largest slope found by more than this fraction",
@@ -334,8 +331,8 @@ Command DeclareCommand() {
                   {.name = "--check",
                    .variable = &options->check,
                    .type = "FILE.json",
-                   .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
-                           "confirmed, 1 not confirmed",
+                   .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 confirmed, 1 "
+                           "not confirmed",
                    .excludes = "--cover"},
                   {.name = "--between",
                    .variable = &options->between,

@@ -5,9 +5,8 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/key_options.h"
-#include "cli/log_commands.h"
 #include "cli/new_file.h"
+#include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
 #include "records/result_json.h"

@@ -106,9 +106,9 @@ void PrintForPeople(const Fit& fit, const Config& config) {
         << RoundedUp(fit.after.col(k).cwiseAbs().maxCoeff(), 4) << "\n";
   std::cout
       << out.str()
-      << "\nThe sum of squared errors of one step, each over its rms before, has a local minimum there. The "
-         "standard errors assume\nindependent errors of measurement; what the equations lack is none. A model "
-         "that fits better leaves a smaller residual,\nwhich still has to be declared, for the new parameters.\n\n"
+      << "\nThe sum of squared errors of one step, each over its rms before, has a local minimum there. The standard "
+         "errors assume\nindependent errors of measurement; what the equations lack is none. A model that fits better "
+         "leaves a smaller residual,\nwhich still has to be declared, for the new parameters.\n\n"
          "model:\n  "
       << Yaml(fit) << std::endl;
 }
@@ -147,10 +147,10 @@ Command FitCommand() {
   return {.name = kFit.name,
           .purpose = kFit.purpose,
           .footer =
-              "The model has to be text in the task file or in a model file. Its parameters begin at their values, "
-              "a range at its middle.\n"
-              "Copy the last line into the task file: `model.parameters`. Then declare the residual that is left; "
-              "see docs/data.md.\n\n"
+              "The model has to be text in the task file or in a model file. Its parameters begin at their values, a "
+              "range at its middle.\n"
+              "Copy the last line into the task file: `model.parameters`. Then declare the residual that is left; see "
+              "docs/data.md.\n\n"
               "Example:\n  forereach fit --config my_robot.yaml --parameters gain,drag --picture errors",
           .options = {TaskOption(options->config, "Task file (YAML) with a model as text, and transitions"),
                       {"--parameters", &options->names, "NAMES",

@@ -36,8 +36,7 @@ bool IsNullOfYaml(const std::string& name) { return name == "null" || name == "N
 void RequireOneLine(const char* option, const std::string& path) {
   if (std::ranges::any_of(path, [](unsigned char c) { return std::iscntrl(c) != 0; }))
     throw ConfigError(std::string(option) +
-                      ": the path has a control character, as a line break, which no task file "
-                      "can name");
+                      ": the path has a control character, as a line break, which no task file can name");
 }
 
 struct InitArguments {
@@ -190,10 +189,10 @@ Header ReadHeader(const std::string& path) {
   for (const std::string& column : columns) {
     if (column.ends_with(kNextEnding)) continue;
     if (!IsName(column) || IsReserved(column) || column == "dt" || IsNullOfYaml(column) || column.size() > kLongestName)
-      throw ConfigError(path + ":1: '" + column.substr(0, kLongestName) +
-                        "' cannot be the name of a state or an input: that is a letter, then letters, digits and "
-                        "underscores, " +
-                        std::to_string(kLongestName) + " at most, and no function, pi, dt or null; rename the column");
+      throw ConfigError(
+          path + ":1: '" + column.substr(0, kLongestName) +
+          "' cannot be the name of a state or an input: that is a letter, then letters, digits and underscores, " +
+          std::to_string(kLongestName) + " at most, and no function, pi, dt or null; rename the column");
     const bool is_state = std::ranges::find(columns, column + kNextEnding) != columns.end();
     (is_state ? header.states : header.inputs).push_back(column);
   }
@@ -203,10 +202,9 @@ Header ReadHeader(const std::string& path) {
       throw ConfigError(path + ":1: " + column + " is the state after a step, and there is no column " + name +
                         " with the state before it");
   if (header.states.empty())
-    throw ConfigError(
-        path +
-        ":1: no column is a state: a state x has the columns x, before a step, and x_next, after it. A log "
-        "of states and inputs over time is made into such a file first");
+    throw ConfigError(path +
+                      ":1: no column is a state: a state x has the columns x, before a step, and x_next, after it. A "
+                      "log of states and inputs over time is made into such a file first");
   RequireCount(path, "states", header.states, kMaxStates);
   if (header.inputs.empty())
     throw ConfigError(path + ":1: no column is an input: every column has one with _next, and a model needs an input");
@@ -217,8 +215,7 @@ Header ReadHeader(const std::string& path) {
 TaskTemplate FromTransitions(const InitArguments& options) {
   if (!options.dt)
     throw ConfigError(
-        "--transitions: needs --dt, the time from one sample of the data to the next in s: the file does not "
-        "have it");
+        "--transitions: needs --dt, the time from one sample of the data to the next in s: the file does not have it");
   const std::string& path = options.transitions;
   const Header header = ReadHeader(path);
   std::vector<std::string> columns = header.states;
@@ -293,8 +290,7 @@ Command InitCommand() {
           "placeholders; the laws by which it stops and is steered are those of its task in config/drive, and so is "
           "the\n"
           "range of what is never zero there, as the speed of an aeroplane.\n"
-          "With --transitions, a column x with a column x_next is a state, the others are inputs, and "
-          "the\n"
+          "With --transitions, a column x with a column x_next is a state, the others are inputs, and the\n"
           "domain is the range of the data, a tenth wider at each end.\n"
           "The file can be used as it is. Its placeholders keep plans from being certified until you replace them.\n\n"
           "Examples:\n  forereach init --model differential_drive --out robot.yaml\n"

@@ -9,7 +9,7 @@
 #include "bus/node.h"
 #include "bus/process.h"
 #include "cli/commands.h"
-#include "cli/live.h"
+#include "cli/offline.h"
 #include "live/web_server.h"
 #include "task/config.h"
 
@@ -87,8 +87,8 @@ Command LiveCommand() {
           .purpose = kLive.purpose,
           .footer =
               "It listens to the bus and sends nothing. The page is for browsers of this machine alone; from another "
-              "one, forward its port: ssh -L 8080:127.0.0.1:8080 ROBOT. It prints its address, and ends with "
-              "Ctrl-C. See docs/live.md.\n\n"
+              "one, forward its port: ssh -L 8080:127.0.0.1:8080 ROBOT. It prints its address, and ends with Ctrl-C. "
+              "See docs/live.md.\n\n"
               "Example:\n  forereach live --config config/demo.yaml --key keys/verify.pub",
           .options = {ConfigOption(options->config, "The task file of the certifier"),
                       {"--lcm-url", &options->bus.url, "URL", "The bus; by default the task file's bus.url"},

@@ -3,7 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/log_commands.h"
+#include "cli/commands.h"
+#include "cli/offline.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/log_edit.h"

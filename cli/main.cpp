@@ -2,8 +2,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
-#include <span>
-#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -11,8 +10,6 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
-#include "cli/live.h"
-#include "cli/log_commands.h"
 #include "cli/offline.h"
 
 namespace forereach {
@@ -38,16 +35,11 @@ int Become(const char* path, char** argv) {
 int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands{CertifyCommand()};
-  using Offline = std::span<const OfflineCommand>;
-  for (const Offline offline : {Offline(kOfflineCommands), Offline(kLogCommands)})
-    for (const OfflineCommand& each : offline) {
-      if (argc > 1 && std::string(argv[1]) == each.name) return Become(FOREREACH_OFFLINE, argv);
-      commands.push_back(
-          {.name = each.name, .purpose = each.purpose, .run = [argv] { return Become(FOREREACH_OFFLINE, argv); }});
-    }
-  if (argc > 1 && std::string(argv[1]) == kLive.name) return Become(FOREREACH_LIVE, argv);
-  commands.push_back(
-      {.name = kLive.name, .purpose = kLive.purpose, .run = [argv] { return Become(FOREREACH_LIVE, argv); }});
+  for (const OfflineCommand& each : kOfflineCommands) {
+    const char* const program = each.name == std::string_view(kLive.name) ? FOREREACH_LIVE : FOREREACH_OFFLINE;
+    if (argc > 1 && each.name == std::string_view(argv[1])) return Become(program, argv);
+    commands.push_back({.name = each.name, .purpose = each.purpose, .run = [=] { return Become(program, argv); }});
+  }
   for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),
                                    ResetCommand(), ReloadCommand(), KeygenCommand()})
     commands.push_back(std::move(each));

@@ -87,8 +87,8 @@ Command ObstaclesCommand() {
   Command command{
       .name = "obstacles",
       .purpose =
-          "Send a task file's obstacles on the bus repeatedly until SIGTERM, in place of perception. Their "
-          "motions begin when it starts, and none is sent before its motion.from. SIGHUP reads the file again",
+          "Send a task file's obstacles on the bus repeatedly until SIGTERM, in place of perception. Their motions "
+          "begin when it starts, and none is sent before its motion.from. SIGHUP reads the file again",
       .footer =
           "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nWith gate.obstacles: bus, a "
           "certifier certifies nothing before it receives obstacles, and nothing after they stop.",

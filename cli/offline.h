@@ -1,5 +1,6 @@
-/** The commands that `forereach` leaves to the program forereach-offline: they need no robot, and OMPL, SQLite, cairo
-and MPFI, which the commands for a running system do not load. */
+/** The commands that `forereach` leaves to other programs. Those of forereach-offline need no robot, and OMPL, SQLite,
+cairo and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web server:
+the commands that stop and start a robot do without. */
 #pragma once
 
 namespace forereach {
@@ -12,23 +13,20 @@ struct OfflineCommand {
 inline constexpr OfflineCommand kInit{
     "init",
     "Write a commented task file to begin with, from a model of the library or the header of a transitions file"};
-inline constexpr OfflineCommand kCheck{
-    "check",
-    "Examine one task file, say what to change, and draw it: exit 0 if a plan could be certified in principle, 1 with "
-    "findings, 2 bad input"};
+inline constexpr OfflineCommand kCheck{"check",
+                                       "Examine one task file, say what to change, and draw it: exit 0 if a plan could "
+                                       "be certified in principle, 1 with findings, 2 bad input"};
 inline constexpr OfflineCommand kExportModel{
     "export-model", "Write the equations of a task's model as a C++ header, for a certifier with compiled equations"};
 inline constexpr OfflineCommand kPlan{"plan",
                                       "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a "
                                       "CSV file, 1 if none was found, 2 bad input"};
-inline constexpr OfflineCommand kImport{
-    "import",
-    "Make the transitions of a task from logs of states and inputs: exit 0 with a CSV file, 1 if there is none, 2 bad "
-    "input"};
-inline constexpr OfflineCommand kFit{
-    "fit",
-    "Fit the parameters of a model as text to the task's transitions: exit 0 if the search converged, 1 if not, 2 bad "
-    "input"};
+inline constexpr OfflineCommand kImport{"import",
+                                        "Make the transitions of a task from logs of states and inputs: exit 0 with a "
+                                        "CSV file, 1 if there is none, 2 bad input"};
+inline constexpr OfflineCommand kFit{"fit",
+                                     "Fit the parameters of a model as text to the task's transitions: exit 0 if the "
+                                     "search converged, 1 if not, 2 bad input"};
 inline constexpr OfflineCommand kDeclare{
     "declare",
     "Prove a declaration: bound the slopes of an analytic residual over the whole domain and all its parameters. Exit "
@@ -39,10 +37,9 @@ inline constexpr OfflineCommand kVerify{
     "certificates and all are confirmed, 1 with the first that is not and its first failing step, 2 bad input"};
 inline constexpr OfflineCommand kReplay{
     "replay", "Replay a recorded log through the gate: exit 0 if every decision equals the recorded one, otherwise 1"};
-inline constexpr OfflineCommand kAdvise{
-    "advise",
-    "Find what would have turned abstentions into certificates: exit 0 if each has such a change, 1 if not, 2 bad "
-    "input"};
+inline constexpr OfflineCommand kAdvise{"advise",
+                                        "Find what would have turned abstentions into certificates: exit 0 if each has "
+                                        "such a change, 1 if not, 2 bad input"};
 inline constexpr OfflineCommand kReport{"report", "Summarise a recorded log, and draw it"};
 inline constexpr OfflineCommand kCheckLog{
     "check-log",
@@ -51,10 +48,21 @@ inline constexpr OfflineCommand kCheckLog{
 inline constexpr OfflineCommand kRun{
     "run",
     "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock: exit 0 if "
-    "the "
-    "robot reaches its goal, touches nothing, and keeps its limits and slices, otherwise 1"};
+    "the robot reaches its goal, touches nothing, and keeps its limits and slices, otherwise 1"};
 
-inline constexpr OfflineCommand kOfflineCommands[] = {kInit,   kImport, kCheck,  kFit,    kExportModel, kPlan, kDeclare,
-                                                      kVerify, kReplay, kAdvise, kReport, kCheckLog,    kRun};
+inline constexpr OfflineCommand kExport{
+    "export",
+    "Write a recorded run for other programs: tables (csv, jsonl), tubes as NumPy arrays (npz), messages (mcap): exit "
+    "0 if all of it could be read, otherwise 1"};
+inline constexpr OfflineCommand kLogEdit{
+    "log", "List, cut and merge LCM event logs: exit 0 if all of them could be read, 1 if one is damaged"};
+/** That of forereach-live. */
+inline constexpr OfflineCommand kLive{"live",
+                                      "Show the running robot on a page for this machine's browsers, until Ctrl-C: it "
+                                      "listens to the bus and sends nothing"};
+
+inline constexpr OfflineCommand kOfflineCommands[] = {kInit,    kImport, kCheck,   kFit,    kExportModel, kPlan,
+                                                      kDeclare, kVerify, kReplay,  kAdvise, kReport,      kCheckLog,
+                                                      kRun,     kExport, kLogEdit, kLive};
 
 }  // namespace forereach

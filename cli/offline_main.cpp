@@ -1,6 +1,5 @@
 /** forereach-offline: started by `forereach` with the same arguments. */
 #include "cli/commands.h"
-#include "cli/log_commands.h"
 
 int main(int argc, char** argv) {
   using namespace forereach;

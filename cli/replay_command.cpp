@@ -8,7 +8,6 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/key_options.h"
 #include "cli/offline.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
@@ -247,8 +246,7 @@ Command ReplayCommand() {
           "With --compare: exit 0 if no certificate would have been lost, otherwise 1.\n\n"
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach replay run/log --resume night.replayed\n"
-          "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config "
-          "config/demo.yaml\n"
+          "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config config/demo.yaml\n"
           "  forereach replay run/log --compare --config config/demo.yaml",
       .options = {Required({"logs", &options->logs, "LOG|DATABASE|DIRECTORY", kRuns}),
                   {"--config", &options->config, "FILE", kTaskOfLogs},
@@ -258,9 +256,8 @@ Command ReplayCommand() {
                    .needs = "--config"},
                   {.name = "--compare",
                    .variable = &options->compare,
-                   .help =
-                       "Replay it through the gate of another task, given by --config, and count what it would have "
-                       "changed: certificates gained and lost, by cause, obstacle and step",
+                   .help = "Replay it through the gate of another task, given by --config, and count what it would "
+                           "have changed: certificates gained and lost, by cause, obstacle and step",
                    .needs = "--config",
                    .excludes = "--other-task"},
                   {"--plan-digest", &options->plan_digest, "HEX",

@@ -6,7 +6,6 @@
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/key_options.h"
 #include "cli/new_file.h"
 #include "cli/offline.h"
 #include "lcmtypes/printable.h"

@@ -41,17 +41,16 @@ int Run(const RunArguments& options) {
 
 Command RunCommand() {
   const auto options = std::make_shared<RunArguments>();
-  return {
-      .name = kRun.name,
-      .purpose = kRun.purpose,
-      .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
-      .options = {TaskOption(options->config),
-                  {"--directory", &options->directory, "DIR", "The logger's directory"},
-                  {"--obstacles", &options->obstacles, "FILE",
-                   "Task file whose obstacles are sent on OBSTACLES, as `forereach obstacles` does, if the task has "
-                   "gate.obstacles: bus; by default the same task file"},
-                  {"--key", &options->key, "DIR", "Directory of keys; by default the task file's bus.key"}},
-      .run = [options] { return Run(*options); }};
+  return {.name = kRun.name,
+          .purpose = kRun.purpose,
+          .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
+          .options = {TaskOption(options->config),
+                      {"--directory", &options->directory, "DIR", "The logger's directory"},
+                      {"--obstacles", &options->obstacles, "FILE",
+                       "Task file whose obstacles are sent on OBSTACLES, as `forereach obstacles` does, if the task "
+                       "has gate.obstacles: bus; by default the same task file"},
+                      {"--key", &options->key, "DIR", "Directory of keys; by default the task file's bus.key"}},
+          .run = [options] { return Run(*options); }};
 }
 
 }  // namespace forereach

@@ -15,7 +15,7 @@
 #include "bus/bus_options.h"
 #include "bus/node.h"
 #include "bus/process.h"
-#include "cli/log_commands.h"
+#include "cli/commands.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"

@@ -7,7 +7,6 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/key_options.h"
 #include "cli/offline.h"
 #include "command_line/progress.h"
 #include "forereach/certify/certifier.h"
@@ -161,15 +160,13 @@ std::string Extent(const Verified& sum) {
   if (sum.certificates == 0) return "  checked: nothing, because there are no certificates";
   if (sum.of_decision)
     return "  checked: every field of the decision except elapsed_us and capped: digests against the task and its "
-           "data; "
-           "hull,\n"
+           "data; hull,\n"
            "  generators, envelope, remainder, radius and clearance of each slice against a rederived tube; the "
            "witness\n"
            "  and the sentence against the clearances";
   return "  checked: for each certified plan its digests, its candidate, the obstacles in force, the hull of each "
-         "slice "
-         "against\n  a rederived tube, and the clearance of this tube from every obstacle; of its decision, if the log "
-         "has it, inputs,\n"
+         "slice against\n  a rederived tube, and the clearance of this tube from every obstacle; of its decision, if "
+         "the log has it, inputs,\n"
          "  witness, margin and sentence. Not checked: times, sequence numbers, elapsed_us, which step is the closest";
 }
 

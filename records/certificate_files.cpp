@@ -30,11 +30,9 @@
 namespace forereach {
 namespace {
 
-using Json = nlohmann::json;
-
 // ---- A decision's document.
 
-CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
+CertificateFile FromDecision(const std::string& path, const nlohmann::json& document, const std::string& config_path) {
   const std::string task = TaskOf(path, document);
   CertificateFile file;
   file.of_decision = true;
@@ -370,7 +368,7 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const 
         [[fallthrough]];
       default: return ReadAllLogs({path}, config_path, key);
     }
-  } catch (const Json::exception& error) {
+  } catch (const nlohmann::json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
   } catch (const std::invalid_argument& error) {
     throw ConfigError(path + ": " + error.what());

@@ -18,8 +18,6 @@
 namespace forereach {
 namespace {
 
-using Json = nlohmann::json;
-
 Eigen::MatrixXd Columns(const JsonField& field, int rows) {
   Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(field.Count()));
   for (Eigen::Index j = 0; j < matrix.cols(); ++j)
@@ -62,7 +60,7 @@ class Reading {
   RecordedCertificate Take() { return std::move(record_); }
 
  private:
-  void Compare(const JsonField& field, const Json& expected) {
+  void Compare(const JsonField& field, const nlohmann::json& expected) {
     if (field.json() == expected) return;
     record_.mismatches.push_back({kAltered + field.name(), JsonText(expected), JsonText(field.json())});
   }
@@ -161,7 +159,7 @@ class Reading {
       step = static_cast<int>(t), obstacle = static_cast<int>(o);
     };
     // Of several that are equally close the record may name any.
-    const Json &named_step = document_["closest_step"].json(), &named_obstacle = document_["obstacle"].json();
+    const nlohmann::json &named_step = document_["closest_step"].json(), &named_obstacle = document_["obstacle"].json();
     if (named_step.is_number_unsigned() && named_obstacle.is_number_unsigned() && named_step < slices.size() &&
         named_obstacle < slices[named_step.get<std::size_t>()].clearance.size())
       consider(named_step.get<std::size_t>(), named_obstacle.get<std::size_t>());
@@ -190,8 +188,8 @@ class Reading {
       if (!is_kept_by_one) Compare(threshold, by_part);
       const double claimed = SubDown(margin.Number(), threshold.Number());
       if (claimed != clearance)
-        record_.Compare(kAltered + margin.name() + " less the distance to be kept", JsonText(Json(clearance)),
-                        JsonText(Json(claimed)));
+        record_.Compare(kAltered + margin.name() + " less the distance to be kept", JsonText(nlohmann::json(clearance)),
+                        JsonText(nlohmann::json(claimed)));
     }
     const std::string sentence = ExplainCertificate(*config_.problem, {step, obstacle, part, clearance});
     Compare(document_["message"], sentence + (document_["capped"].Bool() ? kCapped : ""));
@@ -215,14 +213,14 @@ std::vector<double> ThresholdsOf(const Problem& problem, const Obstacle& obstacl
   return thresholds;
 }
 
-std::string TaskOf(const std::string& path, const Json& document) {
+std::string TaskOf(const std::string& path, const nlohmann::json& document) {
   const JsonField config = JsonField(path, document)["inputs"]["config"];
   const std::string absolute = config["absolute"].Text(), given = config["given"].Text();
   std::error_code no_path;
   return std::filesystem::exists(absolute, no_path) ? absolute : given;
 }
 
-bool IsCertificate(const std::string& path, const Json& document) {
+bool IsCertificate(const std::string& path, const nlohmann::json& document) {
   const JsonField outcome = JsonField(path, document)["outcome"];
   const std::string name = outcome.Text();
   for (const std::int16_t abstention :
@@ -233,7 +231,7 @@ bool IsCertificate(const std::string& path, const Json& document) {
   return true;
 }
 
-RecordedCertificate ReadCertificate(const std::string& path, const Json& document, const Config& config) {
+RecordedCertificate ReadCertificate(const std::string& path, const nlohmann::json& document, const Config& config) {
   return Reading(path, JsonField(path, document), config).Take();
 }
 

@@ -8,9 +8,7 @@
 namespace forereach {
 
 inline command_t ResetAt(std::int64_t utime) {
-  command_t command{};
-  command.utime = utime;
-  command.kind = command_t::RESET;
+  command_t command{.utime = utime, .kind = command_t::RESET};
   return command;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <system_error>
 
@@ -30,9 +31,21 @@ class ScratchDirectory final {
     std::ofstream(*this / name, std::ios::binary) << text;
     return *this / name;
   }
+  /** The text without the directory's path. */
+  [[nodiscard]] std::string Cut(std::string text) const {
+    for (std::size_t at; (at = text.find(path_ + "/")) != std::string::npos;) text.erase(at, path_.size() + 1);
+    return text;
+  }
 
  private:
   std::string path_;
 };
+
+/** What a file holds. */
+inline std::string Read(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
 
 }  // namespace forereach

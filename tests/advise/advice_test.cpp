@@ -12,10 +12,10 @@
 #include "lcmtypes/names.h"
 #include "tests/advise/answered.h"
 #include "tests/oracle/problems.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/tries.h"
 
-namespace forereach {
-namespace advice_test {
+namespace forereach::advice_test {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -213,8 +213,7 @@ std::optional<Tried> TryAnswered(Random& random, std::int16_t cause) {
 }
 
 TEST(Advise, EveryAdviceDoesWhatItSays) {
-  Random random(1201);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(1201);
   std::cout << random.trace() << "\n";
   const int wanted = Tries(1500);
   std::map<std::string, int> abstentions, turned;
@@ -249,5 +248,4 @@ TEST(Advise, EveryAdviceDoesWhatItSays) {
     EXPECT_GT(turned[cause], abstentions[cause] / 2) << cause;
 }
 
-}  // namespace advice_test
-}  // namespace forereach
+}  // namespace forereach::advice_test

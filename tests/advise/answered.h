@@ -141,8 +141,7 @@ inline Answered AnyAnswered(Random& random, std::int16_t cause) {
       gate.obstacles = ObstaclesSource::kBus;
       gate.obstacles_timeout_ms = random.Uniform(1, 500);
       if (random.Coin(0.8)) {
-        obstacles_t seen{};
-        seen.utime = now - us(gate.obstacles_timeout_ms + random.Uniform(0.01, 1000));
+        obstacles_t seen{.utime = now - us(gate.obstacles_timeout_ms + random.Uniform(0.01, 1000))};
         abstention.last_obstacles =
             std::make_shared<std::pair<std::vector<std::uint8_t>, std::int64_t>>(Encode(seen), seen.utime);
       }

@@ -2,19 +2,15 @@
 // they claim to be.
 #include "bench/straightforward.h"
 
-#include <algorithm>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bench/latencies.h"
 #include "bench/tasks.h"
 #include "forereach/certify/certifier.h"
 #include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach::bench {
-namespace straightforward_test {
+namespace forereach::bench::straightforward_test {
 
 constexpr double kTolerance = 1e-9;
 
@@ -59,8 +55,7 @@ int ExpectSame(const std::shared_ptr<const Problem>& problem, const Eigen::Matri
 TEST(StraightforwardTest, AgreesOnRandomTasks) {
   int steps = 0, questions = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    Random random(seed);
-    SCOPED_TRACE(random.trace());
+    TracedRandom random(seed);
     const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 60));
     problem->method = Method::kPaper;
     ASSERT_FALSE(Straightforward(problem, PlainModelOf(*problem)).FindViolation());
@@ -121,5 +116,4 @@ TEST(TasksTest, FewerObservationsAreTheFirstOfMore) {
   EXPECT_EQ(few.problem->transitions.x_next, more.problem->transitions.x_next.topRows(25));
 }
 
-}  // namespace straightforward_test
-}  // namespace forereach::bench
+}  // namespace forereach::bench::straightforward_test

@@ -1,17 +1,5 @@
 // `forereach advise`: the shipped abstentions, a recorded course, and answers that are about time.
-#include <filesystem>
-#include <map>
-#include <memory>
-#include <random>
-#include <string>
-#include <tuple>
-#include <utility>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "cli/abstention_advice.h"
@@ -22,13 +10,8 @@
 #include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace advise_test {
-
-using testing::AllOf;
-using testing::HasSubstr;
+namespace forereach::advise_test {
 
 const std::string kCourse = "tests/data/course.lcmlog --config tests/data/course.yaml";
 
@@ -208,8 +191,7 @@ TEST_F(AdviseTest, NamesTheQueueLengthAndTheTimeoutThatSuffice) {
 
   abstention.decision.cause = decision_t::CAUSE_NO_OBSTACLES;
   EXPECT_FALSE(RemedyFor(abstention)->turns) << "none was ever heard";
-  obstacles_t seen{};
-  seen.utime = abstention.decision.utime - 1'250'000;
+  obstacles_t seen{.utime = abstention.decision.utime - 1'250'000};
   abstention.last_obstacles =
       std::make_shared<std::pair<std::vector<std::uint8_t>, std::int64_t>>(Encode(seen), seen.utime);
   const Remedy silence = RemedyFor(abstention).value();
@@ -272,5 +254,4 @@ TEST_F(AdviseTest, RefusesAFileThatIsNoRecord) {
               HasSubstr("judged again by what is recorded: certified"));
 }
 
-}  // namespace advise_test
-}  // namespace forereach
+}  // namespace forereach::advise_test

@@ -1,29 +1,15 @@
 // The `forereach` program as a person or a script calls it.
-#include <algorithm>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <limits>
 #include <regex>
-#include <set>
-#include <sstream>
-#include <tuple>
-#include <utility>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 
-namespace {
+namespace forereach::cli_test {
 
-using forereach::Forereach, forereach::Output, forereach::Read;
-using testing::HasSubstr;
 using Json = nlohmann::json;
 
 Json CertifyJson(const std::string& config, const std::string& plan) {
@@ -89,7 +75,7 @@ TEST(CertifyJsonTest, SaysWhenItHoldsAndWhatItIsAbout) {
 
 // The pedestrian is seen only from 10 s on, when the plan has ended.
 TEST(CertifyJsonTest, AnObstacleThatIsNowhereHasNoClearance) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   std::string task = Read(FOREREACH_SOURCE_DIR "/config/pedestrian.yaml");
   task = std::regex_replace(task, std::regex("growth: 0.2\\}"), "growth: 0.2, from: 10}");
   task = std::regex_replace(task, std::regex("transitions: "), "transitions: " FOREREACH_SOURCE_DIR "/config/");
@@ -106,12 +92,12 @@ TEST(CertifyJsonTest, AnObstacleThatIsNowhereHasNoClearance) {
 }
 
 TEST(CertifyJsonTest, SaysWhichDisturbanceItAllowsFor) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   std::string task = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
   task = std::regex_replace(task, std::regex("transitions: "), "transitions: " FOREREACH_SOURCE_DIR "/config/");
   const std::string noise = "  noise_bound: [0, 0, 0, 0, 0, 0]\n";
   const auto with = [&](const std::string& bounds) {
-    return scratch.Write("task.yaml", forereach::Replaced(task, noise, noise + "  disturbance: [" + bounds + "]\n"));
+    return scratch.Write("task.yaml", Replaced(task, noise, noise + "  disturbance: [" + bounds + "]\n"));
   };
   const std::string plan = " --plan config/plans/bicycle_certified.csv", decision_path = scratch / "decision.json";
   std::string path = with("0, 0, 1e-4, 0.01, 0, 0");
@@ -211,7 +197,7 @@ TEST(CertifyJsonTest, AnAbstentionFNamesThePairAndWhatTheDeclarationAllows) {
 }
 
 TEST(CertifyJsonTest, WithoutObstaclesThereIsNoClosestOne) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   std::string text = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
   text = std::regex_replace(text, std::regex("obstacles:\n *- circle.*"), "obstacles: []");
   text = std::regex_replace(text, std::regex("transitions: data"), "transitions: " FOREREACH_SOURCE_DIR "/config/data");
@@ -297,7 +283,7 @@ TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
 
 // Each is refused with 2 and says what cannot be used.
 TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   scratch.Write("empty", "");
   const std::string certify = "certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv";
   const std::string plan = "plan --config config/demo.yaml --out " + (scratch / "x.csv");
@@ -360,7 +346,7 @@ TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
 }
 
 TEST(Keygen, AgainReplacesOneKeyAndSaysWhoNeedsWhichFile) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   const std::string keys = scratch / "keys";
   ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
   const Output output = Forereach("keygen --robot alpha " + keys + " --again planner 2>&1");
@@ -407,7 +393,7 @@ TEST(Program, CommandsForARunningSystemLoadNoLibraryOfTheOthers) {
 // that the examples use, too. "old" is the same run. Not run: what needs a bus, and declare's covers, which take long
 // and have tests of their own.
 TEST(Help, EveryExampleRuns) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   std::filesystem::create_directory_symlink(FOREREACH_SOURCE_DIR "/config", scratch / "config");
   std::filesystem::create_directory_symlink("run", scratch / "old");
   std::filesystem::create_directories(scratch / "bin");
@@ -454,7 +440,7 @@ std::string LineAfter(const std::string& text, const std::string& mark) {
 
 TEST_P(PlanCommand, SuggestsACommandThatExitsWithZero) {
   const auto& [task, seed] = GetParam();
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   const std::string file = scratch / "a plan's.csv", config = std::string("config/") + task + ".yaml";
   const Output planned =
       Forereach("plan --config " + config + " --out \"" + file + "\" --seed " + std::to_string(seed));
@@ -477,7 +463,7 @@ INSTANTIATE_TEST_SUITE_P(ShippedTasks, PlanCommand,
                          testing::Combine(testing::Values("demo", "policy"), testing::Range(0, 12)));
 
 TEST(Plan, TheSameSeedGivesTheSamePlan) {
-  const forereach::ScratchDirectory scratch;
+  const ScratchDirectory scratch;
   for (const char* file : {"a.csv", "b.csv"})
     ASSERT_EQ(Forereach("plan --config config/demo.yaml --seed 5 --out " + (scratch / file)).code, 0);
   EXPECT_EQ(Read(scratch / "a.csv"), Read(scratch / "b.csv"));
@@ -486,7 +472,7 @@ TEST(Plan, TheSameSeedGivesTheSamePlan) {
 using Replacements = std::vector<std::pair<std::string, std::string>>;
 
 // The field of circles with parts of its text replaced.
-std::string DemoWith(const forereach::ScratchDirectory& scratch, const Replacements& replacements) {
+std::string DemoWith(const ScratchDirectory& scratch, const Replacements& replacements) {
   std::string text = Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml");
   const auto replace = [&text](const std::string& what, const std::string& with) {
     const std::size_t at = text.find(what);
@@ -513,7 +499,7 @@ TEST(Plan, SaysWhyWhenNoPlanIsFound) {
                {{{"  goal: [120, 0]\n", ""}}, 2, "planner.goal: missing"},
                {{{"algorithm: kpiece", "algorithm: magic"}}, 2, "planner.algorithm: magic"}};
   for (const auto& c : cases) {
-    const forereach::ScratchDirectory scratch;
+    const ScratchDirectory scratch;
     const std::string out = scratch / "plan.csv";
     const Output output = Forereach("plan --config " + DemoWith(scratch, c.task) + " --out " + out + " 2>&1");
     EXPECT_EQ(output.code, c.code) << output.text;
@@ -583,4 +569,4 @@ TEST(Readme, CodeIsTheInstalledExample) {
   EXPECT_EQ(blocks[0], Read(FOREREACH_SOURCE_DIR "/tests/install/main.cpp"));
 }
 
-}  // namespace
+}  // namespace forereach::cli_test

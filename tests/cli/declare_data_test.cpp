@@ -1,24 +1,13 @@
 // `forereach declare --from-data` and `--hold-out`: what they propose goes into a task file, and what they say is true.
-#include <filesystem>
-#include <fstream>
-#include <numbers>
-#include <random>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace declare_data_test {
+namespace forereach::declare_data_test {
 
-using testing::HasSubstr;
-using testing::Not;
 using Json = nlohmann::json;
 
 class DeclareDataTest : public testing::Test {
@@ -161,5 +150,4 @@ TEST_F(DeclareDataTest, BadInputIsExitTwo) {
   EXPECT_EQ(Forereach("declare --config " + task_ + " --hold-out 2>&1").code, 2) << "it needs --from-data";
 }
 
-}  // namespace declare_data_test
-}  // namespace forereach
+}  // namespace forereach::declare_data_test

@@ -1,11 +1,7 @@
 // `forereach declare`: its matrix, its cover, and the results of --check for valid and altered covers.
-#include <filesystem>
-#include <fstream>
 #include <regex>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "identify/cover_file.h"
 #include "task/config.h"
@@ -14,10 +10,8 @@
 #include "tests/paths.h"
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace declare_test {
+namespace forereach::declare_test {
 
-using testing::HasSubstr;
 using Json = nlohmann::json;
 
 // The bicycle's task with another residual section.
@@ -351,5 +345,4 @@ TEST(DeclareHelp, ShowsOptionsExitCodesAndAnExample) {
     EXPECT_THAT(output.text, HasSubstr(text));
 }
 
-}  // namespace declare_test
-}  // namespace forereach
+}  // namespace forereach::declare_test

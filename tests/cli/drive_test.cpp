@@ -1,20 +1,10 @@
 // `forereach run` drives a robot with each model of the library to its goal.
-#include <algorithm>
-#include <filesystem>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "tests/cli/program.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace drive_test {
+namespace forereach::drive_test {
 
 using Json = nlohmann::json;
 
@@ -60,5 +50,4 @@ std::vector<std::string> Drives() {
 
 INSTANTIATE_TEST_SUITE_P(Models, Drive, testing::ValuesIn(Drives()), [](const auto& info) { return info.param; });
 
-}  // namespace drive_test
-}  // namespace forereach
+}  // namespace forereach::drive_test

@@ -1,21 +1,13 @@
 // `forereach fit`: what it prints goes into a task file, and what cannot be fitted is refused.
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/dynamics/model.h"
 #include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace fit_test {
+namespace forereach::fit_test {
 
-using testing::HasSubstr;
 using Json = nlohmann::json;
 
 class FitCommandTest : public testing::Test {
@@ -82,5 +74,4 @@ TEST_F(FitCommandTest, BadInputIsExitTwo) {
   EXPECT_THAT(compiled.text, HasSubstr("only the parameters of a model as text can be fitted"));
 }
 
-}  // namespace fit_test
-}  // namespace forereach
+}  // namespace forereach::fit_test

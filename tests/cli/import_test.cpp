@@ -1,20 +1,13 @@
 // `forereach import`: a log in another's format becomes the transitions of a task; the commands of docs/data.md.
-#include <filesystem>
-#include <fstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace import_test {
+namespace forereach::import_test {
 
-using testing::HasSubstr;
 using Json = nlohmann::json;
 
 class ImportCommandTest : public testing::Test {
@@ -156,5 +149,4 @@ TEST(DataDocument, CommandsPrintWhatItSays) {
   EXPECT_GE(commands, 1);
 }
 
-}  // namespace import_test
-}  // namespace forereach
+}  // namespace forereach::import_test

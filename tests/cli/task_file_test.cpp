@@ -1,13 +1,5 @@
 // `forereach init` and `forereach check`: a task to begin with, and what keeps one from certifying plans.
-#include <algorithm>
-#include <filesystem>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
@@ -16,16 +8,11 @@
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace task_file_test {
+namespace forereach::task_file_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
 
 const std::string kSource = FOREREACH_SOURCE_DIR;
 
@@ -536,5 +523,4 @@ TEST_F(CheckTest, PrintsItsFindingsEvenIfItCannotDrawThem) {
   EXPECT_EQ(Read(scratch_ / "out"), Forereach("check config/drive/quadrotor.yaml").text);
 }
 
-}  // namespace task_file_test
-}  // namespace forereach
+}  // namespace forereach::task_file_test

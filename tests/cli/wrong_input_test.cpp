@@ -1,14 +1,7 @@
 // Which task a log was recorded with, and inputs that are no log or none of this task: a sentence and exit 2.
-#include <filesystem>
-#include <fstream>
 #include <regex>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/decision_t.hpp"
 #include "records/database.h"
@@ -18,14 +11,8 @@
 #include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace wrong_input_test {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::wrong_input_test {
 
 namespace fs = std::filesystem;
 
@@ -263,9 +250,7 @@ TEST_F(KeptTaskTest, ADecisionOfATaskThatNobodyKnowsSpoilsItselfOnly) {
   const std::string copy = Copied(), log = In(copy, logs_->front());
   {
     EventLogWriter writer(log);
-    decision_t decision{};
-    decision.outcome = decision_t::CERTIFIED;
-    decision.sequence = 1 << 20;
+    decision_t decision{.sequence = 1 << 20, .outcome = decision_t::CERTIFIED};
     decision.config_digest[0] = 1;
     writer.Append(1, "PLAN_DECISION", Encode(decision));
     ASSERT_TRUE(writer.Flush());
@@ -287,5 +272,4 @@ TEST_F(KeptTaskTest, ADatabaseDoesNotLeadOutOfItsDirectory) {
   ExpectRefused("check-log " + copy, {"not in its directory"});
 }
 
-}  // namespace wrong_input_test
-}  // namespace forereach
+}  // namespace forereach::wrong_input_test

@@ -1,12 +1,9 @@
 // What a good task file means.
 #include "task/config.h"
 
-#include <fstream>
 #include <regex>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/models/residuals.h"
@@ -14,8 +11,7 @@
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace config_test {
+namespace forereach::config_test {
 
 Eigen::VectorXd Numbers(std::initializer_list<double> entries) {
   Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
@@ -128,12 +124,7 @@ TEST(LoadConfig, ReadsEveryOption) {
 
 // What the check says of the task; empty if it takes it.
 std::string Refusal(void (*require)(const Config&), const Config& config) {
-  try {
-    require(config);
-    return {};
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
+  return Thrown<ConfigError>([&] { require(config); });
 }
 
 std::string RefusalOnBus(const Config& config) { return Refusal(RequireForCertifyingOnBus, config); }
@@ -167,13 +158,9 @@ TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
   EXPECT_EQ(load(", obstacles_lost_ms: 600").gate.obstacles_lost_ms, 600);
   EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: never")), "");
   EXPECT_EQ(load(", obstacles_lost_ms: never").gate.obstacles_lost_ms, kNeverLost);
-  try {
-    static_cast<void>(load(", obstacles_lost_ms: 599"));
-    ADD_FAILURE() << "it is taken";
-  } catch (const ConfigError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr(
-                                  "gate.obstacles_lost_ms: 599 is less than 1.5 times gate.obstacles_timeout_ms, 400"));
-  }
+  EXPECT_THAT([&] { static_cast<void>(load(", obstacles_lost_ms: 599")); },
+              ThrowsMessage<ConfigError>(testing::HasSubstr(
+                  "gate.obstacles_lost_ms: 599 is less than 1.5 times gate.obstacles_timeout_ms, 400")));
 }
 
 TEST(LoadConfig, TheDelayOfTheBusHasADefaultAndMayBeDeclared) {
@@ -217,9 +204,8 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
 
 // The bicycle of tests/data/field.yaml with this for its projection.
 std::string BicycleWith(const std::string& body) {
-  std::ostringstream text;
-  text << std::ifstream(FOREREACH_SOURCE_DIR "/tests/data/field.yaml").rdbuf();
-  const std::string task = std::regex_replace(text.str(), std::regex("  between: .*\n"), "");
+  const std::string task =
+      std::regex_replace(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"), std::regex("  between: .*\n"), "");
   return Replaced(Replaced(task, "  projection: [x, y]\n", body),
                   "\ntransitions: ../../config/data/demo_transitions.csv",
                   "\ntransitions: " FOREREACH_SOURCE_DIR "/config/data/demo_transitions.csv");
@@ -452,5 +438,4 @@ TEST(Schema, EveryKeyStandsInAMapOrList) {
   }
 }
 
-}  // namespace config_test
-}  // namespace forereach
+}  // namespace forereach::config_test

@@ -2,31 +2,19 @@
 #include "task/csv.h"
 
 #include <bit>
-#include <cstring>
-#include <limits>
-#include <random>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "task/config.h"
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace csv_test {
-
-using testing::HasSubstr;
+namespace forereach::csv_test {
 
 class CsvTest : public testing::Test {
  protected:
   std::string Error(const std::string& text) {
-    try {
-      (void)ReadCsv(files_.Write("t.csv", text), {"a", "b"});
-      return {};
-    } catch (const ConfigError& error) {
-      return std::string(error.what()).substr((files_ / "").size());
-    }
+    return files_.Cut(Thrown<ConfigError>([&] { (void)ReadCsv(files_.Write("t.csv", text), {"a", "b"}); }));
   }
 
   ScratchDirectory files_;
@@ -150,5 +138,4 @@ TEST_F(CsvTest, PlansHaveOneToTheLargestNumberOfSteps) {
               testing::ThrowsMessage<ConfigError>(HasSubstr("p.csv:130: 129 steps are outside [1, 128]")));
 }
 
-}  // namespace csv_test
-}  // namespace forereach
+}  // namespace forereach::csv_test

@@ -1,16 +1,12 @@
 // Digests: the same for the same data however it is written, another for other data.
 #include "task/canonical.h"
 
-#include <cmath>
-#include <set>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace digest_test {
+namespace forereach::digest_test {
 
 using Eigen::Vector2d;
 
@@ -138,5 +134,4 @@ TEST(CanonicalBytes, MatchTheSpecifiedBytes) {
   EXPECT_EQ(bytes.digest(), DigestOf(std::string_view(expected)));
 }
 
-}  // namespace digest_test
-}  // namespace forereach
+}  // namespace forereach::digest_test

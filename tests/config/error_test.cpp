@@ -1,14 +1,9 @@
 // What is wrong with a task file: one error that names file, line, key, value and bound.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace error_test {
-
-using testing::HasSubstr;
-using testing::StartsWith;
+namespace forereach::error_test {
 
 class ErrorTest : public testing::Test {
  protected:
@@ -563,5 +558,4 @@ TEST_F(ErrorTest, AMissingFileOrADirectoryIsAnError) {
               testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
 }
 
-}  // namespace error_test
-}  // namespace forereach
+}  // namespace forereach::error_test

@@ -1,11 +1,7 @@
 // docs/expressions.md is true: its models load, its expressions have their values, its errors are what is said.
-#include <array>
-#include <fstream>
 #include <regex>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "command_line/nearest.h"
 #include "forereach/dynamics/equations_header.h"
@@ -15,15 +11,9 @@
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace expressions_document_test {
+namespace forereach::expressions_document_test {
 
-std::string Document() {
-  std::ifstream file(FOREREACH_SOURCE_DIR "/docs/expressions.md");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
+std::string Document() { return Read(FOREREACH_SOURCE_DIR "/docs/expressions.md"); }
 
 // The rows of the table below the line `head`, without their bars; each has `columns` cells.
 std::vector<std::vector<std::string>> Rows(const std::string& head) {
@@ -153,5 +143,4 @@ TEST(ExpressionsDocument, AStepThatIsWrittenOutIsTheIntegrators) {
   EXPECT_THROW(static_cast<void>(EquationsHeader(*staged->text(), "robot", "")), ExportError);
 }
 
-}  // namespace expressions_document_test
-}  // namespace forereach
+}  // namespace forereach::expressions_document_test

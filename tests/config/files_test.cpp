@@ -6,29 +6,20 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <condition_variable>
 #include <cstdio>
-#include <filesystem>
-#include <functional>
-#include <memory>
 #include <mutex>
-#include <thread>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bus/reloading.h"
 #include "task/config.h"
 #include "task/csv.h"
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace files_test {
+namespace forereach::files_test {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 class FilesTest : public testing::Test {
  protected:
@@ -232,5 +223,4 @@ TEST_F(ReloadingTest, PassesOnTheExceptionOfTheReader) {
   EXPECT_EQ(reloads.Take(), std::nullopt);
 }
 
-}  // namespace files_test
-}  // namespace forereach
+}  // namespace forereach::files_test

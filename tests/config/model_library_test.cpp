@@ -1,20 +1,13 @@
 // The models in config/models: each is there, says where it comes from, and has the values that other code computes.
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <random>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <Eigen/Dense>
+
+#include "tests/test.h"
 
 #include "forereach/numerics/size.h"
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace model_library_test {
+namespace forereach::model_library_test {
 
 const std::string kDirectory = FOREREACH_SOURCE_DIR "/config/models/";
 
@@ -242,10 +235,7 @@ TEST(ModelLibrary, EachFileIsTestedHere) {
 
 TEST(ModelLibrary, EachFileSaysItsSourceAndUnits) {
   for (const Case& one : Cases()) {
-    std::ifstream file(kDirectory + one.file + ".yaml");
-    std::ostringstream text;
-    text << file.rdbuf();
-    EXPECT_THAT(text.str(), testing::HasSubstr("\n# Source: ")) << one.file;
+    EXPECT_THAT(Read(kDirectory + one.file + ".yaml"), testing::HasSubstr("\n# Source: ")) << one.file;
     const auto loaded = Load(one);
     const ModelText& model = *loaded->text();
     EXPECT_EQ(model.name, one.file);
@@ -255,13 +245,11 @@ TEST(ModelLibrary, EachFileSaysItsSourceAndUnits) {
 }
 
 TEST(ModelLibrary, TheReadmeListsEachFile) {
-  std::ifstream file(FOREREACH_SOURCE_DIR "/config/README.md");
-  std::ostringstream text;
-  text << file.rdbuf();
+  const std::string text = Read(FOREREACH_SOURCE_DIR "/config/README.md");
   for (const Case& one : Cases()) {
     const auto bar = [](std::size_t count) { return std::to_string(count) + " [|]"; };
-    EXPECT_THAT(text.str(), testing::ContainsRegex("`models/" + std::string(one.file) + ".yaml` [|] [^|]* [|] " +
-                                                   bar(one.middle.size() - one.inputs) + " " + bar(one.inputs)));
+    EXPECT_THAT(text, testing::ContainsRegex("`models/" + std::string(one.file) + ".yaml` [|] [^|]* [|] " +
+                                             bar(one.middle.size() - one.inputs) + " " + bar(one.inputs)));
   }
 }
 
@@ -289,5 +277,4 @@ TEST(ModelLibrary, EquationsAreThoseOfTheSource) {
   }
 }
 
-}  // namespace model_library_test
-}  // namespace forereach
+}  // namespace forereach::model_library_test

@@ -1,18 +1,13 @@
 // Models as text in task files: what they mean, and what is said of those that mean nothing.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
 #include "task/canonical.h"
 #include "tests/config/task_files.h"
 
-namespace forereach {
-namespace model_text_test {
+namespace forereach::model_text_test {
 
-using testing::AllOf;
-using testing::HasSubstr;
 using testing::MatchesRegex;
-using testing::StartsWith;
 
 // In the place of the first line of the good task. Errors are asserted by line and column.
 constexpr const char* kModel =
@@ -482,5 +477,4 @@ TEST_F(AnglesTest, OfAModelFileMayBeReplaced) {
               HasSubstr("task.yaml:1: model.angles: u is no state"));
 }
 
-}  // namespace model_text_test
-}  // namespace forereach
+}  // namespace forereach::model_text_test

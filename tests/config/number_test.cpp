@@ -1,13 +1,10 @@
 #include "task/number.h"
 
 #include <clocale>
-#include <cmath>
-#include <string>
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-namespace forereach {
-namespace number_test {
+namespace forereach::number_test {
 
 TEST(ParseNumber, ReadsDecimals) {
   const std::pair<const char*, double> cases[] = {{"0", 0},
@@ -60,5 +57,4 @@ TEST(ParseInteger, ReadsIntegersOnly) {
   EXPECT_EQ(ParseInteger("017").problem, "has a leading zero");
 }
 
-}  // namespace number_test
-}  // namespace forereach
+}  // namespace forereach::number_test

@@ -1,10 +1,5 @@
 // The tasks in config/ have the described outcomes, and the README there agrees with the code.
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
@@ -15,19 +10,12 @@
 #include "tests/config/task_files.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace shipped_test {
+namespace forereach::shipped_test {
 
 const std::string kDirectory = FOREREACH_SOURCE_DIR "/config/";
 
-std::string Contents(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
-
 TEST(Shipped, ReadmeListsTheKeysOfTheSchema) {
-  const std::string readme = Contents(kDirectory + "README.md");
+  const std::string readme = Read(kDirectory + "README.md");
   const std::size_t keys = readme.find("## Keys\n");
   ASSERT_NE(keys, std::string::npos);
   EXPECT_EQ(readme.substr(keys), SchemaMarkdown()) << "everything from '## Keys' on is what `forereach keys` prints";
@@ -207,7 +195,7 @@ TEST(Shipped, ARobotsPlanHasToEndStanding) {
 
 // The first block of this kind in the README.
 std::string Block(const std::string& kind) {
-  const std::string readme = Contents(kDirectory + "README.md"), fence = "```" + kind + "\n";
+  const std::string readme = Read(kDirectory + "README.md"), fence = "```" + kind + "\n";
   const std::size_t begin = readme.find(fence) + fence.size();
   return readme.substr(begin, readme.find("```", begin) - begin);
 }
@@ -218,17 +206,16 @@ TEST(Shipped, TheReadmesExampleGetsTheAnswerItQuotes) {
   const Decision decision = Decide(config, Eigen::MatrixXd::Zero(2, 6));
   EXPECT_EQ(decision.outcome, Outcome::kCertified);
   EXPECT_EQ(decision.closest_step, 5);
-  EXPECT_THAT(Contents(kDirectory + "README.md"), testing::HasSubstr(Explain(decision, *config.problem)));
+  EXPECT_THAT(Read(kDirectory + "README.md"), testing::HasSubstr(Explain(decision, *config.problem)));
 }
 
 TEST(Shipped, TheReadmesErrorsAreThoseItQuotes) {
   const TaskFiles files;
-  const std::string task = Block("yaml"), steps = Block("csv"), readme = Contents(kDirectory + "README.md");
+  const std::string task = Block("yaml"), steps = Block("csv"), readme = Read(kDirectory + "README.md");
   for (const std::string& error : {files.Error(Replaced(task, "vx: {vx: 0.02", "vx: {vx: -0.02"), steps),
                                    files.Error(Replaced(task, "{lower: [-1, -1]", "{lower: [-1]"), steps),
                                    files.Error(task, Replaced(steps, "1,2,2.0,", "1,2,3.5,"))})
     EXPECT_THAT(readme, testing::HasSubstr("\n" + error + "\n"));
 }
 
-}  // namespace shipped_test
-}  // namespace forereach
+}  // namespace forereach::shipped_test

@@ -1,11 +1,8 @@
 /** Task files to try: a good one, and the same with one thing changed. */
 #pragma once
 
-#include <stdexcept>
-#include <string>
-
 #include "task/config.h"
-#include "tests/scratch.h"
+#include "tests/test.h"
 
 namespace forereach {
 
@@ -68,21 +65,11 @@ class TaskFiles {
   }
   /** What LoadConfig says, with the directory cut off; empty if it accepts the file. */
   std::string Error(const std::string& task, const std::string& transitions = kTransitions) const {
-    try {
-      (void)Load(task, transitions);
-      return {};
-    } catch (const ConfigError& error) {
-      return Cut(error.what());
-    }
+    return directory_.Cut(Thrown<ConfigError>([&] { (void)Load(task, transitions); }));
   }
   /** The error of the good task file with `to` in the place of `from`. */
   std::string ErrorWith(const std::string& from, const std::string& to) const {
     return Error(Replaced(kTask, from, to));
-  }
-  std::string Cut(std::string text) const {
-    const std::string prefix = directory_ / "";
-    for (std::size_t at; (at = text.find(prefix)) != std::string::npos;) text.erase(at, prefix.size());
-    return text;
   }
   const ScratchDirectory& directory() const { return directory_; }
 

@@ -1,19 +1,12 @@
 // The verifier's check of covers: whole ones hold; with a part missing, a bound lowered or a leaf moved they do not.
 #include "verifier/cover_check.h"
 
-#include <algorithm>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/declare/families.h"
 #include "verifier/ranges.h"
 
-namespace forereach::verifier {
-namespace cover_check_test {
-
-using testing::HasSubstr;
+namespace forereach::verifier::cover_check_test {
 
 SlopeClaim ClaimOf(const Family& family, int row, int column, double gap = 1e-7) {
   const SlopeBound bound = family.Bound(row, column, {gap});
@@ -194,5 +187,4 @@ TEST(SlopesOfATextTest, OverBoxesAreRanges) {
   for (int column = 0; column < 3; ++column) EXPECT_EQ(hidden.slopes.Occurs(0, column), column == 2);
 }
 
-}  // namespace cover_check_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::cover_check_test

@@ -1,15 +1,11 @@
 // Jets: derivatives against difference quotients in extended precision, kinks, zeros that stay zero.
 #include "forereach/dynamics/jet.h"
 
-#include <cmath>
-#include <random>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/saturation.h"
 
-namespace forereach {
-namespace jet_test {
+namespace forereach::jet_test {
 
 // One expression with every smooth operation of two arguments.
 template <class T>
@@ -88,5 +84,4 @@ TEST(Jet, SquareIsNotNegative) {
   EXPECT_EQ((x * x).slope, Interval(-4, 6));
 }
 
-}  // namespace jet_test
-}  // namespace forereach
+}  // namespace forereach::jet_test

@@ -1,15 +1,7 @@
 // Bounds on the motion between two samples: known suprema, motions that come close to them, and what has no bound.
 #include "forereach/declare/motion_bound.h"
 
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/declare/mean_value.h"
 #include "forereach/dynamics/models/kinematic_bicycle.h"
@@ -17,8 +9,7 @@
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 
-namespace forereach {
-namespace motion_bound_test {
+namespace forereach::motion_bound_test {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kGap = 1e-5;
@@ -472,5 +463,4 @@ TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
   EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).triples, 1);
 }
 
-}  // namespace motion_bound_test
-}  // namespace forereach
+}  // namespace forereach::motion_bound_test

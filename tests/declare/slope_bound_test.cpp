@@ -1,18 +1,13 @@
 // Suprema of slopes: known ones of made-up residuals, the paper's, over parameter boxes, over balls.
 #include "forereach/declare/slope_bound.h"
 
-#include <array>
-#include <cmath>
-#include <random>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/residuals.h"
 #include "research/equations_slopes.h"
 #include "tests/declare/families.h"
 
-namespace forereach {
-namespace slope_bound_test {
+namespace forereach::slope_bound_test {
 
 // Slopes 3 c (x^2 - y^2) and -6 c x y; the second has kinks.
 Family Cubic(const Domain& domain, const Interval& c = {1, 1}) {
@@ -300,5 +295,4 @@ TEST(SlopeBound, OverParameterBoxesGrowsAndContainsSamples) {
   }
 }
 
-}  // namespace slope_bound_test
-}  // namespace forereach
+}  // namespace forereach::slope_bound_test

@@ -1,16 +1,5 @@
 // `forereach export`: each format read back by a reader that shares nothing with its writer.
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <map>
-#include <random>
-#include <set>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -28,16 +17,11 @@
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
-#include "tests/scratch.h"
 #include "tests/tries.h"
 
-namespace forereach {
-namespace export_test {
+namespace forereach::export_test {
 
 using nlohmann::json;
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
 
 const std::string kCourse = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
@@ -344,8 +328,7 @@ TEST_F(ExportTest, AHostileLogIsExported) {
     certified_plan_t certified{};
     certified.plan = candidate;
     writer.Append(4, "PLAN_CERTIFIED", Encode(certified));
-    withdrawal_t withdrawal{};
-    withdrawal.cause = withdrawal_t::OBSTACLE;
+    withdrawal_t withdrawal{.cause = withdrawal_t::OBSTACLE};
     for (int i = 0; i < 3; ++i) {
       withdrawal.sequence = withdrawal.utime = i;
       writer.Append(5 + i, "PLAN_WITHDRAWN", Encode(withdrawal));
@@ -581,5 +564,4 @@ TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {
   EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 2u * kCourseDecisions + 1);
 }
 
-}  // namespace export_test
-}  // namespace forereach
+}  // namespace forereach::export_test

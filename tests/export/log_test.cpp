@@ -1,24 +1,13 @@
 // `forereach log`: listing, cutting and merging logs, damaged ones too.
-#include <algorithm>
-#include <filesystem>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "records/log_edit.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace log_test {
-
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::log_test {
 
 const std::string kCourse = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 
@@ -177,5 +166,4 @@ TEST_F(LogTest, RefusesWhatItCannotDoAndSaysWhy) {
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "x"));
 }
 
-}  // namespace log_test
-}  // namespace forereach
+}  // namespace forereach::log_test

@@ -1,19 +1,9 @@
 // Every field of every message type is in its JSON, and counts in a message are not believed.
 #include "records/message_json.h"
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <map>
-#include <random>
 #include <regex>
-#include <set>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
@@ -31,8 +21,7 @@
 #include "tests/paths.h"
 #include "tests/tries.h"
 
-namespace forereach {
-namespace message_json_test {
+namespace forereach::message_json_test {
 
 using nlohmann::json;
 
@@ -88,16 +77,13 @@ TEST(MessageJson, CountsOfAMessageAreBounded) {
   EXPECT_EQ(object["plan"]["control"].size(), 128u);
   certified.plan.num_states = certified.plan.num_inputs = certified.plan.num_steps = -32768;
   EXPECT_EQ(json::parse(ToJsonMessage(Encode(certified))->json)["slice_lower"].size(), 0u);
-  obstacles_t obstacles{};
-  obstacles.num_obstacles = 32767;
+  obstacles_t obstacles{.num_obstacles = 32767};
   EXPECT_EQ(json::parse(ToJsonMessage(Encode(obstacles))->json)["obstacle"].size(), 64u);
 }
 
 TEST(MessageJson, NumbersThatAreNotFiniteAreLeftOut) {
-  decision_t decision{};
-  decision.outcome = decision_t::CERTIFIED;
-  decision.margin = std::numeric_limits<double>::infinity();
-  decision.threshold = std::nan("");
+  decision_t decision{
+      .outcome = decision_t::CERTIFIED, .margin = std::numeric_limits<double>::infinity(), .threshold = std::nan("")};
   const json object = json::parse(ToJsonMessage(Encode(decision))->json);
   EXPECT_FALSE(object.contains("margin"));
   EXPECT_FALSE(object.contains("threshold"));
@@ -106,9 +92,7 @@ TEST(MessageJson, NumbersThatAreNotFiniteAreLeftOut) {
 }
 
 TEST(MessageJson, AnAdviceIsOfTheCandidateThatItIsAbout) {
-  advice_t advice{};
-  advice.plan_id = 7;
-  advice.outcome = decision_t::ABSTAIN_SAFETY;
+  advice_t advice{.plan_id = 7, .outcome = decision_t::ABSTAIN_SAFETY};
   advice.plan_digest[31] = 9;
   const auto summary = Summarize(Encode(advice));
   ASSERT_TRUE(summary && summary->is_of_plan);
@@ -175,5 +159,4 @@ TEST(MessageJson, AnyMessageFitsItsSchema) {
   TryAnyBytes<withdrawal_t>(random);
 }
 
-}  // namespace message_json_test
-}  // namespace forereach
+}  // namespace forereach::message_json_test

@@ -1,18 +1,12 @@
 // Signed messages: which are refused, and that only the message, its role and its freshness decide.
 #include "bus/authentic.h"
 
-#include <limits>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bus/authentic_bus.h"
 #include "tests/keys.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace authentic_test {
+namespace forereach::authentic_test {
 
 constexpr std::int64_t kBegun = 1'000'000;
 constexpr std::int64_t kClock = kBegun + 1000;  // of the receiver
@@ -380,5 +374,4 @@ TEST(SignedBus, DoesNotSpeakAsAnotherRole) {
   EXPECT_TRUE(bus->Publish("nobody's", Bytes(kMessage)));
 }
 
-}  // namespace authentic_test
-}  // namespace forereach
+}  // namespace forereach::authentic_test

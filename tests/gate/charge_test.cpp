@@ -1,14 +1,10 @@
 #include "certifier/gate/charge.h"
 
 #include <deque>
-#include <random>
-#include <string>
-#include <vector>
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-namespace forereach {
-namespace charge_test {
+namespace forereach::charge_test {
 
 using State = Charge::State;
 
@@ -179,5 +175,4 @@ TEST(ChargeTest, ExactlyOneIsInChargeAfterAnyLossPauseOrRestart) {
   }
 }
 
-}  // namespace charge_test
-}  // namespace forereach
+}  // namespace forereach::charge_test

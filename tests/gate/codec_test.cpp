@@ -1,11 +1,6 @@
 #include "lcmtypes/codec.h"
 
-#include <map>
-#include <random>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/advice_change_t.hpp"
 #include "forereach/advice_t.hpp"
@@ -23,8 +18,7 @@
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 
-namespace forereach {
-namespace codec_test {
+namespace forereach::codec_test {
 
 // The contract with everything that is recorded or built against these messages. From 0.1.0 on, a changed type is a new
 // type with a new name, and a new line here; no line ever changes.
@@ -149,5 +143,4 @@ TEST(DigestTest, GoesIntoAFieldAndBack) {
   EXPECT_EQ(GetDigest(decision.plan_digest), digest);
 }
 
-}  // namespace codec_test
-}  // namespace forereach
+}  // namespace forereach::codec_test

@@ -1,14 +1,9 @@
 // The ledger of certified plans: a measured state against the slice of the step it is at.
 #include "certifier/gate/plan_ledger.h"
 
-#include <cmath>
-#include <limits>
-#include <numbers>
+#include "tests/test.h"
 
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace conformance_test {
+namespace forereach::conformance_test {
 
 // Slices [t, t + 1] in both coordinates, T = 3.
 certified_plan_t Plan(std::int64_t plan_id) {
@@ -213,5 +208,4 @@ TEST_F(ConformanceTest, TheLastPlansAreRemembered) {
   EXPECT_TRUE(ledger_.FindDeparture(At(20, count, 0, 100, 100)));
 }
 
-}  // namespace conformance_test
-}  // namespace forereach
+}  // namespace forereach::conformance_test

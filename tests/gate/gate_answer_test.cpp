@@ -1,14 +1,5 @@
 // The gate's answer to an admitted candidate: outcomes, witnesses, digests, slices, counts.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <stdexcept>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
@@ -16,12 +7,7 @@
 #include "lcmtypes/seal.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace gate_answer_test {
-
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::Not;
+namespace forereach::gate_answer_test {
 
 class GateAnswerTest : public testing::Test {
  protected:
@@ -114,10 +100,7 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
 
 TEST_F(GateAnswerTest, ACertificateNamesTheTransitionsOfTheTaskWithoutWhatWasLearned) {
   Gate gate(config_);
-  transition_t learned{};
-  learned.utime = kNow;
-  learned.num_states = 4;
-  learned.num_inputs = 2;
+  transition_t learned{.utime = kNow, .num_states = 4, .num_inputs = 2};
   ASSERT_EQ(gate.Learn(Encode(learned)), "");
   const GateAnswer answer = gate.Decide(Encode(Candidate(7)), kNow);
   ASSERT_TRUE(answer.certified);
@@ -401,9 +384,7 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
   Config config = SmallTask();
   config.gate.learns = true;
   Gate gate(config);
-  transition_t good{};
-  good.num_states = 4;
-  good.num_inputs = 2;
+  transition_t good{.num_states = 4, .num_inputs = 2};
   const auto expect_refused = [&](auto change, const char* why) {
     transition_t bad = good;
     change(bad);
@@ -436,5 +417,4 @@ TEST(CandidateMessageTest, TheStartIsReadFromTheBytesAsADecoderReadsIt) {
   EXPECT_EQ(StartOf(bytes), INT64_MAX);
 }
 
-}  // namespace gate_answer_test
-}  // namespace forereach
+}  // namespace forereach::gate_answer_test

@@ -1,19 +1,13 @@
 // Random mutations of valid candidates, and the same bytes twice.
-#include <array>
 #include <bit>
-#include <iostream>
-#include <limits>
-#include <random>
-#include <string>
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace gate_mutation_test {
+namespace forereach::gate_mutation_test {
 
 class Mutator {
  public:
@@ -208,5 +202,4 @@ TEST(GateReplayTest, TheSameBytesAndClockGiveTheSameAnswers) {
   EXPECT_GT(certified, 100);
 }
 
-}  // namespace gate_mutation_test
-}  // namespace forereach
+}  // namespace forereach::gate_mutation_test

@@ -1,12 +1,7 @@
 // Obstacles that arrive on the bus, and the decisions bound to them.
-#include <functional>
 #include <initializer_list>
-#include <limits>
-#include <memory>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
@@ -14,10 +9,8 @@
 #include "task/step_time.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace gate_obstacles_test {
+namespace forereach::gate_obstacles_test {
 
-using testing::HasSubstr;
 using Shorts = std::initializer_list<std::int16_t>;
 
 const std::vector<Obstacle> kFarAway = {Obstacle::Circle(Eigen::Vector2d(0, 15), 1)};
@@ -602,5 +595,4 @@ TEST(GateMovingTest, StartsBeyondTheLatestTimeOfAScheduleAreRejected) {
   }
 }
 
-}  // namespace gate_obstacles_test
-}  // namespace forereach
+}  // namespace forereach::gate_obstacles_test

@@ -1,21 +1,15 @@
 // Every refusal of the gate, at its boundary, with its own cause.
-#include <functional>
 #include <initializer_list>
-#include <limits>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/freshness.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace gate_refusal_test {
+namespace forereach::gate_refusal_test {
 
-using testing::HasSubstr;
 using Shorts = std::initializer_list<std::int16_t>;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
@@ -333,5 +327,4 @@ TEST(FreshnessTest, IsFreshUpToItsBoundsAndForExtremeStamps) {
   EXPECT_EQ(FreshnessOf(kMax, kMax, 0, 0), kFresh);
 }
 
-}  // namespace gate_refusal_test
-}  // namespace forereach
+}  // namespace forereach::gate_refusal_test

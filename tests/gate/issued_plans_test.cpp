@@ -1,13 +1,9 @@
 // The ledger of certified plans: which of them may be executing, at the boundaries of time and step.
 #include "certifier/gate/plan_ledger.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-namespace forereach {
-namespace issued_plans_test {
-
-using testing::HasSubstr;
+namespace forereach::issued_plans_test {
 
 constexpr std::int64_t kStep = 100'000, kLifetime = 2'000'000, kAge = 500'000, kSteady = 5'000'000;
 constexpr std::int64_t kWall = 1'700'000'000'000'000;
@@ -142,5 +138,4 @@ TEST_F(IssuedPlansTest, AnotherCertifierBeginsTheToleranceAnewAReloadDoesNot) {
   EXPECT_EQ(Judge(Executing(1, 0), kLater + Life(128) + 1000), "") << "never for less than before";
 }
 
-}  // namespace issued_plans_test
-}  // namespace forereach
+}  // namespace forereach::issued_plans_test

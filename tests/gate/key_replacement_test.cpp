@@ -2,15 +2,7 @@
 // disk.
 #include <cerrno>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <map>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -18,10 +10,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/test.h"
+
 #include "bus/authentic.h"
 #include "bus/keys.h"
 #include "tests/keys.h"
-#include "tests/scratch.h"
 
 namespace {
 
@@ -49,30 +42,15 @@ extern "C" int renameat2(int from_at, const char* from, int to_at, const char* t
   return IsLast() ? -1 : static_cast<int>(::syscall(SYS_renameat2, from_at, from, to_at, to, flags));
 }
 
-namespace forereach {
-namespace key_replacement_test {
+namespace forereach::key_replacement_test {
 
-using testing::HasSubstr;
-using testing::Not;
 namespace fs = std::filesystem;
 
 constexpr const char* kBus = "the bus";
 constexpr std::int64_t kBegun = 1'000'000;
 const std::vector<std::uint8_t> kSaid{1, 2, 3};
 
-std::string WhyRefused(const std::function<void()>& replace) {
-  try {
-    replace();
-    return "";
-  } catch (const KeyError& error) {
-    return error.what();
-  }
-}
-
-std::string ContentOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string WhyRefused(const std::function<void()>& replace) { return Thrown<KeyError>(replace); }
 
 class KeyReplacement : public testing::Test {
  protected:
@@ -85,7 +63,7 @@ class KeyReplacement : public testing::Test {
   [[nodiscard]] std::map<std::string, std::string> Files() const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(scratch_.path()))
-      if (entry.is_regular_file()) files[entry.path()] = ContentOf(entry.path());
+      if (entry.is_regular_file()) files[entry.path()] = Read(entry.path());
     return files;
   }
 
@@ -101,7 +79,7 @@ std::string SecretOf(const std::string& file) {
 TEST_F(KeyReplacement, ChangesOneKeyAndNoOther) {
   for (const Role replaced : kAllRoles) {
     const KeyRing before = LoadAllKeys(keys_);
-    const std::string secret = SecretOf(ContentOf(File(std::string(RoleName(replaced)) + ".key")));
+    const std::string secret = SecretOf(Read(File(std::string(RoleName(replaced)) + ".key")));
     ASSERT_EQ(Replace(replaced), "");
     const KeyRing after = LoadAllKeys(keys_), open = LoadPublicKeys(File("verify.pub"));
     EXPECT_TRUE(before.Tag(kSaid) == after.Tag(kSaid)) << "the group key stays";
@@ -184,7 +162,7 @@ TEST_F(KeyReplacement, RefusesWhatIsNotTheWholeSetOfThisRobotAndChangesNothing) 
       refused([&] { fs::copy_file(File("robot.key"), File("logger.key"), fs::copy_options::overwrite_existing); }),
       HasSubstr("/keys/logger.key: line 3: role: has to be logger"));
   EXPECT_THAT(refused([&] {
-                std::string text = ContentOf(File("robot.key"));
+                std::string text = Read(File("robot.key"));
                 const std::size_t group = text.find("group ") + 6;
                 text[group] = text[group] == '0' ? '1' : '0';
                 std::ofstream(File("robot.key"), std::ios::trunc) << text;
@@ -318,5 +296,4 @@ TEST_F(KeyReplacement, ALinkADotAndAnyUmaskLeadToTheSame) {
   (void)LoadAllKeys(keys_);
 }
 
-}  // namespace key_replacement_test
-}  // namespace forereach
+}  // namespace forereach::key_replacement_test

@@ -2,38 +2,20 @@
 #include "bus/keys.h"
 
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/test.h"
+
 #include "tests/keys.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace keys_test {
-
-using testing::HasSubstr;
+namespace forereach::keys_test {
 
 std::string ProblemOf(const std::function<void()>& load) {
-  try {
-    load();
-    return "";
-  } catch (const KeyError& error) {
-    return error.what();
-  }
-}
-
-std::string TextOf(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
+  return Thrown<KeyError>([&] { load(); });
 }
 
 unsigned ModeOf(const std::string& path) {
@@ -69,8 +51,8 @@ TEST_F(KeyFiles, AreForTheirOwnerAloneAndOneForEachRole) {
     EXPECT_TRUE(LoadPublicKeys(keys_).IsSigned(role, {}, signature));
     EXPECT_TRUE(LoadAllKeys(keys_).Holds(role));
   }
-  EXPECT_THAT(TextOf(File("verify.pub")), testing::Not(HasSubstr("secret")));
-  EXPECT_THAT(TextOf(File("verify.pub")), testing::Not(HasSubstr("group")));
+  EXPECT_THAT(Read(File("verify.pub")), testing::Not(HasSubstr("secret")));
+  EXPECT_THAT(Read(File("verify.pub")), testing::Not(HasSubstr("group")));
   EXPECT_EQ(LoadPublicKeys(File("verify.pub")).robot(), "test");
 }
 
@@ -171,7 +153,7 @@ TEST_F(KeyFiles, ThatAreNoRegularFilesAreRefusedAndNotWaitedFor) {
 }
 
 TEST_F(KeyFiles, AreReadLineByLine) {
-  const std::string good = TextOf(File("planner.key"));
+  const std::string good = Read(File("planner.key"));
   std::vector<std::string> lines;
   std::istringstream text(good);
   for (std::string line; std::getline(text, line);) lines.push_back(line);
@@ -215,5 +197,4 @@ TEST_F(KeyFiles, AreReadLineByLine) {
   EXPECT_THAT(problem({""}), HasSubstr("line 1"));
 }
 
-}  // namespace keys_test
-}  // namespace forereach
+}  // namespace forereach::keys_test

@@ -1,22 +1,13 @@
 #include "lcmtypes/names.h"
 
-#include <algorithm>
 #include <cctype>
-#include <fstream>
-#include <limits>
-#include <map>
 #include <regex>
-#include <set>
-#include <sstream>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
 
-namespace forereach {
-namespace names_test {
+namespace forereach::names_test {
 
 using Constants = std::map<std::string, int>;
 
@@ -210,5 +201,4 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
   EXPECT_EQ(ConstantsOf("obstacle_shape_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
 }
 
-}  // namespace names_test
-}  // namespace forereach
+}  // namespace forereach::names_test

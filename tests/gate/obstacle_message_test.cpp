@@ -1,23 +1,13 @@
 // Obstacles as messages: shapes, and predictions in pieces.
 #include "certifier/gate/obstacle_message.h"
 
-#include <algorithm>
-#include <functional>
-#include <limits>
-#include <random>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "lcmtypes/codec.h"
 #include "task/canonical.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace obstacle_message_test {
-
-using testing::HasSubstr;
+namespace forereach::obstacle_message_test {
 
 constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max(), kLeast = -kMost - 1;
 const Obstacle kCircle = Obstacle::Circle(Eigen::Vector2d(1, 2), 0.5);
@@ -61,9 +51,7 @@ obstacle_t Gone(obstacle_t piece) {
 }
 
 obstacles_t Of(const std::vector<obstacle_t>& pieces, std::int64_t utime = kNow) {
-  obstacles_t message{};
-  message.utime = utime;
-  message.num_obstacles = static_cast<std::int16_t>(pieces.size());
+  obstacles_t message{.utime = utime, .num_obstacles = static_cast<std::int16_t>(pieces.size())};
   std::ranges::copy(pieces, message.obstacle);
   return message;
 }
@@ -73,12 +61,7 @@ std::vector<Obstacle> Taken(const std::vector<obstacle_t>& pieces, std::int64_t 
 }
 
 std::string WhyRefused(const obstacles_t& message) {
-  try {
-    (void)FromMessage(message, 2);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+  return Thrown<std::invalid_argument>([&] { (void)FromMessage(message, 2); });
 }
 std::string WhyRefused(const std::vector<obstacle_t>& pieces) { return WhyRefused(Of(pieces)); }
 
@@ -293,5 +276,4 @@ TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
   EXPECT_GT(refused, 1000);
 }
 
-}  // namespace obstacle_message_test
-}  // namespace forereach
+}  // namespace forereach::obstacle_message_test

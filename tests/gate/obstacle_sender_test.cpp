@@ -1,15 +1,12 @@
 #include "certifier/gate/obstacle_sender.h"
 
-#include <stdexcept>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace obstacle_sender_test {
+namespace forereach::obstacle_sender_test {
 
 const std::vector<Obstacle> kOne{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)};
 
@@ -143,5 +140,4 @@ TEST(ObstacleSenderTest, AtItsPeriodAGateKnowsWhereTwoMessagesInARowAreLost) {
   }
 }
 
-}  // namespace obstacle_sender_test
-}  // namespace forereach
+}  // namespace forereach::obstacle_sender_test

@@ -1,9 +1,8 @@
 #include "certifier/gate/pauses.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-namespace forereach {
-namespace pauses_test {
+namespace forereach::pauses_test {
 
 constexpr std::int64_t kEpoch = 1'700'000'000'000'000, kSecond = 1'000'000;
 
@@ -50,5 +49,4 @@ TEST(PausesTest, ManyPausesTakeNoMoreMemoryAndTheLastOnesCount) {
   EXPECT_EQ(pauses.Since(kEpoch), static_cast<std::int64_t>(Pauses::kRemembered) * kSecond);
 }
 
-}  // namespace pauses_test
-}  // namespace forereach
+}  // namespace forereach::pauses_test

@@ -1,20 +1,13 @@
 // The ledger of certified plans: they are judged again, how many controls stand, and when withdrawals are sent.
 #include "certifier/gate/plan_ledger.h"
 
-#include <cmath>
-#include <limits>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/transition_t.hpp"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace plans_in_force_test {
-
-using testing::HasSubstr;
+namespace forereach::plans_in_force_test {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr int kSteps = 10;  // of Candidate
@@ -688,5 +681,4 @@ TEST_F(PlansInForceTest, NoUnknownPlanStandsUnderADeclarationThatIsKnownToBeFals
   EXPECT_EQ(GetDigest(Due().value().observations_digest), Digest{}) << "no certificate names these";
 }
 
-}  // namespace plans_in_force_test
-}  // namespace forereach
+}  // namespace forereach::plans_in_force_test

@@ -1,11 +1,8 @@
 #include "lcmtypes/printable.h"
 
-#include <random>
+#include "tests/test.h"
 
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace printable_test {
+namespace forereach::printable_test {
 
 TEST(PrintableTest, LeavesOrdinaryTextUnchanged) {
   for (const char* text : {"", "PLAN_CANDIDATE", "a b/c~", "Stra\u00dfe, \u03b8, \u4e16, \U0001F916"}) {
@@ -48,5 +45,4 @@ TEST(PrintableTest, GivesOnlyPrintableTextForRandomBytes) {
   }
 }
 
-}  // namespace printable_test
-}  // namespace forereach
+}  // namespace forereach::printable_test

@@ -1,24 +1,13 @@
 // The seal of a certified plan: its parts, and that every change of the message breaks it.
 #include "lcmtypes/seal.h"
 
-#include <cmath>
-#include <cstring>
-#include <limits>
-#include <random>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "lcmtypes/grounds.h"
 #include "tests/robot/sealed_plan.h"
 
-namespace forereach {
-namespace seal_test {
+namespace forereach::seal_test {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
 using Kind = SealFault::Kind;
 
 constexpr int kAllStates = 16, kAllSlices = 129;
@@ -170,5 +159,4 @@ TEST(Seal, BreaksWhenTheCountsChange) {
     EXPECT_THAT(with(states, steps), ElementsAre(Kind::kPlanDigest, Kind::kUnusedEntry)) << states << " " << steps;
 }
 
-}  // namespace seal_test
-}  // namespace forereach
+}  // namespace forereach::seal_test

@@ -62,9 +62,7 @@ inline constexpr double kAccelerationThatCertifies = 0, kAccelerationIntoTheCirc
 /** Ten steps with a constant acceleration along px, sent now, to start in half a second. */
 inline candidate_plan_t Candidate(std::int64_t plan_id, double acceleration = kAccelerationThatCertifies,
                                   std::int64_t now_us = kNow) {
-  candidate_plan_t candidate{};
-  candidate.utime = now_us;
-  candidate.plan_id = plan_id;
+  candidate_plan_t candidate{.utime = now_us, .plan_id = plan_id};
   SetText(candidate.source, "test");
   candidate.start_utime = now_us + 500'000;
   candidate.step_us = 150'000;

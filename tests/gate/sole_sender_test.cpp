@@ -1,17 +1,11 @@
 // Who sends on a stream: one sender counts, two are in doubt, and one that has fallen silent is replaced.
 #include "lcmtypes/sole_sender.h"
 
-#include <limits>
-#include <random>
+#include "tests/test.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace sole_sender_test {
+namespace forereach::sole_sender_test {
 
 using Place = SoleSender::Place;
-using testing::HasSubstr;
 
 constexpr std::int64_t kTimeout = 1'000'000, kHour = 3'600'000'000;
 constexpr std::uint64_t kA = 0xa, kB = 0xb, kC = 0xc;
@@ -159,5 +153,4 @@ TEST_F(SoleSenderTest, TakesAnyTimes) {
   }
 }
 
-}  // namespace sole_sender_test
-}  // namespace forereach
+}  // namespace forereach::sole_sender_test

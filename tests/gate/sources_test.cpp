@@ -1,16 +1,11 @@
 // The used plan_ids of a source, the forgotten sources, and the number of lost candidates.
 #include "certifier/gate/sources.h"
 
-#include <limits>
-#include <random>
-#include <set>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "lcmtypes/codec.h"
 
-namespace forereach {
-namespace sources_test {
+namespace forereach::sources_test {
 
 using Admission = Sources::Admission;
 constexpr std::int64_t kForget = 550'000;
@@ -144,5 +139,4 @@ TEST(SourcesTest, CountsLossesCorrectlyAcrossASilence) {
   EXPECT_EQ(sources.lost(), 1) << "3999";
 }
 
-}  // namespace sources_test
-}  // namespace forereach
+}  // namespace forereach::sources_test

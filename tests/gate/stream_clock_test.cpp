@@ -1,16 +1,11 @@
 // The clocks of a robot and of who sees obstacles, by stamps and arrivals.
 #include "certifier/gate/stream_clock.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace stream_clock_test {
-
-using testing::HasSubstr;
-using testing::IsEmpty;
+namespace forereach::stream_clock_test {
 
 constexpr ClockBounds kClocks{60'000, 10'000};
 
@@ -59,5 +54,4 @@ TEST(StreamClockTest, TheBoundsAreTheTasksAndWithoutAClockErrorThereAreNone) {
   EXPECT_EQ(ClockBoundsOf(config)->delay_us, 500);
 }
 
-}  // namespace stream_clock_test
-}  // namespace forereach
+}  // namespace forereach::stream_clock_test

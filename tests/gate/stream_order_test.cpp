@@ -1,15 +1,9 @@
 // Every short history of messages against the rule as it is written down, over the list of messages alone.
 #include "lcmtypes/stream_order.h"
 
-#include <array>
-#include <limits>
-#include <ostream>
-#include <vector>
+#include "tests/test.h"
 
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace stream_order_test {
+namespace forereach::stream_order_test {
 
 constexpr std::int64_t kMin = std::numeric_limits<std::int64_t>::min(), kMax = std::numeric_limits<std::int64_t>::max();
 
@@ -135,5 +129,4 @@ TEST(SumOfLostTest, EndsAtTheLargestNumber) {
   EXPECT_EQ(SumOfLost(0, kMin), 0);
 }
 
-}  // namespace stream_order_test
-}  // namespace forereach
+}  // namespace forereach::stream_order_test

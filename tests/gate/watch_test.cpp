@@ -1,15 +1,11 @@
 #include "certifier/gate/watch.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 
-namespace forereach {
-namespace watch_test {
-
-using testing::HasSubstr;
+namespace forereach::watch_test {
 
 constexpr WatchOptions kOptions{true, 1000, 200};
 
@@ -177,5 +173,4 @@ TEST(WatchTest, OptionsThatAreFollowedDecideWhetherTheRobotIsNeeded) {
   EXPECT_EQ(watch.state(), Watch::State::kArmed);
 }
 
-}  // namespace watch_test
-}  // namespace forereach
+}  // namespace forereach::watch_test

@@ -1,20 +1,13 @@
 // docs/bus.md documents every message, field, constant and channel, with the tables that its types give.
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <regex>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
 #include "tests/scratch.h"
 #include "tests/shell.h"
 
-namespace {
+namespace forereach::bus_document_test {
 
 using forereach::Output;
 using forereach::ScratchDirectory;
@@ -125,4 +118,4 @@ TEST(BusDocumentTest, EveryChannelIsListed) {
     EXPECT_TRUE(std::regex_search(document, std::regex("\n\\| `" + std::string(channel) + "` \\|"))) << channel;
 }
 
-}  // namespace
+}  // namespace forereach::bus_document_test

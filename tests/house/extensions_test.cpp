@@ -1,30 +1,14 @@
 // CONTRIBUTING.md, "Extensions": its lists of files are those that the sources give.
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <regex>
-#include <set>
-#include <sstream>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
 
-namespace {
+namespace forereach::extensions_test {
 
 namespace fs = std::filesystem;
 const fs::path kRoot = FOREREACH_SOURCE_DIR;
-
-std::string Read(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
 
 // A source without comments and includes: what is left of its text names what its code names.
 std::string CodeOf(const std::string& text) {
@@ -118,4 +102,4 @@ TEST(Extensions, DocumentListsTheFilesOfAnObstacleKind) {
                                     R"(\bkHalfSpace\b|\bHalfSpace\b|\bHALF_SPACE\b|\]\.half_plane\b)"});
 }
 
-}  // namespace
+}  // namespace forereach::extensions_test

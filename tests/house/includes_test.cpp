@@ -1,23 +1,10 @@
 // scripts/check-includes: the sources keep to the arrows, and the script sees when they do not.
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
-namespace {
-
-using forereach::Output;
-using forereach::Shell;
-using testing::HasSubstr;
+namespace forereach::includes_test {
 
 Output CheckIncludes(const std::string& root) {
   return Shell("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' '" + root + "' 2>&1");
@@ -60,7 +47,7 @@ class IncludesTest : public testing::Test {
     for (const std::string& message : expected_) EXPECT_THAT(result.text, HasSubstr(message));
   }
 
-  const forereach::ScratchDirectory scratch_;
+  const ScratchDirectory scratch_;
   const std::filesystem::path root_ = scratch_.path();
   std::map<std::string, int> lines_;
   std::vector<std::string> expected_;
@@ -167,4 +154,4 @@ TEST_F(IncludesTest, PathsAreThoseFromTheRoot) {
   ExpectRefused();
 }
 
-}  // namespace
+}  // namespace forereach::includes_test

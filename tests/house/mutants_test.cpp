@@ -1,21 +1,10 @@
 // scripts/mutants --check: the list of mutations fits the tree, and the script sees where one does not.
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
-namespace {
-
-using forereach::Output;
-using forereach::Shell;
-using testing::HasSubstr;
+namespace forereach::mutants_test {
 
 Output Check(const std::string& root) {
   return Shell("'" FOREREACH_SOURCE_DIR "/scripts/mutants' --check --root '" + root + "' 2>&1");
@@ -47,7 +36,7 @@ class MutantsTest : public testing::Test {
   }
 
  private:
-  const forereach::ScratchDirectory scratch_;
+  const ScratchDirectory scratch_;
   const std::filesystem::path root_ = scratch_.path();
 };
 
@@ -87,4 +76,4 @@ TEST_F(MutantsTest, AMutantThatChangesNothingIsNamed) {
   ExpectFault("changes nothing");
 }
 
-}  // namespace
+}  // namespace forereach::mutants_test

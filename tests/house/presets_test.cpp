@@ -1,18 +1,11 @@
 // CMakePresets.json: a build directory keeps what an earlier configure set, so whoever configures it says all of it.
-#include <filesystem>
-#include <fstream>
-#include <map>
 #include <regex>
-#include <set>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "tests/paths.h"
 
-namespace {
+namespace forereach::presets_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -69,4 +62,4 @@ TEST(Presets, OfReleaseSetsEveryVariableThatAScriptSets) {
   EXPECT_GT(found, 0);
 }
 
-}  // namespace
+}  // namespace forereach::presets_test

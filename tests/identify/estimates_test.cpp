@@ -1,10 +1,6 @@
 // Estimates of declarations: what is called a lower bound is one, what is called consistent is consistent, and counts
 // give Clopper & Pearson's bound.
-#include <cmath>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/residual/consistency.h"
@@ -17,11 +13,7 @@
 #include "tests/oracle/exact.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace estimates_test {
-
-using exact::Rational;
-using testing::ElementsAre;
+namespace forereach::estimates_test {
 
 // Observations of a residual with known slopes: r(z) = sum_l L_l g_l(z_l) with |g_l'| <= 1, and errors within eps.
 struct World {
@@ -267,5 +259,4 @@ TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   EXPECT_THAT(begins, ElementsAre(30, 45, 90, 100, 110));
 }
 
-}  // namespace estimates_test
-}  // namespace forereach
+}  // namespace forereach::estimates_test

@@ -1,18 +1,13 @@
 // Fits: what made the transitions is found again, and what they do not show is said.
 #include "identify/fit.h"
 
-#include <cmath>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/text_model.h"
 #include "forereach/numerics/size.h"
 #include "tests/identify/seed.h"
 
-namespace forereach {
-namespace fit_test {
+namespace forereach::fit_test {
 
 // A pendulum with damping: rates, by Runge and Kutta.
 ModelText Pendulum(double length, double damping, double unused = 1) {
@@ -178,5 +173,4 @@ TEST(Fit, RefusesWhatItCannotFit) {
   EXPECT_THROW((void)FitParameters(Pendulum(1, 0), none, {"length"}), std::invalid_argument);
 }
 
-}  // namespace fit_test
-}  // namespace forereach
+}  // namespace forereach::fit_test

@@ -1,23 +1,14 @@
 // Transitions of logs: which samples make one, which do not and why, and what is said of their errors.
 #include "identify/import.h"
 
-#include <cmath>
-#include <numbers>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "task/config_error.h"
 #include "tests/identify/seed.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace import_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
+namespace forereach::import_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -193,12 +184,11 @@ TEST_F(ImportTest, TakesOnlyStepsInsideTheWindowOfTime) {
 }
 
 TEST_F(ImportTest, ALogThatIsTooCoarseIsRefused) {
-  try {
-    (void)From({{0}, {0.2}, {0.4}, {0.6}});
-    FAIL();
-  } catch (const ConfigError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("typically 0.2 s apart, and a step of the task is 0.1 s"));
-  }
+  EXPECT_THAT(
+      [&] {
+        (void)From({{0}, {0.2}, {0.4}, {0.6}});
+      },
+      ThrowsMessage<ConfigError>(HasSubstr("typically 0.2 s apart, and a step of the task is 0.1 s")));
 }
 
 // Every transition is of two rows of the log, with stamps and input as promised; every start is counted once.
@@ -247,5 +237,4 @@ TEST_F(ImportTest, KeepsItsPromisesOnRandomLogs) {
   }
 }
 
-}  // namespace import_test
-}  // namespace forereach
+}  // namespace forereach::import_test

@@ -1,21 +1,12 @@
 // Logs as they come: what is read of them, what is left out, and what is refused.
 #include "identify/log_table.h"
 
-#include <cmath>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "task/config_error.h"
 #include "tests/identify/seed.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace log_table_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
+namespace forereach::log_table_test {
 
 class LogTableTest : public testing::Test {
  protected:
@@ -23,12 +14,7 @@ class LogTableTest : public testing::Test {
     return ReadLog(files_.Write("log.csv", text), {"t", "pos x"}, format);
   }
   std::string Error(const std::string& text, const LogFormat& format = {}) {
-    try {
-      (void)Table(text, format);
-      return {};
-    } catch (const ConfigError& error) {
-      return std::string(error.what()).substr((files_ / "").size());
-    }
+    return files_.Cut(Thrown<ConfigError>([&] { (void)Table(text, format); }));
   }
   ScratchDirectory files_;
 };
@@ -125,5 +111,4 @@ TEST_F(LogTableTest, AnyBytesAreReadOrRefused) {
   }
 }
 
-}  // namespace log_table_test
-}  // namespace forereach
+}  // namespace forereach::log_table_test

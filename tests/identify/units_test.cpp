@@ -1,15 +1,9 @@
 // Units of logged columns.
 #include "identify/units.h"
 
-#include <cmath>
-#include <numbers>
-#include <stdexcept>
+#include "tests/test.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace units_test {
+namespace forereach::units_test {
 
 TEST(Units, FactorsAreThoseOfTheirDefinitions) {
   EXPECT_DOUBLE_EQ(static_cast<double>(180 * FactorOf("deg", "rad")), std::numbers::pi);
@@ -33,13 +27,8 @@ TEST(Units, EveryUnitConvertsToItsBaseAndToNoOther) {
 TEST(Units, WhatIsNoUnitIsRefused) {
   for (const char* text : {"degree", "", "0", "-1", "nan", "inf", "deg ", "1e400"})
     EXPECT_THROW((void)FactorOf(text, ""), std::invalid_argument) << text;
-  try {
-    (void)FactorOf("dek", "rad");
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("did you mean deg?"));
-  }
+  EXPECT_THAT([&] { (void)FactorOf("dek", "rad"); },
+              ThrowsMessage<std::invalid_argument>(testing::HasSubstr("did you mean deg?")));
 }
 
-}  // namespace units_test
-}  // namespace forereach
+}  // namespace forereach::units_test

@@ -1,9 +1,8 @@
 #include "live/access.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-namespace forereach {
-namespace access_test {
+namespace forereach::access_test {
 
 using Headers = std::vector<std::pair<std::string_view, std::string_view>>;
 
@@ -60,5 +59,4 @@ TEST(AccessTest, AnswersGetWithoutABodyAlone) {
   EXPECT_EQ(with("Upgrade", "websocket"), Answer::kBadRequest);
 }
 
-}  // namespace access_test
-}  // namespace forereach
+}  // namespace forereach::access_test

@@ -36,7 +36,7 @@ void SendHostile(Watcher& watcher) {
   SetText(status.message, kEvil), SetText(logger.message, kEvil);
   status.state = certifier_status_t::ARMED, status.level = certifier_status_t::ERROR;
   for (std::int64_t sequence : {std::int64_t{0}, std::int64_t{7}, kMost}) {
-    for (std::int16_t outcome : {0, 1, 2, 3, 4, 5, 6, 7, 99}) {
+    for (const int outcome : {0, 1, 2, 3, 4, 5, 6, 7, 99}) {
       decision.utime = decision.plan_id = decision.sequence = sequence;
       decision.outcome = decision.cause = outcome;
       decision.step = decision.obstacle = std::numeric_limits<std::int16_t>::max();
@@ -55,9 +55,8 @@ void SendHostile(Watcher& watcher) {
     watcher.Take(EventOf("LOGGER_STATUS", logger));
   }
   for (const double far : {1e308, -1e308, 1e12, 1.0}) {
-    robot_state_t state{};
-    state.num_states = static_cast<std::int16_t>(CourseTask().problem->model->num_states());
-    state.mode = robot_state_t::EXECUTING;
+    robot_state_t state{.mode = robot_state_t::EXECUTING,
+                        .num_states = static_cast<std::int16_t>(CourseTask().problem->model->num_states())};
     state.executing_plan_id = state.sequence = kMost;
     std::fill_n(state.state, state.num_states, far);
     watcher.Take(EventOf("ROBOT_STATE", state));

@@ -1,9 +1,6 @@
 #include "live/watcher.h"
 
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bus/authentic.h"
 #include "forereach/certified_plan_t.hpp"
@@ -14,11 +11,9 @@
 #include "tests/records/course.h"
 #include "tests/tries.h"
 
-namespace forereach {
-namespace watcher_test {
+namespace forereach::watcher_test {
 
 using nlohmann::json;
-using testing::HasSubstr;
 
 std::vector<LogEvent> Without(std::vector<LogEvent> events, const std::string& channel) {
   std::erase_if(events, [&](const LogEvent& event) { return event.channel == channel; });
@@ -241,5 +236,4 @@ TEST(WatcherTest, ShowsARepeatedFaultOrWithdrawalOnce) {
   EXPECT_EQ(reader.withdrawals.size(), 1u);
 }
 
-}  // namespace watcher_test
-}  // namespace forereach
+}  // namespace forereach::watcher_test

@@ -1,27 +1,18 @@
 #include "live/web_server.h"
 
-#include <chrono>
-#include <random>
-#include <thread>
-
 #include <arpa/inet.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/live/live_fixture.h"
 #include "tests/records/course.h"
 #include "tests/tries.h"
 
-namespace forereach {
-namespace web_server_test {
+namespace forereach::web_server_test {
 
 using namespace std::chrono_literals;
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
 
 /** A connection as a browser or an attacker makes it. */
 class Connection final {
@@ -205,5 +196,4 @@ TEST(SlowReaderTest, DelaysNeitherMessagesNorOtherReadersNorTheEnd) {
   EXPECT_LT(std::chrono::steady_clock::now() - end, std::chrono::milliseconds(WebServer::kWriteMs + 3000));
 }
 
-}  // namespace web_server_test
-}  // namespace forereach
+}  // namespace forereach::web_server_test

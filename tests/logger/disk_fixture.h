@@ -1,15 +1,6 @@
 /** A logger's node on a bus without threads and on a disk of a test's choice, and what it left there. */
 #pragma once
 
-#include <algorithm>
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -18,6 +9,7 @@
 #include "tests/logger/direct_bus.h"
 #include "tests/records/logs.h"
 #include "tests/small_disk.h"
+#include "tests/test.h"
 
 namespace forereach {
 

@@ -1,20 +1,15 @@
 // Log files that follow one another, and disks that fill.
-#include <algorithm>
 #include <csignal>
-#include <random>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
+
+#include "tests/test.h"
 
 #include "tests/logger/disk_fixture.h"
 
-namespace forereach {
-namespace disk_test {
+namespace forereach::disk_test {
 
-using testing::AllOf;
 using testing::Ge;
-using testing::HasSubstr;
 using testing::Le;
 
 constexpr std::int64_t kMinuteUs = 60'000'000;
@@ -443,5 +438,4 @@ TEST_F(DiskTest, PausesOnAFullDiskAndResumesWhenThereIsRoom) {
   EXPECT_EQ(std::ssize(ReadRows().events), std::ssize(Recorded()));
 }
 
-}  // namespace disk_test
-}  // namespace forereach
+}  // namespace forereach::disk_test

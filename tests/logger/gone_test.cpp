@@ -1,17 +1,12 @@
 // The logger's files are deleted, moved, replaced or cut: it reports this, counts the losses, and continues.
-#include <filesystem>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
+
+#include "tests/test.h"
 
 #include "records/check.h"
 #include "tests/logger/disk_fixture.h"
 
-namespace forereach {
-namespace gone_test {
-
-using testing::HasSubstr;
+namespace forereach::gone_test {
 
 namespace fs = std::filesystem;
 
@@ -234,5 +229,4 @@ TEST_F(GoneTest, ADirectoryThatBecomesReadOnlyIsSaidAtTheNextFile) {
   EXPECT_EQ(std::ssize(Recorded()), fed_);
 }
 
-}  // namespace gone_test
-}  // namespace forereach
+}  // namespace forereach::gone_test

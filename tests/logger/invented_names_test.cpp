@@ -1,17 +1,11 @@
 // Whoever is on the network invents channels and sources: neither memory nor terminal are theirs.
-#include <fstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
+
+#include "tests/test.h"
 
 #include "tests/logger/disk_fixture.h"
 
-namespace forereach {
-namespace invented_names_test {
-
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::invented_names_test {
 
 const std::vector<std::uint8_t> kData{1, 2, 3};
 
@@ -58,5 +52,4 @@ TEST_F(InventedNamesTest, DoNotReachTheTerminal) {
   EXPECT_THAT(out_.str(), Not(HasSubstr("\x1b")));
 }
 
-}  // namespace invented_names_test
-}  // namespace forereach
+}  // namespace forereach::invented_names_test

@@ -1,15 +1,12 @@
 #include "logger/logger_node.h"
 
 #include <csignal>
-#include <optional>
-#include <random>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include "tests/test.h"
 
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -17,8 +14,7 @@
 #include "tests/logger/direct_bus.h"
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace logger_node_test {
+namespace forereach::logger_node_test {
 
 class LoggerNodeTest : public testing::Test {
  protected:
@@ -118,8 +114,7 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
   candidate(0, "a");
   candidate(1, "a");
   bus_.Publish("OBSTACLES", [] {
-    obstacles_t obstacles{};
-    obstacles.sequence = 5;
+    obstacles_t obstacles{.sequence = 5};
     return obstacles;
   }());
   bus_.Publish("OBSTACLES", [] {
@@ -433,5 +428,4 @@ TEST_F(LoggerNodeTest, TakesWhatTheMemoryBusCarries) {
   EXPECT_EQ(node.recorder().summary().contacts, 1);
 }
 
-}  // namespace logger_node_test
-}  // namespace forereach
+}  // namespace forereach::logger_node_test

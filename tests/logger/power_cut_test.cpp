@@ -1,13 +1,8 @@
 // What the disk has confirmed, and when: fsync and fdatasync are ours here, and note the files they are called for.
-#include <algorithm>
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/syscall.h>
 #include <unistd.h>
+
+#include "tests/test.h"
 
 #include "logger/recorder.h"
 #include "tests/records/logs.h"
@@ -32,13 +27,9 @@ int Note(int file, long call) {
 extern "C" int fsync(int file) { return Note(file, SYS_fsync); }
 extern "C" int fdatasync(int file) { return Note(file, SYS_fdatasync); }
 
-namespace forereach {
-namespace power_cut_test {
+namespace forereach::power_cut_test {
 
 using testing::Contains;
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::Not;
 
 constexpr const char* kJournal = "decisions.sqlite-wal";
 
@@ -87,5 +78,4 @@ TEST_F(PowerCutTest, RowsOfRunsAreSyncedToDiskAndRowsOfEventsAreNot) {
   EXPECT_THAT(confirmed([&] { EXPECT_TRUE(database.Write({}, "a", 2)); }), IsEmpty()) << "after a failure too";
 }
 
-}  // namespace power_cut_test
-}  // namespace forereach
+}  // namespace forereach::power_cut_test

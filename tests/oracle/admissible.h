@@ -21,15 +21,14 @@ class AdmissibleResidual {
     for (int i = 0; i < problem.transitions.size(); ++i) {
       const Eigen::VectorXd z = z_.row(i);
       const auto nominal = NominalSuccessor(bicycle, {z.begin(), z.end()});
-      std::vector<exact::Real> lower, upper;
+      std::vector<Real> lower, upper;
       for (std::size_t k = 0; k < nominal.size(); ++k) {
         const auto coordinate = static_cast<Eigen::Index>(k);
         const double next = problem.transitions.x_next(i, coordinate);
-        const exact::Real slack = exact::Real(NextUp(std::abs(next))) - exact::Real(std::abs(next)) +
-                                  exact::Real(declaration_.noise_bound[coordinate]) +
-                                  exact::Real(declaration_.DisturbanceBound(coordinate));
-        lower.push_back(exact::Real(next) - nominal[k] - slack);
-        upper.push_back(exact::Real(next) - nominal[k] + slack);
+        const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) +
+                           Real(declaration_.noise_bound[coordinate]) + Real(declaration_.DisturbanceBound(coordinate));
+        lower.push_back(Real(next) - nominal[k] - slack);
+        upper.push_back(Real(next) - nominal[k] + slack);
       }
       lower_.push_back(lower);
       upper_.push_back(upper);
@@ -38,25 +37,25 @@ class AdmissibleResidual {
     mix_ = random.Uniform(0, 1);
   }
 
-  exact::Real operator()(const std::vector<exact::Real>& z, int k) const {
-    exact::Real from_below, from_above;
+  Real operator()(const std::vector<Real>& z, int k) const {
+    Real from_below, from_above;
     for (std::size_t i = 0; i < lower_.size(); ++i) {
-      exact::Real distance = 0;
+      Real distance = 0;
       for (Eigen::Index l = 0; l < z_.cols(); ++l)
         if (declaration_.lipschitz(k, l) != 0)
-          distance += exact::Real(declaration_.lipschitz(k, l)) *
+          distance += Real(declaration_.lipschitz(k, l)) *
                       abs(z[static_cast<std::size_t>(l)] - z_(static_cast<Eigen::Index>(i), l));
       const auto row = static_cast<std::size_t>(k);
-      const exact::Real low = lower_[i][row] - distance, high = upper_[i][row] + distance;
+      const Real low = lower_[i][row] - distance, high = upper_[i][row] + distance;
       if (i == 0 || low > from_below) from_below = low;
       if (i == 0 || high < from_above) from_above = high;
     }
     switch (kind_[static_cast<std::size_t>(k)]) {
       case 0: return from_below;
       case 1: return from_above;
-      case 2: return from_below + exact::Real(mix_) * (from_above - from_below);
+      case 2: return from_below + Real(mix_) * (from_above - from_below);
       default: {
-        const exact::Real own = own_(z, k);
+        const Real own = own_(z, k);
         return own < from_below ? from_below : own > from_above ? from_above : own;
       }
     }
@@ -66,18 +65,18 @@ class AdmissibleResidual {
   Declaration declaration_;
   Eigen::MatrixXd z_;
   Ramps own_;
-  std::vector<std::vector<exact::Real>> lower_, upper_;
+  std::vector<std::vector<Real>> lower_, upper_;
   std::vector<int> kind_;
   double mix_;
 };
 
 /** A point of a set, often a corner. */
-inline std::vector<exact::Real> PointOf(Random& random, const Zonotope& set) {
-  std::vector<exact::Real> x(set.center().begin(), set.center().end());
+inline std::vector<Real> PointOf(Random& random, const Zonotope& set) {
+  std::vector<Real> x(set.center().begin(), set.center().end());
   const bool corner = random.Coin(0.7);
   for (int j = 0; j < set.num_generators(); ++j) {
-    const exact::Real weight(corner ? random.Sign() : random.Uniform(-1, 1));
-    for (int k = 0; k < set.dim(); ++k) x[static_cast<std::size_t>(k)] += weight * exact::Real(set.generator(k, j));
+    const Real weight(corner ? random.Sign() : random.Uniform(-1, 1));
+    for (int k = 0; k < set.dim(); ++k) x[static_cast<std::size_t>(k)] += weight * Real(set.generator(k, j));
   }
   return x;
 }

@@ -1,18 +1,12 @@
 // States against intervals modulo whole turns, judged in 256 bits.
 #include "lcmtypes/angle.h"
 
-#include <array>
-#include <numbers>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace angle_oracle_test {
-
-using exact::Real;
+namespace forereach::angle_oracle_test {
 
 constexpr double kTurn = 2 * std::numbers::pi, kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -25,8 +19,7 @@ bool IsInside(double value, double lower, double upper) {
 }
 
 TEST(LiesWithin, AcceptsAnAngleOnlyIfItIsInsideAfterWholeTurns) {
-  Random random(641);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(641);
   int inside = 0, left_out = 0;
   for (int trial = 0; trial < 40'000; ++trial) {
     const double value = random.Uniform(-20, 20), near = value + random.Integer(-3, 3) * kTurn;
@@ -79,8 +72,7 @@ TEST(LiesWithin, AcceptsATurnedNumberOnlyIfItsRoundingLiesInsideToo) {
 }
 
 TEST(TurnTowards, EnclosesTheTurnedNumber) {
-  Random random(642);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(642);
   for (int trial = 0; trial < 100'000; ++trial) {
     const double value = random.Uniform(-1, 1) * std::ldexp(1, random.Integer(-60, 30));
     const int turns = random.Integer(-1000, 1000);
@@ -101,5 +93,4 @@ TEST(AnglesOf, RefusesIndicesThatAreNoStates) {
   EXPECT_THROW(static_cast<void>(AnglesOf(std::array{16}, 17)), std::invalid_argument);
 }
 
-}  // namespace angle_oracle_test
-}  // namespace forereach
+}  // namespace forereach::angle_oracle_test

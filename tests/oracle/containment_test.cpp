@@ -1,24 +1,14 @@
 // What a certificate claims, tried: rollouts of many residuals that satisfy data and declaration, in 256 bits, never
 // leave a slice of the tube, and under a certified plan never meet an obstacle.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <iostream>
-#include <memory>
-#include <tuple>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace containment_test {
-
-using exact::Rational;
-using exact::Real;
+namespace forereach::containment_test {
 
 // 113 bits: far beyond the tube's rounding, and fast enough for thousands of directions a slice.
 __extension__ typedef __float128 Quad;
@@ -120,8 +110,7 @@ class Containment : public testing::TestWithParam<std::tuple<bool, bool>> {};
 
 TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
   const auto [bicycle, disturbed] = GetParam();
-  Random random(801 + bicycle), winds(811 + bicycle);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(801 + bicycle), winds(811 + bicycle);
   int certified = 0, rollouts = 0, slices = 0;
   for (int trial = 0; trial < 70; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
@@ -186,8 +175,7 @@ double Excess(const Tube& tube, const Tube& of) {
 // these, so it holds for them; whether it could be derived again is not said.
 TEST_P(Containment, ACertificateHoldsForEveryResidualThatMoreObservationsAdmit) {
   const auto [bicycle, disturbed] = GetParam();
-  Random random(821 + bicycle), winds(831 + bicycle);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(821 + bicycle), winds(831 + bicycle);
   int rollouts = 0, plans = 0, wider = 0;
   double farthest = 0;
   for (int trial = 0; trial < 60; ++trial) {
@@ -242,8 +230,7 @@ INSTANTIATE_TEST_SUITE_P(Models, Containment, testing::Combine(testing::Bool(), 
 
 // The rollouts reach the bounds of the disturbance: a tube that knows less of it does not contain them.
 TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanDeclared) {
-  Random random(804);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(804);
   for (const bool bicycle : {false, true}) {
     const auto problem = AnyProblem(random, bicycle, 1);
     problem->declaration.lipschitz.setZero();
@@ -283,8 +270,7 @@ TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanDeclared) {
 
 // The judge itself: it has to notice a state just outside.
 TEST(ContainmentJudge, NoticesAStateJustOutside) {
-  Random random(803);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(803);
   for (int trial = 0; trial < 50; ++trial) {
     const Zonotope slice = random.AnyZonotope(6, 20);
     const Membership member(random, slice);
@@ -305,5 +291,4 @@ TEST(ContainmentJudge, NoticesAStateJustOutside) {
   }
 }
 
-}  // namespace containment_test
-}  // namespace forereach
+}  // namespace forereach::containment_test

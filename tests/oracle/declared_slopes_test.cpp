@@ -1,23 +1,15 @@
 // Declared bounds on residuals as text against the residuals themselves in 256 bits: no two points differ by more. The
 // verifier confirms each cover, and none of a bound below a slope that was found.
-#include <algorithm>
-#include <array>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
 #include "tests/declare/families.h"
 #include "tests/oracle/any_expression.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "verifier/cover_check.h"
 
-namespace forereach {
-namespace declared_slopes_test {
-
-using exact::Real;
+namespace forereach::declared_slopes_test {
 
 constexpr Interval kParameter(0.5, 0.75);
 
@@ -94,8 +86,7 @@ void Examine(Random& random, const std::string& text, double half_width, Count& 
 }
 
 TEST(DeclaredSlopes, OfEachFunctionBoundItAndAreConfirmed) {
-  Random random(1741);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(1741);
   const std::vector<std::string> texts{"-c*x*abs(x)",
                                        "max(x, c*y) - min(x*y, u)",
                                        "c*sin(2*x)*cos(y) + tan(x/2)",
@@ -119,8 +110,7 @@ TEST(DeclaredSlopes, OfEachFunctionBoundItAndAreConfirmed) {
 }
 
 TEST(DeclaredSlopes, OfRandomExpressionsBoundThemAndAreConfirmed) {
-  Random random(1742);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(1742);
   const std::vector<std::string> leaves{"x", "y", "u", "c", "0.5", "2", "x", "y"};
   Count count;
   for (int trial = 0; trial < 320; ++trial) Examine(random, AnyExpression(random, leaves, 4, true), 1, count);
@@ -131,5 +121,4 @@ TEST(DeclaredSlopes, OfRandomExpressionsBoundThemAndAreConfirmed) {
   EXPECT_GT(count.narrowed, 60);
 }
 
-}  // namespace declared_slopes_test
-}  // namespace forereach
+}  // namespace forereach::declared_slopes_test

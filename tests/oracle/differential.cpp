@@ -272,14 +272,14 @@ std::optional<Meeting> Met(Random& random, const Problem& problem, const Query& 
   const bool bicycle = problem.model->num_states() == 6;
   const MotionJudge judge(problem, query.schedule);
   const AdmissibleResidual residual(random, problem);
-  std::vector<exact::Real> x = PointOf(random, query.initial_set), next;
+  std::vector<Real> x = PointOf(random, query.initial_set), next;
   const int t = random.Below(query.plan().num_steps);
   for (int step = 0; step <= t; ++step) {
     if (step > 0) x = next;
-    std::vector<exact::Real> z = x;
+    std::vector<Real> z = x;
     for (const double u : query.plan().input(step)) z.emplace_back(u);
     next = NominalSuccessor(bicycle, z);
-    const std::vector<exact::Real> wind = AnyDisturbance(random, problem);
+    const std::vector<Real> wind = AnyDisturbance(random, problem);
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
   }
   const Chord chord = judge.ChordOf(x, next);
@@ -298,7 +298,7 @@ std::optional<Meeting> Met(Random& random, const Problem& problem, const Query& 
       JustAccepted([&](double far) { return !judge.Meet(parts, approach->At(far), t, s, error, 0, 1e-13); });
   if (!away) return std::nullopt;
   Obstacle met = approach->At(*away - 1e-9);
-  const auto exactly = judge.Place<exact::Real>(chord, path ? &*path : nullptr, s);
+  const auto exactly = judge.Place<Real>(chord, path ? &*path : nullptr, s);
   if (!judge.Meet(exactly, met, t, s, error, 0, 1e-60)) return std::nullopt;
   return Meeting{std::move(met), problem.between ? t : std::max(t + static_cast<int>(s) - 1, 0)};
 }
@@ -428,9 +428,8 @@ std::string AnyExpression(Random& random, const std::vector<std::string>& names,
 }
 
 // The value of an expression of the model's states and inputs in 256 bits.
-exact::Real ValueOf(const ExpressionText& text, const std::vector<std::string>& names,
-                    const std::vector<exact::Real>& z) {
-  return Evaluate<exact::Real>(ParseExpression(text, names), z, [](double x) { return exact::Real(x); });
+Real ValueOf(const ExpressionText& text, const std::vector<std::string>& names, const std::vector<Real>& z) {
+  return Evaluate<Real>(ParseExpression(text, names), z, [](double x) { return Real(x); });
 }
 
 // Limits to the last bit of what the certifier bounds, which the verifier has to confirm, and a limit that a state of
@@ -466,7 +465,7 @@ Counts RunLimits(const Options& options, long number, Tube& tube, std::mutex& ou
     Count(options, number, i, verifier::Verifier(tight, verifier::MethodOf(*tight)).Verify(certificate), output,
           counts);
 
-    std::vector<exact::Real> z = PointOf(random, query.initial_set);
+    std::vector<Real> z = PointOf(random, query.initial_set);
     for (const double u : query.plan().input(0)) z.emplace_back(u);
     const auto exceeded = std::make_shared<Problem>(*problem);
     Limit& limit = exceeded->limits[static_cast<std::size_t>(random.Below(static_cast<int>(problem->limits.size())))];

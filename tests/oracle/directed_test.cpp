@@ -1,23 +1,12 @@
 // Directed rounding against exact rationals: never on the wrong side, and as close as the header says.
 #include "forereach/numerics/directed.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <functional>
-#include <vector>
+#include "tests/test.h"
 
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace directed_test {
-
-using exact::AtLeast;
-using exact::AtMost;
-using exact::Ceiling;
-using exact::Floor;
-using exact::Rational;
+namespace forereach::directed_test {
 
 constexpr int kTrials = 60000;
 const double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -65,8 +54,7 @@ void ExpectBounds(const Operation& operation, double a, double b) {
 class DirectedOperation : public testing::TestWithParam<Operation> {};
 
 TEST_P(DirectedOperation, IsTheNeighbourOfTheExactResult) {
-  Random random(101);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(101);
   for (int trial = 0; trial < kTrials; ++trial) {
     const double a = random.Double(), b = random.Near(a);
     if (GetParam().divides && b == 0) continue;
@@ -90,8 +78,7 @@ TEST_P(DirectedOperation, HoldsAtTheEndsOfTheDoubles) {
 
 // The textbook error of a sum overflows on its way where one operand is the largest double.
 TEST_P(DirectedOperation, HoldsNextToTheLargestDouble) {
-  Random random(107);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(107);
   for (int trial = 0; trial < 4000; ++trial) {
     const double large = random.Sign() * (random.Coin() ? kMaxDouble : NextDown(kMaxDouble));
     const double other = random.Sign() * std::ldexp(random.Uniform(1, 2), random.Integer(960, 1023));
@@ -102,8 +89,7 @@ TEST_P(DirectedOperation, HoldsNextToTheLargestDouble) {
 }
 
 TEST_P(DirectedOperation, LeavesExactResultsAlone) {
-  Random random(102);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(102);
   for (int trial = 0; trial < 2000; ++trial) {
     const double a = random.Integer(-(1 << 20), 1 << 20), b = std::ldexp(random.Sign(), random.Integer(-20, 20));
     const Rational result = GetParam().exact(Rational(a), Rational(b));
@@ -135,8 +121,7 @@ TEST(Directed, InfiniteOperandsStayInfinite) {
 }
 
 TEST(Directed, NextDoublesAgreeWithTheLibrary) {
-  Random random(103);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(103);
   for (int trial = 0; trial < kTrials; ++trial) {
     const double x = random.Double();
     ASSERT_EQ(NextUp(x), std::nextafter(x, kInfinity)) << x;
@@ -162,8 +147,7 @@ void ExpectRoot(double x) {
 }
 
 TEST(Directed, SquareRootsAreNeighbours) {
-  Random random(104);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(104);
   for (int trial = 0; trial < kTrials; ++trial) {
     const double x = std::abs(random.Double()), square = x * x;
     ExpectRoot(x);
@@ -197,8 +181,7 @@ std::vector<double> Terms(Random& random, int count) {
 }
 
 TEST(Directed, SumUpperBoundsSumsInAnyOrder) {
-  Random random(105);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(105);
   for (int trial = 0; trial < 20000; ++trial) {
     std::vector<double> terms = Terms(random, random.Integer(0, 112));
     if (random.Coin()) std::sort(terms.begin(), terms.end(), std::greater<>());  // the order that loses most
@@ -215,8 +198,7 @@ TEST(Directed, SumUpperBoundsSumsInAnyOrder) {
 }
 
 TEST(Directed, DotErrorUpperBoundsTheErrorOfDotProducts) {
-  Random random(106);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(106);
   for (int trial = 0; trial < 20000; ++trial) {
     const int count = random.Integer(1, 24), exponent = random.Coin() ? -537 : 0;
     double dot = 0;
@@ -237,5 +219,4 @@ TEST(Directed, DotErrorUpperBoundsTheErrorOfDotProducts) {
   EXPECT_EQ(DotErrorUpper(0, 5), 0);
 }
 
-}  // namespace directed_test
-}  // namespace forereach
+}  // namespace forereach::directed_test

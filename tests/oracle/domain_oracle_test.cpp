@@ -1,19 +1,13 @@
 // The domain test against rational arithmetic: a set that leaves the domain by any amount is never found inside, and
 // one that stays inside by more than rounding always is.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/reach/domain.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace domain_oracle_test {
+namespace forereach::domain_oracle_test {
 
-using exact::Rational;
 using Kind = DomainExit::Kind;
 
 constexpr int kStates = 4, kInputs = 2, kSize = kStates + kInputs;
@@ -78,10 +72,10 @@ std::vector<DomainExit> FindExits(const Domain& domain, const Query& query) {
 // A bound next to `value`: below it by an ulp or a few, above it by as much, or far enough above to be seen in plain
 // arithmetic.
 double Beside(const Rational& value, Random& random) {
-  double bound = random.Coin() ? exact::Floor(value) : exact::Ceiling(value);
+  double bound = random.Coin() ? Floor(value) : Ceiling(value);
   switch (random.Below(4)) {
-    case 0: return NextDown(exact::Floor(value));
-    case 1: return NextUp(exact::Ceiling(value));
+    case 0: return NextDown(Floor(value));
+    case 1: return NextUp(Ceiling(value));
     case 2:
       for (int ulps = random.Below(16); ulps > 0; --ulps) bound = NextDown(bound);
       return bound;
@@ -90,8 +84,7 @@ double Beside(const Rational& value, Random& random) {
 }
 
 TEST(FindExit, AgainstAnInequalityNoSetOutsideIsFoundInside) {
-  Random random(601);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(601);
   int inside = 0, outside = 0;
   for (int trial = 0; trial < 40000; ++trial) {
     const Query query(random);
@@ -122,8 +115,7 @@ TEST(FindExit, AgainstAnInequalityNoSetOutsideIsFoundInside) {
 }
 
 TEST(FindExit, AgainstABallNoSetOutsideIsFoundInside) {
-  Random random(602);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(602);
   int inside = 0, outside = 0;
   for (int trial = 0; trial < 40000; ++trial) {
     Query query(random);
@@ -161,8 +153,7 @@ TEST(FindExit, AgainstABallNoSetOutsideIsFoundInside) {
 }
 
 TEST(FindExit, AgainstTheBoxNoSetOutsideIsFoundInside) {
-  Random random(603);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(603);
   for (int trial = 0; trial < 20000; ++trial) {
     const Query query(random);
     const int at = random.Below(kSize);
@@ -238,5 +229,4 @@ TEST(FindExit, NanAndInfinityLieOutsideTheDomain) {
   }
 }
 
-}  // namespace domain_oracle_test
-}  // namespace forereach
+}  // namespace forereach::domain_oracle_test

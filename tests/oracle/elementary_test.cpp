@@ -2,25 +2,15 @@
 // beyond them, and is infinite where the function is undefined.
 #include "forereach/numerics/elementary.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-#include <algorithm>
-#include <array>
 #include <climits>
-#include <cmath>
-#include <limits>
-#include <string>
-#include <vector>
 
 #include "forereach/dynamics/saturation.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace elementary_test {
-
-using exact::Inside;
-using exact::Real;
+namespace forereach::elementary_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kTiny = std::numeric_limits<double>::denorm_min();
 
@@ -90,8 +80,7 @@ int DoublesBetween(double from, double to, int most) {
 
 TEST_P(Elementary, ContainsTheRangeAndReachesFewDoublesBeyond) {
   const Function& f = GetParam();
-  Random random(220);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(220);
   for (int trial = 0; trial < 12000; ++trial) {
     const Interval x = AnyInterval(random), range = f.enclose(x);
     SCOPED_TRACE(testing::Message() << std::hexfloat << f.name << "[" << x.lower << ", " << x.upper << "] = ["
@@ -123,8 +112,7 @@ TEST_P(Elementary, IsEverythingWhereTheArgumentLeavesTheDomain) {
 TEST_P(Elementary, KeepsTheSignOfTheFunction) {
   const Function& f = GetParam();
   if (f.name == std::string("log1p")) return;  // widened on both sides of 0 alike
-  Random random(221);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(221);
   for (int trial = 0; trial < 10000; ++trial) {
     const Interval x = AnyInterval(random), range = f.enclose(x);
     const Real at_lower = f.value(Real(x.lower)), at_upper = f.value(Real(x.upper));
@@ -138,8 +126,7 @@ TEST_P(Elementary, KeepsTheSignOfTheFunction) {
 // What elementary.h assumes of the C library, measured.
 TEST_P(Elementary, LibraryErrorIsWithinWhatIsAssumed) {
   const Function& f = GetParam();
-  Random random(222);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(222);
   double worst = 0, worst_at = 0;
   for (int trial = 0; trial < 30000; ++trial) {
     const double x = AnyArgument(random), value = f.library(x);
@@ -197,8 +184,7 @@ void ExpectAngles(const Interval& y, const Interval& x, Random& random) {
 }
 
 TEST(Atan2, IsTheRangeOfTheAngles) {
-  Random random(223);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(223);
   const auto any = [&] {
     const double a = random.Coin(0.1) ? 0 : random.Coin() ? random.Uniform(-2, 2) : random.Double();
     const double b = random.Coin(0.2) ? a : random.Coin() ? random.Uniform(-2, 2) : random.Near(a);
@@ -215,8 +201,7 @@ TEST(Atan2, IsTheRangeOfTheAngles) {
 }
 
 TEST(Atan2, EnclosesAtTheAxesAndAtTheCut) {
-  Random random(224);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(224);
   constexpr std::array ends{-kMaxDouble, -1.0, -0x1p-1022, -kTiny, -0.0, 0.0, kTiny, 0x1p-1022, 1.0, kMaxDouble};
   for (std::size_t a = 0; a < ends.size(); ++a)
     for (std::size_t b = a; b < ends.size(); ++b)
@@ -232,8 +217,7 @@ TEST(Atan2, EnclosesAtTheAxesAndAtTheCut) {
 }
 
 TEST(Atan2, LibraryErrorIsBelowOneUnit) {
-  Random random(225);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(225);
   double worst = 0;
   for (int trial = 0; trial < 30000; ++trial) {
     const double y = random.Double(), x = random.Coin() ? random.Near(y) : random.Double();
@@ -250,8 +234,7 @@ TEST(Atan2, LibraryErrorIsBelowOneUnit) {
 // ---- Powers.
 
 TEST(Power, IsTheRange) {
-  Random random(226);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(226);
   for (int trial = 0; trial < 60000; ++trial) {
     const double a = random.Coin() ? random.Uniform(-3, 3) : random.Double(), b = random.Near(a);
     const Interval x(std::min(a, b), std::max(a, b));
@@ -352,8 +335,7 @@ TEST(Cut, IsFoundOnTheNegativeHalfAxisAndAtTheOrigin) {
 
 // exp(-1/e) and its derivatives at points of the interval.
 TEST(SmoothGateRanges, ContainTheExactValues) {
-  Random random(12);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(12);
   for (int i = 0; i < 50'000; ++i) {
     const double lower = std::pow(10, random.Uniform(-4, 1)) - 0.01, upper = lower + random.Uniform(0, 1);
     const DerivativeRanges ranges = SmoothGateRanges({lower, upper});
@@ -368,8 +350,7 @@ TEST(SmoothGateRanges, ContainTheExactValues) {
 // t log(1 + exp(x / t)) and its first and second derivatives, at points of the box. With s = exp(-|u|), u = x / t, all
 // are sums and products of numbers of one sign: nothing cancels.
 TEST(SoftplusRanges, ContainTheExactValues) {
-  Random random(13);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(13);
   const auto any_of = [&](const Interval& range) {
     const int which = random.Below(3);
     return which == 0   ? range.lower
@@ -412,5 +393,4 @@ TEST(SoftplusRanges, HaveNoBoundWhereTheTemperatureMayBeZero) {
   }
 }
 
-}  // namespace elementary_test
-}  // namespace forereach
+}  // namespace forereach::elementary_test

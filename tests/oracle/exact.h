@@ -148,3 +148,9 @@ class Real {
 }
 
 }  // namespace forereach::exact
+
+namespace forereach {
+
+using exact::Rational, exact::Real, exact::AtLeast, exact::AtMost, exact::Ceiling, exact::Floor, exact::Inside;
+
+}  // namespace forereach

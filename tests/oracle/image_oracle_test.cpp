@@ -1,23 +1,14 @@
 // The image of a slice's generators against exact rationals: for no matrix within the Jacobian's error does what the
 // plain image leaves out exceed the slack.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <memory>
-#include <span>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/dynamics/equations_model.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace image_oracle_test {
-
-using exact::Rational;
+namespace forereach::image_oracle_test {
 
 // Rows of the Jacobian that no shipped model has: the last entry of a sum is one. Row 1 copies a coordinate.
 struct LastIsOne {
@@ -84,8 +75,7 @@ Rational LeftOut(Random& random, const Program& program, const Case& c, const Zo
 }
 
 TEST(ImageOracle, SlackBoundsTheRoundingErrorOfTheImage) {
-  Random random(614);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(614);
   const std::shared_ptr<const NominalModel> last_is_one = std::make_shared<EquationsModel<LastIsOne>>(LastIsOne());
   for (const auto& model : {MakeKinematicBicycle(0.1, 2.5), MakePointMass(0.15), last_is_one})
     for (int trial = 0; trial < 2000; ++trial) {
@@ -125,5 +115,4 @@ TEST(ImageOracle, RowsThatCopyACoordinateAddNothing) {
   EXPECT_EQ(copies, 2);  // acceleration and steering, whose inputs are points
 }
 
-}  // namespace image_oracle_test
-}  // namespace forereach
+}  // namespace forereach::image_oracle_test

@@ -1,25 +1,12 @@
 // Interval arithmetic against exact ranges, and the trigonometric functions against 256-bit values.
 #include "forereach/numerics/interval.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <optional>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace interval_test {
-
-using exact::AtLeast;
-using exact::AtMost;
-using exact::Ceiling;
-using exact::Floor;
-using exact::Rational;
-using exact::Real;
+namespace forereach::interval_test {
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -64,8 +51,7 @@ class IntervalOperation : public testing::TestWithParam<char> {};
 
 // All four operations are monotone in each operand, so the exact range is spanned by the ends.
 TEST_P(IntervalOperation, IsTheRangeUpToTwoDoubles) {
-  Random random(201);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(201);
   for (int trial = 0; trial < 20000; ++trial) {
     const Interval a = random.AnyInterval(), b = random.AnyInterval();
     if (GetParam() == '/' && b.Contains(0)) {
@@ -97,8 +83,7 @@ INSTANTIATE_TEST_SUITE_P(All, IntervalOperation, testing::Values('+', '-', '*', 
 
 // Halving is not exact where an end is an odd subnormal, and a width may overflow.
 TEST(Interval, HalfWidthAndMiddleHoldAtEveryScale) {
-  Random random(203);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(203);
   const auto small = [&] { return random.Sign() * random.Integer(0, 9) * 0x1p-1074; };
   const auto huge = [&] { return random.Sign() * (kMaxDouble - random.Integer(0, 9) * 0x1p+970); };
   for (int trial = 0; trial < 60000; ++trial) {
@@ -123,8 +108,7 @@ TEST(Interval, HalfWidthAndMiddleHoldAtEveryScale) {
 }
 
 TEST(Directed, HalfUpIsTheLeastDoubleThatIsNotBelowTheHalf) {
-  Random random(204);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(204);
   for (int trial = 0; trial < 60000; ++trial) {
     const double x = trial % 2 == 0 ? random.Double() : random.Sign() * random.Integer(0, 1000) * 0x1p-1074;
     ASSERT_EQ(HalfUp(x), Ceiling(Rational(x) / 2)) << std::hexfloat << x;
@@ -135,8 +119,7 @@ TEST(Directed, HalfUpIsTheLeastDoubleThatIsNotBelowTheHalf) {
 }
 
 TEST(Interval, SquareIsTheRangeUpToTwoDoubles) {
-  Random random(202);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(202);
   for (int trial = 0; trial < 20000; ++trial) {
     const Interval x = random.AnyInterval();
     const Rational lower(x.lower), upper(x.upper), a = lower * lower, b = upper * upper;
@@ -163,8 +146,7 @@ TEST(Interval, ProductsWithZeroAreZero) {
 }
 
 TEST(Interval, MiddleLiesInsideAndDistanceReachesTheEnds) {
-  Random random(203);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(203);
   for (int trial = 0; trial < 20000; ++trial) {
     const Interval x = random.AnyInterval();
     const double middle = x.Middle(), y = random.Near(x.lower);
@@ -252,8 +234,7 @@ Interval Angle(Random& random) {
 class Trigonometric : public testing::TestWithParam<Function> {};
 
 TEST_P(Trigonometric, IsTheTrueRange) {
-  Random random(204);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(204);
   for (int trial = 0; trial < 30000; ++trial) {
     const Interval x = Angle(random);
     if (x.lower > x.upper) continue;
@@ -289,8 +270,7 @@ TEST_P(Trigonometric, OfArgumentsTooLargeToReduceIsEverything) {
 
 // What elementary.cpp assumes of the C library, two units in the last place, measured.
 TEST_P(Trigonometric, LibraryErrorIsBelowOneUnit) {
-  Random random(205);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(205);
   double worst = 0, worst_at = 0;
   for (int trial = 0; trial < 60000; ++trial) {
     const double x = Angle(random).lower;
@@ -308,5 +288,4 @@ TEST_P(Trigonometric, LibraryErrorIsBelowOneUnit) {
 
 INSTANTIATE_TEST_SUITE_P(All, Trigonometric, testing::Values(Function::kSin, Function::kCos, Function::kTan));
 
-}  // namespace interval_test
-}  // namespace forereach
+}  // namespace forereach::interval_test

@@ -1,19 +1,12 @@
 // Jets of the elementary functions against closed formulas for their derivatives in 256 bits.
 #include "forereach/dynamics/jet.h"
 
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
+#include "tests/test.h"
 
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace jet_oracle_test {
-
-using exact::Inside;
-using exact::Real;
+namespace forereach::jet_oracle_test {
 
 struct Derivatives {
   Real value, first, second;
@@ -98,8 +91,7 @@ class UnaryJet : public testing::TestWithParam<Unary> {};
 // Of a linear argument a = 3 w_0 - 2 w_1, so that the chain rule counts.
 TEST_P(UnaryJet, ContainsValueSlopeAndCurvature) {
   const Unary& f = GetParam();
-  Random random(520);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(520);
   int finite = 0;
   for (int trial = 0; trial < 4000; ++trial) {
     const double size = std::ldexp(1, -random.Integer(0, 40)), center = random.Uniform(f.lower, f.upper);
@@ -129,8 +121,7 @@ TEST_P(UnaryJet, ContainsValueSlopeAndCurvature) {
 // Over narrow boxes the enclosures are narrow too.
 TEST_P(UnaryJet, IsTightOverNarrowBoxes) {
   const Unary& f = GetParam();
-  Random random(521);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(521);
   for (int trial = 0; trial < 2000; ++trial) {
     const double center = random.Uniform(f.lower * 0.9 + f.upper * 0.1, f.upper * 0.9 + f.lower * 0.1);
     const Jet jet = f.jet(Jet::Argument(Interval(center), 0, true));
@@ -149,8 +140,7 @@ INSTANTIATE_TEST_SUITE_P(All, UnaryJet, testing::ValuesIn(kFunctions),
                          [](const auto& f) { return std::string(f.param.name); });
 
 TEST(JetAtan2, ContainsValueGradientAndCurvature) {
-  Random random(522);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(522);
   int finite = 0;
   for (int trial = 0; trial < 20000; ++trial) {
     const double size = std::ldexp(1, -random.Integer(0, 40));
@@ -197,5 +187,4 @@ TEST(JetOutsideTheDomain, HasNoFiniteValueWhateverItIsMultipliedBy) {
   }
 }
 
-}  // namespace jet_oracle_test
-}  // namespace forereach
+}  // namespace forereach::jet_oracle_test

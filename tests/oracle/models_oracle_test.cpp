@@ -1,23 +1,13 @@
 // Values, Jacobians and Hessians of the nominal models against closed formulas in 256 bits.
-#include <gtest/gtest.h>
-
-#include <array>
-#include <map>
-#include <tuple>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/dynamics/equations_model.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/rounding.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace models_oracle_test {
-
-using exact::Inside;
-using exact::Rational;
-using exact::Real;
+namespace forereach::models_oracle_test {
 
 constexpr double kDt = 0.1, kWheelbase = 2.5, kPointMassDt = 0.15;
 
@@ -107,8 +97,7 @@ void ExpectJacobian(const Linearization& linearization, const Formulas& f) {
 }
 
 TEST_P(Model, LinearizationContainsValueAndJacobian) {
-  Random random(501);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(501);
   for (int trial = 0; trial < 4000; ++trial) {
     const Eigen::VectorXd z = AnyPoint(random);
     const Formulas f = At(GetParam(), z);
@@ -124,8 +113,7 @@ TEST_P(Model, LinearizationContainsValueAndJacobian) {
 }
 
 TEST_P(Model, LinearizationIsTight) {
-  Random random(502);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(502);
   for (int trial = 0; trial < 1000; ++trial) {
     const Eigen::VectorXd z = random.Vector(model().num_variables(), 1.2);
     Linearization linearization;
@@ -140,8 +128,7 @@ TEST_P(Model, LinearizationIsTight) {
 
 // Rounded once from extended precision: the nearest double except where extended precision meets a tie.
 TEST_P(Model, EvaluateIsRoundedOnce) {
-  Random random(503);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(503);
   int nearest = 0, total = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     Eigen::VectorXd z = random.Vector(model().num_variables(), 1.2), next(model().num_states());
@@ -178,8 +165,7 @@ std::vector<Real> PointIn(Random& random, const std::vector<Interval>& box) {
 }
 
 TEST_P(Model, HessianContainsAllSecondDerivativesOverTheBox) {
-  Random random(504);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(504);
   for (int trial = 0; trial < 2000; ++trial) {
     const std::vector<Interval> box = AnyBox(random, model().num_variables());
     HessianEnclosure hessian;
@@ -208,8 +194,7 @@ INSTANTIATE_TEST_SUITE_P(All, Model,
                                                    Bicycle}));
 
 TEST(PointMassModel, HasNoSecondDerivativesAtAll) {
-  Random random(505);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(505);
   HessianEnclosure hessian;
   hessian.count = 7;
   MakePointMass(kPointMassDt)->EncloseHessian(AnyBox(random, 6), hessian);
@@ -218,8 +203,7 @@ TEST(PointMassModel, HasNoSecondDerivativesAtAll) {
 
 // Each second derivative uses every variable once, so its enclosure is its range: dense samples reach almost all of it.
 TEST(BicycleModel, HessianIsTheTrueRange) {
-  Random random(506);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(506);
   const auto model = MakeKinematicBicycle(kDt, kWheelbase);
   for (int trial = 0; trial < 60; ++trial) {
     std::vector<Interval> box(8, Interval(0));
@@ -335,8 +319,7 @@ Derivatives ByHand(std::size_t expression, double x, double y, double w) {
 }
 
 TEST(Program, DerivativesAgreeWithThoseMadeByHand) {
-  Random random(507);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(507);
   const EquationsModel<Expressions> model{Expressions{}};
   const Program& program = model.program();
   for (int trial = 0; trial < 300; ++trial) {
@@ -403,8 +386,7 @@ struct DomainCase {
 };
 
 TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
-  Random random(508);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(508);
   const Program& program = model().program();
   for (int trial = 0; trial < 3000; ++trial) {
     const DomainCase c(random, model().num_variables());
@@ -437,8 +419,7 @@ TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
 // A heading known to half a turn or worse: the sine's slopes at both ends may have the same sign, and a maximum and a
 // minimum lie between them.
 TEST(BicycleModel, PlainRangesHoldForHeadingsWiderThanPi) {
-  Random random(510);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(510);
   const auto model = MakeKinematicBicycle(kDt, kWheelbase);
   const Program& program = model->program();
   std::vector<Interval> domain(8, Interval(-1, 1));
@@ -478,8 +459,7 @@ TEST(BicycleModel, PlainRangesHoldForHeadingsWiderThanPi) {
 
 // The plain ranges are no looser than interval arithmetic's, which are the true ones where each variable occurs once.
 TEST_P(Model, ExpansionRangesAreTight) {
-  Random random(509);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(509);
   for (int trial = 0; trial < 2000; ++trial) {
     const DomainCase c(random, model().num_variables());
     Expansion plain;
@@ -518,8 +498,7 @@ struct Differences {
 };
 
 TEST(ExpansionError, BoundsProductsAndQuotientsOfDifferencesThatCancel) {
-  Random random(511);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(511);
   const EquationsModel<Differences> model{Differences{}};
   const std::vector<Interval> domain{{1e6, 1e6 + 1e-3}, {1e6, 1e6 + 1e-3}, {0.5, 1e3}, {0, 1}};
   const ExpansionError error = BoundExpansionError(model.program(), model.parameters(), domain);
@@ -559,5 +538,4 @@ TEST(ExpansionError, IsInfiniteWhereTheDomainHoldsAPole) {
   EXPECT_EQ(BoundExpansionError(model->program(), model->parameters(), domain).value[kTheta], kInfinity);
 }
 
-}  // namespace models_oracle_test
-}  // namespace forereach
+}  // namespace forereach::models_oracle_test

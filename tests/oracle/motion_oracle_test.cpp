@@ -1,14 +1,12 @@
 // Continuous motions under certificates never meet an obstacle, and the trials would notice if they did: without any
 // one part of the declaration, they find contacts.
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/oracle/meeting.h"
 #include "tests/oracle/motions.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace motion_oracle_test {
-
-using exact::Real;
+namespace forereach::motion_oracle_test {
 
 TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
   Tally total;
@@ -81,8 +79,7 @@ TEST(Meeting, ContactIsDecidedExactly) {
 }
 
 TEST(Meeting, OfRandomHullsLiesBetweenTheGapsAndTheDistancesOfPoints) {
-  Random random(811);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(811);
   for (int trial = 0; trial < 300; ++trial) {
     const int dim = random.Integer(2, 3);
     const auto hull = [&](double offset) {
@@ -119,5 +116,4 @@ TEST(Meeting, OfRandomHullsLiesBetweenTheGapsAndTheDistancesOfPoints) {
   }
 }
 
-}  // namespace motion_oracle_test
-}  // namespace forereach
+}  // namespace forereach::motion_oracle_test

@@ -71,12 +71,12 @@ class Bulge {
     return Twice<Scalar>(s).first - Scalar(s) * Twice<Scalar>(1).first;
   }
   /** The largest |b'|. */
-  [[nodiscard]] exact::Real Steepest() const {
-    const exact::Real mean = Twice<exact::Real>(1).first;
-    exact::Real steepest = 0;
+  [[nodiscard]] Real Steepest() const {
+    const Real mean = Twice<Real>(1).first;
+    Real steepest = 0;
     for (std::size_t i = 0; i <= pieces_.size(); ++i) {
       const double s = static_cast<double>(i) / static_cast<double>(pieces_.size());
-      const exact::Real slope = abs(Twice<exact::Real>(s).second - mean);
+      const Real slope = abs(Twice<Real>(s).second - mean);
       if (steepest < slope) steepest = slope;
     }
     return steepest;
@@ -110,12 +110,12 @@ struct Path {
 
 /** The pose at two samples. */
 struct Chord {
-  std::vector<exact::Real> from, to;  // p entries
-  exact::Real heading_from, heading_to;
+  std::vector<Real> from, to;  // p entries
+  Real heading_from, heading_to;
 };
 
 template <class Scalar>
-Scalar Of(const exact::Real& x) {
+Scalar Of(const Real& x) {
   if constexpr (std::is_same_v<Scalar, double>)
     return x.ToDouble();
   else
@@ -127,9 +127,9 @@ class MotionJudge {
  public:
   MotionJudge(const Problem& problem, const Schedule& schedule) : problem_(problem), schedule_(schedule) {}
 
-  [[nodiscard]] Chord ChordOf(const std::vector<exact::Real>& from, const std::vector<exact::Real>& to) const {
-    const auto heading = [&](const std::vector<exact::Real>& x) {
-      return problem_.body.heading < 0 ? exact::Real() : x[ToSize(problem_.body.heading)];
+  [[nodiscard]] Chord ChordOf(const std::vector<Real>& from, const std::vector<Real>& to) const {
+    const auto heading = [&](const std::vector<Real>& x) {
+      return problem_.body.heading < 0 ? Real() : x[ToSize(problem_.body.heading)];
     };
     return {Position(from), Position(to), heading(from), heading(to)};
   }
@@ -147,9 +147,9 @@ class MotionJudge {
     };
     Path path{{}, any(), 0};
     for (std::size_t k = 0; k < chord.from.size(); ++k) path.of_position.push_back(any());
-    const exact::Real period(between.period), change = abs(chord.heading_to - chord.heading_from);
-    const exact::Real left = exact::Real(between.turn_rate) - change / period;
-    if (problem_.body.heading >= 0 && left < exact::Real(0.0)) return std::nullopt;
+    const Real period(between.period), change = abs(chord.heading_to - chord.heading_from);
+    const Real left = Real(between.turn_rate) - change / period;
+    if (problem_.body.heading >= 0 && left < Real(0.0)) return std::nullopt;
     const double most = (left / (period * path.of_heading.Steepest())).ToDouble() * (1 - 1e-12);
     path.turn = std::max(0.0, std::min(between.turn_acceleration, most));
     return path;
@@ -220,12 +220,12 @@ class MotionJudge {
            (motion.until_us == ObstacleMotion::kAlways || within <= static_cast<double>(motion.until_us - sample));
   }
 
-  [[nodiscard]] std::vector<exact::Real> Position(const std::vector<exact::Real>& x) const {
-    std::vector<exact::Real> y;
+  [[nodiscard]] std::vector<Real> Position(const std::vector<Real>& x) const {
+    std::vector<Real> y;
     for (Eigen::Index k = 0; k < problem_.projection.rows(); ++k) {
       y.emplace_back(0.0);
       for (std::size_t l = 0; l < x.size(); ++l)
-        y.back() += exact::Real(problem_.projection(k, static_cast<Eigen::Index>(l))) * x[l];
+        y.back() += Real(problem_.projection(k, static_cast<Eigen::Index>(l))) * x[l];
     }
     return y;
   }
@@ -327,12 +327,12 @@ class MotionTrial {
                int first, int standing) {
     const Problem& problem = judge.problem();
     const AdmissibleResidual residual(random_, problem);
-    std::vector<exact::Real> x = PointOf(random_, query.initial_set);
+    std::vector<Real> x = PointOf(random_, query.initial_set);
     for (int t = 0; t < standing; ++t) {
-      std::vector<exact::Real> z = x;
+      std::vector<Real> z = x;
       for (const double u : query.plan().input(t)) z.emplace_back(u);
-      std::vector<exact::Real> next = NominalSuccessor(bicycle, z);
-      const std::vector<exact::Real> wind = AnyDisturbance(winds_, problem);
+      std::vector<Real> next = NominalSuccessor(bicycle, z);
+      const std::vector<Real> wind = AnyDisturbance(winds_, problem);
       for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
       const Chord chord = judge.ChordOf(x, next);
       if (t >= first && problem.between)
@@ -368,7 +368,7 @@ class MotionTrial {
                                                                 : random_.Below(static_cast<int>(2 * most + 1)) - most;
       if (!judge.Meet(parts, obstacles[o], t, s, error, kScreen, kDouble)) continue;
       ++tally_.decided_exactly;
-      if (!judge.Meet(judge.Place<exact::Real>(chord, path, s), obstacles[o], t, s, error, 0, kReal)) continue;
+      if (!judge.Meet(judge.Place<Real>(chord, path, s), obstacles[o], t, s, error, 0, kReal)) continue;
       std::ostringstream text;
       text << random_.trace() << ": obstacle " << o << " (kind " << static_cast<int>(obstacles[o].kind())
            << (obstacles[o].motion() ? ", moving" : "") << ") is met at step " << t << " + " << s << ", clock off by "

@@ -1,15 +1,12 @@
 // Places at expressions, computed in plain arithmetic, against their values in 256 bits at points of slices.
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
 #include "forereach/safety/placement.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace places_oracle_test {
-
-using exact::Real;
+namespace forereach::places_oracle_test {
 
 const ExpressionNames kNames{{"q", "r", "s"}, {"u"}, {{"l", 1.5, 1.5}}, {}};
 const std::vector<std::vector<std::string>> kPlaces{
@@ -32,8 +29,7 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
   std::vector<Expression> expressions;
   for (const auto& place : kPlaces)
     for (const std::string& coordinate : place) expressions.push_back(ParseExpression({coordinate, 1, 1}, names));
-  Random random(7301);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7301);
   Placement::Sample sample;
   std::vector<Zonotope> places(kPlaces.size());
   for (int trial = 0; trial < 1500; ++trial) {
@@ -72,5 +68,4 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
   }
 }
 
-}  // namespace places_oracle_test
-}  // namespace forereach
+}  // namespace forereach::places_oracle_test

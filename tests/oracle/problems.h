@@ -32,16 +32,15 @@ class Ramps {
   }
 
   /** Coordinate k at z. */
-  [[nodiscard]] exact::Real operator()(const std::vector<exact::Real>& z, int k) const {
-    exact::Real sum = 0;
+  [[nodiscard]] Real operator()(const std::vector<Real>& z, int k) const {
+    Real sum = 0;
     for (const Ramp& ramp : ramps_) {
-      exact::Real along = 0;
+      Real along = 0;
       for (Eigen::Index l = 0; l < lipschitz_.cols(); ++l) {
         if (lipschitz_(k, l) == 0) continue;
-        along += exact::Real(ramp.weight(k, l)) * exact::Real(lipschitz_(k, l)) *
-                 (z[static_cast<std::size_t>(l)] - ramp.knee[l]);
+        along += Real(ramp.weight(k, l)) * Real(lipschitz_(k, l)) * (z[static_cast<std::size_t>(l)] - ramp.knee[l]);
       }
-      sum += exact::Real(ramp.height[k]) * abs(along) / static_cast<double>(ramps_.size());
+      sum += Real(ramp.height[k]) * abs(along) / static_cast<double>(ramps_.size());
     }
     return sum;
   }
@@ -56,12 +55,12 @@ class Ramps {
 };
 
 /** f0(z) in high precision, from the models' own equations. */
-[[nodiscard]] inline std::vector<exact::Real> NominalSuccessor(bool bicycle, const std::vector<exact::Real>& z) {
-  std::vector<exact::Real> next(bicycle ? 6 : 4);
+[[nodiscard]] inline std::vector<Real> NominalSuccessor(bool bicycle, const std::vector<Real>& z) {
+  std::vector<Real> next(bicycle ? 6 : 4);
   if (bicycle)
-    KinematicBicycle{0.1, 2.5}(std::span<const exact::Real>(z), std::span<exact::Real>(next));
+    KinematicBicycle{0.1, 2.5}(std::span<const Real>(z), std::span<Real>(next));
   else
-    PointMass{0.15}(std::span<const exact::Real>(z), std::span<exact::Real>(next));
+    PointMass{0.15}(std::span<const Real>(z), std::span<Real>(next));
   return next;
 }
 
@@ -107,7 +106,7 @@ inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int cou
       for (int l = 0; l < variables; ++l)
         z[l] = (l < n ? reach[l] : input[l - n]) * random.Uniform(-0.8, 0.8) * (random.Coin() ? 0.3 : 1);
     } while (!problem->domain.Contains(View(z)));
-    const std::vector<exact::Real> exact_z(z.begin(), z.end()), nominal = NominalSuccessor(bicycle, exact_z);
+    const std::vector<Real> exact_z(z.begin(), z.end()), nominal = NominalSuccessor(bicycle, exact_z);
     for (int k = 0; k < n; ++k) {
       const double noise = declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1));
       problem->transitions.x_next(i, k) =
@@ -133,12 +132,11 @@ inline void Disturb(Random& random, Problem& problem) {
 }
 
 /** What disturbs one step: by the bound or by anything within it. */
-inline std::vector<exact::Real> AnyDisturbance(Random& random, const Problem& problem) {
-  std::vector<exact::Real> w(static_cast<std::size_t>(problem.model->num_states()));
+inline std::vector<Real> AnyDisturbance(Random& random, const Problem& problem) {
+  std::vector<Real> w(static_cast<std::size_t>(problem.model->num_states()));
   const Eigen::VectorXd& bound = problem.declaration.disturbance;
   for (Eigen::Index k = 0; k < bound.size(); ++k)
-    w[static_cast<std::size_t>(k)] =
-        exact::Real(bound[k]) * exact::Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+    w[static_cast<std::size_t>(k)] = Real(bound[k]) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
   return w;
 }
 

@@ -1,23 +1,15 @@
 // A step of an affine model against exact rationals: the successor's support is nowhere below that of the exact image,
 // whichever way the model is expanded.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <memory>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace propagator_oracle_test {
-
-using exact::Rational;
+namespace forereach::propagator_oracle_test {
 
 constexpr double kDt = 0.15;
 constexpr int kStates = 4, kInputs = 2, kOrder = 5;
@@ -81,8 +73,7 @@ Rational ImageSupport(const Task& task, const Zonotope& slice, std::span<const d
 class StepOracle : public testing::TestWithParam<double> {};
 
 TEST_P(StepOracle, TheSuccessorContainsTheExactImage) {
-  Random random(630);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(630);
   for (int trial = 0; trial < 200; ++trial) {
     const Task task(random, GetParam(), trial % 2 == 1);
     const Certifier certifier(task.problem);
@@ -150,8 +141,7 @@ TEST(PropagatorOracle, ADisturbanceFarAboveTheResidualIsRoundedOutward) {
 }
 
 TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
-  Random random(631);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(631);
   for (int trial = 0; trial < 2000; ++trial) {
     Zonotope slice = random.AnyZonotope(kStates, random.Integer(0, 60), std::ldexp(1, random.Integer(-40, 40)));
     for (int k = 0; k < kStates; ++k)
@@ -163,5 +153,4 @@ TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
   }
 }
 
-}  // namespace propagator_oracle_test
-}  // namespace forereach
+}  // namespace forereach::propagator_oracle_test

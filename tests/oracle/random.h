@@ -1,5 +1,5 @@
 /** Seeded random inputs for property tests. FOREREACH_TEST_SEED=N in the environment shifts every seed, so a test can
-be run on fresh inputs; SCOPED_TRACE(random.trace()) prints what reproduces a failure. */
+be run on fresh inputs; a TracedRandom prints the seed that reproduces a failure. */
 #pragma once
 
 #include <array>

@@ -1,20 +1,12 @@
 // The remainder's bound against exact rationals: no quadratic form over the slice leaves it.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <limits>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace remainder_oracle_test {
-
-using exact::Rational;
+namespace forereach::remainder_oracle_test {
 
 // A slice, generators alike in some coordinates, and Hessians that are anything.
 struct Case {
@@ -92,8 +84,7 @@ void ExpectContainsForms(Random& random, const Case& c, const NominalModel& mode
 }
 
 TEST(RemainderOracle, ContainsEveryQuadraticFormOfTheSlice) {
-  Random random(611);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(611);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial)
     ExpectContainsForms(random, Case(random, model->program()), *model);
@@ -101,8 +92,7 @@ TEST(RemainderOracle, ContainsEveryQuadraticFormOfTheSlice) {
 
 // Every size is a power of two of its own, so that some products are subnormal numbers or zero and others are large.
 TEST(RemainderOracle, ContainsEveryQuadraticFormWhereProductsUnderflow) {
-  Random random(614);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(614);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   const auto any = [&](int lowest, int highest) {
     return random.Sign() * std::ldexp(1, random.Integer(lowest, highest));
@@ -124,8 +114,7 @@ TEST(RemainderOracle, ContainsEveryQuadraticFormWhereProductsUnderflow) {
 
 // Lower and upper ends that are odd subnormals, so that neither half of their sum nor of their difference is a double.
 TEST(RemainderOracle, ContainsEveryQuadraticFormWhereHalvingRounds) {
-  Random random(616);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(616);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial) {
     Case c(random, model->program());
@@ -159,8 +148,7 @@ TEST(RemainderOracle, IsNotFiniteWhereADerivativeIsNan) {
 }
 
 TEST(RemainderOracle, CentredIsNeverWiderThanThePapers) {
-  Random random(612);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(612);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   int narrower = 0;
   for (int trial = 0; trial < 1000; ++trial) {
@@ -183,5 +171,4 @@ TEST(RemainderOracle, OfAnAffineModelIsExactlyZero) {
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(c.Bound(*model, Method::kCentred).half_width[k], 0);
 }
 
-}  // namespace remainder_oracle_test
-}  // namespace forereach
+}  // namespace forereach::remainder_oracle_test

@@ -1,19 +1,14 @@
 // Observations, the pairwise test and the envelope against exact rationals.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <numbers>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace residual_oracle_test {
+namespace forereach::residual_oracle_test {
 
 void Enclose(const ResidualEnclosure& envelope, const Zonotope& slice, std::span<const double> input,
              ResidualBounds& bounds) {
@@ -33,11 +28,6 @@ LipschitzEnvelope EnvelopeFor(const Declaration& declaration, const Observations
   return LipschitzEnvelope(declaration, observations, lower, upper, options);
 }
 
-using exact::AtLeast;
-using exact::AtMost;
-using exact::Rational;
-using exact::Real;
-
 constexpr double kDt = 0.15;
 
 Rational Ulp(double x) { return Rational(NextUp(std::abs(x))) - abs(Rational(x)); }
@@ -50,8 +40,7 @@ Rational PointMassNominal(const Eigen::VectorXd& z, int k) {
 }
 
 TEST(Observe, EnclosesTheExactResidualAndOneUnitOfTheSuccessor) {
-  Random random(601);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(601);
   const auto model = MakePointMass(kDt);
   for (int trial = 0; trial < 300; ++trial) {
     const double scale = std::ldexp(1, random.Integer(-1000, 900));
@@ -73,8 +62,7 @@ TEST(Observe, EnclosesTheExactResidualAndOneUnitOfTheSuccessor) {
 }
 
 TEST(Observe, OfTheBicycleEnclosesTheResidual) {
-  Random random(602);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(602);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   const Transitions data{random.Matrix(300, 8, 1.2), random.Matrix(300, 6, 2)};
   const Observations observations = Observe(*model, data);
@@ -110,8 +98,7 @@ Real NextHeading(const Transitions& data, int i) {
 }
 
 TEST(Observe, TakesTheTurnsOffAnAngleAndEnclosesItsResidual) {
-  Random random(631);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(631);
   const auto model = MakeKinematicBicycle(0.1, 2.5, {2}), plain = MakeKinematicBicycle(0.1, 2.5);
   const auto [data, turns] = TurnedTransitions(random, 1000);
   const Observations observations = Observe(*model, data), unturned = Observe(*plain, data);
@@ -227,8 +214,7 @@ TEST(FindViolation, AllowsTheDisturbanceOfBothToTheLastBit) {
 
 // The difference is as large as it may be: however the bound of many terms is rounded, it is no contradiction.
 TEST(TestPair, NoRoundingOfTheBoundMakesAContradiction) {
-  Random random(617);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(617);
   for (int trial = 0; trial < 5000; ++trial) {
     const int variables = random.Integer(1, 8);
     Declaration declaration{random.Matrix(1, variables).cwiseAbs(), random.Vector(1, 1e-3).cwiseAbs(), {}};
@@ -237,9 +223,9 @@ TEST(TestPair, NoRoundingOfTheBoundMakesAContradiction) {
     Rational bound = 2 * (Rational(declaration.noise_bound[0]) + Rational(declaration.DisturbanceBound(0)));
     for (int l = 0; l < variables; ++l)
       bound += Rational(declaration.lipschitz(0, l)) * abs(Rational(two.z(0, l)) - Rational(two.z(1, l)));
-    two.lower(0, 0) = two.upper(0, 0) = exact::Floor(bound);
+    two.lower(0, 0) = two.upper(0, 0) = Floor(bound);
     ASSERT_FALSE(TestPair(declaration, two, 0, 1, 0)) << "trial " << trial;
-    two.lower(0, 0) = two.upper(0, 0) = exact::Ceiling(bound) * (1 + 0x1p-47);
+    two.lower(0, 0) = two.upper(0, 0) = Ceiling(bound) * (1 + 0x1p-47);
     ASSERT_TRUE(TestPair(declaration, two, 0, 1, 0)) << "trial " << trial;
   }
 }
@@ -274,8 +260,7 @@ std::optional<Violation> BruteForce(const Sample& s) {
 
 // Small binary fractions: nothing rounds, so the test has to agree with exact arithmetic, ties and all.
 TEST(FindViolation, FindsTheFirstPairOfRowsWithColumns) {
-  Random random(603);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(603);
   int found = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     const int count = random.Integer(1, 12), columns = random.Integer(1, 3);
@@ -299,8 +284,7 @@ TEST(FindViolation, FindsTheFirstPairOfRowsWithColumns) {
 }
 
 TEST(FindViolation, OfConstantRowsAgreesWithExactArithmetic) {
-  Random random(604);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(604);
   for (int trial = 0; trial < 2000; ++trial) {
     const int count = random.Integer(1, 12);
     const Sample s = Exactly(Eigen::MatrixXd::Zero(1, 2), random.Matrix(count, 2),
@@ -316,8 +300,7 @@ TEST(FindViolation, OfConstantRowsAgreesWithExactArithmetic) {
 }
 
 TEST(FindViolation, NeverFalsifiesWhatRationalsDoNotProve) {
-  Random random(605);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(605);
   for (int trial = 0; trial < 1500; ++trial) {
     const int count = random.Integer(2, 6), columns = random.Integer(1, 3);
     // Residuals on the edge of what L allows, each off by the last bits.
@@ -337,8 +320,7 @@ TEST(FindViolation, NeverFalsifiesWhatRationalsDoNotProve) {
 
 // A residual that uses up its whole declaration, observed through rounded successors, with sigma = 0.
 TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
-  Random random(606);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(606);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   for (int trial = 0; trial < 60; ++trial) {
     const double slope_v = random.Uniform(0, 0.1), slope_delta = random.Uniform(0, 1);
@@ -374,8 +356,7 @@ TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
 
 // Wrapped and unwrapped, the same drives give the same envelope, up to the units and the width of 2 pi.
 TEST(Envelope, OfWrappedDataIsThatOfUnwrappedData) {
-  Random random(632);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(632);
   const auto model = MakeKinematicBicycle(0.1, 2.5, {2});
   for (int trial = 0; trial < 100; ++trial) {
     auto [wrapped, turns] = TurnedTransitions(random, 40);
@@ -467,8 +448,7 @@ class Envelope : public testing::TestWithParam<int> {};
 
 TEST_P(Envelope, IsTheExactEnvelopeRoundedOutward) {
   const int active = GetParam(), states = std::max(2, std::min(active, 9)), inputs = std::max(1, active - states + 1);
-  Random random(607 + static_cast<std::uint64_t>(active));
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(607 + static_cast<std::uint64_t>(active));
   const int trials = active <= 3 ? 200 : active <= 8 ? 15 : active <= 12 ? 1 : 30;
   for (int trial = 0; trial < trials; ++trial) {
     const int count = active <= 3 ? random.Integer(1, 140) : 4, variables = states + inputs;
@@ -496,8 +476,7 @@ TEST_P(Envelope, IsTheExactEnvelopeRoundedOutward) {
 INSTANTIATE_TEST_SUITE_P(ActiveColumns, Envelope, testing::Values(0, 1, 2, 3, 4, 8, 12, 13));
 
 TEST(EnvelopeOracle, HoldsForWildScales) {
-  Random random(630);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(630);
   for (int trial = 0; trial < 500; ++trial) {
     const double scale = std::ldexp(1, random.Integer(-500, 480));
     Sample s = Exactly(random.Matrix(2, 4).cwiseAbs() * std::ldexp(1, random.Integer(-500, 480)),
@@ -525,8 +504,7 @@ TEST(EnvelopeOracle, OverflowNeverNarrows) {
 }
 
 TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
-  Random random(631);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(631);
   for (int trial = 0; trial < 3000; ++trial) {
     const auto any = [&] { return random.Double(); };
     const Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(1, 3, any).cwiseAbs(),
@@ -546,5 +524,4 @@ TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
   }
 }
 
-}  // namespace residual_oracle_test
-}  // namespace forereach
+}  // namespace forereach::residual_oracle_test

@@ -2,19 +2,12 @@
 // program. Program.DerivativesAgreeWithThoseMadeByHand checks that a program has the right derivatives.
 #include "forereach/dynamics/rounding.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <memory>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/program_model.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
 // What Evaluate needs of a scalar type besides the functions of exact.h.
 namespace forereach::exact {
@@ -28,11 +21,7 @@ Real TanCurvature(const Real& t) { return Real(2) * t * (Real(1) + t * t); }
 
 }  // namespace forereach::exact
 
-namespace forereach {
-namespace rounding_oracle_test {
-
-using exact::Inside;
-using exact::Real;
+namespace forereach::rounding_oracle_test {
 
 constexpr int kOutputs = 16;
 
@@ -142,8 +131,7 @@ using Both = testing::Types<Plainly, AfterCancellation>;
 TYPED_TEST_SUITE(RoundingOf, Both);
 
 TYPED_TEST(RoundingOf, ElementaryFunctionsIsBounded) {
-  Random random(530);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(530);
   const auto model = Model<TypeParam>();
   const Program& program = model->program();
   double largest = 0;
@@ -253,5 +241,4 @@ TEST(RoundingAt, KinksAndEndsOfDomainsHasNoBound) {
   }
 }
 
-}  // namespace rounding_oracle_test
-}  // namespace forereach
+}  // namespace forereach::rounding_oracle_test

@@ -1,18 +1,13 @@
 // Separation against exact geometry: never proven where slice and obstacle touch, always where they are apart.
 #include "forereach/safety/separation.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/safety/projection.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace separation_oracle_test {
+namespace forereach::separation_oracle_test {
 
 Separation SeparateByHulls(const Zonotope& slice, const Obstacle& obstacle) {
   Hull hull{};
@@ -22,8 +17,6 @@ Separation SeparateByHulls(const Zonotope& slice, const Obstacle& obstacle) {
   }
   return SeparateHulls(hull, obstacle);
 }
-
-using exact::Rational;
 
 struct Point {
   Rational x, y;
@@ -146,8 +139,7 @@ Obstacle AnyPlanarObstacle(Random& random) {
 }
 
 TEST(PlanarSeparation, IsTheExactDistanceFromBelow) {
-  Random random(701);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(701);
   for (int trial = 0; trial < 3000; ++trial) {
     ExpectSoundAndExact(AnySlice(random), AnyPlanarObstacle(random));
     ASSERT_FALSE(HasFatalFailure()) << "trial " << trial;
@@ -156,8 +148,7 @@ TEST(PlanarSeparation, IsTheExactDistanceFromBelow) {
 
 // A slice's slack is as much a part of it as its generators, whichever way its distance is found.
 TEST(PlanarSeparation, CountsTheSlack) {
-  Random random(709);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(709);
   int proven = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     Zonotope slice = AnySlice(random);
@@ -176,8 +167,7 @@ TEST(PlanarSeparation, CountsTheSlack) {
 }
 
 TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
-  Random random(702);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(702);
   int proven = 0;
   for (int trial = 0; trial < 1500; ++trial) {
     const double scale = std::ldexp(1, random.Integer(-460, 460)), away = random.Coin() ? scale : scale * 1e8;
@@ -200,8 +190,7 @@ TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
 }
 
 TEST(PlanarSeparation, AnyDoublesAreNeverWronglyProven) {
-  Random random(703);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(703);
   for (int trial = 0; trial < 1500; ++trial) {
     const auto any = [&] { return random.Double(); };
     const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any),
@@ -218,8 +207,7 @@ TEST(PlanarSeparation, AnyDoublesAreNeverWronglyProven) {
 
 // Whole numbers, so that touching is exact: the slice's support along d meets the obstacle there.
 TEST(PlanarSeparation, TouchingIsNeverProvenAndAGapAlwaysIs) {
-  Random random(704);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(704);
   constexpr std::array<std::array<int, 3>, 4> triples{{{3, 4, 5}, {5, 12, 13}, {8, 15, 17}, {1, 0, 1}}};
   for (int trial = 0; trial < 2000; ++trial) {
     const int m = random.Integer(0, 6);
@@ -313,8 +301,7 @@ double WidestSpatialGap(const Zonotope& slice, const Obstacle& box) {
 }
 
 TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
-  Random random(705);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(705);
   int proven = 0, met = 0;
   for (int trial = 0; trial < 800; ++trial) {
     const int m = random.Integer(0, 6);
@@ -341,8 +328,7 @@ TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
 }
 
 TEST(LineSeparation, IsDecidedAtTheLastBit) {
-  Random random(706);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(706);
   for (int trial = 0; trial < 2000; ++trial) {
     const Zonotope slice(random.Vector(1), random.Matrix(1, random.Integer(0, 5)));
     const Eigen::VectorXd lower = random.Vector(1, 4), upper = lower + random.Vector(1).cwiseAbs();
@@ -366,8 +352,7 @@ TEST(LineSeparation, IsDecidedAtTheLastBit) {
 }
 
 TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
-  Random random(707);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(707);
   for (int trial = 0; trial < 3000; ++trial) {
     const int p = random.Integer(1, 3);
     const double scale = std::ldexp(1, random.Integer(-30, 30));
@@ -393,8 +378,7 @@ TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
 
 // Hulls that reach to the boundary up to a few roundings.
 TEST(HalfSpaceSeparation, OfHullsNextToItIsNeverWronglyProven) {
-  Random random(711);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(711);
   int proven = 0;
   for (int trial = 0; trial < 5000; ++trial) {
     const int p = random.Integer(1, 3);
@@ -408,7 +392,7 @@ TEST(HalfSpaceSeparation, OfHullsNextToItIsNeverWronglyProven) {
       reach += Rational(normal[k]) * Rational(hull.center[i]) + abs(Rational(normal[k])) * Rational(hull.half_width[i]);
       square += Rational(normal[k]) * Rational(normal[k]);
     }
-    double offset = exact::Floor(reach);
+    double offset = Floor(reach);
     for (int ulps = random.Integer(-1, 20); ulps != 0; ulps -= ulps > 0 ? 1 : -1)
       offset = ulps > 0 ? NextUp(offset) : NextDown(offset);
     if (random.Coin(0.2)) offset += std::abs(offset) * 1e-12;
@@ -424,8 +408,7 @@ TEST(HalfSpaceSeparation, OfHullsNextToItIsNeverWronglyProven) {
 
 // Boxes and circles a few roundings away from a hull, in one coordinate or several.
 TEST(HullSeparation, NextToAnObstacleIsNeverWronglyProven) {
-  Random random(712);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(712);
   const auto few = [&](double x, double sign) {  // roundings in the direction of sign
     for (int i = random.Integer(0, 20); i > 0; --i) x = sign > 0 ? NextUp(x) : NextDown(x);
     return random.Coin(0.3) ? x + sign * std::abs(x) * 1e-12 : x;
@@ -486,8 +469,7 @@ TEST(HalfSpaceSeparation, TouchingIsNotProven) {
 
 // What the sums cancel their rounding does not: the hull's margin is of their terms' size.
 TEST(ProjectionOracle, HullsContainTheExactProjectionWhereItCancels) {
-  Random random(710);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(710);
   for (int trial = 0; trial < 5000; ++trial) {
     const int n = random.Integer(2, 6), p = random.Integer(1, 3);
     const Eigen::MatrixXd matrix = random.Matrix(p, n);
@@ -515,8 +497,7 @@ TEST(ProjectionOracle, HullsContainTheExactProjectionWhereItCancels) {
 }
 
 TEST(ProjectionOracle, ContainsTheExactProjection) {
-  Random random(708);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(708);
   for (int trial = 0; trial < 300; ++trial) {
     const int n = random.Integer(2, 6), p = random.Integer(1, 3);
     const Eigen::MatrixXd matrix = random.Matrix(p, n);
@@ -540,5 +521,4 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
   }
 }
 
-}  // namespace separation_oracle_test
-}  // namespace forereach
+}  // namespace forereach::separation_oracle_test

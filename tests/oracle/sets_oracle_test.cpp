@@ -1,21 +1,14 @@
 // Zonotope bounds against exact rationals.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/sets/linear_map.h"
 #include "forereach/sets/zonogon.h"
 #include "forereach/sets/zonotope.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
 #include "tests/oracle/reduce_order.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace sets_oracle_test {
-
-using exact::AtMost;
-using exact::Rational;
+namespace forereach::sets_oracle_test {
 
 // Random generators, some tiny, huge, parallel, axis-aligned or zero.
 Zonotope Adversarial(Random& random, int dim, int num_generators) {
@@ -53,8 +46,7 @@ std::vector<Eigen::VectorXd> Directions(Random& random, const Zonotope& set) {
 }
 
 TEST(ZonotopeOracle, SupportAndHalfWidthsAreNeverBelowTheExactOnes) {
-  Random random(401);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(401);
   int plain_below = 0, trials = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     const Zonotope set = Adversarial(random, random.Integer(1, 6), random.Integer(0, 30));
@@ -75,8 +67,7 @@ TEST(ZonotopeOracle, SupportAndHalfWidthsAreNeverBelowTheExactOnes) {
 }
 
 TEST(ZonotopeOracle, SupportIsTight) {
-  Random random(402);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(402);
   for (int trial = 0; trial < 1000; ++trial) {
     const Zonotope set = random.AnyZonotope(random.Integer(1, 6), random.Integer(0, 30));
     const Eigen::VectorXd d = random.Vector(set.dim());
@@ -85,8 +76,7 @@ TEST(ZonotopeOracle, SupportIsTight) {
 }
 
 TEST(ZonotopeOracle, SupportHoldsAtTheEndsOfTheDoubles) {
-  Random random(403);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(403);
   for (int trial = 0; trial < 3000; ++trial) {
     const int n = random.Integer(1, 4), m = random.Integer(0, 6);
     const auto any = [&] { return random.Double(); };
@@ -100,8 +90,7 @@ TEST(ZonotopeOracle, SupportHoldsAtTheEndsOfTheDoubles) {
 }
 
 TEST(ZonotopeOracle, ReducedSetsContainTheOriginal) {
-  Random random(404);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(404);
   for (int trial = 0; trial < 1500; ++trial) {
     const int n = random.Integer(1, 6), order = random.Integer(1, 4);
     const Zonotope set = Adversarial(random, n, random.Integer(order * n, (order + 2) * n + 1));
@@ -117,8 +106,7 @@ TEST(ZonotopeOracle, ReducedSetsContainTheOriginal) {
 
 // The size of such a column is infinite, that of the set is not.
 TEST(ZonotopeOracle, ReducesColumnsWhoseSizesOverflow) {
-  Random random(405);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(405);
   for (int trial = 0; trial < 200; ++trial) {
     Eigen::MatrixXd generators = random.Matrix(6, 13);
     for (int huge = 0; huge < 4; ++huge)
@@ -166,8 +154,7 @@ std::vector<Rational> Sample(Random& random, const IntervalMatrix& matrix) {
 // Everything the exact image reaches beyond the part of the computed one that belongs to the set's generators has to
 // lie within the axes appended for errors.
 TEST(LinearMapOracle, ErrorAxesCoverEveryMatrixInside) {
-  Random random(405);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(405);
   for (int trial = 0; trial < 2000; ++trial) {
     const int n = random.Integer(1, 6), rows = random.Integer(1, 4), m = random.Integer(0, 20);
     const Zonotope set = Adversarial(random, n, m);
@@ -192,8 +179,7 @@ TEST(LinearMapOracle, ErrorAxesCoverEveryMatrixInside) {
 }
 
 TEST(LinearMapOracle, PointMatricesAddOnlyRounding) {
-  Random random(406);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(406);
   for (int trial = 0; trial < 300; ++trial) {
     const Zonotope set = random.AnyZonotope(5, 12);
     std::vector<MatrixEntry> entries;
@@ -206,8 +192,7 @@ TEST(LinearMapOracle, PointMatricesAddOnlyRounding) {
 }
 
 TEST(ZonogonOracle, RadiusIsTheFarthestCorner) {
-  Random random(407);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(407);
   for (int trial = 0; trial < 600; ++trial) {
     const int dim = random.Integer(1, 3), m = random.Integer(0, 9);
     const Zonotope set = random.Coin() ? random.AnyZonotope(dim, m) : Adversarial(random, dim, m);
@@ -230,8 +215,7 @@ TEST(ZonogonOracle, RadiusIsTheFarthestCorner) {
 }
 
 TEST(ZonogonOracle, RadiusOfManyNearlyParallelGeneratorsIsTheFarthestCorner) {
-  Random random(408);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(408);
   for (int trial = 0; trial < 100; ++trial) {
     const int m = 10;
     const double angle = random.Uniform(0, 3.2);
@@ -257,5 +241,4 @@ TEST(ZonogonOracle, RadiusOfManyNearlyParallelGeneratorsIsTheFarthestCorner) {
   }
 }
 
-}  // namespace sets_oracle_test
-}  // namespace forereach
+}  // namespace forereach::sets_oracle_test

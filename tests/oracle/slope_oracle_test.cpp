@@ -1,20 +1,13 @@
 // A step under residual bounds with a slope, against exact rationals: the successor contains the image of the slice for
 // every admissible residual, and is not wider than rounding makes it.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace slope_oracle_test {
-
-using exact::Rational;
+namespace forereach::slope_oracle_test {
 
 constexpr std::size_t kStates = 4;
 constexpr double kStep = 0.125;  // its square and half of it are doubles
@@ -70,8 +63,7 @@ Rational Support(const Zonotope& slice, const std::array<double, 2>& input, cons
 }
 
 TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
-  Random random(617);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(617);
   const auto model = MakePointMass(kStep);
   Domain domain;
   domain.state = Box(Eigen::VectorXd::Constant(4, -1000), Eigen::VectorXd::Constant(4, 1000));
@@ -108,5 +100,4 @@ TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
   EXPECT_GT(reduced, 500);
 }
 
-}  // namespace slope_oracle_test
-}  // namespace forereach
+}  // namespace forereach::slope_oracle_test

@@ -1,16 +1,13 @@
 // Functions from text over boxes and slices, against their values in 256 bits at points of these.
 #include "forereach/dynamics/text_enclosure.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace text_enclosure_test {
-
-using exact::Real;
+namespace forereach::text_enclosure_test {
 
 const ExpressionNames kNames{{"x", "y", "z"}, {"u"}, {{"c", 0.75, 0.75}, {"d", 0.5, 1.5}}, {{"xy", {"x*y", 1, 1}}}};
 
@@ -100,8 +97,7 @@ bool IsInside(const Real& x, const Interval& range) {
 TEST(TextEnclosure, ContainsTheValueAtEveryPoint) {
   const TextEnclosure enclosure(kNames, Texts());
   const Exact exact;
-  Random random(7201);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7201);
   std::size_t finite = 0, all = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     const Enclosed enclosed = AnyEnclosed(random, enclosure);
@@ -154,5 +150,4 @@ TEST(TextEnclosure, TellsWhichExpressionsUseAnInput) {
   EXPECT_FALSE(enclosure.UsesInput(3));
 }
 
-}  // namespace text_enclosure_test
-}  // namespace forereach
+}  // namespace forereach::text_enclosure_test

@@ -1,26 +1,19 @@
 // Models from text: the bits of the compiled models, and enclosures of values and derivatives, with and without stages.
 #include "forereach/dynamics/text_model.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cstring>
+#include "tests/test.h"
 
 #include "forereach/declare/flow.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
 #include "tests/oracle/text_in_high_precision.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 
-namespace forereach {
-namespace text_model_test {
+namespace forereach::text_model_test {
 
-using exact::Real;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 using Integrator = ModelText::Integrator;
 
 // In the order of operations of kinematic_bicycle.h and point_mass.h.
@@ -71,8 +64,7 @@ TEST_P(SameBitsTest, TextAndCompiledModelAgreeInExpansionRemainderAndImage) {
   EXPECT_TRUE(SameBits(error.value.data(), same.value.data(), n));
   EXPECT_TRUE(SameBits(error.jacobian.data(), same.jacobian.data(), first));
   EXPECT_TRUE(SameBits(error.hessian.data(), same.hessian.data(), second));
-  Random random(7102);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7102);
   for (int trial = 0; trial < 2000; ++trial) {
     const Zonotope slice(random.Vector(static_cast<int>(n)),
                          random.Matrix(static_cast<int>(n), random.Integer(0, 40), 0.05));
@@ -117,8 +109,7 @@ TEST_P(SameBitsTest, TextAndCompiledModelAgreeInExpansionRemainderAndImage) {
 // Random equations: what the step computes in plain arithmetic differs from enclosures by no more than its error
 // bounds.
 TEST(TextModel, ExpansionsAreWithinTheirErrors) {
-  Random random(7104);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7104);
   int bounded = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     ModelText text = AnyText(random);
@@ -160,8 +151,7 @@ TEST(TextModel, ExpansionsAreWithinTheirErrors) {
 
 TEST_P(SameBitsTest, TextAndCompiledModelAgreeInValuesAndIntervals) {
   const auto [text, compiled, largest] = Models();
-  Random random(7103);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7103);
   for (int trial = 0; trial < 1000; ++trial) {
     std::vector<double> z(static_cast<std::size_t>(text->num_variables())),
         next(static_cast<std::size_t>(text->num_states())), same = next;
@@ -204,8 +194,7 @@ TEST_P(StagesTest, EncloseValuesAndDerivatives) {
   for (const ModelText::Parameter& parameter : text.parameters) parameters.push_back(parameter.lower);
   const TextInHighPrecision exact(text, parameters);
   const int n = model->num_states(), d = model->num_variables();
-  Random random(7104);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7104);
   const Real h(0x1p-50);
   for (int trial = 0; trial < (which == 0 ? 60 : 4); ++trial) {
     std::vector<double> z(static_cast<std::size_t>(d));
@@ -370,5 +359,4 @@ TEST(TextModel, ComputesSharedDerivativesOnce) {
   EXPECT_LT(MakeTextModel(text)->program().size, 2000);
 }
 
-}  // namespace text_model_test
-}  // namespace forereach
+}  // namespace forereach::text_model_test

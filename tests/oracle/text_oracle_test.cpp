@@ -1,18 +1,11 @@
 // Printed numbers against exact rationals: they lie on the side that keeps them true.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdlib>
-#include <string>
+#include "tests/test.h"
 
 #include "forereach/numerics/text.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace text_oracle_test {
-
-using exact::Rational;
+namespace forereach::text_oracle_test {
 
 Rational PowerOfTen(long exponent) {
   mpz_class power;
@@ -54,8 +47,7 @@ void ExpectOnBothSides(double x, int digits) {
 }
 
 TEST(RoundedText, IsOnTheSafeSideAndNextToTheNumber) {
-  Random random(621);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(621);
   for (int trial = 0; trial < 20000 && !testing::Test::HasFatalFailure(); ++trial)
     ExpectOnBothSides(random.Double(), random.Coin(0.9) ? random.Integer(1, 17) : random.Integer(18, 30));
 }
@@ -111,5 +103,4 @@ TEST(RoundedText, ReadsAsPeopleWriteIt) {
   EXPECT_EQ(RoundedUp(std::nan("")), "nan");
 }
 
-}  // namespace text_oracle_test
-}  // namespace forereach
+}  // namespace forereach::text_oracle_test

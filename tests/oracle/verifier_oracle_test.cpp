@@ -1,19 +1,16 @@
 // The verifier's envelope against rational numbers, where recorded observations contradict each other by less than
 // doubles show.
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/verifier/record.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace verifier_oracle_test {
-
-using exact::Rational;
+namespace forereach::verifier_oracle_test {
 
 constexpr int kDelta = 5, kSteerRate = 7;
 constexpr double kDt = 0.1;
@@ -75,8 +72,8 @@ TEST_F(Cancelling, DataContradictEachOtherAndDoublesDoNotShowIt) {
   EXPECT_FALSE(FindViolation(problem->declaration, Observe(*problem->model, problem->transitions)));
   Certify();
   for (std::size_t t = 0; t + 1 < certificate.slices.size(); ++t) {
-    EXPECT_TRUE(exact::AtLeast(lower, certificate.slices[t].envelope_lower[kDelta]));
-    EXPECT_TRUE(exact::AtMost(upper, certificate.slices[t].envelope_upper[kDelta]));
+    EXPECT_TRUE(AtLeast(lower, certificate.slices[t].envelope_lower[kDelta]));
+    EXPECT_TRUE(AtMost(upper, certificate.slices[t].envelope_upper[kDelta]));
   }
 }
 
@@ -88,8 +85,7 @@ TEST_F(Cancelling, ACertificateOfSuchDataIsConfirmed) {
 
 // Steps that cancel, off by up to 2^-62 of their terms; sets from points to wide ones.
 TEST_F(Cancelling, RandomCertificatesOfSuchDataAreConfirmed) {
-  Random random(1);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(1);
   int contradicting = 0;
   for (int i = 0; i < 300; ++i) {
     const double before = random.Uniform(-0.09, 0.09), rate = -before / kDt;
@@ -117,11 +113,11 @@ TEST_F(Cancelling, AClaimThatIsTooStrongIsRefuted) {
   EXPECT_EQ(Verify().status, verifier::Status::kRefuted);
   certificate = whole;
   const Rational upper = Residual(1) + Allowed(1);
-  certificate.slices[0].envelope_upper[kDelta] = std::nextafter(exact::Floor(upper), -kInfinity);
+  certificate.slices[0].envelope_upper[kDelta] = std::nextafter(Floor(upper), -kInfinity);
   EXPECT_EQ(Verify().status, verifier::Status::kRefuted);
   certificate = whole;
-  certificate.slices[0].envelope_lower[kDelta] = exact::Floor(Residual(0) - Allowed(0));  // each end for itself is true
-  certificate.slices[0].envelope_upper[kDelta] = exact::Ceiling(upper);
+  certificate.slices[0].envelope_lower[kDelta] = Floor(Residual(0) - Allowed(0));  // each end for itself is true
+  certificate.slices[0].envelope_upper[kDelta] = Ceiling(upper);
   EXPECT_EQ(Verify().failure.what, "the recorded envelope of delta is not empty");
   certificate = whole;
   certificate.obstacles = {Obstacle::Circle(Eigen::Vector2d(9, 0.8), 1)};
@@ -153,5 +149,4 @@ TEST_F(Cancelling, AContradictionThatDoublesShowIsRefuted) {
   }
 }
 
-}  // namespace verifier_oracle_test
-}  // namespace forereach
+}  // namespace forereach::verifier_oracle_test

@@ -1,8 +1,4 @@
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "page/columns.h"
 #include "page/detail.h"
@@ -16,14 +12,9 @@
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/course.h"
-#include "tests/scratch.h"
 #include "tests/tries.h"
 
-namespace forereach {
-namespace page_test {
-
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::page_test {
 
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kTask = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
@@ -136,11 +127,10 @@ TEST(GatherTest, DrawsNoMoreThanItsBounds) {
 
 // A car of the demo stands for three steps.
 PageDetail DetailOfStandingCar(const Config& task, const std::vector<Obstacle>& obstacles = {}) {
-  candidate_plan_t candidate{};
-  candidate.num_steps = 3;
-  candidate.num_states = static_cast<std::int16_t>(task.problem->model->num_states());
-  candidate.num_inputs = static_cast<std::int16_t>(task.problem->model->num_inputs());
-  candidate.step_us = 100'000;
+  candidate_plan_t candidate{.step_us = 100'000,
+                             .num_states = static_cast<std::int16_t>(task.problem->model->num_states()),
+                             .num_inputs = static_cast<std::int16_t>(task.problem->model->num_inputs()),
+                             .num_steps = 3};
   std::fill_n(candidate.initial_half_width, candidate.num_states, 0.01);
   EXPECT_EQ(WhyNotJudged(candidate, task), "");
   const Certifier certifier(task.problem);
@@ -381,5 +371,4 @@ TEST(WriteTest, APageIsOfAsciiWhereItsTextsAre) {
   EXPECT_TRUE(std::ranges::all_of(html, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
 }
 
-}  // namespace page_test
-}  // namespace forereach
+}  // namespace forereach::page_test

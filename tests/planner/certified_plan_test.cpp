@@ -1,14 +1,11 @@
 #include "planner_bridge/certified_plan.h"
 
-#include <limits>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "planner_bridge/lessons.h"
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace certified_plan_test {
+namespace forereach::certified_plan_test {
 
 Config WithInitialSet(Config config) {
   const Eigen::VectorXd center = Vec({0, 0, 0, 0}), half_width = Vec({0.05, 0.05, 0.03, 0.03});
@@ -94,8 +91,7 @@ TEST(Lessons, AnExceededLimitAddsTheExcessOfTheTubeToItsMargin) {
 }
 
 advice_t Advised(std::int16_t kind, int index, double value, std::int16_t count = 1) {
-  advice_t advice{};
-  advice.num_changes = count;
+  advice_t advice{.num_changes = count};
   advice.change[0].kind = kind;
   advice.change[0].index = static_cast<std::int16_t>(index);
   advice.change[0].value = value;
@@ -147,5 +143,4 @@ TEST(Lessons, AFalseAdviceChangesNoMargin) {
   EXPECT_EQ(lessons.DomainMargin(Eigen::Vector2d(1, 1), Eigen::MatrixXd::Identity(1, 2)), Eigen::Vector2d(0, 0));
 }
 
-}  // namespace certified_plan_test
-}  // namespace forereach
+}  // namespace forereach::certified_plan_test

@@ -1,10 +1,5 @@
 // Planner, certifier and simulated robot on one bus and a simulated clock; every step of the robot is disturbed.
-#include <map>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/process/certifier_node.h"
 #include "forereach/execution_event_t.hpp"
@@ -12,8 +7,7 @@
 #include "simulator/sim_node.h"
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace disturbed_run_test {
+namespace forereach::disturbed_run_test {
 
 // X0 of a candidate leaves room for the two steps until it starts.
 Config Task(const std::string& disturbance, int seed) {
@@ -86,5 +80,4 @@ TEST(UndeclaredDisturbance, StopsTheRobotBecauseItsDataContradictTheDeclaration)
   EXPECT_TRUE(Certifier(std::make_shared<const Problem>(told)).violation());
 }
 
-}  // namespace disturbed_run_test
-}  // namespace forereach
+}  // namespace forereach::disturbed_run_test

@@ -1,8 +1,5 @@
 // Braking and steering by the laws of a task.
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/text_model.h"
@@ -10,10 +7,7 @@
 #include "tests/planner/tasks.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace laws_test {
-
-using testing::HasSubstr, testing::ThrowsMessage;
+namespace forereach::laws_test {
 
 std::span<const double> Span(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
@@ -163,12 +157,9 @@ TEST(Laws, SpeedIsTheExpressionOfTheTask) {
 TEST(Laws, WhatALawMayNotUseIsAnError) {
   const Config config = Unicycle();
   const auto refusal = [&](const std::string& law) -> std::string {
-    try {
+    return Thrown<ExpressionError>([&] {
       static_cast<void>(MakeStopLaw(*config.problem->model, config.laws, {{law}, {"0"}}));
-    } catch (const ExpressionError& error) {
-      return error.what();
-    }
-    return "";
+    });
   };
   EXPECT_EQ(refusal("twice*gain*theta + dt"), "");
   EXPECT_THAT(refusal("-a"), HasSubstr("a is not a name that is known here"));
@@ -188,12 +179,7 @@ TEST(Laws, AMissingLawIsAnErrorThatNamesIt) {
   const auto missing = [](void (*spoil)(Config&)) -> std::string {
     Config config = Unicycle();
     spoil(config);
-    try {
-      static_cast<void>(RobotMotion(config, Braking::kPlanned));
-    } catch (const ConfigError& error) {
-      return error.what();
-    }
-    return "";
+    return Thrown<ConfigError>([&] { static_cast<void>(RobotMotion(config, Braking::kPlanned)); });
   };
   EXPECT_THAT(missing([](Config& config) { config.laws.stop.clear(); }),
               HasSubstr("unicycle: planner.stop: missing: how the robot brakes"));
@@ -201,5 +187,4 @@ TEST(Laws, AMissingLawIsAnErrorThatNamesIt) {
   EXPECT_THAT(missing([](Config& config) { config.robot.hold.reset(); }), HasSubstr("robot.hold: missing"));
 }
 
-}  // namespace laws_test
-}  // namespace forereach
+}  // namespace forereach::laws_test

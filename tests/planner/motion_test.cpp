@@ -1,15 +1,10 @@
 #include "planner_bridge/motion.h"
 
-#include <cmath>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace motion_test {
+namespace forereach::motion_test {
 
 Eigen::VectorXd Successor(const NominalModel& model, const Eigen::VectorXd& x, const Eigen::VectorXd& u) {
   Eigen::VectorXd z(x.size() + u.size()), next(x.size());
@@ -92,5 +87,4 @@ TEST(Motion, PursuitTurnsTowardsTheHeadingWithinTheInputDomain) {
   }
 }
 
-}  // namespace motion_test
-}  // namespace forereach
+}  // namespace forereach::motion_test

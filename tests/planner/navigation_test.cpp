@@ -1,13 +1,10 @@
 #include "planner_bridge/navigation.h"
 
-#include <random>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace navigation_test {
+namespace forereach::navigation_test {
 
 const Box kRegion(Vec({-50, -50}), Vec({50, 50}));
 
@@ -64,5 +61,4 @@ TEST(NavigationField, IsTheDistanceInOneDimension) {
   EXPECT_DOUBLE_EQ(field.Descent(Vec({-3}))(0), 1);
 }
 
-}  // namespace navigation_test
-}  // namespace forereach
+}  // namespace forereach::navigation_test

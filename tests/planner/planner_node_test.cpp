@@ -1,21 +1,13 @@
 #include "planner_bridge/planner_node.h"
 
-#include <cmath>
-#include <limits>
-#include <set>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/withdrawal_t.hpp"
 #include "task/canonical.h"
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace planner_node_test {
+namespace forereach::planner_node_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000, kPeriod = 40'000;
 
@@ -51,8 +43,7 @@ class PlannerNodeTest : public testing::Test {
   }
 
   robot_state_t Standing() {
-    robot_state_t state{};
-    state.utime = now_;
+    robot_state_t state{.utime = now_};
     state.executing_plan_id = state.executing_step = -1;
     state.mode = robot_state_t::STANDING;
     state.num_states = 6;
@@ -74,10 +65,7 @@ class PlannerNodeTest : public testing::Test {
   }
 
   decision_t Decision(const candidate_plan_t& candidate, std::int16_t outcome, std::int16_t cause) {
-    decision_t decision{};
-    decision.utime = now_;
-    decision.plan_id = candidate.plan_id;
-    decision.candidate_utime = candidate.utime;
+    decision_t decision{.utime = now_, .candidate_utime = candidate.utime, .plan_id = candidate.plan_id};
     std::copy(std::begin(candidate.source), std::end(candidate.source), decision.source);
     decision.outcome = outcome;
     decision.cause = cause;
@@ -91,6 +79,12 @@ class PlannerNodeTest : public testing::Test {
   void Say(const decision_t& decision) {
     ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
     Deliver();
+  }
+  // And lets it plan.
+  template <class Message>
+  void Tell(const Message& message) {
+    Say(message);
+    Run(3);
   }
   void Certify() { Say(Decision(candidates_.back(), decision_t::CERTIFIED, decision_t::CAUSE_NONE)); }
   void AbstainS() { Say(Decision(candidates_.back(), decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE)); }
@@ -124,20 +118,17 @@ TEST_F(PlannerNodeTest, SaysNothingBeforeItHearsOfTheRobot) {
 TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
   robot_state_t state = Standing();
   state.state[3] = std::nextafter(config_.planner.initial_half_width[3], 1);
-  Say(state);
-  Run(3);
+  Tell(state);
   EXPECT_TRUE(candidates_.empty()) << "it will be somewhere else";
   ++state.sequence;
   state.state[3] = -config_.planner.initial_half_width[3];
-  Say(state);
-  Run(3);
+  Tell(state);
   EXPECT_EQ(candidates_.size(), 1u);
 }
 
 TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
   const robot_state_t state = Standing();
-  Say(state);
-  Run(3);
+  Tell(state);
   ASSERT_EQ(candidates_.size(), 1u);
   const candidate_plan_t& plan = candidates_[0];
   EXPECT_EQ(plan.utime, now_ - 2000);
@@ -183,8 +174,7 @@ TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
     candidates_.clear();
     Start(config);
     robot_state_t state = Standing();
-    Say(state);
-    Run(3);
+    Tell(state);
     ASSERT_EQ(candidates_.size(), 1u);
     first.push_back(controls(candidates_.back()));
     for (std::size_t round = 2; round <= 3; ++round) {
@@ -192,8 +182,7 @@ TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
       Run(3);
       state.utime = now_;
       ++state.sequence;
-      Say(state);
-      Run(3);
+      Tell(state);
       ASSERT_EQ(candidates_.size(), round);
       later.push_back(controls(candidates_.back()));
     }
@@ -202,8 +191,7 @@ TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
     state = Standing();
     state.sequence = 9;
     state.state[0] = 0.5;
-    Say(state);
-    Run(3);
+    Tell(state);
     ASSERT_EQ(candidates_.size(), 4u);
     first.push_back(controls(candidates_.back()));
   }
@@ -221,8 +209,7 @@ TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
   robot_state_t state = Standing();
   state.state[0] = 8;
   state.state[3] = 5;  // it comes to rest still
-  Say(state);
-  Run(3);
+  Tell(state);
   ASSERT_EQ(candidates_.size(), 0u);
   state.state[3] = 0;
   ++state.sequence;
@@ -248,8 +235,7 @@ class AdvisedPlannerTest : public PlannerNodeTest {
     robot_state_t state = Standing();
     state.state[0] = 8;
     state.state[1] = 3.5;
-    Say(state);
-    Run(3);
+    Tell(state);
     ASSERT_EQ(candidates_.size(), 1u);
   }
 
@@ -338,37 +324,31 @@ TEST_F(AdvisedPlannerTest, FalseAdviceCostsARoundAtMost) {
   state.sequence = 7;
   state.state[0] = 8;
   state.state[1] = 3.5;
-  Say(state);
-  Run(3);
+  Tell(state);
   ASSERT_EQ(candidates_.size(), before + 1) << "the next round begins anew";
   Certify();
   EXPECT_EQ(Summary()["certified"], 1);
 }
 
 TEST_F(PlannerNodeTest, WaitsForNoAdviceUnlessItIsSent) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   AbstainS();
   Run(2);
   EXPECT_EQ(candidates_.size(), 2u);
 }
 
 TEST_F(PlannerNodeTest, ProposesAgainAfterARejectionAndAfterAnAbstentionForTheDomain) {
-  Say(Standing());
-  Run(3);
-  Say(Decision(candidates_.back(), decision_t::REJECTED, decision_t::CAUSE_QUEUE_FULL));
-  Run(3);
+  Tell(Standing());
+  Tell(Decision(candidates_.back(), decision_t::REJECTED, decision_t::CAUSE_QUEUE_FULL));
   ASSERT_EQ(candidates_.size(), 2u);
-  Say(Decision(candidates_.back(), decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
-  Run(3);
+  Tell(Decision(candidates_.back(), decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
   EXPECT_EQ(candidates_.size(), 3u);
   EXPECT_EQ(Summary()["rejected"]["queue_full"], 1);
   EXPECT_EQ(Summary()["abstained"]["domain_exit"], 1);
 }
 
 TEST_F(PlannerNodeTest, GivesUpARoundWhoseDataAreFalsified) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   Say(Decision(candidates_.back(), decision_t::ABSTAIN_FALSIFIED, decision_t::CAUSE_PAIRWISE));
   Run(20);
   EXPECT_EQ(candidates_.size(), 1u);
@@ -386,8 +366,7 @@ TEST_F(PlannerNodeTest, StopsAfterSoManyCandidatesAndBeginsAnewWithTheNextState)
   EXPECT_EQ(candidates_.size(), 3u);
   EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
   now_ = kNow + kPeriod;
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   EXPECT_EQ(candidates_.size(), 4u);
 }
 
@@ -403,8 +382,7 @@ TEST_F(PlannerNodeTest, SendsNothingThatWouldComeTooLate) {
 
 TEST_F(PlannerNodeTest, WaitsForTheStartOfACertifiedPlan) {
   const robot_state_t state = Standing();
-  Say(state);
-  Run(3);
+  Tell(state);
   Certify();
   Run(37);
   Say(Standing());  // the boundary before the start
@@ -413,20 +391,17 @@ TEST_F(PlannerNodeTest, WaitsForTheStartOfACertifiedPlan) {
 }
 
 TEST_F(PlannerNodeTest, PlansTheHandoverInTimeForTheTail) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   Certify();
   const candidate_plan_t first = candidates_[0];
   for (int step = 0; step < first.progress_steps - config_.planner.lead_steps; ++step) {
     now_ = first.start_utime + step * kPeriod;
-    Say(Executing(first, step));
-    Run(3);
+    Tell(Executing(first, step));
     ASSERT_EQ(candidates_.size(), 1u) << "step " << step;
   }
   const int due = first.progress_steps - config_.planner.lead_steps;
   now_ = first.start_utime + due * kPeriod;
-  Say(Executing(first, due));
-  Run(3);
+  Tell(Executing(first, due));
   ASSERT_EQ(candidates_.size(), 2u);
   EXPECT_EQ(candidates_[1].start_utime, first.start_utime + first.progress_steps * kPeriod);
   const robot_state_t expected = Executing(first, first.progress_steps);  // the residual of this task is zero
@@ -434,14 +409,12 @@ TEST_F(PlannerNodeTest, PlansTheHandoverInTimeForTheTail) {
 }
 
 TEST_F(PlannerNodeTest, PredictsThatARobotStandsAfterItsTail) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   Certify();
   const candidate_plan_t first = candidates_[0];
   const int last = first.num_steps - 1;
   now_ = first.start_utime + last * kPeriod;
-  Say(Executing(first, last));
-  Run(3);
+  Tell(Executing(first, last));
   ASSERT_EQ(candidates_.size(), 2u);
   EXPECT_EQ(candidates_[1].initial_center[3], 0);
   EXPECT_EQ(candidates_[1].initial_center[4], 0);
@@ -449,38 +422,31 @@ TEST_F(PlannerNodeTest, PredictsThatARobotStandsAfterItsTail) {
 }
 
 TEST_F(PlannerNodeTest, PlansAgainIfTheRobotDidNotStartACertifiedPlan) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   Certify();
   now_ = candidates_[0].start_utime;
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   EXPECT_EQ(candidates_.size(), 2u);
 }
 
 TEST_F(PlannerNodeTest, GivesUpWaitingForADecisionAtTheStart) {
   const robot_state_t state = Standing();
-  Say(state);
-  Run(3);
+  Tell(state);
   now_ = candidates_[0].start_utime;
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   EXPECT_EQ(candidates_.size(), 2u);
   EXPECT_EQ(Summary()["unanswered"], 1);
 }
 
 TEST_F(PlannerNodeTest, LeavesAPlanThatItDidNotSendAlone) {
-  candidate_plan_t foreign{};
-  foreign.plan_id = 5;
-  foreign.num_steps = 20;
+  candidate_plan_t foreign{.plan_id = 5, .num_steps = 20};
   Say(Executing(foreign, 10));
   Run(10);
   EXPECT_TRUE(candidates_.empty());
 }
 
 TEST_F(PlannerNodeTest, IgnoresDecisionsThatConcernSomebodyElse) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   decision_t decision = Decision(candidates_[0], decision_t::CERTIFIED, decision_t::CAUSE_NONE);
   SetText(decision.source, "another planner");
   Say(decision);
@@ -519,15 +485,13 @@ TEST_F(PlannerNodeTest, SurvivesBadMessagesAndThenWorks) {
   Run(10);
   EXPECT_TRUE(candidates_.empty());
   EXPECT_EQ(Summary()["messages_ignored"], 16);
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   EXPECT_EQ(candidates_.size(), 1u);
 }
 
 TEST_F(PlannerNodeTest, AStateIsUsedOnce) {
   const robot_state_t state = Standing();
-  Say(state);
-  Run(3);
+  Tell(state);
   Certify();
   Say(state);
   EXPECT_EQ(Summary()["messages_ignored"], 1);
@@ -551,12 +515,10 @@ TEST_F(PlannerNodeTest, AStateThatComesLateIsIgnored) {
 TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
   robot_state_t state = Standing();
   state.utime = now_ + 50'001;  // gate.max_ahead_ms is 50
-  Say(state);
-  Run(3);
+  Tell(state);
   EXPECT_TRUE(candidates_.empty());
   EXPECT_EQ(Summary()["messages_ignored"], 1);
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   EXPECT_EQ(candidates_.size(), 1u);
 }
 
@@ -571,10 +533,7 @@ TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
     ++message.sequence;
     Deliver();
   };
-  const auto round = [&] {
-    Say(Standing());
-    Run(3);
-  };
+  const auto round = [&] { Tell(Standing()); };
   round();
   EXPECT_TRUE(candidates_.empty()) << "none has been heard";
   see();
@@ -595,11 +554,9 @@ TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
 }
 
 TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   ASSERT_EQ(candidates_.size(), 1u);
-  decision_t decision{};
-  decision.plan_id = candidates_.back().plan_id;
+  decision_t decision{.plan_id = candidates_.back().plan_id};
   SetText(decision.source, PlannerNode::kSource);
   decision.outcome = decision_t::ABSTAIN_OBSTACLES;
   decision.cause = decision_t::CAUSE_NO_OBSTACLES;
@@ -644,8 +601,7 @@ TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
   EXPECT_EQ(Summary()["messages_ignored"], 1);
   robot_state_t state = Standing();
   for (int plan = 0; plan < 8; ++plan) {
-    Say(state);
-    Run(3);
+    Tell(state);
     ASSERT_EQ(candidates_.size(), static_cast<std::size_t>(plan + 1));
     EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
     Certify();
@@ -655,8 +611,7 @@ TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
 }
 
 TEST_F(PlannerNodeTest, SendsNothingOnceTheRobotHasFinished) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   now_ += 1000;
   robot_state_t finished = Standing();
   finished.mode = robot_state_t::FINISHED;
@@ -701,12 +656,10 @@ class WithdrawnPlanTest : public PlannerNodeTest {
  protected:
   // The robot executes the first candidate, at this step.
   void Execute(int step) {
-    Say(Standing());
-    Run(3);
+    Tell(Standing());
     Certify();
     now_ = candidates_[0].start_utime + step * kPeriod;
-    Say(Executing(candidates_[0], step));
-    Run(3);
+    Tell(Executing(candidates_[0], step));
     ASSERT_EQ(candidates_.size(), 1u) << "no other is due";
   }
   void Withdraw(int valid_steps, std::size_t which = 0) {
@@ -793,8 +746,7 @@ TEST_F(WithdrawnPlanTest, ARoundUnderWayGivesWayToTheStop) {
   Execute(3);
   const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
   now_ = candidates_[0].start_utime + due * kPeriod;
-  Say(Executing(candidates_[0], due));
-  Run(3);
+  Tell(Executing(candidates_[0], due));
   ASSERT_EQ(candidates_.size(), 2u);
   Withdraw(due + 2);
   Run(1);
@@ -806,8 +758,7 @@ TEST_F(WithdrawnPlanTest, NoStopIsProposedWhereACertifiedPlanTakesOverInTime) {
   Execute(3);
   const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
   now_ = candidates_[0].start_utime + due * kPeriod;
-  Say(Executing(candidates_[0], due));
-  Run(3);
+  Tell(Executing(candidates_[0], due));
   Certify();
   Withdraw(due + config_.planner.lead_steps);
   Run(3);
@@ -818,22 +769,19 @@ TEST_F(WithdrawnPlanTest, NoStopIsProposedWhereACertifiedPlanTakesOverInTime) {
 }
 
 TEST_F(WithdrawnPlanTest, AWithdrawnPlanThatHasNotBegunIsReplaced) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   Certify();
   Withdraw(0);
   Run(3);
   EXPECT_EQ(candidates_.size(), 1u) << "it needs a state to begin from";
   now_ += kPeriod;
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   EXPECT_EQ(candidates_.size(), 2u);
 }
 
 TEST_F(WithdrawnPlanTest, WithdrawalsOfOthersAreIgnored) {
   Execute(3);
-  withdrawal_t withdrawal{};
-  withdrawal.plan_id = candidates_[0].plan_id;
+  withdrawal_t withdrawal{.plan_id = candidates_[0].plan_id};
   SetText(withdrawal.source, "another");
   ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
   ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, Bytes(std::vector<std::uint8_t>{1, 2, 3})));
@@ -847,15 +795,13 @@ TEST_F(PlannerNodeTest, WorksForThePointMassToo) {
   Start(PointMass());
   robot_state_t state = Standing();
   state.num_states = 4;
-  Say(state);
-  Run(3);
+  Tell(state);
   ASSERT_EQ(candidates_.size(), 1u);
   EXPECT_EQ(candidates_[0].num_states, 4);
 }
 
 TEST_F(PlannerNodeTest, StopPrintsTheCounts) {
-  Say(Standing());
-  Run(3);
+  Tell(Standing());
   AbstainS();
   Run(3);
   Certify();
@@ -879,5 +825,4 @@ TEST(PlannerNode, RefusesATaskThatDoesNotFit) {
   EXPECT_THROW(PlannerNode(config, *bus), ConfigError);
 }
 
-}  // namespace planner_node_test
-}  // namespace forereach
+}  // namespace forereach::planner_node_test

@@ -1,11 +1,5 @@
 // A learned policy on the bus: it proposes, the gate certifies or abstains, and the robot executes what is certified.
-#include <algorithm>
-#include <set>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/process/certifier_node.h"
 #include "forereach/certified_plan_t.hpp"
@@ -16,8 +10,7 @@
 #include "tests/paths.h"
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace policy_run_test {
+namespace forereach::policy_run_test {
 
 const std::string kTask = FOREREACH_SOURCE_DIR "/config/policy.yaml";
 
@@ -185,5 +178,4 @@ TEST(PolicyProposer, RefusesWhatDoesNotFit) {
   EXPECT_EQ(refusal(config, fewer), "planner.policy: has 4 features, has to have 12");
 }
 
-}  // namespace policy_run_test
-}  // namespace forereach
+}  // namespace forereach::policy_run_test

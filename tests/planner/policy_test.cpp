@@ -1,22 +1,15 @@
 // Policy files, the output of a policy, and its inputs.
 #include "planner_bridge/policy.h"
 
-#include <cmath>
-#include <fstream>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
+
+#include "tests/test.h"
 
 #include "planner_bridge/reference.h"
 #include "tests/paths.h"
 #include "tests/planner/tasks.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace policy_test {
+namespace forereach::policy_test {
 
 using Json = nlohmann::json;
 
@@ -94,12 +87,8 @@ TEST(Policy, EveryBadFieldIsNamedWithValueAndBound) {
     else
       parent.erase(at.back());
     std::ofstream(path) << json;
-    try {
-      static_cast<void>(LoadPolicy(path));
-      ADD_FAILURE() << "accepted: " << bad.pointer << " " << bad.value;
-    } catch (const PolicyError& error) {
-      EXPECT_EQ(error.what(), path + ": " + bad.message);
-    }
+    EXPECT_THAT([&] { static_cast<void>(LoadPolicy(path)); }, ThrowsMessage<PolicyError>(path + ": " + bad.message))
+        << bad.pointer << " " << bad.value;
   }
   std::ofstream(path) << good;
   EXPECT_NO_THROW(static_cast<void>(LoadPolicy(path)));
@@ -109,9 +98,7 @@ TEST(Policy, AFieldOfAMillionListsInOneAnotherIsRefused) {
   const ScratchDirectory scratch;
   const std::string path = scratch / "policy.json";
   SavePolicy(path, Small());
-  std::stringstream good;
-  good << std::ifstream(path).rdbuf();
-  const std::string text = good.str(), field = "\"forereach-policy\"",
+  const std::string text = forereach::Read(path), field = "\"forereach-policy\"",
                     deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
   std::ofstream(path) << std::string(text).replace(text.find(field), field.size(), deep);
   EXPECT_THROW(static_cast<void>(LoadPolicy(path)), PolicyError);
@@ -122,12 +109,8 @@ TEST(Policy, WhatIsNoJsonIsRefusedWithItsFile) {
   const std::string path = scratch / "policy.json";
   for (const char* text : {"", "{", "{\"format\": 1e999}", "\xff"}) {
     std::ofstream(path) << text;
-    try {
-      static_cast<void>(LoadPolicy(path));
-      ADD_FAILURE() << "accepted: " << text;
-    } catch (const PolicyError& error) {
-      EXPECT_THAT(error.what(), testing::StartsWith(path + ": "));
-    }
+    EXPECT_THAT([&] { static_cast<void>(LoadPolicy(path)); }, ThrowsMessage<PolicyError>(StartsWith(path + ": ")))
+        << text;
   }
   EXPECT_THROW(static_cast<void>(LoadPolicy("/nowhere/policy.json")), PolicyError);
 }
@@ -173,5 +156,4 @@ TEST(ShippedPolicy, FollowsReferencesOfASlowRobot) {
     }
 }
 
-}  // namespace policy_test
-}  // namespace forereach
+}  // namespace forereach::policy_test

@@ -1,17 +1,12 @@
 #include "planner_bridge/proposal.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/safety/clearance.h"
 #include "tests/paths.h"
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace proposal_test {
+namespace forereach::proposal_test {
 
 std::unique_ptr<Proposer> PlannerOf(const Config& config) { return MakeOmplProposer(config); }
 
@@ -418,5 +413,4 @@ TEST(Planner, RefusesOptionsThatDoNotFit) {
   }
 }
 
-}  // namespace proposal_test
-}  // namespace forereach
+}  // namespace forereach::proposal_test

@@ -1,13 +1,10 @@
 #include "planner_bridge/residual_estimate.h"
 
-#include <array>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace residual_estimate_test {
+namespace forereach::residual_estimate_test {
 
 // The bicycle's task with transitions at the given speeds, whose heading residual is `residual` of the speed.
 template <class Residual>
@@ -62,5 +59,4 @@ TEST(ResidualEstimate, AConstantCoordinateTakesTheMean) {
   EXPECT_NEAR(next[4], 0.2, 1e-12);
 }
 
-}  // namespace residual_estimate_test
-}  // namespace forereach
+}  // namespace forereach::residual_estimate_test

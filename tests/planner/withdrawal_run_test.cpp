@@ -1,11 +1,5 @@
 // Planner, certifier and simulated robot on one bus and a simulated clock: a wall appears across the whole way.
-#include <cmath>
-#include <map>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
@@ -15,8 +9,7 @@
 #include "simulator/sim_node.h"
 #include "tests/planner/tasks.h"
 
-namespace forereach {
-namespace withdrawal_run_test {
+namespace forereach::withdrawal_run_test {
 
 Config Task() {
   Config config = Bicycle();
@@ -102,5 +95,4 @@ TEST_F(WithdrawalRunTest, AWallTooNearToStopBeforeItIsAnEmergency) {
   EXPECT_LT(robot_.state()[0], wall) << "the simulated robot's emergency stop takes no way";
 }
 
-}  // namespace withdrawal_run_test
-}  // namespace forereach
+}  // namespace forereach::withdrawal_run_test

@@ -1,14 +1,8 @@
 // `forereach keygen`, `status`, `reset` and `reload` against a certifier that runs, signs and checks.
-#include <algorithm>
 #include <atomic>
 #include <csignal>
-#include <filesystem>
-#include <map>
-#include <thread>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "bus/process.h"
 #include "forereach/certifier_status_t.hpp"
@@ -20,10 +14,7 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace bus_commands_test {
-
-using testing::HasSubstr;
+namespace forereach::bus_commands_test {
 
 class BusCommands : public testing::Test {
  protected:
@@ -104,10 +95,7 @@ TEST_F(BusCommands, AReloadIsTakenOrItsErrorIsShown) {
 
 TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {
   const auto open = OpenBus(config_.bus.url);
-  robot_state_t state{};
-  state.utime = WallClockUs();
-  state.mode = robot_state_t::STANDING;
-  state.num_states = 4;
+  robot_state_t state{.utime = WallClockUs(), .mode = robot_state_t::STANDING, .num_states = 4};
   open->Publish(config_.bus.robot_state, state);
   open->Publish(config_.bus.candidate, CandidateFor(config_, 1, Eigen::Vector2d(0, 0)));
   auto status = nlohmann::json::parse(Say("status --json").text);
@@ -222,5 +210,4 @@ TEST(BusCommandsTest, StatusSaysThatNoCertifierAnswered) {
   EXPECT_THAT(status.text, HasSubstr("no certifier answered"));
 }
 
-}  // namespace bus_commands_test
-}  // namespace forereach
+}  // namespace forereach::bus_commands_test

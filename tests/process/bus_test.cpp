@@ -1,29 +1,19 @@
 #include "bus/bus.h"
 
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sched.h>
 #include <unistd.h>
+
+#include "tests/test.h"
 
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/process/process_fixture.h"
 #include "tests/sanitized.h"
 
-namespace forereach {
-namespace bus_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
+namespace forereach::bus_test {
 
 robot_state_t State(std::int64_t sequence) {
-  robot_state_t state{};
-  state.sequence = sequence;
+  robot_state_t state{.sequence = sequence};
   return state;
 }
 
@@ -245,5 +235,4 @@ TEST(BusErrorTest, OtherKindsOfBusAreRefused) {
     EXPECT_THROW((void)OpenBus(url), BusError) << url;
 }
 
-}  // namespace bus_test
-}  // namespace forereach
+}  // namespace forereach::bus_test

@@ -1,15 +1,8 @@
 #include "bus/bus_url.h"
 
-#include <string>
+#include "tests/test.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace bus_url_test {
-
-using testing::AllOf;
-using testing::HasSubstr;
+namespace forereach::bus_url_test {
 
 TEST(BusUrlTest, EveryPartIsRead) {
   const MulticastUrl url = ParseMulticastUrl("udpm://224.1.2.3:65535?ttl=255&recv_buf_size=4096");
@@ -63,14 +56,9 @@ TEST(BusUrlTest, AWrongPartIsNamedWithWhatItHasToBe) {
            {"udpm://?tll=1", "the option \"tll\" has to be ttl or recv_buf_size"},
            {"udpm://?&ttl=1", "the option \"\""},
        }) {
-    try {
-      static_cast<void>(ParseMulticastUrl(bad.url));
-      ADD_FAILURE() << bad.url;
-    } catch (const BusError& error) {
-      EXPECT_THAT(error.what(), AllOf(HasSubstr(bad.url), HasSubstr(bad.why), HasSubstr("as in udpm://")));
-    }
+    EXPECT_THAT([&] { static_cast<void>(ParseMulticastUrl(bad.url)); },
+                ThrowsMessage<BusError>(AllOf(HasSubstr(bad.url), HasSubstr(bad.why), HasSubstr("as in udpm://"))));
   }
 }
 
-}  // namespace bus_url_test
-}  // namespace forereach
+}  // namespace forereach::bus_url_test

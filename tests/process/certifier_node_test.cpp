@@ -1,23 +1,11 @@
 // The certifier's node on an in-memory bus with a simulated clock.
 #include "certifier/process/certifier_node.h"
 
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <limits>
-#include <map>
-#include <random>
 #include <regex>
-#include <set>
-#include <sstream>
-#include <string>
-#include <thread>
-#include <utility>
 
 #include <unistd.h>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/dynamics/models/named_residuals.h"
@@ -26,12 +14,8 @@
 #include "tests/keys.h"
 #include "tests/paths.h"
 #include "tests/reset.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace certifier_node_test {
-
-using testing::ElementsAre;
+namespace forereach::certifier_node_test {
 
 class CertifierNodeTest : public testing::Test {
  protected:
@@ -489,12 +473,8 @@ TEST_F(ObstaclesNodeTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAllAndSaysS
 TEST_F(ObstaclesNodeTest, RefusesATaskThatDoesNotSayWhereObstaclesComeFrom) {
   config_.gate.obstacles = ObstaclesSource::kUnsaid;
   config_.path = "task.yaml";
-  try {
-    CertifierNode node(config_, *bus_, clocks_);
-    ADD_FAILURE() << "it began";
-  } catch (const ConfigError& error) {
-    EXPECT_THAT(error.what(), testing::StartsWith("task.yaml: gate.obstacles: missing. `bus`: "));
-  }
+  EXPECT_THAT([&] { CertifierNode node(config_, *bus_, clocks_); },
+              ThrowsMessage<ConfigError>(testing::StartsWith("task.yaml: gate.obstacles: missing. `bus`: ")));
 }
 
 // ---- Two certifiers on one bus.
@@ -733,9 +713,7 @@ TEST_F(TwoCertifiersTest, ADeclarationThatTheFirstHasSeenContradictedStaysFalse)
 TEST_F(TwoCertifiersTest, AFaultThatNoHeartbeatHasShownIsTakenOver) {
   FOREREACH_START_BOTH();
   nodes_[0].reset();
-  fault_t last_word{};
-  last_word.utime = now_us_;
-  last_word.cause = fault_t::CLOCK_JUMP;
+  fault_t last_word{.utime = now_us_, .cause = fault_t::CLOCK_JUMP};
   listener_.Publish("FAULT", last_word);
   Pass(3'000'000);
   EXPECT_EQ(Status(1).fault, fault_t::CLOCK_JUMP);
@@ -1115,8 +1093,7 @@ TEST_F(ArmedNodeTest, AStateOutsideItsSliceLatchesAndNamesTheTransition) {
     robot_state_t state = State(plan.plan.plan_id, 1);
     for (int k = 0; k < 4; ++k) state.state[k] = plan.slice_upper[1][k];
     if (outside) state.state[2] = std::nextafter(plan.slice_upper[1][2], 10.0);
-    transition_t transition{};
-    transition.utime = 77;
+    transition_t transition{.utime = 77};
     bus_->Publish("TRANSITION", transition);
     SayState(state);
     ASSERT_EQ(faults_.size(), outside ? 1u : 0u);
@@ -1250,9 +1227,7 @@ TEST_F(StrangerTest, ShadowModeDoesNotLatchOnAnUnknownPlan) {
 }
 
 transition_t Executed(const NominalModel& model, const Eigen::VectorXd& z, double error = 0) {
-  transition_t transition{};
-  transition.num_states = 4;
-  transition.num_inputs = 2;
+  transition_t transition{.num_states = 4, .num_inputs = 2};
   std::copy_n(z.data(), 4, transition.state);
   std::copy_n(z.data() + 4, 2, transition.input);
   model.Evaluate({z.data(), 6}, {transition.next_state, 4});
@@ -1376,9 +1351,7 @@ TEST_F(ArmedNodeTest, CommandsThatAreStaleOrUnknownAreRefused) {
   Pass(2'000'000);
   Run();
   ASSERT_TRUE(node_->watch().fault());
-  command_t command{};
-  command.kind = command_t::RESET;
-  command.utime = now_us_ - 500'001;
+  command_t command{.utime = now_us_ - 500'001, .kind = command_t::RESET};
   bus_->Publish("COMMAND", command);
   command.utime = now_us_;
   command.kind = 7;
@@ -1393,9 +1366,8 @@ class ReloadTest : public testing::Test {
  protected:
   void Write(const std::string& text) const { std::ofstream(path_) << text; }
   void Copy(const std::function<std::string(std::string)>& edit, const std::string& shipped = "point_mass") const {
-    std::ostringstream text;
-    text << std::ifstream(FOREREACH_SOURCE_DIR "/config/" + shipped + ".yaml").rdbuf();
-    Write(edit(std::regex_replace(text.str(), std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/")));
+    const std::string text = Read(FOREREACH_SOURCE_DIR "/config/" + shipped + ".yaml");
+    Write(edit(std::regex_replace(text, std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/")));
   }
   // Reads the file again and waits for what comes of it.
   void Reload(CertifierNode& node) {
@@ -1592,5 +1564,4 @@ TEST_F(ReloadTest, ReloadsOnceMoreForRequestsDuringAReload) {
   EXPECT_EQ(status_.version, 3) << "the first, and one for those asked for while it was under way";
 }
 
-}  // namespace certifier_node_test
-}  // namespace forereach
+}  // namespace forereach::certifier_node_test

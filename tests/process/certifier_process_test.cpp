@@ -1,17 +1,9 @@
 // forereach-certifier as a process, fed good and bad messages over a real bus.
-#include <algorithm>
 #include <csignal>
-#include <filesystem>
-#include <limits>
-#include <map>
-#include <memory>
-#include <string>
-#include <string_view>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sched.h>
-#include <nlohmann/json.hpp>
+
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/certified_plan_t.hpp"
@@ -23,8 +15,7 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace certifier_process_test {
+namespace forereach::certifier_process_test {
 
 const Eigen::Vector2d kGentle(0.2, 0), kIntoTheCircle(0, 1.2), kOutsideDomain(0, 3.5);
 
@@ -293,5 +284,4 @@ TEST_F(CertifierProcessTest, StopsInTheMiddleOfAFlood) {
   EXPECT_TRUE(nlohmann::json::accept(certifier_.output())) << certifier_.output();
 }
 
-}  // namespace certifier_process_test
-}  // namespace forereach
+}  // namespace forereach::certifier_process_test

@@ -1,18 +1,11 @@
 // The parser of datagrams, at every boundary.
 #include "bus/datagram.h"
 
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/process/raw_datagrams.h"
 
-namespace forereach {
-namespace datagram_test {
-
-using testing::HasSubstr;
+namespace forereach::datagram_test {
 
 DatagramKind KindOf(const RawDatagram& bytes) {
   const Datagram datagram = ParseDatagram(bytes);
@@ -119,5 +112,4 @@ TEST(DatagramTest, RefusedOnesAreCountedByTheirCauseAndSaid) {
     EXPECT_THAT(words, HasSubstr(part));
 }
 
-}  // namespace datagram_test
-}  // namespace forereach
+}  // namespace forereach::datagram_test

@@ -1,15 +1,6 @@
 // Datagrams that a stranger without a key sends to the bus of four signed processes: all four live on, still do their
 // work, and take no memory for what they were told.
-#include <algorithm>
-#include <array>
-#include <functional>
-#include <ostream>
-#include <random>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bus/authentic.h"
 #include "forereach/certifier_status_t.hpp"
@@ -20,8 +11,7 @@
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 
-namespace forereach {
-namespace hostile_datagrams_test {
+namespace forereach::hostile_datagrams_test {
 
 constexpr double kMegabyte = 1 << 20;
 constexpr double kMayGrowBy =
@@ -146,5 +136,4 @@ TEST_P(HostileDatagramsTest, EveryProcessLivesOnAndWorks) {
   }
 }
 
-}  // namespace hostile_datagrams_test
-}  // namespace forereach
+}  // namespace forereach::hostile_datagrams_test

@@ -1,30 +1,20 @@
 // What a certifier does not forget when it ends: faults and contradictions, on disks that work and on disks that do
 // not.
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <memory>
-#include <string>
-#include <utility>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "tests/test.h"
 
 #include "certifier/process/certifier_node.h"
 #include "forereach/withdrawal_t.hpp"
 #include "tests/gate/small_task.h"
 #include "tests/reset.h"
-#include "tests/scratch.h"
 #include "tests/small_disk.h"
 
-namespace forereach {
-namespace latch_test {
-
-using testing::HasSubstr;
-using testing::StartsWith;
+namespace forereach::latch_test {
 
 std::string Contents(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -109,9 +99,7 @@ class LatchTest : public testing::Test {
   }
   void Falsify() {
     const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
-    transition_t transition{};
-    transition.num_states = 4;
-    transition.num_inputs = 2;
+    transition_t transition{.num_states = 4, .num_inputs = 2};
     std::copy_n(z.data(), 4, transition.state);
     config_.problem->model->Evaluate({z.data(), 6}, {transition.next_state, 4});
     transition.next_state[2] += 0.01;
@@ -340,12 +328,8 @@ TEST_F(LatchTest, AsManyContradictionsFitAsAreAllowed) {
 
 TEST_F(LatchTest, RefusesADirectoryThatAnotherCertifierUses) {
   Begin();
-  try {
-    const LatchFile second(directory_);
-    FAIL();
-  } catch (const BadInput& error) {
-    EXPECT_THAT(error.what(), HasSubstr(directory_ + ": another certifier keeps its state there"));
-  }
+  EXPECT_THAT([&] { const LatchFile second(directory_); },
+              ThrowsMessage<BadInput>(HasSubstr(directory_ + ": another certifier keeps its state there")));
   node_.reset();
   EXPECT_NO_THROW(LatchFile{directory_});
 }
@@ -572,5 +556,4 @@ TEST_F(LatchTest, DoesNotArmOnAReadOnlyDiskAndSaysWhy) {
   ExpectArmed();
 }
 
-}  // namespace latch_test
-}  // namespace forereach
+}  // namespace forereach::latch_test

@@ -1,22 +1,10 @@
 // On the wire it stays LCM: plain LCM, lcm-logger and lcm-logplayer understand what we send, and we understand them.
 // And LCM receives nothing in our processes.
-#include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <set>
-#include <sstream>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
+
+#include "tests/test.h"
 
 #include "bus/authentic.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -25,8 +13,7 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace lcm_interoperation_test {
+namespace forereach::lcm_interoperation_test {
 
 using Message = std::pair<std::string, std::vector<std::uint8_t>>;  // channel, bytes
 
@@ -265,5 +252,4 @@ TEST_F(LcmInteroperationTest, OurLargestMessageFitsOneDatagramWithItsSignature) 
   EXPECT_TRUE(FitsOneDatagram(kMaxChannelBytes, EncodedSize<certified_plan_t>() + kTrailerBytes));
 }
 
-}  // namespace lcm_interoperation_test
-}  // namespace forereach
+}  // namespace forereach::lcm_interoperation_test

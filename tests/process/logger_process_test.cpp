@@ -1,17 +1,12 @@
 // forereach-logger as a process: its files contain the messages of the bus when it ends.
-#include <filesystem>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace logger_process_test {
+namespace forereach::logger_process_test {
 
 TEST(LoggerProcessTest, RecordsAndEndsWithASummary) {
   const ScratchDirectory scratch;
@@ -61,5 +56,4 @@ TEST(LoggerProcessTest, ExitsWithOneIfItsLogWasDeleted) {
   EXPECT_NE(logger.output().find("confirmed events are gone"), std::string::npos) << logger.output();
 }
 
-}  // namespace logger_process_test
-}  // namespace forereach
+}  // namespace forereach::logger_process_test

@@ -1,12 +1,6 @@
 // All four processes together: what is proposed is decided on, what is certified is driven, and the robot never leaves
 // its tube. How far it gets depends on the machine; these things do not.
-#include <map>
-#include <set>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -14,8 +8,7 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace pipeline_test {
+namespace forereach::pipeline_test {
 
 TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   const ScratchDirectory scratch;
@@ -58,5 +51,4 @@ TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   }
 }
 
-}  // namespace pipeline_test
-}  // namespace forereach
+}  // namespace forereach::pipeline_test

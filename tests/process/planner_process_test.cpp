@@ -1,18 +1,12 @@
 // forereach-planner as a process: it proposes when it hears of a robot that stands, and takes no for an answer.
-#include <limits>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "forereach/robot_state_t.hpp"
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace planner_process_test {
+namespace forereach::planner_process_test {
 
 class PlannerProcessTest : public testing::Test {
  protected:
@@ -74,9 +68,7 @@ TEST_F(PlannerProcessTest, BadMessagesDoNotStopIt) {
     probe_.bus().Publish(channel, Bytes());
     probe_.bus().Publish(channel, candidate_plan_t{});
   }
-  robot_state_t state{};
-  state.utime = WallClockUs();
-  state.mode = robot_state_t::STANDING;
+  robot_state_t state{.utime = WallClockUs(), .mode = robot_state_t::STANDING};
   for (const std::int16_t states : std::initializer_list<std::int16_t>{-1, 0, 5, 32767}) {
     state.num_states = states;
     probe_.bus().Publish("ROBOT_STATE", state);
@@ -94,5 +86,4 @@ TEST_F(PlannerProcessTest, EndsWhenTheRobotHasFinished) {
   EXPECT_EQ(planner_.WaitForExit(), 0) << planner_.error();
 }
 
-}  // namespace planner_process_test
-}  // namespace forereach
+}  // namespace forereach::planner_process_test

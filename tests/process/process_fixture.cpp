@@ -99,9 +99,7 @@ void BusProbe::ListenFor(std::chrono::milliseconds time) {
 
 candidate_plan_t CandidateFor(const Config& config, std::int64_t plan_id, const Eigen::VectorXd& control, int steps,
                               std::chrono::milliseconds lead) {
-  candidate_plan_t candidate{};
-  candidate.utime = WallClockUs();
-  candidate.plan_id = plan_id;
+  candidate_plan_t candidate{.utime = WallClockUs(), .plan_id = plan_id};
   SetText(candidate.source, "process test");
   candidate.start_utime = candidate.utime + std::chrono::microseconds(lead).count();
   candidate.step_us = static_cast<std::int64_t>(config.robot.step_period_ms * 1e3);

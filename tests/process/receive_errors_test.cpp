@@ -2,13 +2,11 @@
 // own recvmsg stands before the system's.
 #include <atomic>
 #include <cerrno>
-#include <chrono>
-#include <string>
-#include <thread>
 
 #include <dlfcn.h>
-#include <gtest/gtest.h>
 #include <sys/socket.h>
+
+#include "tests/test.h"
 
 #include "bus/udp_receiver.h"
 #include "tests/process/process_fixture.h"
@@ -27,8 +25,7 @@ extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
   return -1;
 }
 
-namespace forereach {
-namespace receive_errors_test {
+namespace forereach::receive_errors_test {
 
 using std::chrono::milliseconds;
 
@@ -79,5 +76,4 @@ TEST_F(NoErrorsTest, DoesNotCountATimeoutOrASignal) {
   EXPECT_EQ(receiver_.counts().receive_errors, 0);
 }
 
-}  // namespace receive_errors_test
-}  // namespace forereach
+}  // namespace forereach::receive_errors_test

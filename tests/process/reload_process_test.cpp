@@ -1,21 +1,16 @@
 // Reloads of a process whose task file stopped being a file, or whose mount stalls: it stays, says so, and ends in
 // time.
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
+
+#include "tests/test.h"
 
 #include "tests/process/process_fixture.h"
 
 #include "tests/paths.h"
 
-namespace forereach {
-namespace reload_process_test {
+namespace forereach::reload_process_test {
 
 class ReloadProcessTest : public testing::TestWithParam<const char*> {
  protected:
@@ -71,5 +66,4 @@ TEST_P(ReloadProcessTest, ReloadsAgainDuringAReadThatNeverEnds) {
 INSTANTIATE_TEST_SUITE_P(All, ReloadProcessTest, testing::Values(FOREREACH_CERTIFIER, FOREREACH_ROBOT_SIM),
                          [](const auto& info) { return info.index == 0 ? "Certifier" : "Robot"; });
 
-}  // namespace reload_process_test
-}  // namespace forereach
+}  // namespace forereach::reload_process_test

@@ -1,15 +1,8 @@
 // forereach-certifier as a process that ends while the robot executes its plan, and starts again: the plan goes on
 // exactly where nothing that it rests on has changed meanwhile.
-#include <algorithm>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <memory>
-#include <string>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
@@ -18,8 +11,7 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace restart_process_test {
+namespace forereach::restart_process_test {
 
 constexpr int kSteps = 14;  // 4.2 s
 
@@ -121,5 +113,4 @@ TEST_F(RestartProcessTest, WithoutAnObstacleItStopsTheRobot) {
   ExpectAStop();
 }
 
-}  // namespace restart_process_test
-}  // namespace forereach
+}  // namespace forereach::restart_process_test

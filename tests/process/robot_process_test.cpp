@@ -1,10 +1,5 @@
 // forereach-robot-sim as a process: it moves only for a certified plan.
-#include <algorithm>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "forereach/command_t.hpp"
@@ -15,8 +10,7 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace robot_process_test {
+namespace forereach::robot_process_test {
 
 constexpr int kSteps = 5;
 
@@ -61,9 +55,7 @@ TEST_F(RobotProcessTest, AReloadMakesItTakePlansOfTheTaskAsItIsNow) {
   ASSERT_TRUE(answer.certified);
   probe_.bus().Publish("PLAN_CERTIFIED", *answer.certified);
   ASSERT_TRUE(WaitForEvents(execution_event_t::REFUSED));
-  command_t reload{};
-  reload.utime = WallClockUs();
-  reload.kind = command_t::RELOAD;
+  command_t reload{.utime = WallClockUs(), .kind = command_t::RELOAD};
   probe_.bus().Publish("COMMAND", reload);
   ASSERT_TRUE(robot_.WaitForLog("as it is now are accepted")) << robot_.error();
   probe_.bus().Publish("PLAN_CERTIFIED", *answer.certified);
@@ -123,5 +115,4 @@ TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {
   EXPECT_EQ(robot_.Terminate(), 0) << robot_.error();
 }
 
-}  // namespace robot_process_test
-}  // namespace forereach
+}  // namespace forereach::robot_process_test

@@ -1,23 +1,12 @@
 // The screen and the two queues behind it, on both kinds of bus.
-#include <algorithm>
 #include <atomic>
-#include <chrono>
-#include <memory>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace screen_test {
-
-using testing::ElementsAre;
+namespace forereach::screen_test {
 
 constexpr std::uint8_t kGood = 1, kBad = 2, kThrows = 3, kElsewhere = 4;
 
@@ -166,5 +155,4 @@ TEST_P(ScreenTest, WhatDoesNotFitOneDatagramOrHasNoNameIsNotSent) {
   EXPECT_EQ(heard.size(), 2u) << "the first, and what DispatchAll sends";
 }
 
-}  // namespace screen_test
-}  // namespace forereach
+}  // namespace forereach::screen_test

@@ -1,16 +1,6 @@
 // Every signed channel at a node that listens on it: what its speaker signs here and now has an effect, and nothing
 // else has any. The channels are spelled out here, so that none is lost from the list of those that are signed.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <functional>
-#include <map>
-#include <memory>
-#include <set>
-#include <sstream>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
 #include "bus/bus_options.h"
 #include "bus/process.h"
@@ -30,10 +20,8 @@
 #include "tests/keys.h"
 #include "tests/planner/tasks.h"
 #include "tests/process/process_fixture.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace signed_channels_test {
+namespace forereach::signed_channels_test {
 
 using Message = std::vector<std::uint8_t>;
 
@@ -154,11 +142,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "ROBOT_STATE")
     return Certifier([](int number) {
-      robot_state_t state{};
-      state.utime = WallClockUs();
-      state.sequence = number;
-      state.num_states = 4;
-      state.mode = robot_state_t::STANDING;
+      robot_state_t state{.utime = WallClockUs(), .sequence = number, .mode = robot_state_t::STANDING, .num_states = 4};
       state.executing_plan_id = state.executing_step = -1;
       return Encode(state);
     });
@@ -170,11 +154,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "TRANSITION")
     return Certifier([](int number) {
-      transition_t transition{};
-      transition.utime = WallClockUs();
-      transition.sequence = number;
-      transition.num_states = 4;
-      transition.num_inputs = 2;
+      transition_t transition{.utime = WallClockUs(), .sequence = number, .num_states = 4, .num_inputs = 2};
       return Encode(transition);
     });
   if (channel == "CERTIFIER_STATUS")
@@ -188,14 +168,12 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "PLAN_DECISION")
     return Planner([](int number) {
-      decision_t decision{};
-      decision.sequence = number;
+      decision_t decision{.sequence = number};
       return Encode(decision);
     });
   if (channel == "PLAN_ADVICE")
     return Planner([](int number) {
-      advice_t advice{};
-      advice.sequence = number;
+      advice_t advice{.sequence = number};
       return Encode(advice);
     });
   if (channel == "PLAN_CERTIFIED")
@@ -212,27 +190,17 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "FAULT" || channel == "COMMAND")
     return Robot([channel](int number) {
-      fault_t fault{};
-      fault.utime = WallClockUs();
-      fault.sequence = number;
-      fault.cause = fault_t::SLICE_LEFT;
-      command_t reset{};
-      reset.utime = WallClockUs();
-      reset.kind = command_t::RESET;
+      fault_t fault{.utime = WallClockUs(), .sequence = number, .cause = fault_t::SLICE_LEFT};
+      command_t reset{.utime = WallClockUs(), .kind = command_t::RESET};
       return channel == "FAULT" ? Encode(fault) : Encode(reset);
     });
   if (channel == "EXECUTION_EVENT")
     return Logger([](int number) {
-      execution_event_t event{};
-      event.utime = WallClockUs();
-      event.sequence = number;
-      event.kind = execution_event_t::CONTACT;
+      execution_event_t event{.utime = WallClockUs(), .sequence = number, .kind = execution_event_t::CONTACT};
       return Encode(event);
     });
   return Logger([](int number) {  // of which every second one is lost
-    logger_status_t status{};
-    status.utime = WallClockUs();
-    status.sequence = 1000 + 2 * number;
+    logger_status_t status{.utime = WallClockUs(), .sequence = 1000 + 2 * number};
     return Encode(status);
   });
 }
@@ -251,9 +219,7 @@ TEST_P(SignedChannelsTest, OnlyWhatItsSpeakerSignsNowHasAnEffect) {
   listener_ = ListenerOn(channel);
   for (int i = 0; i < 4; ++i) Step();
   if (channel == "COMMAND") {  // there is a fault to reset
-    fault_t fault{};
-    fault.utime = WallClockUs();
-    fault.cause = fault_t::SLICE_LEFT;
+    fault_t fault{.utime = WallClockUs(), .cause = fault_t::SLICE_LEFT};
     const std::string before = listener_.state();
     Send("FAULT", signer_->Sign(Role::kCertifier, "FAULT", Encode(fault), WallClockUs()));
     ASSERT_TRUE(AwaitAnotherState(before));
@@ -306,5 +272,4 @@ INSTANTIATE_TEST_SUITE_P(All, SignedChannelsTest, testing::ValuesIn([] {
                          }()),
                          [](const auto& instance) { return instance.param; });
 
-}  // namespace signed_channels_test
-}  // namespace forereach
+}  // namespace forereach::signed_channels_test

@@ -1,11 +1,7 @@
 // `forereach tail` on a real bus.
 #include <csignal>
-#include <map>
-#include <memory>
-#include <thread>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "bus/process.h"
 #include "forereach/decision_t.hpp"
@@ -14,18 +10,10 @@
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace tail_test {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::tail_test {
 
 decision_t Decided(std::int64_t sequence, std::int16_t outcome, const std::string& message) {
-  decision_t decision{};
-  decision.sequence = sequence;
-  decision.plan_id = 10 + sequence;
-  decision.outcome = outcome;
+  decision_t decision{.sequence = sequence, .plan_id = 10 + sequence, .outcome = outcome};
   SetText(decision.source, "planner\x1b[2J");
   SetText(decision.message, message);
   return decision;
@@ -109,5 +97,4 @@ TEST_F(TailTest, ColoursOnATerminalUnlessNoColorIsSet) {
   }
 }
 
-}  // namespace tail_test
-}  // namespace forereach
+}  // namespace forereach::tail_test

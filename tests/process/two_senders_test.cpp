@@ -1,12 +1,5 @@
 // Two processes under one key on one stream: the certifier certifies nothing on what either of them says.
-#include <algorithm>
-#include <cmath>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/obstacle_sender.h"
@@ -14,12 +7,8 @@
 #include "forereach/execution_event_t.hpp"
 #include "tests/gate/signed_air.h"
 #include "tests/gate/small_task.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace two_senders_test {
-
-using testing::HasSubstr;
+namespace forereach::two_senders_test {
 
 constexpr std::int64_t kTick = 5'000;
 constexpr std::int64_t kTimeout = 1'000'000;  // of obstacles and of the robot's state, by default
@@ -221,22 +210,18 @@ class TwoRobotsTest : public TwoSendersTest {
     Begin();
   }
   void Stands(Speaking& robot, std::int64_t sequence) {
-    robot_state_t state{};
-    state.utime = now_us_;
-    state.sequence = sequence;
-    state.mode = robot_state_t::STANDING;
+    robot_state_t state{.utime = now_us_, .sequence = sequence, .mode = robot_state_t::STANDING};
     state.executing_plan_id = state.executing_step = -1;
     state.num_states = 4;
     robot.Say("ROBOT_STATE", state, now_us_);
   }
   // At the first step of the plan. Of every second number, so that none of them follows another.
   void Executes(Speaking& robot, std::int64_t number, std::int64_t plan_id) {
-    robot_state_t state{};
-    state.utime = now_us_;
-    state.sequence = 2 * number;
-    state.mode = robot_state_t::EXECUTING;
-    state.executing_plan_id = plan_id;
-    state.num_states = 4;
+    robot_state_t state{.utime = now_us_,
+                        .sequence = 2 * number,
+                        .executing_plan_id = plan_id,
+                        .mode = robot_state_t::EXECUTING,
+                        .num_states = 4};
     const candidate_plan_t plan = Candidate(plan_id);
     std::ranges::copy(plan.initial_center, state.state);
     robot.Say("ROBOT_STATE", state, now_us_);
@@ -256,11 +241,10 @@ class TwoRobotsTest : public TwoSendersTest {
     EXPECT_EQ(node_->gate().Status(now_us_).learned, 1);
   }
   void Answer(Speaking& robot) {
-    execution_event_t event{};
-    event.utime = now_us_;
-    event.kind = execution_event_t::WITHDRAWN;
-    event.plan_id = withdrawals_.back().plan_id;
-    event.value = static_cast<double>(withdrawals_.back().sequence);
+    execution_event_t event{.utime = now_us_,
+                            .plan_id = withdrawals_.back().plan_id,
+                            .kind = execution_event_t::WITHDRAWN,
+                            .value = static_cast<double>(withdrawals_.back().sequence)};
     robot.Say("EXECUTION_EVENT", event, now_us_);
     Run();
   }
@@ -271,10 +255,7 @@ class TwoRobotsTest : public TwoSendersTest {
     return withdrawals_.size() > sent;
   }
   transition_t Step() const {
-    transition_t step{};
-    step.utime = now_us_;
-    step.num_states = 4;
-    step.num_inputs = 2;
+    transition_t step{.utime = now_us_, .num_states = 4, .num_inputs = 2};
     return step;
   }
 
@@ -370,8 +351,7 @@ TEST_F(TwoRobotsTest, NeitherOfTwoAnswersAWithdrawal) {
   CertifyForOne(first);
   ContradictTheDeclaration(first);
   ASSERT_FALSE(withdrawals_.empty());
-  execution_event_t accepted{};
-  accepted.kind = execution_event_t::ACCEPTED;
+  execution_event_t accepted{.kind = execution_event_t::ACCEPTED};
   first.Say("EXECUTION_EVENT", accepted, now_us_);
   Answer(second);
   EXPECT_TRUE(IsSentAgain());
@@ -474,10 +454,7 @@ TEST_F(TwoRobotsTest, ThatOneHasFinishedSwitchesNoFaultOffForTheOther) {
       if (are_two) Stands(second, i);
       Run();
     }
-    robot_state_t finished{};
-    finished.utime = now_us_;
-    finished.sequence = 3;
-    finished.mode = robot_state_t::FINISHED;
+    robot_state_t finished{.utime = now_us_, .sequence = 3, .mode = robot_state_t::FINISHED};
     finished.executing_plan_id = finished.executing_step = -1;
     finished.num_states = 4;
     (are_two ? second : first).Say("ROBOT_STATE", finished, now_us_);
@@ -497,10 +474,7 @@ TEST_F(TwoRobotsTest, ASecondOneCountsThoughItsMessageCannotBeUsed) {
     Begin();
     Speaking first = one(), second = other();
     CertifyForOne(first);
-    robot_state_t stale{};
-    stale.utime = now_us_ - 600'000;
-    stale.mode = robot_state_t::STANDING;
-    stale.num_states = 4;
+    robot_state_t stale{.utime = now_us_ - 600'000, .mode = robot_state_t::STANDING, .num_states = 4};
     if (is_stale)
       second.Say("ROBOT_STATE", stale, now_us_);
     else
@@ -531,9 +505,7 @@ TEST_F(TwoRobotsTest, WithoutArmingAStateOfAClockThatIsOffIsForgotten) {
     config_.gate.needs_robot_state = needs_robot;
     Begin();
     Speaking robot = one();
-    robot_state_t late{};
-    late.utime = now_us_ - 300'000;
-    late.mode = robot_state_t::STANDING;
+    robot_state_t late{.utime = now_us_ - 300'000, .mode = robot_state_t::STANDING};
     late.executing_plan_id = late.executing_step = -1;
     late.num_states = 4;
     robot.Say("ROBOT_STATE", late, now_us_);
@@ -551,11 +523,10 @@ TEST_F(TwoRobotsTest, WhatOneOfThemReportsAsWrongCounts) {
   Speaking first = one(), second = other();
   for (int i = 0; i < 20; ++i, now_us_ += 100'000) Stands(first, i), Run();
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  robot_state_t state{};
-  state.utime = now_us_;
-  state.mode = robot_state_t::EXECUTING;
-  state.executing_plan_id = decisions_.back().plan_id;
-  state.num_states = 4;
+  robot_state_t state{.utime = now_us_,
+                      .executing_plan_id = decisions_.back().plan_id,
+                      .mode = robot_state_t::EXECUTING,
+                      .num_states = 4};
   state.state[0] = 10;
   second.Say("ROBOT_STATE", state, now_us_);
   Run();
@@ -575,9 +546,7 @@ TEST_F(TwoSendersTest, TwoOperatorsAndTwoPlannersAreHeard) {
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   EXPECT_EQ(decisions_.size(), 2u);
   for (const std::uint64_t id : {1u, 2u}) {
-    command_t reset{};
-    reset.utime = now_us_;
-    reset.kind = 99;
+    command_t reset{.utime = now_us_, .kind = 99};
     Speaking(*air_, Role::kOperator, id).Say("COMMAND", reset, now_us_);
   }
   const std::int64_t refused = status_.messages_refused;
@@ -606,5 +575,4 @@ TEST_F(TwoRobotsTest, ATransitionThatWasSignedWhileAClockWasAheadDoesNotLatchThe
   EXPECT_EQ(status_.refused_replayed, 6) << "the heartbeat says it";
 }
 
-}  // namespace two_senders_test
-}  // namespace forereach
+}  // namespace forereach::two_senders_test

@@ -1,33 +1,22 @@
 // Datagrams at the socket: by group, port and kind; their counts; their cost in memory.
 #include "bus/udp_receiver.h"
 
-#include <algorithm>
-#include <chrono>
 #include <csignal>
-#include <cstring>
-#include <functional>
 #include <mutex>
-#include <random>
-#include <string>
-#include <thread>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <netinet/ip.h>
 #include <pthread.h>
 #include <sys/socket.h>
 #include <unistd.h>
+
+#include "tests/test.h"
 
 #include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 #include "tests/sanitized.h"
 
-namespace forereach {
-namespace udp_receiver_test {
-
-using testing::ElementsAre;
+namespace forereach::udp_receiver_test {
 
 class UdpReceiverTest : public testing::Test {
  protected:
@@ -220,5 +209,4 @@ TEST(BusCountsTest, WhatTheKernelLostIsDroppedByTheBus) {
   EXPECT_GT(bus->datagrams().messages, 0);
 }
 
-}  // namespace udp_receiver_test
-}  // namespace forereach
+}  // namespace forereach::udp_receiver_test

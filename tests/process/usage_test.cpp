@@ -1,20 +1,11 @@
 // How every process starts, refuses to, and ends.
-#include <algorithm>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/keys.h"
 #include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
-namespace forereach {
-namespace usage_test {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::usage_test {
 
 class UsageTest : public testing::TestWithParam<std::pair<const char*, const char*>> {
  protected:
@@ -117,5 +108,4 @@ TEST_P(UsageTest, EndsCleanlyOnSigterm) {
   EXPECT_NE(process.output(), "") << "a summary";
 }
 
-}  // namespace usage_test
-}  // namespace forereach
+}  // namespace forereach::usage_test

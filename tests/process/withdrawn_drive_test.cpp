@@ -1,13 +1,5 @@
 // The certifier's node and the simulated robot on one bus and a simulated clock: a wall appears while the robot drives.
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <functional>
-#include <map>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
@@ -16,11 +8,9 @@
 #include "simulator/sim_node.h"
 #include "tests/gate/small_task.h"
 
-namespace forereach {
-namespace withdrawn_drive_test {
+namespace forereach::withdrawn_drive_test {
 
 using testing::Contains;
-using testing::Not;
 
 constexpr std::int64_t kStepUs = 150'000;
 constexpr int kSteps = 34, kProgress = 24;
@@ -204,10 +194,7 @@ TEST_F(WithdrawnDriveTest, AnOldAnswerDoesNotStopTheRepetition) {
   lossy_.to_lose["PLAN_WITHDRAWN"] = 3;
   SeeWall(2);
   RunFor(4000);
-  execution_event_t old{};
-  old.utime = now_ - 500'001;
-  old.plan_id = 1;
-  old.kind = execution_event_t::WITHDRAWN;
+  execution_event_t old{.utime = now_ - 500'001, .plan_id = 1, .kind = execution_event_t::WITHDRAWN};
   bus_->Publish("EXECUTION_EVENT", old);
   RunFor(4'000'000);
   ASSERT_EQ(withdrawn_.size(), 1u);
@@ -268,10 +255,7 @@ TEST_F(WithdrawnDriveTest, AFalsifiedDeclarationStopsTheRobotEvenIfItsFaultIsLos
   Drive();
   RunFor(200'000);
   lossy_.to_lose["FAULT"] = 1000;
-  transition_t transition{};
-  transition.utime = now_;
-  transition.num_states = 4;
-  transition.num_inputs = 2;
+  transition_t transition{.utime = now_, .num_states = 4, .num_inputs = 2};
   transition.next_state[2] = 1;
   bus_->Publish("TRANSITION", transition);
   RunFor(10'000);
@@ -412,10 +396,7 @@ class RestartedCertifierTest : public WithdrawnDriveTest {
     return config;
   }
   transition_t Learned() const {
-    transition_t learned{};
-    learned.utime = now_;
-    learned.num_states = 4;
-    learned.num_inputs = 2;
+    transition_t learned{.utime = now_, .num_states = 4, .num_inputs = 2};
     learned.state[2] = 1.5;
     learned.next_state[0] = 1.5 * 0.15;
     learned.next_state[2] = 1.5;
@@ -577,5 +558,4 @@ TEST_F(RestartedCertifierTest, ThePlanStopsWhereSomethingChangesLater) {
   EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP));
 }
 
-}  // namespace withdrawn_drive_test
-}  // namespace forereach
+}  // namespace forereach::withdrawn_drive_test

@@ -1,11 +1,8 @@
 #include "records/check.h"
 
-#include <algorithm>
 #include <cctype>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "records/database.h"
 #include "records/interpreter.h"
@@ -13,11 +10,7 @@
 #include "tests/paths.h"
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace check_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
+namespace forereach::check_test {
 
 class CheckTest : public testing::Test {
  protected:
@@ -138,5 +131,4 @@ TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
   EXPECT_EQ(ToJson({check})[0]["damaged_tasks"].size(), 1u);
 }
 
-}  // namespace check_test
-}  // namespace forereach
+}  // namespace forereach::check_test

@@ -1,11 +1,7 @@
 // `forereach replay --compare`: what another task would have changed.
 #include "records/compare.h"
 
-#include <filesystem>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "records/database.h"
 #include "records/timeline.h"
@@ -13,12 +9,8 @@
 #include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace compare_test {
-
-using testing::HasSubstr;
+namespace forereach::compare_test {
 
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
@@ -150,5 +142,4 @@ TEST_F(CompareTest, RefusesToCompareWithoutOneTask) {
   EXPECT_EQ(Forereach("replay '" + kLog + "' --compare --other-task --config '" + kConfig + "' 2>&1").code, 2);
 }
 
-}  // namespace compare_test
-}  // namespace forereach
+}  // namespace forereach::compare_test

@@ -1,20 +1,18 @@
 #include "records/event_log.h"
 
 #include <csignal>
-#include <cstring>
-#include <random>
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "tests/test.h"
+
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace event_log_test {
+namespace forereach::event_log_test {
 
 constexpr int kHeader = 28;
 
@@ -368,5 +366,4 @@ TEST(EventLog, ReadsAnyMutationWithoutInventingRecords) {
   }
 }
 
-}  // namespace event_log_test
-}  // namespace forereach
+}  // namespace forereach::event_log_test

@@ -1,13 +1,9 @@
 // Real logs, damaged at random: the reader ends, stays within its memory, and returns every record that is undamaged.
-#include <algorithm>
-#include <array>
-#include <cstdlib>
-#include <map>
 #include <new>
-#include <random>
 
-#include <gtest/gtest.h>
 #include <malloc.h>
+
+#include "tests/test.h"
 
 #include "records/event_log.h"
 #include "tests/paths.h"
@@ -31,8 +27,7 @@ std::size_t live_bytes = 0, peak_bytes = 0;
 }
 [[gnu::noinline]] void operator delete(void* block, std::size_t) noexcept { operator delete(block); }
 
-namespace forereach {
-namespace hostile_log_test {
+namespace forereach::hostile_log_test {
 
 constexpr std::size_t kMemory = kMaxLogDataBytes + (1 << 16);  // one event, its channel and the reader itself
 
@@ -266,5 +261,4 @@ TEST_F(HostileLog, NestedClaimsTakeNoLongerThanTheirBytes) {
   EXPECT_GT(reader.damage().places, 25'000);
 }
 
-}  // namespace hostile_log_test
-}  // namespace forereach
+}  // namespace forereach::hostile_log_test

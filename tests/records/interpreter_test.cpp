@@ -1,15 +1,11 @@
 // Sequence numbers: missing, late and repeated messages, and restarts.
 #include "records/interpreter.h"
 
-#include <limits>
-#include <optional>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace interpreter_test {
+namespace forereach::interpreter_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000, kSecond = 1'000'000;
 
@@ -104,5 +100,4 @@ TEST(GapsTest, ASumOfLossesEndsAtTheLargestNumber) {
   EXPECT_EQ(SumOfLost(2, -3), 2) << "a database may hold anything";
 }
 
-}  // namespace interpreter_test
-}  // namespace forereach
+}  // namespace forereach::interpreter_test

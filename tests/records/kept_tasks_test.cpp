@@ -1,17 +1,14 @@
 // The tasks of a logger's runs are kept next to its logs, including those of reloads, as long as a log needs them.
 #include "records/kept_tasks.h"
 
-#include <fstream>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certifier_status_t.hpp"
 #include "tests/config/task_files.h"
 #include "tests/logger/disk_fixture.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace kept_tasks_test {
+namespace forereach::kept_tasks_test {
 
 namespace fs = std::filesystem;
 
@@ -132,5 +129,4 @@ TEST_F(KeptTest, TheQuotaTakesATaskWithTheLastLogThatNeedsIt) {
   Stop();
 }
 
-}  // namespace kept_tasks_test
-}  // namespace forereach
+}  // namespace forereach::kept_tasks_test

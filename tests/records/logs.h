@@ -1,20 +1,12 @@
 /** What the logger's tests share: files as bytes, logs as lists, and messages. */
 #pragma once
 
-#include <algorithm>
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "lcmtypes/codec.h"
 #include "records/event_log.h"
-#include "tests/scratch.h"
+#include "tests/test.h"
 
 namespace forereach {
 
@@ -64,18 +56,14 @@ void CopyLog(const std::string& from, const std::string& to, Edit edit) {
 }
 
 inline candidate_plan_t MakeCandidate(std::int64_t sequence, std::int64_t plan_id, const std::string& source = "test") {
-  candidate_plan_t candidate{};
-  candidate.sequence = sequence;
-  candidate.plan_id = plan_id;
+  candidate_plan_t candidate{.sequence = sequence, .plan_id = plan_id};
   SetText(candidate.source, source);
   return candidate;
 }
 
 inline decision_t MakeDecision(const candidate_plan_t& candidate, std::int64_t sequence, std::int16_t outcome,
                                std::int16_t cause) {
-  decision_t decision{};
-  decision.sequence = sequence;
-  decision.plan_id = candidate.plan_id;
+  decision_t decision{.sequence = sequence, .plan_id = candidate.plan_id};
   SetText(decision.source, GetText(candidate.source));
   decision.outcome = outcome;
   decision.cause = cause;
@@ -84,9 +72,7 @@ inline decision_t MakeDecision(const candidate_plan_t& candidate, std::int64_t s
 }
 
 inline execution_event_t MakeEvent(std::int64_t sequence, std::int16_t kind) {
-  execution_event_t event{};
-  event.sequence = sequence;
-  event.kind = kind;
+  execution_event_t event{.sequence = sequence, .kind = kind};
   return event;
 }
 

@@ -1,15 +1,12 @@
 // What a picture shows of a body: a sweep contains the body at every sample that it spans, and predictions grow.
 #include "records/outlines.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace outlines_test {
+namespace forereach::outlines_test {
 
 using Eigen::Vector2d;
 
@@ -95,5 +92,4 @@ TEST(Outlines, PredictionsGrowWhereTheObstacleIs) {
   EXPECT_TRUE(PredictionOf(Obstacle::HalfSpace(Vector2d(1, 0), 3).Moving(motion)).empty());
 }
 
-}  // namespace outlines_test
-}  // namespace forereach
+}  // namespace forereach::outlines_test

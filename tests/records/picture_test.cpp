@@ -1,16 +1,10 @@
 #include "records/picture.h"
 
-#include <filesystem>
-#include <iterator>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace picture_test {
+namespace forereach::picture_test {
 
 Picture Sample() {
   Picture picture;
@@ -99,5 +93,4 @@ TEST(Picture, WritesAPdf) {
   EXPECT_EQ(std::string(bytes.begin(), bytes.begin() + 5), "%PDF-");
 }
 
-}  // namespace picture_test
-}  // namespace forereach
+}  // namespace forereach::picture_test

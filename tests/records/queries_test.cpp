@@ -1,12 +1,9 @@
 // docs/queries.md: its columns are those of the database, and its queries answer.
-#include <map>
 #include <regex>
-#include <set>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sqlite3.h>
+
+#include "tests/test.h"
 
 #include "records/database.h"
 #include "records/interpreter.h"
@@ -14,18 +11,12 @@
 #include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace queries_test {
+namespace forereach::queries_test {
 
 const std::string kData = FOREREACH_SOURCE_DIR "/tests/data/";
 
-std::string Document() {
-  std::ostringstream text;
-  text << std::ifstream(FOREREACH_SOURCE_DIR "/docs/queries.md").rdbuf();
-  return text.str();
-}
+std::string Document() { return Read(FOREREACH_SOURCE_DIR "/docs/queries.md"); }
 
 using Table = std::vector<std::vector<std::string>>;
 
@@ -114,5 +105,4 @@ TEST_F(QueriesTest, TheFirstQueryCountsTheDecisionsOfTheLog) {
   EXPECT_EQ(certified, kCourseCertified);
 }
 
-}  // namespace queries_test
-}  // namespace forereach
+}  // namespace forereach::queries_test

@@ -1,10 +1,5 @@
 // A recorded log through the same gate gives the same decisions, and a changed one does not.
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
@@ -20,12 +15,8 @@
 #include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace replay_test {
-
-using testing::HasSubstr;
+namespace forereach::replay_test {
 
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
@@ -442,5 +433,4 @@ TEST_F(ReplayTest, AnotherTaskIsNoticed) {
   EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
 }
 
-}  // namespace replay_test
-}  // namespace forereach
+}  // namespace forereach::replay_test

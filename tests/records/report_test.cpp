@@ -1,10 +1,6 @@
 #include "records/report.h"
 
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/dynamics/models/named_models.h"
@@ -14,8 +10,7 @@
 #include "tests/records/logs.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace report_test {
+namespace forereach::report_test {
 
 /** A point mass without residual, and one circle at (3, 0). */
 Config PointMassConfig() {
@@ -74,8 +69,7 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
   Step(1, execution_event_t::STARTED, 0);
   for (int step = 1; step <= 4; ++step) Step(1, execution_event_t::STEP_INSIDE, step);
   Step(1, execution_event_t::STANDING, 4);
-  robot_state_t state{};
-  state.num_states = 4;
+  robot_state_t state{.num_states = 4};
   state.state[1] = 1.8;
   Append("ROBOT_STATE", state);
 
@@ -177,5 +171,4 @@ TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
   EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 2u);
 }
 
-}  // namespace report_test
-}  // namespace forereach
+}  // namespace forereach::report_test

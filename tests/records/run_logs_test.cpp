@@ -1,25 +1,15 @@
 // Which logs belong together, whose they are, and what is kept of finished runs.
 #include "records/run_logs.h"
 
-#include <filesystem>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/logger_status_t.hpp"
 #include "records/finished_runs.h"
 #include "records/output_file.h"
 #include "tests/cli/program.h"
 #include "tests/records/logs.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace run_logs_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+namespace forereach::run_logs_test {
 
 class RunLogsTest : public testing::Test {
  protected:
@@ -29,8 +19,7 @@ class RunLogsTest : public testing::Test {
     std::filesystem::create_directories(std::filesystem::path(path).parent_path());
     EventLogWriter writer(path);
     for (std::int64_t sequence = first; sequence <= last; ++sequence) {
-      logger_status_t status{};
-      status.sequence = sequence;
+      logger_status_t status{.sequence = sequence};
       writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(status));
     }
     EXPECT_TRUE(writer.Flush());
@@ -53,12 +42,7 @@ TEST_F(RunLogsTest, LogsThatGoOnAreOneRun) {
   const NamedRuns two = RunsNamedBy({a, b, c}, 2);
   EXPECT_THAT(LogsOf(two), ElementsAre(ElementsAre(a, b), ElementsAre(c)));
   EXPECT_TRUE(two.is_many);
-  try {
-    static_cast<void>(RunsNamedBy({b, a}, 1));
-    FAIL() << "the wrong order";
-  } catch (const BadInput& error) {
-    EXPECT_THAT(error.what(), HasSubstr("go on from it"));
-  }
+  EXPECT_THAT([&] { static_cast<void>(RunsNamedBy({b, a}, 1)); }, ThrowsMessage<BadInput>(HasSubstr("go on from it")));
 }
 
 TEST_F(RunLogsTest, ADirectoryIsReadWithItsSubdirectories) {
@@ -215,5 +199,4 @@ TEST(OutputFile, HasItsNameOnlyOnceItIsWhole) {
             std::filesystem::perms::group_read);
 }
 
-}  // namespace run_logs_test
-}  // namespace forereach
+}  // namespace forereach::run_logs_test

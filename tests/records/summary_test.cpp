@@ -1,14 +1,11 @@
 #include "records/summary.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "forereach/robot_state_t.hpp"
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace summary_test {
+namespace forereach::summary_test {
 
 Config GoalConfig() {
   Config config;
@@ -41,8 +38,7 @@ void WriteRun(const std::string& path) {
         E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::LIMIT_EXCEEDED, E::GOAL_REACHED})
     writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind)));
   writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence + 4, E::STANDING)));
-  robot_state_t state{};
-  state.num_states = 4;
+  robot_state_t state{.num_states = 4};
   state.state[0] = 3;
   state.state[1] = 3.5;
   writer.Append(3'000'000, "ROBOT_STATE", Encode(state));
@@ -181,5 +177,4 @@ TEST(Summary, PassesDamageAndCountsIt) {
   EXPECT_GT(summary.damage.bytes, 0);
 }
 
-}  // namespace summary_test
-}  // namespace forereach
+}  // namespace forereach::summary_test

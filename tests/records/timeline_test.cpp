@@ -1,13 +1,7 @@
 // A recorded run is read in one way: verify, replay, report and the timeline itself agree on the grounds of decisions.
 #include "records/timeline.h"
 
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
@@ -21,10 +15,7 @@
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 
-namespace forereach {
-namespace timeline_test {
-
-using testing::IsEmpty;
+namespace forereach::timeline_test {
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000;
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
@@ -322,5 +313,4 @@ TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
   EXPECT_EQ(believed["passed_over"]["not_authentic"]["unsigned"], 0);
 }
 
-}  // namespace timeline_test
-}  // namespace forereach
+}  // namespace forereach::timeline_test

@@ -1,13 +1,10 @@
 // `forereach verify` on event logs and decision databases: recorded ones, and ones with one message changed.
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <cstdio>
 #include <functional>
 #include <regex>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
@@ -24,11 +21,8 @@
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 
-namespace forereach {
-namespace verify_log_test {
+namespace forereach::verify_log_test {
 
-using testing::AllOf;
-using testing::HasSubstr;
 using verifier::Status;
 using verifier::Verdict;
 
@@ -547,5 +541,4 @@ TEST_F(VerifyObstacles, NoticesStaleObstaclesThatWereNeverInForce) {
   EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
 }
 
-}  // namespace verify_log_test
-}  // namespace forereach
+}  // namespace forereach::verify_log_test

@@ -1,14 +1,9 @@
 // The adversarial family: the value of a true declaration, a kept one, and one estimated from uninformative data.
-#include <algorithm>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/experiment.h"
 
-namespace forereach::research {
-namespace adversarial_test {
+namespace forereach::research::adversarial_test {
 
 TEST(AdversarialFamily, TheTrueDeclarationIsSoundAndTheOthersAreNot) {
   const Scope scope{1, true};
@@ -33,5 +28,4 @@ TEST(AdversarialFamily, TheTrueDeclarationIsSoundAndTheOthersAreNot) {
   EXPECT_GT(figure(1, "lambda = 32: estimate, false certificates, all groups"), 8);
 }
 
-}  // namespace adversarial_test
-}  // namespace forereach::research
+}  // namespace forereach::research::adversarial_test

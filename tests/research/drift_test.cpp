@@ -1,19 +1,11 @@
 // CommonRoad's single-track drift model, and the experiment on it.
 #include "research/drift/drift.h"
 
-#include <cmath>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/drift/drive.h"
-#include "tests/scratch.h"
 
-namespace forereach::research {
-namespace drift_test {
-
-using testing::HasSubstr;
+namespace forereach::research::drift_test {
 
 TEST(SingleTrackDrift, HasThePublishedDerivative) {
   // State, input and derivative from the unit test of CommonRoad's program (test_derivatives, test_std), with
@@ -113,5 +105,4 @@ TEST(DriftDrive, ReachesItsGoalInsideItsSlices) {
   }
 }
 
-}  // namespace drift_test
-}  // namespace forereach::research
+}  // namespace forereach::research::drift_test

@@ -1,16 +1,13 @@
 // One plan under one method: the certifier's own answers, and a coverage test that detects missing coverage.
 #include "research/evaluate.h"
 
-#include <memory>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "research/cell.h"
 #include "research/methods/envelope.h"
 
-namespace forereach::research {
-namespace evaluate_test {
+namespace forereach::research::evaluate_test {
 
 // Claims that the residual is zero.
 class NoResidual final : public ResidualEnclosure {
@@ -234,5 +231,4 @@ TEST(RunCell, CountsAddUpAndADeclarationThatDataContradictIsF) {
   for (const Tally& tally : RunCell(cell, {10, 20})) EXPECT_EQ(tally.falsified, tally.plans);
 }
 
-}  // namespace evaluate_test
-}  // namespace forereach::research
+}  // namespace forereach::research::evaluate_test

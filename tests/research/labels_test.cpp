@@ -1,18 +1,11 @@
 // Labels meet neither each other nor a mark, and stay in the frame.
 #include "research/labels.h"
 
-#include <cmath>
-#include <stdexcept>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/oracle/traced_random.h"
 
-#include "tests/oracle/random.h"
-
-namespace forereach::research {
-namespace labels_test {
+namespace forereach::research::labels_test {
 
 constexpr PixelBox kFrame{100, 50, 500, 450};
 constexpr double kRadius = 5, kClearance = 7;
@@ -25,8 +18,7 @@ double Distance(const PixelBox& box, const Label& label) {
 }
 
 TEST(Labels, OfClustersOverlapNothing) {
-  Random random(18);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(18);
   for (int round = 0; round < 100; ++round) {
     std::vector<PixelBox> marks;
     std::vector<Label> labels;
@@ -78,5 +70,4 @@ TEST(Labels, WithoutRoomAreAnError) {
       testing::ThrowsMessage<std::runtime_error>("picture: no room for the label 100"));
 }
 
-}  // namespace labels_test
-}  // namespace forereach::research
+}  // namespace forereach::research::labels_test

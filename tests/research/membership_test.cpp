@@ -1,14 +1,11 @@
 // Membership in zonotopes: at the boundary, inside the hull but outside the set, in flat sets, and against its support.
 #include "research/membership.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/random.h"
 
-namespace forereach::research {
-namespace membership_test {
+namespace forereach::research::membership_test {
 
 Membership At(const Zonotope& set, std::initializer_list<double> x) { return Locate(set, {x.begin(), x.size()}); }
 
@@ -66,5 +63,4 @@ TEST(Locate, AgreesWithSupportFunctions) {
   }
 }
 
-}  // namespace membership_test
-}  // namespace forereach::research
+}  // namespace forereach::research::membership_test

@@ -1,17 +1,11 @@
 // The paper's fixed grids give the paper's digits: rounded to nearest for the point mass, upward for the bicycle.
 #include "research/paper_grids.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <span>
+#include "tests/test.h"
 
-#include <gtest/gtest.h>
+#include "tests/oracle/traced_random.h"
 
-#include "tests/oracle/random.h"
-
-namespace forereach::research {
-namespace paper_grids_test {
+namespace forereach::research::paper_grids_test {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
 double RoundedUp(double x) { return std::ceil(x * 1e9) / 1e9; }
@@ -47,8 +41,7 @@ TEST(PaperGrids, BoxesHaveThePapersSlack) {
 TEST(PaperGrids, ABoxBoundsTheSlopesOfAllItsParameters) {
   const HeadingSaturation low = Scaled(0.8), high = Scaled(1.2);
   const BicycleGrid bound = PaperBicycleGrid(low, high, 25, 0.48, 500, 250);
-  Random random(5);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(5);
   double steepest = 0;
   for (int i = 0; i < 200'000; ++i) {
     const auto between = [&](double a, double b) { return random.Uniform(a, b); };
@@ -83,5 +76,4 @@ TEST(PaperGrids, AFinerGridIsLower) {
   EXPECT_GT(PaperPointMassGrid(knee, 5.4, 40000).velocity_diagonal, 0.06145786);
 }
 
-}  // namespace paper_grids_test
-}  // namespace forereach::research
+}  // namespace forereach::research::paper_grids_test

@@ -1,19 +1,9 @@
 // The experiment on a real car, with drives of a car that is made up here and whose equations and noise are known.
 #include "research/real/real.h"
 
-#include <array>
-#include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <numbers>
-#include <random>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "research/real/recording.h"
@@ -21,14 +11,11 @@
 #include "task/config.h"
 #include "task/config_error.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
-namespace forereach::research {
-namespace real_test {
+namespace forereach::research::real_test {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
 
 constexpr const char* kHeader =
     "elapsed time sensors,current,voltage,acc x (IMU),acc y (IMU),W (IMU),vel encoder,safety_value,throttle,steering,"
@@ -77,12 +64,7 @@ class RealTest : public testing::Test {
   }
   void ExpectRefusal(const std::string& text, const std::string& message) const {
     const std::string path = scratch_.Write("bad.csv", text);
-    try {
-      (void)ReadRecording(path);
-      ADD_FAILURE() << "accepted; expected: " << message;
-    } catch (const ConfigError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(path + message));
-    }
+    EXPECT_THAT([&] { (void)ReadRecording(path); }, ThrowsMessage<ConfigError>(HasSubstr(path + message)));
   }
 
   const ScratchDirectory scratch_;
@@ -297,12 +279,6 @@ std::map<std::string, std::string> RowOf(const std::string& csv, const std::stri
   return {};
 }
 
-std::string Read(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
-
 Output Command(const std::string& arguments) {
   return Shell(FOREREACH_BINARY_DIR "/research/forereach-research real " + arguments + " 2>&1");
 }
@@ -352,5 +328,4 @@ TEST_F(RealTest, WithoutDataItSaysWhereTheyCanBeHad) {
   EXPECT_THAT(standing.text, HasSubstr("run_a: the car drives at 1 m/s or more, under power, in 0 steps"));
 }
 
-}  // namespace real_test
-}  // namespace forereach::research
+}  // namespace forereach::research::real_test

@@ -1,35 +1,18 @@
 // Runs: quick figures in bands that a broken method would miss, the same files for any number of threads, resuming.
 #include "research/run.h"
 
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "research/methods/envelope.h"
 #include "research/plans.h"
 #include "research/run_directory.h"
 #include "research/sides.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
-namespace forereach::research {
-namespace run_test {
+namespace forereach::research::run_test {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
-
-std::string Read(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
 
 class RunTest : public testing::Test {
  protected:
@@ -215,20 +198,15 @@ TEST_F(RunTest, AnotherEffortOrADamagedFileIsRefusedByName) {
   const Cell cell = PaperCell(PointMassSystem(), 100, 0, 0);
   const RunDirectory directory(root_, {2, 2});
   (void)RunAll({cell}, directory, 1);
-  try {
-    const RunDirectory other(root_, {3, 2});
-    FAIL() << "accepted";
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("run.json: scenarios: begun with 2, this run has 3"));
-  }
+  EXPECT_THAT(
+      [&] {
+        const RunDirectory other(root_, {3, 2});
+      },
+      ThrowsMessage<std::runtime_error>(HasSubstr("run.json: scenarios: begun with 2, this run has 3")));
   std::ofstream(root_ / "cells" / (cell.key() + ".json")) << "{\"groups\": {\"A\"";
-  try {
-    (void)RunAll({cell}, directory, 1);
-    FAIL() << "accepted";
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr(cell.key() + ".json: "));
-    EXPECT_THAT(error.what(), HasSubstr("delete it"));
-  }
+  EXPECT_THAT([&] { (void)RunAll({cell}, directory, 1); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(cell.key() + ".json: "));
+              EXPECT_THAT(error.what(), HasSubstr("delete it")));
 }
 
 TEST_F(RunTest, TooSmallADeclarationIsSeenByTheTestOrByTheTruth) {
@@ -360,5 +338,4 @@ TEST_F(RunTest, TheCommandTeachesRunsAndRefuses) {
   EXPECT_THAT(quick.text, HasSubstr("run.json: scenarios: begun with 600, this run has 30"));
 }
 
-}  // namespace run_test
-}  // namespace forereach::research
+}  // namespace forereach::research::run_test

@@ -1,16 +1,11 @@
 // Scenarios: in their groups' bounds, half of them unsafe, the obstacle where it is said to be.
 #include "research/scenarios.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/truth.h"
 
-namespace forereach::research {
-namespace scenarios_test {
+namespace forereach::research::scenarios_test {
 
 constexpr int kCount = 200;
 
@@ -110,5 +105,4 @@ TEST(Scenarios, TheObstacleIsOutsideTheCurve) {
   }
 }
 
-}  // namespace scenarios_test
-}  // namespace forereach::research
+}  // namespace forereach::research::scenarios_test

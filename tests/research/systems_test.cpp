@@ -1,9 +1,7 @@
 // The paper's two systems: the deployed declarations are valid, smaller ones are not, and the data have the right form.
 #include "research/systems.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
@@ -11,8 +9,7 @@
 #include "research/random.h"
 #include "research/scenarios.h"
 
-namespace forereach::research {
-namespace systems_test {
+namespace forereach::research::systems_test {
 
 // The largest |r_k(z) - r_k(z')| / sum_l L_kl |z_l - z'_l| over random near pairs of the domain.
 double LargestSlopeRatio(const System& system, const Eigen::MatrixXd& lipschitz) {
@@ -118,5 +115,4 @@ TEST(Data, DoNotContradictTheDeployedDeclaration) {
     }
 }
 
-}  // namespace systems_test
-}  // namespace forereach::research
+}  // namespace forereach::research::systems_test

@@ -1,22 +1,12 @@
 // Tables: the paper's digits, the words where ours differ, means and deviations.
 #include "research/table.h"
 
-#include <cmath>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/paper_values.h"
 #include "research/statistics.h"
 
-namespace forereach::research {
-namespace table_test {
-
-using testing::HasSubstr;
+namespace forereach::research::table_test {
 
 constexpr PaperValue kRecall{"x", 0.490, 3, "Table 1"};
 constexpr PaperValue kWithSeeds{"x", 0.4899, 4, "Table 1", 0.1};
@@ -162,5 +152,4 @@ TEST(PaperValues, HaveKeysOfTheirOwn) {
   EXPECT_THROW((void)Paper("bicycle.D.recall"), std::invalid_argument);
 }
 
-}  // namespace table_test
-}  // namespace forereach::research
+}  // namespace forereach::research::table_test

@@ -1,13 +1,9 @@
 // Rollouts of the target: where they start, that they are the target's, and when they touch.
 #include "research/truth.h"
 
-#include <cmath>
-#include <vector>
+#include "tests/test.h"
 
-#include <gtest/gtest.h>
-
-namespace forereach::research {
-namespace truth_test {
+namespace forereach::research::truth_test {
 
 TEST(Rollouts, StartAtTheCenterThenAtEachCornerThenInside) {
   for (const System* system : Systems()) {
@@ -65,5 +61,4 @@ TEST(Rollouts, ACircleThatIsMetExactlyIsTouched) {
   EXPECT_TRUE(path.StayClearOf({beyond, std::nextafter(distance, 0)}));
 }
 
-}  // namespace truth_test
-}  // namespace forereach::research
+}  // namespace forereach::research::truth_test

@@ -1,18 +1,12 @@
 // Variants: the same target, split in another way; their declarations bound the slopes of the rest.
 #include "research/variants.h"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/scenarios.h"
 #include "tests/oracle/random.h"
 
-namespace forereach::research {
-namespace variants_test {
+namespace forereach::research::variants_test {
 
 struct Point {
   std::vector<double> z, residual, next;
@@ -138,5 +132,4 @@ TEST(Escaping, MembersAgreeBelowTheKneeAndTheFirstIsTheKnee) {
   EXPECT_GT(EscapeAt(32, 3), 29 * EscapeAt(1, 3));
 }
 
-}  // namespace variants_test
-}  // namespace forereach::research
+}  // namespace forereach::research::variants_test

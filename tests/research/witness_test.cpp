@@ -1,16 +1,12 @@
 // Factors found by bisection hold, and just below them they do not.
 #include "research/witness.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/noise_floor.h"
 #include "research/variants.h"
 
-namespace forereach::research {
-namespace witness_test {
+namespace forereach::research::witness_test {
 
 TEST(FactorForContainment, HoldsAndFailsJustBelow) {
   const Undeclared kept{Escaping(32), PointMassSystem().deployed};
@@ -99,5 +95,4 @@ TEST(NoiseFloor, TheShiftIsAddedInEveryStep) {
   EXPECT_NEAR(ShiftedRollout(system, still, controls, -shift)(0, 3), -1.5, 1e-9);
 }
 
-}  // namespace witness_test
-}  // namespace forereach::research
+}  // namespace forereach::research::witness_test

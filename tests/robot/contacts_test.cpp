@@ -1,17 +1,14 @@
 // What the simulated robot touches between two samples, just inside and just outside of what the bounds admit.
 #include "simulator/contacts.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace contacts_test {
+namespace forereach::contacts_test {
 
 using Eigen::Vector2d;
-using testing::IsEmpty;
 using testing::SizeIs;
 
 constexpr double kLittle = 1e-9;
@@ -121,5 +118,4 @@ TEST(Contacts, AtASampleCoverTheWholeBody) {
   EXPECT_EQ(met[0].obstacle, 1);
 }
 
-}  // namespace contacts_test
-}  // namespace forereach
+}  // namespace forereach::contacts_test

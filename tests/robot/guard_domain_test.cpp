@@ -1,20 +1,13 @@
 // The guard's domain and the certifier's: no honest certificate is refused, however close to the domain's ends it
 // comes.
-#include <cmath>
-#include <limits>
-#include <memory>
-#include <random>
-#include <utility>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "certifier/gate/gate.h"
 #include "robot/guard.h"
 #include "task/config.h"
 #include "tests/paths.h"
 
-namespace forereach {
-namespace guard_domain_test {
+namespace forereach::guard_domain_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000;
 
@@ -93,5 +86,4 @@ TEST(GuardDomainProperty, EveryHonestCertificatePasses) {
   }
 }
 
-}  // namespace guard_domain_test
-}  // namespace forereach
+}  // namespace forereach::guard_domain_test

@@ -1,25 +1,15 @@
 #include "robot/guard.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstring>
-#include <limits>
-#include <numbers>
-#include <random>
-
-#include <gmock/gmock.h>
 #include <gmpxx.h>
-#include <gtest/gtest.h>
+
+#include "tests/test.h"
 
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace guard_test {
+namespace forereach::guard_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
@@ -28,13 +18,6 @@ using State = std::array<double, 2>;
 
 double Above(double x) { return std::nextafter(x, kInf); }
 double Below(double x) { return std::nextafter(x, -kInf); }
-
-GuardOptions TwoStates() {
-  GuardOptions options{2, 1, kStep, {}, {}};
-  options.config_digest = DigestOf("config");
-  options.model_digest = DigestOf("model");
-  return options;
-}
 
 GuardCause AcceptedBy(const certified_plan_t& certified, std::int64_t now = kNow) {
   Guard guard(TwoStates());
@@ -903,5 +886,4 @@ TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
   }
 }
 
-}  // namespace guard_test
-}  // namespace forereach
+}  // namespace forereach::guard_test

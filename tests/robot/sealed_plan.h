@@ -1,11 +1,13 @@
-/** Certified plans for tests, with the digests they need to pass. */
+/** Certified plans for tests, with the digests they need to pass, and the options of a guard that takes them. */
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/execution_event_t.hpp"
 #include "lcmtypes/seal.h"
+#include "robot/guard.h"
 
 namespace forereach {
 
@@ -49,6 +51,31 @@ inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
   SetDigest(certified.transitions_digest, DigestOf("transitions"));
   return certified;
 }
+
+/** Of a guard that takes SmallPlan. */
+inline GuardOptions TwoStates() {
+  GuardOptions options{2, 1, kPlanStepUs, {}, {}};
+  options.config_digest = DigestOf("config");
+  options.model_digest = DigestOf("model");
+  return options;
+}
+
+enum : std::int16_t {
+  kAccepted = execution_event_t::ACCEPTED,
+  kRefused = execution_event_t::REFUSED,
+  kStarted = execution_event_t::STARTED,
+  kInside = execution_event_t::STEP_INSIDE,
+  kOutside = execution_event_t::STEP_OUTSIDE,
+  kTailBegun = execution_event_t::TAIL_BEGUN,
+  kStanding = execution_event_t::STANDING,
+  kGoalReached = execution_event_t::GOAL_REACHED,
+  kContact = execution_event_t::CONTACT,
+  kHalted = execution_event_t::HALTED,
+  kReset = execution_event_t::RESET,
+  kOffSchedule = execution_event_t::OFF_SCHEDULE,
+  kWithdrawn = execution_event_t::WITHDRAWN,
+  kStop = execution_event_t::EMERGENCY_STOP
+};
 
 inline std::vector<std::uint8_t> Sealed(certified_plan_t certified) {
   Seal(certified);

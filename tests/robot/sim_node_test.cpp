@@ -1,14 +1,6 @@
 #include "simulator/sim_node.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <numbers>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "bus/authentic_bus.h"
 #include "certifier/gate/obstacle_message.h"
@@ -28,27 +20,9 @@
 #include "tests/robot/sealed_plan.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace sim_node_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::ThrowsMessage;
+namespace forereach::sim_node_test {
 
 constexpr std::int64_t kT0 = 1'700'000'000'000'000, kPeriod = 40'000;
-
-enum : std::int16_t {
-  kAccepted = execution_event_t::ACCEPTED,
-  kRefused = execution_event_t::REFUSED,
-  kStarted = execution_event_t::STARTED,
-  kInside = execution_event_t::STEP_INSIDE,
-  kOutside = execution_event_t::STEP_OUTSIDE,
-  kTailBegun = execution_event_t::TAIL_BEGUN,
-  kStanding = execution_event_t::STANDING,
-  kGoalReached = execution_event_t::GOAL_REACHED,
-  kContact = execution_event_t::CONTACT
-};
 
 std::int64_t BoundaryTime(int j) { return kT0 + j * kPeriod; }
 
@@ -170,6 +144,11 @@ class Rig {
   RobotSimNode node_;
 };
 
+// Boundary 0 has been handled.
+struct RunningRig : Rig {
+  explicit RunningRig(Config config, Plant plant = {}) : Rig(std::move(config), std::move(plant)) { RunTo(0); }
+};
+
 const std::vector<double> kOrigin{0, 0, 0, 0};
 
 // Its speed is 0.3 at the second step, and may be 0.2.
@@ -197,13 +176,10 @@ TEST(RobotSim, StandsAndReportsAtEveryBoundary) {
 
 TEST(RobotSim, ObeysNothingButACertifiedPlan) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   const certified_plan_t good = Plan(config, 1, 3, kOrigin);
 
-  decision_t decision{};
-  decision.outcome = decision_t::CERTIFIED;
-  decision.plan_id = 1;
+  decision_t decision{.plan_id = 1, .outcome = decision_t::CERTIFIED};
   rig.SendRaw(config.bus.candidate, Encode(good.plan));
   rig.SendRaw(config.bus.decision, Encode(decision));
   rig.RunTo(1);
@@ -237,8 +213,7 @@ TEST(RobotSim, ObeysNothingButACertifiedPlan) {
 
 TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 5, 3, {0.05, 0, 0, 0}));
   rig.RunTo(6);
 
@@ -298,8 +273,7 @@ TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
   config.problem = std::make_shared<const Problem>(problem);
   EXPECT_THAT([&] { Rig rig(config); }, ThrowsMessage<ConfigError>(HasSubstr("task.yaml: robot.hold: missing")));
   config.robot.hold = std::vector<std::string>{"vx"};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   certified_plan_t first = Plan(config, 1, 1, kOrigin);
   first.plan.control[3][0] = -0.75;
   first.plan.control[3][1] = 0.1;
@@ -312,8 +286,7 @@ TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
 
 TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   certified_plan_t first = Plan(config, 1, 1, kOrigin);
   first.plan.control[3][0] = -0.75;  // it ends near rest, not at it
   rig.Send(first);
@@ -346,9 +319,7 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   rig.RunTo(0);
   rig.Send(Plan(config, 1, 1, kOrigin, 40));
   rig.RunTo(2);
-  fault_t fault{};
-  fault.utime = BoundaryTime(2);
-  fault.cause = fault_t::ROBOT_STATE_LOST;
+  fault_t fault{.utime = BoundaryTime(2), .cause = fault_t::ROBOT_STATE_LOST};
   send("FAULT", fault);
   rig.RunTo(3);
   EXPECT_EQ(rig.states[3].mode, robot_state_t::EXECUTING) << "that is the certifier's own affair";
@@ -401,8 +372,7 @@ TEST(RobotSim, IgnoresAFaultFromBeforeTheLastReset) {
   rig.RunTo(1);
   const command_t reset = ResetAt(BoundaryTime(1));
   send("COMMAND", reset);
-  fault_t fault{};
-  fault.cause = fault_t::SLICE_LEFT;
+  fault_t fault{.cause = fault_t::SLICE_LEFT};
   for (const std::int64_t after : {-1, 0, 1}) {
     fault.utime = reset.utime + after;
     send("FAULT", fault);
@@ -417,9 +387,7 @@ TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
   const command_t reset = ResetAt(BoundaryTime(1) + 50'000);  // gate.max_ahead_ms is 50
   rig.SendRaw("COMMAND", Bytes(Encode(reset)));
   rig.RunTo(2);
-  fault_t fault{};
-  fault.cause = fault_t::SLICE_LEFT;
-  fault.utime = BoundaryTime(2);
+  fault_t fault{.utime = BoundaryTime(2), .cause = fault_t::SLICE_LEFT};
   ASSERT_LT(fault.utime, reset.utime);
   rig.SendRaw("FAULT", Bytes(Encode(fault)));
   rig.RunTo(3);
@@ -428,8 +396,7 @@ TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
 
 TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(PlanThatIsLeft(config));
   rig.RunTo(1);
   rig.RunTo(6, 49 * kPeriod / 10);  // held up: boundary 3 is handled shortly before the sixth
@@ -443,8 +410,7 @@ TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
 
 TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(2);
   const std::vector<double> at_two = rig.StateAt(2);
@@ -466,8 +432,7 @@ TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
 
 TEST(RobotSim, APlanForAnotherStateIsRefusedAndTheOldOneGoesOn) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(2);
   rig.Send(Plan(config, 2, 3, {5, 0, 0, 0}));
@@ -493,8 +458,7 @@ TEST(RobotSim, APlanThatArrivesAfterItsStartIsNotStarted) {
 
 TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(PlanThatIsLeft(config));
   rig.RunTo(6);
   EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kOutside));
@@ -523,8 +487,7 @@ Config TaskWithBrake() {
 
 TEST(RobotSim, ComesToRestAsItsEmergencyStopSays) {
   Config config = TaskWithBrake();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(PlanThatIsLeft(config));
   rig.RunTo(8);
   EXPECT_EQ(rig.First(kOutside).utime, BoundaryTime(3));
@@ -541,8 +504,7 @@ TEST(RobotSim, ComesToRestAsItsEmergencyStopSays) {
 TEST(RobotSim, WhatItsEmergencyStopDoesNotNameIsZeroAtOnce) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0.5};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   plan.slice_upper[1][0] = 0;
   rig.Send(plan);
@@ -556,16 +518,12 @@ TEST(RobotSim, WhatItsEmergencyStopDoesNotNameIsZeroAtOnce) {
 TEST(RobotSim, AnEmergencyStopInTheMiddleOfAStepBrakesForTheRestOfIt) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   Seal(plan);
   rig.Send(plan);
   rig.RunTo(2);
-  withdrawal_t message{};
-  message.utime = BoundaryTime(2);
-  message.plan_id = 1;
-  message.cause = withdrawal_t::OBSTACLE;
+  withdrawal_t message{.utime = BoundaryTime(2), .plan_id = 1, .cause = withdrawal_t::OBSTACLE};
   SetGrounds(message, GroundsOf(plan));
   SetDigest(message.certificate_digest, GetDigest(plan.certificate_digest));
   rig.SendRaw("PLAN_WITHDRAWN", Bytes(Encode(message)));  // 2 ms after boundary 2
@@ -583,8 +541,7 @@ TEST(RobotSim, WhatItMeetsWhileItStopsIsAContact) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0};
   config.obstacles = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.4)};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   plan.slice_upper[1][0] = 0;
   rig.Send(plan);
@@ -599,8 +556,7 @@ TEST(RobotSim, WhatItMeetsWhileItStopsIsAContact) {
 TEST(RobotSim, ANewPlanMayTakeOverWhileItStops) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, config.robot.start, 1));
   rig.RunTo(2);
   EXPECT_EQ(rig.Count(kStanding), 1) << "the plan ends in motion";
@@ -615,8 +571,7 @@ TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
   Config config = PointMassTask();
   config.planner.goal = {0.1, 0};
   config.planner.goal_radius = 0.09;
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(3);
   rig.Send(Plan(config, 2, 4, kOrigin));
@@ -653,8 +608,7 @@ TEST(RobotSim, TakesADistanceEqualToTheGoalRadiusAsReached) {
 TEST(RobotSim, AfterTheTimeLimitItStandsAndIsDone) {
   Config config = PointMassTask();
   config.robot.time_limit_s = 0.12;  // boundary 3
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 2, kOrigin));
   rig.RunTo(2);
   EXPECT_FALSE(rig.node().done());
@@ -670,8 +624,7 @@ TEST(RobotSim, AfterTheTimeLimitItStandsAndIsDone) {
 TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
   Config config = PointMassTask();
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(50, 0), 1), Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(4);
   ASSERT_EQ(rig.Count(kContact), 2) << "positions 0, 0, 0.011, 0.045, 0.079";
@@ -689,8 +642,7 @@ TEST(RobotSim, ReportsLimitsThatDoNotHoldAtABoundaryOrWithItsControl) {
                     {.name = "braking", .that = {"ax", 1, 1}, .at_least = -0.75},
                     {.name = "force", .that = {"ax", 1, 1}, .at_least = -1, .at_most = 1}};
   config.problem = std::make_shared<const Problem>(problem);
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(8);
   std::vector<std::string> reported;
@@ -726,8 +678,7 @@ TEST(RobotSim, ReportsContactOfPartsAtExpressions) {
 TEST(RobotSim, ReportsContactWithAnObstacleOfTheBusThatAppearsOnTheWay) {
   Config config = PointMassTask();
   config.gate.obstacles = ObstaclesSource::kBus;
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(2);
   obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)}, BoundaryTime(2));
@@ -744,8 +695,7 @@ TEST(RobotSim, BulgesBetweenItsSamplesWhileItMoves) {
   config.problem = std::make_shared<const Problem>(problem);
   const double bulge = 4 * 0.15 * 0.15 / 8;  // at 0, 0.011 and 0.045 the middles of steps are at 0.0055 and 0.028
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d((0.01125 + 0.045) / 2, 1 + bulge - 1e-9), 1)};
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(9);
   ASSERT_EQ(rig.Count(kContact), 1);
@@ -773,8 +723,7 @@ TEST(RobotSim, ALateTickGivesTheSameRun) {
 
 TEST(RobotSim, DoesNotStartAPlanThatExpiredWhileItWasHeldUp) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, kOrigin));
   rig.RunTo(12, 13 * kPeriod / 4);
   EXPECT_EQ(rig.Count(kStarted), 0);
@@ -787,8 +736,7 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   config.problem = std::make_shared<const Problem>(problem);
   config.robot.start = {0, 0, 0, 20, 1, 0.3};
   config.robot_residual = ResidualOf(*problem.model, ResidualNamed("heading_saturation"));
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   rig.Send(Plan(config, 1, 1, config.robot.start, 2));
   rig.RunTo(4);
   std::vector<double> expected = config.robot.start;
@@ -802,8 +750,7 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
 
 TEST(RobotSim, APlanThatLeavesItsDomainIsRefused) {
   const Config config = PointMassTask();
-  Rig rig(config);
-  rig.RunTo(0);
+  RunningRig rig(config);
   certified_plan_t certified = Plan(config, 1, 1, kOrigin);
   certified.slice_upper[1][0] = 1e9;
   rig.Send(certified);
@@ -942,5 +889,4 @@ TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
   }
 }
 
-}  // namespace sim_node_test
-}  // namespace forereach
+}  // namespace forereach::sim_node_test

@@ -1,22 +1,8 @@
 // What the supervisor does when the robot's program throws: at a send, a measurement, a hold, a brake law, an
 // allocation or a clock, once or always, in any order of calls.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdlib>
-#include <functional>
-#include <iostream>
-#include <map>
 #include <new>
-#include <random>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
@@ -67,8 +53,7 @@ struct Trouble {
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace forereach {
-namespace supervisor_exceptions_test {
+namespace forereach::supervisor_exceptions_test {
 
 constexpr std::int64_t kJitterUs = 3000;
 
@@ -234,12 +219,11 @@ class TroubledRobot final : public Supervisor::Robot {
   }
   void Withdraw(std::int64_t id, int valid, int j) {
     const certified_plan_t& plan = plans_.at(id);
-    withdrawal_t message{};
-    message.utime = At(j);
-    message.plan_id = id;
-    message.expires_utime = plan.expires_utime;
-    message.cause = withdrawal_t::OBSTACLE;
-    message.valid_steps = static_cast<std::int16_t>(valid);
+    withdrawal_t message{.utime = At(j),
+                         .plan_id = id,
+                         .expires_utime = plan.expires_utime,
+                         .cause = withdrawal_t::OBSTACLE,
+                         .valid_steps = static_cast<std::int16_t>(valid)};
     SetGrounds(message, GroundsOf(plan));
     SetDigest(message.certificate_digest, GetDigest(plan.certificate_digest));
     SetText(message.message, "a wall that is long enough for a sentence on the heap");
@@ -249,17 +233,13 @@ class TroubledRobot final : public Supervisor::Robot {
     if (!trouble.struck_inside) stands_[id] = std::min(stands_[id], valid);  // otherwise it may not have got there
   }
   void Fault(int j) {
-    fault_t fault{};
-    fault.utime = At(j);
-    fault.cause = fault_t::SLICE_LEFT;
+    fault_t fault{.utime = At(j), .cause = fault_t::SLICE_LEFT};
     SetText(fault.message, "a slice was left, which is long enough for a sentence on the heap");
     const auto bytes = Encode(fault);
     Call([&](std::int64_t now) { supervisor_.OnFault(bytes, now); }, At(j) + 1000);
   }
   void Command(std::int16_t kind, int j) {
-    command_t command{};
-    command.kind = kind;
-    command.utime = At(j) + 2000;
+    command_t command{.utime = At(j) + 2000, .kind = kind};
     SetText(command.source, "an operator whose name is long");
     const auto bytes = Encode(command);
     Call([&](std::int64_t now) { (void)supervisor_.OnCommand(bytes, now); }, At(j) + 2000);
@@ -517,10 +497,6 @@ std::vector<std::int64_t> SequencesOf(const std::vector<Message>& messages) {
   return sequences;
 }
 
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-
 TEST(SupervisorSends, AReportThatCannotBeSentIsCountedAndSentAgainInItsOrder) {
   OddRobot robot;
   robot.send = [](const std::string&) { throw 7; };
@@ -580,9 +556,7 @@ TEST(SupervisorSends, ASendThatReportsWithoutEndEnds) {
 TEST(SupervisorSends, AFaultThatArrivesInASendStopsTheRobotBeforeTheCallReturns) {
   OddRobot robot;
   robot.Start();
-  fault_t fault{};
-  fault.utime = At(1);
-  fault.cause = fault_t::SLICE_LEFT;
+  fault_t fault{.utime = At(1), .cause = fault_t::SLICE_LEFT};
   robot.send = [&](const std::string&) { robot.supervisor.OnFault(Encode(fault), At(1)); };
   EXPECT_TRUE(robot.supervisor.Boundary(At(1), At(1)).empty());
   EXPECT_EQ(robot.holds, 1);
@@ -649,9 +623,7 @@ TEST(SupervisorExceptions, AHoldThatThrowsIsCalledAgainBeforeAnythingStarts) {
   EXPECT_TRUE(robot.supervisor.Boundary(At(1), At(1)).empty());
   EXPECT_EQ(robot.events.back().kind, execution_event_t::ERROR_STOP);
   robot.x[0] = 1;
-  command_t reset{};
-  reset.kind = command_t::RESET;
-  reset.utime = At(1) + 1;
+  command_t reset{.utime = At(1) + 1, .kind = command_t::RESET};
   EXPECT_EQ(robot.supervisor.OnCommand(Encode(reset), At(1) + 2), "") << "a reset is a reset, whatever the brakes do";
   robot.supervisor.OnCertified(Sealed(NarrowPlan(8, At(2))), At(1) + 1000);
   EXPECT_TRUE(robot.supervisor.Boundary(At(2), At(2)).empty());
@@ -668,9 +640,7 @@ TEST(SupervisorExceptions, AFaultHaltsARobotThatCanNeitherMeasureNorHold) {
   robot.Start();
   robot.measure = []() -> std::span<const double> { throw 7; };
   robot.hold = [] { throw 7; };
-  fault_t fault{};
-  fault.utime = At(1);
-  fault.cause = fault_t::SLICE_LEFT;
+  fault_t fault{.utime = At(1), .cause = fault_t::SLICE_LEFT};
   robot.supervisor.OnFault(Encode(fault), At(1));
   EXPECT_TRUE(robot.supervisor.halted());
   EXPECT_TRUE(robot.supervisor.control().empty());
@@ -703,9 +673,7 @@ TEST(SupervisorExceptions, AStateOutsideItsSliceHaltsARobotWithoutMemory) {
 TEST(SupervisorExceptions, AReloadThatThrowsEndsThePlan) {
   OddRobot robot;
   robot.Start();
-  command_t reload{};
-  reload.kind = command_t::RELOAD;
-  reload.utime = At(0);
+  command_t reload{.utime = At(0), .kind = command_t::RELOAD};
   EXPECT_EQ(robot.supervisor.OnCommand(Encode(reload), At(0)), "not obeyed");
   EXPECT_EQ(robot.holds, 1);
   EXPECT_TRUE(robot.supervisor.Boundary(At(1), At(1)).empty());
@@ -737,9 +705,7 @@ TEST(SupervisorExceptions, AStateOfAnotherSizeIsNotGivenToTheBrakeLaw) {
   robot.measure = [&]() -> std::span<const double> { return one; };
   certified_plan_t plan = NarrowPlan();
   Seal(plan);
-  withdrawal_t message{};
-  message.plan_id = 7;
-  message.cause = withdrawal_t::OBSTACLE;
+  withdrawal_t message{.plan_id = 7, .cause = withdrawal_t::OBSTACLE};
   SetDigest(message.certificate_digest, GetDigest(plan.certificate_digest));
   robot.supervisor.OnWithdrawn(Encode(message), At(0) + 1000);
   EXPECT_EQ(robot.events.back().kind, execution_event_t::EMERGENCY_STOP);
@@ -747,5 +713,4 @@ TEST(SupervisorExceptions, AStateOfAnotherSizeIsNotGivenToTheBrakeLaw) {
   EXPECT_EQ(robot.holds, 1);
 }
 
-}  // namespace supervisor_exceptions_test
-}  // namespace forereach
+}  // namespace forereach::supervisor_exceptions_test

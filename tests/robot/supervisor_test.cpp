@@ -1,44 +1,15 @@
 #include "robot/supervisor.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
 
-namespace forereach {
-namespace supervisor_test {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+namespace forereach::supervisor_test {
 
 constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs;
-
-enum : std::int16_t {
-  kAccepted = execution_event_t::ACCEPTED,
-  kRefused = execution_event_t::REFUSED,
-  kStarted = execution_event_t::STARTED,
-  kInside = execution_event_t::STEP_INSIDE,
-  kOutside = execution_event_t::STEP_OUTSIDE,
-  kTailBegun = execution_event_t::TAIL_BEGUN,
-  kStanding = execution_event_t::STANDING,
-  kHalted = execution_event_t::HALTED,
-  kReset = execution_event_t::RESET,
-  kOffSchedule = execution_event_t::OFF_SCHEDULE
-};
-
-SupervisorOptions TwoStates() {
-  SupervisorOptions options;
-  options.guard.num_states = 2;
-  options.guard.num_inputs = 1;
-  options.guard.step_us = kStep;
-  options.guard.config_digest = DigestOf("config");
-  options.guard.model_digest = DigestOf("model");
-  return options;
-}
 
 // A robot whose state the test sets, and its supervisor. Boundary j lies at kStart + j * kStep.
 class SupervisorTest : public testing::Test, protected Supervisor::Robot {
@@ -58,15 +29,11 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
   }
   std::span<const double> Boundary(int j) { return supervisor_.Boundary(At(j), At(j)); }
   void Fault(std::int64_t utime, std::int64_t now_us, std::int16_t cause = fault_t::SLICE_LEFT) {
-    fault_t fault{};
-    fault.utime = utime;
-    fault.cause = cause;
+    fault_t fault{.utime = utime, .cause = cause};
     supervisor_.OnFault(Encode(fault), now_us);
   }
   std::string Command(std::int16_t kind, std::int64_t utime, std::int64_t now_us) {
-    command_t command{};
-    command.kind = kind;
-    command.utime = utime;
+    command_t command{.utime = utime, .kind = kind};
     return supervisor_.OnCommand(Encode(command), now_us);
   }
   std::string ResetAt(std::int64_t utime, std::int64_t now_us) { return Command(command_t::RESET, utime, now_us); }
@@ -81,7 +48,7 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
   std::vector<execution_event_t> events_;
   std::vector<robot_state_t> states_;
   std::vector<transition_t> transitions_;
-  Supervisor supervisor_{TwoStates(), *this};
+  Supervisor supervisor_{SupervisorOptions{TwoStates()}, *this};
 };
 
 TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
@@ -109,7 +76,7 @@ TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
 }
 
 TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
-  SupervisorOptions options = TwoStates();
+  SupervisorOptions options{TwoStates()};
   options.guard.max_jitter_us = 3000;
   Supervisor supervisor(options, *this);
   const auto boundary = [&](int j, std::int64_t late) { return supervisor.Boundary(At(j), At(j) + late); };
@@ -141,7 +108,7 @@ TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
 }
 
 TEST_F(SupervisorTest, AStepWhoseEndsAreOffScheduleIsNoTransition) {
-  SupervisorOptions options = TwoStates();
+  SupervisorOptions options{TwoStates()};
   struct {
     std::optional<std::int64_t> jitter;
     std::int64_t begin_late, end_late;
@@ -322,23 +289,19 @@ TEST_F(SupervisorTest, BytesThatAreNoMessageDoNothing) {
 }
 
 TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
-  SupervisorOptions options = TwoStates();
+  SupervisorOptions options{TwoStates()};
   options.guard.keys = TestKeys();
   options.guard.bus_name = "memq";
   Supervisor supervisor(options, *this);
   Signer signer(TestKeys(), "memq");
-  fault_t fault{};
-  fault.utime = At(1);
-  fault.cause = fault_t::SLICE_LEFT;
+  fault_t fault{.utime = At(1), .cause = fault_t::SLICE_LEFT};
   supervisor.OnFault(Encode(fault), At(1));
   supervisor.OnFault(signer.Sign(Role::kOperator, "FAULT", Encode(fault), At(1)), At(1));
   EXPECT_FALSE(supervisor.halted());
   supervisor.OnFault(signer.Sign(Role::kCertifier, "FAULT", Encode(fault), At(1)), At(1));
   EXPECT_TRUE(supervisor.halted());
 
-  command_t reset{};
-  reset.kind = command_t::RESET;
-  reset.utime = At(2);
+  command_t reset{.utime = At(2), .kind = command_t::RESET};
   EXPECT_NE(supervisor.OnCommand(Encode(reset), At(2)), "");
   EXPECT_NE(supervisor.OnCommand(signer.Sign(Role::kCertifier, "COMMAND", Encode(reset), At(2)), At(2)), "");
   EXPECT_TRUE(supervisor.halted());
@@ -349,7 +312,7 @@ TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
 // Somebody has recorded what was signed earlier, or while a clock was ahead.
 TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNothingAndIsReported) {
   constexpr std::int64_t kHour = 3'600'000'000;
-  SupervisorOptions options = TwoStates();
+  SupervisorOptions options{TwoStates()};
   options.guard.keys = TestKeys();
   options.guard.bus_name = "memq";
   for (const auto& [off, cause] :
@@ -362,21 +325,16 @@ TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNoth
     const auto signed_off = [&, off = off](Role role, const char* channel, Bytes message) {
       return Signer(TestKeys(), "memq").Sign(role, channel, message, start + off);
     };
-    fault_t fault{};
-    fault.utime = start + off;
-    fault.cause = fault_t::SLICE_LEFT;
+    fault_t fault{.utime = start + off, .cause = fault_t::SLICE_LEFT};
     supervisor.OnFault(signed_off(Role::kCertifier, "FAULT", Encode(fault)), start);
     EXPECT_FALSE(supervisor.halted());
     supervisor.OnCertified(signed_off(Role::kCertifier, "PLAN_CERTIFIED", Sealed(SmallPlan())), start);
-    withdrawal_t withdrawal{};
-    withdrawal.plan_id = SmallPlan().plan.plan_id;
+    withdrawal_t withdrawal{.plan_id = SmallPlan().plan.plan_id};
     supervisor.OnWithdrawn(signed_off(Role::kCertifier, "PLAN_WITHDRAWN", Encode(withdrawal)), start);
     EXPECT_THAT(Events(), ElementsAre(kRefused, kRefused, kRefused));
     for (const execution_event_t& event : events_)
       EXPECT_THAT(GetText(event.message), testing::StartsWith(std::string(cause) + ": "));
-    command_t reload{};
-    reload.kind = command_t::RELOAD;
-    reload.utime = start;
+    command_t reload{.utime = start, .kind = command_t::RELOAD};
     const auto stale = signed_off(Role::kOperator, "COMMAND", Encode(reload));
     EXPECT_THAT(supervisor.OnCommand(stale, start), HasSubstr("COMMAND was signed"));
     EXPECT_EQ(reloads_, 0);
@@ -389,7 +347,7 @@ TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNoth
 // A certifier whose clock is ahead stops the robot nevertheless. It starts nothing.
 TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
   constexpr std::int64_t kMinute = 60'000'000;
-  SupervisorOptions options = TwoStates();
+  SupervisorOptions options{TwoStates()};
   options.guard.keys = TestKeys();
   options.guard.bus_name = "memq";
   for (const std::int64_t ahead : {kClockErrorUs, kClockErrorUs + 1, kMinute, kMinute + 1}) {
@@ -404,16 +362,13 @@ TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
     EXPECT_EQ(events_.back().kind, plan_counts ? kAccepted : kRefused);
     supervisor.OnCertified(say(0, "PLAN_CERTIFIED", Sealed(SmallPlan(8))), At(0) - 1000);
     EXPECT_EQ(events_.back().kind, kAccepted);
-    withdrawal_t withdrawal{};
-    withdrawal.plan_id = 8;
+    withdrawal_t withdrawal{.plan_id = 8};
     supervisor.OnWithdrawn(say(ahead, "PLAN_WITHDRAWN", Encode(withdrawal)), At(0) - 1000);
     EXPECT_EQ(events_.back().kind, stop_counts ? execution_event_t::WITHDRAWN : kRefused);
     if (!stop_counts) {
       EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
     }
-    fault_t fault{};
-    fault.utime = At(0) + ahead;
-    fault.cause = fault_t::SLICE_LEFT;
+    fault_t fault{.utime = At(0) + ahead, .cause = fault_t::SLICE_LEFT};
     supervisor.OnFault(say(ahead, "FAULT", Encode(fault)), At(0) - 1000);
     EXPECT_EQ(supervisor.halted(), stop_counts);
     if (!stop_counts) {
@@ -424,23 +379,18 @@ TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
 
 // A certifier that was started again sends its latched fault with the stamp of then, and signs it now.
 TEST_F(SupervisorTest, ALatchedFaultThatIsSentAgainHaltsARobotThatHasJustStarted) {
-  SupervisorOptions options = TwoStates();
+  SupervisorOptions options{TwoStates()};
   options.guard.keys = TestKeys();
   options.guard.bus_name = "memq";
   Supervisor supervisor(options, *this);
-  fault_t fault{};
-  fault.utime = At(0) - 3'600'000'000;
-  fault.cause = fault_t::SLICE_LEFT;
+  fault_t fault{.utime = At(0) - 3'600'000'000, .cause = fault_t::SLICE_LEFT};
   supervisor.OnFault(Signer(TestKeys(), "memq").Sign(Role::kCertifier, "FAULT", Encode(fault), At(0)), At(0) + 100);
   EXPECT_TRUE(supervisor.halted());
-  command_t reset{};
-  reset.kind = command_t::RESET;
-  reset.utime = At(1);
+  command_t reset{.utime = At(1), .kind = command_t::RESET};
   EXPECT_EQ(
       supervisor.OnCommand(Signer(TestKeys(), "memq").Sign(Role::kOperator, "COMMAND", Encode(reset), At(1)), At(1)),
       "");
   EXPECT_FALSE(supervisor.halted());
 }
 
-}  // namespace supervisor_test
-}  // namespace forereach
+}  // namespace forereach::supervisor_test

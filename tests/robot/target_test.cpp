@@ -1,80 +1,35 @@
 #include "simulator/target.h"
 
-#include <array>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <utility>
-
-#include <gmock/gmock.h>
-#include <gmpxx.h>
-#include <gtest/gtest.h>
-#include <mpfr.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/models/residuals.h"
 #include "forereach/dynamics/text_model.h"
 #include "forereach/residual/consistency.h"
+#include "tests/oracle/exact.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace target_test {
+namespace forereach::target_test {
 
-using testing::HasSubstr;
-using testing::ThrowsMessage;
-
-// 256 bits: the paper's formulas are written out again below over this type, apart from the code under test.
-class Real {
- public:
-  Real(double x = 0) { mpfr_init2(r_, 256), mpfr_set_d(r_, x, MPFR_RNDN); }  // NOLINT: a double is a real number
-  Real(const Real& other) { mpfr_init2(r_, 256), mpfr_set(r_, other.r_, MPFR_RNDN); }
-  Real& operator=(const Real& other) { return mpfr_set(r_, other.r_, MPFR_RNDN), *this; }
-  ~Real() { mpfr_clear(r_); }
-
-  double Rounded() const { return mpfr_get_d(r_, MPFR_RNDN); }
-  friend Real operator+(const Real& a, const Real& b) { return Apply(mpfr_add, a, b); }
-  friend Real operator-(const Real& a, const Real& b) { return Apply(mpfr_sub, a, b); }
-  friend Real operator*(const Real& a, const Real& b) { return Apply(mpfr_mul, a, b); }
-  friend Real operator/(const Real& a, const Real& b) { return Apply(mpfr_div, a, b); }
-  friend Real operator-(const Real& a) { return Apply(mpfr_neg, a); }
-  friend bool operator<=(const Real& a, const Real& b) { return mpfr_lessequal_p(a.r_, b.r_); }
-  friend Real Sin(const Real& a) { return Apply(mpfr_sin, a); }
-  friend Real Cos(const Real& a) { return Apply(mpfr_cos, a); }
-  friend Real Tan(const Real& a) { return Apply(mpfr_tan, a); }
-  friend Real Exp(const Real& a) { return Apply(mpfr_exp, a); }
-  friend Real Log(const Real& a) { return Apply(mpfr_log, a); }
-  friend Real Sqrt(const Real& a) { return Apply(mpfr_sqrt, a); }
-  friend Real Abs(const Real& a) { return Apply(mpfr_abs, a); }
-
- private:
-  template <class Operation, class... Arguments>
-  static Real Apply(Operation operation, const Arguments&... arguments) {
-    Real result;
-    operation(result.r_, arguments.r_..., MPFR_RNDN);
-    return result;
-  }
-
-  mpfr_t r_;
-};
-
+// The paper's formulas are written out again below in exact.h's numbers of 256 bits, apart from the code under test.
 using Reals = std::vector<Real>;
 
 Reals BicycleResidual(const std::vector<double>& z) {
-  const Real v = z[3], tan_delta = Tan(Real(z[5])), wheelbase = 2.5;
-  const Real excess = Abs(v * v * tan_delta / wheelbase) - Real(0.9) * Real(9.81);
+  const Real v = z[3], tan_delta = tan(Real(z[5])), wheelbase = 2.5;
+  const Real excess = abs(v * v * tan_delta / wheelbase) - Real(0.9) * Real(9.81);
   Reals r(6);
   if (!(excess <= 0))
-    r[2] = -(Real(0.1) * Real(0.32) / wheelbase * v * tan_delta * Exp(Real(-1) / (Real(0.1) * excess)));
+    r[2] = -(Real(0.1) * Real(0.32) / wheelbase * v * tan_delta * exp(Real(-1) / (Real(0.1) * excess)));
   return r;
 }
 
 Reals BicycleTarget(const std::vector<double>& z) {
   const Real dt = 0.1, v = z[3], theta = z[2];
   Reals next = BicycleResidual(z);
-  next[0] = next[0] + z[0] + dt * v * Cos(theta);
-  next[1] = next[1] + z[1] + dt * v * Sin(theta);
-  next[2] = next[2] + theta + dt / Real(2.5) * v * Tan(Real(z[5]));
+  next[0] = next[0] + z[0] + dt * v * cos(theta);
+  next[1] = next[1] + z[1] + dt * v * sin(theta);
+  next[2] = next[2] + theta + dt / Real(2.5) * v * tan(Real(z[5]));
   next[3] = next[3] + v + dt * z[4];
   next[4] = next[4] + z[4] + dt * z[6];
   next[5] = next[5] + z[5] + dt * z[7];
@@ -83,8 +38,8 @@ Reals BicycleTarget(const std::vector<double>& z) {
 
 Reals PointMassResidual(const std::vector<double>& z) {
   const Real dt = 0.15, vx = z[2], vy = z[3], gamma = 0.4, kappa = 0.3, beta = 0.14;
-  const Real s = Sqrt(vx * vx + vy * vy + Real(1e-12));
-  const Real l = beta * Log(Real(1) + Exp((s - Real(0.9)) / beta));
+  const Real s = sqrt(vx * vx + vy * vy + Real(1e-12));
+  const Real l = beta * log(Real(1) + exp((s - Real(0.9)) / beta));
   const Real g = l / (s + Real(0.15));
   const Real ax = g * (-gamma * vx - kappa * vy), ay = g * (kappa * vx - gamma * vy);
   const Real half = dt * dt / Real(2);
@@ -141,8 +96,8 @@ void ExpectOneRounding(const Config& config, Reals (*reference)(const std::vecto
     const Reals expected = reference(z);
     for (std::size_t k = 0; k < n; ++k) {
       const double next = made.x_next(i, static_cast<Eigen::Index>(k));
-      exact += next == expected[k].Rounded();
-      const double error = std::abs((expected[k] - Real(next)).Rounded());
+      exact += next == expected[k].ToDouble();
+      const double error = std::abs((expected[k] - Real(next)).ToDouble());
       beyond_one_ulp += error > Ulp(next);
       const double term = std::abs(z[k]) + std::abs(next - z[k]);
       ASSERT_LE(error, Ulp(next) / 2 + 0x1p-60 * term) << "row " << i << " coordinate " << k;
@@ -165,14 +120,14 @@ TEST(Target, TextModelIsRoundedOnce) {
       "friction", {{"c", 0.3, 0.3}}, {{"size", {"abs(rate)"}}}, {{"rate", {"-dt*c*rate*size"}}}};
   const auto reference = [](const std::vector<double>& z) {
     const Real dt = 0.05, half = dt / Real(2), torque = z[2];
-    const auto rates = [&](const Reals& x) { return Reals{x[1], torque - Real(9.81) * Sin(x[0])}; };
+    const auto rates = [&](const Reals& x) { return Reals{x[1], torque - Real(9.81) * sin(x[0])}; };
     const auto at = [&](const Real& length, const Reals& k) {
       return Reals{Real(z[0]) + length * k[0], Real(z[1]) + length * k[1]};
     };
     const Reals k1 = rates({z[0], z[1]}), k2 = rates(at(half, k1)), k3 = rates(at(half, k2)), k4 = rates(at(dt, k3));
     Reals next = {z[0], z[1]};
     for (const std::size_t k : {0u, 1u}) next[k] = next[k] + dt / Real(6) * (k1[k] + Real(2) * (k2[k] + k3[k]) + k4[k]);
-    next[1] = next[1] - dt * Real(0.3) * Real(z[1]) * Abs(Real(z[1]));
+    next[1] = next[1] - dt * Real(0.3) * Real(z[1]) * abs(Real(z[1]));
     return next;
   };
   ExpectOneRounding(Task(WorldOf(MakeTextModel(text), Within({3, 5}), Within({2})), friction), reference, 3);
@@ -250,7 +205,7 @@ TEST(HeadingSaturationTest, AgreesWithThePapersFormula) {
     const double v = 25.0 * static_cast<double>(random() >> 11) * 0x1p-53;
     const double delta = 0.48 * (static_cast<double>(random() >> 11) * 0x1p-52 - 1);
     const std::vector<double> z{0, 0, 0, v, 0, delta, 0, 0};
-    const double expected = BicycleResidual(z)[2].Rounded();
+    const double expected = BicycleResidual(z)[2].ToDouble();
     // Close to the knee the gate's exponent amplifies rounding.
     EXPECT_NEAR(EvaluateResidual(residual, z, 6)[2], expected, 1e-12 * std::abs(expected) + 1e-16);
     active += expected != 0;
@@ -267,7 +222,7 @@ TEST(VelocityKneeTest, AgreesWithThePapersFormula) {
     const Reals expected = PointMassResidual(z);
     const std::vector<double> r = EvaluateResidual(residual, z, 4);
     for (std::size_t k = 0; k < 4; ++k)
-      EXPECT_NEAR(r[k], expected[k].Rounded(), 1e-13 * (std::abs(z[2]) + std::abs(z[3])));
+      EXPECT_NEAR(r[k], expected[k].ToDouble(), 1e-13 * (std::abs(z[2]) + std::abs(z[3])));
   }
 }
 
@@ -447,5 +402,4 @@ TEST(MakeTransitionsTest, RefusesWhatIsNotInsideTheDomain) {
                std::invalid_argument);
 }
 
-}  // namespace target_test
-}  // namespace forereach
+}  // namespace forereach::target_test

@@ -1,11 +1,5 @@
 // Withdrawals at the guard and the supervisor: no withdrawn control is ever applied, and each message is answered.
-#include <array>
-#include <cmath>
-#include <limits>
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/grounds.h"
@@ -14,34 +8,23 @@
 #include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
 
-namespace forereach {
-namespace withdrawal_test {
+namespace forereach::withdrawal_test {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
 using State = std::array<double, 2>;
 
 constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs, kNow = kStart - 3 * kStep;
-constexpr State kInside{1, -2};
+constexpr State kInSlice{1, -2};
 constexpr double kFarthest = 11;  // of the first state in slice 1 of SmallPlan
-
-GuardOptions TwoStates() {
-  GuardOptions options{2, 1, kStep, {}, {}};
-  options.config_digest = DigestOf("config");
-  options.model_digest = DigestOf("model");
-  return options;
-}
 
 // Of a plan of SmallPlan's kind.
 withdrawal_t Withdrawal(const certified_plan_t& plan, int valid_steps, std::int16_t cause = withdrawal_t::OBSTACLE) {
   certified_plan_t sealed = plan;
   Seal(sealed);
-  withdrawal_t message{};
-  message.utime = kNow;
-  message.plan_id = plan.plan.plan_id;
-  message.expires_utime = plan.expires_utime;
-  message.cause = cause;
-  message.valid_steps = static_cast<std::int16_t>(valid_steps);
+  withdrawal_t message{.utime = kNow,
+                       .plan_id = plan.plan.plan_id,
+                       .expires_utime = plan.expires_utime,
+                       .cause = cause,
+                       .valid_steps = static_cast<std::int16_t>(valid_steps)};
   SetGrounds(message, GroundsOf(plan));
   if (cause == withdrawal_t::UNKNOWN_PLAN)
     SetDigest(message.observations_digest, GetDigest(plan.transitions_digest));
@@ -55,7 +38,7 @@ class GuardWithdrawTest : public testing::Test {
   void Accept(std::int64_t plan_id = 7) { EXPECT_TRUE(guard_.Accept(Sealed(SmallPlan(plan_id)), kNow).ok()); }
   void Start(std::int64_t plan_id = 7) {
     Accept(plan_id);
-    EXPECT_TRUE(guard_.TryStart(kStart, kStart, kInside).ok());
+    EXPECT_TRUE(guard_.TryStart(kStart, kStart, kInSlice).ok());
   }
   int Withdraw(int valid_steps, std::int64_t plan_id = 7) {
     const GuardWithdrawal answer = guard_.Withdraw(Encode(Withdrawal(SmallPlan(plan_id), valid_steps)), kNow);
@@ -72,9 +55,9 @@ TEST_F(GuardWithdrawTest, TheFirstWithdrawnControlIsNotGivenAndTheOneBeforeIs) {
   EXPECT_EQ(Withdraw(1), 1);
   EXPECT_EQ(guard_.standing_steps(), 1);
   EXPECT_EQ(guard_.control().size(), 1u) << "control 0 stands";
-  EXPECT_TRUE(guard_.Check(1, kInside, kStart + kStep).ok()) << "it was applied";
+  EXPECT_TRUE(guard_.Check(1, kInSlice, kStart + kStep).ok()) << "it was applied";
   EXPECT_TRUE(guard_.control().empty());
-  EXPECT_EQ(guard_.Check(2, kInside, kStart + 2 * kStep).cause, GuardCause::kWithdrawn)
+  EXPECT_EQ(guard_.Check(2, kInSlice, kStart + 2 * kStep).cause, GuardCause::kWithdrawn)
       << "somebody has applied control 1";
   EXPECT_EQ(guard_.executing(), nullptr);
 }
@@ -83,7 +66,7 @@ TEST_F(GuardWithdrawTest, WithoutAWithdrawalEachControlIsGiven) {
   Start();
   for (int t = 0; t < 3; ++t) {
     EXPECT_EQ(guard_.control().size(), 1u);
-    EXPECT_TRUE(guard_.Check(t + 1, kInside, kStart + (t + 1) * kStep).ok());
+    EXPECT_TRUE(guard_.Check(t + 1, kInSlice, kStart + (t + 1) * kStep).ok());
   }
   EXPECT_TRUE(guard_.control().empty());
 }
@@ -155,7 +138,7 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
   const auto standing_after = [&](std::uint8_t(withdrawal_t::*digest)[32]) {
     Guard guard(TwoStates());
-    EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
+    EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok() && guard.TryStart(kStart, kStart, kInSlice).ok());
     withdrawal_t changed = unknown;
     SetDigest(changed.*digest, DigestOf("another"));
     return guard.Withdraw(Encode(changed), kNow).standing_steps;
@@ -175,7 +158,7 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsWhateverWasLearnedAfterTheFile) {
     certified_plan_t plan = SmallPlan();
     SetDigest(plan.observations_digest, observations);
     Guard guard(TwoStates());
-    EXPECT_TRUE(guard.Accept(Sealed(plan), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
+    EXPECT_TRUE(guard.Accept(Sealed(plan), kNow).ok() && guard.TryStart(kStart, kStart, kInSlice).ok());
     withdrawal_t unknown = Withdrawal(plan, 0, withdrawal_t::UNKNOWN_PLAN);
     SetDigest(unknown.observations_digest, named);
     return guard.Withdraw(Encode(unknown), kNow).standing_steps;
@@ -242,19 +225,10 @@ TEST(GuardWithdrawKeys, OnlyTheCertifierWithdraws) {
   EXPECT_EQ(guard.Withdraw(good, kNow).verdict.cause, GuardCause::kSignatureReplayed);
 }
 
-enum : std::int16_t {
-  kAccepted = execution_event_t::ACCEPTED,
-  kStarted = execution_event_t::STARTED,
-  kInsideSlice = execution_event_t::STEP_INSIDE,
-  kTailBegun = execution_event_t::TAIL_BEGUN,
-  kWithdrawn = execution_event_t::WITHDRAWN,
-  kStop = execution_event_t::EMERGENCY_STOP,
-};
-
 // A robot whose state is always inside. Boundary j lies at kStart + j * kStep.
 class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot {
  protected:
-  std::span<const double> state() const override { return kInside; }
+  std::span<const double> state() const override { return kInSlice; }
   void Hold() override { ++holds_; }
   void Reload() override {}
   void Send(const std::string& channel, Bytes message) override {
@@ -315,7 +289,7 @@ TEST_F(SupervisorWithdrawTest, GoesOnWithinWhatStandsThenStopsWithoutACertificat
   EXPECT_TRUE(Boundary(1));
   EXPECT_FALSE(Boundary(2));
   EXPECT_EQ(holds_, 1);
-  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kWithdrawn, kInsideSlice, kTailBegun, kInsideSlice, kStop));
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kWithdrawn, kInside, kTailBegun, kInside, kStop));
   EXPECT_EQ(events_[2].plan_id, 7);
   EXPECT_EQ(events_[2].step, 2);
   EXPECT_EQ(events_[2].value, 4) << "the withdrawal's sequence";
@@ -436,7 +410,7 @@ TEST_F(SupervisorWithdrawTest, AStopThatJustFitsMayWaitForABoundaryAndOneThatDoe
     Withdraw(PlanFrom(0, 7), 2);
     EXPECT_EQ(holds_, fits ? 0 : 1) << "two steps have to begin before the next boundary";
     EXPECT_FALSE(Boundary(1));
-    const std::vector<std::int16_t> waits{kWithdrawn, kInsideSlice, kStop}, stops{kWithdrawn, kStop};
+    const std::vector<std::int16_t> waits{kWithdrawn, kInside, kStop}, stops{kWithdrawn, kStop};
     ASSERT_EQ(Events(), fits ? waits : stops);
     EXPECT_EQ(events_.back().step, fits ? 1 : 0);
     EXPECT_EQ(events_.back().value, 1) << "from the state that it has";
@@ -539,5 +513,4 @@ TEST(BrakeTest, RefusesWhatIsNoDecline) {
   EXPECT_THROW(Brake({std::numeric_limits<double>::quiet_NaN()}), std::invalid_argument);
 }
 
-}  // namespace withdrawal_test
-}  // namespace forereach
+}  // namespace forereach::withdrawal_test

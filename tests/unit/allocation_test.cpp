@@ -1,12 +1,8 @@
 // The certify step uses no heap. This program counts every malloc by putting its own in front of the C library's.
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include <atomic>
 #include <cstddef>
-#include <cstdlib>
-#include <memory>
-#include <optional>
-#include <vector>
 
 #include "forereach/certify/certifier.h"
 #include "tests/sanitized.h"
@@ -42,8 +38,7 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
 }
 #endif
 
-namespace forereach {
-namespace allocation_test {
+namespace forereach::allocation_test {
 
 Problem BicycleProblem() {
   Problem problem = PaperBicycle();
@@ -111,5 +106,4 @@ TEST_F(Allocation, CertifyAllocatesNothingForLimitsAndPlacesAtExpressions) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
-}  // namespace allocation_test
-}  // namespace forereach
+}  // namespace forereach::allocation_test

@@ -1,24 +1,16 @@
 // Which states are angles of a model's equations.
 #include "forereach/dynamics/angles.h"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
 #include "forereach/numerics/size.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 
-namespace forereach {
-namespace angles_test {
+namespace forereach::angles_test {
 
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 using Integrator = ModelText::Integrator;
 
 // q is the angle; x follows the given equation.
@@ -33,8 +25,7 @@ class IsAnAngle : public testing::TestWithParam<const char*> {};
 
 // f0(z + 2 pi e) = f0(z) + 2 pi e, as far as doubles show.
 TEST_P(IsAnAngle, AStateWhoseTurnChangesNothingElseIsAccepted) {
-  Random random(651);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(651);
   for (const Integrator integrator : {Integrator::kNone, Integrator::kEuler, Integrator::kMidpoint, Integrator::kRk4}) {
     const bool is_rate = integrator != Integrator::kNone;
     const auto model = MakeTextModel(Of(GetParam(), is_rate ? "u*cos(q)" : "q + dt*u", integrator));
@@ -104,5 +95,4 @@ TEST(Angles, RefuseNamesThatAreNoStates) {
   EXPECT_EQ(MakeTextModel(text)->angles(), (std::vector<int>{0, 1}));
 }
 
-}  // namespace angles_test
-}  // namespace forereach
+}  // namespace forereach::angles_test

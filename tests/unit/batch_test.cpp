@@ -2,17 +2,12 @@
 #include "forereach/certify/batch.h"
 
 #include <atomic>
-#include <map>
-#include <tuple>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/oracle/problems.h"
 
-namespace forereach {
-namespace batch_test {
+namespace forereach::batch_test {
 
 auto Fields(const Decision& d) {
   return std::tuple(d.outcome, d.cause, d.step, d.exit.kind, d.exit.index, d.coordinate, d.first_observation,
@@ -105,5 +100,4 @@ TEST_F(BatchTest, SaysWhatDoesNotFit) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("0 threads")));
 }
 
-}  // namespace batch_test
-}  // namespace forereach
+}  // namespace forereach::batch_test

@@ -2,15 +2,7 @@
 // certifier refuses to be made of.
 #include "forereach/certify/certifier.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstring>
-#include <memory>
-#include <optional>
-#include <thread>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/certify/explain.h"
 #include "forereach/dynamics/models/named_models.h"
@@ -19,11 +11,9 @@
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace certifier_test {
+namespace forereach::certifier_test {
 
-using testing::Eq, testing::HasSubstr;
-using testing::ThrowsMessage;
+using testing::Eq;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kPx = 0, kVx = 2, kVy = 3, kAx = 4;
@@ -657,5 +647,4 @@ TEST(Explain, SaysWhenADecisionHoldsAndOfSeveralPartsWhich) {
   EXPECT_EQ(Explain(abstention, body), "abstain S: between steps 3 and 4 part 1 may touch obstacle 0 (by 0.5 m)");
 }
 
-}  // namespace certifier_test
-}  // namespace forereach
+}  // namespace forereach::certifier_test

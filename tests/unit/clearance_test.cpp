@@ -2,15 +2,12 @@
 // and directions of both sets.
 #include "forereach/safety/clearance.h"
 
-#include <numbers>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/text_model.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace clearance_test {
+namespace forereach::clearance_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -69,8 +66,7 @@ TEST(BodyPlaces, AtExpressionsUseTheMiddlesOfTheParameters) {
 }
 
 TEST(PartDistance, OfOnePointIsThatOfThePointLessTheRadius) {
-  Random random(31);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(31);
   const std::vector obstacles{Obstacle::Circle(Vector2d(1, 0), 2), Obstacle::AxisBox(Vector2d(0, 0), Vector2d(4, 2)),
                               Obstacle::HalfSpace(Vector2d(0, 2), 4),
                               Obstacle::Polygon({Vector2d(0, 0), Vector2d(4, 2), Vector2d(4, 0), Vector2d(0, 2)})};
@@ -101,8 +97,7 @@ TEST(PartDistance, IsTheKnownOneForASquare) {
 // For each pair of sets, the gap along any direction is a lower bound and the distance of any two points an upper
 // bound.
 TEST(PartDistance, LiesBetweenTheGapsAndTheDistancesOfPoints) {
-  Random random(32);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(32);
   int apart = 0, close = 0;
   for (int trial = 0; trial < 600; ++trial) {
     const int p = random.Integer(2, 3);
@@ -188,5 +183,4 @@ TEST(Deviation, IsTheLengthOfTheBulgeAndTheTurnOfTheFarthestPoint) {
   EXPECT_DOUBLE_EQ(Deviation(between, Hull({{3, 4, 0}, {1, 1, 0}})), (5 + 5 * 1) * 0.04 / 8);
 }
 
-}  // namespace clearance_test
-}  // namespace forereach
+}  // namespace forereach::clearance_test

@@ -1,13 +1,7 @@
 // Equations of a text as C++: the header, its program, and decisions with it, bit for bit.
 #include <bit>
-#include <cstdint>
-#include <fstream>
-#include <sstream>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/compiled_models.h"
@@ -19,11 +13,7 @@
 #include "tests/unit/exported_model.inc"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace compiled_models_test {
-
-using testing::HasSubstr;
-using testing::Not;
+namespace forereach::compiled_models_test {
 
 // Every operation that a nominal model may have, names that are words of C++, and a definition that nothing uses.
 ModelText EveryOperation() {
@@ -41,19 +31,13 @@ ModelText EveryOperation() {
   return text;
 }
 
-std::string File(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
-
 // The file in the repository is what the exporter writes, so the compiled test covers it.
 TEST(EquationsHeader, IsTheOneThatIsCompiledHere) {
   const std::string header =
       EquationsHeader(EveryOperation(), "exported_operations", "Made by compiled_models_test.cpp.");
   const std::string path = FOREREACH_SOURCE_DIR "/tests/unit/exported_model.inc";
-  if (header != File(path)) std::ofstream("exported_model.inc") << header;
-  EXPECT_EQ(header, File(path)) << "the new one is exported_model.inc in the working directory";
+  if (header != Read(path)) std::ofstream("exported_model.inc") << header;
+  EXPECT_EQ(header, Read(path)) << "the new one is exported_model.inc in the working directory";
 }
 
 // A unit is any text, and what a task says does not become code.
@@ -115,12 +99,8 @@ TEST(StructNameTest, IsAValidNameThatIsNotTaken) {
 }
 
 void ExpectRefused(const ModelText& text, const std::string& why) {
-  try {
-    static_cast<void>(EquationsHeader(text, "robot", ""));
-    ADD_FAILURE() << "not refused: " << why;
-  } catch (const ExportError& error) {
-    EXPECT_THAT(error.what(), HasSubstr(why));
-  }
+  EXPECT_THAT([&] { static_cast<void>(EquationsHeader(text, "robot", "")); },
+              ThrowsMessage<ExportError>(HasSubstr(why)));
 }
 
 TEST(EquationsHeader, RefusesAModelThatGainsNothingByCompiling) {
@@ -199,5 +179,4 @@ TEST(UseCompiledTest, DecisionsHaveTheSameBits) {
   EXPECT_THROW(static_cast<void>(CompiledFor(MakeTextModel(changed))), std::invalid_argument);
 }
 
-}  // namespace compiled_models_test
-}  // namespace forereach
+}  // namespace forereach::compiled_models_test

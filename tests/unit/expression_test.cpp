@@ -1,15 +1,9 @@
 // Texts as expressions: what each stands for, to the last bit, and what is said of those that are none.
 #include "forereach/dynamics/expression.h"
 
-#include <numbers>
-#include <random>
-#include <sstream>
+#include "tests/test.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-namespace forereach {
-namespace expression_test {
+namespace forereach::expression_test {
 
 const std::vector<std::string> kNames{"x", "y", "theta", "v", "dt"};
 constexpr long double Wide(double x) { return x; }
@@ -282,5 +276,4 @@ TEST(Expression, AnyTextIsTakenOrRefusedInItsPlace) {
   EXPECT_GT(taken, 100) << "seed " << seed;
 }
 
-}  // namespace expression_test
-}  // namespace forereach
+}  // namespace forereach::expression_test

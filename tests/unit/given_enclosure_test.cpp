@@ -1,16 +1,11 @@
 // A certifier over an enclosure of the residual that the caller supplies.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <memory>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace given_enclosure_test {
+namespace forereach::given_enclosure_test {
 
 // r(x) in slope * (x - c) +- width in the velocities, zero in the positions.
 class Velocities final : public ResidualEnclosure {
@@ -82,5 +77,4 @@ TEST_F(GivenEnclosure, ASlopeThatIsNotFiniteIsNoBound) {
   EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
 }
 
-}  // namespace given_enclosure_test
-}  // namespace forereach
+}  // namespace forereach::given_enclosure_test

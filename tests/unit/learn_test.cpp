@@ -1,18 +1,11 @@
 // A certifier that learns transitions gives the same answers as one that had them from the start.
-#include <array>
-#include <cmath>
-#include <memory>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace learn_test {
+namespace forereach::learn_test {
 
 constexpr int kBase = 5, kLearned = 400;
 
@@ -164,5 +157,4 @@ TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {
   EXPECT_EQ(Certify(certifier, tube).outcome, Outcome::kFalsified);
 }
 
-}  // namespace learn_test
-}  // namespace forereach
+}  // namespace forereach::learn_test

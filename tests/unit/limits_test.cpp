@@ -1,12 +1,7 @@
 // Limits on functions of state and input: just inside and just outside, which samples count, what comes first.
 #include "forereach/certify/limits.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <memory>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
@@ -14,10 +9,7 @@
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace limits_test {
-
-using testing::HasSubstr, testing::ThrowsMessage;
+namespace forereach::limits_test {
 
 Limit AtMost(const std::string& that, double bound, const std::string& name = "it") {
   return {.name = name, .that = {that, 1, 1}, .at_most = bound};
@@ -186,5 +178,4 @@ TEST_F(Limits, AreRefusedIfTheyAreMalformed) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("33 limits, must be at most 32")));
 }
 
-}  // namespace limits_test
-}  // namespace forereach
+}  // namespace forereach::limits_test

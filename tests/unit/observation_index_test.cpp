@@ -1,18 +1,13 @@
 // The search over observations against looking at every one: the same number to the last bit, in a tree and in a row,
 // on every instruction set; and what a cap makes of it is wider.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <set>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/pairs.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace observation_index_test {
+namespace forereach::observation_index_test {
 
 constexpr int kStates = 9, kInputs = 5, kVariables = kStates + kInputs;
 constexpr int kFlat = 1 << 20;
@@ -84,8 +79,7 @@ std::vector<InstructionSet> InstructionSets() {
 class Search : public testing::TestWithParam<int> {};  // active columns
 
 TEST_P(Search, TreeAndRowAgreeToTheLastBitOnEveryInstructionSet) {
-  Random random(700 + static_cast<std::uint64_t>(GetParam()));
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(700 + static_cast<std::uint64_t>(GetParam()));
   for (const int count : {1, 2, 7, 8, 9, 31, 32, 33, 64, 65, 255, 256, 257, 300, 2000, 20000}) {
     const double scale = std::ldexp(1, count == 300 ? -1060 : count == 257 ? 500 : random.Integer(-3, 3));
     const Data data = Make(random, count, GetParam(), scale);
@@ -111,8 +105,7 @@ TEST_P(Search, TreeAndRowAgreeToTheLastBitOnEveryInstructionSet) {
 
 // Each observation by itself is an envelope of one: the best of them all is the envelope.
 TEST_P(Search, FindsTheTightestBoundOfAllObservations) {
-  Random random(720 + static_cast<std::uint64_t>(GetParam()));
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(720 + static_cast<std::uint64_t>(GetParam()));
   for (const int count : {1, 3, 40, 200}) {
     const Data data = Make(random, count, GetParam(), 1);
     const LipschitzEnvelope envelope = EnvelopeOf(data, {.max_flat_blocks = 0});
@@ -134,8 +127,7 @@ TEST_P(Search, FindsTheTightestBoundOfAllObservations) {
 }
 
 TEST_P(Search, WithACapIsWiderAndSaysSo) {
-  Random random(740 + static_cast<std::uint64_t>(GetParam()));
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(740 + static_cast<std::uint64_t>(GetParam()));
   int capped = 0, wider = 0;
   for (const int cap : {1, 1, 1, 1, 2, 3, 4}) {
     const Data data = Make(random, 3000, GetParam(), 1);
@@ -164,8 +156,7 @@ TEST_P(Search, WithACapIsWiderAndSaysSo) {
 INSTANTIATE_TEST_SUITE_P(ActiveColumns, Search, testing::Range(0, 15));
 
 TEST(ObservationIndex, HoldsEveryObservationOnce) {
-  Random random(760);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(760);
   for (const int count : {1, 8, 31, 33, 257, 5000})
     for (const int active : {1, 2, 3, 5}) {
       const Data data = Make(random, count, active, 1);
@@ -200,8 +191,7 @@ std::optional<Violation> TryAll(const Data& data) {
 }
 
 TEST(FindViolation, AgreesWithTryingAllPairs) {
-  Random random(770);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(770);
   int found = 0, tried = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const int count = trial < 360 ? random.Integer(1, 150) : random.Integer(300, 1200);
@@ -300,8 +290,7 @@ TEST(FindViolation, TakesManyObservationsThatAllContradictEachOther) {
 }
 
 TEST(PairSearch, FindsTheBestOtherEntryAmongTiesAndWithoutAFiniteMargin) {
-  Random random(773);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(773);
   for (int trial = 0; trial < 200; ++trial) {
     const int count = random.Integer(1, trial % 20 ? 70 : 600), active = random.Integer(1, 6);
     Data data = Make(random, count, active, 1);
@@ -350,8 +339,7 @@ TEST(PairSearch, FindsTheBestOtherEntryAmongTiesAndWithoutAFiniteMargin) {
 }
 
 TEST(PairSearch, SaysTheSameOnEveryInstructionSet) {
-  Random random(772);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(772);
   for (const int active : {1, 2, 3, 7}) {
     const Data data = Make(random, 700, active, 1);
     const LipschitzRow row(data.declaration, 0);
@@ -369,5 +357,4 @@ TEST(PairSearch, SaysTheSameOnEveryInstructionSet) {
   }
 }
 
-}  // namespace observation_index_test
-}  // namespace forereach
+}  // namespace forereach::observation_index_test

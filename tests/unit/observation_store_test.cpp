@@ -1,19 +1,12 @@
 // Observations that grow: whatever way they came in, the store answers as an envelope of all of them does.
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-#include <algorithm>
 #include <atomic>
-#include <cstdlib>
-#include <functional>
 #include <new>
-#include <set>
-#include <thread>
-#include <utility>
-#include <vector>
 
 #include "forereach/residual/observation_store.h"
 #include "forereach/residual/retention.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
 namespace {
 
@@ -33,8 +26,7 @@ thread_local std::function<void()>* at_next_allocation = nullptr;
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace forereach {
-namespace observation_store_test {
+namespace forereach::observation_store_test {
 
 constexpr int kStates = 3, kVariables = 5;
 const std::vector<double> kLower(kVariables, -1), kUpper(kVariables, 1);
@@ -137,8 +129,7 @@ ObservationStore StoreOf(const std::vector<Sample>& samples, const StoreOptions&
 }
 
 TEST(ObservationStore, AnswersAsAnEnvelopeOfAllItHolds) {
-  Random random(800);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(800);
   for (const int capacity : {1, 7, 8, 64}) {
     std::vector<Sample> samples = Observe(random, 30);
     ObservationStore store = StoreOf(samples, Options(capacity));
@@ -156,8 +147,7 @@ TEST(ObservationStore, AnswersAsAnEnvelopeOfAllItHolds) {
 }
 
 TEST(ObservationStore, ASnapshotStaysAsItWas) {
-  Random random(801);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(801);
   const std::vector<Sample> samples = Observe(random, 20);
   ObservationStore store = StoreOf(samples, Options(16));
   const auto before = store.snapshot();
@@ -167,8 +157,7 @@ TEST(ObservationStore, ASnapshotStaysAsItWas) {
 }
 
 TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
-  Random random(802);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(802);
   for (int trial = 0; trial < 120; ++trial) {
     const int coordinate = trial % kStates;
     std::vector<Sample> samples = Observe(random, 40);
@@ -279,8 +268,7 @@ TEST(ObservationStore, RefusesOptionsOutsideTheirRange) {
 
 // Readers ask while one thread inserts and another compacts: what they get is sound, and each snapshot is one thing.
 TEST(ObservationStore, IsReadWhileItGrows) {
-  Random random(807);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(807);
   ObservationStore store = StoreOf(Observe(random, 50), Options(32));
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0, asked = 0;
@@ -323,8 +311,7 @@ TEST(ObservationStore, IsReadWhileItGrows) {
 
 // Compact merges the tail, then builds the index: what is inserted between both has to be in the new tail.
 TEST(ObservationStore, CompactKeepsWhatArrivesWhileItBuilds) {
-  Random random(811);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(811);
   for (const int arrivals : {1, 2, 9}) {
     std::vector<Sample> samples = Observe(random, 40);
     ObservationStore store = StoreOf(samples, Options(32));
@@ -352,8 +339,7 @@ TEST(ObservationStore, CompactKeepsWhatArrivesWhileItBuilds) {
 }
 
 TEST(ObservationStore, CompactKeepsAContradictionThatArrivesWhileItBuilds) {
-  Random random(812);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(812);
   std::vector<Sample> samples = Observe(random, 40);
   ObservationStore store = StoreOf(samples, Options(32, 200));
   Sample liar = samples[7];
@@ -369,8 +355,7 @@ TEST(ObservationStore, CompactKeepsAContradictionThatArrivesWhileItBuilds) {
 
 // With a contradiction among them nothing is dropped for want of room, however often the index is built anew.
 TEST(ObservationStore, AContradictionOutlivesAnyNumberOfCompactions) {
-  Random random(813);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(813);
   for (int trial = 0; trial < 20; ++trial) {
     ObservationStore store = StoreOf(Observe(random, 30), Options(16, 40));
     const Sample honest = Observe(random);
@@ -395,8 +380,7 @@ TEST(ObservationStore, AContradictionOutlivesAnyNumberOfCompactions) {
 }
 
 TEST(EnvelopeTail, BoundsAreRoundedOutwardAndValuesBeyondTheHeadroomAreNotCovered) {
-  Random random(814);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(814);
   for (int trial = 0; trial < 500; ++trial) {
     Declaration declaration = MakeDeclaration();
     for (double& sigma : declaration.noise_bound) sigma = std::ldexp(random.Uniform(0.5, 1), -random.Integer(0, 8));
@@ -426,8 +410,7 @@ TEST(EnvelopeTail, BoundsAreRoundedOutwardAndValuesBeyondTheHeadroomAreNotCovere
 }
 
 TEST(ObservationStore, HoldsAtMostItsLargestNumberOfObservations) {
-  Random random(808);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(808);
   std::vector<Sample> samples = Observe(random, 30);
   ObservationStore store = StoreOf(samples, Options(32, 100));
   for (int i = 0; i < 1000; ++i) {
@@ -440,8 +423,7 @@ TEST(ObservationStore, HoldsAtMostItsLargestNumberOfObservations) {
 }
 
 TEST(MostUseful, KeepsEveryBoundWhileAllThatAttainTheEnvelopeHaveRoom) {
-  Random random(810);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(810);
   Declaration declaration = MakeDeclaration();
   declaration.lipschitz.row(2).setZero();  // so that some never attain it
   for (int trial = 0; trial < 20; ++trial) {
@@ -505,8 +487,7 @@ TEST(MostUseful, KeepsOnlyTheFirstOfEqualRows) {
 }
 
 TEST(MostUseful, KeepsOnlyTheFirstOfRowsThatDifferWhereLHasNoColumn) {
-  Random random(811);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(811);
   Declaration declaration{Eigen::MatrixXd::Zero(1, 3), Eigen::VectorXd::Zero(1)};
   declaration.lipschitz(0, 1) = 0.1;
   Observations o = SameRows(500, 3);
@@ -516,8 +497,7 @@ TEST(MostUseful, KeepsOnlyTheFirstOfRowsThatDifferWhereLHasNoColumn) {
 }
 
 TEST(MostUseful, KeepsTheFirstOfEachKindOfRow) {
-  Random random(812);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(812);
   const Declaration declaration{Eigen::MatrixXd::Constant(1, 2, 1), Eigen::VectorXd::Zero(1)};
   for (int trial = 0; trial < 50; ++trial) {
     const int kinds = random.Integer(1, 40);
@@ -534,8 +514,7 @@ TEST(MostUseful, KeepsTheFirstOfEachKindOfRow) {
 
 TEST(MostUseful, KeepsSomethingOfValuesNearOverflow) {
   const Declaration declaration{Eigen::MatrixXd::Constant(1, 2, 1), Eigen::VectorXd::Zero(1)};
-  Random random(813);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(813);
   Observations o = SameRows(100, 2);
   o.lower = random.Matrix(100, 1, 1e308);
   o.upper = o.lower;
@@ -543,8 +522,7 @@ TEST(MostUseful, KeepsSomethingOfValuesNearOverflow) {
 }
 
 TEST(ObservationStore, BoundsAsOneRowDoesWhenTheSameRowIsRepeated) {
-  Random random(814);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(814);
   const Sample row = Observe(random);
   for (const int count : {1, 2, 9, 10, 11, 100}) {  // below, at and above the budget
     const std::vector<Sample> rows(ToSize(count), row);
@@ -570,5 +548,4 @@ TEST(MostUseful, DropsTheObservationThatNarrowsLeast) {
   EXPECT_EQ(MostUseful(declaration, o, 1).size(), 1u);
 }
 
-}  // namespace observation_store_test
-}  // namespace forereach
+}  // namespace forereach::observation_store_test

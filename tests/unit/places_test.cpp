@@ -1,11 +1,5 @@
 // Parts of a body that stand at expressions of the state: an arm whose links just clear an obstacle, and just do not.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <memory>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
@@ -14,10 +8,7 @@
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace places_test {
-
-using testing::HasSubstr, testing::ThrowsMessage;
+namespace forereach::places_test {
 
 constexpr double kHair = 1e-9;
 
@@ -168,5 +159,4 @@ TEST_F(Places, AreRefusedIfTheyAreMalformed) {
   refused(At(std::vector<std::vector<std::string>>(17, {"q1", "q2"}), 0), "17 points, must be at most 16");
 }
 
-}  // namespace places_test
-}  // namespace forereach
+}  // namespace forereach::places_test

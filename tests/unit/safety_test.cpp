@@ -1,14 +1,12 @@
 // Obstacles and projections: refused arguments, and the distances shown to people.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/safety/obstacle.h"
 #include "forereach/safety/placement.h"
 #include "forereach/safety/projection.h"
 #include "forereach/safety/separation.h"
 
-namespace forereach {
-namespace safety_test {
+namespace forereach::safety_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -82,5 +80,4 @@ TEST(Projection, RefusesWhatProjectsToNothing) {
   EXPECT_THROW(Projection(Eigen::MatrixXd::Constant(2, 4, kNan), 4), std::invalid_argument);
 }
 
-}  // namespace safety_test
-}  // namespace forereach
+}  // namespace forereach::safety_test

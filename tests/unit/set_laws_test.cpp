@@ -1,22 +1,13 @@
 // Laws that hold for every set type, at empty dimension, point, flat, 1e-8 wide, huge and random sets. A new set type
 // is one more entry of SetTypes, and an adapter of five lines where its interface differs.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <string>
-#include <vector>
+#include "tests/test.h"
 
 #include "forereach/sets/box.h"
 #include "forereach/sets/zonotope.h"
 #include "tests/oracle/exact.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
-namespace forereach {
-namespace set_laws_test {
-
-using exact::AtLeast;
-using exact::AtMost;
-using exact::Rational;
+namespace forereach::set_laws_test {
 
 // A point of a set, exactly.
 using Point = std::vector<Rational>;
@@ -113,8 +104,7 @@ Rational Dot(const Eigen::VectorXd& d, const Point& point) {
 
 template <class Laws>
 void ForEachExample(void (*check)(const typename Laws::Set&, const Example&, Random&)) {
-  Random random(301);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(301);
   for (const Example& example : Examples(random)) {
     SCOPED_TRACE(example.name + ", dimension " + std::to_string(example.center.size()));
     check(Laws::FromBox(example.center, example.half_width), example, random);
@@ -185,5 +175,4 @@ TYPED_TEST(SetLaws, HullEndsAreTheSupportAlongTheAxes) {
   });
 }
 
-}  // namespace set_laws_test
-}  // namespace forereach
+}  // namespace forereach::set_laws_test

@@ -1,25 +1,17 @@
 // Boxes, zonotopes and zonogons at their boundaries: refused arguments, degenerate cases, small cases worked by hand.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
 #include <type_traits>
 
 #include "forereach/sets/box.h"
 #include "forereach/sets/linear_map.h"
 #include "forereach/sets/zonogon.h"
 #include "forereach/sets/zonotope.h"
-#include "tests/oracle/random.h"
 #include "tests/oracle/reduce_order.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace sets_test {
-
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+namespace forereach::sets_test {
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -85,8 +77,7 @@ TEST(Zonotope, FromBoxDropsZeroHalfWidths) {
 }
 
 TEST(Zonotope, EnclosesBoxesWhoseMiddleIsNoDouble) {
-  Random random(311);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(311);
   for (int trial = 0; trial < 2000; ++trial) {
     const Interval side = random.AnyInterval();
     if (!std::isfinite(side.upper - side.lower)) continue;
@@ -139,8 +130,7 @@ bool HasColumn(const Eigen::MatrixXd& generators, const Eigen::VectorXd& wanted)
 }
 
 TEST(ReduceOrder, KeepsTheBestColumnsAndTheEarlierOfEquals) {
-  Random random(312);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(312);
   for (int trial = 0; trial < 3000; ++trial) {
     const int n = random.Integer(1, 6), order = random.Integer(1, 5);
     const int m = random.Integer(0, std::min(kMaxGenerators, (order + 3) * n));
@@ -158,8 +148,7 @@ TEST(ReduceOrder, KeepsTheBestColumnsAndTheEarlierOfEquals) {
 }
 
 TEST(ReduceOrder, ChangesNothingUpToOrderTimesDimension) {
-  Random random(313);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(313);
   for (int order = 1; order <= 5; ++order) {
     const Eigen::MatrixXd generators = random.Matrix(4, order * 4 + 1);
     Zonotope full(Eigen::VectorXd::Zero(4), generators.leftCols(order * 4)), over(Eigen::VectorXd::Zero(4), generators);
@@ -172,8 +161,7 @@ TEST(ReduceOrder, ChangesNothingUpToOrderTimesDimension) {
 }
 
 TEST(LinearMap, RowsThatCopyACoordinateAreExact) {
-  Random random(314);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(314);
   const Zonotope set = random.AnyZonotope(4, 9);
   const MatrixEntry entries[] = {{0, 2, Interval(1)}, {1, 0, Interval(-1)}};
   Zonotope image;
@@ -209,8 +197,7 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() 
 
 // Integers, so the brute force over all sign vectors is exact.
 TEST(Outline, IsTheHullOfAllSignVectors) {
-  Random random(315);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(315);
   for (int trial = 0; trial < 500; ++trial) {
     const int m = random.Integer(1, 7);
     const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(2, m, [&] { return random.Integer(-4, 4); });
@@ -239,5 +226,4 @@ TEST(Outline, IsTheHullOfAllSignVectors) {
   }
 }
 
-}  // namespace sets_test
-}  // namespace forereach
+}  // namespace forereach::sets_test

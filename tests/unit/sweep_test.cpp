@@ -1,18 +1,11 @@
 // Bodies, motion between samples, and obstacles that move: each at its boundary, just inside and just outside.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <functional>
-#include <random>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace sweep_test {
+namespace forereach::sweep_test {
 
 using Eigen::Vector3d;
 
@@ -580,5 +573,4 @@ TEST(SeparatePieces, DecidesASegmentInSpaceWithinAHair) {
   }
 }
 
-}  // namespace sweep_test
-}  // namespace forereach
+}  // namespace forereach::sweep_test

@@ -1,16 +1,13 @@
 // Which operation of a text meets its kink or pole.
 #include "forereach/dynamics/unbounded.h"
 
-#include <array>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 
-namespace forereach {
-namespace unbounded_test {
+namespace forereach::unbounded_test {
 
 using Integrator = ModelText::Integrator;
 
@@ -114,5 +111,4 @@ TEST(FindUnbounded, FindsAKinkInALaterStageOfTheStep) {
   EXPECT_FALSE(Find(Of("abs(v)", Integrator::kEuler), {0.02, 0.08})) << "Euler's step looks at its beginning only";
 }
 
-}  // namespace unbounded_test
-}  // namespace forereach
+}  // namespace forereach::unbounded_test

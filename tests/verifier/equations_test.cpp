@@ -1,17 +1,13 @@
 // Derivatives, by hand or by rule, against difference quotients of the equations themselves, in high precision.
-#include <map>
-#include <ostream>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/equations_model.h"
 #include "forereach/dynamics/models/named_models.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 #include "verifier/equations.h"
 
-namespace forereach::verifier {
-namespace equations_test {
+namespace forereach::verifier::equations_test {
 
 const Real kStep(0x1p-60), kTolerance(0x1p-90);
 
@@ -63,8 +59,7 @@ SecondEntries SecondOf(const Equations& equations, const std::vector<Real>& z) {
 TEST_P(Derivatives, AreThoseOfTheEquations) {
   const auto& [name, equations, states, variables] = GetParam();
   const Equations& of = *equations;
-  Random random(71);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(71);
   for (int trial = 0; trial < 4; ++trial) {
     std::vector<Real> z;
     for (int l = 0; l < variables; ++l) z.emplace_back(random.Uniform(-1.4, 1.4));
@@ -89,8 +84,7 @@ TEST_P(Derivatives, AreThoseOfTheEquations) {
 
 TEST_P(Derivatives, BoundTheirRangeOverABox) {
   const auto& [name, equations, states, variables] = GetParam();
-  Random random(72);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(72);
   for (int trial = 0; trial < 20; ++trial) {
     std::vector<Real> box, point;
     for (int l = 0; l < variables; ++l) {
@@ -132,5 +126,4 @@ struct Unicycle {
 
 TEST(Equations, AnUnknownModelHasNoEquations) { EXPECT_FALSE(EquationsOf(EquationsModel<Unicycle>(Unicycle{}))); }
 
-}  // namespace equations_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::equations_test

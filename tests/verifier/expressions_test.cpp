@@ -1,14 +1,10 @@
 // The verifier's parser: values of what it accepts, places and causes of what it refuses.
-#include <chrono>
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "verifier/expressions.h"
 #include "verifier/jet.h"
 
-namespace forereach::verifier {
-namespace expressions_test {
+namespace forereach::verifier::expressions_test {
 
 // With x = 3, y = -2.
 Real ValueOf(const std::string& text) {
@@ -22,12 +18,7 @@ Real ValueOf(const std::string& text) {
 std::string RefusalOf(const std::string& text, int line = 1, int column = 1) {
   Tape tape;
   const Names names{{"x", tape.Add({Op::kVariable, -1, -1, 0})}};
-  try {
-    static_cast<void>(Parse({text, line, column}, names, tape));
-  } catch (const ExpressionError& error) {
-    return error.what();
-  }
-  return "";
+  return Thrown<ExpressionError>([&] { static_cast<void>(Parse({text, line, column}, names, tape)); });
 }
 
 std::string Repeated(const std::string& piece, int times) {
@@ -168,5 +159,4 @@ TEST(Tape, EvaluatesOnlyWhatIsWanted) {
   EXPECT_EQ(Evaluate(tape, std::vector{wanted, wanted}, RealArithmetic(zero, {}))[1].ToDouble(), 1);
 }
 
-}  // namespace expressions_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::expressions_test

@@ -1,15 +1,8 @@
 /** A problem whose numbers are known by hand, and what the verifier says of certificates of it. */
 #pragma once
 
-#include <cmath>
-#include <limits>
-#include <memory>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "forereach/dynamics/models/named_models.h"
+#include "tests/test.h"
 #include "tests/worlds.h"
 #include "verifier/verifier.h"
 

@@ -1,8 +1,7 @@
 // Limits of a task in certificates: kept by a hair, exceeded by a hair, and what the verifier cannot decide.
 #include "tests/verifier/hand_made.h"
 
-namespace forereach::verifier {
-namespace limits_test {
+namespace forereach::verifier::limits_test {
 
 constexpr double kHair = 1e-9;
 
@@ -79,5 +78,4 @@ TEST(LimitOf, AMalformedExpressionCannotBeVerified) {
   EXPECT_THAT(verdict.failure.what, testing::HasSubstr("a limit or place is no expression"));
 }
 
-}  // namespace limits_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::limits_test

@@ -1,8 +1,7 @@
 // Bodies at expressions in certificates: clear by a hair, touching by a hair.
 #include "tests/verifier/hand_made.h"
 
-namespace forereach::verifier {
-namespace places_test {
+namespace forereach::verifier::places_test {
 
 constexpr double kHair = 1e-9;
 
@@ -62,5 +61,4 @@ TEST(PlacesOf, AMotionAreOnTheChordAndItsBulge) {
   ExpectRefuted(Judge(part, wall(3 - kHair), 0, M_PI, 16), 0, "the motion to the next sample keeps clear");
 }
 
-}  // namespace places_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::places_test

@@ -1,14 +1,10 @@
 // The verifier's numbers: enclosures, comparisons that are certain or none, and precision that can be raised.
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "verifier/answer.h"
 #include "verifier/real.h"
 
-namespace forereach::verifier {
-namespace real_test {
+namespace forereach::verifier::real_test {
 
 TEST(Real, AThirdIsEnclosedAndNotExact) {
   const Real third = Real(1.0) / Real(3.0);
@@ -48,5 +44,4 @@ TEST(Real, AnIntervalHasItsEndsMiddleAndMagnitude) {
   EXPECT_EQ(Real(0.1).text(), "0.10000000000000001");
 }
 
-}  // namespace real_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::real_test

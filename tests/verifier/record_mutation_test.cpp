@@ -1,25 +1,13 @@
 // `verify` on a decision of which one thing was changed: each leaf of the document, in every way. What is not refused
 // stands on a list here, with the reason.
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <limits>
-#include <map>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/certificates.h"
-#include "tests/scratch.h"
 
-namespace forereach {
-namespace record_mutation_test {
+namespace forereach::record_mutation_test {
 
 using Json = nlohmann::json;
 using Pointer = Json::json_pointer;
@@ -218,5 +206,4 @@ TEST_F(RecordMutation, AKeyThatStandsTwiceIsRefused) {
   EXPECT_FALSE(IsConfirmed(text));
 }
 
-}  // namespace record_mutation_test
-}  // namespace forereach
+}  // namespace forereach::record_mutation_test

@@ -1,12 +1,9 @@
 // Distances known by hand: exactly this distance is confirmed, one last bit more is not.
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "verifier/separation.h"
 
-namespace forereach::verifier {
-namespace separation_test {
+namespace forereach::verifier::separation_test {
 
 Slice BoxSlice(std::vector<double> half_widths) {
   Slice slice;
@@ -74,5 +71,4 @@ TEST(Separation, RadiusIsThatOfTheFarthestCorner) {
   EXPECT_EQ(ProjectedSlice(BoxSlice({2, 3, 6}), Eigen::Matrix3d::Identity()).Radius().ToDouble(), 7);
 }
 
-}  // namespace separation_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::separation_test

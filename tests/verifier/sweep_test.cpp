@@ -3,12 +3,11 @@
 #include <cmath>
 
 #include "forereach/numerics/size.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/verifier/hand_made.h"
 #include "verifier/separation.h"
 
-namespace forereach::verifier {
-namespace sweep_test {
+namespace forereach::verifier::sweep_test {
 
 constexpr double kHair = 1e-12;
 
@@ -137,8 +136,7 @@ TEST(Turning, AnUncertainHeadingBendsThePlace) {
 }
 
 TEST(Turning, TheBendHasTheSupportOfItsArc) {
-  Random random(17);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(17);
   for (int trial = 0; trial < 400; ++trial) {
     const double theta = random.Uniform(-4, 4), r = random.Uniform(0, random.Coin() ? 0.5 : 4);
     const Eigen::Vector2d q = random.Vector(2, 3), d = random.Vector(2);
@@ -164,8 +162,7 @@ TEST(Turning, ThePlaceIsCorrelatedWithTheSlice) {
 
 // Samples of motions within the bounds: the verifier's proof excludes none of them.
 TEST(Turning, NoAdmissibleMotionMeetsWhatIsProvenClear) {
-  Random random(16);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(16);
   int close = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const bool spatial = random.Coin(0.3);
@@ -491,5 +488,4 @@ TEST(Misfit, AScheduleThatDoesNotFitIsRefuted) {
     ExpectRefuted(judge(bad, false), -1, "the schedule lies within its bounds");
 }
 
-}  // namespace sweep_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::sweep_test

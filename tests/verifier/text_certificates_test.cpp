@@ -1,20 +1,13 @@
 // Certificates of models that are texts: what the certifier claims, the verifier derives by its own parser.
-#include <cmath>
-#include <memory>
-#include <numbers>
-#include <string>
-#include <tuple>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/text_model.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/record.h"
 #include "tests/worlds.h"
 
-namespace forereach::verifier {
-namespace text_certificates_test {
+namespace forereach::verifier::text_certificates_test {
 
 using Integrator = ModelText::Integrator;
 
@@ -60,14 +53,12 @@ void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorX
 class TextCertificates : public testing::TestWithParam<Integrator> {};
 
 TEST_P(TextCertificates, OfAQuadrotorAreConfirmed) {
-  Random random(91);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(91);
   ExpectConfirmed(QuadrotorText(GetParam()), random, Eigen::Vector4d(4.9, 0, 0, 0), 8);
 }
 
 TEST_P(TextCertificates, OfManyFunctionsAreConfirmed) {
-  Random random(92);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(92);
   const Lines equations{{"x", "0.5*tanh(y) + 0.1*atan(x*y) - 0.2*x*exp(-y^2)"},
                         {"y", "0.3*sin(x)*sqrt(2 + x^2 + y^2) - 0.1*log(3 + x) + 0.2*asin(x/2)"},
                         {"w", "0.2*atan2(y, 2 + x) + 0.1*max(x, y - 9)*hypot(x, 1 + y^2) - w/(2 + cos(x)) + u"}};
@@ -76,8 +67,7 @@ TEST_P(TextCertificates, OfManyFunctionsAreConfirmed) {
 }
 
 TEST_P(TextCertificates, WithAParameterThatIsAnIntervalAreConfirmed) {
-  Random random(93);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(93);
   ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "k*u"}, {"v", "-k*v*abs(v + 2)"}}, {"u"},
                             {{"dt", 0.1, 0.1}, {"k", 0.19, 0.21}}, {}, GetParam()),
                   random, Eigen::VectorXd::Constant(1, 0.1), 8);
@@ -231,5 +221,4 @@ INSTANTIATE_TEST_SUITE_P(Terms, PointAtAKink,
 INSTANTIATE_TEST_SUITE_P(Integrators, TextCertificates,
                          testing::Values(Integrator::kEuler, Integrator::kMidpoint, Integrator::kRk4));
 
-}  // namespace text_certificates_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::text_certificates_test

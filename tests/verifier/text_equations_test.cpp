@@ -1,20 +1,14 @@
 // Equations of a text: against those written by hand, against closed formulas, and where there is no finite enclosure.
-#include <array>
-#include <functional>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/equations_by_hand.h"
 #include "verifier/equations.h"
 #include "verifier/expressions.h"
 
-namespace forereach::verifier {
-namespace text_equations_test {
+namespace forereach::verifier::text_equations_test {
 
 using Integrator = ModelText::Integrator;
 
@@ -48,8 +42,7 @@ bool Inside(const Real& a, const Real& b) {
 bool AreEqual(const Real& a, const Real& b) { return Inside(a, b) && Inside(b, a); }
 
 void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int variables) {
-  Random random(81);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(81);
   for (int trial = 0; trial < 50; ++trial) {
     std::vector<Real> box;
     for (int l = 0; l < variables; ++l) {
@@ -163,8 +156,7 @@ const std::vector<Formula>& Formulas() {
 }
 
 TEST(TextEquations, FunctionsAreTheirFormulas) {
-  Random random(82);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(82);
   for (const Formula& formula : Formulas()) {
     SCOPED_TRACE(formula.text);
     for (int trial = 0; trial < 50; ++trial) {
@@ -179,8 +171,7 @@ TEST(TextEquations, FunctionsAreTheirFormulas) {
 
 // Of a single function the ranges are the least ones: what sampling finds is near both ends.
 TEST(TextEquations, FunctionsHaveTheirRangesOverABox) {
-  Random random(83);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(83);
   for (const Formula& formula : Formulas()) {
     SCOPED_TRACE(formula.text);
     for (int trial = 0; trial < 20; ++trial) {
@@ -324,12 +315,7 @@ TEST(TextEquations, OnlyDerivativesThatCanBeNonzeroAreListed) {
 
 TEST(TextEquations, RefuseWhatIsNoModel) {
   const auto refusal = [](const ModelText& model) -> std::string {
-    try {
-      static_cast<void>(EquationsOf(model));
-    } catch (const ExpressionError& error) {
-      return error.what();
-    }
-    return "";
+    return Thrown<ExpressionError>([&] { static_cast<void>(EquationsOf(model)); });
   };
   const ModelText good = OneState("x + u", Integrator::kEuler);
   EXPECT_EQ(refusal(good), "");
@@ -396,8 +382,7 @@ class Expressions {
 class RandomTexts : public testing::TestWithParam<int> {};
 
 TEST_P(RandomTexts, HaveTheDerivativesOfTheirValues) {
-  Random random(900 + static_cast<std::uint64_t>(GetParam()));
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(900 + static_cast<std::uint64_t>(GetParam()));
   const Real step(0x1p-60);
   for (int trial = 0; trial < 60; ++trial) {
     Expressions expressions(random);
@@ -449,5 +434,4 @@ TEST_P(RandomTexts, HaveTheDerivativesOfTheirValues) {
 
 INSTANTIATE_TEST_SUITE_P(Integrators, RandomTexts, testing::Range(0, 4));
 
-}  // namespace text_equations_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::text_equations_test

@@ -1,14 +1,8 @@
 // Certificates made by hand, true by a hair and false by a hair, and the certifier's own with one thing changed.
-#include <cmath>
-#include <limits>
-#include <memory>
-#include <utility>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"
 #include "tests/worlds.h"
@@ -16,10 +10,7 @@
 #include "verifier/equations.h"
 #include "verifier/tube.h"
 
-namespace forereach::verifier {
-namespace verifier_test {
-
-using testing::HasSubstr;
+namespace forereach::verifier::verifier_test {
 
 // One step with u = (1, 0) from the unit box: X_1 has center (1/8, 0, 1/2, 0) and half-widths (3/2, 3/2, 1, 1), and
 // kTiny more.
@@ -41,8 +32,7 @@ TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), On
 
 // f0(z) - f0(c) - J (z - c) lies inside the split remainder, wherever in the slice z is.
 TEST(SplitRemainder, HoldsAllOverTheSlice) {
-  Random random(51);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(51);
   const auto problem = std::make_shared<Problem>(
       WorldOf(MakeKinematicBicycle(0.1, 2.5), Within({1e3, 1e3, 20, 100, 10, 1.5}), Within({10, 1})));
   const auto equations = EquationsOf(*problem->model);
@@ -476,5 +466,4 @@ TEST_F(Tampered, AShrunkenEnvelopeOrRemainderIsRefuted) {
   ExpectRefuted(Verdict_(), 3, "residual of theta");
 }
 
-}  // namespace verifier_test
-}  // namespace forereach::verifier
+}  // namespace forereach::verifier::verifier_test

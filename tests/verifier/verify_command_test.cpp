@@ -1,13 +1,7 @@
 // `forereach verify` on a decision: confirmed as it is, refuted with one thing changed, digests made good again or not.
-#include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <regex>
-#include <sstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
+#include "tests/test.h"
 
 #include "command_line/progress.h"
 #include "records/decision_json.h"
@@ -15,11 +9,8 @@
 #include "tests/paths.h"
 #include "tests/records/logs.h"
 
-namespace forereach {
-namespace verify_command_test {
+namespace forereach::verify_command_test {
 
-using testing::HasSubstr;
-using testing::Not;
 using Json = nlohmann::json;
 
 // A task of its own beside its transitions, and the decision on a plan of it.
@@ -345,5 +336,4 @@ TEST(ProgressTest, PrintsTheShareDoneAndTheTimeLeft) {
   EXPECT_EQ(Progress::Line("plans", 10, 10, 3), "[##############################] 10 of 10 plans");
 }
 
-}  // namespace verify_command_test
-}  // namespace forereach
+}  // namespace forereach::verify_command_test

@@ -1,19 +1,13 @@
 // Plans of the policy, where they are observed, and quick figures in bands that a broken method would miss.
 #include "research/chunks/blocks.h"
 
-#include <algorithm>
-#include <cmath>
-#include <set>
-#include <utility>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/cell.h"
 #include "research/chunks/demonstrations.h"
 #include "research/truth.h"
 
-namespace forereach::research {
-namespace blocks_test {
+namespace forereach::research::blocks_test {
 
 TEST(Blocks, AreThePolicysAndTheirOwnForEachPlan) {
   std::set<double> first_jerks;
@@ -97,5 +91,4 @@ TEST(Chunks, QuickFiguresAreInTheirBands) {
     }
 }
 
-}  // namespace blocks_test
-}  // namespace forereach::research
+}  // namespace forereach::research::blocks_test

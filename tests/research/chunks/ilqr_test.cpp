@@ -1,12 +1,11 @@
 #include "research/chunks/ilqr.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
 #include "research/chunks/demonstrations.h"
 
-namespace forereach::research {
-namespace ilqr_test {
+namespace forereach::research::ilqr_test {
 
 double Cost(const NominalModel& model, const Eigen::VectorXd& start, const Eigen::MatrixXd& controls,
             const Eigen::MatrixXd& reference, const TrackingWeights& weights) {
@@ -76,5 +75,4 @@ TEST(Ilqr, TracksTheReferencesOfEveryGroup) {
     }
 }
 
-}  // namespace ilqr_test
-}  // namespace forereach::research
+}  // namespace forereach::research::ilqr_test

@@ -1,14 +1,11 @@
 #include "research/chunks/support.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "planner_bridge/reference.h"
 #include "research/chunks/blocks.h"
 
-namespace forereach::research {
-namespace support_test {
+namespace forereach::research::support_test {
 
 TEST(Support, CorrelationOfRanksWithTies) {
   // Ranks off their mean by -1.5, 0, 0, 1.5; abstentions by -0.5, -0.5, 0.5, 0.5.
@@ -44,5 +41,4 @@ TEST(Support, DistanceIsThatOfTheFarthestStateToItsNearestObservation) {
   EXPECT_NEAR(DistanceToData(system, scenario, data), std::hypot(10.0 / 40, 0.25 / 0.5), 1e-12);
 }
 
-}  // namespace support_test
-}  // namespace forereach::research
+}  // namespace forereach::research::support_test

@@ -1,11 +1,10 @@
 #include "research/chunks/training.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/chunks/blocks.h"
 
-namespace forereach::research {
-namespace training_test {
+namespace forereach::research::training_test {
 
 TrainingOptions Few(int epochs, std::uint64_t seed) { return {384, epochs, seed, 1}; }
 
@@ -43,5 +42,4 @@ TEST(Training, TheShippedPolicyDoesAsTheExpertDoes) {
   EXPECT_LT(CloningError(ShippedPolicy(), MakeDemonstrations(300, 2, 1)), 0.16);
 }
 
-}  // namespace training_test
-}  // namespace forereach::research
+}  // namespace forereach::research::training_test

@@ -1,16 +1,12 @@
 // The extremal residuals are admissible, and every tube of the certifier contains their rollouts.
 #include "research/limits/extremal.h"
 
-#include <cmath>
-#include <memory>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace extremal_test {
+namespace forereach::research::extremal_test {
 
 TEST(ExtremalResiduals, ByHand) {
   Task task = HandTask(0.5, 1);
@@ -30,8 +26,7 @@ TEST(ExtremalResiduals, ByHand) {
 }
 
 TEST(ExtremalResiduals, AgreeWithDataAndDeclaration) {
-  Random random(21);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(21);
   const Task task = PointMassTask(40, 3);
   const Observations observations = Observe(*task.model, task.data);
   const ExtremalResiduals residuals(task.declaration, observations);
@@ -124,5 +119,4 @@ TEST(ExtremalRollouts, LieInThePointMassTube) {
                              Eigen::Vector4d(0.05, 0.05, 0.03, 0.03), {0.1, -0.1});
 }
 
-}  // namespace extremal_test
-}  // namespace forereach::research
+}  // namespace forereach::research::extremal_test

@@ -1,14 +1,11 @@
 // The bump, the two systems it makes, and Theorem 1 in numbers.
 #include "research/limits/two_systems.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace two_systems_test {
+namespace forereach::research::two_systems_test {
 
 const Bump kUnit{Eigen::VectorXd::Zero(1), 1};
 
@@ -73,5 +70,4 @@ TEST(TwoSystems, OfAnAffineModelSeparateByTheGain) {
   EXPECT_NEAR(pair.HalfSeparation(Eigen::MatrixXd::Identity(2, 4), 12), 0.05 * 8 * 0.15, 1e-14);
 }
 
-}  // namespace two_systems_test
-}  // namespace forereach::research
+}  // namespace forereach::research::two_systems_test

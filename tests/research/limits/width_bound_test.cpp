@@ -1,16 +1,11 @@
 // Theorem 2: the scan has the paper's 64 pairs, and every bound is met by two systems that are simulated.
 #include "research/limits/width_bound.h"
 
-#include <algorithm>
-#include <cmath>
-#include <memory>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace width_bound_test {
+namespace forereach::research::width_bound_test {
 
 const Eigen::MatrixXd kPosition6 = Eigen::MatrixXd::Identity(2, 6), kPosition4 = Eigen::MatrixXd::Identity(2, 4);
 
@@ -162,5 +157,4 @@ TEST(WidthBound, RefusesAClassWithoutSlack) {
   EXPECT_THROW((void)BoundWidth(scene.question, 0, 6), std::invalid_argument);
 }
 
-}  // namespace width_bound_test
-}  // namespace forereach::research
+}  // namespace forereach::research::width_bound_test

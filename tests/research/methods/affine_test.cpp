@@ -1,12 +1,11 @@
 // Affine consistency sets worked by hand.
 #include "research/methods/affine.h"
 
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace affine_test {
+namespace forereach::research::affine_test {
 
 // r_vx at vx = 0 and 1 is 0 and 2, each known to 0.1.
 Task TwoPoints() {
@@ -53,5 +52,4 @@ TEST(AffineEnclosure, OfTooFewObservationsIsUnbounded) {
   EXPECT_EQ(bounds.upper[2], kInfinity);
 }
 
-}  // namespace affine_test
-}  // namespace forereach::research
+}  // namespace forereach::research::affine_test

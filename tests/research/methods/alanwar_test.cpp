@@ -1,16 +1,12 @@
 // Covering radii by hand and against a grid; Algorithm 6 contains every residual that satisfies the declaration.
 #include "research/methods/alanwar.h"
 
-#include <array>
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/methods/covering.h"
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace alanwar_test {
+namespace forereach::research::alanwar_test {
 
 TEST(CoveringRadius, ByHand) {
   const std::array<Interval, 1> box{Interval(0, 2)};
@@ -27,8 +23,7 @@ TEST(CoveringRadius, OfACoordinateWithoutWeightIsNothing) {
 }
 
 TEST(CoveringRadius, IsAboveAGridAndClose) {
-  Random random(5);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(5);
   for (int trial = 0; trial < 5; ++trial) {
     const Eigen::MatrixXd points = random.Matrix(random.Integer(1, 40), 2);
     const Eigen::Vector2d weights(random.Uniform(0.1, 1), random.Uniform(0.1, 1));
@@ -61,8 +56,7 @@ TEST(Alanwar, OfAnAffineResidualIsTheFitAndTheCovering) {
 }
 
 TEST(Alanwar, ContainsTheTrueResidual) {
-  Random random(7);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(7);
   for (const int count : {1, 25, 400}) {
     const Task task = BicycleTask(count, 3);
     const AlanwarEnclosure enclosure(task.setting());
@@ -91,8 +85,7 @@ TEST(Alanwar, NoiseWidensBothSides) {
 }
 
 TEST(Alanwar, IsNoNarrowerOnALargerQuery) {
-  Random random(8);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(8);
   const Task task = PointMassTask(50, 2);
   const AlanwarEnclosure enclosure(task.setting());
   for (int trial = 0; trial < 100; ++trial) {
@@ -107,5 +100,4 @@ TEST(Alanwar, IsNoNarrowerOnALargerQuery) {
   }
 }
 
-}  // namespace alanwar_test
-}  // namespace forereach::research
+}  // namespace forereach::research::alanwar_test

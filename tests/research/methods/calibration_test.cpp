@@ -1,17 +1,13 @@
 // The calibrated methods against values worked by hand.
 #include "research/methods/calibration.h"
 
-#include <cmath>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/methods/envelope.h"
 #include "research/methods/plug_in_gaussian.h"
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace calibration_test {
+namespace forereach::research::calibration_test {
 
 constexpr double kRounding = 1e-14;  // what a recorded successor of size 4 hides, and some
 
@@ -110,8 +106,7 @@ TEST(RegionalCalibration, EqualsTheGlobalOneWhileNoCellHasNineObservations) {
 }
 
 TEST(RegionalCalibration, IsNoNarrowerOnALargerQuery) {
-  Random random(11);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(11);
   const Task task = BicycleTask(400, 5);
   for (const Elsewhere elsewhere :
        {Elsewhere::kGlobal, Elsewhere::kNearest, Elsewhere::kWidest, Elsewhere::kDeclared, Elsewhere::kUnbounded}) {
@@ -200,5 +195,4 @@ TEST(PlugInGaussian, OfOneObservationIsThatOne) {
   EXPECT_NEAR(bounds.upper[2], 0.25, kRounding);
 }
 
-}  // namespace calibration_test
-}  // namespace forereach::research
+}  // namespace forereach::research::calibration_test

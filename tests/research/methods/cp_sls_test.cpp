@@ -2,14 +2,11 @@
 // vacuous.
 #include "research/methods/cp_sls.h"
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace cp_sls_test {
+namespace forereach::research::cp_sls_test {
 
 constexpr Covariance kAll[] = {Covariance::kLocal, Covariance::kLocalDiagonal, Covariance::kGlobal,
                                Covariance::kGlobalDiagonal};
@@ -39,8 +36,7 @@ TEST(CpSls, RadiusIsFiniteFromTheFloorOn) {
 }
 
 TEST(CpSls, UpToOneHundredObservationsAreStarvedEverywhere) {
-  Random random(2);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(2);
   const Task task = BicycleTask(100, 4);
   const CpSls method(task.setting(), {});
   for (int trial = 0; trial < 100; ++trial) ASSERT_EQ(AnyQueryIn(random, task, 0.1).Of(method).upper[2], kInfinity);
@@ -168,5 +164,4 @@ TEST(CpSls, RefusesAnOptionOutOfRange) {
   EXPECT_THROW(CpSls(task.setting(), {Covariance::kLocal, 0.1, 0}), std::invalid_argument);
 }
 
-}  // namespace cp_sls_test
-}  // namespace forereach::research
+}  // namespace forereach::research::cp_sls_test

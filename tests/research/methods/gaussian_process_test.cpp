@@ -1,15 +1,11 @@
 // Gaussian processes against one and two observations worked by hand, and the gradient against differences.
 #include "research/methods/gaussian_process.h"
 
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace gaussian_process_test {
+namespace forereach::research::gaussian_process_test {
 
 Eigen::VectorXd Scalar(double x) { return Eigen::VectorXd::Constant(1, x); }
 
@@ -45,8 +41,7 @@ TEST(GaussianProcess, OfTwoObservations) {
 }
 
 TEST(GaussianProcess, GradientIsThatOfTheLikelihood) {
-  Random random(3);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(3);
   const Eigen::MatrixXd x = random.Matrix(12, 2);
   const Eigen::VectorXd y = random.Vector(12);
   const Eigen::Vector4d at(0.3, -0.2, 0.1, -1);
@@ -90,5 +85,4 @@ TEST(GaussianProcessBand, ContainsAFunctionOnItsDataAndWidensWithK) {
   EXPECT_GT(whole.upper[2], 0.98);
 }
 
-}  // namespace gaussian_process_test
-}  // namespace forereach::research
+}  // namespace forereach::research::gaussian_process_test

@@ -1,18 +1,12 @@
 // What holds of the methods as a family, and of ForeReach among them.
 #include "research/methods/method.h"
 
-#include <array>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "research/methods/envelope.h"
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace methods_test {
-
-using testing::ElementsAre;
+namespace forereach::research::methods_test {
 
 TEST(Methods, AreThePapersInItsOrder) {
   std::vector<std::string> names;
@@ -23,8 +17,7 @@ TEST(Methods, AreThePapersInItsOrder) {
 
 TEST(Methods, MakeBoundsForBothSystemsThatTheSeedDetermines) {
   const std::array tasks{BicycleTask(150, 1), PointMassTask(100, 1)};
-  Random random(4);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(4);
   for (const Task& task : tasks)
     for (const Method& method : Methods()) {
       const auto one = method.make(task.setting(7)), other = method.make(task.setting(7));
@@ -42,8 +35,7 @@ TEST(Methods, MakeBoundsForBothSystemsThatTheSeedDetermines) {
 
 // The claim of the sound ones.
 TEST(Methods, SoundOnesContainTheTrueResidual) {
-  Random random(6);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(6);
   const Task bicycle = BicycleTask(60, 2), point_mass = PointMassTask(60, 2);
   const auto check = [&](const Task& task, const auto& residual) {
     for (const Method& method : Methods()) {
@@ -86,8 +78,7 @@ TEST(ScalarEnvelope, IsTheOneNormByHand) {
 }
 
 TEST(ScalarEnvelope, IsNeverNarrowerThanForeReach) {
-  Random random(10);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(10);
   const Task task = BicycleTask(100, 8);
   const auto matrix = MakeForeReach(task.setting()), scalar = MakeScalarEnvelope(task.setting());
   for (int trial = 0; trial < 50; ++trial) {
@@ -100,5 +91,4 @@ TEST(ScalarEnvelope, IsNeverNarrowerThanForeReach) {
   }
 }
 
-}  // namespace methods_test
-}  // namespace forereach::research
+}  // namespace forereach::research::methods_test

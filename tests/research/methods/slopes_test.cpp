@@ -1,16 +1,12 @@
 // Slope estimates by hand; no estimator finds a slope that no sample shows.
 #include "identify/slopes.h"
 
-#include <cmath>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/residual/consistency.h"
 #include "tests/research/methods/small_task.h"
 
-namespace forereach::research {
-namespace slopes_test {
+namespace forereach::research::slopes_test {
 
 constexpr SlopeEstimator kAll[] = {SlopeEstimator::kLacki, SlopeEstimator::kStrongin, SlopeEstimator::kKnuthChou};
 
@@ -82,8 +78,7 @@ TEST(Slopes, KnuthChouDependsOnTheSeedAlone) {
 }
 
 TEST(ExtremeValueEnd, OfMaximaOfUniformNumbersIsOne) {
-  Random random(13);
-  SCOPED_TRACE(random.trace());
+  TracedRandom random(13);
   std::vector<double> maxima(2000, 0.0);
   for (double& largest : maxima)
     for (int i = 0; i < 20; ++i) largest = std::max(largest, random.Uniform(0, 1));
@@ -96,5 +91,4 @@ TEST(ExtremeValueEnd, IsNeverBelowTheLargest) {
   EXPECT_GE(ExtremeValueEnd({1, 2, 3}), 3);
 }
 
-}  // namespace slopes_test
-}  // namespace forereach::research
+}  // namespace forereach::research::slopes_test

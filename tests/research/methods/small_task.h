@@ -9,7 +9,7 @@ from their true residuals. */
 #include "forereach/dynamics/models/residuals.h"
 #include "forereach/reach/propagator.h"
 #include "research/methods/method.h"
-#include "tests/oracle/random.h"
+#include "tests/oracle/traced_random.h"
 
 namespace forereach::research {
 
