@@ -36,7 +36,7 @@ void SendHostile(Watcher& watcher) {
   SetText(status.message, kEvil), SetText(logger.message, kEvil);
   status.state = certifier_status_t::ARMED, status.level = certifier_status_t::ERROR;
   for (std::int64_t sequence : {std::int64_t{0}, std::int64_t{7}, kMost}) {
-    for (const int outcome : {0, 1, 2, 3, 4, 5, 6, 7, 99}) {
+    for (const std::int16_t outcome : std::initializer_list<std::int16_t>{0, 1, 2, 3, 4, 5, 6, 7, 99}) {
       decision.utime = decision.plan_id = decision.sequence = sequence;
       decision.outcome = decision.cause = outcome;
       decision.step = decision.obstacle = std::numeric_limits<std::int16_t>::max();
