@@ -1,7 +1,7 @@
 /** Random inputs in a test: what fails says the seed that repeats it. */
 #pragma once
 
-#include <source_location>
+#include <cstdint>
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,9 @@ namespace forereach {
 
 class TracedRandom final : public Random {
  public:
-  explicit TracedRandom(std::uint64_t seed, std::source_location at = std::source_location::current())
-      : Random(seed), trace_(at.file_name(), static_cast<int>(at.line()), trace()) {}
+  // clang 14 has no std::source_location.
+  explicit TracedRandom(std::uint64_t seed, const char* file = __builtin_FILE(), int line = __builtin_LINE())
+      : Random(seed), trace_(file, line, trace()) {}
 
  private:
   testing::ScopedTrace trace_;
