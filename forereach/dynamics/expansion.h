@@ -33,8 +33,8 @@ kCentred bounds each term. A diagonal term has d_i^2 in [0, r_i^2]. A mixed prod
 two squares, so it lies in [-N, P],
     P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4.
 Nearly parallel generators make N or P small. If a diagonal term and a mixed term share a variable, the exact range of
-1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l is a second bound, and the tighter one is used. docs/mathematics.md
-derives this. */
+1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l is a second bound, and the tighter one is used. docs/soundness.md,
+3.4, derives this. */
 enum class Method { kPaper, kCentred };
 
 /** rho_k lies in center_k +- half_width_k. Zero where f0_k is affine. */
