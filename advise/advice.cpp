@@ -329,10 +329,11 @@ class Adviser {
     for (std::size_t i = 0; i < case_.problem->rest.size(); ++i) {
       const Decision decision = Judged(changed).decision;
       if (decision.cause != Cause::kNoStop) break;
+      const Interval reached = scratch_.hull(scratch_.length(), decision.coordinate);  // both sides have to be inside
       changed = WithProblem(changed, [&](Problem& problem) {
         for (RestBound& bound : problem.rest)
           if (bound.coordinate == decision.coordinate)
-            bound.tolerance = std::max(bound.tolerance, std::abs(decision.margin));
+            bound.tolerance = std::max({bound.tolerance, reached.upper, -reached.lower});
       });
     }
     std::string what;

@@ -221,7 +221,10 @@ void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
     other_task_.clear();
     return;
   }
-  if (config == tried_ || (tried_us_ != 0 && std::abs(now_us - tried_us_) < kReadsAgainAfterUs)) return;
+  const auto [earlier, later] =
+      std::minmax(now_us, tried_us_);  // any numbers, so their difference is one without a sign
+  const std::uint64_t apart = static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
+  if (config == tried_ || (tried_us_ != 0 && apart < std::uint64_t{kReadsAgainAfterUs})) return;
   tried_ = config;
   tried_us_ = now_us;
   other_task_ = "the certifier's task file is not " + task_.path + " as it is now: tubes and names may be wrong";

@@ -44,6 +44,28 @@ TEST_F(AdviseTest, NamesTheBoundOfTheDomain) {
               HasSubstr("if the domain, and with it the declaration, reached farther: a to 4.41"));
 }
 
+// vx ends in [-0.25, 0.15], or the mirror image of it, and has to be in [-0.01, 0.01].
+TEST_F(AdviseTest, TheBoundOfRestCoversBothSides) {
+  scratch_.Write("d.csv", "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,0,0,0,0,0,0,0,0\n");
+  scratch_.Write("plan.csv", "ax,ay\n0,0\n");
+  for (const char* center : {"-0.05", "0.05"}) {
+    scratch_.Write("task.yaml",
+                   "model: {name: point_mass, dt: 0.1}\n"
+                   "domain: {state: {lower: [-9, -9, -9, -9], upper: [9, 9, 9, 9]}, input: {lower: [-1, -1], upper: "
+                   "[1, 1]}}\ndeclaration: {lipschitz: {}, noise_bound: [0, 0, 0, 0]}\ntransitions: d.csv\n"
+                   "task: {initial_set: {center: [0, 0, " +
+                       std::string(center) +
+                       ", 0], half_width: [0.1, 0.1, 0.2, 0]}, projection: [px, py], between: samples, rest: {vx: "
+                       "0.01}, obstacles: []}\n");
+    const std::string decision = scratch_ / "rest.json";
+    Forereach("certify --json --config " + (scratch_ / "task.yaml") + " --plan " + (scratch_ / "plan.csv") + " > " +
+              decision);
+    EXPECT_THAT(Forereach("advise " + decision + " 2>&1").text,
+                HasSubstr("it would be certified\n    if standing allowed vx up to 0.25"))
+        << center;
+  }
+}
+
 TEST_F(AdviseTest, NamesWhatMakesTheDataConsistent) {
   const Output output = AdviseOn("bicycle_falsified.yaml", "bicycle_certified.csv");
   EXPECT_THAT(output.text, AllOf(HasSubstr("if larger slopes were declared: those of theta times 5.99"),

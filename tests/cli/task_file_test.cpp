@@ -322,6 +322,24 @@ TEST_F(CheckTest, DataOutsideTheDomainAreAllNamed) {
   EXPECT_THAT(Check().text, HasSubstr("domain.balls[0]: 1 transition outside, the first in " + steps + ":3\n"));
 }
 
+// As `init` writes it.
+TEST_F(CheckTest, AMatrixThatDataContradictIsNamedAsAMapIs) {
+  scratch_.Write("d.csv", "x,u,x_next\n0,0,0\n1,0.5,1.22\n");
+  const auto check = [&](const std::string& lipschitz) {
+    scratch_.Write("task.yaml",
+                   "model: {states: {x: m}, inputs: {u: m/s}, parameters: {dt: 0.1}, next: {x: x + dt*u}}\n"
+                   "domain: {state: {lower: [-10], upper: [10]}, input: {lower: [-1], upper: [1]}}\n"
+                   "declaration: {lipschitz: " +
+                       lipschitz +
+                       ", noise_bound: [0.001]}\ntransitions: d.csv\ngate: {obstacles: task}\n"
+                       "task: {initial_set: {center: [0], half_width: [0.01]}, projection: [x], between: samples, "
+                       "obstacles: []}\n");
+    return Forereach("check " + (scratch_ / "task.yaml") + " 2>&1").text;
+  };
+  for (const char* lipschitz : {"[[0.1, 0.1]]", "{x: {x: 0.1, u: 0.1}}"})
+    EXPECT_THAT(check(lipschitz), HasSubstr("x: lines 2 and 3 of")) << lipschitz;
+}
+
 // The first row is outside the domain, so that rows and lines differ by more than the header.
 TEST_F(CheckTest, TransitionsThatNothingCanBeObservedOfAreNamedByTheirLine) {
   const auto check = [&](const std::string& model, const std::string& rows) {
