@@ -68,15 +68,15 @@ void WriteTable(const ExportArguments& options, const std::vector<std::optional<
   JoinTables(options.what.format, parts, path);
 }
 
-// What a command that was killed left there, also files that it had not named yet (NAME.part-XXXXXX).
+// Removes what a killed command left in its directory, also files that it had not named yet (NAME.part-XXXXXX).
 void RemoveFilesOf(const fs::path& directory, const std::vector<std::string>& names) {
+  std::error_code error;
   std::vector<fs::path> left;
-  for (const auto& entry : fs::directory_iterator(directory))
+  for (const auto& entry : fs::directory_iterator(directory, error))
     if (std::ranges::any_of(names, [file = entry.path().filename().string()](const std::string& name) {
           return file == name || file.starts_with(name + ".part-");
         }))
       left.push_back(entry.path());
-  std::error_code error;
   for (const fs::path& file : left) fs::remove(file, error);
 }
 

@@ -221,8 +221,8 @@ void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
     other_task_.clear();
     return;
   }
-  const auto [earlier, later] =
-      std::minmax(now_us, tried_us_);  // any numbers, so their difference is one without a sign
+  // Both may be any number. Their difference, taken without a sign, does not overflow.
+  const auto [earlier, later] = std::minmax(now_us, tried_us_);
   const std::uint64_t apart = static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
   if (config == tried_ || (tried_us_ != 0 && apart < std::uint64_t{kReadsAgainAfterUs})) return;
   tried_ = config;

@@ -111,7 +111,7 @@ class Reading {
     clearance.RequireCount(completed || !config_.problem->between ? config_.obstacles.size() : 0);
     for (std::size_t o = 0; o < clearance.Count(); ++o)
       recorded.clearance.push_back(clearance[o].json().is_null() ? kInfinity : clearance[o].Number());
-    // Null: above every double, as the squares are of which it is the root.
+    // The radius is the root of a sum of squares. Where these overflow, from 1e154 on, it is recorded as null.
     const bool is_huge = std::ranges::any_of(recorded.half_width, [](double r) { return r > 1e150; });
     if (!is_huge || !slice["radius"].json().is_null()) recorded.radius = slice["radius"].Number();
     if (!completed) return recorded;

@@ -1,7 +1,9 @@
 #include "verifier/claims.h"
 
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "forereach/numerics/size.h"
@@ -119,15 +121,22 @@ class SliceCheck {
     }
   }
 
-  // Some motion within task.between leads from a state of this slice to one of the next. Of the recorded hulls, which
-  // are those that the certifier tests: the derived slices may be narrower.
+  // The recorded range of coordinate k; nothing if no hull is recorded.
+  static std::optional<std::pair<Real, Real>> HullOf(const RecordedSlice& recorded, int k) {
+    if (recorded.lower.size() > 0) return std::pair(Real(recorded.lower[k]), Real(recorded.upper[k]));
+    if (recorded.center.size() == 0) return std::nullopt;
+    const Real center(recorded.center[k]), half_width(recorded.half_width[k]);
+    return std::pair(center - half_width, center + half_width);
+  }
+
+  // Some motion within task.between leads from a state of this slice to one of the next. The recorded hulls are
+  // compared, as the certifier does: the derived slices may be narrower.
   void CheckTurn() {
     const int heading = problem_.body.heading;
-    if (!problem_.between || heading < 0 || certificate_.slices.empty() || recorded_.lower.size() == 0) return;
-    const RecordedSlice& next = certificate_.slices[ToSize(t_ + 1)];
-    if (next.lower.size() == 0) return;
-    const Real lower = Real(next.lower[heading]) - Real(recorded_.upper[heading]);
-    const Real upper = Real(next.upper[heading]) - Real(recorded_.lower[heading]);
+    if (!problem_.between || heading < 0 || certificate_.slices.empty()) return;
+    const auto here = HullOf(recorded_, heading), next = HullOf(certificate_.slices[ToSize(t_ + 1)], heading);
+    if (!here || !next) return;
+    const Real lower = next->first - here->second, upper = next->second - here->first;
     const auto least = [&](const Real& turns) { return max(lower - turns, turns - upper); };
     Real turn = least(0.0);
     if (problem_.model->IsAngle(heading)) {
@@ -136,7 +145,10 @@ class SliceCheck {
       turn = min(turn, min(least(whole), least(-whole)));
     }
     const Real most = Real(problem_.between->turn_rate) * Real(problem_.between->period);
-    claims_.AtMost(turn, most * Real(1 + 0x1p-40), most, [&] {
+    // The certifier rounds its hulls outward, the turn down and the bound up. This is above what that takes.
+    const Real rounding = Real(0x1p-40) * (most + here->first.magnitude() + here->second.magnitude() +
+                                           next->first.magnitude() + next->second.magnitude());
+    claims_.AtMost(turn, most + rounding, most, [&] {
       return "the least turn of " + name(heading) + " from the slice to the next is one that task.between allows";
     });
   }

@@ -239,7 +239,7 @@ double LeastTurn(const Interval& a, const Interval& b, bool is_angle) noexcept {
   const auto least = [](const Interval& difference) { return std::max(difference.lower, -difference.upper); };
   const Interval difference = b - a;
   if (!is_angle) return std::max(least(difference), 0.0);
-  // Below half a turn more than it can turn, or else more turns may be nearer: nothing is claimed then.
+  // Farther apart than one turn, two turns or more may be nearer: nothing is claimed then.
   if (difference.lower < -kTurn.upper || kTurn.upper < difference.upper) return 0;
   return std::max(std::min({least(difference), least(difference - kTurn), least(difference + kTurn)}), 0.0);
 }
@@ -251,8 +251,9 @@ Decision Certifier::JudgeBetween(const Tube& tube) const noexcept {
   const int heading = problem_->body.heading;
   if (!problem_->between || heading < 0) return decision;
   const double most = MulUp(problem_->between->turn_rate, problem_->between->period);
+  const bool is_angle = problem_->model->IsAngle(heading);
   for (int t = 0; t < tube.length(); ++t) {
-    const double least = LeastTurn(tube.hull(t, heading), tube.hull(t + 1, heading), problem_->model->IsAngle(heading));
+    const double least = LeastTurn(tube.hull(t, heading), tube.hull(t + 1, heading), is_angle);
     if (!(least > most)) continue;
     decision.outcome = Outcome::kDomain;
     decision.cause = Cause::kBetween;

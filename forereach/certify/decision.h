@@ -53,10 +53,10 @@ struct Decision {
 
   /** The deciding value and the value that it is compared with. Certificate and S by kObstacle: proven distance from
   the body to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's
-  radius, or the reach of the whole body (m). S by kLimit: the value that the limit's function may reach, infinite if it
-  has no bound, and the limit's bound. D: extreme value of the hull, and the bound of the domain or of rest; by kBetween
-  the least turn from X_t to X_{t+1} and the largest that is declared (rad). F: difference of two residuals, and the
-  difference that the declaration allows. */
+  radius, or the reach of the whole body where that has one part or none is named (m). S by kLimit: the value that the
+  limit's function may reach, infinite if it has no bound, and the limit's bound. D: extreme value of the hull, and the
+  bound of the domain or of rest; by kBetween the least turn from X_t to X_{t+1} and the largest that is declared (rad).
+  F: difference of two residuals, and the difference that the declaration allows. */
   double margin = 0, threshold = 0;
 
   /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than

@@ -54,11 +54,7 @@ class Hurt final : Kind {
             rig.Signal(Rig::kCertifier, SIGHUP);
           else
             rig.Command(command_t::RELOAD);
-          const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
-          Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
-          const std::int64_t certificates = rig.witness().certificates();
-          const auto certifies = [&] { return rig.witness().certificates() > certificates; };
-          Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
+          DemandRefusedAndCertifying(row, rig, before);
           rig.Listen(kHeartbeat);
           Demand(row, now->failed_reloads == before.failed_reloads + 1, "it was not refused once");
           Demand(row, GetText(now->message).starts_with("the last reload failed"), "the heartbeat does not say so");
@@ -67,9 +63,7 @@ class Hurt final : Kind {
           Demand(row, digest == GetDigest(before.config_digest), "plans were certified under another task");
 
           std::ofstream(path) << good;
-          rig.Command(command_t::RELOAD);
-          const auto taken = [&] { return now->version > before.version; };
-          Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
+          DemandTaken(row, rig, before);
         },
         options_.others);
     ReloadOfNoFile(rig);
@@ -90,6 +84,22 @@ class Hurt final : Kind {
           rig.Signal(role, SIGCONT);
         },
         tries);
+  }
+
+  // A reload that has been asked for is refused, and the certifier goes on. @param before its heartbeat then.
+  static void DemandRefusedAndCertifying(Row& row, Rig& rig, const certifier_status_t& before) {
+    const auto refused = [&] { return rig.witness().status()->failed_reloads > before.failed_reloads; };
+    Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
+    const std::int64_t certificates = rig.witness().certificates();
+    const auto certifies = [&] { return rig.witness().certificates() > certificates; };
+    Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
+  }
+
+  // The task file is good again: a reload takes it.
+  static void DemandTaken(Row& row, Rig& rig, const certifier_status_t& before) {
+    rig.Command(command_t::RELOAD);
+    const auto taken = [&] { return rig.witness().status()->version > before.version; };
+    Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
   }
 
   // Certainly bad, each way in turn.
@@ -130,20 +140,14 @@ class Hurt final : Kind {
           PutNoFile(path, i);
           rig.Signal(Rig::kRobot, SIGHUP);
           rig.Command(command_t::RELOAD);
-          const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
-          Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
+          DemandRefusedAndCertifying(row, rig, before);
           Demand(row, now->version == before.version, "it raised the version");
-          const std::int64_t certificates = rig.witness().certificates();
-          const auto certifies = [&] { return rig.witness().certificates() > certificates; };
-          Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
           const bool ends = i / 4 % 2 == 1;
           if (ends) rig.End(Rig::kCertifier);  // that it ends in time is looked at after each try
           std::filesystem::remove_all(path);
           std::ofstream(path) << good;
           if (ends) return;
-          rig.Command(command_t::RELOAD);
-          const auto taken = [&] { return now->version > before.version; };
-          Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
+          DemandTaken(row, rig, before);
         },
         options_.others);
   }

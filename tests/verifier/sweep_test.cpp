@@ -289,6 +289,27 @@ TEST(BetweenSamples, ATurningBodyLeavesTheChordOfItsPoints) {
   ExpectConfirmed(With(AtAllTimes(Curving(0, 0, 2, 4)), Obstacle::HalfSpace(Eigen::Vector2d(0, 1), kTiny * 2)));
 }
 
+// The heading goes from 0 to 4 in half a second, within recorded hulls that leave it 4 - 2 kHair. They are given by
+// their ends, as on the bus, or by their middles, as in a decision.
+TEST(BetweenSamples, ATurnThatNoMotionMakesIsRefuted) {
+  constexpr double kHair = 0x1p-30;
+  const Body body = Corner(0, 0.5, 0);
+  for (const bool by_ends : {true, false}) {
+    Certificate certificate = Driving();
+    for (const double heading : {0.0, 4.0}) {
+      const Eigen::Vector4d middle(heading, 0, 8, 0), half_width = Eigen::Vector4d::Constant(kHair);
+      RecordedSlice& slice = certificate.slices.emplace_back();
+      if (by_ends)
+        slice.lower = middle - half_width, slice.upper = middle + half_width;
+      else
+        slice.center = middle, slice.half_width = half_width;
+    }
+    ExpectConfirmed(Judge(AtAllTimes(Curving(0, 0, 8 - 4 * kHair), body), certificate));
+    ExpectRefuted(Judge(AtAllTimes(Curving(0, 0, 8 - 5 * kHair), body), certificate), 0,
+                  "the least turn of px from the slice to the next");
+  }
+}
+
 TEST(BetweenSamples, ARecordedClearanceIsThatOfTheMotionAfterTheSample) {
   Certificate certificate = Driving();
   certificate.obstacles = {Post(2, 3, 1)};
