@@ -81,7 +81,7 @@ class AbstentionReader final : public TimelineUser {
       return;
     }
     for (const std::string& why :
-         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between, task.gate)})
+         {WhyNoSchedule(*candidate, task.gate), WhyNoStep(*candidate, task.gate)})
       if (abstention.missing.empty()) abstention.missing = why;
     if (!abstention.missing.empty()) return;
     Case& judged = abstention.judged;

@@ -17,6 +17,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "task/json_text.h"
+#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -249,7 +250,7 @@ PlanRequest PlannerNode::RequestOf(const Round& round) const {
           round.lessons.DomainMargin(half_width_, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1,
-          {round.start_utime, period_us_, Microseconds(config_.gate.max_clock_error_ms.value_or(0))},
+          {round.start_utime, period_us_, ScheduleErrorUs(config_.gate)},
           round.lessons.limit_margin(),
           round.lessons.obstacle_clearance(),
           round.searches == 1 && !(refused_center_ && *refused_center_ == round.center)};

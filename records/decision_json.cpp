@@ -10,6 +10,7 @@
 #include "forereach/safety/separation.h"
 #include "forereach/sets/zonogon.h"
 #include "lcmtypes/names.h"
+#include "task/step_time.h"
 
 namespace forereach {
 
@@ -131,7 +132,7 @@ Schedule ScheduleFromZero(const Config& config, int steps) {
   const auto whole = std::max(std::int64_t{1}, static_cast<std::int64_t>(std::llround(step_us)));
   const double off = AddUp(std::abs(static_cast<double>(whole) - MulUp(config.period, 1e6)),
                            std::abs(MulUp(config.period, 1e6) - MulDown(config.period, 1e6)));
-  const double error = AddUp(MulUp(off, steps), MulUp(config.gate.max_clock_error_ms.value_or(0), 1e3));
+  const double error = AddUp(MulUp(off, steps), static_cast<double>(ScheduleErrorUs(config.gate)));
   return {0, whole, static_cast<std::int64_t>(std::ceil(error))};
 }
 

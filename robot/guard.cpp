@@ -486,7 +486,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
     executing_ = std::move(pending_);
     executing_angles_ = pending_angles_;
     last_step_ = 0;
-    last_step_utime_ = now_us;
+    first_step_utime_ = last_step_utime_ = now_us;
     standing_steps_.reset();
   }
   pending_.reset();
@@ -517,20 +517,30 @@ GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
                 Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
 }
 
-// On what is due at the beginning of a step. A time that no integer holds is due at the last one.
-GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const {
-  if (!options_.max_jitter_us) return {};
+// When a step is due that begins `step` steps after `begin`. A time that no integer holds is the last one.
+std::int64_t Guard::DueAfter(std::int64_t begin, int step) const {
   std::int64_t due = 0;
-  if (__builtin_mul_overflow(plan.step_us, step, &due) || __builtin_add_overflow(plan.start_utime, due, &due))
-    due = INT64_MAX;
+  const bool overflows = __builtin_mul_overflow(options_.step_us, step, &due) || __builtin_add_overflow(begin, due, &due);
+  return overflows ? INT64_MAX : due;
+}
+
+GuardVerdict Guard::ExamineDue(const candidate_plan_t& plan, int step, std::int64_t due, const char* by,
+                               std::int64_t now_us) const {
   const std::uint64_t apart = Apart(now_us, due);
   if (apart <= static_cast<std::uint64_t>(*options_.max_jitter_us)) return {};
   const bool late = now_us > due;
   return RefuseAt(GuardCause::kOffSchedule, step, -1, static_cast<double>(apart) * (late ? 1 : -1),
                   static_cast<double>(*options_.max_jitter_us),
-                  Sentence("plan %" PRId64 ": step %d was due at %" PRId64 " us, it is %" PRIu64
+                  Sentence("plan %" PRId64 ": step %d was due at %" PRId64 " us%s, it is %" PRIu64
                            " us too %s, at most %" PRId64 " us are allowed",
-                           plan.plan_id, step, due, apart, late ? "late" : "early", *options_.max_jitter_us));
+                           plan.plan_id, step, due, by, apart, late ? "late" : "early", *options_.max_jitter_us));
+}
+
+GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const {
+  if (!options_.max_jitter_us) return {};
+  const GuardVerdict verdict = ExamineDue(plan, step, DueAfter(plan.start_utime, step), "", now_us);
+  if (!verdict.ok() || step == 0) return verdict;
+  return ExamineDue(plan, step, DueAfter(first_step_utime_, step), " by the first step", now_us);
 }
 
 // Of the step that ends: its motion is bounded for so long.
@@ -597,6 +607,7 @@ GuardVerdict Guard::CheckAgain(std::span<const double> measured_state, std::int6
     verdict.cause = GuardCause::kInternalError;
   }
   last_step_utime_ = now_us;
+  if (last_step_ == 0) first_step_utime_ = now_us;
   EndIfRefused(verdict);
   return verdict;
 }

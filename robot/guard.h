@@ -79,8 +79,8 @@ enum class GuardCause {
   kTooLate,
   kOutsideInitialSet,
   // TryStart and Check
-  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, or from step_us after the
-                 ///< last step.
+  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, from the first step's time
+                 ///< + step * step_us, or from step_us after the last step.
   kWrongStateSize,
   kOutsideSlice,
   // Check
@@ -140,9 +140,9 @@ struct GuardOptions {
   /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
   if it is there after whole turns of these (lcmtypes/angle.h). */
   std::vector<int> angles = {};
-  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, and no later than this
-  after step_us from the last step, microseconds, not negative. It is half of the task's gate.max_clock_error_ms
-  (task/step_time.h): certificates assume it of obstacles that move, and of the motion between two samples. */
+  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us and of the first step's time
+  + t * step_us, and no later than this after step_us from the last step, microseconds, not negative. It is the task's
+  robot.step_error_ms (task/step_time.h): certificates hold for steps within it. */
   std::optional<std::int64_t> max_jitter_us = {};
 };
 
@@ -180,7 +180,7 @@ class Guard final {
                                       std::span<const double> measured_state) noexcept;
 
   /** Checks the state measured after control step - 1 against the hull of slice `step`, and then, with max_jitter_us,
-  |now_us - start_utime - step * step_us| <= max_jitter_us and now_us - (that of the step before, or of TryStart) <=
+  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of the step before, or of TryStart) <=
   step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n);
   it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
@@ -251,6 +251,9 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
                                           std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
+  [[nodiscard]] std::int64_t DueAfter(std::int64_t begin, int step) const;
+  [[nodiscard]] GuardVerdict ExamineDue(const candidate_plan_t& plan, int step, std::int64_t due, const char* by,
+                                        std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineAgain(std::span<const double> state, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const;
@@ -266,6 +269,7 @@ class Guard final {
   std::unique_ptr<certified_plan_t> pending_, executing_;
   Angles pending_angles_, executing_angles_;
   int last_step_ = 0;                   // last checked step of the executing plan
+  std::int64_t first_step_utime_ = 0;   // when the plan started
   std::int64_t last_step_utime_ = 0;    // when it was checked
   std::int64_t step_before_utime_ = 0;  // when the one before it was
   std::optional<int> standing_steps_;   // of the executing plan

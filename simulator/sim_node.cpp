@@ -55,7 +55,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
-  options.guard.max_jitter_us = MaxJitterUs(config.gate);
+  options.guard.max_jitter_us = StepErrorUs(config.gate);
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;

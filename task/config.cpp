@@ -97,6 +97,15 @@ void FillStanding(TaskDraft& draft) {
   for (RestBound& bound : *config.laws.at_rest) bound.tolerance *= kShareOfRest;
 }
 
+// The errors that StepOffsets allows, with the key's name.
+void RequireSteps(const Document& file, const Config& config, const Problem& problem) try {
+  static_cast<void>(StepOffsets(*problem.model, problem.timing, problem.declaration.disturbance));
+} catch (const std::invalid_argument& error) {
+  const char* key = config.gate.step_error_ms ? "robot.step_error_ms" : "gate.max_clock_error_ms";
+  const char* what = config.gate.step_error_ms ? "" : "half of it is for the robot's steps (robot.step_error_ms): ";
+  file.Fail(key, std::string(what) + error.what());
+}
+
 Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
   Document file(path);
   TaskDraft draft;
@@ -115,7 +124,10 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   config.path = path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
+  problem.timing.error = StepErrorSeconds(config);
+  RequireSteps(file, config, problem);
   if (problem.between) problem.between->period = LongestPeriod(config);
+  if (problem.between || StepErrorUs(config.gate)) config.gate.step_us = StepUs(config);
   if (problem.between && config.robot.step_period_ms > config.period * 1e3)
     file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
                                           ToText(config.period * 1e3) +

@@ -1,6 +1,7 @@
 /** The options of the gate, from `gate` in a task file. Times in milliseconds. */
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -28,9 +29,13 @@ struct GateOptions {
   bool needs_robot_state = true;   ///< Certifies only while the robot's state is heard.
   double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;
-  /** How far step t of a plan may be from start_utime + t step_us, on the clock of the obstacles' stamps. Without it no
-  obstacle may move. Stamps of states and obstacles are held to it at their arrival (gate/stream_clock.h). */
+  /** How far the clocks of robot and obstacles' sender may differ; without step_error_ms half of it is for
+  the robot's steps. Without it no obstacle may move. Stamps of states and obstacles are held to it at their arrival
+  (gate/stream_clock.h). */
   std::optional<double> max_clock_error_ms;
+  /** How far the boundary of a step may be from its time, on the robot's clock: from the plan's start and from the first
+  step's. Nothing: not said (StepErrorUs in step_time.h). The key is robot.step_error_ms. */
+  std::optional<double> step_error_ms;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
   /** Plans under way are withdrawn once the obstacles of the bus have been unknown for so long; kNeverLost: never.
@@ -38,6 +43,8 @@ struct GateOptions {
   std::optional<double> obstacles_lost_ms;
   bool learns = true;            ///< Adds executed transitions to the observations.
   std::string state = "state";   ///< The directory that keeps a latched fault across restarts.
+  /** step_us of every candidate: model.dt, where a certificate rests on when steps are. 0: any. */
+  std::int64_t step_us = 0;
   double longest_step_ms = 150;  ///< An upper bound on a step. The larger of the model's dt and robot.step_period_ms.
 };
 

@@ -196,7 +196,7 @@ std::shared_ptr<const NominalModel> MakeFromText(const ModelText& text) {
 }
 
 std::shared_ptr<const NominalModel> ReadNamedModel(const Field& at) {
-  std::vector<std::string> keys{"name", kStepName, "angles"};
+  std::vector<std::string> keys{"name", kStepName, "angles", "set_at_steps", "rate_bound"};
   for (const NamedModel& model : NamedModels())
     for (const NamedModel::Parameter& parameter : model.parameters) keys.emplace_back(parameter.name);
   RequireOnly(at, keys, "is for a model as text, this one has a name");
@@ -218,7 +218,7 @@ std::shared_ptr<const NominalModel> ReadNamedModel(const Field& at) {
 
 std::shared_ptr<const NominalModel> ReadTextModel(const Field& at, TaskDraft& draft) {
   if (at.Has("file")) {
-    RequireOnly(at, {"file", "parameters", "angles"}, "stands in the model file, not beside its name");
+    RequireOnly(at, {"file", "parameters", "angles", "set_at_steps", "rate_bound"}, "stands in the model file, not beside its name");
     return MakeFromText(ReadModelFile(at, draft));
   }
   if (at.Has(kStepName)) at.Fail(kStepName, "is model.parameters.dt of a model as text");
@@ -227,12 +227,32 @@ std::shared_ptr<const NominalModel> ReadTextModel(const Field& at, TaskDraft& dr
   return MakeFromText(text);
 }
 
+// How states move with time where the equations do not say it.
+void ReadTiming(const Field& at, TaskDraft& draft) {
+  const std::vector<std::string>& states = draft.problem.model->state_names();
+  StepTiming& timing = draft.problem.timing;
+  const auto index = [&](const Field& of, const std::string& name) {
+    const auto found = std::ranges::find(states, name);
+    if (found == states.end()) of.Fail(name + " is no state; " + Suggestion(name, states));
+    return static_cast<int>(found - states.begin());
+  };
+  if (at.Has("set_at_steps"))
+    for (const std::string& name : at["set_at_steps"].Names())
+      timing.set_at_steps.push_back(index(at["set_at_steps"], name));
+  for (const Field& bound : at.Entries("rate_bound")) {
+    if (timing.rate_bound.size() == 0)
+      timing.rate_bound.setConstant(static_cast<Eigen::Index>(states.size()), kInfinity);
+    timing.rate_bound[index(bound, bound.name())] = bound.Number();
+  }
+}
+
 void ReadModel(const Field& at, TaskDraft& draft) {
   const bool has_kind = at.Has("name") || at.Has("file") || at.Has("states");
   if (!has_kind) at.Fail("has no model: write name, file, or states with their equations");
   draft.problem.model = at.Has("name") ? ReadNamedModel(at) : ReadTextModel(at, draft);
   const NominalModel& model = *draft.problem.model;
   draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
+  ReadTiming(at, draft);
   draft.config.period = StepOf(model);
   draft.config.gate.longest_step_ms = draft.config.period * 1e3;
 }
@@ -293,6 +313,16 @@ std::vector<Key> ModelKeys() {
       keys.push_back(OnlyFor(std::string(model.name),
                              Required(Number("model." + std::string(parameter.name), std::string(parameter.unit),
                                              UpTo(parameter.most), std::string(parameter.meaning)))));
+  keys.push_back(
+      Optional(Names("model.set_at_steps", Between(0, kMaxStates), Key::Size::kStates,
+                     "The states that the robot's software sets at the boundaries of steps, whatever a step lasts: "
+                     "what robot.step_error_ms adds leaves them out."),
+               "none"));
+  keys.push_back(Map("model.rate_bound",
+                     "Where equations in `next` do not use dt, how fast the true state moves: robot.step_error_ms "
+                     "needs it of each such state."));
+  keys.push_back(Number("model.rate_bound.<state>", "of the state, per second", kNotNegative,
+                        "The largest absolute derivative of the state in true motions."));
   keys.push_back(Text("model.file",
                       "A model file, relative to this file or to the installed config directory: "
                       "`models/unicycle.yaml`. It has one map, `model`, with a model as text."));

@@ -451,7 +451,7 @@ std::vector<Key> ObstacleKeys() {
 
 void CheckOrder(const Field& at, TaskDraft& draft) {
   const int order = draft.problem.zonotope_order, states = draft.problem.model->num_states(),
-            largest = kMaxGenerators / states - 2;
+            largest = (kMaxGenerators - 1) / states - 2;
   if (order > largest)
     at.Fail("zonotope_order", fmt::format("{} is outside [1, {}] for {} states", order, largest, states));
 }
@@ -466,7 +466,7 @@ std::vector<Key> CertifierKeys() {
       certifier.Integer("zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
                         fmt::format("rho: a slice has at most rho generators for each state. (rho + 2) times the "
                                     "number of states may not exceed {}.",
-                                    kMaxGenerators)),
+                                    kMaxGenerators - 1)),
       certifier.Integer("max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
                         "How many groups of 32 observations one search for the tightest bound may visit. Every subset "
                         "gives a sound bound; a decision that met this cap says so."),

@@ -2,18 +2,41 @@
 
 #include <cmath>
 
-#include "forereach/numerics/directed.h"
+#include "forereach/numerics/interval.h"
+#include "forereach/numerics/limits.h"
 
 namespace forereach {
+namespace {
 
-std::optional<std::int64_t> MaxJitterUs(const GateOptions& options) {
-  if (!options.max_clock_error_ms) return std::nullopt;
-  return std::llround(*options.max_clock_error_ms * 1e3) / 2;
+std::int64_t MicrosecondsOf(double ms) { return std::llround(ms * 1e3); }
+
+double SecondsUp(std::int64_t us) { return DivUp(static_cast<double>(us), 1e6); }
+
+}  // namespace
+
+std::optional<std::int64_t> StepErrorUs(const GateOptions& options) {
+  if (options.step_error_ms) return MicrosecondsOf(*options.step_error_ms);
+  if (options.max_clock_error_ms) return MicrosecondsOf(*options.max_clock_error_ms) / 2;
+  return std::nullopt;
+}
+
+std::int64_t ScheduleErrorUs(const GateOptions& options) {
+  const std::int64_t clocks = MicrosecondsOf(options.max_clock_error_ms.value_or(0));
+  return options.step_error_ms ? clocks + MicrosecondsOf(*options.step_error_ms) : clocks;
+}
+
+std::int64_t StepUs(const Config& config) { return std::llround(config.period * 1e6); }
+
+double StepErrorSeconds(const Config& config) {
+  const std::int64_t error_us = StepErrorUs(config.gate).value_or(0);
+  if (error_us == 0) return 0;
+  const Interval differs = Interval(static_cast<double>(StepUs(config))) / Interval(1e6) - Interval(config.period);
+  return AddUp(SecondsUp(error_us), MulUp(kMaxSteps, differs.Magnitude()));
 }
 
 double LongestPeriod(const Config& config) {
-  const std::int64_t longer_us = MaxJitterUs(config.gate).value_or(0);
-  return longer_us > 0 ? AddUp(config.period, DivUp(static_cast<double>(longer_us), 1e6)) : config.period;
+  const std::int64_t longer_us = StepErrorUs(config.gate).value_or(0);
+  return longer_us > 0 ? AddUp(config.period, SecondsUp(longer_us)) : config.period;
 }
 
 }  // namespace forereach

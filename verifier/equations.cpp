@@ -15,12 +15,14 @@
 namespace forereach::verifier {
 namespace {
 
-// The model's equations, each one on the line of its state.
-Formulas FormulasOf(const ModelText& model) {
+// The model's equations, each one on the line of its state. `as_variable`: a parameter that is the last variable.
+Formulas FormulasOf(const ModelText& model, const std::string& as_variable = "") {
   std::vector<std::string> variables, parameters;
   for (const auto* const group : {&model.states, &model.inputs})
     for (const ModelText::Variable& named : *group) variables.push_back(named.name);
-  for (const ModelText::Parameter& named : model.parameters) parameters.push_back(named.name);
+  for (const ModelText::Parameter& named : model.parameters)
+    if (named.name != as_variable) parameters.push_back(named.name);
+  if (!as_variable.empty()) variables.push_back(as_variable);
   return verifier::FormulasOf(variables, parameters, model.definitions, model.equations);
 }
 
@@ -51,6 +53,7 @@ class TextEquations final : public Equations {
       parameters_.emplace_back(lower, upper);
     }
     if (!stages_.empty() && dt_ < 0) throw ExpressionError("an integrator needs the parameter dt");
+    if (dt_ >= 0) formulas_in_dt_ = FormulasOf(model, "dt");
   }
 
   bool IsExact() const override {
@@ -88,6 +91,45 @@ class TextEquations final : public Equations {
         derivatives.push_back({static_cast<int>(k), key / JetArithmetic::kStride, key % JetArithmetic::kStride, value});
     std::ranges::sort(derivatives, {}, [](const SecondDerivative& d) { return std::tuple(d.output, d.column, d.row); });
     return derivatives;
+  }
+
+  // Forward along h: with a stage's argument a = x + c h k, da/dh = c k + c h dk/dh, where k and dk/dh are those of the
+  // stage before, and dk/dh = D_x rates da/dh + D_h rates.
+  std::vector<Real> Rate(std::span<const Real> z, const Real& duration) const override {
+    std::vector<Real> parameters = Parameters(), at(z.begin(), z.end());
+    if (dt_ >= 0) parameters.erase(parameters.begin() + dt_);
+    at.push_back(duration);
+    std::vector<bool> by(at.size(), false);
+    std::fill_n(by.begin(), num_states_, true);
+    by.back() = true;
+    std::vector<Real> along(at.size()), rates, changes, end(num_states_);
+    along.back() = 1.0;
+    const auto evaluate = [&] {
+      rates.clear(), changes.clear();
+      const JetArithmetic arithmetic(at, parameters, by, JetArithmetic::Order::kFirst);
+      for (const Jet& jet : Evaluate(formulas_in_dt_.tape, formulas_in_dt_.results, arithmetic)) {
+        Real change;
+        for (const auto& [variable, value] : jet.first) change += value * along[ToSize(variable)];
+        rates.push_back(jet.value), changes.push_back(change);
+      }
+    };
+    if (stages_.empty()) {
+      evaluate();
+      return changes;
+    }
+    const auto fraction = [](const std::pair<int, int>& part) {
+      return Real::Integer(part.first) / Real::Integer(part.second);
+    };
+    for (const Stage& stage : stages_) {
+      const Real before = fraction(stage.before), weight = fraction(stage.weight);
+      for (std::size_t k = 0; k < rates.size(); ++k) {
+        at[k] = z[k] + before * duration * rates[k];
+        along[k] = before * rates[k] + before * duration * changes[k];
+      }
+      evaluate();
+      for (std::size_t k = 0; k < num_states_; ++k) end[k] += weight * rates[k] + weight * duration * changes[k];
+    }
+    return end;
   }
 
  private:
@@ -131,7 +173,7 @@ class TextEquations final : public Equations {
     return next;
   }
 
-  Formulas formulas_;
+  Formulas formulas_, formulas_in_dt_;
   std::vector<Stage> stages_;
   std::size_t num_states_;
   std::vector<std::pair<double, double>> parameters_;

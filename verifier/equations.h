@@ -39,6 +39,8 @@ class Equations {
   [[nodiscard]] virtual std::vector<Real> Value(std::span<const Real> z) const = 0;
   [[nodiscard]] virtual std::vector<FirstDerivative> First(std::span<const Real> z) const = 0;
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
+  /** For each state the derivative of x+ by the step's duration, where that is in `duration` instead of dt. */
+  [[nodiscard]] virtual std::vector<Real> Rate(std::span<const Real> z, const Real& duration) const = 0;
 };
 
 /** The equations of TextOf(model) (forereach/dynamics/models/named_models.h); null if there is no text.

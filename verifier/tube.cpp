@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
@@ -288,6 +289,18 @@ bool AllFinite(const std::vector<SecondDerivative>& hessian) {
 // The ends of what encloses either bound.
 Bounds Outermost(const Bounds& bounds) { return {bounds.lower.lower(), bounds.upper.upper()}; }
 
+// The record's generator that is nearest to d, unless d is nearer to nothing.
+int NearestGenerator(const RecordedSet& recorded, const std::vector<Real>& column) {
+  Eigen::VectorXd rounded(recorded.center.size());
+  for (Eigen::Index k = 0; k < rounded.size(); ++k) rounded[k] = column[ToSize(k)].ToDouble();
+  int nearest = -1;
+  double least = rounded.lpNorm<1>();
+  for (Eigen::Index j = 0; j < recorded.generators.cols(); ++j)
+    if (const double away = (recorded.generators.col(j) - rounded).lpNorm<1>(); away < least)
+      least = away, nearest = static_cast<int>(j);
+  return nearest;
+}
+
 // Replaces a number by a point, and adds to `slack` how far it may be away.
 void Round(Real& number, Real& slack) {
   const Real point = number.middle();
@@ -342,6 +355,12 @@ struct TubeMaker::Query {
   }
 };
 
+// What the offsets of the boundaries of a step add: d, and what is added without correlation.
+struct TubeMaker::Offset {
+  std::vector<Real> column, spread;
+  int recorded = -1;
+};
+
 TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method method)
     : problem_(problem), equations_(equations), method_(method), remainder_rounding_(RemainderRounding()) {
   const Transitions& data = problem.transitions;
@@ -393,7 +412,11 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
   Tube tube;
   tube.slices.push_back(SliceOf(initial_set));
   for (int t = 0, steps = static_cast<int>(controls.cols()); t < steps && !tube.failure; ++t) {
-    const Slice slice = options.follow ? SliceOf((*options.follow)[ToSize(t)]) : tube.slices.back();
+    Slice slice = tube.slices.back();
+    if (options.follow) {
+      slice = SliceOf((*options.follow)[ToSize(t)]);
+      slice.offset = tube.recorded_offsets.back();
+    }
     tube.failure = Advance(tube, Query(t, slice, controls.col(t)), options);
   }
   return tube;
@@ -417,8 +440,10 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     step.envelope.push_back(equations_.IsExact() ? bounds : Outermost(bounds));
   }
 
+  const RecordedSet* const recorded = options.follow ? &(*options.follow)[tube.slices.size()] : nullptr;
+  const Offset offset = OffsetOf(query, step.envelope, recorded);
   std::vector<Real> slack(ToSize(n));
-  Slice next = Image(query, slack);
+  Slice next = Image(query, offset, slack);
   const Real half(0.5);
   for (int k = 0; k < n; ++k) {  // diag(q)
     const auto& [lower, upper] = step.remainder[ToSize(k)];
@@ -430,14 +455,20 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real h = half * abs(upper - lower) + disturbance_[ToSize(k)]; !h.IsZero())
+    if (const Real h = half * abs(upper - lower) + disturbance_[ToSize(k)] + offset.spread[ToSize(k)]; !h.IsZero())
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }
-  const bool followed =
-      options.follow && ReduceAs(next, problem_.zonotope_order, (*options.follow)[tube.slices.size()].generators);
+  const bool followed = recorded && ReduceAs(next, problem_.zonotope_order, recorded->generators);
   if (options.reduce && !followed)
     tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
+  if (!IsZeroColumn(offset.column)) {
+    next.offset = static_cast<int>(next.columns.size());
+    next.columns.push_back(offset.column);
+    for (int k = 0; k < n; ++k)
+      if (!next.HalfWidth(k).IsFinite()) return no_bound("the successor");
+  }
+  tube.recorded_offsets.push_back(offset.recorded);
   for (int k = 0; k < n; ++k)
     if (!slack[ToSize(k)].IsZero()) {
       next.columns.push_back(Axis(n, k, slack[ToSize(k)]));
@@ -448,9 +479,43 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   return std::nullopt;
 }
 
+// Any d is sound, since what it differs from E g counts as spread: the record's is the one by which its slices hold.
+TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const std::vector<Bounds>& envelope,
+                                      const RecordedSet* recorded) const {
+  const std::size_t n = envelope.size();
+  Offset offset{std::vector<Real>(n), std::vector<Real>(n)};
+  const StepTiming& timing = problem_.timing;
+  if (timing.error == 0) return offset;
+  const Real error(timing.error), dt(StepOf(*problem_.model)), ends(query.t == 0 ? 1.0 : 2.0);
+  const Real most = Real(2.0) * error;
+  const std::vector<Real> rate = equations_.Rate(query.hull, Around(dt, most));
+  const auto is_set = [&](std::size_t k) {
+    return std::ranges::count(timing.set_at_steps, static_cast<int>(k)) > 0;
+  };
+  const auto declared = [&](std::size_t k) {
+    return timing.rate_bound.size() > 0 ? timing.rate_bound[static_cast<Eigen::Index>(k)] : kNone;
+  };
+  std::vector<Real> moved(n);
+  for (std::size_t k = 0; k < n; ++k)
+    if (!is_set(k) && declared(k) == kNone) moved[k] = error * rate[k], offset.column[k] = moved[k].middle();
+  if (recorded) offset.recorded = NearestGenerator(*recorded, offset.column);
+  for (std::size_t k = 0; k < n; ++k) {
+    if (offset.recorded >= 0) offset.column[k] = recorded->generators(static_cast<Eigen::Index>(k), offset.recorded);
+    if (is_set(k)) {
+      offset.spread[k] = ends * abs(offset.column[k]);
+    } else if (declared(k) < kNone) {
+      offset.spread[k] = ends * (error * Real(declared(k)) + abs(offset.column[k]));
+    } else {
+      const Real unexpected = max(abs(envelope[k].lower), abs(envelope[k].upper)) + disturbance_[k];
+      offset.spread[k] = ends * ((moved[k] - offset.column[k]).magnitude() + error * unexpected / dt);
+    }
+  }
+  return offset;
+}
+
 // <f0(c), J G>. With parameters that are intervals, the middles; `slack` then is set to what they may be off,
 // coordinate by coordinate, the slice's own slack included.
-Slice TubeMaker::Image(const Query& query, std::vector<Real>& slack) const {
+Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const {
   const std::size_t n = slack.size(), num_columns = query.slice.columns.size() - query.slice.num_slack;
   Slice next;
   next.center = equations_.Value(query.center);
@@ -461,11 +526,14 @@ Slice TubeMaker::Image(const Query& query, std::vector<Real>& slack) const {
     for (const auto& [output, variable, value] : jacobian)
       if (ToSize(variable) < n && !column[ToSize(variable)].IsZero())
         image[ToSize(output)] += value * column[ToSize(variable)];
+    if (static_cast<int>(j) == query.slice.offset)
+      for (std::size_t k = 0; k < n; ++k) image[k] -= offset.column[k];
     if (j >= num_columns)
       for (std::size_t k = 0; k < n; ++k) slack[k] += image[k].magnitude();
     else if (!IsZeroColumn(image))
       next.columns.push_back(std::move(image));
   }
+  if (query.t > 0 && query.slice.offset < 0 && !IsZeroColumn(offset.column)) next.columns.push_back(offset.column);
   if (equations_.IsExact()) return next;
   for (std::size_t k = 0; k < n; ++k) {
     Round(next.center[k], slack[k]);

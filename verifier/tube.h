@@ -33,6 +33,8 @@ struct Slice {
   /** The last columns, each along an axis, are what the others are off because a parameter is an interval. A reduction
   never counts them. */
   std::size_t num_slack = 0;
+  /** The column of this boundary's offset; -1: none, the offset is independent of the state. */
+  int offset = -1;
 
   [[nodiscard]] int dim() const { return static_cast<int>(center.size()); }
   /** sum_j |G_kj|. */
@@ -61,6 +63,8 @@ struct Step {
 struct Tube {
   std::vector<Slice> slices;  ///< X_0, X_1, ... up to the last computed slice.
   std::vector<Step> steps;
+  /** Where a record is followed: the generator of each slice's record that was taken for its offset's, or -1. */
+  std::vector<int> recorded_offsets = {-1};
   /** Why the tube ends early: Box(Z_t) leaves the domain, or a quantity has no finite enclosure. */
   std::optional<Failure> failure;
   /** Not zero if a reduction chose between columns whose scores differ by no more than a double's rounding, or exceed
@@ -112,7 +116,10 @@ class TubeMaker final {
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
-  [[nodiscard]] Slice Image(const Query& query, std::vector<Real>& slack) const;
+  struct Offset;
+  [[nodiscard]] Offset OffsetOf(const Query& query, const std::vector<Bounds>& envelope,
+                                const RecordedSet* recorded) const;
+  [[nodiscard]] Slice Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;

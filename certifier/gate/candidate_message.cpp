@@ -22,7 +22,7 @@ Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule) {
 
 Schedule ScheduleOf(const candidate_plan_t& candidate, const GateOptions& options) {
   if (!options.max_clock_error_ms) return {};
-  return {candidate.start_utime, candidate.step_us, Microseconds(*options.max_clock_error_ms)};
+  return {candidate.start_utime, candidate.step_us, ScheduleErrorUs(options)};
 }
 
 std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options) {
@@ -35,14 +35,10 @@ std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& 
   return {};
 }
 
-std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between,
-                          const GateOptions& options) {
-  if (!between) return {};
-  const std::string step = fmt::format("step_us is {}", candidate.step_us);
-  if (candidate.step_us < 1) return step + ", must be at least 1";
-  const std::int64_t longest = Microseconds(between->period * 1e3) - MaxJitterUs(options).value_or(0);
-  if (candidate.step_us <= longest) return {};
-  return fmt::format("{}, longer than model.dt, {} us: task.between bounds the motion in this time", step, longest);
+std::string WhyNoStep(const candidate_plan_t& candidate, const GateOptions& options) {
+  if (options.step_us == 0 || candidate.step_us == options.step_us) return {};
+  return fmt::format("step_us is {}, must be {}, model.dt: the model says what a step of this time does",
+                     candidate.step_us, options.step_us);
 }
 
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {

@@ -30,11 +30,9 @@ schedule. Whether the candidate's times are within the bounds of a schedule is f
 than Schedule::kLatest from the epoch. Empty if they are one, and without gate.max_clock_error_ms. */
 [[nodiscard]] std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options);
 
-/** Why the task's bounds between samples do not hold for the candidate's steps: step_us is not positive, or a step that
-lasts longer by what the guard allows (MaxJitterUs of task/step_time.h) is longer than `between`'s period. Empty if they
-hold, and without bounds. */
-[[nodiscard]] std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between,
-                                        const GateOptions& options);
+/** Why step_us is none of the task: it is not model.dt where certificates rest on when steps are
+(GateOptions::step_us). Empty if it is. */
+[[nodiscard]] std::string WhyNoStep(const candidate_plan_t& candidate, const GateOptions& options);
 
 /** X_0. @throws std::invalid_argument if num_states is not 1 to 16, or as Zonotope::FromBox does. */
 [[nodiscard]] Zonotope InitialSetOf(const candidate_plan_t& candidate);

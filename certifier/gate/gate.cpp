@@ -112,7 +112,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
   for (const std::string& why :
-       {WhyNoSchedule(candidate, options_), WhyNotBounded(candidate, certifier_.problem().between, options_)})
+       {WhyNoSchedule(candidate, options_), WhyNoStep(candidate, options_)})
     if (!why.empty()) return Rejection{decision_t::CAUSE_WRONG_DIMENSION, why};
   return CheckSource(candidate, now_us);
 }
@@ -210,9 +210,9 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
 
 Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noexcept {
   try {
-    // The task may have been read again, with another time from one sample to the next.
+    // The task may have been read again, with another dt.
     if (!WhyNoSchedule(candidate, options_).empty()) return {};
-    if (!WhyNotBounded(candidate, certifier_.problem().between, options_).empty()) return {};
+    if (!WhyNoStep(candidate, options_).empty()) return {};
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.all());

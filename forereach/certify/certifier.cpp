@@ -30,8 +30,9 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   const int n = problem->model->num_states();
   problem->domain.Validate(n, problem->model->num_inputs());
   problem->declaration.ValidateDisturbance(n);
-  // A successor adds up to 2 n columns before it is reduced, a projection up to p.
-  const int highest_order = (kMaxGenerators - std::max(2 * n, kMaxSafetyDim)) / n;
+  // A slice has one column more where steps may be off their times. A successor adds up to 2 n columns before it is
+  // reduced, a projection up to p.
+  const int highest_order = (kMaxGenerators - 1 - std::max(2 * n, kMaxSafetyDim)) / n;
   Require(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
           "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
               std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
@@ -126,14 +127,14 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
       propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
-                  problem_->zonotope_order, problem_->method, problem_->instructions) {}
+                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
       limits_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
-                  problem_->zonotope_order, problem_->method, problem_->instructions) {}
+                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
 
 Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
   Observations observed;
@@ -216,7 +217,7 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
     const auto i = ToSize(t);
     StepRecord& record = tube.steps_[i];
     const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1],
-                                               tube.steps_[i + 1].half_width.data());
+                                               tube.steps_[i + 1].half_width.data(), t == 0);
     if (result.status != StepResult::Status::kDone) return Stopped(result, t, record);
     tube.length_ = t + 1;
   }

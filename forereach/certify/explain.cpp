@@ -123,7 +123,10 @@ std::string ExplainUnbounded(const Decision& decision, const NominalModel& model
 }  // namespace
 
 std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest) {
-  const std::string limits = problem.limits.empty() ? "" : "; within its limits at the sample instants";
+  const double error = problem.timing.error;
+  const std::string steps =
+      error > 0 ? "; steps up to " + RoundedDown(error) + " s off their times" : "; steps on time";
+  const std::string limits = (problem.limits.empty() ? "" : "; within its limits at the sample instants") + steps;
   if (closest.obstacle < 0) return "certified: no obstacle is there" + limits;
   const std::string who = NamesPart(problem, closest.part) ? "part " + std::to_string(closest.part) + " " : "";
   return std::string(problem.between ? "certified: the robot stays clear at all times"

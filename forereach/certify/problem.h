@@ -10,6 +10,7 @@ projection. */
 #include "forereach/dynamics/model.h"
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/reach/domain.h"
+#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/declaration.h"
 #include "forereach/residual/transitions.h"
 #include "forereach/safety/body.h"
@@ -33,6 +34,7 @@ struct Problem {
   Transitions transitions;                    ///< D_N, all inside the domain
   Eigen::MatrixXd projection;                 ///< P, p-by-n: the position of the robot's frame
   Body body;                                  ///< By default the point P x
+  StepTiming timing;                          ///< By how much the boundaries of steps may be off their times
   /** The bounds with which a certificate holds at all times; without them it holds at the samples only. */
   std::optional<Between> between;
   std::vector<Limit> limits;          ///< At most kMaxLimits, which hold at the samples

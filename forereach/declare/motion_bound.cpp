@@ -369,7 +369,7 @@ Quantity AccelerationOfPlace(std::size_t i) {
 
 // ---- Recorded motion.
 
-constexpr double kTurn = 2 * std::numbers::pi;
+constexpr double kWholeTurn = 2 * std::numbers::pi;
 
 // From the state in which transition i begins to its successor, without the turns of an angle that a record adds.
 Eigen::VectorXd StepOf(const NominalModel& model, const Transitions& transitions, Eigen::Index i) {
@@ -379,7 +379,7 @@ Eigen::VectorXd StepOf(const NominalModel& model, const Transitions& transitions
     const Eigen::VectorXd z = transitions.z.row(i);
     std::array<double, kMaxStates> expected;
     model.Evaluate({z.data(), ToSize(z.size())}, {expected.data(), ToSize(n)});
-    for (const int k : model.angles()) next[k] += kTurn * std::round((expected[ToSize(k)] - next[k]) / kTurn);
+    for (const int k : model.angles()) next[k] += kWholeTurn * std::round((expected[ToSize(k)] - next[k]) / kWholeTurn);
   }
   return next - transitions.z.row(i).head(n).transpose();
 }
@@ -389,7 +389,7 @@ bool FollowsTheOneBefore(const NominalModel& model, const Transitions& transitio
   constexpr double kRounding = 0x1p-48;
   for (int k = 0; k < static_cast<int>(transitions.x_next.cols()); ++k) {
     const double ended = transitions.x_next(i - 1, k), begins = transitions.z(i, k);
-    if (ended != begins && !(model.IsAngle(k) && std::abs(std::remainder(ended - begins, kTurn)) <= kRounding))
+    if (ended != begins && !(model.IsAngle(k) && std::abs(std::remainder(ended - begins, kWholeTurn)) <= kRounding))
       return false;
   }
   return true;

@@ -158,6 +158,16 @@ class ProgramDraft final {
   derivative. */
   constexpr void Differentiate();
 
+  /** Replaces each value by its derivative by a parameter. @pre SetValues, and no Differentiate before. @throws as
+  Differentiate. */
+  constexpr void DifferentiateBy(int parameter) {
+    std::vector<unsigned char> wanted(nodes_.size(), 0);
+    for (const int node : value_) wanted[ToSize(node)] = 1;
+    MarkOperands(nodes_, wanted);
+    const Derivatives d = DifferentiateAll(static_cast<short>(-1 - parameter), wanted, false);
+    for (int& node : value_) node = d[ToSize(node)] == kZero ? Constant(0) : d[ToSize(node)];
+  }
+
   /** Refers to this draft, which must not change while it is used. @pre Differentiate, or no derivative is used. */
   [[nodiscard]] constexpr Program View() const {
     return {nodes_,
@@ -174,7 +184,8 @@ class ProgramDraft final {
   }
 
  private:
-  // By its index, the derivative of each node by one variable; kZero: identically zero.
+  // By its index, the derivative of each node by one variable, or by parameter p as variable -1 - p; kZero: identically
+  // zero.
   static constexpr int kZero = -1;
   using Derivatives = std::vector<int>;
 
@@ -311,7 +322,7 @@ constexpr int ProgramDraft::DerivativeOf(int i, short variable, const Derivative
   const int da = n.has_first() ? d[ToSize(n.a)] : kZero, db = n.has_second() ? d[ToSize(n.b)] : kZero;
   switch (n.op) {
     case Op::kVariable: return n.a == variable ? Constant(1) : kZero;
-    case Op::kParameter:
+    case Op::kParameter: return n.a == -1 - variable ? Constant(1) : kZero;
     case Op::kConstant: return kZero;
     case Op::kAdd:
       if (slopes && IsOne(n.a)) {

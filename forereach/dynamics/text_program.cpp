@@ -68,15 +68,12 @@ ExpressionNames NamesOf(const NominalModel& model) {
   return names;
 }
 
-ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const ExpressionText> expressions) {
-  RequireAtMost(names.states.size(), kMaxStates, "states");
-  RequireAtMost(names.inputs.size(), kMaxInputs, "inputs");
-  const std::size_t states = names.states.size();
-  ProgramDraft program(static_cast<int>(states), static_cast<int>(states + names.inputs.size()));
+std::vector<Symbol> ValuesAt(std::span<const Symbol> states, const ExpressionNames& names,
+                             std::span<const ExpressionText> expressions, ProgramDraft& program) {
   Known known;
-  int variable = 0, parameter = 0;
-  for (const auto* variables : {&names.states, &names.inputs})
-    for (const std::string& name : *variables) known.Add(name, Symbol::Variable(program, variable++));
+  for (std::size_t k = 0; k < states.size(); ++k) known.Add(names.states[k], states[k]);
+  int variable = static_cast<int>(states.size()), parameter = 0;
+  for (const std::string& name : names.inputs) known.Add(name, Symbol::Variable(program, variable++));
   for (const auto& [name, lower, upper] : names.parameters) {
     if (!(-kInfinity < lower && lower <= upper && upper < kInfinity))
       throw std::invalid_argument("the parameter " + name + " in [" + ToText(lower) + ", " + ToText(upper) +
@@ -84,9 +81,29 @@ ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const Expressio
     known.Add(name, Symbol::Parameter(program, parameter++));
   }
   for (const ModelText::Definition& definition : names.definitions) known.Define(definition, program);
-  std::vector<int> values;
-  for (const ExpressionText& expression : expressions) values.push_back(known.ValueOf(expression, program).node());
-  program.SetValues(values);
+  std::vector<Symbol> values;
+  for (const ExpressionText& expression : expressions) values.push_back(known.ValueOf(expression, program));
+  return values;
+}
+
+std::vector<Symbol> StatesOf(ProgramDraft& program) {
+  std::vector<Symbol> states;
+  for (int k = 0; k < program.View().states; ++k) states.push_back(Symbol::Variable(program, k));
+  return states;
+}
+
+void SetValues(std::span<const Symbol> values, ProgramDraft& program) {
+  std::vector<int> nodes;
+  for (const Symbol& value : values) nodes.push_back(value.node());
+  program.SetValues(nodes);
+}
+
+ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const ExpressionText> expressions) {
+  RequireAtMost(names.states.size(), kMaxStates, "states");
+  RequireAtMost(names.inputs.size(), kMaxInputs, "inputs");
+  const std::size_t states = names.states.size();
+  ProgramDraft program(static_cast<int>(states), static_cast<int>(states + names.inputs.size()));
+  SetValues(ValuesAt(StatesOf(program), names, expressions, program), program);
   return program;
 }
 

@@ -24,6 +24,16 @@ or if the name of a definition is used twice or belongs to the language.
 language, or if the range of a parameter is empty or not finite. */
 [[nodiscard]] ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const ExpressionText> expressions);
 
+/** @name The same in parts, for a program in which expressions are evaluated at states of its own. */
+///@{
+/** The variables that are the states. */
+[[nodiscard]] std::vector<Symbol> StatesOf(ProgramDraft& program);
+/** The values of the expressions at these states. @throws as MakeProgram. */
+[[nodiscard]] std::vector<Symbol> ValuesAt(std::span<const Symbol> states, const ExpressionNames& names,
+                                           std::span<const ExpressionText> expressions, ProgramDraft& program);
+void SetValues(std::span<const Symbol> values, ProgramDraft& program);
+///@}
+
 /** @throws ExpressionError at a call of softplus or smooth_gate on which an expression depends, itself or through
 definitions: they have derivatives in residuals only, where `forereach declare` bounds them, and Differentiate needs
 those of everything else. @pre MakeProgram takes these expressions. */

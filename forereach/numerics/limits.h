@@ -15,7 +15,8 @@ inline constexpr int kMaxObstaclePoints = 16;
 inline constexpr int kMaxSafetyDim = 3;  ///< p
 inline constexpr int kMaxBodyParts = 16;
 inline constexpr int kMaxBodyPoints = 16;  ///< of all parts together
-/** Columns of [J G, diag(q), diag(h)]: an order-5 zonotope in 16 states has 80, its successor 112. */
-inline constexpr int kMaxGenerators = 112;
+/** Columns of [J G, diag(q), diag(h)]: an order-5 zonotope in 16 states has 81 with that of a step's offset, its
+successor 113. */
+inline constexpr int kMaxGenerators = 120;
 
 }  // namespace forereach

@@ -26,10 +26,11 @@ bool IsNegligible(const StepError& error) {
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-                       InstructionSet instructions)
+                       InstructionSet instructions, const StepTiming& timing)
     : model_(model),
       domain_(domain),
       residual_(residual),
+      offsets_(model, timing, disturbance),
       order_(zonotope_order),
       method_(method),
       instructions_(instructions) {
@@ -179,12 +180,12 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
 }  // namespace
 
 StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
-                            double* next_half_width) const noexcept {
-  return Dispatch<&Propagator::StepInline>(instructions_, *this, slice, input, record, next, next_half_width);
+                            double* next_half_width, bool is_first) const noexcept {
+  return Dispatch<&Propagator::StepInline>(instructions_, *this, slice, input, record, next, next_half_width, is_first);
 }
 
 StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
-                                  Zonotope& next, double* next_half_width) const noexcept {
+                                  Zonotope& next, double* next_half_width, bool is_first) const noexcept {
   const double* half_width = record.half_width.data();
   // The domain comes first: error_ and the bounds of the envelope hold inside it only.
   if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input);
@@ -194,27 +195,29 @@ StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double>
   const std::size_t variables = ToSize(slice.dim()) + input.size();
   const std::span<const double> center(around.center.data(), variables);
   const std::span<const PlainInterval> hull(around.hull.data(), variables);
-  if (!plain_) return StepByIntervals(slice, input, center, hull, record, next, next_half_width);
+  if (!plain_) return StepByIntervals(slice, input, center, hull, record, next, next_half_width, is_first);
   Expansion expansion;
   model_.Expand(center, hull, expansion, instructions_);
-  return Advance(slice, input, expansion, error_, record, next, next_half_width);
+  return Advance(slice, input, hull, expansion, error_, record, next, next_half_width, is_first);
 }
 
 StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const double> input,
                                        std::span<const double> center, std::span<const PlainInterval> hull,
-                                       StepRecord& record, Zonotope& next, double* next_half_width) const noexcept {
+                                       StepRecord& record, Zonotope& next, double* next_half_width,
+                                       bool is_first) const noexcept {
   Expansion expansion;
   ExpansionError error;
   ExpandByIntervals(center, hull, expansion, error);
   std::array<double, kMaxVariables> half_width{};
   std::copy_n(record.half_width.begin(), slice.dim(), half_width.begin());
-  return Advance(slice, input, expansion, BoundStepError(model_.program(), error, half_width), record, next,
-                 next_half_width);
+  return Advance(slice, input, hull, expansion, BoundStepError(model_.program(), error, half_width), record, next,
+                 next_half_width, is_first);
 }
 
-StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
-                               const StepError& error, StepRecord& record, Zonotope& next,
-                               double* next_half_width) const noexcept {
+StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input,
+                               std::span<const PlainInterval> hull, const Expansion& expansion, const StepError& error,
+                               StepRecord& record, Zonotope& next, double* next_half_width,
+                               bool is_first) const noexcept {
   const auto n = ToSize(slice.dim());
   const double* half_width = record.half_width.data();
   model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(),
@@ -226,13 +229,21 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
 
   record.envelope.has_slope = false;
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
+  OffsetSpread offset;
+  const bool is_punctual = offsets_.AreZero();
+  if (!is_punctual)
+    if (const int k = offsets_.Enclose(hull, record.envelope, is_first, offset); k >= 0)
+      return {StepResult::Status::kNoFiniteEnclosure, {}, k};
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums, instructions_);
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
+  if (!is_punctual && !is_first) StepOffsets::SubtractFromLast(offset, next, sums);
   std::array<double, kMaxStates> box_half_width;
-  if (!Join(expansion, error, record, sums, disturbance_.data(), next, box_half_width.data(), next_half_width))
+  const double* added = is_punctual ? disturbance_.data() : offset.half_width.data();
+  if (!Join(expansion, error, record, sums, added, next, box_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
   AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), box_half_width.data(), order_, instructions_);
+  if (!is_punctual) StepOffsets::Append(offset, next, next_half_width);
   return {};
 }
 

@@ -6,7 +6,7 @@ with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder 
 middle, half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope).
 w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
 defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
-f0(c), J and (J + A) G. */
+f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_offsets.h says what is added. */
 #pragma once
 
 #include <array>
@@ -17,6 +17,7 @@ f0(c), J and (J + A) G. */
 #include "forereach/dynamics/rounding.h"
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/reach/domain.h"
+#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/sets/zonotope.h"
 
@@ -46,19 +47,21 @@ class Propagator final {
  public:
   /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
   slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
-  @param disturbance w^, n entries or none. @param instructions changes the computing time only. */
+  @param disturbance w^, n entries or none. @param instructions changes the computing time only.
+  @throws std::invalid_argument as StepOffsets. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
              const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-             InstructionSet instructions = BestInstructionSet());
+             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {});
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
   @param record the caller sets half_width (see HalfWidths); the step sets the other members.
   @param next_half_width n entries: set to the half-widths of `next`, for the following step.
-  @pre order * n + 2 n <= kMaxGenerators, and `slice` has at most order * n generators.
+  @param is_first `slice` is X_0. With offsets, the last generator of every other slice is that of its boundary's.
+  @pre order * n + 2 n + 1 <= kMaxGenerators, and `slice` has at most order * n generators, not counting this one.
   Cost O(n m) for m generators, plus the residual enclosure and the reduction. */
   [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record,
-                                Zonotope& next, double* next_half_width) const noexcept;
+                                Zonotope& next, double* next_half_width, bool is_first = true) const noexcept;
 
   /** Writes n upper bounds on the half-widths of Box(slice). */
   static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
@@ -69,19 +72,21 @@ class Propagator final {
   [[nodiscard, gnu::noinline]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
                                                           std::span<const double> center,
                                                           std::span<const PlainInterval> hull, StepRecord& record,
-                                                          Zonotope& next, double* next_half_width) const noexcept;
+                                                          Zonotope& next, double* next_half_width,
+                                                          bool is_first) const noexcept;
   // The step without model, envelope and reduction.
   [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
-                                                       StepRecord& record, Zonotope& next,
-                                                       double* next_half_width) const noexcept;
+                                                       StepRecord& record, Zonotope& next, double* next_half_width,
+                                                       bool is_first) const noexcept;
   [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input,
-                                                    const Expansion& expansion, const StepError& error,
-                                                    StepRecord& record, Zonotope& next,
-                                                    double* next_half_width) const noexcept;
+                                                    std::span<const PlainInterval> hull, const Expansion& expansion,
+                                                    const StepError& error, StepRecord& record, Zonotope& next,
+                                                    double* next_half_width, bool is_first) const noexcept;
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;
   std::array<double, kMaxStates> disturbance_{};
+  StepOffsets offsets_;
   int order_;
   Method method_;
   InstructionSet instructions_;

@@ -1,5 +1,5 @@
 /** A zonotope <c, G> + [-s, s] = {c + G b + diag(s) b' : |b|_inf <= 1, |b'|_inf <= 1}, Eq. (zonotope-definition), in up
-to 16 dimensions, with up to 112 generators in G.
+to 16 dimensions, with up to 120 generators in G.
 
 The box [-s, s], called the slack, contains the rounding errors. It is separate from G so that errors of 1e-15 do not
 count as generators and do not displace a real generator in the order reduction. A set without rounding errors has s =

@@ -6,7 +6,6 @@
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/transition_t.hpp"
-#include "task/step_time.h"
 #include "tests/gate/small_task.h"
 
 namespace forereach::gate_obstacles_test {
@@ -561,21 +560,24 @@ TEST(GateMovingTest, AScheduleOutOfItsBoundsIsRejected) {
   }
 }
 
-// The guard lets a step last longer by half of the clock error: the bounds between the samples have to be for so long.
-TEST(GateMovingTest, AStepThatMayLastLongerThanItsMotionIsBoundedIsRejected) {
+// The model says what a step of model.dt does, and nothing of one that is planned to take another time.
+TEST(GateMovingTest, AStepOfAnotherTimeThanTheModelsIsRejected) {
   Config config = SmallTaskWithAClock();
-  const std::int64_t longer = MaxJitterUs(config.gate).value();
-  ASSERT_GT(longer, 0);
-  for (const bool is_enough : {true, false}) {
-    Problem problem = *config.problem;
-    problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, 0.15 + 1e-6 * static_cast<double>(longer - !is_enough)};
-    config.problem = std::make_shared<const Problem>(problem);
-    Gate gate(config);
-    ASSERT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
-    const decision_t decision = gate.Decide(Encode(Candidate(1)), kNow).decision;
-    EXPECT_EQ(decision.outcome, is_enough ? decision_t::CERTIFIED : decision_t::REJECTED);
-    if (is_enough) continue;
-    EXPECT_THAT(GetText(decision.message), HasSubstr("step_us is 150000, longer than model.dt, 149999 us"));
+  config.gate.step_us = 150'000;
+  Gate gate(config);
+  ASSERT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
+  std::int64_t id = 0;
+  for (const std::int64_t step_us : {150'000, 149'999, 150'001, 1}) {
+    candidate_plan_t candidate = Candidate(++id);
+    candidate.step_us = step_us;
+    const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
+    if (step_us == 150'000) {
+      EXPECT_EQ(decision.outcome, decision_t::CERTIFIED);
+      continue;
+    }
+    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
+    EXPECT_EQ(decision.cause, decision_t::CAUSE_WRONG_DIMENSION);
+    EXPECT_THAT(GetText(decision.message), HasSubstr("must be 150000, model.dt")) << step_us;
   }
 }
 

@@ -54,14 +54,21 @@ class Ramps {
   std::vector<Ramp> ramps_;
 };
 
-/** f0(z) in high precision, from the models' own equations. */
-[[nodiscard]] inline std::vector<Real> NominalSuccessor(bool bicycle, const std::vector<Real>& z) {
+[[nodiscard]] inline double StepOf(bool bicycle) { return bicycle ? 0.1 : 0.15; }
+
+/** f0(z) in high precision, from the models' own equations, with a step of another duration than dt. */
+[[nodiscard]] inline std::vector<Real> NominalSuccessor(bool bicycle, const std::vector<Real>& z, const Real& duration) {
   std::vector<Real> next(bicycle ? 6 : 4);
+  const std::vector<Real> parameters{duration, Real(2.5)};
+  const std::span<const Real> all(parameters), state(z);
   if (bicycle)
-    KinematicBicycle{0.1, 2.5}(std::span<const Real>(z), std::span<Real>(next));
+    KinematicBicycle::Step<Real>(all, state, next);
   else
-    PointMass{0.15}(std::span<const Real>(z), std::span<Real>(next));
+    PointMass::Step<Real>(all.first(1), state, next);
   return next;
+}
+[[nodiscard]] inline std::vector<Real> NominalSuccessor(bool bicycle, const std::vector<Real>& z) {
+  return NominalSuccessor(bicycle, z, Real(StepOf(bicycle)));
 }
 
 /** One certify call's arguments. */
@@ -138,6 +145,48 @@ inline std::vector<Real> AnyDisturbance(Random& random, const Problem& problem) 
   for (Eigen::Index k = 0; k < bound.size(); ++k)
     w[static_cast<std::size_t>(k)] = Real(bound[k]) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
   return w;
+}
+
+/** Declares that boundaries of steps may be off their times, that software sets some states at them, and bounds on the
+rates of some others. */
+inline void Shift(Random& random, Problem& problem) {
+  const int n = problem.model->num_states();
+  problem.timing.error = StepOf(n == 6) * std::ldexp(random.Uniform(0.5, 1), -random.Integer(2, 8));
+  for (int k = 0; k < n; ++k) {
+    if (random.Coin(0.2)) problem.timing.set_at_steps.push_back(k);
+    if (!random.Coin(0.2)) continue;
+    if (problem.timing.rate_bound.size() == 0) problem.timing.rate_bound.setConstant(n, kInfinity);
+    problem.timing.rate_bound[k] = random.Uniform(0, 2);
+  }
+}
+
+/** The offset of a boundary: by the error or by anything within it. */
+inline Real AnyOffset(Random& random, const Problem& problem) {
+  return Real(problem.timing.error) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+}
+
+/** f0(z) + r + w for a step that lasts `longer` than dt: the residual and the disturbance do what they may meanwhile, or
+the state moves by what is declared of its rate.
+@param unexpected r + w. @param most bounds on |r| + w^. */
+inline std::vector<Real> LongerSuccessor(Random& random, const Problem& problem, const std::vector<Real>& z,
+                                         const std::vector<Real>& unexpected, const std::vector<Real>& most,
+                                         const Real& longer) {
+  const bool bicycle = problem.model->num_states() == 6;
+  const Real dt(StepOf(bicycle));
+  const StepTiming& timing = problem.timing;
+  std::vector<Real> next = NominalSuccessor(bicycle, z), of_duration = NominalSuccessor(bicycle, z, dt + longer);
+  for (std::size_t k = 0; k < next.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const Real way(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+    if (std::ranges::count(timing.set_at_steps, static_cast<int>(k)) == 0) {
+      if (timing.rate_bound.size() > 0 && timing.rate_bound[i] < kInfinity)
+        next[k] += way * abs(longer) * Real(timing.rate_bound[i]);
+      else
+        next[k] = of_duration[k] + way * abs(longer) * most[k] / dt;
+    }
+    next[k] += unexpected[k];
+  }
+  return next;
 }
 
 inline Query AnyQuery(Random& random, const Problem& problem) {

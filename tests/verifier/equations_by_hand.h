@@ -29,6 +29,9 @@ class PointMassEquations final : public Equations {
             {1, 5, half_square}, {2, 2, 1.0},  {2, 4, step},        {3, 3, 1.0}, {3, 5, step}};
   }
   std::vector<SecondDerivative> Second(std::span<const Real>) const override { return {}; }
+  std::vector<Real> Rate(std::span<const Real> z, const Real& h) const override {
+    return {z[2] + h * z[4], z[3] + h * z[5], z[4], z[5]};
+  }
 
  private:
   double dt_;
@@ -77,6 +80,9 @@ class BicycleEquations final : public Equations {
     const Real bent = t.IsFinite() ? TangentBend(t) : t;
     return {{0, 2, 2, -(step * v * c)}, {0, 2, 3, -(step * s)},           {1, 2, 2, -(step * v * s)},
             {1, 2, 3, step * c},        {2, 3, 5, turn * (one + sqr(t))}, {2, 5, 5, turn * v * bent}};
+  }
+  std::vector<Real> Rate(std::span<const Real> z, const Real&) const override {
+    return {z[3] * cos(z[2]), z[3] * sin(z[2]), z[3] * tan(z[5]) / Real(wheelbase_), z[4], z[6], z[7]};
   }
 
  private:

@@ -67,6 +67,12 @@ void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int
       EXPECT_EQ(second[i].column, second_by_hand[i].column);
       EXPECT_TRUE(AreEqual(second[i].value, second_by_hand[i].value));
     }
+    const Real duration = Real::FromTo(0.125, trial % 2 == 0 ? 0.125 : 0.1875);
+    const auto rate = text.Rate(box, duration), rate_by_hand = by_hand.Rate(box, duration);
+    ASSERT_EQ(rate.size(), rate_by_hand.size());
+    // Over a box the texts' order of operations may cost some width.
+    for (std::size_t k = 0; k < rate.size(); ++k)
+      EXPECT_TRUE(trial % 2 == 0 ? AreEqual(rate[k], rate_by_hand[k]) : Inside(rate_by_hand[k], rate[k])) << k;
   }
 }
 

@@ -1,0 +1,38 @@
+/** How fast the end of a step moves with the step's duration: d f0 / d dt, enclosed over boxes.
+
+With f0^h the step of duration h, f0^(dt + delta)(z) - f0^dt(z) = delta g for some g in d f0^h(z) / d h, |h - dt| <=
+|delta|. For an Euler step this is the rate x' itself; for midpoint, Runge-Kutta and `next` it is derived from the text
+of the step. */
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "forereach/dynamics/model_text.h"
+#include "forereach/dynamics/program.h"
+#include "forereach/numerics/interval.h"
+
+namespace forereach {
+
+class StepRate final {
+ public:
+  /** @throws as MakeProgram (text_program.h); std::invalid_argument if the text has no parameter dt. */
+  explicit StepRate(const ModelText& text);
+
+  /** Whether the end of state k depends on the duration at all: false for a step that says nothing of it. */
+  [[nodiscard]] bool UsesDuration(int k) const { return uses_duration_[static_cast<std::size_t>(k)]; }
+
+  /** Sets rate[k] to an interval that contains d f0^h_k(z) / d h for every z in the box and h in `duration`; infinite
+  where there is none. Allocates nothing. @param box d_z intervals. @param rate n entries. Cost O(operations). */
+  void Enclose(std::span<const Interval> box, const Interval& duration, std::span<Interval> rate) const noexcept;
+
+ private:
+  std::shared_ptr<const ProgramDraft> program_;
+  std::vector<unsigned char> needed_;
+  std::vector<Interval> parameters_;
+  std::size_t dt_ = 0;  // its place among the parameters
+  std::vector<bool> uses_duration_;
+};
+
+}  // namespace forereach

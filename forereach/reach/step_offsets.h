@@ -1,0 +1,75 @@
+/** Steps whose boundaries are off the plan's schedule: what that adds to a step of the tube.
+
+Boundary t is at the time s_t = s_0 + t dt + j_t, with j_0 = 0 and |j_t| <= E, so step t lasts dt + j_{t+1} - j_t and
+    x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,    |e| <= |j_{t+1} - j_t| (|r| + w^) / dt:
+beyond dt the residual and the disturbance add no more than in proportion. With d some double next to E g, j_t = E b_t,
+    (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|.
+The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as the generator of
+b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step. docs/soundness.md, 3.15. */
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "forereach/dynamics/expansion.h"
+#include "forereach/dynamics/model.h"
+#include "forereach/dynamics/step_rate.h"
+#include "forereach/residual/enclosure.h"
+#include "forereach/sets/eigen.h"
+#include "forereach/sets/zonotope.h"
+
+namespace forereach {
+
+/** What is declared of the times of steps. */
+struct StepTiming {
+  /** E: a boundary of steps is at most this far from its time, counted from the plan's start and from the first step's,
+  in seconds; below half a step. 0: steps are on time. */
+  double error = 0;
+  /** The states that the robot's software sets at boundaries, however long a step lasts, by their indices. */
+  std::vector<int> set_at_steps = {};
+  /** For each state a bound on |dx_k/ds| of every true motion, in its unit a second; infinite: none, then the model's
+  equations say it. No entries: none for any. */
+  Eigen::VectorXd rate_bound = {};
+};
+
+/** What the offsets of both ends add to one step. */
+struct OffsetSpread {
+  std::array<double, kMaxStates> column;      ///< d
+  std::array<double, kMaxStates> half_width;  ///< Bounds on all that is added without correlation.
+};
+
+class StepOffsets final {
+ public:
+  /** @param disturbance w^, n entries or none. @throws std::invalid_argument if a number is out of its range, the error
+  is not below half of the model's dt, or neither rate_bound nor the equations say how state k moves with time; the
+  message names it. */
+  StepOffsets(const NominalModel& model, const StepTiming& timing, const Eigen::VectorXd& disturbance);
+
+  /** Nothing is ever off: E = 0. */
+  [[nodiscard]] bool AreZero() const { return error_ == 0; }
+
+  /** Sets `spread` for a step from a slice with this hull, d_z intervals rounded to nearest. Returns the first coordinate
+  that has no finite bound, -1 if all have. Allocates nothing.
+  @param residual bounds of r over the slice. @param is_first j_t = 0. */
+  [[nodiscard]] int Enclose(std::span<const PlainInterval> hull, const ResidualBounds& residual, bool is_first,
+                            OffsetSpread& spread) const noexcept;
+
+  /** Subtracts d from the last generator of an image and adds the rounding to its slack; updates `sums`. */
+  static void SubtractFromLast(const OffsetSpread& spread, Zonotope& image, ImageSums& sums) noexcept;
+  /** Appends d as a generator, and adds it to the half-widths of the hull. */
+  static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept;
+
+ private:
+  enum class Kind { kBySoftware, kDeclared, kByEquations };
+  double error_, period_ = 0;
+  Interval duration_{0};
+  std::array<Kind, kMaxStates> kind_{};
+  std::array<double, kMaxStates> rate_bound_{}, disturbance_{};
+  std::optional<StepRate> rate_;
+  std::size_t states_;
+};
+
+}  // namespace forereach
