@@ -520,7 +520,8 @@ GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
 // When a step is due that begins `step` steps after `begin`. A time that no integer holds is the last one.
 std::int64_t Guard::DueAfter(std::int64_t begin, int step) const {
   std::int64_t due = 0;
-  const bool overflows = __builtin_mul_overflow(options_.step_us, step, &due) || __builtin_add_overflow(begin, due, &due);
+  const bool overflows =
+      __builtin_mul_overflow(options_.step_us, step, &due) || __builtin_add_overflow(begin, due, &due);
   return overflows ? INT64_MAX : due;
 }
 
@@ -538,7 +539,7 @@ GuardVerdict Guard::ExamineDue(const candidate_plan_t& plan, int step, std::int6
 
 GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const {
   if (!options_.max_jitter_us) return {};
-  const GuardVerdict verdict = ExamineDue(plan, step, DueAfter(plan.start_utime, step), "", now_us);
+  GuardVerdict verdict = ExamineDue(plan, step, DueAfter(plan.start_utime, step), "", now_us);
   if (!verdict.ok() || step == 0) return verdict;
   return ExamineDue(plan, step, DueAfter(first_step_utime_, step), " by the first step", now_us);
 }

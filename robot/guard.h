@@ -79,7 +79,8 @@ enum class GuardCause {
   kTooLate,
   kOutsideInitialSet,
   // TryStart and Check
-  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, from the first step's time
+  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, from the first step's
+                 ///< time
                  ///< + step * step_us, or from step_us after the last step.
   kWrongStateSize,
   kOutsideSlice,
@@ -140,7 +141,8 @@ struct GuardOptions {
   /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
   if it is there after whole turns of these (lcmtypes/angle.h). */
   std::vector<int> angles = {};
-  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us and of the first step's time
+  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us and of the first step's
+  time
   + t * step_us, and no later than this after step_us from the last step, microseconds, not negative. It is the task's
   robot.step_error_ms (task/step_time.h): certificates hold for steps within it. */
   std::optional<std::int64_t> max_jitter_us = {};
@@ -180,9 +182,10 @@ class Guard final {
                                       std::span<const double> measured_state) noexcept;
 
   /** Checks the state measured after control step - 1 against the hull of slice `step`, and then, with max_jitter_us,
-  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of the step before, or of TryStart) <=
-  step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n);
-  it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of
+  the step before, or of TryStart) <= step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a
+  refusal no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock,
+  microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
 
   /** Checks the step that was checked or started last once more, before its control is applied: for a robot that lets

@@ -33,16 +33,16 @@ struct GateOptions {
   the robot's steps. Without it no obstacle may move. Stamps of states and obstacles are held to it at their arrival
   (gate/stream_clock.h). */
   std::optional<double> max_clock_error_ms;
-  /** How far the boundary of a step may be from its time, on the robot's clock: from the plan's start and from the first
-  step's. Nothing: not said (StepErrorUs in step_time.h). The key is robot.step_error_ms. */
+  /** How far the boundary of a step may be from its time, on the robot's clock: from the plan's start and from the
+  first step's. Nothing: not said (StepErrorUs in step_time.h). The key is robot.step_error_ms. */
   std::optional<double> step_error_ms;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
   /** Plans under way are withdrawn once the obstacles of the bus have been unknown for so long; kNeverLost: never.
   Nothing: not said; no certifier starts with the obstacles of the bus. */
   std::optional<double> obstacles_lost_ms;
-  bool learns = true;            ///< Adds executed transitions to the observations.
-  std::string state = "state";   ///< The directory that keeps a latched fault across restarts.
+  bool learns = true;           ///< Adds executed transitions to the observations.
+  std::string state = "state";  ///< The directory that keeps a latched fault across restarts.
   /** step_us of every candidate: model.dt, where a certificate rests on when steps are. 0: any. */
   std::int64_t step_us = 0;
   double longest_step_ms = 150;  ///< An upper bound on a step. The larger of the model's dt and robot.step_period_ms.

@@ -218,7 +218,8 @@ std::shared_ptr<const NominalModel> ReadNamedModel(const Field& at) {
 
 std::shared_ptr<const NominalModel> ReadTextModel(const Field& at, TaskDraft& draft) {
   if (at.Has("file")) {
-    RequireOnly(at, {"file", "parameters", "angles", "set_at_steps", "rate_bound"}, "stands in the model file, not beside its name");
+    RequireOnly(at, {"file", "parameters", "angles", "set_at_steps", "rate_bound"},
+                "stands in the model file, not beside its name");
     return MakeFromText(ReadModelFile(at, draft));
   }
   if (at.Has(kStepName)) at.Fail(kStepName, "is model.parameters.dt of a model as text");

@@ -42,6 +42,35 @@ std::vector<Stage> StagesOf(ModelText::Integrator integrator) {
   throw ExpressionError("the integrator is unknown");
 }
 
+// For Evaluate: values with their derivatives along one direction, of variables that have such already.
+class AlongArithmetic final {
+ public:
+  using Number = Jet;
+
+  explicit AlongArithmetic(std::span<const Real> parameters)
+      : jets_({}, parameters, std::vector<bool>{true}, JetArithmetic::Order::kFirst) {}
+
+  /** With these variables, which must outlive the result. */
+  [[nodiscard]] AlongArithmetic At(std::span<const Jet> variables) const {
+    AlongArithmetic at = *this;
+    at.variables_ = variables;
+    return at;
+  }
+  [[nodiscard]] Jet Apply(const Tape::Operation& operation, const Jet* a, const Jet* b) const {
+    return operation.op == Op::kVariable ? variables_[ToSize(operation.index)] : jets_.Apply(operation, a, b);
+  }
+  [[nodiscard]] Jet Product(const Jet& a, const Jet& b) const { return jets_.Apply({.op = Op::kMultiply}, &a, &b); }
+  [[nodiscard]] static std::vector<Real> Slopes(const std::vector<Jet>& jets) {
+    std::vector<Real> slopes;
+    for (const Jet& jet : jets) slopes.push_back(jet.first.empty() ? Real() : jet.first[0].second);
+    return slopes;
+  }
+
+ private:
+  JetArithmetic jets_;
+  std::span<const Jet> variables_;
+};
+
 class TextEquations final : public Equations {
  public:
   explicit TextEquations(const ModelText& model)
@@ -93,43 +122,27 @@ class TextEquations final : public Equations {
     return derivatives;
   }
 
-  // Forward along h: with a stage's argument a = x + c h k, da/dh = c k + c h dk/dh, where k and dk/dh are those of the
-  // stage before, and dk/dh = D_x rates da/dh + D_h rates.
+  // Forward along h: x+ = x + h sum_s w_s k_s, with the rates k_s at x + h b_s k_{s-1}.
   std::vector<Real> Rate(std::span<const Real> z, const Real& duration) const override {
-    std::vector<Real> parameters = Parameters(), at(z.begin(), z.end());
+    std::vector<Real> parameters = Parameters();
     if (dt_ >= 0) parameters.erase(parameters.begin() + dt_);
-    at.push_back(duration);
-    std::vector<bool> by(at.size(), false);
-    std::fill_n(by.begin(), num_states_, true);
-    by.back() = true;
-    std::vector<Real> along(at.size()), rates, changes, end(num_states_);
-    along.back() = 1.0;
-    const auto evaluate = [&] {
-      rates.clear(), changes.clear();
-      const JetArithmetic arithmetic(at, parameters, by, JetArithmetic::Order::kFirst);
-      for (const Jet& jet : Evaluate(formulas_in_dt_.tape, formulas_in_dt_.results, arithmetic)) {
-        Real change;
-        for (const auto& [variable, value] : jet.first) change += value * along[ToSize(variable)];
-        rates.push_back(jet.value), changes.push_back(change);
-      }
-    };
-    if (stages_.empty()) {
-      evaluate();
-      return changes;
-    }
-    const auto fraction = [](const std::pair<int, int>& part) {
-      return Real::Integer(part.first) / Real::Integer(part.second);
-    };
+    const AlongArithmetic along(parameters);
+    const Jet h{duration, {{0, 1.0}}, {}};
+    std::vector<Jet> at;
+    for (const Real& coordinate : z) at.push_back({coordinate, {}, {}});
+    at.push_back(h);
+    const auto evaluate = [&] { return Evaluate(formulas_in_dt_.tape, formulas_in_dt_.results, along.At(at)); };
+    if (stages_.empty()) return AlongArithmetic::Slopes(evaluate());
+    std::vector<Jet> rates, sum(num_states_);
     for (const Stage& stage : stages_) {
-      const Real before = fraction(stage.before), weight = fraction(stage.weight);
-      for (std::size_t k = 0; k < rates.size(); ++k) {
-        at[k] = z[k] + before * duration * rates[k];
-        along[k] = before * rates[k] + before * duration * changes[k];
-      }
-      evaluate();
-      for (std::size_t k = 0; k < num_states_; ++k) end[k] += weight * rates[k] + weight * duration * changes[k];
+      const auto [before, weight] = std::pair(Fraction(stage.before), Fraction(stage.weight));
+      for (std::size_t k = 0; k < rates.size(); ++k)
+        at[k] = AddScaled({z[k], {}, {}}, before, along.Product(h, rates[k]));
+      rates = evaluate();
+      for (std::size_t k = 0; k < num_states_; ++k) sum[k] = AddScaled(sum[k], weight, rates[k]);
     }
-    return end;
+    for (Jet& moved : sum) moved = along.Product(h, moved);
+    return AlongArithmetic::Slopes(sum);
   }
 
  private:
@@ -142,6 +155,9 @@ class TextEquations final : public Equations {
   [[nodiscard]] Real Length(const std::pair<int, int>& part) const {
     const auto& [lower, upper] = parameters_[ToSize(dt_)];
     return Real::FromTo(lower, upper) * Real::Integer(part.first) / Real::Integer(part.second);
+  }
+  [[nodiscard]] static Real Fraction(const std::pair<int, int>& part) {
+    return Real::Integer(part.first) / Real::Integer(part.second);
   }
 
   // x+ with its derivatives by the first `count` variables. Each stage's arguments are jets, whose derivatives those of

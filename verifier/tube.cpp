@@ -489,9 +489,7 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const std::vector<Boun
   const Real error(timing.error), dt(StepOf(*problem_.model)), ends(query.t == 0 ? 1.0 : 2.0);
   const Real most = Real(2.0) * error;
   const std::vector<Real> rate = equations_.Rate(query.hull, Around(dt, most));
-  const auto is_set = [&](std::size_t k) {
-    return std::ranges::count(timing.set_at_steps, static_cast<int>(k)) > 0;
-  };
+  const auto is_set = [&](std::size_t k) { return std::ranges::count(timing.set_at_steps, static_cast<int>(k)) > 0; };
   const auto declared = [&](std::size_t k) {
     return timing.rate_bound.size() > 0 ? timing.rate_bound[static_cast<Eigen::Index>(k)] : kNone;
   };

@@ -111,8 +111,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
-  for (const std::string& why :
-       {WhyNoSchedule(candidate, options_), WhyNoStep(candidate, options_)})
+  for (const std::string& why : {WhyNoSchedule(candidate, options_), WhyNoStep(candidate, options_)})
     if (!why.empty()) return Rejection{decision_t::CAUSE_WRONG_DIMENSION, why};
   return CheckSource(candidate, now_us);
 }

@@ -38,10 +38,11 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing, co
                : is_declared                                  ? Kind::kDeclared
                                                               : Kind::kByEquations;
     if (is_declared) rate_bound_[i] = bound[k];
-    Require(kind_[i] != Kind::kByEquations || (rate_ && rate_->UsesDuration(k)),
-            "step error: how " + model.state_names()[i] +
-                " moves with time is not in the model's equations, which do not use dt: declare model.rate_bound, or say "
-                "in model.set_at_steps that software sets it");
+    Require(
+        kind_[i] != Kind::kByEquations || (rate_ && rate_->UsesDuration(k)),
+        "step error: how " + model.state_names()[i] +
+            " moves with time is not in the model's equations, which do not use dt: declare model.rate_bound, or say "
+            "in model.set_at_steps that software sets it");
   }
 }
 
@@ -65,7 +66,8 @@ int StepOffsets::Enclose(std::span<const PlainInterval> hull, const ResidualBoun
     const Interval moved = Interval(error_) * rate[k];
     if (!moved.IsFinite()) return static_cast<int>(k);
     spread.column[k] = moved.Middle();
-    const double unexpected = AddUp(std::max(std::abs(residual.lower[k]), std::abs(residual.upper[k])), disturbance_[k]);
+    const double unexpected =
+        AddUp(std::max(std::abs(residual.lower[k]), std::abs(residual.upper[k])), disturbance_[k]);
     const double part = DivUp(MulUp(error_, unexpected), period_);
     half_width = AddUp(half_width, MulUp(ends, AddUp(moved.DistanceUpper(spread.column[k]), part)));
   }

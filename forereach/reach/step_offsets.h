@@ -1,11 +1,11 @@
 /** Steps whose boundaries are off the plan's schedule: what that adds to a step of the tube.
 
 Boundary t is at the time s_t = s_0 + t dt + j_t, with j_0 = 0 and |j_t| <= E, so step t lasts dt + j_{t+1} - j_t and
-    x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,    |e| <= |j_{t+1} - j_t| (|r| + w^) / dt:
-beyond dt the residual and the disturbance add no more than in proportion. With d some double next to E g, j_t = E b_t,
-    (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|.
-The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as the generator of
-b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step. docs/soundness.md, 3.15. */
+    x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,    |e| <= |j_{t+1} - j_t| (|r| + w^) /
+dt: beyond dt the residual and the disturbance add no more than in proportion. With d some double next to E g, j_t = E
+b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. The last generator of X_t, t > 0, is
+that of b_t. The step subtracts d from its image and appends d as the generator of b_{t+1}, so offsets do not add up:
+what stays of them is how g changes from step to step. docs/soundness.md, 3.15. */
 #pragma once
 
 #include <array>
@@ -51,8 +51,8 @@ class StepOffsets final {
   /** Nothing is ever off: E = 0. */
   [[nodiscard]] bool AreZero() const { return error_ == 0; }
 
-  /** Sets `spread` for a step from a slice with this hull, d_z intervals rounded to nearest. Returns the first coordinate
-  that has no finite bound, -1 if all have. Allocates nothing.
+  /** Sets `spread` for a step from a slice with this hull, d_z intervals rounded to nearest. Returns the first
+  coordinate that has no finite bound, -1 if all have. Allocates nothing.
   @param residual bounds of r over the slice. @param is_first j_t = 0. */
   [[nodiscard]] int Enclose(std::span<const PlainInterval> hull, const ResidualBounds& residual, bool is_first,
                             OffsetSpread& spread) const noexcept;

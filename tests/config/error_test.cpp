@@ -39,10 +39,10 @@ TEST_F(ErrorTest, ErrorsComeInTheSchemasOrder) {
 }
 
 TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
-  EXPECT_EQ(
-      files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
-      "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase, file, states, inputs, parameters, "
-      "let, next, rate, integrator, angles");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
+            "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase, set_at_steps, rate_bound, file, "
+            "states, inputs, "
+            "parameters, let, next, rate, integrator, angles");
   EXPECT_EQ(files_.ErrorWith("name: point_mass", "name: \"point\\nmass\""),
             "task.yaml:1: model.name: point?mass is not known; did you mean point_mass?");
 }
@@ -386,9 +386,9 @@ TEST_F(ErrorTest, ANumberOutsideItsRangeIsAnError) {
   EXPECT_EQ(ErrorAfter("bus: {delay_ms: -1}\n"), "task.yaml:20: bus.delay_ms: -1 is outside [0, 3600000]");
   EXPECT_EQ(ErrorAfter("gate: {queue: 0}\n"), "task.yaml:20: gate.queue: 0 is outside [1, 65536]");
   EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 0}\n"),
-            "task.yaml:20: certifier.zonotope_order: 0 is outside [1, 112]");
-  EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 27}\n"),
-            "task.yaml:20: certifier.zonotope_order: 27 is outside [1, 26] for 4 states");
+            "task.yaml:20: certifier.zonotope_order: 0 is outside [1, 120]");
+  EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 28}\n"),
+            "task.yaml:20: certifier.zonotope_order: 28 is outside [1, 27] for 4 states");
   EXPECT_EQ(
       ErrorAfter("planner: {progress_steps: 100, tail_steps: 29}\n"),
       "task.yaml:20: planner.tail_steps: 29 is outside [0, 28]: with progress_steps 129 steps, a plan has at most 128");

@@ -159,7 +159,7 @@ TEST(Shipped, ACarIsCertifiedIfItKeepsItsLane) {
   };
   const Decision straight = decide("straight"), turn = decide("lane_turn");
   EXPECT_EQ(Explain(straight, *config.problem),
-            "certified: no obstacle is there; within its limits at the sample instants");
+            "certified: no obstacle is there; within its limits at the sample instants; steps on time");
   EXPECT_EQ(turn.cause, Cause::kLimit);
   EXPECT_THAT(Explain(turn, *config.problem), testing::HasSubstr("left front corner may reach"));
 }

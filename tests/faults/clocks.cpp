@@ -80,7 +80,7 @@ class Clocked final : Kind {
   // A robot that starts with a clock that is off: its states come, and nothing is certified on them.
   void OffClock(const char* how, microseconds offset) {
     std::vector<Obstacle> seen = WithADriftingOne();
-    Rig rig(DemoTaskOnTheBus(", max_clock_error_ms: 200"), {.settable_clocks = true, .seen = seen});
+    Rig rig(DemoTaskOnTheBus(200), {.settable_clocks = true, .seen = seen});
     rig.witness().SetWorld({ObstaclesDigest(seen)});
     Row& row = Begin(std::string("The clock of the robot is 0.4 s ") + how + " from its start", options_.others);
     const auto start_with = [&](microseconds clock) {

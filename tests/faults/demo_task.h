@@ -26,9 +26,13 @@ inline std::string DemoTaskWithGate(const std::string& gate) {
   return task.replace(task.find(demos), demos.size(), gate);
 }
 
-/** The same with its obstacles taken out: they are on the bus only. @param more YAML of the gate that is added. */
-inline std::string DemoTaskOnTheBus(const std::string& more = "") {
-  std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1500" + more + "}");
+/** The same with its obstacles taken out: they are on the bus only. @param clocks if not 0, obstacles may move: the
+clocks differ by up to this, ms, and steps take the time of the model. */
+inline std::string DemoTaskOnTheBus(int clocks = 0) {
+  const std::string error = clocks > 0 ? ", max_clock_error_ms: " + std::to_string(clocks) : "";
+  std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1500" + error + "}");
+  if (const std::string period = "step_period_ms: 50"; clocks > 0)
+    task.replace(task.find(period), period.size(), "step_period_ms: 100\n  step_error_ms: 10");
   const std::size_t begin = task.find("  obstacles:\n"), end = task.find("\n\n", begin);
   return task.replace(begin, end - begin, "  obstacles: []");
 }

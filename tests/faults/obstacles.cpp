@@ -123,7 +123,7 @@ class Obstructed final : Kind {
   // The same where one of the obstacles moves. `hurt` is told all of them.
   void MovingTries(const std::string& fault, const std::function<void(Row&, Rig&, int, std::vector<Obstacle>&)>& hurt) {
     std::vector<Obstacle> seen = WithADriftingOne();
-    Rig rig(DemoTaskOnTheBus(", max_clock_error_ms: 400"), {.seen = seen});
+    Rig rig(DemoTaskOnTheBus(400), {.seen = seen});
     rig.witness().SetWorld({ObstaclesDigest(seen)});
     Row& row = Begin(fault, options_.others);
     told_unknown_ = 0;
@@ -155,7 +155,7 @@ class Obstructed final : Kind {
   // The plan that the robot drives is withdrawn, and what of it stands is used up.
   void Walls() {
     std::vector<Obstacle> seen = OfTheCourse();
-    Rig rig(DemoTaskOnTheBus(""), {.seen = seen});
+    Rig rig(DemoTaskOnTheBus(), {.seen = seen});
     rig.witness().SetWorld({ObstaclesDigest(seen)});
     std::int64_t last_withdrawn = 0, withdrawn = 0, stops = 0, short_stops = 0;
     std::map<std::int64_t, int> standing;  // by plan

@@ -27,7 +27,7 @@ struct Contract {
   std::size_t bytes;
 };
 const std::map<std::string, Contract> kContracts = {
-    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}}, {"decision_t", {0x6c785a9e0911c4e6, 466}},
+    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}}, {"decision_t", {0x6c785a9e090fc6f2, 562}},
     {"execution_event_t", {0x4742c25e0eefd377, 336}}, {"obstacle_shape_t", {0x29158dc0270b76d4, 406}},
     {"robot_state_t", {0xe3677d78a66b57da, 166}},     {"transition_t", {0xa599cda800864690, 348}},
     {"logger_status_t", {0x2a2438623a759ef0, 260}},   {"command_t", {0x1b315e627593a95f, 58}},

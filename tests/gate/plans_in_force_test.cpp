@@ -144,6 +144,7 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
       if (is_bounded) problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, period};
       if (!is_bounded) config.gate.max_clock_error_ms = 10;
       config.gate.longest_step_ms = period * 1e3;
+      config.gate.step_us = std::llround(period * 1e6);
       config.problem = std::make_shared<const Problem>(problem);
       config.grounds.config = DigestOf("a period of " + std::to_string(period));
       return config;

@@ -243,7 +243,8 @@ INSTANTIATE_TEST_SUITE_P(Models, Containment, testing::Combine(testing::Bool(), 
 // The rollouts reach the bounds of the offsets: a tube that knows less of them does not contain one. It has no other
 // spread: a point moves at 2 m/s, and after five steps it is where the last offset lets it be.
 TEST(ContainmentJudge, NoticesAnOffsetThatIsLargerThanDeclared) {
-  auto problem = std::make_shared<Problem>(WorldOf(MakePointMass(0.125), Within(Vec({9, 9, 6, 6})), Within(Vec({3, 3}))));
+  auto problem =
+      std::make_shared<Problem>(WorldOf(MakePointMass(0.125), Within(Vec({9, 9, 6, 6})), Within(Vec({3, 3}))));
   problem->transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
   problem->timing.error = 0.03125;
   const Certifier certifier(problem);

@@ -503,6 +503,7 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
     problem->declaration.disturbance =
         Eigen::VectorXd::Constant(problem->model->num_states(), std::ldexp(1, winds.Integer(-1074, 300)));
   if (options.wide) Tighten(wide, *problem);
+  if (Random times(start ^ 0x2545f4914f6cdd1d); times.Coin(0.4)) Shift(times, *problem);
   std::unique_ptr<Certifier> certifier;
   try {
     certifier = std::make_unique<Certifier>(problem);

@@ -10,6 +10,7 @@
 #include "forereach/dynamics/models/kinematic_bicycle.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/models/point_mass.h"
+#include "forereach/dynamics/step_rate.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/worlds.h"
@@ -57,7 +58,8 @@ class Ramps {
 [[nodiscard]] inline double StepOf(bool bicycle) { return bicycle ? 0.1 : 0.15; }
 
 /** f0(z) in high precision, from the models' own equations, with a step of another duration than dt. */
-[[nodiscard]] inline std::vector<Real> NominalSuccessor(bool bicycle, const std::vector<Real>& z, const Real& duration) {
+[[nodiscard]] inline std::vector<Real> NominalSuccessor(bool bicycle, const std::vector<Real>& z,
+                                                        const Real& duration) {
   std::vector<Real> next(bicycle ? 6 : 4);
   const std::vector<Real> parameters{duration, Real(2.5)};
   const std::span<const Real> all(parameters), state(z);
@@ -151,10 +153,11 @@ inline std::vector<Real> AnyDisturbance(Random& random, const Problem& problem) 
 rates of some others. */
 inline void Shift(Random& random, Problem& problem) {
   const int n = problem.model->num_states();
-  problem.timing.error = StepOf(n == 6) * std::ldexp(random.Uniform(0.5, 1), -random.Integer(2, 8));
+  const StepRate rate(*TextOf(*problem.model));
+  problem.timing.error = StepOf(*problem.model) * std::ldexp(random.Uniform(0.5, 1), -random.Integer(2, 8));
   for (int k = 0; k < n; ++k) {
     if (random.Coin(0.2)) problem.timing.set_at_steps.push_back(k);
-    if (!random.Coin(0.2)) continue;
+    if (rate.UsesDuration(k) && !random.Coin(0.2)) continue;
     if (problem.timing.rate_bound.size() == 0) problem.timing.rate_bound.setConstant(n, kInfinity);
     problem.timing.rate_bound[k] = random.Uniform(0, 2);
   }
@@ -165,8 +168,8 @@ inline Real AnyOffset(Random& random, const Problem& problem) {
   return Real(problem.timing.error) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
 }
 
-/** f0(z) + r + w for a step that lasts `longer` than dt: the residual and the disturbance do what they may meanwhile, or
-the state moves by what is declared of its rate.
+/** f0(z) + r + w for a step that lasts `longer` than dt: the residual and the disturbance do what they may meanwhile,
+or the state moves by what is declared of its rate.
 @param unexpected r + w. @param most bounds on |r| + w^. */
 inline std::vector<Real> LongerSuccessor(Random& random, const Problem& problem, const std::vector<Real>& z,
                                          const std::vector<Real>& unexpected, const std::vector<Real>& most,

@@ -6,11 +6,13 @@
 #include "forereach/declare/flow.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/step_rate.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/text_in_high_precision.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
+#include "verifier/equations.h"
 
 namespace forereach::text_model_test {
 
@@ -259,6 +261,61 @@ INSTANTIATE_TEST_SUITE_P(All, StagesTest,
                          testing::Combine(testing::Values(0, 1),
                                           testing::Values(Integrator::kNone, Integrator::kEuler, Integrator::kMidpoint,
                                                           Integrator::kRk4)));
+
+// By the mean value theorem, a difference quotient in the duration is a derivative somewhere between.
+TEST_P(StagesTest, TheirRateContainsTheSlopeByTheDuration) {
+  const auto [which, integrator] = GetParam();
+  ModelText text = which == 0 ? Everything(integrator) : QuadrotorText(integrator);
+  if (integrator == Integrator::kNone)  // a step that says what its duration does
+    for (std::size_t k = 0; k < text.equations.size(); ++k)
+      text.equations[k].text =
+          text.states[k].name + " + dt*(" + text.equations[k].text + ") + dt^2/3*" + text.states[0].name;
+  const StepRate rate(text);
+  const auto equations = verifier::EquationsOf(text);
+  const auto at = [&](double dt) {
+    std::vector<double> parameters;
+    for (const ModelText::Parameter& parameter : text.parameters)
+      parameters.push_back(parameter.name == "dt" ? dt : parameter.lower);
+    return TextInHighPrecision(text, parameters);
+  };
+  const std::size_t n = text.states.size(), d = n + text.inputs.size();
+  TracedRandom random(7105);
+  for (int trial = 0; trial < 30; ++trial) {
+    std::vector<Interval> box;
+    std::vector<Real> point;
+    std::vector<verifier::Real> precise_box;
+    const double width = random.Coin(0.2) ? 0 : random.Uniform(0, 0.1);
+    for (std::size_t l = 0; l < d; ++l) {
+      const double c = random.Uniform(-0.8, 0.8), r = l < n ? width : 0;
+      box.emplace_back(c - r, c + r);
+      precise_box.push_back(verifier::Real::FromTo(c - r, c + r));
+      point.emplace_back(random.Coin() ? box[l].lower : box[l].upper);
+    }
+    const double shortest = random.Uniform(0.05, 0.1), longest = shortest + random.Uniform(1e-3, 0.02);
+    std::vector<Interval> all(n);
+    rate.Enclose(box, {shortest, longest}, all);
+    const auto precise = equations->Rate(precise_box, verifier::Real::FromTo(shortest, longest));
+    const std::vector<Real> early = at(shortest)(point), late = at(longest)(point);
+    for (std::size_t k = 0; k < n; ++k) {
+      ASSERT_TRUE(rate.UsesDuration(static_cast<int>(k)));
+      const Real slope = (late[k] - early[k]) / (Real(longest) - Real(shortest));
+      ASSERT_TRUE(slope >= Real(all[k].lower) && slope <= Real(all[k].upper)) << k;
+      ASSERT_TRUE(CertainlyAtMost(precise[k].lower(), slope.ToDouble()) ||
+                  precise[k].lower().ToDouble() - slope.ToDouble() < 1e-12)
+          << k;
+      ASSERT_GT(precise[k].upper().ToDouble() + 1e-12, slope.ToDouble()) << k;
+      // In doubles it is as tight.
+      ASSERT_LT(all[k].upper - all[k].lower, (1 + 1e-6) * (precise[k].upper() - precise[k].lower()).ToDouble() + 1e-9)
+          << k;
+    }
+  }
+}
+
+TEST(StepRate, SaysWhatDoesNotDependOnTheDuration) {
+  const StepRate rate(TextModel({{"x", "x + dt*y"}, {"y", "y + u"}}, {"u"}, {{"dt", 0.1, 0.1}}, {}, Integrator::kNone));
+  EXPECT_TRUE(rate.UsesDuration(0));
+  EXPECT_FALSE(rate.UsesDuration(1));
+}
 
 // Every second derivative by the variables of a kink or a jump has no bound, even if each side of it is affine.
 TEST(TextModel, AKinkInsideTheBoxHasNoFiniteHessian) {

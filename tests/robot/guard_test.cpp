@@ -466,8 +466,41 @@ TEST(GuardCheck, AgainItLooksAtHowLongTheStepBeforeHasLasted) {
     EXPECT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
     EXPECT_EQ(guard.CheckAgain(State{0, 0}, kStart + kStep + 2000 + too_long).ok(), !too_long);
     if (!too_long) {
-      EXPECT_TRUE(guard.Check(2, State{0, 0}, kStart + 2 * kStep + 3000).ok()) << "its control is applied from then on";
+      EXPECT_TRUE(guard.Check(2, State{0, 0}, kStart + 2 * kStep + 2000).ok()) << "its control is applied from then on";
     }
+  }
+}
+
+// Each is within 3 ms of the plan's schedule, and within 3 ms longer than a step.
+TEST(GuardCheck, StepsAreOnTimeByTheFirstStepToo) {
+  for (const std::int64_t first : {-2000, 0, 2000})
+    for (const std::int64_t off : {-3000, 3000})
+      for (const bool too_far : {false, true}) {
+        GuardOptions options = TwoStates();
+        options.max_jitter_us = 3000;
+        Guard guard(options);
+        EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+        EXPECT_TRUE(guard.TryStart(kStart, kStart + first, State{1, -2}).ok());
+        EXPECT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep + first).ok());
+        const std::int64_t at = first + off + (off < 0 ? -1 : 1) * too_far;
+        const bool is_on_schedule = std::abs(at) <= 3000;
+        EXPECT_EQ(guard.Check(2, State{0, 0}, kStart + 2 * kStep + at).ok(), is_on_schedule && !too_far)
+            << first << " " << off << " " << too_far;
+      }
+}
+
+// With CheckAgain the plan begins when its first control is applied.
+TEST(GuardCheck, AgainAtTheFirstStepItBeginsThen) {
+  for (const bool too_early : {false, true}) {
+    GuardOptions options = TwoStates();
+    options.max_jitter_us = 3000;
+    Guard guard(options);
+    EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+    EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
+    EXPECT_TRUE(guard.CheckAgain(State{1, -2}, kStart + 2500).ok());
+    const GuardVerdict verdict = guard.Check(1, State{0, 0}, kStart + kStep - 500 - too_early);
+    EXPECT_EQ(verdict.ok(), !too_early);
+    if (too_early) EXPECT_THAT(verdict.message, HasSubstr("us by the first step, it is 3001 us too early"));
   }
 }
 

@@ -512,7 +512,7 @@ TEST(Certifier, RefusesAProblemAndNamesThePartThatDoesNotFit) {
   for (const double bad : {-1.0, kNan, kInfinity})
     ExpectRefused([bad](Problem& p) { p.rest = {{0, bad}}; }, "rest: coordinate 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 0; }, "zonotope_order: 0");
-  ExpectRefused([](Problem& p) { p.zonotope_order = 27; }, "zonotope_order: 27");
+  ExpectRefused([](Problem& p) { p.zonotope_order = 28; }, "zonotope_order: 28");
   Problem largest = PointMassInHalves();
   largest.zonotope_order = 26;
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(largest)));
@@ -618,23 +618,25 @@ TEST(Explain, SaysWhenADecisionHoldsAndOfSeveralPartsWhich) {
   certified.closest_step = 3, certified.obstacle = 2, certified.part = 1;
   certified.margin = 1.5, certified.threshold = 1;
   EXPECT_EQ(Explain(certified, point),
-            "certified at its sample instants only: the robot stays clear, closest at step 3, 0.5 m from obstacle 2");
+            "certified at its sample instants only: the robot stays clear, closest at step 3, 0.5 m from obstacle 2; "
+            "steps on time");
   EXPECT_EQ(Explain(certified, swept),
-            "certified: the robot stays clear at all times, closest between steps 3 and 4, 0.5 m from obstacle 2");
-  EXPECT_EQ(
-      Explain(certified, body),
-      "certified: the robot stays clear at all times, closest between steps 3 and 4, part 1 0.5 m from obstacle 2");
+            "certified: the robot stays clear at all times, closest between steps 3 and 4, 0.5 m from obstacle 2; "
+            "steps on time");
+  EXPECT_EQ(Explain(certified, body),
+            "certified: the robot stays clear at all times, closest between steps 3 and 4, part 1 0.5 m from obstacle "
+            "2; steps on time");
   certified.part = -1;
   EXPECT_EQ(Explain(certified, body), Explain(certified, swept));
   certified.obstacle = -1;
-  EXPECT_EQ(Explain(certified, body), "certified: no obstacle is there");
+  EXPECT_EQ(Explain(certified, body), "certified: no obstacle is there; steps on time");
 
   certified.obstacle = 2;
   Problem windy = swept;
   windy.declaration.disturbance = Vec({0, 0, 0.1, 0});
   EXPECT_EQ(Explain(certified, windy),
             "certified: the robot stays clear at all times under the declared disturbance, closest between steps 3 and "
-            "4, 0.5 m from obstacle 2");
+            "4, 0.5 m from obstacle 2; steps on time");
   windy.declaration.disturbance.setZero();
   EXPECT_EQ(Explain(certified, windy), Explain(certified, swept));
 

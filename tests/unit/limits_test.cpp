@@ -152,12 +152,14 @@ TEST_F(Limits, ComeAfterTheDomainAndRest) {
 
 TEST_F(Limits, ACertificateSaysWhenTheyHold) {
   const Decision d = Judge({AtMost("vx", 2)});
-  EXPECT_EQ(Explain(d, problem_), "certified: no obstacle is there; within its limits at the sample instants");
+  EXPECT_EQ(Explain(d, problem_),
+            "certified: no obstacle is there; within its limits at the sample instants; steps on time");
   const std::vector<Obstacle> far{Obstacle::Circle(Eigen::Vector2d(50, 0), 1)};
   problem_.between = Between{Eigen::Vector2d::Zero(), 0, 0, 0.5};
-  EXPECT_THAT(Explain(Judge({AtMost("vx", 2)}, far), problem_),
-              testing::AllOf(HasSubstr("certified: the robot stays clear at all times"),
-                             testing::EndsWith("from obstacle 0; within its limits at the sample instants")));
+  EXPECT_THAT(
+      Explain(Judge({AtMost("vx", 2)}, far), problem_),
+      testing::AllOf(HasSubstr("certified: the robot stays clear at all times"),
+                     testing::EndsWith("from obstacle 0; within its limits at the sample instants; steps on time")));
 }
 
 TEST_F(Limits, AreRefusedIfTheyAreMalformed) {
