@@ -45,6 +45,28 @@ TEST(LoadConfig, ReadsWhatIsRequired) {
   EXPECT_NEAR(config.initial_set.upper()[2], 1.1, 1e-15);
 }
 
+TEST(LoadConfig, TellsAnErrorThatIsNotDeclaredFromZero) {
+  const TaskFiles files;
+  const auto with = [&](const std::string& errors) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files.Load(Replaced(kTask, line, line + errors)).problem->declaration;
+  };
+  EXPECT_FALSE(with("").DeclaresStateError());
+  EXPECT_FALSE(with("  input_error: {ax: 0.1}\n").DeclaresStateError());
+  EXPECT_EQ(with("  input_error: {ay: 0.1}\n").input_error, Eigen::Vector2d(0, 0.1));
+  for (const std::string zero : {"{}", "{vx: 0}", "[0, 0, 0, 0]"}) {
+    const Declaration exact = with("  state_error: " + zero + "\n");
+    EXPECT_TRUE(exact.DeclaresStateError()) << zero;
+    EXPECT_FALSE(exact.HasErrorInZ()) << zero;
+    EXPECT_EQ(exact.state_error, Eigen::Vector4d::Zero()) << zero;
+  }
+  const Declaration both = with("  state_error: {vx: 0.01}\n  input_error: [0.1, 0.2]\n");
+  EXPECT_TRUE(both.HasErrorInZ());
+  std::vector<double> errors(6);
+  for (int l = 0; l < 6; ++l) errors[static_cast<std::size_t>(l)] = both.VariableError(l);
+  EXPECT_THAT(errors, testing::ElementsAre(0, 0, 0.01, 0, 0.1, 0.2));
+}
+
 TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   const Config config = TaskFiles().Load();
   EXPECT_EQ(config.problem->zonotope_order, 5);

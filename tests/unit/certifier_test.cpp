@@ -499,6 +499,9 @@ TEST(Certifier, RefusesAProblemAndNamesThePartThatDoesNotFit) {
       "disturbance has 3 entries, must have 4");
   for (const double bad : {-0.5, kNan, kInfinity})
     ExpectRefused([bad](Problem& p) { p.declaration.disturbance = Vec({0, 0, bad, 0}); }, "disturbance 2");
+  ExpectRefused([](Problem& p) { p.declaration.state_error = Vec({0, 0, 0, -1}); }, "state_error 3");
+  ExpectRefused([](Problem& p) { p.declaration.state_error = Vec({0}); }, "state_error has 1 entries, must have 4");
+  ExpectRefused([](Problem& p) { p.declaration.input_error = Vec({0, kNan}); }, "input_error 1");
   ExpectRefused([](Problem& p) { p.transitions = {}; }, "transitions: none given");
   ExpectRefused([](Problem& p) { p.transitions.z.conservativeResize(1, 5); }, "transitions: 5 columns");
   ExpectRefused([](Problem& p) { p.transitions.x_next.conservativeResize(1, 3); }, "transitions");
