@@ -30,6 +30,13 @@ double Declaration::VariableError(Eigen::Index l) const {
   return errors.size() == 0 ? 0 : errors[l < n ? l : l - n];
 }
 
+std::vector<Interval> Declaration::BoxAround(std::span<const double> z) const {
+  std::vector<Interval> box(z.begin(), z.end());
+  for (std::size_t l = 0; l < box.size(); ++l)
+    if (const double e = VariableError(static_cast<Eigen::Index>(l)); e != 0) box[l] += Interval(-e, e);
+  return box;
+}
+
 double Declaration::ObservationError(Eigen::Index k) const { return AddUp(noise_bound[k], DisturbanceBound(k)); }
 
 void Declaration::Validate(int num_states, int num_variables) const {

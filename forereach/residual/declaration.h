@@ -3,6 +3,10 @@ L_kl |z_l - z'_l| for all z, z' in Z_cert, Eq. (regularity); the bound sigma on 
 bound on the disturbance w, which the paper does not have (docs/soundness.md, 1). */
 #pragma once
 
+#include <span>
+#include <vector>
+
+#include "forereach/numerics/interval.h"
 #include "forereach/sets/eigen.h"
 
 namespace forereach {
@@ -29,6 +33,8 @@ struct Declaration {
   [[nodiscard]] bool HasErrorInZ() const { return !state_error.isZero(0) || !input_error.isZero(0); }
   /** e_l of variable l of z: the states, then the inputs. */
   [[nodiscard]] double VariableError(Eigen::Index l) const;
+  /** The box of the true z of what was recorded as z: z_l +- e_l rounded outward, z_l itself where e_l is zero. */
+  [[nodiscard]] std::vector<Interval> BoxAround(std::span<const double> z) const;
   /** sigma_k + w^_k rounded up: how far an observed residual may lie from r_k, apart from the successor's last bit. It
   is sigma_k itself if w^_k is zero. */
   [[nodiscard]] double ObservationError(Eigen::Index k) const;
