@@ -143,7 +143,7 @@ std::vector<Key> DeclarationKeys() {
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),
       Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
                       "w: in each step the true successor differs from f0 + r by at most this. The difference may be "
-                      "another in each step. Errors of measurement belong to noise_bound.",
+                      "another in each step. Errors of measurement belong to state_error and noise_bound.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.disturbance = at.Vector(); }),
                "zeros"),
       state_error[0],
@@ -154,7 +154,8 @@ std::vector<Key> DeclarationKeys() {
       input_error[2],
       Required(Text("transitions",
                     "CSV of observed steps, relative to this file: a column for each state, each input and each "
-                    "`<state>_next`, all inside the domain, at least one row.",
+                    "`<state>_next`, all inside the domain, at least one row. Those whose declared errors may take "
+                    "them out are left out.",
                     [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
   };
 }

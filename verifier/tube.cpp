@@ -392,9 +392,9 @@ std::vector<Real> TubeMaker::RecordErrors(const std::vector<Real>& z) const {
     for (std::size_t l = 0; l < z.size(); ++l)
       errors[k] += Real(declaration.lipschitz(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(l))) * e[l];
   }
-  for (const auto& [output, variable, value] : equations_.First(box))
+  for (const auto& [output, variable, slope] : equations_.First(box))
     if (const Real& error = e[ToSize(variable)]; !error.IsZero())
-      errors[ToSize(output)] += value.IsFinite() ? value.magnitude() * error : Real::Everything();
+      errors[ToSize(output)] += slope.IsFinite() ? slope.magnitude() * error : Real::Everything();
   return errors;
 }
 

@@ -58,7 +58,7 @@ class Observer final {
           IsAngle(k) ? ResidualOfAngle(x_next[k], nominal) : ResidualOf(x_next[k], UlpOf(x_next[k]), nominal);
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kLocation);
     }
-    if (has_errors_) BoundErrors(z, row);
+    if (has_errors_) BoundErrors(z);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kAround);
@@ -71,21 +71,18 @@ class Observer final {
   [[nodiscard]] bool IsAngle(std::size_t k) const { return model_.IsAngle(static_cast<int>(k)); }
   [[nodiscard]] const std::string& Name(std::size_t k) const { return model_.state_names()[k]; }
 
-  // error_k = e_k + sum_l (sup |D_l f0_k| + L_kl) e_l, rounded up.
-  void BoundErrors(std::span<const double> z, int row) {
+  // error_k = e_k + sum_l (sup |D_l f0_k| + L_kl) e_l, rounded up; infinite where f0_k or a slope has no bound.
+  void BoundErrors(std::span<const double> z) {
     model_.LinearizeOver(declaration_.BoxAround(z), linear_);
     for (int k = 0; k < model_.num_states(); ++k) {
       double& error = error_[ToSize(k)] = declaration_.VariableError(k);
       for (int l = 0; l < model_.num_variables(); ++l)
         error = AddUp(error, MulUp(declaration_.lipschitz(k, l), declaration_.VariableError(l)));
-      if (!linear_.value[ToSize(k)].IsFinite()) error = kInfinity;  // f0_k is not defined everywhere
+      if (!linear_.value[ToSize(k)].IsFinite()) error = kInfinity;
     }
-    for (const auto& [k, l, slope] : linear_.jacobian()) {
-      const double e = declaration_.VariableError(l);
-      if (e == 0) continue;
-      if (!slope.IsFinite()) throw NoNominalValue(row, Name(ToSize(k)), NoNominalValue::At::kAround);
-      error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
-    }
+    for (const auto& [k, l, slope] : linear_.jacobian())
+      if (const double e = declaration_.VariableError(l); e > 0)
+        error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
   }
 
   const NominalModel& model_;
