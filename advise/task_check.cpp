@@ -199,11 +199,10 @@ class Examination final {
       Add(key, Count(outside[which], "transition") + " outside, the first in " + LineOf(first[which]), kWiden);
     }
     if (!near_the_edge.empty())
-      Remark("declaration",
-             Count(std::ssize(near_the_edge), "transition") + " left out, the first in " +
-                 LineOf(near_the_edge.front()) +
-                 ": within state_error and input_error it may be outside the domain, where nothing is declared",
-             "widen the domain, if the declaration holds there");
+      Add("declaration",
+          Count(std::ssize(near_the_edge), "transition") + " left out, the first in " + LineOf(near_the_edge.front()) +
+              ": within state_error and input_error it may be outside the domain, where nothing is declared",
+          "widen the domain, if the declaration holds there", !rows_.empty());
     problem_.transitions = {all_.z(rows_, Eigen::all), all_.x_next(rows_, Eigen::all)};
   }
 
