@@ -453,7 +453,7 @@ class Adviser {
 
   // The centers of some slices before the failure, with their controls.
   void AdviseObservation(int most) {
-    const Observations known = Observe(model_, case_.problem->transitions);
+    const Observations known = Observe(model_, case_.problem->declaration, case_.problem->transitions);
     const int n = model_.num_states(),
               steps = std::min<int>(tube_.length() + 1, static_cast<int>(case_.controls.cols()));
     std::optional<Advice> best;
@@ -461,7 +461,7 @@ class Adviser {
       const int t = std::min(most, steps) == 1 ? 0 : i * (steps - 1) / (std::min(most, steps) - 1);
       Eigen::VectorXd z(model_.num_variables());
       z << tube_.slice(t).CenterVector(), case_.controls.col(t);
-      if (!case_.problem->domain.Contains({z.data(), ToSize(model_.num_variables())})) continue;
+      if (!IsWithin(*case_.problem, {z.data(), ToSize(z.size())})) continue;
       const Allowed allowed(*case_.problem, known, z);
       std::vector<Case> after;
       for (const Eigen::VectorXd& outcome : allowed.Outcomes())
@@ -522,7 +522,7 @@ class Adviser {
   template <class Widen>
   void AdviseWiderDeclaration(Change change, const std::string& begin, Widen widen) {
     if (judgement_.decision.first_observation < 0) return;  // no pair is at fault
-    const Observations known = Observe(model_, case_.problem->transitions);
+    const Observations known = Observe(model_, case_.problem->declaration, case_.problem->transitions);
     Declaration declaration = case_.problem->declaration;
     std::string what;
     const auto largest = ForEachContradictingRow(declaration, known, widen, what);
@@ -621,7 +621,7 @@ std::vector<Place> RankPlaces(const std::vector<Case>& cases, const std::vector<
   std::vector<Place> ranked;
   if (cases.empty()) return ranked;
   const Case& first = cases.front();
-  const Observations known = Observe(*first.problem->model, first.problem->transitions);
+  const Observations known = Observe(*first.problem->model, first.problem->declaration, first.problem->transitions);
   Tube tube;
   const std::size_t count = std::min(most, places.size());
   for (std::size_t i = 0; i < count; ++i) {

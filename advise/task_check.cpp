@@ -162,7 +162,7 @@ class Examination final {
     for (std::size_t l = 0; l < n; ++l) ExamineRange(l);
     if (rows_.empty()) return;
     try {
-      const Observations observations = Observe(model_, problem_.transitions);
+      const Observations observations = Observe(model_, problem_.declaration, problem_.transitions);
       ExamineDeclaration(observations);
     } catch (const AmbiguousAngle& error) {
       Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
@@ -179,12 +179,13 @@ class Examination final {
 
   void KeepThoseInside() {
     std::vector<Eigen::Index> outside(problem_.domain.inequalities.size() + problem_.domain.balls.size(), 0);
-    std::vector<Eigen::Index> first = outside;
+    std::vector<Eigen::Index> first = outside, near_the_edge;
     for (Eigen::Index i = 0; i < all_.z.rows(); ++i) {
-      std::array<Interval, kMaxVariables> point;
-      for (Eigen::Index l = 0; l < all_.z.cols(); ++l) point[ToSize(l)] = Interval(all_.z(i, l));
-      const DomainExit exit = FindExit(problem_.domain, {point.data(), ToSize(model_.num_variables())});
-      if (exit.kind == DomainExit::Kind::kNone) rows_.push_back(i);
+      const Eigen::VectorXd z = all_.z.row(i);
+      const std::vector<Interval> point(z.begin(), z.end());
+      const DomainExit exit = FindExit(problem_.domain, point);
+      if (exit.kind == DomainExit::Kind::kNone)
+        (IsWithin(problem_, {z.data(), ToSize(z.size())}) ? rows_ : near_the_edge).push_back(i);
       const bool is_ball = exit.kind == DomainExit::Kind::kBall;
       if (!is_ball && exit.kind != DomainExit::Kind::kInequality) continue;
       const std::size_t which = ToSize(exit.index) + (is_ball ? problem_.domain.inequalities.size() : 0);
@@ -197,6 +198,11 @@ class Examination final {
                                                    : fmt::format("domain.balls[{}]", which - inequalities);
       Add(key, Count(outside[which], "transition") + " outside, the first in " + LineOf(first[which]), kWiden);
     }
+    if (!near_the_edge.empty())
+      Add("declaration",
+          Count(std::ssize(near_the_edge), "transition") + " left out, the first in " + LineOf(near_the_edge.front()) +
+              ": within state_error and input_error it may be outside the domain, where nothing is declared",
+          "widen the domain, if the declaration holds there", !rows_.empty());
     problem_.transitions = {all_.z(rows_, Eigen::all), all_.x_next(rows_, Eigen::all)};
   }
 

@@ -56,8 +56,9 @@ bool Try(Bytes data) {
     const ImportedLog log = Import(table, problem, options);
     using enum Dropped;
     Require(table.values.rows() == log.samples + Sum(log, {kNoStamp, kRepeatedRow, kRepeatedStamp, kOutsideWindow}));
-    Require(log.samples == log.transitions.size() + Sum(log, {kEnd, kGap, kNoState, kNoInput, kInputChanges,
-                                                              kOutsideDomain, kNoNominalValue, kAmbiguousAngle}));
+    Require(log.samples ==
+            log.transitions.size() + Sum(log, {kEnd, kGap, kNoState, kNoInput, kInputChanges, kOutsideDomain,
+                                               kNearTheEdge, kNoNominalValue, kAmbiguousAngle}));
     Require(std::ssize(log.lines) == log.transitions.size() && log.largest_offset <= options.tolerance);
     for (Eigen::Index i = 0; i < log.transitions.size(); ++i) {
       Require(problem.domain.state.Contains(log.transitions.z.row(i).head(2).transpose()) &&

@@ -78,6 +78,8 @@ std::string DeclarationYaml(const Declaration& declaration, const NominalModel& 
   }
   std::string text = "  lipschitz: {" + rows + "}\n  noise_bound: " + List(declaration.noise_bound) + "\n";
   if (declaration.IsDisturbed()) text += "  disturbance: " + List(declaration.disturbance) + "\n";
+  if (declaration.DeclaresStateError()) text += "  state_error: " + List(declaration.state_error) + "\n";
+  if (declaration.input_error.size() > 0) text += "  input_error: " + List(declaration.input_error) + "\n";
   return text;
 }
 

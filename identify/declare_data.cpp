@@ -23,7 +23,7 @@ using Json = nlohmann::json;
 constexpr int kTableDigits = 4;  // of a number in the table
 
 // A line of the transitions' file: its header is line 1.
-int LineOf(int observation) { return observation + 2; }
+int LineOf(const Config& config, int observation) { return config.rows[ToSize(observation)] + 2; }
 
 std::string Listed(const std::vector<std::string>& names) {
   std::string text;
@@ -33,8 +33,8 @@ std::string Listed(const std::vector<std::string>& names) {
 
 // ---- for people
 
-void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
-  const std::vector<std::string> names = model.variable_names();
+void PrintSlopes(const Proposal& proposal, const Config& config, std::ostream& out) {
+  const std::vector<std::string> names = config.problem->model->variable_names();
   out << "  " << std::left << std::setw(12) << "row" << std::setw(12) << "column" << std::setw(12) << "smallest"
       << std::setw(12) << "at least" << std::setw(12) << "proposed"
       << "because of\n";
@@ -48,7 +48,7 @@ void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostre
           << RoundedUp(found.smallest.slopes[column], kTableDigits) << std::setw(12)
           << RoundedDown(found.least[column], kTableDigits) << std::setw(12) << ToText(proposed);
       if (const auto& reason = found.smallest.reasons[l])
-        out << "lines " << LineOf(reason->first) << " and " << LineOf(reason->second);
+        out << "lines " << LineOf(config, reason->first) << " and " << LineOf(config, reason->second);
       out << "\n";
     }
   if (proposal.declaration.lipschitz.maxCoeff() == 0) out << "  no slopes are needed\n";
@@ -57,8 +57,8 @@ void PrintSlopes(const Proposal& proposal, const NominalModel& model, std::ostre
 // By row of the Lipschitz matrix, then by column.
 using LoneSlopes = std::vector<std::vector<LoneSlope>>;
 
-void PrintLoneSlopes(const LoneSlopes& rows, const NominalModel& model, std::ostream& out) {
-  const std::vector<std::string> names = model.variable_names();
+void PrintLoneSlopes(const LoneSlopes& rows, const Config& config, std::ostream& out) {
+  const std::vector<std::string> names = config.problem->model->variable_names();
   int flat = 0;
   bool has_slopes = false;
   for (std::size_t k = 0; k < rows.size(); ++k)
@@ -72,8 +72,8 @@ void PrintLoneSlopes(const LoneSlopes& rows, const NominalModel& model, std::ost
             << "the largest in\n";
       has_slopes = true;
       out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
-          << RoundedDown(lone.slope, kTableDigits) << std::setw(12) << lone.pairs << "lines " << LineOf(lone.first)
-          << " and " << LineOf(lone.second) << "\n";
+          << RoundedDown(lone.slope, kTableDigits) << std::setw(12) << lone.pairs << "lines "
+          << LineOf(config, lone.first) << " and " << LineOf(config, lone.second) << "\n";
     }
   if (flat > 0)
     out << (has_slopes ? "  " : "\n  ") << "In " << flat << (has_slopes ? " further" : "")
@@ -167,7 +167,7 @@ Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Confi
            {"column", names[l]},
            {"pairs", lone.pairs},
            {"slope", lone.slope},
-           {"lines", lone.slope > 0 ? Json({LineOf(lone.first), LineOf(lone.second)}) : Json()}});
+           {"lines", lone.slope > 0 ? Json({LineOf(config, lone.first), LineOf(config, lone.second)}) : Json()}});
       if (!(proposal.declaration.lipschitz(at, column) > 0)) continue;
       Json entry{{"row", names[k]},
                  {"column", names[l]},
@@ -176,7 +176,7 @@ Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Confi
                  {"proposed", proposal.declaration.lipschitz(at, column)},
                  {"lines", nullptr}};
       if (const auto& reason = row.smallest.reasons[l])
-        entry["lines"] = {LineOf(reason->first), LineOf(reason->second)};
+        entry["lines"] = {LineOf(config, reason->first), LineOf(config, reason->second)};
       document["entries"].push_back(entry);
     }
   }
@@ -192,7 +192,7 @@ int DeclareFromData(const DataCommand& command) {
   const ProposalOptions options{command.factor, command.estimate_noise, ColumnsBy(command.by, *problem.model),
                                 [&] { progress->Advance(); }};
   try {
-    const Observations observations = Observe(*problem.model, problem.transitions);
+    const Observations observations = ObserveForProposal(problem, problem.transitions);
     const Proposal proposal = Propose(problem.declaration, observations, options);
     progress.reset();
     LoneSlopes lone_slopes;
@@ -204,8 +204,8 @@ int DeclareFromData(const DataCommand& command) {
     }
     std::ostringstream text;
     text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
-    PrintSlopes(proposal, *problem.model, text);
-    PrintLoneSlopes(lone_slopes, *problem.model, text);
+    PrintSlopes(proposal, config, text);
+    PrintLoneSlopes(lone_slopes, config, text);
     PrintErrors(proposal, *problem.model, text);
     PrintMeaning(proposal, *problem.model, command, text);
     std::cout << text.str() << "\ndeclaration:\n"
@@ -213,8 +213,9 @@ int DeclareFromData(const DataCommand& command) {
     return 0;
   } catch (const Unexplained& found) {
     progress.reset();
-    std::cerr << "forereach: " << config.path << ": lines " << LineOf(found.pair.first) << " and "
-              << LineOf(found.pair.second) << " of the transitions: " << Explain(found, config, options) << std::endl;
+    std::cerr << "forereach: " << config.path << ": lines " << LineOf(config, found.pair.first) << " and "
+              << LineOf(config, found.pair.second) << " of the transitions: " << Explain(found, config, options)
+              << std::endl;
     return 1;
   }
 }

@@ -211,7 +211,8 @@ int DeclareHoldOut(const DataCommand& command) {
                                 [&] { progress->Advance(); }};
   Proposal learned;
   try {
-    learned = Propose(problem.declaration, Observe(*problem.model, RowsOf(problem.transitions, split.learn)), options);
+    learned =
+        Propose(problem.declaration, ObserveForProposal(problem, RowsOf(problem.transitions, split.learn)), options);
   } catch (const Unexplained& found) {
     progress.reset();
     std::cerr << "forereach: " << config.path << ": in the learning blocks: " << Explain(found, config, options)

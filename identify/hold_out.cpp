@@ -75,8 +75,8 @@ Transitions RowsOf(const Transitions& transitions, const std::vector<Split::Bloc
 }
 
 Contradictions CountContradictions(const Problem& problem, const Declaration& declaration, const Split& split) {
-  const Observations learned = Observe(*problem.model, RowsOf(problem.transitions, split.learn));
-  const Observations judged = Observe(*problem.model, RowsOf(problem.transitions, split.judge));
+  const Observations learned = Observe(*problem.model, declaration, RowsOf(problem.transitions, split.learn));
+  const Observations judged = Observe(*problem.model, declaration, RowsOf(problem.transitions, split.judge));
   const Observations all = Joined(learned, judged);
   std::vector<bool> contradicts(ToSize(judged.size()), false);
   for (int k = 0; k < all.num_states(); ++k) Mark(declaration, all, learned.size(), k, contradicts);

@@ -214,6 +214,8 @@ class Importer {
       case Learned::kAdded: break;
       case Learned::kNotFinite: Drop(Dropped::kNoState, samples_[i].row); return 0;
       case Learned::kOutsideDomain: Drop(Dropped::kOutsideDomain, samples_[i].row, ConstraintAt(location)); return 0;
+      case Learned::kNearTheEdge: Drop(Dropped::kNearTheEdge, samples_[i].row); return 0;
+      case Learned::kNoNominalSlope:
       case Learned::kNoNominalValue: Drop(Dropped::kNoNominalValue, samples_[i].row); return 0;
       case Learned::kAmbiguousAngle: Drop(Dropped::kAmbiguousAngle, samples_[i].row); return 0;
     }
@@ -275,6 +277,7 @@ std::string Explain(Dropped dropped) {
     case Dropped::kNoInput: return "starts with an input that is no number";
     case Dropped::kInputChanges: return "starts whose input is not constant over the step";
     case Dropped::kOutsideDomain: return "starts outside the task's domain";
+    case Dropped::kNearTheEdge: return "starts that the declared errors may take out of the task's domain";
     case Dropped::kNoNominalValue: return "starts where the nominal model has no value";
     case Dropped::kAmbiguousAngle: return "starts of steps in which the turns of an angle cannot be told";
     case Dropped::kCount: break;
@@ -296,6 +299,7 @@ std::string ToWord(Dropped dropped) {
     case Dropped::kNoInput: return "no_input";
     case Dropped::kInputChanges: return "input_changes";
     case Dropped::kOutsideDomain: return "outside_domain";
+    case Dropped::kNearTheEdge: return "near_the_edge";
     case Dropped::kNoNominalValue: return "no_nominal_value";
     case Dropped::kAmbiguousAngle: return "ambiguous_angle";
     case Dropped::kCount: break;

@@ -55,7 +55,8 @@ enum class Dropped {
   kNoInput,         ///< An input during the step is no number.
   kInputChanges,    ///< An input changes during the step by more than its tolerance.
   kOutsideDomain,   ///< z is not in the task's domain.
-  kNoNominalValue,  ///< The nominal model has no value there.
+  kNearTheEdge,     ///< Within the declared errors of states and inputs, z may be outside the domain.
+  kNoNominalValue,  ///< The nominal model has no value there, or no derivative within those errors.
   kAmbiguousAngle,  ///< An angle is more than a quarter of a turn away from the nominal model's.
   kCount
 };

@@ -33,6 +33,12 @@ Eigen::RowVectorXd FreeScales(const Eigen::RowVectorXd& scales, const std::vecto
 
 }  // namespace
 
+Observations ObserveForProposal(const Problem& problem, const Transitions& transitions) {
+  Declaration declaration = problem.declaration;
+  declaration.lipschitz.setZero();
+  return Observe(*problem.model, declaration, transitions);
+}
+
 Proposal Propose(const Declaration& declaration, const Observations& observations, const ProposalOptions& options) {
   const int n = observations.num_states();
   const Eigen::RowVectorXd scales = ScalesOf(observations);

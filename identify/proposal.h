@@ -6,6 +6,7 @@ declaration and cannot establish one. */
 #include <stdexcept>
 #include <vector>
 
+#include "forereach/certify/problem.h"
 #include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
 
@@ -43,6 +44,10 @@ struct Unexplained : std::runtime_error {
   int coordinate;
   ObservedPair pair;
 };
+
+/** The observations for Propose: what the declared errors of the records make of the residual itself is left out, since
+that depends on the slopes, so the proposed ones may be larger than they have to be. */
+[[nodiscard]] Observations ObserveForProposal(const Problem& problem, const Transitions& transitions);
 
 /** @param declaration its sigma and disturbance are those of the task; its L is not read.
 @throws Unexplained if no row is consistent. Cost: n (1 + columns) linear programs; the other estimators take at most

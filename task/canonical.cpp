@@ -59,10 +59,14 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
   CanonicalBytes bytes = Begin("forereach declaration", model);
   bytes.Numbers(declaration.lipschitz);
   bytes.Numbers(declaration.noise_bound);
-  if (declaration.IsDisturbed()) {  // none and zeros declare the same
-    bytes.Text("disturbance");
-    bytes.Numbers(declaration.disturbance);
-  }
+  const auto add = [&](const char* name, const Eigen::VectorXd& bounds) {
+    if (bounds.isZero(0)) return;  // none and zeros declare the same
+    bytes.Text(name);
+    bytes.Numbers(bounds);
+  };
+  add("disturbance", declaration.disturbance);
+  add("state_error", declaration.state_error);
+  add("input_error", declaration.input_error);
   return bytes.digest();
 }
 

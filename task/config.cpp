@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/learned.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -70,16 +71,34 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
   }
 }
 
+// Of the transitions, those whose true z is in the domain within the declared errors. The others may belong to places
+// where nothing is declared. Returns the rows that stay.
+std::vector<int> KeepThoseWithin(const std::string& path, Problem& problem) {
+  const Transitions& all = problem.transitions;
+  std::vector<int> rows;
+  for (int i = 0; i < all.size(); ++i) {
+    const Eigen::VectorXd z = all.z.row(i);
+    if (IsWithin(problem, {z.data(), ToSize(z.size())})) rows.push_back(i);
+  }
+  if (rows.empty())
+    throw ConfigError(path +
+                      ": no transition is inside the domain with all of declaration.state_error and "
+                      "declaration.input_error; at least one is needed");
+  if (std::ssize(rows) < all.size())
+    problem.transitions = Transitions{all.z(rows, Eigen::all), all.x_next(rows, Eigen::all)};
+  return rows;
+}
+
 // Where the nominal model has no value, or the turns of an angle cannot be told, the transition says nothing, and
 // something is wrong with it.
-void RequireObservable(const std::string& path, const Transitions& transitions, const NominalModel& model) try {
-  static_cast<void>(Observe(model, transitions));
+void RequireObservable(const std::string& path, const std::vector<int>& rows, const Problem& problem) try {
+  static_cast<void>(Observe(*problem.model, problem.declaration, problem.transitions));
 } catch (const AmbiguousAngle& error) {
-  throw ConfigError(fmt::format("{}:{}: {}", path, error.row() + 2, error.what()));
+  throw ConfigError(fmt::format("{}:{}: {}", path, rows[ToSize(error.row())] + 2, error.what()));
 } catch (const NoNominalValue& error) {
   throw ConfigError(fmt::format(
       "{}:{}: {}; change the model's equations or parameters, or take the state out of the domain and the data", path,
-      error.row() + 2, error.text()));
+      rows[ToSize(error.row())] + 2, error.text()));
 }
 
 // What a task that defines rest need not say again.
@@ -119,10 +138,15 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   if (transitions == TransitionsFile::kRead) {
     problem.transitions = ReadTransitions(transitions_path, model, file.Place("transitions"));
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
-    RequireObservable(transitions_path, problem.transitions, model);
   }
   config.path = path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
+  if (transitions == TransitionsFile::kRead) {
+    const int all = problem.transitions.size();
+    config.rows = KeepThoseWithin(transitions_path, problem);
+    RequireObservable(transitions_path, config.rows, problem);
+    config.left_out = all - problem.transitions.size();
+  }
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
   problem.timing.error = StepErrorSeconds(config);
   RequireSteps(file, config, problem);

@@ -26,6 +26,11 @@ struct Config {
   std::string path;
   Grounds grounds;  ///< Before anything is heard or learned.
   std::shared_ptr<const Problem> problem;
+  /** Of each of the problem's transitions: its row in the file, counted from 0. */
+  std::vector<int> rows;
+  /** How many transitions of the file are not the problem's: within the declared errors of states and inputs their z
+  may lie outside the domain. The grounds name all. */
+  int left_out = 0;
   double period = 0;  ///< model.dt: from one sample to the next, s.
   std::vector<Obstacle> obstacles;
   Box initial_set;  ///< X0, rounded outward.

@@ -88,8 +88,8 @@ std::vector<Key> GateKeys() {
            "The robot executes its plan to the end, through whatever has come there.",
            [](const Field&, TaskDraft& draft) { draft.config.gate.obstacles_lost_ms = kNeverLost; }),
       gate.Word<bool>("learn", {{"executed", true}, {"none", false}}, &GateOptions::learns,
-                      "executed: transitions that the robot reports become observations; declaration.noise_bound and "
-                      "declaration.disturbance have to cover them. none: only the file's."),
+                      "executed: transitions that the robot reports become observations; declaration.state_error, "
+                      "noise_bound and disturbance have to cover them. none: only the file's."),
       Optional(Word("gate.require_stop", {"true", "false"},
                     "true: certify only plans that provably end at rest, by task.rest. false: they may end in motion.",
                     ReadRequireStop),

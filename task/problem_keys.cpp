@@ -104,7 +104,29 @@ void ReadLipschitzMatrix(const Field& at, TaskDraft& draft) {
   draft.problem.declaration.lipschitz = ReadMatrix(at);
 }
 
+// A bound on the error of what is recorded: by names, then one name, then the vector.
+std::array<Key, 3> ErrorKeys(const std::string& of, Key::Size size, Eigen::VectorXd Declaration::*errors,
+                             std::vector<std::string> SchemaScope::*names, std::string meaning) {
+  const std::string path = "declaration." + of + "_error", unit = "of the " + of;
+  const auto read_names = [=](const Field& at, TaskDraft& draft) {
+    Eigen::VectorXd& read = draft.problem.declaration.*errors;
+    read.setZero(std::ssize(draft.scope.*names));
+    for (const Field& error : at.Entries()) read[IndexOf(draft.scope.*names, error.name())] = error.Number();
+  };
+  return {Optional(Map(path, std::move(meaning), read_names), "not declared, " + of + "s are taken as exact"),
+          Number(path + ".<" + of + ">", unit, kNotNegative, "Of this " + of + ". One that is not named is exact."),
+          Vector(path, unit, kNotNegative, size, "The same as a list.",
+                 [=](const Field& at, TaskDraft& draft) { draft.problem.declaration.*errors = at.Vector(); })};
+}
+
 std::vector<Key> DeclarationKeys() {
+  const auto state_error = ErrorKeys(
+      "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,
+      "e by names: each state that is recorded differs from the true one by at most this, before a step and after it. "
+      "What it makes of f0 and the residual is derived; noise_bound is for other errors of the successor.");
+  const auto input_error =
+      ErrorKeys("input", Size::kInputs, &Declaration::input_error, &SchemaScope::inputs,
+                "The same of each input: how far the one that is recorded may be off the one that acted.");
   return {
       Required(Map("declaration", "The bounds on the residual.")),
       Required(Map("declaration.lipschitz",
@@ -117,16 +139,23 @@ std::vector<Key> DeclarationKeys() {
                        Between(1, kMaxStates), Size::kVariables, "L as a matrix: one row a state.",
                        ReadLipschitzMatrix)),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
-                      "sigma: the largest error of a recorded successor, beside its last bit.",
+                      "sigma: the largest error of a recorded successor, beside its last bit and state_error.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),
       Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
                       "w: in each step the true successor differs from f0 + r by at most this. The difference may be "
-                      "another in each step. Errors of measurement belong to noise_bound.",
+                      "another in each step. Errors of measurement belong to state_error and noise_bound.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.disturbance = at.Vector(); }),
                "zeros"),
+      state_error[0],
+      state_error[1],
+      state_error[2],
+      input_error[0],
+      input_error[1],
+      input_error[2],
       Required(Text("transitions",
                     "CSV of observed steps, relative to this file: a column for each state, each input and each "
-                    "`<state>_next`, all inside the domain, at least one row.",
+                    "`<state>_next`, all inside the domain, at least one row. Those whose declared errors may take "
+                    "them out are left out.",
                     [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
   };
 }

@@ -86,7 +86,8 @@ std::string DeclarationKey(const TaskTemplate& task) {
   for (const TemplateVariable& state : task.states)
     text += "    - " + List(std::vector<std::string>(columns.size(), "1")) + "  # " + state.name + "\n";
   text +=
-      "  # The largest error of measurement of each state in the data. PLACEHOLDER.\n"
+      "  # The largest error of each successor in the data. PLACEHOLDER. If sensors err by up to e, add the line\n"
+      "  # state_error: [e, ...]. It counts for the states before the steps, too.\n"
       "  noise_bound: " +
       List(std::vector<std::string>(task.states.size(), "0.01")) + "\n";
   return text;

@@ -24,12 +24,12 @@ double UlpOf(double x) { return std::nextafter(std::abs(x), kNone) - std::abs(x)
 // By how much the record of an angle may be off: two units in the last place of 2 pi, or one of its own.
 constexpr double kAngleUnit = 0x1p-49;
 
-// What is nearest to zero of the numbers that differ from this by whole turns, if no other is within three times that:
-// at most a quarter of a turn. Otherwise everything.
-Real WithoutTurns(const Real& observed) {
+// What is nearest to zero of the numbers that differ from this by whole turns, if it is at most a quarter of a turn
+// with the error: then no other is within three times that. Otherwise everything.
+Real WithoutTurns(const Real& observed, const Real& error) {
   const Real turn = Real(2.0) * Real::Pi();
   const Real nearest = observed - Real(std::round((observed / turn).ToDouble())) * turn;
-  return CertainlyAtMost(abs(nearest), Real(0.25) * turn) ? nearest : Real::Everything();
+  return CertainlyAtMost(abs(nearest) + error, Real(0.25) * turn) ? nearest : Real::Everything();
 }
 
 bool IsZeroColumn(const std::vector<Real>& column) {
@@ -369,24 +369,52 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
-    const std::vector<Real> nominal = equations.Value(z);
+    const std::vector<Real> nominal = equations.Value(z), errors = RecordErrors(z);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
       const bool is_angle = std::ranges::count(problem.model->angles(), k) > 0;
       const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
-      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)];
+      const Real& error = errors[ToSize(k)];
+      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)] + error;
       const Real difference = Real(x_next) - nominal[ToSize(k)];
-      const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference) : difference;
+      const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
       const Bounds bounds{observed - allowed, observed + allowed};
       // A transition for which the model has no value says nothing.
-      row.push_back(!observed.IsFinite() ? Bounds{-kNone, kNone} : equations.IsExact() ? bounds : Outermost(bounds));
+      row.push_back(!observed.IsFinite() || !error.IsFinite() ? Bounds{-kNone, kNone}
+                    : equations.IsExact()                     ? bounds
+                                                              : Outermost(bounds));
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
-    for (const double x_next : data.x_next.row(i)) sizes.push_back(abs(Real(x_next)));
+    for (Eigen::Index k = 0; k < data.x_next.cols(); ++k)
+      sizes.push_back(abs(Real(data.x_next(i, k))) + errors[ToSize(k)]);
     for (const auto& [output, variable, value] : equations.First(z))
       sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
   }
+}
+
+// With x+ - r(z) = f0(z) + w and z the true one, within e of the recorded one, as x+ is: e_k for x+, L e for r, and for
+// f0 by the mean value theorem the largest slopes over z +- e times e. Not finite where z +- e leaves the domain, or f0
+// has no bound there: nothing is known then.
+std::vector<Real> TubeMaker::RecordErrors(const std::vector<Real>& z) const {
+  const Declaration& declaration = problem_.declaration;
+  std::vector<Real> e(z.size()), errors(ToSize(problem_.model->num_states()));
+  std::ranges::copy(declaration.state_error, e.begin());
+  std::ranges::copy(declaration.input_error, e.begin() + std::ssize(errors));
+  if (std::ranges::all_of(e, [](const Real& error) { return error.IsZero(); })) return errors;
+  std::vector<Real> box;
+  for (std::size_t l = 0; l < z.size(); ++l) box.push_back(Around(z[l], e[l]));
+  if (LeavesDomain(0, z, e)) return std::vector<Real>(errors.size(), Real::Everything());
+  const std::vector<Real> values = equations_.Value(box);
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    errors[k] = values[k].IsFinite() ? e[k] : Real::Everything();
+    for (std::size_t l = 0; l < z.size(); ++l)
+      errors[k] += Real(declaration.lipschitz(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(l))) * e[l];
+  }
+  for (const auto& [output, variable, slope] : equations_.First(box))
+    if (const Real& error = e[ToSize(variable)]; !error.IsZero())
+      errors[ToSize(output)] += slope.IsFinite() ? slope.magnitude() * error : Real::Everything();
+  return errors;
 }
 
 // The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-44 of the
@@ -424,7 +452,7 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
 
 std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const TubeOptions& options) const {
   const int n = query.slice.dim();
-  if (const auto failure = LeavesDomain(query)) return failure;
+  if (const auto failure = LeavesDomain(query.t, query.center, query.half_width)) return failure;
   const auto no_bound = [&](const std::string& what) {
     return Failure{query.t, what + " has no finite enclosure", "", ""};
   };
@@ -540,12 +568,13 @@ Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Rea
   return next;
 }
 
-std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
+std::optional<Failure> TubeMaker::LeavesDomain(int t, const std::vector<Real>& centers,
+                                               const std::vector<Real>& half_width) const {
   const Domain& domain = problem_.domain;
   const auto refuse = [&](const std::string& what, const Real& found, const Real& bound, Answer answer,
                           const char* relation = "at most ") {
     const Real scale = max(abs(found), abs(bound));
-    return Failure{query.t,
+    return Failure{t,
                    "the tube stays in the domain: " + what,
                    found.text(),
                    relation + bound.text(),
@@ -554,10 +583,10 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   };
   const int n = domain.state.dim();
   const std::vector<std::string> names = problem_.model->variable_names();
-  for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {
+  for (int l = 0; l < static_cast<int>(centers.size()); ++l) {
     const Real lower(l < n ? domain.state.lower()[l] : domain.input.lower()[l - n]);
     const Real upper(l < n ? domain.state.upper()[l] : domain.input.upper()[l - n]);
-    const Real &center = query.center[ToSize(l)], &r = query.half_width[ToSize(l)];
+    const Real &center = centers[ToSize(l)], &r = half_width[ToSize(l)];
     const std::string& name = names[ToSize(l)];
     if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes)
       return refuse(name, center - r, lower, a, "at least ");
@@ -568,7 +597,7 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
     Real largest;
     for (Eigen::Index l = 0; l < coefficients.size(); ++l) {
       const Real c(coefficients[l]);
-      largest += c * query.center[ToSize(l)] + abs(c) * query.half_width[ToSize(l)];
+      largest += c * centers[ToSize(l)] + abs(c) * half_width[ToSize(l)];
     }
     if (const Answer a = IsAtMost(largest, bound); a != Answer::kYes)
       return refuse("inequality " + std::to_string(i), largest, bound, a);
@@ -578,7 +607,7 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
     Real square;
     for (Eigen::Index c = 0; c < center.size(); ++c) {
       const auto l = ToSize(coordinates[ToSize(c)]);
-      square += sqr(abs(query.center[l] - Real(center[c])) + query.half_width[l]);
+      square += sqr(abs(centers[l] - Real(center[c])) + half_width[l]);
     }
     if (const Answer a = IsAtMost(square, sqr(Real(radius))); a != Answer::kYes)
       return refuse("ball " + std::to_string(i), sqrt(square), radius, a);

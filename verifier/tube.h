@@ -112,7 +112,9 @@ class TubeMaker final {
   struct Row;
 
   [[nodiscard]] double RemainderRounding() const;
-  [[nodiscard]] std::optional<Failure> LeavesDomain(const Query& query) const;
+  [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,
+                                                    const std::vector<Real>& half_width) const;
+  [[nodiscard]] std::vector<Real> RecordErrors(const std::vector<Real>& z) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
@@ -127,10 +129,10 @@ class TubeMaker final {
   Method method_;
   /** The declared disturbance, one entry for each state. */
   std::vector<Real> disturbance_;
-  /** r~_ik - sigma_k - w_k and r~_ik + sigma_k + w_k, one unit in the last place of the successor included;
-  [observation][state]. */
+  /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
+  included; e_ik is what the declared errors of the record may add. [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;
-  /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
+  /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
   /** The rounding error that the remainder may have added to the certifier's columns. */
   double remainder_rounding_;

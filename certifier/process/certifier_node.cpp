@@ -79,6 +79,11 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       reporter_({channels_, bus_, sender_, watch_, charge_, contradictions_, latch_, reload_, queue_}) {
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
     logging::Warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
+  if (config.left_out > 0)
+    logging::Warn(
+        "{} transitions of the task are left out: within declaration.state_error and declaration.input_error they may "
+        "be outside the domain",
+        config.left_out);
   if (const auto& violation = gate_->certifier().violation())
     logging::Warn(
         "observations {} and {} contradict the declaration: every candidate will be answered ABSTAIN_FALSIFIED (F)",

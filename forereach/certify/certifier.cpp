@@ -53,8 +53,9 @@ void ValidateObservations(const Problem& problem) {
               std::to_string(variables));
   for (int i = 0; i < problem.transitions.size(); ++i) {
     const Eigen::VectorXd z = problem.transitions.z.row(i);
-    Require(problem.domain.Contains({z.data(), ToSize(z.size())}),
-            "transition " + std::to_string(i) + ": lies outside the certification domain");
+    Require(IsWithin(problem, {z.data(), ToSize(z.size())}),
+            "transition " + std::to_string(i) + ": lies outside the certification domain" +
+                (problem.declaration.HasErrorInZ() ? ", or may within the declared errors" : ""));
   }
 }
 
@@ -66,7 +67,8 @@ ObservationStore MakeStore(const Problem& problem) {
   options.max_observations = ToSize(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
   options.envelope.instructions = problem.instructions;
-  return ObservationStore(problem.declaration, Observe(*problem.model, problem.transitions), lower, upper, options);
+  return ObservationStore(problem.declaration, Observe(*problem.model, problem.declaration, problem.transitions), lower,
+                          upper, options);
 }
 
 Decision Falsified(int step, int coordinate) {

@@ -4,20 +4,29 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "forereach/residual/no_nominal_value.h"
+
 namespace forereach {
+
+bool IsWithin(const Problem& problem, std::span<const double> z) {
+  return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
+}
 
 Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next,
                 Observations& observed) {
   const auto finite = [](double value) { return std::isfinite(value); };
   if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
   if (!problem.domain.Contains(z)) return Learned::kOutsideDomain;
+  if (!IsWithin(problem, z)) return Learned::kNearTheEdge;
   const auto row = [](std::span<const double> values) {
     return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
   };
   try {
-    observed = Observe(*problem.model, {row(z), row(next)});
+    observed = Observe(*problem.model, problem.declaration, {row(z), row(next)});
   } catch (const AmbiguousAngle&) {
     return Learned::kAmbiguousAngle;
+  } catch (const NoNominalValue& error) {
+    return error.at() == NoNominalValue::At::kAround ? Learned::kNoNominalSlope : Learned::kNoNominalValue;
   } catch (const std::invalid_argument&) {
     return Learned::kNoNominalValue;
   }
@@ -29,6 +38,10 @@ std::string Explain(Learned learned) {
     case Learned::kAdded: break;
     case Learned::kNotFinite: return "NaN or infinity in it";
     case Learned::kOutsideDomain: return "it lies outside the certification domain";
+    case Learned::kNearTheEdge:
+      return "within the declared errors of states and inputs it may lie outside the certification domain";
+    case Learned::kNoNominalSlope:
+      return "the nominal model has no finite derivative within the declared errors of states and inputs there";
     case Learned::kNoNominalValue: return "the nominal model has no finite value there";
     case Learned::kAmbiguousAngle:
       return "an angle is more than a quarter of a turn away from the nominal model's, so its turns cannot be told";

@@ -14,9 +14,15 @@ enum class Learned {
   kAdded,
   kNotFinite,       ///< An entry is NaN or infinite.
   kOutsideDomain,   ///< z is not proven to lie in the domain: the transition says nothing about the residual there.
+  kNearTheEdge,     ///< z lies in the domain, but the box of the true z (Declaration::BoxAround) is not proven to.
   kNoNominalValue,  ///< The nominal map has no finite enclosure at z.
+  kNoNominalSlope,  ///< Nor has its derivative over that box, or it is not defined on all of it.
   kAmbiguousAngle,  ///< An angle departs from the nominal map's by more than a quarter of a turn (observations.h).
 };
+
+/** Whether the box around z (Declaration::BoxAround) provably lies in the domain: a transition that was recorded at z
+then counts. */
+[[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z);
 
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. Without a fault `observed` gets
 the enclosure of its residual, one row. Cost: one evaluation of the model. */

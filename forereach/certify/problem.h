@@ -30,8 +30,8 @@ struct RestBound {
 struct Problem {
   std::shared_ptr<const NominalModel> model;  ///< f0
   Domain domain;                              ///< Z_cert
-  Declaration declaration;                    ///< L, sigma and the disturbance
-  Transitions transitions;                    ///< D_N, all inside the domain
+  Declaration declaration;                    ///< L, sigma, the disturbance and the errors of records
+  Transitions transitions;                    ///< D_N; the box around each (Declaration::BoxAround) is in the domain
   Eigen::MatrixXd projection;                 ///< P, p-by-n: the position of the robot's frame
   Body body;                                  ///< By default the point P x
   StepTiming timing;                          ///< By how much the boundaries of steps may be off their times

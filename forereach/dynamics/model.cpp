@@ -20,6 +20,12 @@ void NominalModel::Evaluate(std::span<const double> z, std::span<double> next) c
   for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(wide[k]);
 }
 
+void NominalModel::Linearize(std::span<const double> z, Linearization& out) const noexcept {
+  std::array<Interval, kMaxVariables> point;
+  std::ranges::copy(z, point.begin());
+  LinearizeOver({point.data(), z.size()}, out);
+}
+
 bool NominalModel::IsAngle(int state) const { return std::ranges::binary_search(names_.angles, state); }
 
 std::vector<std::string> NominalModel::variable_names() const {

@@ -96,7 +96,10 @@ class NominalModel {
   virtual void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept = 0;
 
   /** Encloses f0(z) and D_z f0(z), Eq. (propagation), for all parameters, by interval arithmetic. */
-  virtual void Linearize(std::span<const double> z, Linearization& out) const noexcept = 0;
+  void Linearize(std::span<const double> z, Linearization& out) const noexcept;
+  /** The same for all z in a box of d_z intervals. Where f0 has a kink inside, the derivatives are the generalised
+  gradient. They count only where the value is finite: then f0 is defined and continuous on the box. */
+  virtual void LinearizeOver(std::span<const Interval> box, Linearization& out) const noexcept = 0;
 
   /** Encloses every second derivative of f0 by states over a box of d_z intervals, Eq. (qt-formula), by interval
   arithmetic. An entry is infinite if no finite enclosure exists, for example if a steering interval contains a pole of

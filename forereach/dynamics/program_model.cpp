@@ -44,11 +44,9 @@ void ProgramModel::EvaluateWide(std::span<const double> z, std::span<long double
   for (std::size_t k = 0; k < next.size(); ++k) next[k] = values[ToSize(program().value[k])];
 }
 
-void ProgramModel::Linearize(std::span<const double> z, Linearization& out) const noexcept {
-  std::array<Interval, kMaxVariables> point;
-  std::ranges::copy(z, point.begin());
+void ProgramModel::LinearizeOver(std::span<const Interval> box, Linearization& out) const noexcept {
   const std::span values(FOREREACH_ON_STACK(Interval, program().size), ToSize(program().size));
-  forereach::Evaluate<Interval>(program(), program().at_point, parameter_ranges(), {point.data(), z.size()}, values);
+  forereach::Evaluate<Interval>(program(), program().at_point, parameter_ranges(), box, values);
   for (std::size_t k = 0; k < ToSize(num_states()); ++k) out.value[k] = values[ToSize(program().value[k])];
   out.count = program().num_first;
   for (std::size_t e = 0; e < ToSize(out.count); ++e) {

@@ -18,7 +18,7 @@ class ProgramModel : public InterpretedModel {
   ProgramModel(std::shared_ptr<const ProgramDraft> draft, std::vector<Interval> parameters, ModelNames names);
 
   void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept override;
-  void Linearize(std::span<const double> z, Linearization& out) const noexcept override;
+  void LinearizeOver(std::span<const Interval> box, Linearization& out) const noexcept override;
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept override;
   [[nodiscard]] ExpansionError BoundError(std::span<const Interval> domain) const override;
 

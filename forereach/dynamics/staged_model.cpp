@@ -112,13 +112,14 @@ class StagedModel::Stages final {
     for (std::size_t j = 0; j < n; ++j) next[j] = z[j] + sum[j];
   }
 
-  void Linearize(std::span<const double> z, std::span<const Interval> parameters, Linearization& out) const noexcept {
-    std::array<Interval, kMaxVariables> point;
-    std::ranges::copy(z, point.begin());
+  void LinearizeOver(std::span<const Interval> box, std::span<const Interval> parameters,
+                     Linearization& out) const noexcept {
+    std::array<Interval, kMaxVariables> z;
+    std::ranges::copy(box, z.begin());
     const std::span values(FOREREACH_ON_STACK(Interval, rates_.size), ToSize(rates_.size));
     Forward forward;
     const bool is_finite =
-        Dispatch<&Stages::Run>(BestInstructionSet(), *this, point, parameters, all_columns_, false, values, forward);
+        Dispatch<&Stages::Run>(BestInstructionSet(), *this, z, parameters, all_columns_, false, values, forward);
     for (std::size_t k = 0; k < ToSize(rates_.states); ++k)
       out.value[k] = is_finite ? forward.sum.value[k] : Interval::Entire();
     out.count = static_cast<int>(jacobian_.size());
@@ -425,8 +426,8 @@ void StagedModel::EvaluateWide(std::span<const double> z, std::span<long double>
   stages_->Evaluate(z, parameters(), next);
 }
 
-void StagedModel::Linearize(std::span<const double> z, Linearization& out) const noexcept {
-  stages_->Linearize(z, parameter_ranges(), out);
+void StagedModel::LinearizeOver(std::span<const Interval> box, Linearization& out) const noexcept {
+  stages_->LinearizeOver(box, parameter_ranges(), out);
 }
 
 void StagedModel::EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept {

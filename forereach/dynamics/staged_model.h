@@ -9,7 +9,7 @@ they are numbers instead. With F and F_j the first and second derivatives of f a
 
     D k = F D x_s,    D^2 k_j = sum_l F_jl D^2 x_s,l + (D x_s)^T F_j (D x_s),
 
-by intervals: at a point for value and Jacobian, over a box for the Hessians. docs/soundness.md, 3.2. */
+by intervals: for value and Jacobian mostly at a point, for the Hessians over a box. docs/soundness.md, 3.2. */
 #pragma once
 
 #include <memory>
@@ -26,7 +26,7 @@ class StagedModel final : public InterpretedModel {
   StagedModel(std::shared_ptr<const ProgramDraft> rates, double dt, std::vector<Interval> parameters, ModelNames names);
 
   void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept override;
-  void Linearize(std::span<const double> z, Linearization& out) const noexcept override;
+  void LinearizeOver(std::span<const Interval> box, Linearization& out) const noexcept override;
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept override;
   /** Infinite: a step uses the enclosures above. */
   [[nodiscard]] ExpansionError BoundError(std::span<const Interval> domain) const override;

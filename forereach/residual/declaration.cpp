@@ -14,7 +14,28 @@ void RequireBound(const std::string& name, double value) {
     throw std::invalid_argument(name + ": " + ToText(value) + " must be finite and not negative");
 }
 
+// A bound that may be left out.
+void RequireBounds(const std::string& name, const Eigen::VectorXd& bounds, int size) {
+  if (bounds.size() != 0 && bounds.size() != size)
+    throw std::invalid_argument("declaration: " + name + " has " + std::to_string(bounds.size()) +
+                                " entries, must have " + std::to_string(size) + " or none");
+  for (Eigen::Index k = 0; k < bounds.size(); ++k) RequireBound(name + " " + std::to_string(k), bounds[k]);
+}
+
 }  // namespace
+
+double Declaration::VariableError(Eigen::Index l) const {
+  const Eigen::Index n = noise_bound.size();
+  const Eigen::VectorXd& errors = l < n ? state_error : input_error;
+  return errors.size() == 0 ? 0 : errors[l < n ? l : l - n];
+}
+
+std::vector<Interval> Declaration::BoxAround(std::span<const double> z) const {
+  std::vector<Interval> box(z.begin(), z.end());
+  for (std::size_t l = 0; l < box.size(); ++l)
+    if (const double e = VariableError(static_cast<Eigen::Index>(l)); e != 0) box[l] += Interval(-e, e);
+  return box;
+}
 
 double Declaration::ObservationError(Eigen::Index k) const { return AddUp(noise_bound[k], DisturbanceBound(k)); }
 
@@ -30,14 +51,10 @@ void Declaration::Validate(int num_states, int num_variables) const {
       RequireBound("lipschitz " + std::to_string(k) + ", " + std::to_string(l), lipschitz(k, l));
   }
   ValidateDisturbance(num_states);
+  RequireBounds("state_error", state_error, num_states);
+  RequireBounds("input_error", input_error, num_variables - num_states);
 }
 
-void Declaration::ValidateDisturbance(int num_states) const {
-  if (disturbance.size() != 0 && disturbance.size() != num_states)
-    throw std::invalid_argument("declaration: disturbance has " + std::to_string(disturbance.size()) +
-                                " entries, must have " + std::to_string(num_states) + " or none");
-  for (Eigen::Index k = 0; k < disturbance.size(); ++k)
-    RequireBound("disturbance " + std::to_string(k), disturbance[k]);
-}
+void Declaration::ValidateDisturbance(int num_states) const { RequireBounds("disturbance", disturbance, num_states); }
 
 }  // namespace forereach

@@ -3,6 +3,10 @@ L_kl |z_l - z'_l| for all z, z' in Z_cert, Eq. (regularity); the bound sigma on 
 bound on the disturbance w, which the paper does not have (docs/soundness.md, 1). */
 #pragma once
 
+#include <span>
+#include <vector>
+
+#include "forereach/numerics/interval.h"
 #include "forereach/sets/eigen.h"
 
 namespace forereach {
@@ -14,17 +18,29 @@ struct Declaration {
   /** w^: |w_k| <= w^_k in every step, by a value of its own in each step that may depend on everything before; n
   entries, not negative, in the units of the states. No entries: zeros. */
   Eigen::VectorXd disturbance = {};
+  /** e: |recorded - true| <= e in every state, input and successor that is recorded; n and m entries, not negative, in
+  the units of the states and inputs. No entries: not declared, and then what is recorded is taken as exact, as with
+  zeros. It counts beside sigma and w^ (docs/soundness.md, 3.16). */
+  Eigen::VectorXd state_error = {}, input_error = {};
 
   /** Whether some w^_k is not zero. */
   [[nodiscard]] bool IsDisturbed() const { return (disturbance.array() != 0).any(); }
   /** w^_k. */
   [[nodiscard]] double DisturbanceBound(Eigen::Index k) const { return disturbance.size() == 0 ? 0 : disturbance[k]; }
+  /** Whether a bound on the error of recorded states is declared, be it zero. */
+  [[nodiscard]] bool DeclaresStateError() const { return state_error.size() != 0; }
+  /** Whether some e_l is not zero, so that z_i is not known exactly. */
+  [[nodiscard]] bool HasErrorInZ() const { return !state_error.isZero(0) || !input_error.isZero(0); }
+  /** e_l of variable l of z: the states, then the inputs. */
+  [[nodiscard]] double VariableError(Eigen::Index l) const;
+  /** The box of the true z of what was recorded as z: z_l +- e_l rounded outward, z_l itself where e_l is zero. */
+  [[nodiscard]] std::vector<Interval> BoxAround(std::span<const double> z) const;
   /** sigma_k + w^_k rounded up: how far an observed residual may lie from r_k, apart from the successor's last bit. It
   is sigma_k itself if w^_k is zero. */
   [[nodiscard]] double ObservationError(Eigen::Index k) const;
 
-  /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ has neither n nor none, or an
-  entry is negative or not finite; the message names the entry. */
+  /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ or e has another number of entries
+  and not none, or an entry is negative or not finite; the message names the entry. */
   void Validate(int num_states, int num_variables) const;
   /** The same for w^ alone. */
   void ValidateDisturbance(int num_states) const;

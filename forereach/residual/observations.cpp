@@ -1,6 +1,7 @@
 #include "forereach/residual/observations.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -35,15 +36,70 @@ bool IsWithinAQuarterTurn(const Interval& residual) {
   return -kQuarterTurn <= residual.lower && residual.upper <= kQuarterTurn;
 }
 
-[[noreturn]] void RefuseAngle(int row, const std::string& name, const Interval& residual) {
+[[noreturn]] void RefuseAngle(int row, const std::string& name, const Interval& residual, double error) {
   throw AmbiguousAngle(row, "transition " + std::to_string(row) + ": " + name + " is " + ToText(residual.Middle()) +
+                                (error > 0 ? " +- " + RoundedUp(error, 3) : "") +
                                 " rad away from the nominal model's next value, up to whole turns, which is more than "
                                 "pi/2: how often it has turned cannot be told");
 }
 
+// Makes the observations of one transition after another.
+class Observer final {
+ public:
+  Observer(const NominalModel& model, const Declaration& declaration)
+      : model_(model), declaration_(declaration), has_errors_(declaration.HasErrorInZ()) {}
+
+  // An enclosure for each state, valid until the next call.
+  const std::array<Interval, kMaxStates>& At(std::span<const double> z, std::span<const double> x_next, int row) {
+    model_.Linearize(z, linear_);
+    for (std::size_t k = 0; k < x_next.size(); ++k) {
+      const Interval& nominal = linear_.value[k];
+      residual_[k] =
+          IsAngle(k) ? ResidualOfAngle(x_next[k], nominal) : ResidualOf(x_next[k], UlpOf(x_next[k]), nominal);
+      if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kLocation);
+    }
+    if (has_errors_) BoundErrors(z);
+    for (std::size_t k = 0; k < x_next.size(); ++k) {
+      if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
+      if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kAround);
+      if (IsAngle(k) && !IsWithinAQuarterTurn(residual_[k])) RefuseAngle(row, Name(k), residual_[k], error_[k]);
+    }
+    return residual_;
+  }
+
+ private:
+  [[nodiscard]] bool IsAngle(std::size_t k) const { return model_.IsAngle(static_cast<int>(k)); }
+  [[nodiscard]] const std::string& Name(std::size_t k) const { return model_.state_names()[k]; }
+
+  // error_k = e_k + sum_l (sup |D_l f0_k| + L_kl) e_l, rounded up; infinite where f0_k or a slope has no bound.
+  void BoundErrors(std::span<const double> z) {
+    model_.LinearizeOver(declaration_.BoxAround(z), linear_);
+    for (int k = 0; k < model_.num_states(); ++k) {
+      double& error = error_[ToSize(k)] = declaration_.VariableError(k);
+      for (int l = 0; l < model_.num_variables(); ++l)
+        error = AddUp(error, MulUp(declaration_.lipschitz(k, l), declaration_.VariableError(l)));
+      if (!linear_.value[ToSize(k)].IsFinite()) error = kInfinity;
+    }
+    for (const auto& [k, l, slope] : linear_.jacobian())
+      if (const double e = declaration_.VariableError(l); e > 0)
+        error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
+  }
+
+  const NominalModel& model_;
+  const Declaration& declaration_;
+  const bool has_errors_;
+  Linearization linear_;
+  std::array<Interval, kMaxStates> residual_;
+  std::array<double, kMaxStates> error_{};
+};
+
 }  // namespace
 
 Observations Observe(const NominalModel& model, const Transitions& transitions) {
+  return Observe(model, {}, transitions);
+}
+
+Observations Observe(const NominalModel& model, const Declaration& declaration, const Transitions& transitions) {
   const int n = model.num_states(), count = transitions.size();
   if (count == 0) throw std::invalid_argument("transitions: none given, at least one is needed");
   if (transitions.z.cols() != model.num_variables() || transitions.x_next.cols() != n ||
@@ -51,20 +107,14 @@ Observations Observe(const NominalModel& model, const Transitions& transitions) 
     throw std::invalid_argument("transitions: sizes do not fit the model " + model.name());
 
   Observations observations{transitions.z, Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
-  Linearization nominal;
+  Observer observer(model, declaration);
   for (int i = 0; i < count; ++i) {
-    const Eigen::VectorXd z = transitions.z.row(i);
-    if (!z.allFinite() || !transitions.x_next.row(i).allFinite()) Refuse(i, "not finite");
-    model.Linearize({z.data(), ToSize(z.size())}, nominal);
+    const Eigen::VectorXd z = transitions.z.row(i), x_next = transitions.x_next.row(i);
+    if (!z.allFinite() || !x_next.allFinite()) Refuse(i, "not finite");
+    const auto& residual = observer.At({z.data(), ToSize(z.size())}, {x_next.data(), ToSize(n)}, i);
     for (int k = 0; k < n; ++k) {
-      const double x_next = transitions.x_next(i, k);
-      const bool is_angle = model.IsAngle(k);
-      const Interval& value = nominal.value[ToSize(k)];
-      const Interval residual = is_angle ? ResidualOfAngle(x_next, value) : ResidualOf(x_next, UlpOf(x_next), value);
-      if (!residual.IsFinite()) throw NoNominalValue(i, model.state_names()[ToSize(k)]);
-      if (is_angle && !IsWithinAQuarterTurn(residual)) RefuseAngle(i, model.state_names()[ToSize(k)], residual);
-      observations.lower(i, k) = residual.lower;
-      observations.upper(i, k) = residual.upper;
+      observations.lower(i, k) = residual[ToSize(k)].lower;
+      observations.upper(i, k) = residual[ToSize(k)].upper;
     }
   }
   return observations;

@@ -5,6 +5,11 @@ So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and with eps_k = Declara
 residual satisfies
     lower_ik - eps_k <= r_k(z_i) <= upper_ik + eps_k.
 
+Where the declaration bounds the error e of what is recorded, z_i and x_i+ are near the true ones, which the step
+belongs to. By the mean value theorem and by L, [lower, upper] then contains in addition
+    e_k + sum_l (sup |D_l f0_k| + L_kl) e_l,    the sup over the box z_i +- e,
+and the inequality above holds at the recorded z_i. That box has to lie in the domain (docs/soundness.md, 3.16).
+
 A recorded angle is known up to whole turns. Its residual is x_i+ + 2 pi j - f0(z_i) with the j that makes it least in
 size, which has to be at most a quarter of a turn: then every other j gives three quarters or more, which the task
 declares not to happen (docs/soundness.md, 3.14). Instead of the unit of x_i+ it counts the larger one of that and
@@ -15,6 +20,7 @@ kAngleUnit, which covers a successor that was computed in doubles and then turne
 #include <string>
 
 #include "forereach/dynamics/model.h"
+#include "forereach/residual/declaration.h"
 #include "forereach/residual/transitions.h"
 #include "forereach/sets/eigen.h"
 
@@ -43,9 +49,12 @@ class AmbiguousAngle final : public std::invalid_argument {
   int row_;
 };
 
-/** Computes the observations from transitions. @throws AmbiguousAngle; std::invalid_argument if there are none, a size
-does not match the model, a number is not finite, or f0 has no finite enclosure at a location; the message names the
-row. Cost O(N). */
+/** Computes the observations from transitions. @param declaration its L and its e. @throws AmbiguousAngle;
+NoNominalValue; std::invalid_argument if there are none, a size does not match the model or a number is not finite; the
+message names the row. Cost O(N). */
+[[nodiscard]] Observations Observe(const NominalModel& model, const Declaration& declaration,
+                                   const Transitions& transitions);
+/** The same of exact records: e = 0. */
 [[nodiscard]] Observations Observe(const NominalModel& model, const Transitions& transitions);
 
 }  // namespace forereach

@@ -38,6 +38,33 @@ class DeclareDataTest : public testing::Test {
   const std::string task_ = scratch_ / "task.yaml";
 };
 
+TEST_F(DeclareDataTest, WhatTheErrorsOfTheRecordExplainNeedsNoSlope) {
+  const Json exact = Json::parse(Declare("--by vx --json").text);
+  const std::string line = "transitions: steps.csv\n";
+  const std::string task = Replaced(Read(task_), line, "  state_error: {vx: 0.0001}\n" + line);
+  std::ofstream(task_) << task;
+  const Json document = Json::parse(Declare("--by vx --json").text);
+  EXPECT_LT(document["entries"][0]["smallest"], exact["entries"][0]["smallest"]);
+  const std::size_t begin = task.find("declaration:"), end = task.find("transitions:");
+  std::ofstream(task_) << task.substr(0, begin) + document["yaml"].get<std::string>() + task.substr(end);
+  const Config config = LoadConfig(task_);
+  EXPECT_EQ(config.problem->declaration.state_error, Eigen::Vector4d(0, 0, 0.0001, 0));
+  EXPECT_FALSE(Certifier(config.problem).violation());
+}
+
+// The first of the rows lies next to the domain's edge.
+TEST_F(DeclareDataTest, NamesTheLinesOfTheFileWhereTransitionsAreLeftOut) {
+  const Json before = Json::parse(Declare("--by vx --json").text);
+  const std::string line = "transitions: steps.csv\n", rows = Read(scratch_ / "steps.csv");
+  scratch_.Write("steps.csv", std::string(rows).insert(rows.find('\n') + 1, "20,0,0,0,0,0,20,0,0,0\n"));
+  const std::string task = Replaced(Read(task_), line, "  state_error: {px: 1e-12}\n" + line);
+  std::ofstream(task_) << task;
+  const Json after = Json::parse(Declare("--by vx --json").text);
+  EXPECT_EQ(after["transitions"], before["transitions"]);
+  for (const int which : {0, 1})
+    EXPECT_EQ(after["entries"][0]["lines"][which], before["entries"][0]["lines"][which].get<int>() + 1);
+}
+
 TEST_F(DeclareDataTest, ItsLinesGoIntoATaskFileThatNoTransitionContradicts) {
   const Json document = Json::parse(Declare("--by vx --noise estimated --json").text);
   EXPECT_FALSE(document["proven"]);

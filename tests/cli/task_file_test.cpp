@@ -276,6 +276,16 @@ TEST(YamlTextTest, QuotesTextThatYamlWouldReadOtherwise) {
 
 // ---- check
 
+TEST_F(CheckTest, CountsTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
+  const std::string line = "transitions: steps.csv\n";
+  WriteTask(line, "  state_error: {px: 0.5}\n" + line, kTransitions + std::string("19.6,0,1,0,0,0,19.75,0,1,0\n"));
+  EXPECT_THAT(Check().text, HasSubstr("remark: 1 transition left out, the first in " + (scratch_ / "steps.csv") +
+                                      ":4: within state_error and input_error it may be outside the domain"));
+  WriteTask(line, "  state_error: {px: 21}\n" + line);
+  EXPECT_THAT(Check().text, HasSubstr(" 2 transitions left out")) << "all, and that is no mere remark";
+  EXPECT_EQ(Check().code, 1);
+}
+
 TEST(Check, ExitsWithTheExpectedCodeForEachShippedTask) {
   for (const auto& [task, code] : {std::pair("demo", 0),
                                    {"post", 0},

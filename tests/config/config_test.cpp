@@ -45,6 +45,49 @@ TEST(LoadConfig, ReadsWhatIsRequired) {
   EXPECT_NEAR(config.initial_set.upper()[2], 1.1, 1e-15);
 }
 
+TEST(LoadConfig, TellsAnErrorThatIsNotDeclaredFromZero) {
+  const TaskFiles files;
+  const auto with = [&](const std::string& errors) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files.Load(Replaced(kTask, line, line + errors)).problem->declaration;
+  };
+  EXPECT_FALSE(with("").DeclaresStateError());
+  EXPECT_FALSE(with("  input_error: {ax: 0.1}\n").DeclaresStateError());
+  EXPECT_EQ(with("  input_error: {ay: 0.1}\n").input_error, Eigen::Vector2d(0, 0.1));
+  for (const std::string zero : {"{}", "{vx: 0}", "[0, 0, 0, 0]"}) {
+    const Declaration exact = with("  state_error: " + zero + "\n");
+    EXPECT_TRUE(exact.DeclaresStateError()) << zero;
+    EXPECT_FALSE(exact.HasErrorInZ()) << zero;
+    EXPECT_EQ(exact.state_error, Eigen::Vector4d::Zero()) << zero;
+  }
+  const Declaration both = with("  state_error: {vx: 0.01}\n  input_error: [0.1, 0.2]\n");
+  EXPECT_TRUE(both.HasErrorInZ());
+  std::vector<double> errors(6);
+  for (int l = 0; l < 6; ++l) errors[static_cast<std::size_t>(l)] = both.VariableError(l);
+  EXPECT_THAT(errors, testing::ElementsAre(0, 0, 0.01, 0, 0.1, 0.2));
+}
+
+TEST(LoadConfig, LeavesOutTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
+  const TaskFiles files;
+  const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n", rows = kTransitions;
+  const auto with = [&](const std::string& error) {
+    return Replaced(kTask, line, line + "  state_error: {px: " + error + "}\n");
+  };
+  const std::string edge = "19.5,0,1,0,0,0,19.65,0,1,0\n", last = "3,0,1,0,0,0,3.15,0,1,0\n";
+  const Config exact = files.Load(kTask, rows + edge + last), at = files.Load(with("0.5"), rows + edge + last),
+               beyond = files.Load(with("0.5000000000000001"), rows + edge + last);
+  EXPECT_EQ(at.left_out, 0);
+  EXPECT_THAT(at.rows, testing::ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(beyond.left_out, 1);
+  EXPECT_THAT(beyond.rows, testing::ElementsAre(0, 1, 3));
+  EXPECT_EQ(beyond.problem->transitions.z(2, 0), 3);
+  EXPECT_EQ(beyond.problem->transitions.x_next(2, 0), 3.15);
+  EXPECT_EQ(beyond.grounds.observations, exact.grounds.observations) << "they are those of the file";
+  EXPECT_EQ(files.Error(with("25"), rows),
+            "steps.csv: no transition is inside the domain with all of declaration.state_error and "
+            "declaration.input_error; at least one is needed");
+}
+
 TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   const Config config = TaskFiles().Load();
   EXPECT_EQ(config.problem->zonotope_order, 5);

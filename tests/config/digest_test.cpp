@@ -72,6 +72,26 @@ TEST(DeclarationDigest, NoDisturbanceAndZerosAreTheSame) {
   EXPECT_NE(with("[0, 0, 0.01, 0.01]"), digest);
 }
 
+TEST(DeclarationDigest, NoErrorOfRecordsAndZerosAreTheSame) {
+  const TaskFiles files;
+  const Digest digest = files.Load().grounds.declaration;
+  const auto with = [&](const std::string& errors) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files.Load(Replaced(kTask, line, line + "  " + errors + "\n")).grounds.declaration;
+  };
+  EXPECT_EQ(with("state_error: {}"), digest);
+  EXPECT_EQ(with("input_error: {ax: 0}"), digest);
+  EXPECT_EQ(with("state_error: [0, 0, 0.1, 0]"), with("state_error: {vx: 0.1}"));
+  const std::set<Digest> different{digest,
+                                   with("state_error: {px: 4.9e-324}"),
+                                   with("state_error: {px: 0.1}"),
+                                   with("state_error: {py: 0.1}"),
+                                   with("disturbance: [0.1, 0, 0, 0]"),
+                                   with("input_error: {ax: 0.1}"),
+                                   with("input_error: [0, 0.1]")};
+  EXPECT_EQ(different.size(), 7u);
+}
+
 // Recorded logs and latched faults name it.
 TEST(DeclarationDigest, WithoutDisturbanceIsFixed) {
   const Declaration declaration{Eigen::MatrixXd::Ones(4, 6), Eigen::VectorXd::Zero(4)};

@@ -312,6 +312,21 @@ TEST_F(ErrorTest, ADisturbanceThatDoesNotFitIsAnError) {
   EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a list of numbers");
 }
 
+TEST_F(ErrorTest, AnErrorOfRecordsThatDoesNotFitIsAnError) {
+  const auto with = [&](const std::string& value) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files_.ErrorWith(line, line + "  " + value + "\n");
+  };
+  EXPECT_EQ(with("state_error: {vx: 0.1, py: 0}"), "");
+  EXPECT_EQ(with("state_error: {vx: -1e-9}"), "task.yaml:12: declaration.state_error.vx: -1e-9 is outside [0, inf)");
+  EXPECT_EQ(with("state_error: [0, 0, .nan, 0]"),
+            "task.yaml:12: declaration.state_error[2]: .nan is not a finite number; write a number in [0, inf)");
+  EXPECT_THAT(with("state_error: {ax: 0.1}"), StartsWith("task.yaml:12: declaration.state_error.ax: "));
+  EXPECT_EQ(with("input_error: [0, 0, 1]"),
+            "task.yaml:12: declaration.input_error: has 3 entries, has to have 2: ax, ay");
+  EXPECT_THAT(with("input_error: {vx: 0.1}"), StartsWith("task.yaml:12: declaration.input_error.vx: "));
+}
+
 TEST_F(ErrorTest, AMissingKeyIsAnError) {
   EXPECT_THAT(files_.ErrorWith("transitions: steps.csv\n", ""), StartsWith("task.yaml:1: transitions: missing: "));
   EXPECT_THAT(files_.ErrorWith(", dt: 0.15", ""), StartsWith("task.yaml:1: model.dt: missing: "));

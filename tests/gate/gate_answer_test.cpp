@@ -401,6 +401,24 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
   EXPECT_NE(gate.grounds().observations, config.grounds.observations);
 }
 
+// A robot whose states are recorded with an error of 1/4: at 19.75 m the domain's edge is just reached.
+TEST(GateTransitionTest, ATransitionThatItsErrorsMayTakeOutOfTheDomainIsNotLearned) {
+  Config config = SmallTask();
+  config.gate.learns = true;
+  Problem problem = *config.problem;
+  problem.declaration.state_error = Eigen::Vector4d(0.25, 0, 0, 0);
+  config.problem = std::make_shared<const Problem>(problem);
+  Gate gate(config);
+  transition_t transition{.num_states = 4, .num_inputs = 2};
+  const auto at = [&](double px) {
+    transition.state[0] = transition.next_state[0] = px;
+    return gate.Learn(Encode(transition));
+  };
+  EXPECT_EQ(at(19.75), "");
+  EXPECT_THAT(at(std::nextafter(19.75, 20)),
+              testing::HasSubstr("within the declared errors of states and inputs it may lie outside"));
+}
+
 TEST(CandidateMessageTest, TheStartIsReadFromTheBytesAsADecoderReadsIt) {
   for (const std::int64_t start : {std::int64_t{0}, kNow, std::int64_t{-1}, INT64_MIN, INT64_MAX}) {
     candidate_plan_t candidate = Candidate(7);

@@ -247,6 +247,13 @@ TEST_F(HoldOutTest, CountsEachFreshTransitionThatContradictsALearnedOne) {
   EXPECT_GT(CountContradictions(problem_, declaration_, SplitByTime(120, 8)).contradicting, 0);
 }
 
+TEST_F(HoldOutTest, WhatTheErrorsOfTheRecordExplainDoesNotContradict) {
+  const Split split = SplitByTime(120, 8);
+  EXPECT_GT(CountContradictions(problem_, declaration_, split).contradicting, 0);
+  declaration_.state_error = Vec({0, 0, 0.5, 0});  // the residual is at most 0.02 * 9 in size
+  EXPECT_EQ(CountContradictions(problem_, declaration_, split).contradicting, 0);
+}
+
 TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   const Split split = SplitByTime(120, 4);  // judges by 30..60 and 90..120
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 10).size(), 6u);

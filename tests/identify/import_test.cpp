@@ -149,6 +149,13 @@ TEST_F(ImportTest, OnlyFiniteStatesInTheDomainCount) {
   EXPECT_EQ(From({{0, 0, 1.001}, {0.1, 0}}).At(Dropped::kOutsideDomain).first, "ax 1.001");
 }
 
+TEST_F(ImportTest, AStartThatItsErrorsMayTakeOutOfTheDomainIsDropped) {
+  problem_.declaration.state_error = Vec({0.5, 0, 0, 0});
+  EXPECT_EQ(From({{0, 8.5}, {0.1, 9}}).transitions.size(), 1) << "exactly at the edge";
+  EXPECT_EQ(From({{0, std::nextafter(8.5, 9)}, {0.1, 9}}).transitions.size(), 0);
+  EXPECT_EQ(Again().At(Dropped::kNearTheEdge).count, 1);
+}
+
 TEST_F(ImportTest, UnwrapsAnglesTheShortWayAround) {
   const double pi = std::numbers::pi;
   options_.unwrapped = {0};

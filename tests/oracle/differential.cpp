@@ -487,17 +487,18 @@ Counts RunLimits(const Options& options, long number, Tube& tube, std::mutex& ou
 // All that follows from one seed and one problem's number.
 Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& output) {
   const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
-  Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d);
+  Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d), records(start ^ 0x2545f4914f6cdd1d);
   Counts counts;
   counts.problems = 1;
   const bool absurd = random.Coin(0.25) && !options.texts && !options.kinks;
-  const auto problem = options.kinks   ? AnyTextProblem(random, KinkedText(random))
-                       : options.texts ? AnyTextProblem(random)
-                                       : AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  auto problem = options.kinks   ? AnyTextProblem(random, KinkedText(random))
+                 : options.texts ? AnyTextProblem(random)
+                                 : AnyProblem(random, random.Coin(), random.Integer(1, 20));
   if (!problem) return counts;
   problem->method = options.method;
   Vary(random, *problem);
   if (winds.Coin(0.4)) Disturb(winds, *problem);
+  if (records.Coin(0.3)) problem = Recorded(records, *problem);
   if (absurd) Exaggerate(random, *problem);
   if (absurd && winds.Coin(0.2))
     problem->declaration.disturbance =

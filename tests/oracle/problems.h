@@ -140,6 +140,37 @@ inline void Disturb(Random& random, Problem& problem) {
           (1 - 1e-6) * bound[k] * (random.Coin() ? random.Sign() : random.Uniform(-1, 1));
 }
 
+/** The same as a robot records it whose states and inputs are known to the errors e that it declares, in about half of
+the coordinates: each number that is recorded is off by at most e, many of them by nearly all of it. Whatever residual
+the true transitions admit is that of a robot that may have been recorded so. Transitions that may lie outside the
+domain are left out; if all do, nothing is declared. The margin of 1e-6 is for rounding. */
+inline std::shared_ptr<Problem> Recorded(Random& random, const Problem& truth) {
+  auto problem = std::make_shared<Problem>(truth);
+  const int n = truth.model->num_states(), variables = truth.model->num_variables();
+  Eigen::VectorXd errors = Eigen::VectorXd::Zero(variables);
+  const std::vector<Interval> ranges = truth.domain.Ranges();
+  for (int l = 0; l < variables; ++l)
+    if (random.Coin())
+      errors[l] = std::ldexp(random.Uniform(0.5, 1) * (ranges[static_cast<std::size_t>(l)].HalfWidthUpper()),
+                             -random.Integer(5, 16));
+  problem->declaration.state_error = errors.head(n);
+  problem->declaration.input_error = errors.tail(variables - n);
+  const auto off = [&](double e) {
+    return (1 - 1e-6) * e * (random.Coin(0.7) ? random.Sign() : random.Uniform(-1, 1));
+  };
+  Transitions& data = problem->transitions;
+  std::vector<int> rows;
+  for (int i = 0; i < data.size(); ++i) {
+    for (int l = 0; l < variables; ++l) data.z(i, l) += off(errors[l]);
+    for (int k = 0; k < n; ++k) data.x_next(i, k) += off(errors[k]);
+    const Eigen::VectorXd z = data.z.row(i);
+    if (IsWithin(*problem, View(z))) rows.push_back(i);
+  }
+  if (rows.empty()) return std::make_shared<Problem>(truth);
+  data = Transitions{data.z(rows, Eigen::all), data.x_next(rows, Eigen::all)};
+  return problem;
+}
+
 /** What disturbs one step: by the bound or by anything within it. */
 inline std::vector<Real> AnyDisturbance(Random& random, const Problem& problem) {
   std::vector<Real> w(static_cast<std::size_t>(problem.model->num_states()));

@@ -4,8 +4,10 @@
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_envelope.h"
+#include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"
+#include "tests/oracle/text_problems.h"
 #include "tests/oracle/traced_random.h"
 
 namespace forereach::residual_oracle_test {
@@ -160,6 +162,228 @@ TEST(Observe, RefusesAnAngleThatIsAQuarterOfATurnOrMoreFromItsSuccessor) {
                  "transition 1: theta is 2 rad away from the nominal model's next value, up to whole turns, which is "
                  "more than pi/2: how often it has turned cannot be told");
   }
+}
+
+// e_k + sum_l (sup |D_l f0_k| + L_kl) e_l of the point mass, exactly: its derivatives are 1, dt and dt^2 / 2.
+Rational RecordError(const Declaration& declaration, int k) {
+  const auto e = [&](int l) { return Rational(declaration.VariableError(l)); };
+  const Rational dt(kDt);
+  Rational sum = 2 * e(k) + dt * e(k + 2);
+  if (k < 2) sum += dt * dt / 2 * e(k + 4);
+  for (int l = 0; l < 6; ++l) sum += Rational(declaration.lipschitz(k, l)) * e(l);
+  return sum;
+}
+
+TEST(Observe, WidensByTheErrorsOfTheRecordAndByNoMore) {
+  TracedRandom random(640);
+  const auto model = MakePointMass(kDt);
+  for (int trial = 0; trial < 300; ++trial) {
+    const double scale = std::ldexp(1, random.Integer(-400, 400));
+    const Transitions data{random.Matrix(5, 6, scale), random.Matrix(5, 4, scale)};
+    Declaration declaration{random.Matrix(4, 6).cwiseAbs(), Eigen::VectorXd::Zero(4)};
+    if (trial % 3 != 0) declaration.state_error = random.Vector(4, scale).cwiseAbs();
+    if (trial % 3 != 1) declaration.input_error = random.Vector(2, scale).cwiseAbs();
+    const Observations exact = Observe(*model, data), observations = Observe(*model, declaration, data);
+    for (int i = 0; i < 5; ++i)
+      for (int k = 0; k < 4; ++k) {
+        const Rational error = RecordError(declaration, k), rounding = Rational(scale) * Rational(1e-13);
+        const Rational below = Rational(exact.lower(i, k)) - Rational(observations.lower(i, k)),
+                       above = Rational(observations.upper(i, k)) - Rational(exact.upper(i, k));
+        ASSERT_LE(error, below);
+        ASSERT_LE(error, above);
+        ASSERT_LE(below, error + rounding);
+        ASSERT_LE(above, error + rounding);
+      }
+  }
+}
+
+TEST(Observe, AnErrorOfZeroChangesNoBit) {
+  TracedRandom random(643);
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  const Transitions data{random.Matrix(50, 8, 1.2), random.Matrix(50, 6, 2)};
+  Declaration declaration{random.Matrix(6, 8).cwiseAbs(), Eigen::VectorXd::Zero(6)};
+  declaration.state_error = Eigen::VectorXd::Zero(6);
+  declaration.input_error = Eigen::VectorXd::Zero(2);
+  const Observations undeclared = Observe(*model, data), zeros = Observe(*model, declaration, data);
+  EXPECT_EQ(undeclared.lower, zeros.lower);
+  EXPECT_EQ(undeclared.upper, zeros.upper);
+  declaration.input_error[0] = 0x1p-1074;
+  EXPECT_NE(Observe(*model, declaration, data).lower, zeros.lower);
+}
+
+// A model, its values in high precision, and a residual within a declaration whose sigma and w^ are zero in half of the
+// coordinates.
+struct Robot {
+  std::shared_ptr<const NominalModel> model;
+  TextInHighPrecision nominal;
+  Declaration declaration;
+  Ramps residual;
+
+  Robot(Random& random, const ModelText& text, const std::vector<double>& parameters)
+      : model(MakeTextModel(text)),
+        nominal(text, parameters),
+        declaration(Declared(random, model->num_states(), model->num_variables())),
+        residual(random, declaration.lipschitz) {}
+
+  static Declaration Declared(Random& random, int states, int variables) {
+    const auto some = [&](double largest) { return random.Coin() ? random.Uniform(0, largest) : 0.0; };
+    const auto vector = [&](int size, double largest) {
+      return Eigen::VectorXd(Eigen::VectorXd::NullaryExpr(size, [&] { return some(largest); }));
+    };
+    return {Eigen::MatrixXd::NullaryExpr(states, variables, [&] { return some(1); }), vector(states, 1e-3),
+            vector(states, 1e-3), vector(states, 0.1), vector(variables - states, 0.1)};
+  }
+};
+
+// A transition as it is recorded, and the coordinate whose errors all have one sign, if there is one.
+struct Record {
+  Transitions data;
+  int aligned = -1;
+};
+
+// All numbers are off by less than the errors, by 1e-6 of them for rounding.
+Record AnyRecord(Random& random, const Robot& robot) {
+  const int n = robot.model->num_states(), variables = robot.model->num_variables();
+  Record record{{Eigen::MatrixXd(1, variables), Eigen::MatrixXd(1, n)}};
+  record.aligned = random.Coin(0.8) ? random.Below(n) : -1;
+  const double side = random.Sign();
+  Eigen::VectorXd slopes = Eigen::VectorXd::Zero(variables), z = random.Vector(variables, 2);
+  Linearization there;
+  robot.model->Linearize(View(z), there);
+  for (const auto& [k, l, slope] : there.jacobian())
+    if (k == record.aligned) slopes[l] = slope.Middle();
+  const auto share = [&] { return (1 - 1e-6) * (random.Coin(0.3) ? random.Uniform(-1, 1) : random.Sign()); };
+  std::vector<Real> truth;
+  for (int l = 0; l < variables; ++l) {
+    const double off = record.aligned >= 0 && slopes[l] != 0 ? (1 - 1e-6) * (slopes[l] > 0 ? side : -side) : share();
+    truth.emplace_back(z[l] + off * robot.declaration.VariableError(l));
+  }
+  const std::vector<Real> nominal = robot.nominal(truth);
+  for (int k = 0; k < n; ++k) {
+    const auto off = [&] { return k == record.aligned ? (1 - 1e-6) * side : share(); };
+    record.data.x_next(0, k) =
+        (nominal[static_cast<std::size_t>(k)] + robot.residual(truth, k) +
+         Real(off() * robot.declaration.noise_bound[k]) + Real(off() * robot.declaration.disturbance[k]) +
+         Real(off() * robot.declaration.state_error[k]))
+            .ToDouble();
+  }
+  record.data.z.row(0) = z;
+  return record;
+}
+
+// What is observed at a place that is not the true one bounds the residual at that place. Without what e adds to the
+// successor, to f0 or to the residual it does not.
+TEST(Observe, OfAnInexactRecordBoundsTheResidualWhereItWasRecorded) {
+  TracedRandom random(641);
+  std::array<int, 3> noticed{};
+  int judged = 0, refused = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const ModelText text = random.Coin(0.3) ? KinkedText(random) : AnyText(random);
+    std::vector<double> parameters;
+    for (const auto& [name, lower, upper] : text.parameters) parameters.push_back(random.Coin() ? lower : upper);
+    const Robot robot(random, text, parameters);
+    const Declaration& declaration = robot.declaration;
+    for (int i = 0; i < 10; ++i) {
+      const auto [data, aligned] = AnyRecord(random, robot);
+      if (!data.x_next.allFinite()) continue;
+      Observations seen, exact;
+      try {
+        exact = Observe(*robot.model, data);
+        seen = Observe(*robot.model, declaration, data);
+      } catch (const NoNominalValue&) {
+        ++refused;
+        continue;
+      }
+      const std::vector<Real> z(data.z.row(0).begin(), data.z.row(0).end());
+      for (int k = 0; k < robot.model->num_states(); ++k) {
+        const Real residual = robot.residual(z, k),
+                   eps = Real(declaration.noise_bound[k]) + Real(declaration.disturbance[k]);
+        const auto holds = [&](double less) {
+          return Real(seen.lower(0, k)) + Real(less) - eps <= residual &&
+                 residual <= Real(seen.upper(0, k)) - Real(less) + eps;
+        };
+        ASSERT_TRUE(holds(0)) << "trial " << trial << ", record " << i << ", coordinate " << k;
+        ++judged;
+        double of_residual = 0;
+        for (int l = 0; l < robot.model->num_variables(); ++l)
+          of_residual += declaration.lipschitz(k, l) * declaration.VariableError(l);
+        const double of_successor = declaration.state_error[k],
+                     of_model = exact.lower(0, k) - seen.lower(0, k) - of_successor - of_residual;
+        noticed[0] += !holds(of_successor);
+        noticed[1] += !holds(of_model);
+        noticed[2] += !holds(of_residual);
+      }
+    }
+  }
+  std::cout << judged << " bounds, " << refused << " records without one; too weak without the error of the successor "
+            << noticed[0] << ", of f0 " << noticed[1] << ", of the residual " << noticed[2] << "\n";
+  EXPECT_GT(judged, 4000);
+  EXPECT_LT(refused, judged / 10);
+  EXPECT_THAT(noticed, testing::Each(testing::Gt(20)));
+}
+
+// The slope counts at its largest within the errors: at the recorded place that of z^2 is zero.
+TEST(Observe, TheSlopeOfTheModelIsTheLargestWithinTheErrors) {
+  const auto model = MakeTextModel(TextModel({{"x", "x^2"}}, {"u"}, {{"dt", 1, 1}}));
+  Declaration declaration{Eigen::MatrixXd::Zero(1, 2), Eigen::VectorXd::Zero(1)};
+  declaration.state_error = Eigen::VectorXd::Constant(1, 0.5);
+  const Transitions data{Eigen::MatrixXd::Zero(1, 2), Eigen::MatrixXd::Ones(1, 1)};
+  EXPECT_LE(Observe(*model, declaration, data).lower(0, 0), 1 - 0.5 - 2 * 0.5 * 0.5);
+  EXPECT_GE(Observe(*model, declaration, data).lower(0, 0), 1 - 0.5 - 2 * 0.5 * 0.5 - 1e-15);
+}
+
+// Where the value of the model is known and its slope is not, as of the root at zero, the record is refused with the
+// state's name.
+TEST(Observe, RefusesARecordWhoseErrorsReachAnUnboundedSlope) {
+  const auto model = MakeTextModel(TextModel({{"y", "y"}, {"x", "sqrt(x) + y"}}, {"u"}, {{"dt", 1, 1}}));
+  const auto observe = [&](double x, double e_x, double e_y) {
+    Declaration declaration{Eigen::MatrixXd::Zero(2, 3), Eigen::VectorXd::Zero(2)};
+    declaration.state_error = Eigen::Vector2d(e_y, e_x);
+    Transitions data{Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 2)};
+    data.z(0, 1) = x;
+    return Observe(*model, declaration, data);
+  };
+  EXPECT_NO_THROW(observe(0.25, 0.125, 0));
+  EXPECT_NO_THROW(observe(0, 0, 0.125)) << "x is exact";
+  for (const double error : {0.25, 0.5}) {  // to the end of the root's domain, and beyond it
+    try {
+      observe(0.25, error, 0);
+      FAIL() << error;
+    } catch (const NoNominalValue& refused) {
+      EXPECT_EQ(refused.at(), NoNominalValue::At::kAround);
+      EXPECT_STREQ(refused.what(),
+                   "transition 0: x: the nominal model has no finite derivative within the declared errors of states "
+                   "and inputs there");
+    }
+  }
+  try {
+    observe(-1, 0.5, 0);
+    FAIL();
+  } catch (const NoNominalValue& refused) {
+    EXPECT_EQ(refused.at(), NoNominalValue::At::kLocation);
+  }
+}
+
+// theta+ = theta at a standstill: an error of 1/4 counts before and after the step, and the turns are told as long as
+// all of it is within a quarter of a turn.
+TEST(Observe, RefusesAnAngleIfItsErrorsReachAQuarterOfATurn) {
+  const auto model = MakeKinematicBicycle(0.5, 2, {2});
+  Declaration declaration{Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+  declaration.state_error = Eigen::VectorXd::Unit(6, 2) * 0.25;
+  const auto observe = [&](double next) {
+    Transitions data{Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
+    data.x_next(0, 2) = next;
+    return Observe(*model, declaration, data);
+  };
+  const double quarter = std::numbers::pi / 2, inside = quarter - 0.5 - 0x1p-48;
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_NO_THROW(observe(sign * inside));
+    EXPECT_THROW(observe(sign * (quarter - 0.5)), AmbiguousAngle);
+    EXPECT_THROW(observe(sign * 1.5), AmbiguousAngle);
+    EXPECT_NO_THROW(observe(sign * 5.3)) << "a turn less: 0.983";
+    EXPECT_THROW(observe(sign * 5.2), AmbiguousAngle) << "a turn less: 1.083";
+  }
+  EXPECT_THAT(Thrown<AmbiguousAngle>([&] { observe(1.25); }), testing::HasSubstr("theta is 1.25 +- 0.5 rad away"));
 }
 
 // One coordinate, columns of L as given, exactly known residuals.

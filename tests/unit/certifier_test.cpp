@@ -375,6 +375,69 @@ TEST(Certifier, ADisturbanceExplainsDataThatContradictEachOtherWithoutIt) {
   EXPECT_TRUE(Judge(problem).certifier().violation());
 }
 
+// s+ = s + r(v), r changes by at most 0.5 for a change of 1 in v, and v was recorded as 1.1 +- 0.1 when s went from 0
+// to 0.5, which is exact. So r(1.1) is at most 0.5 + 0.5 * 0.1, and a robot that starts with exactly v = 1.1 gets to
+// 0.55.
+Problem RecordedOnce(double error) {
+  const ModelText text = TextModel({{"s", "s"}, {"y", "y"}, {"v", "v"}}, {"a"}, {{"dt", 0.1, 0.1}});
+  Problem problem = WorldOf(MakeTextModel(text), Box(Vec({-10, -10, -3}), Vec({50, 10, 3})), Within({5}));
+  problem.method = Method::kPaper;
+  problem.declaration.lipschitz(0, 2) = 0.5;
+  problem.declaration.noise_bound[2] = 0.2;
+  problem.declaration.state_error = Vec({0, 0, error});
+  problem.transitions = {Vec({0, 0, 1.1, 0}).transpose(), Vec({0.5, 0, 1.1}).transpose()};
+  return problem;
+}
+
+TEST(Certifier, AnErrorOfTheRecordedPlaceCountsByTheSlopeOfTheResidual) {
+  Judge exact(RecordedOnce(0)), inexact(RecordedOnce(0.1));
+  const auto at_wall = [](Judge& judge, double s) {
+    return judge(PointSet(Vec({0, 0, 1.1})), Eigen::MatrixXd::Zero(1, 1), {Obstacle::HalfSpace(Vec({1, 0}), s)})
+        .outcome;
+  };
+  constexpr double kHair = 1e-13;
+  EXPECT_EQ(at_wall(exact, 0.52), Outcome::kCertified);
+  EXPECT_EQ(at_wall(exact, 0.5 + kHair), Outcome::kCertified);
+  EXPECT_EQ(at_wall(inexact, 0.52), Outcome::kSafety);
+  EXPECT_EQ(at_wall(inexact, 0.55 - kHair), Outcome::kSafety);
+  EXPECT_EQ(at_wall(inexact, 0.55 + kHair), Outcome::kCertified);
+}
+
+TEST(Certifier, AnErrorOfTheRecordExplainsDataThatContradictEachOtherWithoutIt) {
+  Problem problem = PointMassInHalves();
+  problem.transitions = {Eigen::MatrixXd::Zero(2, 6), Eigen::MatrixXd::Zero(2, 4)};
+  problem.transitions.x_next(1, kVx) = 0.5;
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+  problem.declaration.state_error = Vec({0, 0, 0, 0});
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+  problem.declaration.state_error[kVx] = 0.125;  // of each of two records, before and after the step
+  EXPECT_FALSE(Judge(problem).certifier().violation());
+  problem.declaration.state_error[kVx] = 0.125 * (1 - 0x1p-50);
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+  problem.declaration.state_error[kVx] = 0;
+  problem.declaration.input_error = Vec({0.5, 0});  // vx+ = vx + ax / 2
+  EXPECT_FALSE(Judge(problem).certifier().violation());
+  problem.declaration.input_error[0] = 0.5 * (1 - 0x1p-50);
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+}
+
+TEST(Certifier, RefusesATransitionThatMayLieOutsideTheDomainWithinItsErrors) {
+  Problem problem = PointMassInHalves(4);
+  problem.declaration.state_error = Vec({0, 0, 0.25, 0});
+  const auto at_speed = [&](double v) {
+    problem.transitions.z(0, kVx) = v;
+    problem.transitions.x_next(0, kVx) = v;
+    problem.transitions.x_next(0, kPx) = v / 2;
+    return Thrown<std::invalid_argument>([&] { Judge judge(problem); });
+  };
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_EQ(at_speed(sign * 3.75), "") << "exactly at the edge";
+    EXPECT_EQ(at_speed(sign * (3.75 - 0x1p-50)), "");
+    EXPECT_EQ(at_speed(sign * (3.75 + 0x1p-50)),
+              "transition 0: lies outside the certification domain, or may within the declared errors");
+  }
+}
+
 TEST(Certifier, UsesTheHullDistanceOnlyAboveTwelveColumns) {
   EXPECT_FALSE(Judge(BicycleProblem()).certifier().uses_hull_distance());
 }
@@ -499,6 +562,9 @@ TEST(Certifier, RefusesAProblemAndNamesThePartThatDoesNotFit) {
       "disturbance has 3 entries, must have 4");
   for (const double bad : {-0.5, kNan, kInfinity})
     ExpectRefused([bad](Problem& p) { p.declaration.disturbance = Vec({0, 0, bad, 0}); }, "disturbance 2");
+  ExpectRefused([](Problem& p) { p.declaration.state_error = Vec({0, 0, 0, -1}); }, "state_error 3");
+  ExpectRefused([](Problem& p) { p.declaration.state_error = Vec({0}); }, "state_error has 1 entries, must have 4");
+  ExpectRefused([](Problem& p) { p.declaration.input_error = Vec({0, kNan}); }, "input_error 1");
   ExpectRefused([](Problem& p) { p.transitions = {}; }, "transitions: none given");
   ExpectRefused([](Problem& p) { p.transitions.z.conservativeResize(1, 5); }, "transitions: 5 columns");
   ExpectRefused([](Problem& p) { p.transitions.x_next.conservativeResize(1, 3); }, "transitions");

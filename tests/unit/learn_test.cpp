@@ -3,6 +3,8 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/text_model.h"
+#include "tests/text_models.h"
 #include "tests/worlds.h"
 
 namespace forereach::learn_test {
@@ -114,6 +116,59 @@ TEST_F(LearnTest, RefusesATransitionInsideTheBoxAndOutsideTheDomain) {
   z = Draw();
   EXPECT_EQ(Learn(certifier, z, Eigen::VectorXd::Constant(6, INFINITY)), Certifier::Learned::kNotFinite);
   EXPECT_EQ(certifier.num_observations(), 2u);
+}
+
+// In the ball {v, delta} of radius 9 about (10, 0), and by the bounds of the other states.
+TEST_F(LearnTest, RefusesATransitionThatItsErrorsMayTakeOutOfTheDomain) {
+  problem_.declaration.state_error = Vec({0, 0.5, 0, 0.25, 0, 0});
+  problem_.declaration.input_error = Vec({0, 0.5});
+  Eigen::VectorXd z = Draw();
+  z[5] = 0;
+  Add(problem_, z, Next(z));
+  Certifier certifier(std::make_shared<Problem>(problem_));
+  const auto learn_at = [&](int l, double value) {
+    Eigen::VectorXd there = z;
+    there[l] = value;
+    return Learn(certifier, there, Next(there));
+  };
+  using Edge = std::tuple<int, double, double>;
+  for (const auto& [l, edge, outside] : {Edge{3, 18.75, 19}, Edge{1, 39.5, 40}, Edge{1, -39.5, -40}, Edge{7, 1.5, 2}}) {
+    EXPECT_EQ(learn_at(l, edge), Learned::kAdded) << l << ", exactly at the edge";
+    EXPECT_EQ(learn_at(l, std::nextafter(edge, 0)), Learned::kAdded) << l;
+    EXPECT_EQ(learn_at(l, std::nextafter(edge, 2 * edge)), Learned::kNearTheEdge) << l;
+    EXPECT_EQ(learn_at(l, outside), Learned::kNearTheEdge) << l;
+    EXPECT_EQ(learn_at(l, std::nextafter(outside, 2 * outside)), Learned::kOutsideDomain) << l;
+  }
+  EXPECT_EQ(learn_at(0, 40), Learned::kAdded) << "x is exact";
+  EXPECT_FALSE(certifier.violation());
+}
+
+// A robot that records its speed with errors contradicts what it recorded before, unless it says so.
+TEST_F(LearnTest, AnInexactRecordContradictsUnlessItsErrorIsDeclared) {
+  const Eigen::VectorXd z = Draw();
+  Add(problem_, z, Next(z));
+  Eigen::VectorXd next = Next(z);
+  next[3] += 0.125;  // v: an error of 1/32 in each of four numbers
+  for (const double error : {0.0, 0x1p-5 * (1 - 1e-9), 0x1p-5 * (1 + 1e-9)}) {
+    problem_.declaration.state_error = Vec({0, 0, 0, error, 0, 0});
+    Certifier certifier(std::make_shared<Problem>(problem_));
+    EXPECT_EQ(Learn(certifier, z, next), Learned::kAdded);
+    EXPECT_EQ(certifier.violation().has_value(), error < 0x1p-5) << error;
+  }
+}
+
+TEST_F(LearnTest, LearnsNothingWhereTheErrorsReachAnUnboundedSlope) {
+  const ModelText text = TextModel({{"x", "sqrt(x + 1)"}}, {"u"}, {{"dt", 1, 1}});
+  Problem problem = WorldOf(MakeTextModel(text), Within({1}), Within({1}));
+  problem.declaration.state_error = Vec({0.25});
+  Certifier certifier(std::make_shared<Problem>(problem));
+  const auto learn = [&](double x) {
+    const std::vector<double> z{x, 0}, next{std::sqrt(x + 1)};
+    return certifier.Learn(z, next);
+  };
+  EXPECT_EQ(learn(-0.5), Learned::kAdded);
+  EXPECT_EQ(learn(-0.75), Learned::kNoNominalSlope) << "to the end of the root's domain";
+  EXPECT_EQ(learn(-0.8), Learned::kNearTheEdge);
 }
 
 TEST_F(LearnTest, LearnsNothingWhereTheNominalModelHasNoFiniteValue) {

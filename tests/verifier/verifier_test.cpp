@@ -241,6 +241,42 @@ TEST(HandMade, ADisturbanceCountsForBothSteps) {
   ExpectRefuted(Judge(problem, sure_of_the_residual), 0, "residual of px");
 }
 
+// px+ = px + vx / 2 + ax / 8. With e = 1/4 in vx and 1/8 in ax, L = 1/2 of px by vx and of vx by ax:
+// px: 1/8 + 1/64 + 1/8, vx: 1/4 after the step, 1/4 before it, 1/16 by ax, and 1/16.
+TEST(HandMade, ErrorsOfTheRecordCountForSuccessorModelAndResidual) {
+  const auto problem = Halves();
+  problem->declaration.lipschitz(0, 2) = problem->declaration.lipschitz(2, 4) = 0.5;
+  problem->declaration.state_error = Eigen::Vector4d(0, 0, 0.25, 0);
+  problem->declaration.input_error = Eigen::Vector2d(0.125, 0);
+  const double px = 0.265625, vx = 0.625;
+  const auto certificate = [&](double of_px, double of_vx) {
+    Certificate here = OneStep();  // D: 1/2 of px over the box of speeds, 1/2 of vx at the input 1
+    here.slices[0].envelope_lower = Eigen::Vector4d(-of_px - 0.5, -kTiny, -of_vx - 0.5, -kTiny);
+    here.slices[0].envelope_upper = Eigen::Vector4d(of_px + 0.5, kTiny, of_vx + 0.5, kTiny);
+    here.slices[1].lower -= Eigen::Vector4d(1, 0, 2, 0);
+    here.slices[1].upper += Eigen::Vector4d(1, 0, 2, 0);
+    return here;
+  };
+  constexpr double kHair = 1e-15;
+  ExpectConfirmed(Judge(problem, certificate(px + kHair, vx + kHair)));
+  ExpectRefuted(Judge(problem, certificate(px - kHair, vx + kHair)), 0, "residual of px");
+  ExpectRefuted(Judge(problem, certificate(px + kHair, vx - kHair)), 0, "residual of vx");
+}
+
+// Within its error the only transition may lie outside the domain: then nothing is known of the residual.
+TEST(HandMade, ATransitionThatMayLieOutsideTheDomainSaysNothing) {
+  const auto problem = Halves();
+  const auto with = [&](double error) {
+    problem->declaration.state_error = Eigen::Vector4d(error, 0, 0, 0);
+    Certificate wide = OneStep();
+    wide.slices[1].lower[0] = -100;
+    wide.slices[1].upper[0] = 100;
+    return Judge(problem, wide);
+  };
+  ExpectConfirmed(with(8));
+  EXPECT_NE(with(Up(8)).status, Status::kConfirmed);
+}
+
 TEST(HandMade, DistanceFromSetToSampleIsExact) {
   const auto problem = Halves();
   problem->declaration.lipschitz(0, 2) = 0.25;  // two columns: over the unit box D = 1/4 + 1/2 at the sample 0
