@@ -158,10 +158,10 @@ class Importer {
 
   [[nodiscard]] long double TargetOf(std::size_t i) const { return samples_[i].time + options_.period; }
 
-  // How far the stamps of samples i and j can be off t_i + dt by the rounding of decimals to doubles.
+  // How far the stamps of samples i and j may be off t_i + dt by the rounding of decimals to doubles.
   [[nodiscard]] long double RoundingOf(std::size_t i, std::size_t j) const {
-    return std::numeric_limits<double>::epsilon() *
-           (std::max(std::abs(samples_[i].time), std::abs(samples_[j].time)) + options_.period);
+    const long double size = std::max(std::abs(samples_[i].time), std::abs(samples_[j].time)) + options_.period;
+    return std::min(std::numeric_limits<double>::epsilon() * size, ImportOptions::kRounding * options_.period);
   }
 
   // The sample nearest to a step behind sample i in its piece, 0 with the cause counted if there is none.

@@ -26,7 +26,9 @@ namespace forereach {
 
 struct ImportOptions {
   double period = 0;     ///< dt, s, positive.
-  double tolerance = 0;  ///< Of a stamp, beyond the rounding of stamps to doubles; s, not negative, less than dt / 2.
+  double tolerance = 0;  ///< Of a stamp, s, not negative and less than dt / 2.
+  /** The rounding of stamps to doubles is no distance, up to this share of dt. */
+  static constexpr long double kRounding = 1e-5L;
   /** The stamps are in the table's first column, and one of their units is so many seconds. Not positive: there is no
   such column, and the rows are `row_spacing` apart. */
   long double time_unit = 1;
