@@ -231,6 +231,24 @@ TEST_F(LateCommandTest, CheckSaysHowManyStepsLieOutside) {
   EXPECT_THAT(Forereach(init + " 2>&1").text, Not(HasSubstr("outside the slices"))) << "slopes of 1 promise little";
 }
 
+// In every other pair of steps the robot jumps from where it stood before.
+TEST_F(LateCommandTest, InitSaysHowManyStepsLieOutside) {
+  const auto init = [&](double jump) {
+    std::ostringstream rows("x,u,x_next\n", std::ios::ate);
+    for (int block = 0; block < 20; ++block) {
+      const double step = block % 2 == 0 ? 0 : jump;
+      rows << "0,0," << step << "\n" << step << ",0," << 2 * step << "\n";
+    }
+    scratch_.Write("jumps.csv", rows.str());
+    return Forereach("init --force --transitions " + scratch_ / "jumps.csv" + " --dt 0.1 --out " +
+                     scratch_ / "new.yaml" + " 2>&1")
+        .text;
+  };
+  EXPECT_THAT(init(0.5), HasSubstr("20 of 20 recorded steps lie outside the slices"));
+  EXPECT_THAT(init(0.5), HasSubstr("(10 stretches of 2 steps)"));
+  EXPECT_THAT(init(0.01), Not(HasSubstr("outside the slices"))) << "less than the errors that it declares";
+}
+
 // A sensor whose error is a little larger than declared: only pairs at nearly the same place show it.
 TEST(NoiseCliff, TheKneeIsProposedInsteadOfASteepSlope) {
   const ScratchDirectory scratch;
