@@ -12,6 +12,7 @@
 #include "cli/offline.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/text.h"
+#include "identify/declare_data.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -113,7 +114,11 @@ Json ToJson(const TaskCheck& check) {
 
 int Check(const CheckArguments& options) {
   std::vector<std::string> files = options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
-  const TaskCheck check = CheckTask(options.check);
+  TaskCheck check = CheckTask(options.check);
+  if (const std::string warning = WarningOfTask(options.check.config); !warning.empty())
+    check.findings.push_back({.place = options.check.config + ": declaration: ",
+                              .what = warning,
+                              .advice = "declare more: `forereach declare --from-data` proposes a disturbance"});
   const bool lacks_picture = !files.empty() && !check.is_planar;
   if (lacks_picture) files.clear();
   for (const std::string& file : files) DrawPicture(check.picture, file);

@@ -29,7 +29,7 @@ struct DeclareArguments {
   std::string config, cover, check;
   std::string from = "equations";
   bool json = false, between = false, from_data = false;
-  std::string noise = "declared";
+  std::string noise = "declared", disturbance = "estimated";
   DataCommand data;
   SlopeBoundOptions search;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
@@ -364,6 +364,11 @@ Command DeclareCommand() {
                    .help = "The task's noise_bound, or that raised to what the transitions show of their error",
                    .one_of = {"declared", "estimated"},
                    .needs = "--from-data"},
+                  {.name = "--disturbance",
+                   .variable = &options->disturbance,
+                   .help = "The task's disturbance, or that raised to the scatter beyond noise_bound of near places",
+                   .one_of = {"declared", "estimated"},
+                   .needs = "--from-data"},
                   {.name = "--hold-out",
                    .variable = &options->data.hold_out,
                    .help = "Learn from every other block of time, and judge by those between",
@@ -397,6 +402,7 @@ Command DeclareCommand() {
           DataCommand& data = options->data;
           data.config = options->config;
           data.estimate_noise = options->noise == "estimated";
+          data.estimate_disturbance = options->disturbance == "estimated";
           data.json = options->json;
           data.jobs = options->jobs;
           return data.hold_out ? DeclareHoldOut(data) : DeclareFromData(data);

@@ -52,9 +52,11 @@ std::string Short(double value) {
 }
 
 std::string DeviationText(const FittedParameter& parameter) {
+  if (std::isnan(parameter.deviation)) return "none: no informative number is left over to show the noise";
   if (std::isfinite(parameter.deviation)) return Short(parameter.deviation);
-  return parameter.together.empty() ? "not determined: it has no effect on these transitions"
-                                    : "not determined, only together with " + Joined(parameter.together);
+  if (!parameter.together.empty()) return "not determined, only together with " + Joined(parameter.together);
+  return parameter.elsewhere ? "not determined: it has no effect near " + Short(parameter.after) + "; begin elsewhere"
+                             : "not determined: it has no effect on these transitions";
 }
 
 std::string Yaml(const Fit& fit) {
@@ -76,6 +78,7 @@ Json ToJson(const Fit& fit, const NominalModel& model) {
          {"before", each.before},
          {"after", each.after},
          {"deviation", std::isfinite(each.deviation) ? Json(each.deviation) : Json(nullptr)},
+         {"why_no_deviation", std::isfinite(each.deviation) ? Json(nullptr) : Json(DeviationText(each))},
          {"undetermined_with", each.together}});
   for (Eigen::Index k = 0; k < fit.after.cols(); ++k)
     document["states"].push_back({{"name", model.state_names()[ToSize(k)]},

@@ -1,10 +1,13 @@
 #include <algorithm>
+#include <array>
 #include <iomanip>
 #include <iostream>
 #include <map>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -31,7 +34,7 @@ struct ImportArguments {
   std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
   std::optional<double> rate, from, until;
   double tolerance_ms = 0.001;
-  bool input_mean = false, overlapping = false, json = false;
+  bool input_mean = false, overlapping = false, keep_few = false, json = false;
 };
 
 // ---- NAME=VALUE options
@@ -170,6 +173,8 @@ Json ToJson(const Source& source, const std::vector<std::string>& columns) {
                 {"transitions", source.log.transitions.size()},
                 {"blank_lines", source.table.blank.count},
                 {"comments", source.table.comments.count},
+                {"repeated_headers", source.table.headers.count},
+                {"decimal_commas", source.table.decimal_commas.count},
                 {"dropped", Json::object()},
                 {"not_a_number", Json::object()},
                 {"largest_offset_s", source.log.largest_offset},
@@ -207,7 +212,7 @@ void PrintGaps(const ImportedLog& log, const ImportArguments& options) {
 void PrintForPeople(const Source& source, const std::vector<std::string>& columns, const ImportArguments& options) {
   const auto& [table, log] = source;
   std::cout << table.path << ": " << log.transitions.size() << " transitions from " << table.values.rows() << " rows";
-  if (log.typical_spacing > 0) std::cout << ", typically " << RoundedUp(log.typical_spacing) << " s apart";
+  if (log.typical_spacing > 0) std::cout << fmt::format(", typically {:.6g} s apart", log.typical_spacing);
   if (table.blank.count + table.comments.count > 0)
     std::cout << "; " << table.blank.count << " blank lines, " << table.comments.count << " comments";
   std::cout << "\n";
@@ -215,6 +220,10 @@ void PrintForPeople(const Source& source, const std::vector<std::string>& column
     if (const Finding& finding = table.not_a_number[j]; finding.count > 0)
       std::cout << Line({finding.count, finding.first_line, "'" + finding.first + "'"},
                         "fields of '" + columns[j] + "' that are no number");
+  if (const Finding& commas = table.decimal_commas; commas.count > 0)
+    std::cout << Line({commas.count, commas.first_line, "'" + commas.first + "'"},
+                      "numbers with a decimal comma: write a point");
+  if (table.headers.count > 0) std::cout << Line(table.headers, "lines that repeat the header");
   for (std::size_t cause = 0; cause < log.dropped.size(); ++cause)
     if (log.dropped[cause].count > 0) {
       std::cout << Line(log.dropped[cause], Explain(static_cast<Dropped>(cause)));
@@ -252,6 +261,63 @@ void PrintErrors(const std::vector<Source>& sources, const ImportArguments& opti
                  "include it.\n";
 }
 
+// What a user can do about a cause. Empty where nothing was lost.
+std::string Remedy(Dropped cause) {
+  switch (cause) {
+    case Dropped::kRowLost: return "mend these lines, or say with --delimiter what separates their fields";
+    case Dropped::kNoStamp: return "write the stamps as decimal numbers";
+    case Dropped::kRepeatedStamp: return "leave one row for each stamp";
+    case Dropped::kBackwards: return "sort the rows by their stamps if they are of one run";
+    case Dropped::kEnd: return "record longer runs without a break";
+    case Dropped::kGap: return "raise --tolerance-ms, or let model.dt be a multiple of the log's spacing";
+    case Dropped::kNoState:
+    case Dropped::kNoInput: return "write these fields as decimal numbers";
+    case Dropped::kInputChanges: return "give --input-mean or --input-tolerance";
+    case Dropped::kOutsideDomain: return "widen the task's domain, or give the columns' units with --unit";
+    case Dropped::kNoNominalValue: return "mend the model's equations there";
+    case Dropped::kAmbiguousAngle: return "record in rad, or with a smaller model.dt";
+    case Dropped::kRepeatedRow:
+    case Dropped::kOutsideWindow:
+    case Dropped::kCount: break;
+  }
+  return "";
+}
+
+// Of the rows of all logs, those that lie in a transition.
+struct Share {
+  std::int64_t rows = 0, used = 0;
+  Dropped main_cause = Dropped::kCount;
+  double gap = 0;  // s, the largest median distance of a log's starts without a stamp near t + dt
+
+  [[nodiscard]] bool IsFew() const { return 2 * used < rows; }
+};
+
+Share ShareOf(const std::vector<Source>& sources) {
+  Share share;
+  std::array<std::int64_t, static_cast<std::size_t>(Dropped::kCount)> counts{};
+  for (const Source& source : sources) {
+    share.rows += source.log.rows;
+    share.used += source.log.rows_used;
+    share.gap = std::max(share.gap, source.log.median_gap);
+    for (std::size_t cause = 0; cause < counts.size(); ++cause)
+      if (!Remedy(static_cast<Dropped>(cause)).empty()) counts[cause] += source.log.dropped[cause].count;
+  }
+  share.main_cause = static_cast<Dropped>(std::ranges::max_element(counts) - counts.begin());
+  return share;
+}
+
+// Which part of the rows is in no transition, and what helps.
+void PrintShare(const Share& share, double period) {
+  if (share.used == share.rows) return;
+  const std::int64_t dropped = share.rows - share.used;
+  const bool tolerable = share.main_cause == Dropped::kGap && share.gap < period / 2;
+  std::cout << fmt::format(
+      "import: {} of {} rows ({:.3g} %) are in no transition; the most frequent reason: {} ({})\n", dropped, share.rows,
+      100.0 * static_cast<double>(dropped) / static_cast<double>(share.rows), Explain(share.main_cause),
+      tolerable ? "--tolerance-ms " + RoundedUp(share.gap * 1000, 3) + " takes half of these starts"
+                : Remedy(share.main_cause));
+}
+
 // Without --time and --rate, a column of this name has the stamps.
 void FindTime(ImportArguments& options) {
   constexpr const char* kUsual = "time";
@@ -287,19 +353,30 @@ int RunImport(ImportArguments options) {
     progress->Advance();
   }
   progress.reset();
-  if (all.size() > 0) SaveTransitions(options.out, model, all);
+  const Share share = ShareOf(sources);
+  const bool writes = all.size() > 0 && (options.keep_few || !share.IsFew());
+  if (writes) SaveTransitions(options.out, model, all);
   if (options.json) {
-    Json document{{"transitions", all.size()}, {"period_s", config.period}, {"logs", Json::array()}};
-    document["out"] = all.size() > 0 ? Json(options.out) : Json(nullptr);
+    Json document{{"transitions", all.size()},
+                  {"period_s", config.period},
+                  {"rows", share.rows},
+                  {"rows_used", share.used},
+                  {"logs", Json::array()}};
+    document["out"] = writes ? Json(options.out) : Json(nullptr);
     for (const Source& source : sources) document["logs"].push_back(ToJson(source, columns));
     std::cout << JsonText(document) << std::endl;
   } else {
     for (const Source& source : sources) PrintForPeople(source, columns, options);
     PrintErrors(sources, options, model);
     std::cout << "import: " << all.size() << " transitions of " << ToText(config.period) << " s"
-              << (all.size() > 0 ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
+              << (writes ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
+    PrintShare(share, config.period);
   }
-  return all.size() > 0 ? 0 : 1;
+  if (all.size() > 0 && !writes)
+    std::cerr
+        << "forereach: less than half of the rows lie in a transition, and which half may be no matter of chance: "
+           "nothing is written. --keep-few writes it.\n";
+  return writes ? 0 : 1;
 }
 
 std::string UnitNames() {
@@ -354,6 +431,8 @@ Command ImportCommand() {
                    .excludes = "--input-tolerance"},
                   {"--overlapping", &options->overlapping, "",
                    "Start a transition at each sample; by default where the one before it ended"},
+                  {"--keep-few", &options->keep_few, "",
+                   "Write the transitions also if less than half of the rows are in one"},
                   {"--from", &options->from, "", "Leave out samples before so many seconds after a log's first stamp",
                    NumberRange{0, 1e12}},
                   {"--until", &options->until, "", "Leave out samples after so many seconds", NumberRange{0, 1e12}},

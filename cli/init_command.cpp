@@ -16,6 +16,7 @@
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "identify/declare_data.h"
 #include "task/config.h"
 #include "task/csv.h"
 #include "task/files.h"
@@ -274,6 +275,8 @@ int Init(const InitArguments& options) {
             << " inputs\n  now: put in what your robot is where a line says PLACEHOLDER";
   if (!task.transitions_exist) std::cout << ", record " << task.transitions;
   std::cout << ", and run\n  forereach check " << options.out << std::endl;
+  if (const std::string warning = WarningOfTask(options.out); !warning.empty())
+    std::cerr << "forereach: warning: " << warning << std::endl;
   return 0;
 }
 

@@ -59,7 +59,9 @@ bool Try(Bytes data) {
     Require(log.samples ==
             log.transitions.size() + Sum(log, {kEnd, kGap, kNoState, kNoInput, kInputChanges, kOutsideDomain,
                                                kNearTheEdge, kNoNominalValue, kAmbiguousAngle}));
-    Require(std::ssize(log.lines) == log.transitions.size() && log.largest_offset <= options.tolerance);
+    Require(std::ssize(log.lines) == log.transitions.size());
+    Require(log.largest_offset <= options.tolerance + static_cast<double>(ImportOptions::kRounding) * options.period);
+    Require(0 <= log.rows_used && log.rows_used <= log.rows);
     for (Eigen::Index i = 0; i < log.transitions.size(); ++i) {
       Require(problem.domain.state.Contains(log.transitions.z.row(i).head(2).transpose()) &&
               problem.domain.input.Contains(log.transitions.z.row(i).tail(1).transpose()) &&

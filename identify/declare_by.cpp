@@ -61,8 +61,10 @@ std::string Explain(const Unexplained& found, const Config& config, const Propos
          (columns.empty() ? std::string("of a residual that may depend on nothing") : "agree in " + columns) +
          ", and their residuals of " + model.state_names()[ToSize(found.coordinate)] + " differ by " +
          RoundedDown(found.pair.difference, 4) +
-         " more than noise_bound and disturbance allow. Raise their sum by at least half of that (--noise estimated "
-         "proposes a noise_bound), or let the residual depend on more (--by)";
+         " more than noise_bound and disturbance allow. If the robot does not always do the same there, that is a "
+         "disturbance (--disturbance estimated); if the residual depends on more, name it (--by); if the sensor errs "
+         "by "
+         "half of that, raise noise_bound (--noise estimated)";
 }
 
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {

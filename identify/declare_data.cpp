@@ -4,6 +4,8 @@
 #include <iostream>
 #include <sstream>
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "command_line/progress.h"
@@ -96,6 +98,34 @@ void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostre
   }
 }
 
+// The smallest slopes of each row with scatter against its disturbance.
+void PrintTrades(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+  const std::vector<std::string> names = model.variable_names();
+  bool any = false;
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
+    const ProposedRow& row = proposal.rows[k];
+    for (std::size_t i = 0; i < row.trades.size(); ++i) {
+      const ProposedRow::Trade& trade = row.trades[i];
+      if (!any)
+        out << "\n  " << std::left << std::setw(12) << "row" << std::setw(14) << "noise_bound" << std::setw(14)
+            << "disturbance"
+            << "smallest slopes\n";
+      any = true;
+      std::string slopes;
+      for (std::size_t l = 0; trade.slopes && l < names.size(); ++l)
+        if (const double slope = (*trade.slopes)[static_cast<Eigen::Index>(l)]; slope > 0)
+          slopes += (slopes.empty() ? "" : ", ") + names[l] + " " + RoundedUp(slope, kTableDigits);
+      const std::string what = !trade.slopes ? "none are consistent" : slopes.empty() ? "none are needed" : slopes;
+      const char* note = i + 2 == row.trades.size()   ? "  <- the knee"
+                         : i + 1 == row.trades.size() ? "  <- proposed"
+                                                      : "";
+      out << "  " << std::setw(12) << names[k] << std::setw(14)
+          << ToText(proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)]) << std::setw(14)
+          << RoundedUp(trade.disturbance, kTableDigits) << what << note << "\n";
+    }
+  }
+}
+
 // Rows whose declared error is below what the data show of it.
 std::vector<std::string> TooQuiet(const Proposal& proposal, const NominalModel& model) {
   std::vector<std::string> names;
@@ -106,8 +136,10 @@ std::vector<std::string> TooQuiet(const Proposal& proposal, const NominalModel& 
 }
 
 void PrintMeaning(const Proposal& proposal, const NominalModel& model, const DataCommand& command, std::ostream& out) {
-  std::vector<std::string> constant;
+  std::vector<std::string> constant, scattered;
   for (const int l : proposal.constant) constant.push_back(model.variable_names()[ToSize(l)]);
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k)
+    if (proposal.rows[k].scatter > 0) scattered.push_back(model.state_names()[k]);
   out << "\nsmallest: the slopes with the least sum, each weighed by its column's standard deviation, that no two "
          "transitions\n  contradict. Every smaller sum is contradicted; the lines are a pair that needs the slope.\n"
          "at least: no smaller slope is possible there, if the row's other slopes are at most the proposed ones.\n"
@@ -124,17 +156,45 @@ void PrintMeaning(const Proposal& proposal, const NominalModel& model, const Dat
          "noise_bound.\n"
          "\nNothing of this is proven. Transitions can refute a declaration; they cannot show that it holds where "
          "the robot\nhas not been. A slope of zero says that the residual does not depend on that column at all, and "
-         "it is proposed\nwherever no pair of transitions needs more. noise_bound and disturbance are "
-      << (command.estimate_noise ? "raised to what these transitions show.\n" : "taken from the task, not learned.\n");
+         "it is proposed\nwherever no pair of transitions needs more. "
+      << (command.estimate_noise ? "noise_bound is raised to what these transitions show.\n"
+          : scattered.empty()    ? "noise_bound and disturbance are taken from the task, not learned.\n"
+                                 : "noise_bound is taken from the task, not learned.\n");
+  if (!scattered.empty())
+    out << "Scatter: at nearly the same place (less than a tenth of the columns' standard deviations apart), residuals "
+           "differ by more\n  than noise_bound explains: "
+        << Listed(scattered)
+        << ". The knee is the least disturbance with which such pairs need no slope. Proposed\n  is "
+        << ToText(command.factor)
+        << " times that, as a disturbance: the robot may do so again in every step. If it is the sensor that errs by "
+           "so\n"
+           "  much, declare noise_bound instead; noise that is too large makes tubes too narrow.\n";
   if (!constant.empty())
     out << "Never varied in these transitions, so that nothing is known of their slopes: " << Listed(constant) << ".\n";
   if (const auto names = TooQuiet(proposal, model); !names.empty())
     out << "The error that near neighbours show is larger than noise_bound and disturbance allow: " << Listed(names)
-        << ".\n  The slopes then explain noise. Declare the error that your sensors have, or use --noise estimated.\n";
+        << ".\n  The slopes then explain what is none. Declare a disturbance, or the error that your sensors have.\n";
   out << "How often fresh transitions contradict such a declaration: --hold-out.\n";
 }
 
+void Warn(const HeldOutSteps& found) {
+  if (const std::string warning = WarningOf(found); !warning.empty())
+    std::cerr << "forereach: warning: " << warning << std::endl;
+}
+
 // ---- for programs
+
+Json TradesJson(const ProposedRow& row) {
+  Json trades = Json::array();
+  for (const ProposedRow::Trade& trade : row.trades)
+    trades.push_back(
+        {{"disturbance", trade.disturbance}, {"slopes", trade.slopes ? Json(*trade.slopes) : Json(nullptr)}});
+  return trades;
+}
+
+Json ToJson(const HeldOutSteps& found) {
+  return {{"stretches", found.stretches}, {"steps", found.steps}, {"slices", found.slices}, {"outside", found.outside}};
+}
 
 Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Config& config, const DataCommand& command) {
   const NominalModel& model = *config.problem->model;
@@ -155,6 +215,9 @@ Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Confi
     document["lipschitz"].push_back(Eigen::RowVectorXd(proposal.declaration.lipschitz.row(at)));
     document["rows"].push_back({{"state", names[k]},
                                 {"noise_bound", proposal.declaration.noise_bound[at]},
+                                {"disturbance", proposal.declaration.DisturbanceBound(at)},
+                                {"scatter", row.scatter},
+                                {"trades", TradesJson(row)},
                                 {"repeated", row.noise.repeated},
                                 {"deviation", row.noise.deviation},
                                 {"strongin", row.strongin},
@@ -189,8 +252,8 @@ int DeclareFromData(const DataCommand& command) {
   const Config config = LoadConfig(command.config);
   const Problem& problem = *config.problem;
   std::optional<Progress> progress(std::in_place, "parts of the work", 2 * ToSize(problem.model->num_states()));
-  const ProposalOptions options{command.factor, command.estimate_noise, ColumnsBy(command.by, *problem.model),
-                                [&] { progress->Advance(); }};
+  const ProposalOptions options{command.factor, command.estimate_noise, command.estimate_disturbance,
+                                ColumnsBy(command.by, *problem.model), [&] { progress->Advance(); }};
   try {
     const Observations observations = ObserveForProposal(problem, problem.transitions);
     const Proposal proposal = Propose(problem.declaration, observations, options);
@@ -198,8 +261,12 @@ int DeclareFromData(const DataCommand& command) {
     LoneSlopes lone_slopes;
     for (int k = 0; k < problem.model->num_states(); ++k)
       lone_slopes.push_back(FindLoneSlopes(proposal.declaration, observations, k, options.columns[ToSize(k)]));
+    const HeldOutSteps held_out = JudgeByHeldOut(config, proposal.declaration, command.jobs);
     if (command.json) {
-      std::cout << JsonText(ToJson(proposal, lone_slopes, config, command)) << std::endl;
+      Json document = ToJson(proposal, lone_slopes, config, command);
+      document["held_out"] = ToJson(held_out);
+      std::cout << JsonText(document) << std::endl;
+      Warn(held_out);
       return 0;
     }
     std::ostringstream text;
@@ -207,9 +274,16 @@ int DeclareFromData(const DataCommand& command) {
     PrintSlopes(proposal, config, text);
     PrintLoneSlopes(lone_slopes, config, text);
     PrintErrors(proposal, *problem.model, text);
+    PrintTrades(proposal, *problem.model, text);
     PrintMeaning(proposal, *problem.model, command, text);
+    if (held_out.slices > 0)
+      text << fmt::format(
+          "With every other block of time as observations, {} of {} recorded steps of the others lie in their "
+          "slices.\n",
+          held_out.slices - held_out.outside, held_out.slices);
     std::cout << text.str() << "\ndeclaration:\n"
               << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
+    Warn(held_out);
     return 0;
   } catch (const Unexplained& found) {
     progress.reset();

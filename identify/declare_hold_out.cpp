@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <iostream>
+#include <numeric>
 #include <optional>
 
 #include <fmt/format.h>
@@ -34,6 +35,7 @@ struct Trial {
   double block_upper = 1;  // of the probability that the next block has a contradiction
   int windows = 0, certified = 0;
   int states = 0, inside = 0;  // recorded states of all windows, and those in their slice
+  int slices = 0;              // of all tubes: a tube may end before its window
   double half_width = 0;       // median over the windows, of a position in the last slice; 0 if no tube is complete
 };
 
@@ -81,7 +83,7 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
     initial_sets.push_back(Zonotope::FromBox(each.states.col(0), half_width));
     certifier.Require(plans.back(), initial_sets.back(), config.obstacles);
   }
-  std::vector<int> inside(plans.size(), 0);
+  std::vector<int> inside(plans.size(), 0), lengths(plans.size(), 0);
   std::vector<double> widths(plans.size(), kInfinity);
   const auto decisions = CertifyAll(
       certifier, plans, initial_sets, config.obstacles, jobs, [&](std::size_t i, const Decision&, const Tube& tube) {
@@ -94,15 +96,32 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
           }
           inside[i] += in;
         }
+        lengths[i] = tube.length();
         if (tube.length() == steps) widths[i] = PositionHalfWidth(tube, steps, problem->projection);
       });
   trial.windows = static_cast<int>(plans.size());
   trial.certified = static_cast<int>(std::ranges::count(decisions, Outcome::kCertified, &Decision::outcome));
   trial.states = trial.windows * steps;
-  for (const int count : inside) trial.inside += count;
+  trial.inside = std::reduce(inside.begin(), inside.end());
+  trial.slices = std::reduce(lengths.begin(), lengths.end());
   const auto middle = widths.begin() + std::ssize(widths) / 2;
   std::ranges::nth_element(widths, middle);
   trial.half_width = *middle;
+}
+
+// "83 of 200 recorded steps"
+std::string OutsideText(int outside, int slices) { return fmt::format("{} of {} recorded steps", outside, slices); }
+
+// Of the factors at which recorded states lie outside their slices.
+void WarnOfOutside(const std::vector<Trial>& trials) {
+  std::string text;
+  for (const Trial& trial : trials)
+    if (trial.inside < trial.slices)
+      text += (text.empty() ? "" : ", ") + OutsideText(trial.slices - trial.inside, trial.slices) + " at factor " +
+              ToText(trial.factor);
+  if (!text.empty())
+    std::cerr << "forereach: warning: outside the slices of their certificates lie " << text
+              << ". A declaration whose slices lose the robot is false, whatever it certifies" << std::endl;
 }
 
 // ---- the outcome
@@ -136,7 +155,8 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
   }
   std::cout
       << table
-      << "\nfactor: on the smallest slopes that the learning blocks do not contradict.\n"
+      << "\nfactor: on the smallest slopes that the learning blocks do not contradict, and on the scatter found "
+         "there.\n"
          "contradicting: held-out transitions that provably contradict one of the learning blocks.\n"
          "next block: with "
       << ToText(100 * command.confidence)
@@ -173,6 +193,7 @@ Json ToJson(const std::vector<Trial>& trials, const DataCommand& command) {
                                    {"certified", trial.certified},
                                    {"states", trial.states},
                                    {"states_inside", trial.inside},
+                                   {"slices", trial.slices},
                                    {"half_width", trial.half_width}});
   return document;
 }
@@ -207,8 +228,8 @@ int DeclareHoldOut(const DataCommand& command) {
   const Split split = SplitByTime(problem.transitions.size(), command.blocks);
   std::optional<Progress> progress(std::in_place, "parts of the work",
                                    2 * ToSize(problem.model->num_states()) + std::size(kFactors));
-  const ProposalOptions options{1, command.estimate_noise, ColumnsBy(command.by, *problem.model),
-                                [&] { progress->Advance(); }};
+  const ProposalOptions options{1, command.estimate_noise, command.estimate_disturbance,
+                                ColumnsBy(command.by, *problem.model), [&] { progress->Advance(); }};
   Proposal learned;
   try {
     learned =
@@ -224,6 +245,8 @@ int DeclareHoldOut(const DataCommand& command) {
   for (const double factor : kFactors) {
     Declaration declaration = learned.declaration;
     declaration.lipschitz *= factor;
+    for (std::size_t k = 0; k < learned.rows.size(); ++k)
+      if (learned.rows[k].scatter > 0) declaration.disturbance[static_cast<Eigen::Index>(k)] *= factor;
     Trial& trial = trials.emplace_back();
     trial.factor = factor;
     trial.found = CountContradictions(problem, declaration, split);
@@ -236,8 +259,48 @@ int DeclareHoldOut(const DataCommand& command) {
     std::cout << JsonText(ToJson(trials, command)) << std::endl;
   else
     PrintForPeople(trials, command, split);
+  WarnOfOutside(trials);
   for (const std::string& file : pictures) DrawChart(ChartOf(trials, command), file);
   return 0;
+}
+
+HeldOutSteps JudgeByHeldOut(const Config& config, const Declaration& declaration, unsigned jobs) {
+  constexpr int kBlocks = 20;
+  constexpr std::size_t kMostStretches = 200;
+  HeldOutSteps found;
+  const Transitions& transitions = config.problem->transitions;
+  if (transitions.size() < 2) return found;
+  const Split split = SplitByTime(transitions.size(), std::min(kBlocks, transitions.size()));
+  std::vector<Commands> commands;
+  for (found.steps = 10; commands.empty() && found.steps > 0; --found.steps)
+    commands = CommandsOf(transitions, split, found.steps);
+  ++found.steps;
+  const std::size_t count = std::min(commands.size(), kMostStretches);
+  std::vector<Commands> chosen;
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(commands[i * commands.size() / count]);
+  Trial trial;
+  CertifyWindows(config, declaration, split, chosen, jobs, trial);
+  found.stretches = trial.windows;
+  found.slices = trial.slices;
+  found.outside = trial.slices - trial.inside;
+  return found;
+}
+
+std::string WarningOf(const HeldOutSteps& found) {
+  if (found.outside == 0) return "";
+  return fmt::format(
+      "{} lie outside the slices that the declaration promises from the other half of the transitions ({} stretches of "
+      "{} steps): it is false, whatever it certifies. What is no function of state and input is a disturbance",
+      OutsideText(found.outside, found.slices), found.stretches, found.steps);
+}
+
+std::string WarningOfTask(const std::string& path) {
+  try {
+    const Config config = LoadConfig(path);
+    return WarningOf(JudgeByHeldOut(config, config.problem->declaration, 1));
+  } catch (const ConfigError&) {
+    return "";
+  }
 }
 
 }  // namespace forereach

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -24,7 +25,7 @@ namespace {
 constexpr int kMostEvaluations = 2000;
 constexpr double kDifference = 1e-12;  // the square of the relative step of a difference
 constexpr double kStep = 6e-6;         // of central differences: the cube root of a rounding
-constexpr double kScaleUnits = 16;     // units in the last place of x+: no error counts as less
+constexpr double kScaleUnits = 16;     // units in the last place of x+: no error or change counts as less
 constexpr double kDependence = 1e-8;   // columns that depend on each other up to this much are dependent
 constexpr double kShare = 1e-4;        // of a parameter in an undetermined direction: less is rounding
 
@@ -92,6 +93,27 @@ class Residuals {
   }
   [[nodiscard]] double unit(std::size_t c) const { return units_[c]; }
 
+  // How fast the scaled errors change with parameter c over steps of this size from x, to the side or sides that have a
+  // value. What rounding may do to each of them is taken off, so that zero means that nothing is seen.
+  [[nodiscard]] double Slope(const Eigen::VectorXd& x, Eigen::Index c, double step) const {
+    const Eigen::VectorXd by = step * Eigen::VectorXd::Unit(x.size(), c);
+    Eigen::VectorXd here(values()), side(values());
+    double slope = 0;
+    if (!Scaled(x, here)) return slope;
+    for (const double sign : {-1.0, 1.0})
+      if (Scaled(x + sign * by, side)) {
+        Eigen::ArrayXXd change = (side - here).cwiseAbs().reshaped(transitions_.x_next.rows(), rounding_.size());
+        change.rowwise() -= kScaleUnits * rounding_.array();
+        slope = std::max(slope, change.cwiseMax(0).matrix().norm() / step);
+      }
+    return slope;
+  }
+  // The sum of squares that the solver minimises; infinite where the model has no value.
+  [[nodiscard]] double Cost(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd values(this->values());
+    return Scaled(x, values) ? values.squaredNorm() : kInfinity;
+  }
+
   // The scaled errors by the parameters at x: central differences, and how far rounding may move each column.
   struct Derivatives {
     Eigen::MatrixXd columns;
@@ -140,40 +162,120 @@ class Residuals {
   Eigen::RowVectorXd rounding_;  // of an error over its scale
 };
 
+double SizeAt(const Eigen::VectorXd& x, Eigen::Index c) { return std::max(std::abs(x[c]), 1.0); }
+
+// A derivative is infinite if the slopes grow whenever a step is a thousandth.
+bool HasDerivative(const Residuals& problem, const Eigen::VectorXd& x, Eigen::Index c) {
+  const double step = kStep * SizeAt(x, c), slope = problem.Slope(x, c, 1e-3 * step);
+  return !(slope > 1.25 * problem.Slope(x, c, step) && problem.Slope(x, c, 1e-6 * step) > 1.25 * slope);
+}
+
+// Whether larger changes of a parameter move the errors.
+bool HasEffectElsewhere(const Residuals& problem, const Eigen::VectorXd& x, Eigen::Index c) {
+  return std::ranges::any_of(std::initializer_list<double>{1e-2, 1},
+                             [&](double share) { return problem.Slope(x, c, share * SizeAt(x, c)) > 0; });
+}
+
+// A parameter runs away if it moved by more than its size, and ten, a hundred and a thousand times as far is no worse.
+bool RunsAway(const Residuals& problem, const Eigen::VectorXd& x, const Eigen::VectorXd& move) {
+  if (!x.allFinite()) return true;
+  const double most = problem.Cost(x) * (1 + 1e-9);
+  return std::ranges::all_of(std::initializer_list<double>{9, 99, 999},
+                             [&](double times) { return problem.Cost(x + times * move) <= most; });
+}
+
+[[noreturn]] void RefuseDerivative(const std::string& what, double value) {
+  throw std::invalid_argument(fmt::format("{} {:.6g}; begin elsewhere", what, value));
+}
+
+void RequireDerivatives(const Residuals& problem, const Eigen::VectorXd& x, const std::vector<std::string>& names) {
+  for (Eigen::Index c = 0; c < x.size(); ++c)
+    if (!HasDerivative(problem, x, c))
+      RefuseDerivative("the model has no derivative by '" + names[ToSize(c)] + "' at", x[c] * problem.unit(ToSize(c)));
+}
+
+// The solver never moves a parameter that begins where its derivative is zero.
+void RequireEffects(const Residuals& problem, const Eigen::VectorXd& x, const std::vector<std::string>& names) {
+  const Residuals::Derivatives derivatives = problem.DerivativesAt(x);
+  for (Eigen::Index c = 0; c < x.size(); ++c)
+    if (derivatives.columns.col(c).norm() <= 2 * derivatives.noise[c] && HasEffectElsewhere(problem, x, c))
+      RefuseDerivative("'" + names[ToSize(c)] + "' has no effect near", x[c] * problem.unit(ToSize(c)));
+}
+
+void RefuseRunaways(const Residuals& problem, const Eigen::VectorXd& x, const std::vector<std::string>& names) {
+  const Eigen::VectorXd start = problem.Start();
+  Eigen::VectorXd far = Eigen::VectorXd::Zero(x.size());
+  std::string all;
+  for (Eigen::Index c = 0; c < x.size(); ++c) {
+    if (std::abs(x[c] - start[c]) <= SizeAt(start, c)) continue;
+    far[c] = x[c] - start[c];
+    all += (all.empty() ? "'" : ", '") + names[ToSize(c)] + "'";
+    if (RunsAway(problem, x, far[c] * Eigen::VectorXd::Unit(x.size(), c))) {
+      far = Eigen::VectorXd::Unit(x.size(), c) * far[c];
+      all = "'" + names[ToSize(c)] + "'";
+      break;
+    }
+  }
+  if (!all.empty() && RunsAway(problem, x, far))
+    throw std::invalid_argument("the transitions do not bound " + all +
+                                ": the fit gets no worse the farther it goes; begin elsewhere, or leave it out");
+}
+
 // What the derivatives at the solution say of the parameters.
 struct Determined {
-  Eigen::VectorXd deviations;    // standard errors, infinite if not determined
+  Eigen::VectorXd deviations;    // standard errors, infinite if not determined, NaN if nothing shows the noise
   Eigen::MatrixXd undetermined;  // the projector onto the directions that the errors do not depend on
 };
 
+// The standard errors by the header's formula. G is J (J^T J)^-1 without the undetermined directions, `leverages` the
+// diagonal of H.
+Eigen::VectorXd DeviationsOf(const Eigen::MatrixXd& G, const Eigen::VectorXd& leverages, const Eigen::VectorXd& values,
+                             Eigen::Index states) {
+  const Eigen::Index rows = values.size() / states;
+  const Eigen::RowVectorXd lengths = G.colwise().norm();
+  Eigen::VectorXd variances = Eigen::VectorXd::Zero(G.cols());
+  for (Eigen::Index k = 0; k < states; ++k) {
+    const double left = static_cast<double>(rows) - leverages.segment(k * rows, rows).sum();
+    const double variance = left > 1 - kShare ? values.segment(k * rows, rows).squaredNorm() / left
+                                              : std::numeric_limits<double>::quiet_NaN();
+    for (Eigen::Index c = 0; c < G.cols(); ++c)
+      if (const double length = G.col(c).segment(k * rows, rows).norm(); length > kShare * lengths[c])
+        variances[c] += variance * length * length;
+  }
+  return variances.cwiseSqrt();
+}
+
 // The columns are scaled to length 1. A direction v is undetermined if the errors change along it by no more than
 // rounding does: a parameter is undetermined if such a direction has a share of it.
-Determined Determine(const Residuals::Derivatives& derivatives, const Eigen::VectorXd& values) {
-  const Eigen::Index count = derivatives.columns.cols(), rows = derivatives.columns.rows();
-  const Eigen::RowVectorXd norms = derivatives.columns.colwise().norm();
-  Eigen::MatrixXd scaled = derivatives.columns;
+Determined Determine(const Residuals::Derivatives& derivatives, const Eigen::VectorXd& values, Eigen::Index states) {
+  const Eigen::Index count = derivatives.columns.cols();
+  Eigen::RowVectorXd norms = derivatives.columns.colwise().norm();
   Eigen::VectorXd noise(count);
   for (Eigen::Index c = 0; c < count; ++c) {
-    if (norms[c] > 0) scaled.col(c) /= norms[c];
     noise[c] = norms[c] > 0 ? derivatives.noise[c] / norms[c] : 1;
+    if (!(norms[c] > 0)) norms[c] = 1;
   }
+  const Eigen::MatrixXd scaled = derivatives.columns.array().rowwise() / norms.array();
   const Eigen::MatrixXd triangle =
       Eigen::HouseholderQR<Eigen::MatrixXd>(scaled).matrixQR().topRows(count).triangularView<Eigen::Upper>();
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
-  Determined found{Eigen::VectorXd::Zero(count), Eigen::MatrixXd::Zero(count, count)};
+  Determined found{{}, Eigen::MatrixXd::Zero(count, count)};
+  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(values.size(), count);
+  Eigen::VectorXd leverages = Eigen::VectorXd::Zero(values.size());
   for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::VectorXd direction = svd.matrixV().col(i);
     const double length = svd.singularValues()[i];
-    if (length <= std::max(kDependence, 2 * direction.cwiseProduct(noise).norm()))
+    if (length <= std::max(kDependence, 2 * direction.cwiseProduct(noise).norm())) {
       found.undetermined += direction * direction.transpose();
-    else
-      found.deviations += (direction / length).cwiseAbs2();
+      continue;
+    }
+    const Eigen::VectorXd unit = scaled * direction / length;
+    G += unit * direction.transpose() / length;
+    leverages += unit.cwiseAbs2();
   }
-  const double freedom = std::max<double>(1, static_cast<double>(rows - count));
-  const double deviation = std::sqrt(values.squaredNorm() / freedom);
+  found.deviations = DeviationsOf(G, leverages, values, states).cwiseQuotient(norms.transpose());
   for (Eigen::Index c = 0; c < count; ++c)
-    found.deviations[c] =
-        found.undetermined(c, c) > kShare * kShare ? kInfinity : std::sqrt(found.deviations[c]) * deviation / norms[c];
+    if (found.undetermined(c, c) > kShare * kShare) found.deviations[c] = kInfinity;
   return found;
 }
 
@@ -181,7 +283,7 @@ Determined Determine(const Residuals::Derivatives& derivatives, const Eigen::Vec
 std::vector<std::string> TogetherWith(Eigen::Index c, const Determined& determined,
                                       const std::vector<std::string>& names) {
   std::vector<std::string> others;
-  if (std::isfinite(determined.deviations[c])) return others;
+  if (determined.deviations[c] != kInfinity) return others;
   for (Eigen::Index other = 0; other < determined.undetermined.cols(); ++other)
     if (other != c && std::abs(determined.undetermined(c, other)) > kShare) others.push_back(names[ToSize(other)]);
   return others;
@@ -219,7 +321,11 @@ Fit FitParameters(const ModelText& text, const Transitions& transitions, const s
   solver.parameters.maxfev = kMostEvaluations;
   solver.parameters.xtol = solver.parameters.ftol = 1e-12;
   Eigen::VectorXd x = problem.Start();
+  RequireDerivatives(problem, x, names);
+  RequireEffects(problem, x, names);
   const auto status = solver.minimize(x);
+  RefuseRunaways(problem, x, names);
+  RequireDerivatives(problem, x, names);
 
   Fit fit;
   fit.converged = status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation &&
@@ -229,11 +335,12 @@ Fit FitParameters(const ModelText& text, const Transitions& transitions, const s
   fit.after = problem.Errors(x);
   Eigen::VectorXd values;
   (void)problem(x, values);
-  const Determined determined = Determine(problem.DerivativesAt(x), values);
+  const Determined determined = Determine(problem.DerivativesAt(x), values, fit.after.cols());
   for (std::size_t c = 0; c < places.size(); ++c) {
     const auto at = static_cast<Eigen::Index>(c);
     fit.parameters.push_back({names[c], middle.parameters[places[c]].lower, x[at] * problem.unit(c),
-                              determined.deviations[at] * problem.unit(c), TogetherWith(at, determined, names)});
+                              determined.deviations[at] * problem.unit(c), TogetherWith(at, determined, names),
+                              HasEffectElsewhere(problem, x, at)});
   }
   return fit;
 }

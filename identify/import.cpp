@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <span>
+
+#include <fmt/format.h>
 
 #include "forereach/certify/learned.h"
 #include "forereach/numerics/limits.h"
@@ -17,6 +20,7 @@ namespace forereach {
 namespace {
 
 constexpr long double kTurn = 2 * std::numbers::pi_v<long double>;
+constexpr double kJitter = 0.1;  // of a step, by which the stamps of a log with the task's step may typically be late
 
 struct Sample {
   long double time;  // s; only differences within a piece are exact enough to mean something
@@ -57,6 +61,8 @@ class Importer {
     const Eigen::Map<const RowMajor> rows(numbers_.data(), count, 2 * n_ + m_);
     log_.transitions = {rows.leftCols(n_ + m_), rows.rightCols(n_)};
     log_.samples = static_cast<int>(samples_.size());
+    log_.rows = table_.values.rows() + table_.lost.count - log_.At(Dropped::kRepeatedRow).count -
+                log_.At(Dropped::kOutsideWindow).count;
     log_.median_gap = MedianOf(gaps_);
     log_.largest_gap = gaps_.empty() ? 0 : *std::ranges::max_element(gaps_);
     return std::move(log_);
@@ -130,11 +136,17 @@ class Importer {
     for (std::size_t i = 1; i < samples_.size(); ++i)
       if (!samples_[i].begins_piece) spacings.push_back(static_cast<double>(samples_[i].time - samples_[i - 1].time));
     log_.typical_spacing = MedianOf(spacings);
-    if (log_.typical_spacing > options_.period + options_.tolerance)
-      throw ConfigError(table_.path + ": its rows are typically " + ToText(log_.typical_spacing) +
-                        " s apart, and a step of the task is " + ToText(options_.period) +
-                        " s; states are not interpolated: record faster, or let model.dt be a multiple of the log's "
-                        "spacing; if the stamps are not in s, give their unit");
+    if (!(log_.typical_spacing > (1 + kJitter) * options_.period + options_.tolerance)) return;
+    if (const Finding& back = log_.At(Dropped::kBackwards); back.count > 0)
+      throw ConfigError(fmt::format(
+          "{}: its stamps go back, {} times, first in line {}, and between these lines its rows are typically {:.6g} s "
+          "apart, more than a step of the task, {} s: sort the rows by their stamps if they are of one run",
+          table_.path, back.count, back.first_line, log_.typical_spacing, ToText(options_.period)));
+    throw ConfigError(fmt::format(
+        "{}: its rows are typically {:.6g} s apart, and a step of the task is {} s; states are not "
+        "interpolated: record faster, or let model.dt be a multiple of the log's spacing; if the stamps are "
+        "not in s, give their unit",
+        table_.path, log_.typical_spacing, ToText(options_.period)));
   }
 
   // ---- samples to transitions
@@ -146,6 +158,12 @@ class Importer {
 
   [[nodiscard]] long double TargetOf(std::size_t i) const { return samples_[i].time + options_.period; }
 
+  // How far the stamps of samples i and j may be off t_i + dt by the rounding of decimals to doubles.
+  [[nodiscard]] long double RoundingOf(std::size_t i, std::size_t j) const {
+    const long double size = std::max(std::abs(samples_[i].time), std::abs(samples_[j].time)) + options_.period;
+    return std::min(std::numeric_limits<double>::epsilon() * size, ImportOptions::kRounding * options_.period);
+  }
+
   // The sample nearest to a step behind sample i in its piece, 0 with the cause counted if there is none.
   std::size_t EndOf(std::size_t i) {
     const long double target = TargetOf(i);
@@ -154,7 +172,7 @@ class Importer {
     const auto offset = [&](std::size_t at) { return std::abs(samples_[at].time - target); };
     const bool ends = j == samples_.size() || samples_[j].begins_piece;
     if (ends || (j > i + 1 && offset(j - 1) < offset(j))) --j;
-    if (j > i && offset(j) <= options_.tolerance) return j;
+    if (j > i && offset(j) <= options_.tolerance + RoundingOf(i, j)) return j;
     if (!ends) gaps_.push_back(static_cast<double>(offset(j)));
     Drop(ends ? Dropped::kEnd : Dropped::kGap, samples_[i].row);
     return 0;
@@ -222,6 +240,8 @@ class Importer {
     numbers_.insert(numbers_.end(), location.begin(), location.end());
     numbers_.insert(numbers_.end(), successor.begin(), successor.end());
     log_.lines.push_back(LineOf(samples_[i].row));
+    log_.rows_used += static_cast<std::int64_t>(j + 1 - std::max(i, next_unused_));
+    next_unused_ = j + 1;
     Note(i, j, location, successor, deviation);
     return j;
   }
@@ -235,7 +255,7 @@ class Importer {
   void Note(std::size_t i, std::size_t j, std::span<const double> z, std::span<const double> next,
             std::span<const double> deviation) {
     const long double offset = std::abs(samples_[j].time - TargetOf(i));
-    log_.largest_offset = std::max(log_.largest_offset, static_cast<double>(offset));
+    if (offset > RoundingOf(i, j)) log_.largest_offset = std::max(log_.largest_offset, static_cast<double>(offset));
     for (Eigen::Index k = 0; k < n_; ++k)
       log_.largest_rate[k] = std::max(log_.largest_rate[k], std::abs(Change(k, z, next)) / options_.period);
     for (Eigen::Index l = 0; l < m_; ++l)
@@ -256,6 +276,7 @@ class Importer {
   const ImportOptions& options_;
   const Eigen::Index first_column_, n_, m_;
   std::vector<Sample> samples_;
+  std::size_t next_unused_ = 0;  // the sample behind the last one of a transition
   std::vector<double> numbers_;  // row by row
   std::vector<double> gaps_;     // from t + dt to the nearest stamp, of the starts without one near
   ImportedLog log_;

@@ -11,6 +11,7 @@ What a transition cannot know is part of its error, and the summary says how muc
 and t_i + dt, and the true input differs from u. */
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <utility>
@@ -26,6 +27,8 @@ namespace forereach {
 struct ImportOptions {
   double period = 0;     ///< dt, s, positive.
   double tolerance = 0;  ///< Of a stamp, s, not negative and less than dt / 2.
+  /** The rounding of stamps to doubles is no distance, up to this share of dt. */
+  static constexpr long double kRounding = 1e-5L;
   /** The stamps are in the table's first column, and one of their units is so many seconds. Not positive: there is no
   such column, and the rows are `row_spacing` apart. */
   long double time_unit = 1;
@@ -70,9 +73,13 @@ struct ImportedLog {
   Transitions transitions;
   std::vector<int> lines;  ///< Where the sample stands that starts each.
   int samples = 0;
+  /** Rows of the file that hold something to use: without those that repeat another or lie outside the window, and with
+  those that were lost. */
+  std::int64_t rows = 0;
+  std::int64_t rows_used = 0;  ///< Those of them that lie in a transition, its two ends included.
   double typical_spacing = 0;  ///< Median of the stamps' differences, s; 0 if there is none.
   std::vector<Finding> dropped = std::vector<Finding>(static_cast<std::size_t>(Dropped::kCount));
-  double largest_offset = 0;  ///< max |t_j - t_i - dt|, s
+  double largest_offset = 0;  ///< max |t_j - t_i - dt|, s; what may be rounding of stamps to doubles counts as 0.
   double median_gap = 0;      ///< Median of |t_j - t_i - dt| over the starts dropped for kGap, s; 0 if there is none.
   double largest_gap = 0;     ///< Their largest.
   Eigen::VectorXd largest_rate;     ///< max |x_j - x_i| / dt for each state
@@ -85,7 +92,8 @@ struct ImportedLog {
 /** Makes the transitions of one log, in the order of their starts. Cost: linear in the samples and in the rows of all
 steps.
 @param table columns: the stamp, unless there is none, the states, the inputs. @param problem its model and domain.
-@throws ConfigError if the log's rows are further apart than dt; the message names both. */
+@throws ConfigError if the log's rows are typically further apart than 1.1 dt and the tolerance; the message names both,
+or the stamps that go back. */
 [[nodiscard]] ImportedLog Import(const LogTable& table, const Problem& problem, const ImportOptions& options);
 
 }  // namespace forereach

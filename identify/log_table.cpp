@@ -11,6 +11,7 @@
 #include <csv.h>
 
 #include "command_line/nearest.h"
+#include "forereach/numerics/text.h"
 #include "task/config_error.h"
 #include "task/line_reader.h"
 #include "task/number.h"
@@ -22,6 +23,25 @@ constexpr std::size_t kShown = 40;            // bytes of a field in a message
 constexpr std::size_t kLongestRow = 1 << 24;  // bytes, of a row that quotes spread over lines
 
 std::string Name(char delimiter) { return delimiter == '\t' ? "tab" : std::string(1, delimiter); }
+
+// Recorders pad numbers with zeros, which ParseNumber refuses: in a task file they may mean octal, in a log they do
+// not.
+Parsed<double> ParseLogged(std::string_view field) {
+  if (const Parsed<double> plain = ParseNumber(field); plain.problem.empty()) return plain;
+  std::string digits(field);
+  const std::size_t first = digits.starts_with('+') || digits.starts_with('-') ? 1 : 0;
+  std::size_t zeros = 0;
+  while (first + zeros + 1 < digits.size() && digits[first + zeros] == '0' && IsDigit(digits[first + zeros + 1]))
+    ++zeros;
+  return ParseNumber(digits.erase(first, zeros));
+}
+
+bool IsNumber(std::string_view field) { return ParseLogged(field).problem.empty(); }
+
+bool HasDecimalComma(std::string field) {
+  const std::size_t at = field.find(',');
+  return at != std::string::npos && IsNumber(field.replace(at, 1, "."));
+}
 
 // libcsv's parser, fed line by line. Its callbacks are called from C, so they throw nothing.
 class RowParser {
@@ -49,6 +69,7 @@ class RowParser {
     return problem;
   }
 
+  [[nodiscard]] char delimiter() const { return delimiter_; }
   [[nodiscard]] bool is_complete() const { return complete_; }
   [[nodiscard]] const std::vector<std::string>& fields() const { return fields_; }
 
@@ -96,7 +117,9 @@ class Reader {
   std::vector<std::string> ReadColumns() {
     if (!format_.header.empty()) return format_.header;
     ReadLines([this] { return num_fields_ == 0; });
-    return parser_->fields();
+    const std::vector<std::string>& names = parser_->fields();
+    if (const std::string why = WhyNoHeader(names); !why.empty()) Fail(first_line_, why);
+    return names;
   }
 
  private:
@@ -122,6 +145,7 @@ class Reader {
     const std::string_view content = Trimmed(line);
     if (!format_.comment.empty() && content.starts_with(format_.comment)) {
       table_.comments.Add(first_line_);
+      if (num_fields_ == 0) comments_.emplace_back(first_line_, Trimmed(content.substr(format_.comment.size())));
       return false;
     }
     if (content.empty()) table_.blank.Add(first_line_);
@@ -136,7 +160,7 @@ class Reader {
     } else if (parser_->is_complete()) {
       if (num_fields_ == 0)
         TakeHeader(parser_->fields());
-      else
+      else if (!IsSecondHeader(parser_->fields()))
         TakeRow(parser_->fields());
     }
   }
@@ -160,27 +184,75 @@ class Reader {
     for (const std::string& name : wanted_) {
       const auto count = std::ranges::count(names, name);
       if (count == 0) {
-        const bool numbers =
-            std::ranges::all_of(names, [](const std::string& field) { return ParseNumber(field).problem.empty(); });
-        Fail(line, numbers ? "this line has numbers only, so no column has a name; give the names of the columns"
-                           : "no column '" + name + "'; " + Suggestion(name, names));
+        const std::string why = WhyNoHeader(names);
+        Fail(line, why.empty() ? "no column '" + name + "'; " + Suggestion(name, names) : why);
       }
       if (count > 1) Fail(line, fmt::format("{} columns are named '{}'", count, name));
       places_.push_back(static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()));
     }
     num_fields_ = names.size();
+    header_ = names;
+  }
+
+  // Why fields that should be names seem to be none; empty if they may be.
+  [[nodiscard]] std::string WhyNoHeader(const std::vector<std::string>& fields) const {
+    if (fields.size() == 1) {
+      constexpr std::pair<char, const char*> kSeparators[] = {
+          {',', "commas"}, {';', "semicolons"}, {'\t', "tabs"}, {' ', "blanks; put commas in their place"}};
+      for (const auto& [separator, name] : kSeparators)
+        if (fields[0].find(separator) != std::string::npos)
+          return std::string("the fields seem to be separated by ") + name;
+    }
+    std::string commented;
+    if (std::ranges::any_of(fields, IsNumber))
+      for (const auto& [line, text] : comments_)
+        if (MayName(text, fields.size()))
+          commented = fmt::format("line {} looks like a header; remove its {}", line, format_.comment);
+    if (!commented.empty() || !std::ranges::all_of(fields, IsNumber)) return commented;
+    return "this line has numbers only, so no column has a name; give the names of the columns";
+  }
+
+  // Whether a comment's text has so many fields, none of them empty or a number.
+  [[nodiscard]] bool MayName(const std::string& text, std::size_t count) const {
+    RowParser parser(parser_->delimiter());
+    return parser.Feed(text).empty() && parser.is_complete() && parser.fields().size() == count &&
+           std::ranges::none_of(parser.fields(),
+                                [](const std::string& field) { return field.empty() || IsNumber(field); });
+  }
+
+  // Skips a line that repeats the header; fails at one that has its names and differs.
+  bool IsSecondHeader(const std::vector<std::string>& fields) {
+    if (std::ranges::any_of(fields, IsNumber)) return false;
+    if (fields == header_) {
+      table_.headers.Add(first_line_);
+      lost_ = true;
+      return true;
+    }
+    const auto is_name = [this](const std::string& field) {
+      return std::ranges::find(header_, field) != header_.end();
+    };
+    // Directly behind the header, units may stand, and one may be spelled as a column is.
+    const std::size_t enough = table_.lines.empty() ? wanted_.size() : std::min<std::size_t>(2, wanted_.size());
+    if (static_cast<std::size_t>(std::ranges::count_if(fields, is_name)) >= enough)
+      Fail(first_line_, fmt::format("a second header that differs from the first: {}; split the file there",
+                                    fmt::join(fields, ", ")));
+    return false;
   }
 
   void TakeRow(const std::vector<std::string>& fields) {
     if (fields.size() != num_fields_) {
-      Lose(fmt::format("{} fields, the header has {}", fields.size(), num_fields_));
+      Lose(fmt::format(
+          "{} fields, the header has {}{}", fields.size(), num_fields_,
+          fields.size() == 2 * num_fields_ ? ": twice as many, as if each number had a decimal comma" : ""));
       return;
     }
     for (std::size_t j = 0; j < places_.size(); ++j) {
       const std::string& field = fields[places_[j]];
-      const auto [value, problem] = ParseNumber(field);
+      const auto [value, problem] = ParseLogged(field);
       numbers_.push_back(problem.empty() ? value : std::numeric_limits<double>::quiet_NaN());
-      if (!problem.empty()) table_.not_a_number[j].Add(first_line_, field.substr(0, kShown));
+      if (problem.empty()) continue;
+      table_.not_a_number[j].Add(first_line_, field.substr(0, kShown));
+      if (HasDecimalComma(field)) table_.decimal_commas.Add(first_line_, field.substr(0, kShown));
     }
     table_.lines.push_back(first_line_);
     table_.after_loss.push_back(std::exchange(lost_, false));
@@ -195,11 +267,13 @@ class Reader {
   const LogFormat& format_;
   LineReader lines_;
   LogTable table_;
-  std::unique_ptr<RowParser> parser_;  // from the first row on, which shows the delimiter
-  std::size_t num_fields_ = 0;         // 0 before the header
-  std::vector<std::size_t> places_;    // of the wanted columns
-  std::vector<double> numbers_;        // row by row
-  int first_line_ = 0;                 // of the row
+  std::unique_ptr<RowParser> parser_;                  // from the first row on, which shows the delimiter
+  std::size_t num_fields_ = 0;                         // 0 before the header
+  std::vector<std::size_t> places_;                    // of the wanted columns
+  std::vector<double> numbers_;                        // row by row
+  std::vector<std::string> header_;                    // the names of all columns
+  std::vector<std::pair<int, std::string>> comments_;  // before the header, with their lines
+  int first_line_ = 0;                                 // of the row
   bool lost_ = false;
 };
 

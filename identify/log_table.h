@@ -3,7 +3,8 @@ anything.
 
 Fields may be in double quotes, also column names. White space around a field is ignored, and so are blank lines and
 comment lines. Nothing is guessed: a field that is not one decimal number is NaN and counted, and a row with more or
-fewer fields than the header is left out and counted. libcsv reads the fields. */
+fewer fields than the header is left out and counted. Zeros in front of a number are part of it: 08.00 is 8. A line that
+repeats the header is skipped and counted; a header that differs is refused. libcsv reads the fields. */
 #pragma once
 
 #include <cstdint>
@@ -41,12 +42,14 @@ struct LogTable {
   std::vector<int> lines;             ///< In which line each row begins.
   std::vector<bool> after_loss;       ///< Whether a row was left out directly before this one.
   Finding blank, comments, lost;      ///< Lines without a row, and rows left out.
+  Finding headers;                    ///< Lines that repeat the header; a row is left out there.
+  Finding decimal_commas;             ///< Fields of wanted columns such as 0,5, which are no number here.
   std::vector<Finding> not_a_number;  ///< For each wanted column.
 };
 
 /** Reads the wanted columns of a log. Cost: linear in the file.
 @throws ConfigError with file and line: the file cannot be read, has no header, names a wanted column twice or not at
-all, or ends inside a quoted field; the delimiter is not clear. */
+all, has a second header that differs, or ends inside a quoted field; the delimiter is not clear. */
 [[nodiscard]] LogTable ReadLog(const std::string& path, const std::vector<std::string>& wanted,
                                const LogFormat& format);
 

@@ -31,6 +31,33 @@ Eigen::RowVectorXd FreeScales(const Eigen::RowVectorXd& scales, const std::vecto
   return free;
 }
 
+// The smallest row for several disturbances from the declared one over the one that takes all scatter to the last.
+std::vector<ProposedRow::Trade> TradesOf(Declaration declaration, const Observations& observations, int k,
+                                         const Eigen::RowVectorXd& scales, double scatter, double last) {
+  const double declared = declaration.disturbance[k];
+  std::vector<ProposedRow::Trade> trades;
+  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0})
+    trades.push_back({.disturbance = declared + share * scatter, .slopes = {}});
+  trades.push_back({.disturbance = last, .slopes = {}});
+  for (ProposedRow::Trade& trade : trades) {
+    declaration.disturbance[k] = trade.disturbance;
+    if (const SmallestRow row = FindSmallestRow(declaration, observations, k, scales); !row.unexplained)
+      trade.slopes = row.slopes;
+  }
+  return trades;
+}
+
+// Raises w^_k to what near places show.
+void EstimateDisturbance(Declaration& proposed, const Observations& observations, int k,
+                         const Eigen::RowVectorXd& scales, double factor, ProposedRow& row) {
+  row.scatter = FindScatter(proposed, observations, k, scales);
+  if (!(row.scatter > 0)) return;
+  if (proposed.disturbance.size() == 0) proposed.disturbance = Eigen::VectorXd::Zero(observations.num_states());
+  const double disturbance = Rounded(factor * (proposed.disturbance[k] + row.scatter));
+  row.trades = TradesOf(proposed, observations, k, scales, row.scatter, disturbance);
+  proposed.disturbance[k] = disturbance;
+}
+
 }  // namespace
 
 Observations ObserveForProposal(const Problem& problem, const Transitions& transitions) {
@@ -53,7 +80,9 @@ Proposal Propose(const Declaration& declaration, const Observations& observation
     if (const double shown = std::max(row.noise.repeated, 3 * row.noise.deviation);
         options.estimate_noise && shown > proposed.noise_bound[k])
       proposed.noise_bound[k] = Rounded(shown);
-    row.smallest = FindSmallestRow(proposed, observations, k, FreeScales(scales, options.columns[ToSize(k)]));
+    const Eigen::RowVectorXd free = FreeScales(scales, options.columns[ToSize(k)]);
+    if (options.estimate_disturbance) EstimateDisturbance(proposed, observations, k, free, options.factor, row);
+    row.smallest = FindSmallestRow(proposed, observations, k, free);
     if (row.smallest.unexplained) throw Unexplained(k, *row.smallest.unexplained);
     if (options.advance) options.advance();
   }

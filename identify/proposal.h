@@ -3,6 +3,7 @@ declaration and cannot establish one. */
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -13,8 +14,11 @@ declaration and cannot establish one. */
 namespace forereach {
 
 struct ProposalOptions {
-  double factor = 1.5;          ///< Proposed slope over the smallest consistent one, at least 1.
+  double factor = 1.5;          ///< Proposed slope over the smallest consistent one, at least 1; likewise for scatter.
   bool estimate_noise = false;  ///< Raise sigma to what the data show: NoiseFloor::repeated and three deviations.
+  /** Raise w^_k to `factor` times w^_k + FindScatter, where that finds any: it acts again in every step, sigma does
+   * not. */
+  bool estimate_disturbance = false;
   /** For each coordinate k: the columns of z on which its residual may depend. */
   std::vector<std::vector<int>> columns;
   /** Called twice for each coordinate, as the work goes on; may be empty. */
@@ -22,15 +26,23 @@ struct ProposalOptions {
 };
 
 struct ProposedRow {
-  SmallestRow smallest;  ///< With the proposed sigma.
+  SmallestRow smallest;  ///< With the proposed sigma and w^.
   NoiseFloor noise;
+  double scatter = 0;  ///< FindScatter with the proposed sigma and the declared w^; 0 if w^ is not estimated.
+  /** If there is scatter: the smallest slopes for several w^_k in order, the first as declared, the last but one with
+  all of the scatter, the last as proposed. */
+  struct Trade {
+    double disturbance = 0;
+    std::optional<Eigen::RowVectorXd> slopes;  ///< None: no slopes are consistent.
+  };
+  std::vector<Trade> trades;
   Eigen::RowVectorXd least;  ///< FindSmallestEntry of each column with a slope, the others as proposed.
   /** What other estimators (slopes.h) say of the row's size, as factors of `smallest`; 0 for a row without slopes. */
   double strongin = 0, knuth_chou = 0;
 };
 
 struct Proposal {
-  Declaration declaration;  ///< L = factor * smallest and sigma, rounded up to kDigits; no pair contradicts it.
+  Declaration declaration;  ///< L = factor * smallest, sigma and w^, rounded up to kDigits; no pair contradicts it.
   std::vector<ProposedRow> rows;
   std::vector<int> constant;  ///< Columns of z that never vary: the data say nothing about their slopes, L has zeros.
 
@@ -50,8 +62,8 @@ that depends on the slopes, so the proposed ones may be larger than they have to
 [[nodiscard]] Observations ObserveForProposal(const Problem& problem, const Transitions& transitions);
 
 /** @param declaration its sigma and disturbance are those of the task; its L is not read.
-@throws Unexplained if no row is consistent. Cost: n (1 + columns) linear programs; the other estimators take at most
-1000 observations, evenly chosen. */
+@throws Unexplained if no row is consistent, which a w^ that is estimated always is. Cost: n (2 + columns) linear
+programs; the other estimators take at most 1000 observations, evenly chosen. */
 [[nodiscard]] Proposal Propose(const Declaration& declaration, const Observations& observations,
                                const ProposalOptions& options);
 

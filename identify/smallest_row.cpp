@@ -20,16 +20,17 @@ constexpr std::size_t kCutsInARound = 60;
 constexpr int kMostRounds = 500;
 constexpr double kTolerance = 1e-9;  // of the program, whose numbers are made to be about 1
 
-// The program: minimise sum_c y_c over y >= 0 with A y >= b, where y_c = s_l L_kl for the free columns l.
+// The program: minimise sum_c p_c y_c over y >= 0 with A y >= b, where y_c = s_l L_kl for the free columns l, and e for
+// the last one if there is a scatter.
 class LinearProgram {
  public:
-  explicit LinearProgram(std::size_t columns) : columns_(columns) {
+  explicit LinearProgram(const std::vector<double>& prices) : columns_(prices.size()) {
     clp_.setLogLevel(0);
-    clp_.resize(0, static_cast<int>(columns));
+    clp_.resize(0, static_cast<int>(columns_));
     clp_.setPrimalTolerance(kTolerance);
-    for (std::size_t c = 0; c < columns; ++c) {
+    for (std::size_t c = 0; c < columns_; ++c) {
       clp_.setColumnBounds(static_cast<int>(c), 0, COIN_DBL_MAX);
-      clp_.setObjectiveCoefficient(static_cast<int>(c), 1);
+      clp_.setObjectiveCoefficient(static_cast<int>(c), prices[c]);
     }
   }
 
@@ -71,7 +72,33 @@ class SmallestRowSearch {
     SmallestRow found;
     found.slopes = declaration_.lipschitz.row(k_);
     found.reasons.resize(ToSize(scales_.size()));
-    LinearProgram program(free_.size());
+    LinearProgram program(std::vector<double>(free_.size(), 1));
+    Solve(program, found);
+    if (found.unexplained) return found;
+    if (!cuts_.empty()) FindReasons(program, found);
+    ScaleUp();
+    found.slopes = declaration_.lipschitz.row(k_);
+    return found;
+  }
+
+  double Scatter() {
+    has_scatter_ = true;
+    const double declared = declaration_.DisturbanceBound(k_);
+    if (declaration_.disturbance.size() == 0)
+      declaration_.disturbance = Eigen::VectorXd::Zero(declaration_.noise_bound.size());
+    std::vector<double> prices(free_.size(), 1);
+    prices.push_back(2 / kNear);
+    LinearProgram program(prices);
+    SmallestRow found;
+    Solve(program, found);
+    const double scatter = declaration_.disturbance[k_] - declared;
+    return scatter > 2 * kTolerance * std::max(unit_, 0.0) ? scatter + kTolerance * unit_ : 0;
+  }
+
+ private:
+  // Adds cuts until no pair violates the row.
+  void Solve(LinearProgram& program, SmallestRow& found) {
+    const double declared = declaration_.DisturbanceBound(k_);
     for (; found.rounds < kMostRounds; ++found.rounds) {
       const std::vector<ObservedPair> violated = MostViolated();
       if (violated.empty()) break;
@@ -79,7 +106,7 @@ class SmallestRowSearch {
         const std::vector<double> coefficients = CoefficientsOf(pair);
         if (std::ranges::all_of(coefficients, [](double value) { return value == 0; })) {
           found.unexplained = pair;
-          return found;
+          return;
         }
         program.Add(coefficients, FreePart(pair) / unit_);
         cuts_.push_back(pair);
@@ -87,14 +114,10 @@ class SmallestRowSearch {
       if (!program.Solve()) break;  // cannot happen: a large enough row satisfies every cut
       for (std::size_t c = 0; c < free_.size(); ++c)
         declaration_.lipschitz(k_, free_[c]) = program.Value(c) * unit_ / scales_[free_[c]];
+      if (has_scatter_) declaration_.disturbance[k_] = declared + program.Value(free_.size()) * unit_;
     }
-    if (!cuts_.empty()) FindReasons(program, found);
-    ScaleUp();
-    found.slopes = declaration_.lipschitz.row(k_);
-    return found;
   }
 
- private:
   [[nodiscard]] ObservationIndex::Entries Entries() const {
     return EntriesOf(LipschitzRow(declaration_, k_), declaration_, observations_, k_);
   }
@@ -104,6 +127,7 @@ class SmallestRowSearch {
   [[nodiscard]] std::vector<double> CoefficientsOf(const ObservedPair& pair) const {
     std::vector<double> coefficients;
     for (const Eigen::Index l : free_) coefficients.push_back(Along(pair, l) / scales_[l]);
+    if (has_scatter_) coefficients.push_back(2);
     return coefficients;
   }
   // What the free columns have to explain of a pair's difference.
@@ -131,7 +155,8 @@ class SmallestRowSearch {
     const LipschitzRow row(declaration_, k_);
     if (row.is_constant()) {
       const auto [highest, lowest] = Extremes();
-      consider(highest, lowest, unit_);
+      const auto entries = Entries();
+      consider(highest, lowest, entries.floors[highest] - entries.ceilings[lowest]);
     } else {
       const auto entries = Entries();
       const ObservationIndex index(entries);
@@ -187,6 +212,7 @@ class SmallestRowSearch {
   std::vector<Eigen::Index> free_;
   ObservationIndex::Entries entries_;  // only floors and ceilings are used
   double unit_;                        // the largest difference
+  bool has_scatter_ = false;           // the program's last column is an error beyond the declared one
   std::vector<ObservedPair> cuts_;
   std::set<std::pair<std::size_t, std::size_t>> known_;
 };
@@ -196,6 +222,11 @@ class SmallestRowSearch {
 SmallestRow FindSmallestRow(const Declaration& declaration, const Observations& observations, int coordinate,
                             const Eigen::RowVectorXd& scales) {
   return SmallestRowSearch(declaration, observations, coordinate, scales).Run();
+}
+
+double FindScatter(const Declaration& declaration, const Observations& observations, int coordinate,
+                   const Eigen::RowVectorXd& scales) {
+  return SmallestRowSearch(declaration, observations, coordinate, scales).Scatter();
 }
 
 SmallestRow FindSmallestEntry(const Declaration& declaration, const Observations& observations, int coordinate,

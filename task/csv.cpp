@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -30,19 +31,20 @@ void Split(std::string_view line, std::vector<std::string_view>& fields) {
 }
 
 // Fails if the header's fields are separated by something else.
-void RequireCommas(const std::string& path, const std::vector<std::string_view>& fields) {
+void RequireCommas(const std::string& path, const std::vector<std::string_view>& fields, const std::string& advice) {
   if (fields.size() > 1) return;
-  for (const char other : {';', '\t'})
+  constexpr std::pair<char, const char*> kOthers[] = {{';', "semicolons"}, {'\t', "tabs"}, {' ', "blanks"}};
+  for (const auto& [other, name] : kOthers)
     if (fields[0].find(other) != std::string_view::npos)
       FailAt(path, 1,
-             std::string("the columns are separated by ") + (other == ';' ? "semicolons" : "tabs") +
-                 ", not by commas; `forereach import` makes transitions of such a file");
+             std::string("the columns are separated by ") + name +
+                 "; put commas in their place, and decimal points in numbers" + advice);
 }
 
 // For each field of the header, the column it is of.
 std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<std::string_view>& fields,
                                      const std::vector<std::string>& columns, const std::string& advice) {
-  RequireCommas(path, fields);
+  RequireCommas(path, fields, advice);
   std::vector<Eigen::Index> order;
   for (const std::string_view field : fields) {
     const auto column = std::find(columns.begin(), columns.end(), field);
@@ -92,7 +94,9 @@ class Reader {
  private:
   void AddRow(int line, const std::vector<std::string_view>& fields, const std::vector<Eigen::Index>& order) {
     if (fields.size() != order.size())
-      FailAt(path_, line, fmt::format("{} fields, the header has {}", fields.size(), order.size()));
+      FailAt(path_, line,
+             fmt::format("{} fields, the header has {}{}", fields.size(), order.size(),
+                         fields.size() > order.size() ? "; numbers have a decimal point, not a comma" : ""));
     const std::size_t row = numbers_.size();
     numbers_.resize(row + fields.size());
     for (std::size_t j = 0; j < fields.size(); ++j) {
@@ -118,7 +122,7 @@ std::vector<std::string> CsvColumns(const std::string& path) {
   if (!LineReader(path).Next(text)) throw ConfigError(path + ":1: the file is empty; it has to begin with a header");
   std::vector<std::string_view> fields;
   Split(text, fields);
-  RequireCommas(path, fields);
+  RequireCommas(path, fields, "");
   std::vector<std::string> columns(fields.begin(), fields.end());
   for (const std::string& column : columns) {
     if (column.empty()) FailAt(path, 1, "a column has no name");

@@ -16,7 +16,7 @@ namespace forereach {
 
 /** @return one row a line, columns in the order of `columns`. Row i is line i + 2 of the file.
 @param named_by prefix of the message if the file cannot be opened: the place that names it. @param advice end of the
-message if the header has other columns.
+message if the header has other columns or separators.
 @throws ConfigError with file, line and column. */
 [[nodiscard]] Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns,
                                       const std::string& named_by = "", const std::string& advice = "");

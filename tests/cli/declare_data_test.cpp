@@ -100,10 +100,19 @@ TEST_F(DeclareDataTest, SaysWhatIsNotProven) {
 }
 
 TEST_F(DeclareDataTest, SaysSoIfNoSlopesAreConsistent) {
-  const Output output = Declare("--by px= --by vx=vy");
+  const Output output = Declare("--by px= --by vx=vy --disturbance declared");
   EXPECT_EQ(output.code, 1);
   EXPECT_THAT(output.text, HasSubstr("no L is consistent"));
   EXPECT_THAT(output.text, HasSubstr("their residuals of vx differ by"));
+  EXPECT_LT(output.text.find("--disturbance estimated"), output.text.find("--noise estimated"));
+}
+
+TEST_F(DeclareDataTest, WhatSlopesAndNoiseExplainIsNoScatter) {
+  const Output output = Declare("--by vx");
+  EXPECT_THAT(output.text, Not(HasSubstr("disturbance:")));
+  EXPECT_THAT(output.text, Not(HasSubstr("knee")));
+  EXPECT_THAT(output.text, HasSubstr("100 of 100 recorded steps of the others lie in their slices"));
+  EXPECT_EQ(Json::parse(Declare("--by vx --json").text)["rows"][2]["scatter"], 0);
 }
 
 TEST_F(DeclareDataTest, HoldOutCountsContradictionsOfEachFactorAndDrawsThem) {
@@ -175,6 +184,129 @@ TEST_F(DeclareDataTest, BadInputIsExitTwo) {
     EXPECT_THAT(output.text, HasSubstr(words)) << options;
   }
   EXPECT_EQ(Forereach("declare --config " + task_ + " --hold-out 2>&1").code, 2) << "it needs --from-data";
+}
+
+// x+ = x + 0.1 u, and the robot obeys each command one step late, which is no function of (x, u). The sensor errs by
+// 0.001.
+class LateCommandTest : public testing::Test {
+ protected:
+  LateCommandTest() {
+    std::mt19937 random(5);
+    std::ostringstream rows("x,u,x_next\n", std::ios::ate);
+    double x = 0, last = 0, u = 0;
+    for (int i = 0; i < 400; ++i) {
+      if (random() % 8 == 0) u = (static_cast<int>(random() % 5) - 2) / 2.0;
+      rows << x << "," << u << "," << x + 0.1 * last << "\n";
+      x += 0.1 * last;
+      last = u;
+    }
+    scratch_.Write("steps.csv", rows.str());
+    Declared("lipschitz: {}\n  noise_bound: [0.001]");
+  }
+  void Declared(const std::string& declaration) {
+    scratch_.Write("task.yaml",
+                   "model: {states: {x: m}, inputs: {u: m/s}, parameters: {dt: 0.1}, next: {x: x + dt*u}}\n"
+                   "domain: {state: {lower: [-100], upper: [100]}, input: {lower: [-1], upper: [1]}}\n"
+                   "declaration:\n  " +
+                       declaration +
+                       "\ntransitions: steps.csv\ngate: {obstacles: task}\n"
+                       "task: {initial_set: {center: [0], half_width: [0.01]}, projection: [x], between: samples, "
+                       "obstacles: [{box: {lower: [98], upper: [99]}}]}\n");
+  }
+  Output Declare(const std::string& options) const {
+    return Forereach("declare --config " + scratch_ / "task.yaml" + " --from-data " + options + " 2>&1");
+  }
+
+  ScratchDirectory scratch_;
+};
+
+TEST_F(LateCommandTest, ScatterIsADisturbanceAndKeepsTheRobotInItsSlices) {
+  const Output output = Declare("");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("noise_bound: [0.001]\n  disturbance: [0."));
+  EXPECT_THAT(output.text, HasSubstr("<- the knee"));
+  EXPECT_THAT(output.text, HasSubstr("differ by more\n  than noise_bound explains: x."));
+  EXPECT_THAT(output.text, Not(HasSubstr("warning")));
+  const Json row = Json::parse(Declare("--json").text)["rows"][0];
+  EXPECT_NEAR(row["disturbance"], 1.5 * row["scatter"].get<double>(), 1e-5);
+  EXPECT_GT(row["scatter"], 0.05);
+  EXPECT_TRUE(row["trades"][0]["slopes"].is_null()) << "the same place and command, and another step";
+  const std::string hold_out = Declare("--hold-out --json").text;
+  for (const Json& factor : Json::parse(hold_out.substr(0, hold_out.rfind('}') + 1))["factors"])
+    if (factor["factor"] >= 1.5) {
+      EXPECT_EQ(factor["states_inside"], factor["states"]) << factor["factor"];
+    }
+}
+
+TEST_F(LateCommandTest, ScatterTakenForNoiseLosesTheRobotAndIsSaid) {
+  EXPECT_EQ(Declare("--disturbance declared").code, 1);
+  const Output output = Declare("--noise estimated --disturbance declared");
+  EXPECT_THAT(output.text, HasSubstr("recorded steps lie outside the slices"));
+  EXPECT_THAT(output.text, HasSubstr("stretches of 10 steps"));
+  EXPECT_THAT(Declare("--noise estimated --disturbance declared --hold-out").text,
+              HasSubstr("warning: outside the slices of their certificates lie "));
+  EXPECT_THAT(Declare("--hold-out --by u").text, Not(HasSubstr("at factor 5")));
+}
+
+TEST_F(LateCommandTest, CheckSaysHowManyStepsLieOutside) {
+  const auto check = [&] { return Forereach("check " + scratch_ / "task.yaml" + " 2>&1").text; };
+  Declared("lipschitz: {x: {u: 0.1}}\n  noise_bound: [0.13]");
+  EXPECT_THAT(check(), HasSubstr("recorded steps lie outside the slices"));
+  Declared("lipschitz: {x: {u: 0.001}}\n  noise_bound: [0.001]\n  disturbance: [0.2]");
+  EXPECT_THAT(check(), Not(HasSubstr("outside the slices")));
+  const std::string init = "init --transitions " + scratch_ / "steps.csv" + " --dt 0.1 --out " + scratch_ / "new.yaml";
+  EXPECT_THAT(Forereach(init + " 2>&1").text, Not(HasSubstr("outside the slices"))) << "slopes of 1 promise little";
+}
+
+// In every other pair of steps the robot jumps from where it stood before.
+TEST_F(LateCommandTest, InitSaysHowManyStepsLieOutside) {
+  const auto init = [&](double jump) {
+    std::ostringstream rows("x,u,x_next\n", std::ios::ate);
+    for (int block = 0; block < 20; ++block) {
+      const double step = block % 2 == 0 ? 0 : jump;
+      rows << "0,0," << step << "\n" << step << ",0," << 2 * step << "\n";
+    }
+    scratch_.Write("jumps.csv", rows.str());
+    return Forereach("init --force --transitions " + scratch_ / "jumps.csv" + " --dt 0.1 --out " +
+                     scratch_ / "new.yaml" + " 2>&1")
+        .text;
+  };
+  EXPECT_THAT(init(0.5), HasSubstr("20 of 20 recorded steps lie outside the slices"));
+  EXPECT_THAT(init(0.5), HasSubstr("(10 stretches of 2 steps)"));
+  EXPECT_THAT(init(0.01), Not(HasSubstr("outside the slices"))) << "less than the errors that it declares";
+}
+
+// A sensor whose error is a little larger than declared: only pairs at nearly the same place show it.
+TEST(NoiseCliff, TheKneeIsProposedInsteadOfASteepSlope) {
+  const ScratchDirectory scratch;
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::ostringstream rows("y,v,a,y_next,v_next\n", std::ios::ate);
+  rows.precision(9);
+  for (int i = 0; i < 300; ++i) {
+    const double v = 2 + 1.5 * uniform(random);
+    rows << "0," << v << ",0," << 0.1 * v + 0.025 * uniform(random) << "," << v << "\n";
+  }
+  scratch.Write("steps.csv", rows.str());
+  const auto declare = [&](const char* noise, const std::string& options) {
+    scratch.Write(
+        "task.yaml",
+        "model: {states: {y: m, v: m/s}, inputs: {a: m/s^2}, parameters: {dt: 0.1}, next: {y: y + dt*v, v: v + "
+        "dt*a}}\ndomain: {state: {lower: [-100, 0], upper: [100, 4]}, input: {lower: [-1], upper: [1]}}\n"
+        "declaration: {lipschitz: {}, noise_bound: [" +
+            std::string(noise) +
+            ", 0]}\ntransitions: steps.csv\ntask: {initial_set: {center: [0, 1.5], half_width: [0.01, 0.01]}, "
+            "projection: [y], between: samples, obstacles: []}\n");
+    return Forereach("declare --config " + scratch / "task.yaml" + " --from-data --by v " + options + " 2>&1");
+  };
+  const auto steepest = [&](const char* noise, const std::string& options) {
+    return Json::parse(declare(noise, "--json " + options).text)["lipschitz"][0][1].get<double>();
+  };
+  EXPECT_GT(steepest("0.02", "--disturbance declared"), 1) << "the slope explains noise";
+  EXPECT_LT(steepest("0.02", ""), 0.05);
+  EXPECT_THAT(declare("0.02", "").text, HasSubstr("<- the knee"));
+  EXPECT_LT(steepest("0.026", ""), 0.05);
+  EXPECT_THAT(declare("0.026", "").text, Not(HasSubstr("knee"))) << "the noise is declared";
 }
 
 }  // namespace forereach::declare_data_test

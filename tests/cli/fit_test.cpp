@@ -59,6 +59,29 @@ TEST_F(FitCommandTest, NamesParametersThatTheDataDoNotDetermine) {
   EXPECT_TRUE(document["parameters"][3]["deviation"].is_number()) << "of gain";
 }
 
+TEST_F(FitCommandTest, SaysWhyAParameterHasNoStandardError) {
+  scratch_.Write("steps.csv", "x,y,u,x_next,y_next\n0.5,0,0,0.26,0\n0,0,0.5,0.12,0\n");
+  const Output two = Fit("");
+  EXPECT_EQ(two.code, 0) << two.text;
+  EXPECT_THAT(two.text, HasSubstr("none: no informative number is left over to show the noise"));
+  EXPECT_THAT(Json::parse(Fit("--json").text)["parameters"][0]["why_no_deviation"], HasSubstr("left over"));
+  scratch_.Write("steps.csv", "x,y,u,x_next,y_next\n0.5,0,0,0.26,0\n0,0,0.5,0.12,0\n0.25,0,0.25,0.2,0\n");
+  EXPECT_TRUE(Json::parse(Fit("--json").text)["parameters"][0]["why_no_deviation"].is_null()) << "one is left over";
+}
+
+TEST_F(FitCommandTest, AParameterThatBeginsWithoutADerivativeIsExitTwo) {
+  const std::string task = Replaced(Read(task_), "decay: 1,", "decay: 0,");
+  for (const auto& [term, words] : std::vector<std::pair<const char*, const char*>>{
+           {"x: sqrt(decay)*x", "no derivative by 'decay' at 0; begin elsewhere"},
+           {"x: decay^2*x", "'decay' has no effect near 0; begin elsewhere"}}) {
+    scratch_.Write("task.yaml", Replaced(task, "x: decay*x", term));
+    const Output output = Fit("");
+    EXPECT_EQ(output.code, 2) << term;
+    EXPECT_THAT(output.text, HasSubstr(words));
+    EXPECT_THAT(output.text, Not(HasSubstr("local minimum")));
+  }
+}
+
 TEST_F(FitCommandTest, BadInputIsExitTwo) {
   for (const auto& [options, words] :
        std::vector<std::pair<std::string, const char*>>{{"--parameters mass", "the model has no parameter 'mass'"},

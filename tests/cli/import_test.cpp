@@ -1,6 +1,8 @@
 // `forereach import`: a log in another's format becomes the transitions of a task; the commands of docs/data.md.
 #include "tests/test.h"
 
+#include <fmt/format.h>
+
 #include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
@@ -97,7 +99,7 @@ TEST_F(ImportCommandTest, BadInputIsExitTwoWithWhatIsWrong) {
       {columns_ + "--unwrap ax " + log_, "--unwrap: the model has no state 'ax'"},
       {columns_ + "--input-tolerance ax=-1 " + log_, "--input-tolerance: ax: '-1' is no number from 0 up"},
       {columns_ + "--input-tolerance ax=1 --input-mean " + log_, "excludes"},
-      {columns_ + "--delimiter comma " + log_, "log.csv:1: no column 'stamp'"},
+      {columns_ + "--delimiter comma " + log_, "log.csv:1: the fields seem to be separated by semicolons"},
       {columns_ + scratch_ / "none.csv", "none.csv: cannot be read"},
       {"--time stamp --state 'px=x pos' --input ax=cmd " + log_, "typically 150 s apart"}};
   for (const auto& [options, words] : cases) {
@@ -112,6 +114,158 @@ TEST_F(ImportCommandTest, AnOptionOfAListTakesOneValueAndLeavesTheFiles) {
   EXPECT_EQ(
       Import("--time stamp --time-unit ms --unit px=cm --input ax=cmd --state 'px=x pos' " + log_ + " " + log_).code,
       0);
+}
+
+// ---- what logs of other recorders have in common: a double integrator whose speed goes from 8 m/s up.
+
+class ForeignLogTest : public testing::Test {
+ protected:
+  ForeignLogTest() {
+    scratch_.Write("task.yaml", Replaced(Replaced(TaskFor("model: {states: {p: m, v: m/s}, inputs: {a: m/s^2}, "
+                                                          "parameters: {dt: 0.1}, next: {p: p + dt*v, v: v + dt*a}}\n",
+                                                          2, 1, "p"),
+                                                  "lower: [-1, -1]", "lower: [-100, -50]"),
+                                         "upper: [1, 1]", "upper: [100, 50]"));
+  }
+  // A row at 0.1 i seconds.
+  static std::string Row(int i, const char* format = "{:.1f},{:.4f},{:05.2f},1.00\n") {
+    const double t = 0.1 * i, p = 8 * t + t * t / 2, v = 8 + t;
+    return fmt::format(fmt::runtime(format), t, p, v);
+  }
+  static std::string Rows(int from, int until, const char* format = "{:.1f},{:.4f},{:05.2f},1.00\n") {
+    std::string text;
+    for (int i = from; i < until; ++i) text += Row(i, format);
+    return text;
+  }
+  Output Import(const std::string& log, const std::string& options = "") {
+    scratch_.Write("log.csv", log);
+    return Forereach("import --config " + scratch_ / "task.yaml" + " --out " + scratch_ / "steps.csv" + " " + options +
+                     " " + scratch_ / "log.csv" + " 2>&1");
+  }
+  const std::string header_ = "time,p,v,a\n";
+  ScratchDirectory scratch_;
+};
+
+TEST_F(ForeignLogTest, ZeroPaddedNumbersAreNumbers) {
+  const Output output = Import(header_ + Rows(0, 60));
+  EXPECT_EQ(output.code, 0);
+  EXPECT_THAT(output.text, HasSubstr("59 transitions from 60 rows, typically 0.1 s apart\n"));
+  EXPECT_THAT(output.text, Not(HasSubstr("no number")));
+}
+
+TEST_F(ForeignLogTest, ASecondHeaderInAnotherOrderIsRefusedWithItsLine) {
+  const Output output = Import(header_ + Rows(0, 20) + "time,v,p,a\n" + Rows(20, 40, "{0:.1f},{2:.2f},{1:.4f},1\n"));
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("log.csv:22: a second header that differs from the first: time, v, p, a"));
+  const Output more = Import(header_ + Rows(0, 20) + "time,p,v,a,mode\n" + Rows(20, 40, "{:.1f},{:.4f},{:.2f},1,b\n"));
+  EXPECT_EQ(more.code, 2) << more.text;
+}
+
+TEST_F(ForeignLogTest, ARepeatedHeaderIsSkippedAndSaid) {
+  const Output output = Import(header_ + Rows(0, 20) + header_ + Rows(20, 40));
+  EXPECT_EQ(output.code, 0);
+  EXPECT_THAT(output.text, HasSubstr("38 transitions from 40 rows"));
+  EXPECT_THAT(output.text, HasSubstr("1  lines that repeat the header; first in line 22"));
+  EXPECT_THAT(output.text, Not(HasSubstr("no number")));
+}
+
+TEST_F(ForeignLogTest, ALineOfUnitsIsNoSecondHeader) {
+  EXPECT_EQ(Import(header_ + "s,m,m/s,m/s^2\n" + Rows(0, 40)).code, 0);
+}
+
+TEST_F(ForeignLogTest, AHeaderThatIsACommentIsNamed) {
+  for (const char* options : {"", "--time time"}) {
+    const Output output = Import("# made by hand\n# time,p,v,a\n" + Rows(0, 20), options);
+    EXPECT_EQ(output.code, 2) << options;
+    EXPECT_THAT(output.text, HasSubstr("line 2 looks like a header; remove its #")) << options;
+  }
+  EXPECT_THAT(Import("# monday, in the hall, two laps, dry\n" + header_ + Rows(0, 20)).text, Not(HasSubstr("remove")));
+  EXPECT_THAT(Import("# 1,2,3,4\n# hall,wet\n" + Rows(0, 20)).text, Not(HasSubstr("remove")));
+}
+
+TEST_F(ForeignLogTest, DecimalCommasAreNamed) {
+  std::string rows = Rows(0, 20, "{:.1f};{:.4f};{:.2f};1\n");
+  std::ranges::replace(rows, '.', ',');
+  const Output output = Import("time;p;v;a\n" + rows);
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("60  numbers with a decimal comma: write a point; first in line 2 ('0,0')"));
+}
+
+TEST_F(ForeignLogTest, OtherSeparatorsAreNamed) {
+  for (const char* options : {"", "--time time"}) {
+    const Output blanks = Import("time p v a\n" + Rows(0, 20, "{:.1f} {:.4f} {:.2f} 1\n"), options);
+    EXPECT_EQ(blanks.code, 2);
+    EXPECT_THAT(blanks.text, HasSubstr("log.csv:1: the fields seem to be separated by blanks"));
+  }
+  const Output semicolons = Import("time;p;v;a\n" + Rows(0, 20, "{:.1f};{:.4f};{:.2f};1\n"), "--delimiter comma");
+  EXPECT_EQ(semicolons.code, 2);
+  EXPECT_THAT(semicolons.text, HasSubstr("log.csv:1: the fields seem to be separated by semicolons"));
+}
+
+TEST_F(ForeignLogTest, StampsThatGoBackAreNamed) {
+  std::string rows;
+  for (int i = 0; i < 40; ++i) rows += Row(i * 7 % 40);
+  const Output output = Import(header_ + rows);
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("stamps go back, 6 times, first in line 8"));
+  EXPECT_THAT(output.text, Not(HasSubstr("record faster")));
+}
+
+TEST_F(ForeignLogTest, FewerThanHalfOfTheRowsAreKeptOnlyIfAskedFor) {
+  const auto log = [&](int lost) { return header_ + Rows(0, 20) + Rows(20, 20 + lost, "{:.1f},{:.4f},-,1\n"); };
+  const Output half = Import(log(20)), fewer = Import(log(21));
+  EXPECT_EQ(half.code, 0) << half.text;
+  EXPECT_THAT(half.text, HasSubstr("20 of 40 rows (50 %) are in no transition"));
+  EXPECT_EQ(fewer.code, 1);
+  EXPECT_THAT(fewer.text, HasSubstr("21 of 41 rows (51.2 %) are in no transition"));
+  EXPECT_THAT(fewer.text, HasSubstr("--keep-few"));
+  EXPECT_THAT(fewer.text, HasSubstr("write these fields as decimal numbers"));
+  std::filesystem::remove(scratch_ / "steps.csv");
+  EXPECT_EQ(Import(log(21)).code, 1);
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "steps.csv"));
+  EXPECT_EQ(Import(log(21), "--keep-few").code, 0);
+  EXPECT_TRUE(std::filesystem::exists(scratch_ / "steps.csv"));
+}
+
+TEST_F(ForeignLogTest, RowsThatNobodyWantsDoNotCountAsDropped) {
+  EXPECT_EQ(Import(header_ + Rows(0, 60), "--until 1").code, 0);
+  EXPECT_EQ(Import(header_ + Row(0) + Row(0) + Row(0) + Row(0) + Row(1)).code, 0);
+}
+
+TEST_F(ForeignLogTest, TheShareThatIsDroppedIsSaidInJsonToo) {
+  const Output few = Import(header_ + Rows(0, 20) + Rows(20, 60, "{:.1f},{:.4f},-,1\n"), "--json");
+  EXPECT_EQ(few.code, 1);
+  const Json document = Json::parse(few.text.substr(0, few.text.rfind('}') + 1));
+  EXPECT_TRUE(document["out"].is_null());
+  EXPECT_EQ(document["rows"], 60);
+  EXPECT_EQ(document["rows_used"], 20);
+}
+
+// 0.1 * 3 is not 0.3: stamps and dt are doubles, and their rounding is no distance.
+TEST_F(ForeignLogTest, RoundingOfStampsIsNoDistance) {
+  const Output zero = Import(header_ + Rows(0, 60), "--tolerance-ms 0");
+  EXPECT_EQ(zero.code, 0);
+  EXPECT_THAT(zero.text, HasSubstr("59 transitions"));
+  EXPECT_THAT(zero.text, Not(HasSubstr("ms off t + dt")));
+  const Output off = Import(header_ + Row(0) + Replaced(Row(1), "0.1,", "0.1000001,") + Row(2));
+  EXPECT_THAT(off.text, HasSubstr("Stamps are up to 0.0001 ms off t + dt"));
+  EXPECT_EQ(Import(header_ + Row(0) + Replaced(Row(1), "0.1,", "0.1000001,") + Row(2), "--tolerance-ms 0").code, 1);
+}
+
+TEST_F(ForeignLogTest, StampsThatJitterAreSaidWithTheToleranceThatTakesThem) {
+  std::string rows;
+  for (int i = 0; i < 60; ++i) rows += fmt::format("{:.4f},0,8,1\n", 0.1 * i + (i % 2 == 0 ? 0 : 0.002));
+  const Output output = Import(header_ + rows);
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("60 of 60 rows (100 %) are in no transition"));
+  EXPECT_THAT(output.text, HasSubstr("--tolerance-ms 2 takes half of these starts"));
+  EXPECT_EQ(Import(header_ + rows, "--tolerance-ms 2").code, 0);
+}
+
+TEST_F(ForeignLogTest, ARowOfDecimalCommasBetweenCommasIsNamed) {
+  EXPECT_THAT(Import(header_ + Rows(0, 3) + "0,3,2,4,8,3,1,0\n" + Rows(4, 8)).text,
+              HasSubstr("8 fields, the header has 4: twice as many, as if each number had a decimal comma"));
+  EXPECT_THAT(Import(header_ + Rows(0, 3) + "0.3,2.4,8.3,1,0\n" + Rows(4, 8)).text, Not(HasSubstr("decimal comma")));
 }
 
 // ---- docs/data.md: its commands are run, in a folder of their own.

@@ -36,7 +36,7 @@ TEST_F(CsvTest, ErrorsNameLineColumnAndValue) {
   EXPECT_EQ(Error("a,b\n1,\n"), "t.csv:2: b: '' is not a number");
   EXPECT_EQ(Error("a,b\n1,0x2\n"), "t.csv:2: b: '0x2' is not a number");
   EXPECT_EQ(Error("a,b\n1\n"), "t.csv:2: 1 fields, the header has 2");
-  EXPECT_EQ(Error("a,b\n1,2,3\n"), "t.csv:2: 3 fields, the header has 2");
+  EXPECT_EQ(Error("a,b\n1,2,3\n"), "t.csv:2: 3 fields, the header has 2; numbers have a decimal point, not a comma");
   EXPECT_EQ(Error("a,b\n\n1,2\n"), "t.csv:2: a blank line; only the end of the file may have some");
   EXPECT_EQ(Error("a,b\n1,2\n \n\n1,2\n"), "t.csv:3: a blank line; only the end of the file may have some");
 }
@@ -54,9 +54,10 @@ TEST_F(CsvTest, RefusesAWrongHeader) {
   EXPECT_EQ(Error("b\n"), "t.csv:1: a: the column is missing");
   EXPECT_EQ(Error(""), "t.csv:1: the file is empty; it has to begin with the header a, b");
   EXPECT_EQ(Error("1,2\n"), "t.csv:1: unknown column '1'; the columns are a, b");
-  EXPECT_EQ(Error("a;b\n1;2\n"),
-            "t.csv:1: the columns are separated by semicolons, not by commas; `forereach import` makes transitions of "
-            "such a file");
+  EXPECT_EQ(
+      Error("a;b\n1;2\n"),
+      "t.csv:1: the columns are separated by semicolons; put commas in their place, and decimal points in numbers");
+  EXPECT_THAT(Error("a b\n"), HasSubstr("separated by blanks"));
   EXPECT_THAT(Error("a\tb\n"), HasSubstr("separated by tabs"));
   EXPECT_THAT([&] { (void)CsvColumns(files_.Write("t.csv", "a;b\n")); },
               testing::ThrowsMessage<ConfigError>(HasSubstr("separated by semicolons")));
@@ -66,6 +67,8 @@ TEST_F(CsvTest, OtherColumnsOfTransitionsNameTheImport) {
   EXPECT_THAT([&] { (void)LoadTransitions(files_.Write("t.csv", "t,px\n"), *MakePointMass(0.1)); },
               testing::ThrowsMessage<ConfigError>(
                   HasSubstr("vy_next; `forereach import` makes transitions of a log with other columns")));
+  EXPECT_THAT([&] { (void)LoadTransitions(files_.Write("t.csv", "px;py\n"), *MakePointMass(0.1)); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("in numbers; `forereach import` makes transitions")));
 }
 
 TEST_F(CsvTest, RefusesMissingFilesAndDirectories) {

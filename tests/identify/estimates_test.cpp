@@ -133,6 +133,41 @@ TEST(SmallestRow, IsTheOneWorkedOutByHand) {
   EXPECT_EQ(one.unexplained->difference, 2);
 }
 
+// Two residuals, 0 and 1, at places that are so far apart, and a third one far away.
+double ScatterAt(double distance, double noise) {
+  const Observations observations{(Eigen::MatrixXd(3, 1) << 0, distance, 4).finished(),
+                                  (Eigen::MatrixXd(3, 1) << 0, 1, 0.5).finished(),
+                                  (Eigen::MatrixXd(3, 1) << 0, 1, 0.5).finished()};
+  const Declaration declaration{Eigen::MatrixXd::Zero(1, 1), Eigen::VectorXd::Constant(1, noise)};
+  const double scatter = FindScatter(declaration, observations, 0, Eigen::RowVectorXd::Ones(1));
+  Declaration with = declaration;
+  with.disturbance = Eigen::VectorXd::Constant(1, scatter);
+  EXPECT_FALSE(FindSmallestRow(with, observations, 0, Eigen::RowVectorXd::Ones(1)).unexplained);
+  return scatter;
+}
+
+TEST(Scatter, IsTheErrorThatNearPlacesShow) {
+  EXPECT_NEAR(ScatterAt(0, 0), 0.5, 1e-6);
+  EXPECT_NEAR(ScatterAt(kNear - 0.001, 0), 0.5, 0.01) << "a slope of 1 / 8 remains";
+  EXPECT_EQ(ScatterAt(kNear + 0.001, 0), 0) << "a slope explains it";
+  EXPECT_NEAR(ScatterAt(0, 0.3), 0.2, 1e-6) << "beyond the noise";
+  EXPECT_EQ(ScatterAt(0, 0.5), 0);
+}
+
+TEST(Scatter, IsNoneOfSlopesAndOfDeclaredNoise) {
+  const unsigned first = SeedOf(1);
+  for (unsigned trial = 0; trial < 10; ++trial) {
+    SCOPED_TRACE("seed " + std::to_string(first + trial));
+    World world(first + trial, 200, 2, 0.05);
+    const Eigen::RowVectorXd scales = ScalesOf(world.observations);
+    EXPECT_EQ(FindScatter(world.declaration, world.observations, 0, scales), 0);
+    world.declaration.noise_bound[0] = 0.01;
+    const double scatter = FindScatter(world.declaration, world.observations, 0, scales);
+    EXPECT_GT(scatter, 0.02);
+    EXPECT_LE(scatter, 0.04 + 1e-6) << "what is not declared of the error";
+  }
+}
+
 TEST(NoiseFloor, OfRepetitionsIsNeverAboveTheError) {
   const unsigned first = SeedOf(1);
   for (unsigned trial = 0; trial < 40; ++trial) {

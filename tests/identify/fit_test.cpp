@@ -164,6 +164,180 @@ TEST(Fit, TheRoundingOfAnExactStateWeighsNothing) {
   EXPECT_LT(fit.parameters[0].deviation, 0.01);
 }
 
+// p+ = p, v+ = v + 0.1 gain a, from rest: four errors of 0.003 in v, and `place` is the error of p.
+Transitions FourSteps(double place) {
+  Transitions data{Eigen::MatrixXd::Zero(4, 3), Eigen::MatrixXd(4, 2)};
+  data.z.col(2) << 1, 1, -1, -1;
+  data.x_next << place, 0.093, -place, 0.087, place, -0.087, -place, -0.093;
+  return data;
+}
+
+// p+ = p + 0.1 v, v+ = v + 0.1 (gain a + what is given).
+ModelText Cart(const std::string& rate, double gain, double k) {
+  ModelText text;
+  text.name = "cart";
+  text.states = {{"p", "m"}, {"v", "m/s"}};
+  text.inputs = {{"a", "m/s^2"}};
+  text.parameters = {{"dt", 0.1, 0.1}, {"gain", gain, gain}, {"k", k, k}};
+  text.equations = {{"p + dt*v", 1, 1}, {"v + dt*(gain*a" + rate + ")", 2, 1}};
+  text.integrator = ModelText::Integrator::kNone;
+  return text;
+}
+
+TEST(FitDeviation, IsOfTheStateThatShowsTheParameter) {
+  for (const double place : {0.0, 1e-9, 0.003, 0.01, 100.0}) {
+    const Fit fit = FitParameters(Cart("", 1, 0), FourSteps(place), {"gain"});
+    EXPECT_NEAR(fit.parameters[0].deviation, std::sqrt(4 * 0.003 * 0.003 / 3) / 0.2, 1e-7) << place;
+  }
+}
+
+TEST(FitDeviation, IsNoneWhenNoNumberIsLeftOver) {
+  Transitions data{Eigen::MatrixXd(2, 3), Eigen::MatrixXd(2, 2)};
+  data.z << 0, 1, 1, 0, 1.1, 0.9;
+  data.x_next << 0.1, 1.13, 0.11, 1.15;
+  const ModelText text = Cart(" - k*v", 1, 0.1);
+  for (const FittedParameter& each : FitParameters(text, data, {"gain", "k"}).parameters)
+    EXPECT_TRUE(std::isnan(each.deviation)) << each.name;
+  const Fit one = FitParameters(text, data, {"gain"});
+  EXPECT_TRUE(std::isfinite(one.parameters[0].deviation)) << "one number is left over";
+  data.z.conservativeResize(3, 3);
+  data.x_next.conservativeResize(3, 2);
+  data.z.row(2) << 0, -1, 0.5;
+  data.x_next.row(2) << -0.1, -0.93;
+  for (const FittedParameter& each : FitParameters(text, data, {"gain", "k"}).parameters)
+    EXPECT_TRUE(std::isfinite(each.deviation)) << each.name;
+}
+
+// x+ = a x + c u with noise 0.01, y+ = d y + c u with noise 1: a parameter of each state, and one of both. The errors
+// of x at the start are 50 times its noise.
+TEST(FitDeviation, IsTheSpreadOverManySetsOfData) {
+  constexpr int kSets = 500, kRows = 40;
+  const unsigned seed = SeedOf(11);
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  ModelText text = Products();
+  text.equations = {{"a*x + c*u", 1, 1}, {"d*y + c*u", 2, 1}};
+  Transitions data{Eigen::MatrixXd(kRows, 3), Eigen::MatrixXd(kRows, 2)};
+  for (double& value : data.z.reshaped()) value = normal(random);
+  const Eigen::Array3d truth(0.4, 1, 0);
+  Eigen::Array3d squares = Eigen::Array3d::Zero(), variances = Eigen::Array3d::Zero();
+  for (int set = 0; set < kSets; ++set) {
+    for (Eigen::Index i = 0; i < kRows; ++i)
+      data.x_next.row(i) << 0.4 * data.z(i, 0) + data.z(i, 2) + 0.01 * normal(random), data.z(i, 2) + normal(random);
+    const Fit fit = FitParameters(text, data, {"a", "c", "d"});
+    for (int p = 0; p < 3; ++p) {
+      const FittedParameter& found = fit.parameters[ToSize(p)];
+      squares[p] += std::pow(found.after - truth[p], 2);
+      variances[p] += std::pow(found.deviation, 2);
+    }
+  }
+  // The sum of kSets squares has the relative deviation sqrt(2 / kSets).
+  const double enough = 4 * std::sqrt(2.0 / kSets);
+  for (const int p : {1, 2}) EXPECT_NEAR(squares[p] / variances[p], 1, enough) << p;
+  EXPECT_LT(squares[0] / variances[0], 1 + enough) << "the error of c in y shows in x, too, and is not taken off";
+  EXPECT_GT(squares[0] / variances[0], 0.25);
+}
+
+TEST(FitDeviation, AgreesWithAJackknife) {
+  const unsigned seed = SeedOf(12);
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  const ModelText start = Pendulum(1.2, 0.1);
+  Transitions all = Drive(Pendulum(0.8, 0.3), seed, 0);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (Eigen::Index i = 0; i < all.x_next.rows(); ++i)
+    all.x_next.row(i) += Eigen::RowVector2d(0.1 * uniform(random), 0.005 * uniform(random));
+  const Fit fit = FitParameters(start, all, {"length", "damping"});
+  const Eigen::Index count = all.x_next.rows(), rest = count - 1;
+  Eigen::ArrayX2d without(count, 2);
+  for (Eigen::Index left_out = 0; left_out < count; ++left_out) {
+    Transitions others{all.z.topRows(rest), all.x_next.topRows(rest)};
+    if (left_out < rest) {
+      others.z.row(left_out) = all.z.row(rest);
+      others.x_next.row(left_out) = all.x_next.row(rest);
+    }
+    const Fit each = FitParameters(start, others, {"length", "damping"});
+    without.row(left_out) << each.parameters[0].after, each.parameters[1].after;
+  }
+  for (const Eigen::Index p : {0, 1}) {
+    const double squares = (without.col(p) - without.col(p).mean()).square().sum();
+    const double jackknife = std::sqrt(squares * static_cast<double>(rest) / static_cast<double>(count));
+    EXPECT_NEAR(fit.parameters[ToSize(p)].deviation / jackknife, 1, 0.15) << p;
+  }
+}
+
+// Five steps with gain 1 and, in v, a drag of 0.07.
+Transitions DraggedSteps() {
+  Transitions data{Eigen::MatrixXd::Zero(5, 3), Eigen::MatrixXd(5, 2)};
+  data.z.rightCols(2) << 1, 1, 2, 1, 1, -1, 2, -1, 3, 0.5;
+  data.x_next << 0.1, 1.093, 0.2, 2.086, 0.1, 0.893, 0.2, 1.886, 0.3, 3.029;
+  return data;
+}
+
+std::string RefusalOf(const ModelText& text, const Transitions& data, const std::vector<std::string>& names) {
+  try {
+    (void)FitParameters(text, data, names);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Fit, RefusesToBeginWhereAParameterHasNoDerivative) {
+  const Transitions data = DraggedSteps();
+  EXPECT_THAT(RefusalOf(Cart(" - sqrt(k)*v", 1, 0), data, {"gain", "k"}),
+              HasSubstr("no derivative by 'k' at 0; begin elsewhere"));
+  EXPECT_THAT(RefusalOf(Cart(" - sqrt(k - 2)*v", 1, 2), data, {"gain", "k"}), HasSubstr("by 'k' at 2"));
+  EXPECT_EQ(RefusalOf(Cart(" - sqrt(k)*v", 1, 0), data, {"gain"}), "") << "k is not fitted";
+  for (const double k : {0.001, 0.1, 3.0}) {
+    const Fit fit = FitParameters(Cart(" - sqrt(k)*v", 1, k), data, {"gain", "k"});
+    EXPECT_NEAR(fit.parameters[1].after, 0.07 * 0.07, 1e-6) << "from " << k;
+  }
+}
+
+TEST(Fit, RefusesToBeginWhereAParameterHasNoEffectNearby) {
+  const Transitions data = DraggedSteps();
+  for (const char* rate : {" - k^2*v", " - k^3*v", " - (1 - cos(k))*v"})
+    EXPECT_THAT(RefusalOf(Cart(rate, 1, 0), data, {"gain", "k"}),
+                HasSubstr("'k' has no effect near 0; begin elsewhere"))
+        << rate;
+  for (const double k : {0.001, 0.1, 3.0})
+    EXPECT_NEAR(std::abs(FitParameters(Cart(" - k^2*v", 1, k), data, {"gain", "k"}).parameters[1].after),
+                std::sqrt(0.07), 1e-6)
+        << "from " << k;
+  const Fit unused = FitParameters(Cart(" - 0.07*v + 0*k*v", 1, 0), data, {"gain", "k"});
+  EXPECT_EQ(unused.parameters[1].deviation, kInfinity) << "it has no effect anywhere, which is no error";
+}
+
+// The factor of k is zero at the start, and the fit moves it.
+TEST(Fit, BeginsWhereAnotherParameterHidesTheEffect) {
+  Transitions data = DraggedSteps();
+  for (Eigen::Index i = 0; i < 5; ++i) data.x_next(i, 1) = data.z(i, 1) + 0.1 * 2 * data.z(i, 2);
+  const Fit fit = FitParameters(Cart(" + 0*v", 0, 0.1), data, {"gain", "k"});
+  EXPECT_NEAR(fit.parameters[0].after, 2, 1e-6);
+  EXPECT_EQ(fit.parameters[1].deviation, kInfinity);
+  ModelText text = Cart("", 0, 1);
+  text.equations[1] = {"v + dt*gain*k^2*a", 2, 1};
+  EXPECT_EQ(RefusalOf(text, data, {"gain", "k"}), "");
+}
+
+TEST(Fit, RefusesAParameterThatRunsAway) {
+  Transitions data = DraggedSteps();
+  for (Eigen::Index i = 0; i < 5; ++i) data.x_next(i, 1) = data.z(i, 1) + 0.12 * data.z(i, 2);
+  EXPECT_THAT(RefusalOf(Cart("*tanh(k)", 1, 0.5), data, {"k"}), HasSubstr("the transitions do not bound 'k'"))
+      << "tanh never reaches 1.2";
+  for (Eigen::Index i = 0; i < 5; ++i) data.x_next(i, 1) = data.z(i, 1) + 0.1 * data.z(i, 2) - 0.01 * data.z(i, 1);
+  EXPECT_THAT(RefusalOf(Cart(" + exp(k)*v", 1, 0), data, {"gain", "k"}), HasSubstr("do not bound 'k'"))
+      << "exp is never negative";
+  EXPECT_EQ(RefusalOf(Cart(" - exp(k)*v", 1, 0), data, {"gain", "k"}), "");
+  for (Eigen::Index i = 0; i < 5; ++i) data.x_next(i, 1) = data.z(i, 1) + 0.098 * data.z(i, 2);
+  const Fit bounded = FitParameters(Cart("*tanh(k)", 1, 0.5), data, {"k"});
+  EXPECT_NEAR(bounded.parameters[0].after, std::atanh(0.98), 1e-6);
+  const Fit far = FitParameters(Cart("", 1e-6, 0), data, {"gain"});
+  EXPECT_NEAR(far.parameters[0].after, 0.98, 1e-6) << "a million times its start is no running away";
+}
+
 TEST(Fit, RefusesWhatItCannotFit) {
   const Transitions data = Drive(Pendulum(0.8, 0.3), SeedOf(3), 0);
   for (const auto& names : std::vector<std::vector<std::string>>{{}, {"dt"}, {"mass"}, {"length", "length"}})

@@ -78,6 +78,25 @@ TEST_F(ImportTest, AStampMayBeOffByTheToleranceAndNotByMore) {
   EXPECT_NEAR(Again().largest_gap, 0.1 + 0.00782, 1e-12) << "from 0.1 - 0.00782 to 0.3";
 }
 
+TEST_F(ImportTest, TheRoundingOfStampsIsNoDistanceUnlessItIsLarge) {
+  options_.tolerance = 0;
+  EXPECT_EQ(From({{0.2}, {0.1 + 0.2}, {0.4}, {0.5}}).transitions.size(), 3) << "0.1 + 0.2 is not 0.3";
+  EXPECT_EQ(Again().largest_offset, 0);
+  EXPECT_EQ(From({{0.2}, {0.3 + 1e-15}}).transitions.size(), 0);
+  EXPECT_EQ(From({{1e9}, {1e9 + 0.1}}).transitions.size(), 1);
+  EXPECT_EQ(From({{1e12}, {1e12 + 0.1}}).transitions.size(), 0) << "0.0001 s are between two doubles";
+}
+
+TEST_F(ImportTest, CountsTheRowsThatLieInATransition) {
+  (void)From({{0}, {0.05}, {0.1}, {0.15}, {0.2}, {0.25}, {kNan}});
+  EXPECT_EQ(Again().rows, 7);
+  EXPECT_EQ(Again().rows_used, 5) << "0 to 0.2";
+  options_.overlapping = true;
+  EXPECT_EQ(Again().rows_used, 6) << "0 to 0.25, each row once";
+  options_.until = 0.1;
+  EXPECT_EQ(Again().rows, 4) << "0 to 0.1, and one without a stamp";
+}
+
 TEST_F(ImportTest, OfTwoStampsTheNearerOneCounts) {
   options_.tolerance = 0.01;
   EXPECT_EQ(From({{0}, {0.098, 1}, {0.103, 2}}).transitions.x_next(0, 0), 1);

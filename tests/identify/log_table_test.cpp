@@ -50,6 +50,12 @@ TEST_F(LogTableTest, AFieldThatIsNoNumberIsNanAndCounted) {
   EXPECT_EQ(table.values(7, 1), 7) << "quotes do not make it less of a number";
 }
 
+TEST_F(LogTableTest, AZeroInFrontOrAPlusMakesItNoLessOfANumber) {
+  const LogTable table = Table("t,pos x\n007,08.00\n+4.0,-03.5\n00,-00\n000.5,+01e2\n0x8,0-8\n-+01,--01\n");
+  EXPECT_EQ(table.values.topRows(4), (Eigen::Matrix<double, 4, 2>() << 7, 8, 4, -3.5, 0, 0, 0.5, 100).finished());
+  EXPECT_TRUE(table.values.bottomRows(2).array().isNaN().all());
+}
+
 TEST_F(LogTableTest, ARowWithOtherFieldsThanTheHeaderIsLostAndSaid) {
   const LogTable table = Table("t,pos x\n1,2\n2\n3,4\n4,5,6\n5,\"a\"b\n6,7\n7,8");
   EXPECT_THAT(table.lines, ElementsAre(2, 4, 7, 8));
