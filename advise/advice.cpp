@@ -185,6 +185,10 @@ void AddObservation(Problem& problem, const Eigen::VectorXd& z, const Eigen::Vec
   all.x_next.conservativeResize(row + 1, Eigen::NoChange);
   all.z.row(row) = z.transpose();
   all.x_next.row(row) = (next + residual).transpose();
+  if (all.longer.size() > 0) {
+    all.longer.conservativeResize(row + 1);
+    all.longer[row] = 0;
+  }
 }
 
 class Adviser {
@@ -453,7 +457,8 @@ class Adviser {
 
   // The centers of some slices before the failure, with their controls.
   void AdviseObservation(int most) {
-    const Observations known = Observe(model_, case_.problem->declaration, case_.problem->transitions);
+    const Observations known =
+        Observe(model_, case_.problem->declaration, case_.problem->transitions, case_.problem->timing);
     const int n = model_.num_states(),
               steps = std::min<int>(tube_.length() + 1, static_cast<int>(case_.controls.cols()));
     std::optional<Advice> best;
@@ -522,7 +527,8 @@ class Adviser {
   template <class Widen>
   void AdviseWiderDeclaration(Change change, const std::string& begin, Widen widen) {
     if (judgement_.decision.first_observation < 0) return;  // no pair is at fault
-    const Observations known = Observe(model_, case_.problem->declaration, case_.problem->transitions);
+    const Observations known =
+        Observe(model_, case_.problem->declaration, case_.problem->transitions, case_.problem->timing);
     Declaration declaration = case_.problem->declaration;
     std::string what;
     const auto largest = ForEachContradictingRow(declaration, known, widen, what);
@@ -568,6 +574,10 @@ class Adviser {
       all.x_next.middleRows(observation, behind) = all.x_next.bottomRows(behind).eval();
       all.z.conservativeResize(all.z.rows() - 1, Eigen::NoChange);
       all.x_next.conservativeResize(all.x_next.rows() - 1, Eigen::NoChange);
+      if (all.longer.size() > 0) {
+        all.longer.segment(observation, behind) = all.longer.tail(behind).eval();
+        all.longer.conservativeResize(all.longer.size() - 1);
+      }
     });
     Add({.change = Change::kOutlier,
          .what = fmt::format("without observation {}", observation),
@@ -621,7 +631,8 @@ std::vector<Place> RankPlaces(const std::vector<Case>& cases, const std::vector<
   std::vector<Place> ranked;
   if (cases.empty()) return ranked;
   const Case& first = cases.front();
-  const Observations known = Observe(*first.problem->model, first.problem->declaration, first.problem->transitions);
+  const Observations known =
+      Observe(*first.problem->model, first.problem->declaration, first.problem->transitions, first.problem->timing);
   Tube tube;
   const std::size_t count = std::min(most, places.size());
   for (std::size_t i = 0; i < count; ++i) {

@@ -228,7 +228,7 @@ class Importer {
     if (!FindStates(i, j, location.first(ToSize(n_)), successor)) return 0;
     if (!FindInput(i, j, location.subspan(ToSize(n_)), deviation)) return 0;
     Observations observed;
-    switch (Observe(problem_, location, successor, observed)) {
+    switch (Observe(problem_, location, successor, 0, observed)) {
       case Learned::kAdded: break;
       case Learned::kNotFinite: Drop(Dropped::kNoState, samples_[i].row); return 0;
       case Learned::kOutsideDomain: Drop(Dropped::kOutsideDomain, samples_[i].row, ConstraintAt(location)); return 0;

@@ -36,7 +36,7 @@ class CertifierFollower : public TimelineUser {
   void OnObstacles(Bytes, std::int64_t, SenderId) override { CertifyAgain(); }
   void OnTransition(const ExecutedTransition& transition, Bytes) override {
     CertifyAgain();
-    static_cast<void>(certifier_->Learn(transition.z, transition.next));
+    static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
   }
 
  protected:

@@ -34,7 +34,11 @@ std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>&
   Eigen::Index row = all.z.rows();
   all.z.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
   all.x_next.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
+  const Eigen::Index before = all.longer.size();
+  all.longer.conservativeResize(all.z.rows());
+  all.longer.tail(all.z.rows() - before).setZero();
   for (const ExecutedTransition& each : learned) {
+    all.longer[row] = each.longer;
     all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(each.z.data(), std::ssize(each.z));
     all.x_next.row(row++) = Eigen::Map<const Eigen::RowVectorXd>(each.next.data(), std::ssize(each.next));
   }
@@ -189,7 +193,7 @@ void Timeline::TakeTransition(const LogEvent& event) {
   if (!transition_sender_.WhyTwo(event.utime).empty()) return;
   const auto message = Decoded<transition_t>(event.message());
   if (!now_->gate.learns || !message) return;
-  ExecutedTransition transition = FromMessage(*message, *now_->problem);
+  ExecutedTransition transition = Examine(*message, *now_->problem);
   if (!transition.refusal.empty()) return;
   logged_observations_ = ChainedDigest(logged_observations_, event.message());
   transitions_ahead_.push_back(

@@ -226,6 +226,7 @@ std::span<const double> Supervisor::Boundary(std::int64_t utime, std::int64_t no
     if (!ends) StartPending(utime, now_us);
     if (IsExecuting()) ContinuePlan(utime);
     step_began_at_ = state_;
+    step_began_us_ = now_us;
     is_under_way_ = IsExecuting();
   });
   ReportState(utime, ends);
@@ -249,7 +250,7 @@ void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
   const bool is_new = std::exchange(is_under_way_, false);
   if (is_new) {
     ++step_;
-    if (guard_.IsOnSchedule(step_, now_us)) ReportTransition(utime - options_.guard.step_us);
+    if (guard_.IsOnSchedule(step_, now_us)) ReportTransition(utime - options_.guard.step_us, now_us - step_began_us_);
   }
   const GuardVerdict verdict = is_new ? guard_.Check(step_, state_, now_us) : guard_.CheckAgain(state_, now_us);
   if (verdict.ok()) {
@@ -376,10 +377,11 @@ void Supervisor::ReportState(std::int64_t utime, bool ends) noexcept {
   reports_.Add(kRobotState, message);
 }
 
-void Supervisor::ReportTransition(std::int64_t utime) noexcept {
+void Supervisor::ReportTransition(std::int64_t utime, std::int64_t duration_us) noexcept {
   transition_t message{};
   message.utime = utime;
   message.sequence = counts_.steps++;
+  message.duration_us = duration_us;
   message.num_states = SetValues(message.state, step_began_at_);
   message.num_inputs = SetValues(message.input, guard_.control());
   SetValues(message.next_state, state_);

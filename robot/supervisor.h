@@ -177,7 +177,7 @@ class Supervisor final {
   void Hold();
   void HoldIfMoving();
   void ReportState(std::int64_t utime, bool ends) noexcept;
-  void ReportTransition(std::int64_t utime) noexcept;
+  void ReportTransition(std::int64_t utime, std::int64_t duration_us) noexcept;
   void ReportRefusal(std::int64_t utime, const GuardVerdict& verdict);
   void ReportEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
                    std::string_view text, int coordinate = -1) noexcept;
@@ -193,6 +193,7 @@ class Supervisor final {
   bool is_holding_ = true;                           // Hold has returned since the last control
   std::int64_t step_utime_ = 0;                      // the boundary from which that control applies
   std::vector<double> step_began_at_;                // the state
+  std::int64_t step_began_us_ = 0;                   // by the robot's clock
   std::vector<double> state_;                        // measured last
   bool is_measured_ = false;                         // in this call
   bool is_deciding_ = false, is_sending_ = false;    // a call is under way

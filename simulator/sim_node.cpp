@@ -79,8 +79,8 @@ Brake BrakeOf(const Config& config) {
 }
 
 Plant TargetOf(const Config& config) {
-  return [target = std::shared_ptr<const Target>(MakeTarget(config))](auto x, auto u, auto next) {
-    target->Step(x, u, next);
+  return [target = std::shared_ptr<const Target>(MakeTarget(config))](auto x, auto u, auto next, double longer) {
+    target->Step(x, u, next, longer);
   };
 }
 
@@ -104,6 +104,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Pl
       places_(*config.problem->model, config.problem->projection, config.problem->body),
       limits_(*config.problem->model, config.problem->limits),
       disturbance_(config.problem->declaration, config.robot),
+      jitter_(config),
       period_us_(Microseconds(config.robot.step_period_ms)),
       brake_(BrakeOf(config_)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
@@ -134,7 +135,10 @@ void RobotSimNode::Tick(std::int64_t now_us) {
   TakeReload();
   if (!start_utime_) start_utime_ = now_us;
   const auto next = [&] { return *start_utime_ + supervisor_.counts().boundaries * period_us_; };
-  while (!done() && next() <= now_us) Boundary(next(), now_us);
+  while (!done() && next() + offset_us_ <= now_us) {
+    Boundary(next(), now_us);
+    offset_before_us_ = std::exchange(offset_us_, jitter_.Next());
+  }
 }
 
 void RobotSimNode::Reload() {
@@ -155,7 +159,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const bool moves = !control.empty() || is_stopping_;
   if (!control.empty()) {
     is_stopping_ = false;
-    plant_(state_, control, state_);
+    plant_(state_, control, state_, static_cast<double>(offset_us_ - offset_before_us_) * 1e-6);
     disturbance_.Add(state_);
   } else if (is_stopping_) {
     BrakeUntil(utime);
@@ -187,7 +191,7 @@ void RobotSimNode::BrakeUntil(std::int64_t utime) {
   const std::vector<double> before = state_;
   const Box& inputs = config_.problem->domain.input;
   const Eigen::VectorXd idle = inputs.lower().cwiseMax(0).cwiseMin(inputs.upper());
-  plant_(before, {idle.data(), ToSize(idle.size())}, state_);
+  plant_(before, {idle.data(), ToSize(idle.size())}, state_, 0);
   disturbance_.Add(state_);
   const double share = static_cast<double>(utime - brakes_since_utime_) / static_cast<double>(period_us_);
   brake_.Apply(before, std::clamp(share, 0.0, 1.0), state_);

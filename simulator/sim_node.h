@@ -1,6 +1,7 @@
 /** The simulated robot: a Plant that executes certified plans under the Supervisor, one step at a time.
 
-Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
+Step boundaries are due at t_j = t_0 + j * step_period, where t_0 is the first Tick, and come as early or late as
+robot.step_jitter says (step_jitter.h); messages carry the times at which they are due. At each boundary, in this order:
  1. The plant takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
     turned into [-pi, pi], and the supervisor finishes the step.
  2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h),
@@ -40,6 +41,7 @@ accepts plans that are certified under the new file (Guard::Expect); its state a
 #include "robot/supervisor.h"
 #include "simulator/contacts.h"
 #include "simulator/disturbance.h"
+#include "simulator/step_jitter.h"
 #include "simulator/target.h"
 #include "task/config.h"
 
@@ -97,6 +99,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   const BodyPlaces places_;
   const LimitValues limits_;
   Disturbance disturbance_;
+  StepJitter jitter_;
   const std::int64_t period_us_;
   const Brake brake_;
   Reloading<std::optional<Config>> reload_;
@@ -105,6 +108,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   std::vector<double> state_;
   std::vector<double> state_before_;  // at the last boundary; empty before the first
   std::optional<std::int64_t> start_utime_;
+  std::int64_t offset_before_us_ = 0, offset_us_ = 0;  // of the last boundary, and of the next one
   std::int64_t next_progress_utime_ = 0;
   bool is_stopping_ = false;
   std::int64_t heard_utime_ = 0;  // of the message or boundary that is being handled

@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/step_rate.h"
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -20,10 +22,13 @@ namespace {
 
 class ModelTarget final : public Target {
  public:
-  ModelTarget(std::shared_ptr<const NominalModel> model, std::optional<TextFunction> residual)
-      : model_(std::move(model)), residual_(std::move(residual)) {}
+  ModelTarget(std::shared_ptr<const NominalModel> model, StepTiming timing, std::optional<TextFunction> residual)
+      : model_(std::move(model)), timing_(std::move(timing)), residual_(std::move(residual)) {
+    if (timing_.error > 0) rate_.emplace(TextOf(*model_).value());
+  }
 
-  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const override {
+  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next,
+            double longer) const override {
     std::array<double, kMaxVariables> all;
     std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), all.begin()));
     const auto z = std::span<const double>(all).first(x.size() + u.size());
@@ -31,11 +36,22 @@ class ModelTarget final : public Target {
     model_->EvaluateWide(z, std::span(nominal).first(next.size()));
     if (residual_) residual_->Evaluate(z, std::span(residual).first(next.size()));
     for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(nominal[k] + residual[k]);
+    if (longer == 0) return;
+    const double dt = StepOf(*model_);
+    std::array<Interval, kMaxVariables> point;
+    std::array<Interval, kMaxStates> rate;
+    std::ranges::copy(z, point.begin());
+    rate_.value().Enclose({point.data(), z.size()}, dt, std::span(rate).first(next.size()));
+    for (std::size_t k = 0; k < next.size(); ++k)
+      if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) == 0)
+        next[k] += longer * (rate[k].Middle() + static_cast<double>(residual[k]) / dt);
   }
 
  private:
   std::shared_ptr<const NominalModel> model_;
+  StepTiming timing_;
   std::optional<TextFunction> residual_;
+  std::optional<StepRate> rate_;
 };
 
 TextFunction FunctionOf(const ParametricResidual& residual, const NominalModel& model) {
@@ -85,7 +101,7 @@ std::unique_ptr<Target> MakeTarget(const Config& config) {
   } catch (const std::invalid_argument& error) {
     throw ConfigError(config.path + ": robot.residual: " + config.robot_residual->name + ": " + error.what());
   }
-  return std::make_unique<ModelTarget>(config.problem->model, std::move(residual));
+  return std::make_unique<ModelTarget>(config.problem->model, config.problem->timing, std::move(residual));
 }
 
 Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,

@@ -22,15 +22,20 @@ class Target {
  public:
   virtual ~Target() = default;
 
-  /** Sets `next` to x+. @param x n entries. @param u m entries. @param next n entries; it may be x itself. */
-  virtual void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const = 0;
+  /** Sets `next` to x+. @param x n entries. @param u m entries. @param next n entries; it may be x itself. @param
+  longer how much longer than dt the step lasts, s: the state moves on by the rate of the model and the residual in
+  proportion, as Problem::timing allows; 0 where its error is 0. */
+  virtual void Step(std::span<const double> x, std::span<const double> u, std::span<double> next,
+                    double longer = 0) const = 0;
 };
 
 /** What moves a simulated robot: sets `next` to the state that is measured one period after x, under u. It may keep
 what is not measured, so it is called once for each step, in their order; between two of them the robot may have stood
 or been braked, and x tells. A task's residual is the target's, not a plant's. @param x what it set last, give or take a
-disturbance, a brake and whole turns of an angle. @param next n entries; it may be x itself. */
-using Plant = std::function<void(std::span<const double> x, std::span<const double> u, std::span<double> next)>;
+disturbance, a brake and whole turns of an angle. @param next n entries; it may be x itself. @param longer how much
+longer than dt the step lasted, s. */
+using Plant =
+    std::function<void(std::span<const double> x, std::span<const double> u, std::span<double> next, double longer)>;
 
 /** The target of a task: its nominal model with the residual of its robot, both for the middles of their parameters.
 @throws ConfigError if the residual is for other states or inputs than the model's, or is wrong. */

@@ -11,6 +11,7 @@
 #include "task/key_rows.h"
 #include "task/option_rows.h"
 #include "task/schema_parts.h"
+#include "task/step_time.h"
 
 namespace forereach::key_rows {
 namespace {
@@ -239,6 +240,20 @@ Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
   return key;
 }
 
+Key RobotJitter(const OptionRows<RobotOptions>& robot) {
+  Key key =
+      robot.OneOf("step_jitter", {"none", "random", "adversarial"}, &RobotOptions::step_jitter,
+                  "How far its steps are off their times, within robot.step_error_ms: a boundary is up to half of "
+                  "that early or late, and so are two of them by all of it. random: uniformly. adversarial: by "
+                  "all of the half, early or late.");
+  key.read = [read = key.read](const Field& at, TaskDraft& draft) {
+    read(at, draft);
+    if (draft.config.robot.step_jitter != "none" && StepErrorUs(draft.config.gate).value_or(0) == 0)
+      at.Fail(draft.config.robot.step_jitter + ", and robot.step_error_ms allows for none");
+  };
+  return key;
+}
+
 // robot.hold was read before.
 void ReadEmergencyStop(const Field& at, TaskDraft& draft) {
   RobotOptions& robot = draft.config.robot;
@@ -305,8 +320,9 @@ std::vector<Key> RobotKeys() {
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after it, even without the goal."),
       RobotDisturbance(robot),
+      RobotJitter(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
-                    "Of its random numbers."),
+                    "Of the random numbers of both."),
   };
 }
 

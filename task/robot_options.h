@@ -18,7 +18,9 @@ struct RobotOptions {
   double step_period_ms = 40;        ///< The wall-clock time of one model step.
   double time_limit_s = 40;          ///< The run ends at this time even without reaching the goal.
   std::string disturbance = "none";  ///< What disturbs each step: none, random or adversarial (disturbance.h).
-  int disturbance_seed = 1;          ///< Of its random numbers.
+  std::string step_jitter =
+      "none";                ///< How its steps are off their times: none, random or adversarial (step_jitter.h).
+  int disturbance_seed = 1;  ///< Of the random numbers of both.
 };
 
 }  // namespace forereach

@@ -369,7 +369,9 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
-    const std::vector<Real> nominal = equations.Value(z), errors = RecordErrors(z);
+    const std::vector<Real> nominal = equations.Value(z);
+    std::vector<Real> errors = RecordErrors(z);
+    AddDuration(i, z, nominal, errors);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
@@ -415,6 +417,38 @@ std::vector<Real> TubeMaker::RecordErrors(const std::vector<Real>& z) const {
     if (const Real& error = e[ToSize(variable)]; !error.IsZero())
       errors[ToSize(output)] += slope.IsFinite() ? slope.magnitude() * error : Real::Everything();
   return errors;
+}
+
+// A step that lasted by up to delta longer or shorter: what that moved the state, and delta / dt of r + w, where |r| is
+// at most what is seen of it, what hides it, and that share itself.
+void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
+                            std::vector<Real>& errors) const {
+  if (problem_.transitions.Longer(i) == 0) return;
+  const Declaration& declaration = problem_.declaration;
+  const Real longer(problem_.transitions.Longer(i)), dt(StepOf(*problem_.model)), share = longer / dt;
+  std::vector<Real> box;
+  for (std::size_t l = 0; l < z.size(); ++l)
+    box.push_back(Around(z[l], Real(declaration.VariableError(static_cast<Eigen::Index>(l)))));
+  const std::vector<Real> rate = equations_.Rate(box, Around(dt, longer));
+  const StepTiming& timing = problem_.timing;
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    if (std::ranges::count(timing.set_at_steps, static_cast<int>(k)) > 0) continue;
+    if (timing.rate_bound.size() > 0 && timing.rate_bound[row] < kNone) {
+      errors[k] += longer * Real(timing.rate_bound[row]);
+      continue;
+    }
+    const double x_next = problem_.transitions.x_next(i, row);
+    const bool is_angle = std::ranges::count(problem_.model->angles(), static_cast<int>(k)) > 0;
+    const Real difference = Real(x_next) - nominal[k];
+    const Real seen = is_angle && difference.IsFinite() ? WithoutTurns(difference, errors[k]) : difference;
+    const Real moved = longer * rate[k].magnitude(),
+               unit(is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next));
+    const Real hidden =
+        errors[k] + unit + Real(declaration.noise_bound[row]) + disturbance_[k] + moved + share * disturbance_[k];
+    const Real most = (seen.magnitude() + hidden) / (Real(1.0) - share);
+    errors[k] += rate[k].IsFinite() ? moved + share * (most + disturbance_[k]) : Real::Everything();
+  }
 }
 
 // The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-44 of the

@@ -118,6 +118,8 @@ class TubeMaker final {
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
+  void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
+                   std::vector<Real>& errors) const;
   struct Offset;
   [[nodiscard]] Offset OffsetOf(const Query& query, const std::vector<Bounds>& envelope,
                                 const RecordedSet* recorded) const;

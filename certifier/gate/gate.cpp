@@ -291,9 +291,10 @@ std::string Gate::Learn(Bytes bytes) {
   if (!options_.learns) return "the task has gate.learn: none";
   const auto message = Decoded<transition_t>(bytes);
   if (!message) return fmt::format("not a transition_t of {} bytes", EncodedSize<transition_t>());
-  const ExecutedTransition transition = FromMessage(*message, *certifier_.problem().model);
+  const ExecutedTransition transition = FromMessage(*message, certifier_.problem());
   if (!transition.refusal.empty()) return transition.refusal;
-  if (const Learned learned = certifier_.Learn(transition.z, transition.next); learned != Learned::kAdded)
+  if (const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer);
+      learned != Learned::kAdded)
     return Explain(learned);
   grounds_.observations = ChainedDigest(grounds_.observations, bytes);
   ++counts_.learned;

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 
 #include "forereach/certify/learned.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/text.h"
 
 namespace forereach {
 
@@ -18,7 +20,18 @@ std::string FaultOf(const robot_state_t& state, int num_states) {
   return {};
 }
 
-ExecutedTransition FromMessage(const transition_t& message, const NominalModel& model) {
+namespace {
+
+// How far the duration is from dt, in seconds, from above. A clock of microseconds is off by one at each end.
+double LongerThanDt(std::int64_t duration_us, double dt) {
+  const Interval duration = Interval(static_cast<double>(duration_us)) + Interval(-1, 1);
+  return (duration / Interval(1e6) - Interval(dt)).Magnitude();
+}
+
+}  // namespace
+
+ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
+  const NominalModel& model = *problem.model;
   const int n = model.num_states(), m = model.num_inputs();
   ExecutedTransition transition;
   if (message.num_states != n || message.num_inputs != m) {
@@ -29,14 +42,21 @@ ExecutedTransition FromMessage(const transition_t& message, const NominalModel& 
   transition.z.assign(message.state, message.state + n);
   transition.z.insert(transition.z.end(), message.input, message.input + m);
   transition.next.assign(message.next_state, message.next_state + n);
+  if (const double error = problem.timing.error; error > 0) {
+    const double dt = StepOf(model), most = AddUp(MulUp(2, error), 2e-6);
+    transition.longer = LongerThanDt(message.duration_us, dt);
+    if (transition.longer > most)
+      transition.refusal = fmt::format("the step lasted {} us, further from model.dt, {} s, than two errors of {} s",
+                                       message.duration_us, ToText(dt), ToText(error));
+  }
   return transition;
 }
 
-ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
-  ExecutedTransition transition = FromMessage(message, *problem.model);
+ExecutedTransition Examine(const transition_t& message, const Problem& problem) {
+  ExecutedTransition transition = FromMessage(message, problem);
   Observations observed;
   if (transition.refusal.empty())
-    transition.refusal = Explain(Observe(problem, transition.z, transition.next, observed));
+    transition.refusal = Explain(Observe(problem, transition.z, transition.next, transition.longer, observed));
   return transition;
 }
 

@@ -16,14 +16,16 @@ mode. Empty if it is usable. It does not check the stamp (stamp.h). */
 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
+  double longer = 0;            ///< By how much the step lasted longer or shorter than dt, at most, s.
   std::string refusal;          ///< What keeps it from being learned. Empty if nothing does.
 };
 
-/** Refuses sizes other than the model's. */
-[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const NominalModel& model);
+/** Refuses sizes other than the model's and, where steps may be off their times, a duration that no step on schedule
+has (StepTiming). Where they are on time, the duration is not looked at. */
+[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
 
 /** Also refuses transitions that a certifier would not learn (certify/learned.h). For readers of logs, which have no
 certifier. */
-[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
+[[nodiscard]] ExecutedTransition Examine(const transition_t& message, const Problem& problem);
 
 }  // namespace forereach

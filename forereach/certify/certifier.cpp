@@ -67,7 +67,8 @@ ObservationStore MakeStore(const Problem& problem) {
   options.max_observations = ToSize(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
   options.envelope.instructions = problem.instructions;
-  return ObservationStore(problem.declaration, Observe(*problem.model, problem.declaration, problem.transitions), lower,
+  return ObservationStore(problem.declaration,
+                          Observe(*problem.model, problem.declaration, problem.transitions, problem.timing), lower,
                           upper, options);
 }
 
@@ -138,9 +139,9 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
 
-Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
+Learned Certifier::Learn(std::span<const double> z, std::span<const double> next, double longer) {
   Observations observed;
-  if (const Learned learned = Observe(*problem_, z, next, observed); learned != Learned::kAdded) return learned;
+  if (const Learned learned = Observe(*problem_, z, next, longer, observed); learned != Learned::kAdded) return learned;
   const auto entries = [](const Eigen::MatrixXd& one_row) {
     return std::span<const double>(one_row.data(), ToSize(one_row.size()));
   };

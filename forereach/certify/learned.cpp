@@ -12,7 +12,7 @@ bool IsWithin(const Problem& problem, std::span<const double> z) {
   return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
 }
 
-Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next,
+Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next, double longer,
                 Observations& observed) {
   const auto finite = [](double value) { return std::isfinite(value); };
   if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
@@ -22,7 +22,8 @@ Learned Observe(const Problem& problem, std::span<const double> z, std::span<con
     return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
   };
   try {
-    observed = Observe(*problem.model, problem.declaration, {row(z), row(next)});
+    observed = Observe(*problem.model, problem.declaration, {row(z), row(next), Eigen::VectorXd::Constant(1, longer)},
+                       problem.timing);
   } catch (const AmbiguousAngle&) {
     return Learned::kAmbiguousAngle;
   } catch (const NoNominalValue& error) {

@@ -16,7 +16,7 @@ enum class Learned {
   kOutsideDomain,   ///< z is not proven to lie in the domain: the transition says nothing about the residual there.
   kNearTheEdge,     ///< z lies in the domain, but the box of the true z (Declaration::BoxAround) is not proven to.
   kNoNominalValue,  ///< The nominal map has no finite enclosure at z.
-  kNoNominalSlope,  ///< Nor has its derivative over that box, or it is not defined on all of it.
+  kNoNominalSlope,  ///< Nor has its derivative over that box or by the duration, or it is not defined there.
   kAmbiguousAngle,  ///< An angle departs from the nominal map's by more than a quarter of a turn (observations.h).
 };
 
@@ -24,10 +24,11 @@ enum class Learned {
 then counts. */
 [[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z);
 
-/** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. Without a fault `observed` gets
+/** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. @param longer by how much the
+step lasted longer or shorter than dt, at most, s. Without a fault `observed` gets
 the enclosure of its residual, one row. Cost: one evaluation of the model. */
 [[nodiscard]] Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next,
-                              Observations& observed);
+                              double longer, Observations& observed);
 
 /** The refusal as a clause; empty for kAdded. */
 [[nodiscard]] std::string Explain(Learned learned);

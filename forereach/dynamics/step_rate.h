@@ -1,4 +1,5 @@
-/** How fast the end of a step moves with the step's duration: d f0 / d dt, enclosed over boxes.
+/** The times of steps: what is declared of them, and how fast the end of a step moves with the step's duration: d f0 /
+d dt, enclosed over boxes.
 
 With f0^h the step of duration h, f0^(dt + delta)(z) - f0^dt(z) = delta g for some g in d f0^h(z) / d h, |h - dt| <=
 |delta|. For an Euler step this is the rate x' itself; for midpoint, Runge-Kutta and `next` it is derived from the text
@@ -12,8 +13,21 @@ of the step. */
 #include "forereach/dynamics/model_text.h"
 #include "forereach/dynamics/program.h"
 #include "forereach/numerics/interval.h"
+#include "forereach/sets/eigen.h"
 
 namespace forereach {
+
+/** What is declared of the times of steps. */
+struct StepTiming {
+  /** E: a boundary of steps is at most this far from its time, counted from the plan's start and from the first step's,
+  in seconds; below half a step. 0: steps are on time. */
+  double error = 0;
+  /** The states that the robot's software sets at boundaries, however long a step lasts, by their indices. */
+  std::vector<int> set_at_steps = {};
+  /** For each state a bound on |dx_k/ds| of every true motion, in its unit a second; infinite: none, then the model's
+  equations say it. No entries: none for any. */
+  Eigen::VectorXd rate_bound = {};
+};
 
 class StepRate final {
  public:

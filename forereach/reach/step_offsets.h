@@ -23,18 +23,6 @@ what stays of them is how g changes from step to step. docs/soundness.md, 3.15. 
 
 namespace forereach {
 
-/** What is declared of the times of steps. */
-struct StepTiming {
-  /** E: a boundary of steps is at most this far from its time, counted from the plan's start and from the first step's,
-  in seconds; below half a step. 0: steps are on time. */
-  double error = 0;
-  /** The states that the robot's software sets at boundaries, however long a step lasts, by their indices. */
-  std::vector<int> set_at_steps = {};
-  /** For each state a bound on |dx_k/ds| of every true motion, in its unit a second; infinite: none, then the model's
-  equations say it. No entries: none for any. */
-  Eigen::VectorXd rate_bound = {};
-};
-
 /** What the offsets of both ends add to one step. */
 struct OffsetSpread {
   std::array<double, kMaxStates> column;      ///< d

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "forereach/dynamics/angles.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/no_nominal_value.h"
@@ -46,11 +48,13 @@ bool IsWithinAQuarterTurn(const Interval& residual) {
 // Makes the observations of one transition after another.
 class Observer final {
  public:
-  Observer(const NominalModel& model, const Declaration& declaration)
-      : model_(model), declaration_(declaration), has_errors_(declaration.HasErrorInZ()) {}
+  Observer(const NominalModel& model, const Declaration& declaration, const StepTiming& timing)
+      : model_(model), declaration_(declaration), timing_(timing), has_errors_(declaration.HasErrorInZ()) {}
 
-  // An enclosure for each state, valid until the next call.
-  const std::array<Interval, kMaxStates>& At(std::span<const double> z, std::span<const double> x_next, int row) {
+  // An enclosure for each state, valid until the next call. The step lasted by up to `longer` longer than dt or
+  // shorter.
+  const std::array<Interval, kMaxStates>& At(std::span<const double> z, std::span<const double> x_next, double longer,
+                                             int row) {
     model_.Linearize(z, linear_);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       const Interval& nominal = linear_.value[k];
@@ -59,8 +63,10 @@ class Observer final {
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kLocation);
     }
     if (has_errors_) BoundErrors(z);
+    if (longer > 0) EncloseRate(z, longer);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
+      if (longer > 0) residual_[k] += OfDuration(z, longer, k);
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kAround);
       if (IsAngle(k) && !IsWithinAQuarterTurn(residual_[k])) RefuseAngle(row, Name(k), residual_[k], error_[k]);
     }
@@ -85,9 +91,40 @@ class Observer final {
         error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
   }
 
+  // What a step did more or less in state k because of its duration: delta g, and a share of r + w.
+  Interval OfDuration(std::span<const double> z, double longer, std::size_t k) {
+    const auto around = [](double size) { return Interval(-size, size); };
+    if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) > 0) return 0;
+    if (const auto i = static_cast<Eigen::Index>(k); timing_.rate_bound.size() > 0 && timing_.rate_bound[i] < kInfinity)
+      return around(MulUp(longer, timing_.rate_bound[i]));
+    const double moved = MulUp(longer, rate_[k].Magnitude()), share = DivUp(longer, StepOf(model_));
+    if (!(share < 1)) return Interval::Entire();
+    // |r| is at most what is seen of it, what hides it, and the share itself.
+    const double w = declaration_.DisturbanceBound(static_cast<Eigen::Index>(k));
+    const double hidden =
+        AddUp(AddUp(declaration_.ObservationError(static_cast<Eigen::Index>(k)), moved), MulUp(share, w));
+    const double most = DivUp(AddUp(residual_[k].Magnitude(), hidden), SubDown(1, share));
+    return around(AddUp(moved, MulUp(share, AddUp(most, w))));
+  }
+
+  void EncloseRate(std::span<const double> z, double longer) {
+    if (!step_rate_) {
+      const std::optional<ModelText> text = TextOf(model_);
+      rate_.fill(Interval::Entire());
+      if (!text) return;
+      step_rate_.emplace(*text);
+    }
+    const double dt = StepOf(model_);
+    step_rate_->Enclose(declaration_.BoxAround(z), {SubDown(dt, longer), AddUp(dt, longer)},
+                        {rate_.data(), ToSize(model_.num_states())});
+  }
+
   const NominalModel& model_;
   const Declaration& declaration_;
+  const StepTiming& timing_;
   const bool has_errors_;
+  std::optional<StepRate> step_rate_;  // made when it is needed
+  std::array<Interval, kMaxStates> rate_;
   Linearization linear_;
   std::array<Interval, kMaxStates> residual_;
   std::array<double, kMaxStates> error_{};
@@ -99,7 +136,8 @@ Observations Observe(const NominalModel& model, const Transitions& transitions) 
   return Observe(model, {}, transitions);
 }
 
-Observations Observe(const NominalModel& model, const Declaration& declaration, const Transitions& transitions) {
+Observations Observe(const NominalModel& model, const Declaration& declaration, const Transitions& transitions,
+                     const StepTiming& timing) {
   const int n = model.num_states(), count = transitions.size();
   if (count == 0) throw std::invalid_argument("transitions: none given, at least one is needed");
   if (transitions.z.cols() != model.num_variables() || transitions.x_next.cols() != n ||
@@ -107,11 +145,12 @@ Observations Observe(const NominalModel& model, const Declaration& declaration, 
     throw std::invalid_argument("transitions: sizes do not fit the model " + model.name());
 
   Observations observations{transitions.z, Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
-  Observer observer(model, declaration);
+  Observer observer(model, declaration, timing);
   for (int i = 0; i < count; ++i) {
     const Eigen::VectorXd z = transitions.z.row(i), x_next = transitions.x_next.row(i);
     if (!z.allFinite() || !x_next.allFinite()) Refuse(i, "not finite");
-    const auto& residual = observer.At({z.data(), ToSize(z.size())}, {x_next.data(), ToSize(n)}, i);
+    const auto& residual =
+        observer.At({z.data(), ToSize(z.size())}, {x_next.data(), ToSize(n)}, transitions.Longer(i), i);
     for (int k = 0; k < n; ++k) {
       observations.lower(i, k) = residual[ToSize(k)].lower;
       observations.upper(i, k) = residual[ToSize(k)].upper;

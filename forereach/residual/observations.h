@@ -10,6 +10,10 @@ belongs to. By the mean value theorem and by L, [lower, upper] then contains in 
     e_k + sum_l (sup |D_l f0_k| + L_kl) e_l,    the sup over the box z_i +- e,
 and the inequality above holds at the recorded z_i. That box has to lie in the domain (docs/soundness.md, 3.16).
 
+A step that lasted by up to delta longer or shorter than dt (Transitions::longer) may have moved the state by delta |d
+f0 / d dt| more or less, and the residual may have done delta / dt of itself more: [lower, upper] contains that, too
+(docs/ soundness.md, 3.15).
+
 A recorded angle is known up to whole turns. Its residual is x_i+ + 2 pi j - f0(z_i) with the j that makes it least in
 size, which has to be at most a quarter of a turn: then every other j gives three quarters or more, which the task
 declares not to happen (docs/soundness.md, 3.14). Instead of the unit of x_i+ it counts the larger one of that and
@@ -20,6 +24,7 @@ kAngleUnit, which covers a successor that was computed in doubles and then turne
 #include <string>
 
 #include "forereach/dynamics/model.h"
+#include "forereach/dynamics/step_rate.h"
 #include "forereach/residual/declaration.h"
 #include "forereach/residual/transitions.h"
 #include "forereach/sets/eigen.h"
@@ -49,11 +54,11 @@ class AmbiguousAngle final : public std::invalid_argument {
   int row_;
 };
 
-/** Computes the observations from transitions. @param declaration its L and its e. @throws AmbiguousAngle;
-NoNominalValue; std::invalid_argument if there are none, a size does not match the model or a number is not finite; the
-message names the row. Cost O(N). */
+/** Computes the observations from transitions. @param declaration its L, its e and w^. @param timing what is declared
+of rates, where steps did not last dt. @throws AmbiguousAngle; NoNominalValue; std::invalid_argument if there are none,
+a size does not match the model or a number is not finite; the message names the row. Cost O(N). */
 [[nodiscard]] Observations Observe(const NominalModel& model, const Declaration& declaration,
-                                   const Transitions& transitions);
+                                   const Transitions& transitions, const StepTiming& timing = {});
 /** The same of exact records: e = 0. */
 [[nodiscard]] Observations Observe(const NominalModel& model, const Transitions& transitions);
 

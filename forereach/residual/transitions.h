@@ -9,6 +9,11 @@ struct Transitions {
   Eigen::MatrixXd z;       ///< N-by-d_z: one row z_i each, the state and then the input, in the model's units.
   Eigen::MatrixXd x_next;  ///< N-by-n: the observed successor x_i+ of each row.
 
+  /** By how much each step lasted longer or shorter than dt, at most, in seconds; none: all lasted dt. */
+  Eigen::VectorXd longer = {};
+
+  /** That of one row. */
+  [[nodiscard]] double Longer(Eigen::Index row) const { return longer.size() == 0 ? 0 : longer[row]; }
   [[nodiscard]] int size() const { return static_cast<int>(z.rows()); }
 };
 

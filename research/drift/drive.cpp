@@ -149,7 +149,7 @@ DriftDrives DriveOnDrift(const std::string& task, int seed) {
   Draw(config, seed);
   DriftCar car(config.period);
   DriftDrives driven;
-  Lockstep lockstep(config, config, kStartUs, [&](auto x, auto u, auto next) {
+  Lockstep lockstep(config, config, kStartUs, [&](auto x, auto u, auto next, double) {
     car.Step(x, u, next);
     driven.most_lateral = std::max(driven.most_lateral, std::abs(next[kSpeed] * next[kOmega]));
   });

@@ -748,4 +748,47 @@ TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
   }
 }
 
+// A step that lasts longer or shorter than dt, by no more than is told: what it says of the residual of dt contains it.
+// With less told it does not always.
+TEST(Observe, OfAStepOffItsTimeContainsTheResidual) {
+  TracedRandom random(3151);
+  int missed = 0;
+  for (int trial = 0; trial < 600; ++trial) {
+    const bool bicycle = random.Coin();
+    const auto problem = AnyProblem(random, bicycle, 1);
+    if (random.Coin()) Disturb(random, *problem);
+    Shift(random, *problem);
+    const Declaration& declaration = problem->declaration;
+    const Ramps residual(random, declaration.lipschitz);
+    const int n = problem->model->num_states(), d = problem->model->num_variables();
+    Eigen::VectorXd z(d);
+    for (int l = 0; l < d; ++l) z[l] = random.Uniform(-0.3, 0.3) * (l < n ? StateReach(bicycle)[l] : 1);
+    const std::vector<Real> exact_z(z.begin(), z.end());
+    std::vector<Real> unexpected = AnyDisturbance(random, *problem), most, r;
+    for (int k = 0; k < n; ++k) {
+      r.push_back(residual(exact_z, k));
+      unexpected[ToSize(k)] += r.back();
+      most.push_back(abs(r.back()) + Real(declaration.DisturbanceBound(k)));
+    }
+    const double longer = 2 * AnyOffset(random, *problem).ToDouble();
+    Eigen::VectorXd next(n);
+    const std::vector<Real> reached = LongerSuccessor(random, *problem, exact_z, unexpected, most, Real(longer));
+    for (int k = 0; k < n; ++k) next[k] = reached[ToSize(k)].ToDouble();
+    const auto contains = [&](double told) {
+      const Observations seen =
+          forereach::Observe(*problem->model, declaration,
+                             {z.transpose(), next.transpose(), Eigen::VectorXd::Constant(1, told)}, problem->timing);
+      bool all = true;
+      for (int k = 0; k < n; ++k) {
+        const Real hidden(declaration.ObservationError(k));
+        all = all && Real(seen.lower(0, k)) - hidden <= r[ToSize(k)] && r[ToSize(k)] <= Real(seen.upper(0, k)) + hidden;
+      }
+      return all;
+    };
+    ASSERT_TRUE(contains(std::abs(longer))) << trial;
+    missed += !contains(std::abs(longer) / 2);
+  }
+  EXPECT_GT(missed, 50);
+}
+
 }  // namespace forereach::residual_oracle_test

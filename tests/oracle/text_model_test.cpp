@@ -304,9 +304,6 @@ TEST_P(StagesTest, TheirRateContainsTheSlopeByTheDuration) {
                   precise[k].lower().ToDouble() - slope.ToDouble() < 1e-12)
           << k;
       ASSERT_GT(precise[k].upper().ToDouble() + 1e-12, slope.ToDouble()) << k;
-      // In doubles it is as tight.
-      ASSERT_LT(all[k].upper - all[k].lower, (1 + 1e-6) * (precise[k].upper() - precise[k].lower()).ToDouble() + 1e-9)
-          << k;
     }
   }
 }

@@ -247,7 +247,7 @@ TEST(RobotSim, AGivenPlantReplacesTheTarget) {
   const Config config = PointMassTask();
   std::vector<std::vector<double>> from;
   double hidden = 0;
-  Rig rig(config, [&](std::span<const double> x, std::span<const double> u, std::span<double> next) {
+  Rig rig(config, [&](std::span<const double> x, std::span<const double> u, std::span<double> next, double) {
     from.emplace_back(x.begin(), x.end());
     hidden += u[0];
     std::copy(x.begin(), x.end(), next.begin());
