@@ -9,6 +9,7 @@
 namespace forereach {
 
 bool IsWithin(const Problem& problem, std::span<const double> z) {
+  if (!problem.declaration.HasErrorInZ()) return problem.domain.Contains(z);
   return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
 }
 
@@ -16,8 +17,7 @@ Learned Observe(const Problem& problem, std::span<const double> z, std::span<con
                 Observations& observed) {
   const auto finite = [](double value) { return std::isfinite(value); };
   if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
-  if (!problem.domain.Contains(z)) return Learned::kOutsideDomain;
-  if (!IsWithin(problem, z)) return Learned::kNearTheEdge;
+  if (!IsWithin(problem, z)) return problem.domain.Contains(z) ? Learned::kNearTheEdge : Learned::kOutsideDomain;
   const auto row = [](std::span<const double> values) {
     return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
   };

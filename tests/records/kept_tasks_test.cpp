@@ -100,6 +100,24 @@ TEST(KeptTasks, AModelFileIsKeptWithItsTask) {
   EXPECT_FALSE(fs::exists(kept.PathOf(config.grounds.config)));
 }
 
+// The grounds name all rows of the file, also the last, which within its error lies outside the domain.
+TEST(KeptTasks, TransitionsThatAreLeftOutAreKeptToo) {
+  const ScratchDirectory scratch;
+  const std::string task =
+      TaskFor("model: {states: {x: m}, inputs: {u: m/s}, parameters: {dt: 0.1}, next: {x: x}}\n", 1, 1, "x");
+  scratch.Write("steps.csv", "x,u,x_next\n0,1,0\n0.9,0,0.9\n");
+  const Config config = LoadConfig(
+      scratch.Write("task.yaml", Replaced(task, "noise_bound: [0]}", "noise_bound: [0], state_error: {x: 0.2}}")));
+  ASSERT_EQ(config.left_out, 1);
+  const KeptTasks kept(scratch / "log");
+  kept.Keep(CopyTask(config));
+  const std::optional<Config> found = kept.Find(config.grounds.config, {});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->grounds, config.grounds);
+  EXPECT_EQ(found->problem->transitions.z, config.problem->transitions.z);
+  EXPECT_TRUE(kept.FindDamage(ToHex(config.grounds.config)).empty());
+}
+
 TEST_F(KeptTest, ADeletedDirectoryGetsItsTasksAgain) {
   fs::remove_all(scratch_ / "log");
   fs::remove(scratch_ / "task.yaml");
