@@ -88,7 +88,13 @@ std::string DeclarationKey(const TaskTemplate& task) {
   text +=
       "  # The largest error of measurement of each state in the data. PLACEHOLDER.\n"
       "  noise_bound: " +
-      List(std::vector<std::string>(task.states.size(), "0.01")) + "\n";
+      List(std::vector<std::string>(task.states.size(), "0.01")) +
+      "\n"
+      "  # How far the true state may be from the one that the robot measures while it drives, by names, such as {" +
+      task.states.front().name +
+      ": 0.01}.\n"
+      "  # PLACEHOLDER: exact, as the simulated robot measures it.\n"
+      "  state_error: {}\n";
   return text;
 }
 

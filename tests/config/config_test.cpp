@@ -151,6 +151,23 @@ std::string Refusal(void (*require)(const Config&), const Config& config) {
 
 std::string RefusalOnBus(const Config& config) { return Refusal(RequireForCertifyingOnBus, config); }
 
+const std::string kMeasuredTask = Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound");
+
+TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStateMayBeOff) {
+  const TaskFiles files;
+  const Config unsaid = files.Load(std::string(kTask) + "gate: {obstacles: task}\n");
+  EXPECT_THAT(RefusalOnBus(unsaid),
+              testing::AllOf(testing::StartsWith(unsaid.path + ": declaration.state_error: missing"),
+                             testing::HasSubstr("`state_error: {}` if you mean 0 for all")));
+  EXPECT_NO_THROW(RequireForCertifying(unsaid)) << "`forereach certify` measures nothing";
+  EXPECT_EQ(RefusalOnBus(files.Load(std::string(kTask) + "gate: {obstacles: task, arming: none}\n")), "");
+  for (const char* declared : {"{}", "{vx: 0.1}", "[0, 0, 0, 0]"})
+    EXPECT_EQ(RefusalOnBus(files.Load(
+                  Replaced(kTask, "  noise_bound", std::string("  state_error: ") + declared + "\n  noise_bound") +
+                  "gate: {obstacles: task}\n")),
+              "");
+}
+
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
   const TaskFiles files;
   const Config unsaid = files.Load(kTask);
@@ -160,7 +177,7 @@ TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
                                                    testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
   for (const auto& [word, source] : std::initializer_list<std::pair<std::string, ObstaclesSource>>{
            {"bus", ObstaclesSource::kBus}, {"task", ObstaclesSource::kTask}}) {
-    const Config config = files.Load(std::string(kTask) + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
+    const Config config = files.Load(kMeasuredTask + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
     EXPECT_EQ(config.gate.obstacles, source);
     EXPECT_EQ(RefusalOnBus(config), "");
   }
@@ -169,7 +186,7 @@ TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
 TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
   const TaskFiles files;
   const auto load = [&](const std::string& more) {
-    return files.Load(std::string(kTask) + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
+    return files.Load(kMeasuredTask + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
   };
   const Config unsaid = load("");
   EXPECT_FALSE(unsaid.gate.obstacles_lost_ms);
@@ -193,7 +210,7 @@ TEST(LoadConfig, TheDelayOfTheBusHasADefaultAndMayBeDeclared) {
 
 TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   const TaskFiles files;
-  const std::string task = std::string(kTask) + "gate: {obstacles: task}\n", line = "  between: samples\n";
+  const std::string task = kMeasuredTask + "gate: {obstacles: task}\n", line = "  between: samples\n";
   const Config unsaid = files.Load(Replaced(task, line, ""));
   EXPECT_FALSE(unsaid.says_between);
   EXPECT_FALSE(unsaid.problem->between);
