@@ -317,8 +317,9 @@ TEST(LoadConfig, ReadsObstaclesThatMove) {
 
 TEST(LoadConfig, OnABusNoObstacleOfTheFileMoves) {
   const TaskFiles files;
-  const std::string moves = Replaced(
-      kTask, "radius: 0.8}}", "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
+  const std::string moves =
+      Replaced(kMeasuredTask, "radius: 0.8}}",
+               "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
   for (const char* source : {"bus", "task"}) {
     const Config config = files.Load(moves + "gate: {obstacles: " + source + ", obstacles_lost_ms: never}\n");
     EXPECT_THAT(RefusalOnBus(config), testing::AllOf(testing::StartsWith(config.path + ": task.obstacles[1].motion: "),
