@@ -154,11 +154,11 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
          "learned from all data.\n"
          "certified, half-width: the recorded commands of held-out stretches as plans, from task.initial_set's "
          "half-widths\n  about the recorded state, among the task's obstacles; the median over the stretches of a "
-         "position's half-width after "
+         "position's half-width after\n  "
       << command.steps
       << " steps (inf: the tube leaves the domain before).\n"
          "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "
-         "declaration.state_error.\n  One that has left its slice halts a robot.\n"
+         "declaration.state_error\n  (not declared: exact). One that has left its slice halts a robot.\n"
       << (first.windows == 0 ? "There is no stretch of so many transitions that follow one another: use fewer --steps "
                                "or fewer --blocks.\n"
                              : "")
