@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <iostream>
 #include <numeric>
 #include <optional>
@@ -34,9 +35,13 @@ struct Trial {
   Contradictions found;
   double block_upper = 1;  // of the probability that the next block has a contradiction
   int windows = 0, certified = 0;
-  int states = 0, inside = 0;  // recorded states of all windows, and those in their slice
-  int slices = 0;              // of all tubes: a tube may end before its window
-  double half_width = 0;       // median over the windows, of a position in the last slice; 0 if no tube is complete
+  int states = 0;                 // recorded ones of all windows
+  std::array<int, 3> found_in{};  // of those that have a slice, by Conformance
+  double half_width = 0;          // median over the windows, of a position in the last slice; 0 if no tube is complete
+
+  // A tube may end before its window.
+  [[nodiscard]] int slices() const { return std::reduce(found_in.begin(), found_in.end()); }
+  [[nodiscard]] int left() const { return found_in[ToSize(static_cast<int>(Conformance::kLeft))]; }
 };
 
 // The recorded commands of a stretch of held-out transitions, from the state that was recorded there.
@@ -83,27 +88,26 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
     initial_sets.push_back(Zonotope::FromBox(each.states.col(0), half_width));
     certifier.Require(plans.back(), initial_sets.back(), config.obstacles);
   }
-  std::vector<int> inside(plans.size(), 0), lengths(plans.size(), 0);
+  std::vector<std::array<int, 3>> found_in(plans.size());
   std::vector<double> widths(plans.size(), kInfinity);
   const auto decisions = CertifyAll(
       certifier, plans, initial_sets, config.obstacles, jobs, [&](std::size_t i, const Decision&, const Tube& tube) {
         for (int t = 1; t <= tube.length(); ++t) {
-          bool in = true;
+          Conformance worst = Conformance::kInside;
           for (int k = 0; k < problem->model->num_states(); ++k) {
             const Interval hull = tube.hull(t, k);
-            const double x = commands[i].states(k, t), error = declaration.noise_bound[k];
-            in &= LiesWithin(x, hull.lower - error, hull.upper + error, problem->model->IsAngle(k));
+            worst = std::max(worst, Conform(commands[i].states(k, t), declaration.VariableError(k), hull.lower,
+                                            hull.upper, problem->model->IsAngle(k)));
           }
-          inside[i] += in;
+          ++found_in[i][ToSize(static_cast<int>(worst))];
         }
-        lengths[i] = tube.length();
         if (tube.length() == steps) widths[i] = PositionHalfWidth(tube, steps, problem->projection);
       });
   trial.windows = static_cast<int>(plans.size());
   trial.certified = static_cast<int>(std::ranges::count(decisions, Outcome::kCertified, &Decision::outcome));
   trial.states = trial.windows * steps;
-  trial.inside = std::reduce(inside.begin(), inside.end());
-  trial.slices = std::reduce(lengths.begin(), lengths.end());
+  for (const auto& counts : found_in)
+    for (std::size_t kind = 0; kind < counts.size(); ++kind) trial.found_in[kind] += counts[kind];
   const auto middle = widths.begin() + std::ssize(widths) / 2;
   std::ranges::nth_element(widths, middle);
   trial.half_width = *middle;
@@ -116,8 +120,8 @@ std::string OutsideText(int outside, int slices) { return fmt::format("{} of {} 
 void WarnOfOutside(const std::vector<Trial>& trials) {
   std::string text;
   for (const Trial& trial : trials)
-    if (trial.inside < trial.slices)
-      text += (text.empty() ? "" : ", ") + OutsideText(trial.slices - trial.inside, trial.slices) + " at factor " +
+    if (trial.left() > 0)
+      text += (text.empty() ? "" : ", ") + OutsideText(trial.left(), trial.slices()) + " at factor " +
               ToText(trial.factor);
   if (!text.empty())
     std::cerr << "forereach: warning: outside the slices of their certificates lie " << text
@@ -125,6 +129,8 @@ void WarnOfOutside(const std::vector<Trial>& trials) {
 }
 
 // ---- the outcome
+
+constexpr const char* kConformances[] = {"inside", "consistent", "left"};
 
 double Share(int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0; }
 
@@ -139,9 +145,9 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
   const auto contradictions = [](const auto&... cells) {
     return fmt::format("  {:<8}{:<17}{:<14}{:<10}{:<12}", cells...);
   };
-  const auto plans = [](const auto&... cells) { return fmt::format("{:<11}{:<9}{}", cells...); };
+  const auto plans = [](const auto&... cells) { return fmt::format("{:<11}{:<9}{:<12}{:<8}{}", cells...); };
   table += contradictions("factor", "contradicting", "per thousand", "blocks", "next block") +
-           plans("certified", "inside", "half-width") + "\n";
+           plans("certified", "inside", "consistent", "left", "half-width") + "\n";
   for (const Trial& trial : trials) {
     const Contradictions& found = trial.found;
     table += contradictions(ToText(trial.factor), fmt::format("{} of {}", found.contradicting, found.transitions),
@@ -149,7 +155,8 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
                             fmt::format("{} of {}", found.blocks_contradicting, found.blocks),
                             "<= " + Percent(100 * trial.block_upper));
     if (trial.windows > 0)
-      table += plans(Percent(Share(trial.certified, trial.windows)), Percent(Share(trial.inside, trial.states)),
+      table += plans(Percent(Share(trial.certified, trial.windows)), Percent(Share(trial.found_in[0], trial.states)),
+                     Percent(Share(trial.found_in[1], trial.states)), Percent(Share(trial.found_in[2], trial.states)),
                      RoundedUp(trial.half_width, 3));
     table += "\n";
   }
@@ -166,11 +173,13 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
          "  It is no bound for other roads, other days, or a plan that goes where nobody has driven. It is of one row, "
          "for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor of slopes "
          "learned from all data.\n"
-         "certified, inside, half-width: the recorded commands of held-out stretches as plans, from task.initial_set's "
-         "half-widths\n  about the recorded state, among the task's obstacles; recorded states that lie in their "
-         "slice, "
-         "give or take noise_bound;\n  the median over the stretches of a position's half-width after "
-      << command.steps << " steps (inf: the tube leaves the domain before).\n"
+         "certified, half-width: the recorded commands of held-out stretches as plans, from task.initial_set's "
+         "half-widths\n  about the recorded state, among the task's obstacles; the median over the stretches of a "
+         "position's half-width after\n  "
+      << command.steps
+      << " steps (inf: the tube leaves the domain before).\n"
+         "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "
+         "declaration.state_error\n  (not declared: exact). One that has left its slice halts a robot.\n"
       << (first.windows == 0 ? "There is no stretch of so many transitions that follow one another: use fewer --steps "
                                "or fewer --blocks.\n"
                              : "")
@@ -182,7 +191,7 @@ Json ToJson(const std::vector<Trial>& trials, const DataCommand& command) {
                 {"steps", command.steps},
                 {"confidence", command.confidence},
                 {"factors", Json::array()}};
-  for (const Trial& trial : trials)
+  for (const Trial& trial : trials) {
     document["factors"].push_back({{"factor", trial.factor},
                                    {"transitions", trial.found.transitions},
                                    {"contradicting", trial.found.contradicting},
@@ -192,9 +201,10 @@ Json ToJson(const std::vector<Trial>& trials, const DataCommand& command) {
                                    {"stretches", trial.windows},
                                    {"certified", trial.certified},
                                    {"states", trial.states},
-                                   {"states_inside", trial.inside},
-                                   {"slices", trial.slices},
                                    {"half_width", trial.half_width}});
+    for (std::size_t kind = 0; kind < trial.found_in.size(); ++kind)
+      document["factors"].back()[fmt::format("states_{}", kConformances[kind])] = trial.found_in[kind];
+  }
   return document;
 }
 
@@ -206,11 +216,12 @@ Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
               .series = {{"blocks with a contradiction", {}},
                          {"their bound, " + ToText(100 * command.confidence) + " %", {}},
                          {"stretches certified", {}},
-                         {"states inside their slice", {}}}};
+                         {"states inside or consistent with their slice", {}}}};
   for (const Trial& trial : trials) {
     chart.x.push_back(trial.factor);
     const double values[] = {Share(trial.found.blocks_contradicting, trial.found.blocks), 100 * trial.block_upper,
-                             Share(trial.certified, trial.windows), Share(trial.inside, trial.states)};
+                             Share(trial.certified, trial.windows),
+                             Share(trial.found_in[0] + trial.found_in[1], trial.states)};
     for (std::size_t s = 0; s < 4; ++s) chart.series[s].y.push_back(values[s]);
   }
   return chart;

@@ -12,6 +12,12 @@ namespace {
 constexpr double kTurnDown = 0x1.921fb54442d18p+2, kTurnUp = 0x1.921fb54442d19p+2;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// What `sum`, a + b rounded to nearest, lacks of it: exact (Knuth's TwoSum).
+double Remainder(double a, double b, double sum) {
+  const double b_part = sum - a, a_part = sum - b_part;
+  return (a - a_part) + (b - b_part);
+}
+
 }  // namespace
 
 Angles AnglesOf(std::span<const int> states, int num_states) {
@@ -35,10 +41,18 @@ Ends TurnTowards(double value, double lower, double upper) {
           std::nextafter(std::fma(turns, most, value), kInfinity)};
 }
 
-bool LiesWithin(double value, double lower, double upper, bool is_angle) {
-  if (!is_angle) return lower <= value && value <= upper;
-  const Ends turned = TurnTowards(value, lower, upper);
-  return lower <= turned.lower && turned.upper <= upper;
+// Rounding is monotone: sums that differ when rounded differ alike before.
+bool SumAtMost(double a, double b, double c, double d) {
+  const double left = a + b, right = c + d;
+  return left == right ? Remainder(a, b, left) <= Remainder(c, d, right) : left < right;
+}
+
+Conformance Conform(double measured, double error, double lower, double upper, bool is_angle) {
+  const Ends at = is_angle ? TurnTowards(measured, lower, upper) : Ends{measured, measured};
+  if (!(error >= 0)) return Conformance::kLeft;
+  if (SumAtMost(lower, error, at.lower, 0) && SumAtMost(at.upper, error, upper, 0)) return Conformance::kInside;
+  const bool meets = SumAtMost(lower, 0, at.lower, error) && SumAtMost(at.upper, 0, upper, error);
+  return meets ? Conformance::kConsistent : Conformance::kLeft;
 }
 
 }  // namespace forereach

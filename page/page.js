@@ -201,7 +201,8 @@ const figuresOf = (run) => {
     const reason = nameAt(run.gaps.reason, i);
     reasons.set(reason, (reasons.get(reason) ?? 0) + 1);
   }
-  const inside = kinds.get('step_inside') ?? 0, outside = kinds.get('step_outside') ?? 0;
+  const inside = kinds.get('step_inside') ?? 0, consistent = kinds.get('step_consistent') ?? 0;
+  const steps = inside + consistent + (kinds.get('step_outside') ?? 0);
   const times = (sorted) => (sorted.length ? `p99 ${duration(quantile(sorted, .99))}, most ${duration(sorted.at(-1))}` : 'not measured');
   return [
     ['Decisions', counted(run.size), run.size === run.count ? 'all' : `of ${counted(run.count)}`],
@@ -213,8 +214,8 @@ const figuresOf = (run) => {
       first.length ? `median; from ${first[0]} to ${first.at(-1)}` : 'no abstention names a step'],
     ['Latency', duration(quantile(latency, .5)), `median; ${times(latency)}`],
     ['Gate', duration(quantile(gate, .5)), `median; ${times(gate)}`],
-    ['Steps in their slice', inside + outside > 0 ? percent(inside, inside + outside) : '\u2013',
-      `${counted(inside)} of ${counted(inside + outside)}`],
+    ['Steps in their slice', steps > 0 ? percent(inside, steps) : '\u2013',
+      `${counted(inside)} of ${counted(steps)}${consistent ? `; ${counted(consistent)} consistent (within the state error)` : ''}`],
     ['Withdrawals', counted(total(run.withdrawals.shown)), listed(countKinds(run.withdrawals, 'kind'))],
     ['Faults', counted(total(run.faults.shown)), listed(countKinds(run.faults, 'kind'))],
     ['Messages lost', counted(lost), `${counted(total(run.gaps.shown))} gaps${reasons.size ? `: ${listed(reasons)}` : ''}`],

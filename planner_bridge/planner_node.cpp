@@ -14,6 +14,7 @@
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "task/json_text.h"
@@ -118,7 +119,7 @@ bool PlannerNode::IsAtRest(const robot_state_t& state) const {
   const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
   Eigen::VectorXd held = x;
   proposer_->motion().Hold({held.data(), static_cast<std::size_t>(held.size())});
-  return ((x - held).cwiseAbs().array() <= half_width_.array()).all();
+  return ((x - held).cwiseAbs().array() <= HalfWidthFor(state).array()).all();
 }
 
 bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
@@ -153,11 +154,20 @@ std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& st
   return x;
 }
 
+// By what a guard asks for: all of the measured state at the start, +- its error, inside X0.
+Eigen::VectorXd PlannerNode::HalfWidthFor(const robot_state_t& state) const {
+  Eigen::VectorXd half_width = half_width_;
+  for (Eigen::Index k = 0; k < half_width.size(); ++k)
+    half_width[k] = AddUp(half_width[k], state.num_state_errors > 0 ? state.state_error[k]
+                                                                    : config_.problem->declaration.VariableError(k));
+  return half_width;
+}
+
 void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops) {
   const std::optional<Eigen::VectorXd> center = PredictStart(state, lead_steps);
   if (!center) return;
   ++(stops ? stopping_rounds_ : rounds_);
-  round_ = Round{state.utime + lead_steps * period_us_, *center,
+  round_ = Round{state.utime + lead_steps * period_us_, *center, HalfWidthFor(state),
                  Lessons(config_.planner, config_.problem->limits.size()), stops};
 }
 
@@ -247,7 +257,7 @@ PlanRequest PlannerNode::RequestOf(const Round& round) const {
   constexpr std::uint32_t kSpread = 1'000'003;
   return {round.center,
           round.lessons.clearance(),
-          round.lessons.DomainMargin(half_width_, config_.problem->projection),
+          round.lessons.DomainMargin(round.half_width, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1,
           {round.start_utime, period_us_, ScheduleErrorUs(config_.gate)},
@@ -269,7 +279,7 @@ candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Roun
   candidate.num_steps = static_cast<std::int16_t>(proposal.controls.cols());
   candidate.progress_steps = static_cast<std::int16_t>(proposal.progress_steps);
   std::copy(round.center.begin(), round.center.end(), candidate.initial_center);
-  std::copy(half_width_.begin(), half_width_.end(), candidate.initial_half_width);
+  std::ranges::copy(round.half_width, candidate.initial_half_width);
   for (int t = 0; t < candidate.num_steps; ++t)
     for (int k = 0; k < candidate.num_inputs; ++k) candidate.control[t][k] = proposal.controls(k, t);
   return candidate;

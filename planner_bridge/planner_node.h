@@ -76,7 +76,7 @@ class PlannerNode final : public Node {
  private:
   struct Round {
     std::int64_t start_utime;
-    Eigen::VectorXd center;  // of X_0
+    Eigen::VectorXd center, half_width;  // of X_0
     Lessons lessons;
     bool stops = false;  // a stopping round
     int searches = 0;
@@ -102,6 +102,7 @@ class PlannerNode final : public Node {
   void BeginStop(int valid_steps, std::int64_t now_us);
   [[nodiscard]] std::optional<Proposal> Propose();
   void Follow(const robot_state_t& state);
+  [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;
   void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
   void SearchOnce(std::int64_t now_us);
@@ -114,7 +115,7 @@ class PlannerNode final : public Node {
   Sender sender_;
   std::ostream& out_;
   const std::int64_t period_us_;
-  const Eigen::VectorXd half_width_;  // of X_0
+  const Eigen::VectorXd half_width_;  // of X_0, without the state error
   const ResidualEstimate residual_;
   const std::unique_ptr<Proposer> proposer_;
   const RobotMotion hardest_;  // the ways to stop after a withdrawal

@@ -117,7 +117,8 @@ class PictureMaker final : public CertifierFollower {
   }
 
   void AddExecution(const execution_event_t& event) {
-    if (event.kind == execution_event_t::STARTED || event.kind == execution_event_t::STEP_INSIDE)
+    if (event.kind == execution_event_t::STARTED || event.kind == execution_event_t::STEP_INSIDE ||
+        event.kind == execution_event_t::STEP_CONSISTENT)
       executed_.insert({event.plan_id, event.step});
     if (event.kind == execution_event_t::GOAL_REACHED) arrived_ = true;
     const bool stops = event.kind == execution_event_t::STANDING || event.kind == execution_event_t::STEP_OUTSIDE ||
@@ -169,8 +170,9 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   if (summary.latency_us.WasMeasured())
     numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", DurationText(summary.latency_us.p50),
                                   DurationText(summary.latency_us.p99)));
-  numbers.push_back(
-      fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
+  numbers.push_back(fmt::format("{} of {} steps inside", summary.steps_inside,
+                                summary.steps_inside + summary.steps_consistent + summary.steps_outside));
+  add(summary.steps_consistent, "consistent (within the state error)");
   numbers.push_back(fmt::format("{} contacts", summary.contacts));
   if (summary.has_limits || summary.limits_exceeded > 0)
     numbers.push_back(fmt::format("{} times a limit exceeded", summary.limits_exceeded));

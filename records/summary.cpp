@@ -77,7 +77,11 @@ std::string ToText(const Summary& summary) {
   if (summary.has_limits || summary.limits_exceeded > 0)
     line("limits exceeded", std::to_string(summary.limits_exceeded));
   line("steps in certified slice",
-       fmt::format("{} of {}", summary.steps_inside, summary.steps_inside + summary.steps_outside));
+       fmt::format("{} of {}", summary.steps_inside,
+                   summary.steps_inside + summary.steps_consistent + summary.steps_outside) +
+           (summary.steps_consistent == 0
+                ? ""
+                : fmt::format(", {} consistent (within the state error)", summary.steps_consistent)));
   line("stops", fmt::format("{} ({} braking tails begun)", summary.stops, summary.tails));
   if (summary.withdrawals > 0)
     line("withdrawals",
@@ -110,7 +114,8 @@ nlohmann::json ToJson(const Summary& summary) {
   json["goal_reached"] = summary.goal_reached;
   json["contacts"] = summary.contacts;
   json["limits_exceeded"] = summary.limits_exceeded;
-  json["steps"] = {{"inside", summary.steps_inside}, {"outside", summary.steps_outside}};
+  json["steps"] = {
+      {"inside", summary.steps_inside}, {"consistent", summary.steps_consistent}, {"outside", summary.steps_outside}};
   json["tails"] = summary.tails;
   json["stops"] = summary.stops;
   json["withdrawals"] = summary.withdrawals;
@@ -175,6 +180,7 @@ void SummaryBuilder::Add(const DecisionRow& row) {
 void SummaryBuilder::Add(const EventRow& row) {
   if (row.kind == "refused") ++summary_.refused;
   if (row.kind == "step_inside") ++summary_.steps_inside;
+  if (row.kind == "step_consistent") ++summary_.steps_consistent;
   if (row.kind == "step_outside") ++summary_.steps_outside;
   if (row.kind == "goal_reached") summary_.goal_reached = true;
   if (!summary_.goal_reached) {

@@ -45,9 +45,10 @@ struct Summary {
   double goal_radius_m = 0;                  ///< The goal is reached within this distance.
   bool goal_reached = false;                 ///< At any time of the run.
   std::int64_t contacts = 0;
-  bool has_limits = false;                           ///< Whether the task, if it is known, has limits.
-  std::int64_t limits_exceeded = 0;                  ///< Counted at each step boundary.
-  std::int64_t steps_inside = 0, steps_outside = 0;  ///< Executed steps by whether the state lay in its slice.
+  bool has_limits = false;           ///< Whether the task, if it is known, has limits.
+  std::int64_t limits_exceeded = 0;  ///< Counted at each step boundary.
+  /** Executed steps by where the state lay at their end: inside its slice, consistent with it, outside (left). */
+  std::int64_t steps_inside = 0, steps_consistent = 0, steps_outside = 0;
   /** Before the goal: braking tails that began, and stops at a plan's end, after a step outside its slice or for a
   withdrawal. */
   std::int64_t tails = 0, stops = 0;

@@ -1,10 +1,12 @@
 #include "robot/guard.h"
 
 #include <algorithm>
+#include <array>
 #include <cinttypes>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
+#include <functional>
 #include <initializer_list>
 #include <new>
 #include <stdexcept>
@@ -58,40 +60,62 @@ GuardVerdict RefuseDecode(DecodeStatus status, std::size_t received) {
                 Sentence("%zu bytes, a %s has %zu", received, Message::getTypeName(), expected));
 }
 
-// x <= a + b in real arithmetic. Where x differs from the rounded sum, the exact sum lies on the same side of x; where
-// it is equal, the rounding error (Knuth's TwoSum, exact) decides.
-bool AtMostSum(double x, double a, double b) {
-  const double sum = a + b;
-  if (x != sum) return x < sum;
-  const double b_part = sum - a, a_part = sum - b_part;
-  return (a - a_part) + (b - b_part) >= 0;
-}
+// A measured state coordinate, in words.
+struct Coordinate {
+  std::array<char, 100> text;
+
+  Coordinate(std::size_t k, double x, double error) {
+    const char* const format = error > 0 ? "state coordinate %zu is %.17g +- %.17g" : "state coordinate %zu is %.17g";
+    std::snprintf(text.data(), text.size(), format, k, x, error);
+  }
+};
 
 const char* TurnsOf(bool is_angle) { return is_angle ? " after whole turns" : ""; }
 
-GuardVerdict CheckInitialSet(const candidate_plan_t& plan, const Angles& angles, std::span<const double> state) {
+// All of the measured state +- its error has to lie in X0.
+GuardVerdict CheckInitialSet(const candidate_plan_t& plan, const Angles& angles, std::span<const double> state,
+                             std::span<const double> error) {
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], center = plan.initial_center[k], half_width = plan.initial_half_width[k];
     const Ends turned = angles[k] ? TurnTowards(x, center - half_width, center + half_width) : Ends{x, x};
-    if (AtMostSum(turned.upper, center, half_width) && AtMostSum(-turned.lower, -center, half_width)) continue;
+    if (SumAtMost(turned.upper, error[k], center, half_width) &&
+        SumAtMost(center, -half_width, turned.lower, -error[k]))
+      continue;
     const double bound = turned.lower < center ? center - half_width : center + half_width;
     return RefuseAt(GuardCause::kOutsideInitialSet, 0, static_cast<int>(k), x, bound,
-                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g, outside X0 = %.17g +- %.17g%s",
-                             plan.plan_id, k, x, center, half_width, TurnsOf(angles[k])));
+                    Sentence("plan %" PRId64 ": %s, not inside X0 = %.17g +- %.17g%s", plan.plan_id,
+                             Coordinate(k, x, error[k]).text.data(), center, half_width, TurnsOf(angles[k])));
   }
   return {};
 }
 
+// Refuses a state that has left the slice. An accepted one that is not inside has its first such coordinate as witness.
 GuardVerdict CheckSlice(const certified_plan_t& certified, const Angles& angles, int step,
-                        std::span<const double> state) {
+                        std::span<const double> state, std::span<const double> error) {
+  GuardVerdict verdict;
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
-    if (LiesWithin(x, lower, upper, angles[k])) continue;
+    const Conformance conformance = Conform(x, error[k], lower, upper, angles[k]);
+    const bool has_left = conformance == Conformance::kLeft;
+    if (conformance == Conformance::kInside || (!has_left && verdict.coordinate >= 0)) continue;
     const double nearest = angles[k] ? TurnTowards(x, lower, upper).lower : x;
-    return RefuseAt(GuardCause::kOutsideSlice, step, static_cast<int>(k), x, nearest < lower ? lower : upper,
-                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g at step %d, outside [%.17g, %.17g]%s",
-                             certified.plan.plan_id, k, x, step, lower, upper, TurnsOf(angles[k])));
+    verdict =
+        RefuseAt(GuardCause::kNone, step, static_cast<int>(k), x, nearest < lower / 2 + upper / 2 ? lower : upper, {});
+    if (!has_left) continue;
+    verdict.cause = GuardCause::kOutsideSlice;
+    verdict.message = Sentence("plan %" PRId64 ": %s at step %d, outside [%.17g, %.17g]%s", certified.plan.plan_id,
+                               Coordinate(k, x, error[k]).text.data(), step, lower, upper, TurnsOf(angles[k]));
+    return verdict;
   }
+  return verdict;
+}
+
+GuardVerdict CheckError(std::span<const double> error) {
+  for (std::size_t k = 0; k < error.size(); ++k)
+    if (!(std::isfinite(error[k]) && error[k] >= 0))
+      return Refuse(
+          GuardCause::kWrongStateError,
+          Sentence("the error of state coordinate %zu is %.17g, it has to be finite and not negative", k, error[k]));
   return {};
 }
 
@@ -178,6 +202,7 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kOutsideInitialSet: return "outside_initial_set";
     case GuardCause::kOffSchedule: return "off_schedule";
     case GuardCause::kWrongStateSize: return "wrong_state_size";
+    case GuardCause::kWrongStateError: return "wrong_state_error";
     case GuardCause::kOutsideSlice: return "outside_slice";
     case GuardCause::kNotExecuting: return "not_executing";
     case GuardCause::kStepOutOfOrder: return "step_out_of_order";
@@ -203,6 +228,17 @@ void RequireDomain(const std::optional<GuardDomain>& domain, const GuardOptions&
   require("input", domain->input_lower, domain->input_upper, options.num_inputs);
 }
 
+std::array<double, 16> ErrorOf(const std::vector<double>& declared, int num_states) {
+  std::array<double, 16> error{};
+  if (!declared.empty() && std::ssize(declared) != num_states)
+    throw std::invalid_argument("GuardOptions: state_error has " + std::to_string(declared.size()) +
+                                " entries, it has to have none or " + std::to_string(num_states));
+  if (const GuardVerdict verdict = CheckError(declared); !verdict.ok())
+    throw std::invalid_argument("GuardOptions: state_error: " + verdict.message);
+  std::ranges::copy(declared, error.begin());
+  return error;
+}
+
 }  // namespace
 
 Guard::Guard(GuardOptions options) : options_(std::move(options)) {
@@ -218,7 +254,7 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
     throw std::invalid_argument("GuardOptions: max_jitter_us is " + std::to_string(*options_.max_jitter_us) +
                                 ", it must not be negative");
   RequireDomain(options_.domain, options_);
-  angles_ = AnglesOf(options_.angles, options_.num_states);
+  sensing_ = {AnglesOf(options_.angles, options_.num_states), ErrorOf(options_.state_error, options_.num_states)};
   expected_.reserve(kMostExpected);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
@@ -233,13 +269,15 @@ void Guard::Halt() noexcept {
 }
 
 void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
-                   const std::optional<std::vector<int>>& angles) {
+                   const std::optional<std::vector<int>>& angles,
+                   const std::optional<std::vector<double>>& state_error) {
   RequireDomain(domain, options_);
-  const std::optional<Angles> known = angles ? std::optional(AnglesOf(*angles, options_.num_states)) : std::nullopt;
+  const auto known = angles ? std::optional(AnglesOf(*angles, options_.num_states)) : std::nullopt;
+  const auto error = state_error ? std::optional(ErrorOf(*state_error, options_.num_states)) : std::nullopt;
   std::erase_if(expected_,
                 [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
   if (expected_.size() >= kMostExpected) expected_.erase(expected_.begin());
-  expected_.push_back({config_digest, model_digest, std::move(domain), known});
+  expected_.push_back({config_digest, model_digest, std::move(domain), known, error});
 }
 
 // Checks and removes the signature.
@@ -288,7 +326,7 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     last_expiry_ = std::max(last_expiry_, certified->expires_utime);
     TakeTaskOf(*certified);
     pending_ = std::move(certified);
-    pending_angles_ = angles_;
+    pending_sensing_ = sensing_;
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
@@ -302,7 +340,7 @@ void Guard::TakeTaskOf(const certified_plan_t& certified) {
   options_.config_digest = task->config;
   options_.model_digest = task->model;
   if (task->domain) options_.domain = std::move(task->domain);
-  angles_ = task->angles.value_or(angles_);
+  sensing_ = {task->angles.value_or(sensing_.angles), task->state_error.value_or(sensing_.state_error)};
   expected_.erase(expected_.begin(), task + 1);
 }
 
@@ -454,8 +492,8 @@ GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
     const double lower = domain->state_lower[static_cast<std::size_t>(k)],
                  upper = domain->state_upper[static_cast<std::size_t>(k)];
     const double center = plan.initial_center[k], half_width = plan.initial_half_width[k];
-    if (!AtMostSum(-upper, -center, -half_width)) return outside("X", 0, k, center + half_width, upper);
-    if (!AtMostSum(lower, center, -half_width)) return outside("X", 0, k, center - half_width, lower);
+    if (!SumAtMost(center, half_width, upper, 0)) return outside("X", 0, k, center + half_width, upper);
+    if (!SumAtMost(lower, 0, center, -half_width)) return outside("X", 0, k, center - half_width, lower);
     for (int t = 0; t < plan.num_steps; ++t) {
       if (!(lower <= certified.slice_lower[t][k])) return outside("slice", t, k, certified.slice_lower[t][k], lower);
       if (!(certified.slice_upper[t][k] <= upper)) return outside("slice", t, k, certified.slice_upper[t][k], upper);
@@ -471,11 +509,11 @@ GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
   return {};
 }
 
-GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
-                             std::span<const double> measured_state) noexcept {
+GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us, std::span<const double> measured_state,
+                             std::span<const double> state_error) noexcept {
   GuardVerdict verdict;
   try {
-    verdict = ExamineStart(boundary_utime, now_us, measured_state);
+    verdict = ExamineStart(boundary_utime, now_us, measured_state, state_error);
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
@@ -484,7 +522,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
   if (verdict.cause == GuardCause::kTooEarly) return verdict;
   if (verdict.ok()) {
     executing_ = std::move(pending_);
-    executing_angles_ = pending_angles_;
+    executing_sensing_ = pending_sensing_;
     last_step_ = 0;
     first_step_utime_ = last_step_utime_ = now_us;
     standing_steps_.reset();
@@ -493,8 +531,8 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
   return verdict;
 }
 
-GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
-                                 std::span<const double> state) const {
+GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_us, std::span<const double> state,
+                                 std::span<const double> error) const {
   if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
   if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(StartTolerance(options_))) {
@@ -506,15 +544,22 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
   GuardVerdict verdict = CheckExpiry(*pending_, now_us);
   if (verdict.ok()) verdict = ExamineTime(plan, 0, now_us);
   if (!verdict.ok()) return verdict;
-  verdict = ExamineStateSize(state);
-  if (verdict.ok()) verdict = CheckInitialSet(plan, pending_angles_, state);
-  return verdict.ok() ? CheckSlice(*pending_, pending_angles_, 0, state) : verdict;
+  verdict = ExamineMeasured(pending_sensing_, state, error);
+  if (verdict.ok()) verdict = CheckInitialSet(plan, pending_sensing_.angles, state, error);
+  return verdict.ok() ? CheckSlice(*pending_, pending_sensing_.angles, 0, state, error) : verdict;
 }
 
-GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
-  if (std::ssize(state) == options_.num_states) return {};
-  return Refuse(GuardCause::kWrongStateSize,
-                Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
+// An error that is not given becomes the declared one.
+GuardVerdict Guard::ExamineMeasured(const Sensing& sensing, std::span<const double> state,
+                                    std::span<const double>& error) const {
+  if (std::ssize(state) != options_.num_states)
+    return Refuse(GuardCause::kWrongStateSize,
+                  Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
+  if (error.empty()) error = std::span(sensing.state_error).first(state.size());
+  if (error.size() != state.size())
+    return Refuse(GuardCause::kWrongStateError,
+                  Sentence("a state error of %zu entries, this robot has %d", error.size(), options_.num_states));
+  return CheckError(error);
 }
 
 // When a step is due that begins `step` steps after `begin`. A time that no integer holds is the last one.
@@ -559,12 +604,18 @@ GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int
                plan.plan_id, step, lasted, most));
 }
 
+bool Guard::IsDeclared(std::span<const double> state_error) const noexcept {
+  return std::ranges::equal(state_error, std::span(executing_sensing_.state_error).first(state_error.size()),
+                            std::less_equal());
+}
+
 bool Guard::IsOnSchedule(int step, std::int64_t now_us) const noexcept {
   return !executing_ ||
          (ExamineTime(executing_->plan, step, now_us).ok() && ExamineDuration(step, last_step_utime_, now_us).ok());
 }
 
-GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const {
+GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us,
+                                std::span<const double> error) const {
   if (!executing_) return Refuse(GuardCause::kNotExecuting, Sentence("no plan is executing"));
   const int num_steps = executing_->plan.num_steps;
   if (step != last_step_ + 1 || step > num_steps)
@@ -572,25 +623,31 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
   if (standing_steps_ && step > *standing_steps_)
     return Refuse(GuardCause::kWithdrawn,
                   Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
-  GuardVerdict verdict = ExamineStateSize(state);
-  if (verdict.ok()) verdict = CheckSlice(*executing_, executing_angles_, step, state);
+  const Angles& angles = executing_sensing_.angles;
+  GuardVerdict verdict = ExamineMeasured(executing_sensing_, state, error), slice;
+  if (verdict.ok()) verdict = slice = CheckSlice(*executing_, angles, step, state, error);
   if (verdict.ok()) verdict = ExamineTime(executing_->plan, step, now_us);
-  return verdict.ok() ? ExamineDuration(step, last_step_utime_, now_us) : verdict;
+  if (verdict.ok()) verdict = ExamineDuration(step, last_step_utime_, now_us);
+  return verdict.ok() ? slice : verdict;
 }
 
-GuardVerdict Guard::ExamineAgain(std::span<const double> state, std::int64_t now_us) const {
+GuardVerdict Guard::ExamineAgain(std::span<const double> state, std::int64_t now_us,
+                                 std::span<const double> error) const {
   if (!executing_) return Refuse(GuardCause::kNotExecuting, Sentence("no plan is executing"));
-  GuardVerdict verdict = ExamineStateSize(state);
-  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, executing_angles_, state);
-  if (verdict.ok()) verdict = CheckSlice(*executing_, executing_angles_, last_step_, state);
+  const Angles& angles = executing_sensing_.angles;
+  GuardVerdict verdict = ExamineMeasured(executing_sensing_, state, error), slice;
+  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, angles, state, error);
+  if (verdict.ok()) verdict = slice = CheckSlice(*executing_, angles, last_step_, state, error);
   if (verdict.ok()) verdict = ExamineTime(executing_->plan, last_step_, now_us);
-  return verdict.ok() && last_step_ > 0 ? ExamineDuration(last_step_, step_before_utime_, now_us) : verdict;
+  if (verdict.ok() && last_step_ > 0) verdict = ExamineDuration(last_step_, step_before_utime_, now_us);
+  return verdict.ok() ? slice : verdict;
 }
 
-GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept {
+GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us,
+                          std::span<const double> state_error) noexcept {
   GuardVerdict verdict;
   try {
-    verdict = ExamineStep(step, measured_state, now_us);
+    verdict = ExamineStep(step, measured_state, now_us, state_error);
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
@@ -600,10 +657,11 @@ GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std:
   return verdict;
 }
 
-GuardVerdict Guard::CheckAgain(std::span<const double> measured_state, std::int64_t now_us) noexcept {
+GuardVerdict Guard::CheckAgain(std::span<const double> measured_state, std::int64_t now_us,
+                               std::span<const double> state_error) noexcept {
   GuardVerdict verdict;
   try {
-    verdict = ExamineAgain(measured_state, now_us);
+    verdict = ExamineAgain(measured_state, now_us, state_error);
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }

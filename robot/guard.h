@@ -6,7 +6,7 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
     Accept    -> the plan is pending and waits for its start; a newer plan replaces it
     TryStart  -> at the plan's start boundary, with the state inside X_0: the plan executes from step 0 and replaces
                  the plan before it
-    Check     -> after each control: the state is inside X_t, so the next control may be applied. With
+    Check     -> after each control: the state has not left X_t, so the next control may be applied. With
                  GuardOptions::max_jitter_us also: the step is on time and has not lasted too long
     CheckAgain -> the same once more, if time has passed since Check
     Withdraw  -> controls of a plan stand no longer: a pending plan is dropped, and of the executing one only the
@@ -15,18 +15,23 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
     Halt      -> no plan is executing, and none is accepted or started until Reset
 
 Every refusal is final. A plan that TryStart refuses for another cause than an early start is discarded. A plan whose
-Check fails stops executing. If Check finds a state outside its slice, the guard halts itself, because an assumption of
-the next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
+Check fails stops executing. If Check finds that a slice was left, the guard halts itself, because an assumption of the
+next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
 next one. Apply only what `control` returns.
+
+The measured state is not the true one: the true state is anywhere in measured +- state_error. A plan starts only if all
+of that lies inside X_0. A slice is left if none of it lies in the slice. In between, the measurement is consistent with
+the certificate, which holds for the true state if the plan began inside X_0 and its assumptions are true.
 
 Check compares with interval hulls: a certified_plan_t contains, for t = 0..T, the interval hull of the certified
 slice X_t, rounded outward. X_t lies in its hull. So a state outside the hull has left X_t, and the certificate does not
-cover it. The guard uses hulls instead of zonotopes because 2n comparisons need no arithmetic. A state that is an angle
+cover it. The guard uses hulls instead of zonotopes because 4n comparisons of sums suffice. A state that is an angle
 may differ by whole turns (GuardOptions::angles); then it has to be inside by more than the rounding of the turns.
 
 Plan ids of all sources are compared with each other, because a robot follows one planner. Single-threaded. */
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -80,10 +85,10 @@ enum class GuardCause {
   kOutsideInitialSet,
   // TryStart and Check
   kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, from the first step's
-                 ///< time
-                 ///< + step * step_us, or from step_us after the last step.
+                 ///< time + step * step_us, or from step_us after the last step.
   kWrongStateSize,
-  kOutsideSlice,
+  kWrongStateError,  ///< An error of the state is negative or not finite, or there is not one for each state.
+  kOutsideSlice,     ///< The slice was left.
   // Check
   kNotExecuting,
   kStepOutOfOrder,  ///< Not the step after the last one checked, or past the horizon.
@@ -102,12 +107,15 @@ struct GuardVerdict {
   int step =
       -1;  ///< Witness of kOutsideInitialSet, kOutsideSlice, kUnusedEntry, kNonFinite, kEmptySlice, kOutsideDomain.
   int coordinate =
-      -1;            ///< Witness: coordinate of state, X_0, slice or control; for kOutsideDomain inputs follow states.
-  double value = 0;  ///< Witness: the value of that coordinate; for kOffSchedule the lateness in microseconds.
-  double bound = 0;  ///< Witness: the violated bound, rounded to double.
+      -1;  ///< Witness: coordinate of state, X_0, slice or control; for kOutsideDomain inputs follow states. If a slice
+           ///< was not left: the first state that is consistent with it, and not inside; -1: all are inside.
+  double value = 0;     ///< Witness: the value of that coordinate; for kOffSchedule the lateness in microseconds.
+  double bound = 0;     ///< Witness: the violated bound, rounded to double.
   std::string message;  ///< One sentence with the values; empty for kNone.
 
   [[nodiscard]] bool ok() const { return cause == GuardCause::kNone; }
+  /** Of Check and CheckAgain: whether all of measured +- error lies in the slice. */
+  [[nodiscard]] bool is_inside() const { return ok() && coordinate < 0; }
 };
 
 /** The domain of the task: one entry for each state and each input, in the model's units. The certifier keeps every
@@ -141,10 +149,12 @@ struct GuardOptions {
   /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
   if it is there after whole turns of these (lcmtypes/angle.h). */
   std::vector<int> angles = {};
+  /** The task's declaration.state_error: half-widths, one for each state, of what the true state may be from the
+  measured one; none: zeros. */
+  std::vector<double> state_error = {};
   /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us and of the first step's
-  time
-  + t * step_us, and no later than this after step_us from the last step, microseconds, not negative. It is the task's
-  robot.step_error_ms (task/step_time.h): certificates hold for steps within it. */
+  time + t * step_us, and no later than this after step_us from the last step, microseconds, not negative. It is the
+  task's robot.step_error_ms (task/step_time.h): certificates hold for steps within it. */
   std::optional<std::int64_t> max_jitter_us = {};
 };
 
@@ -172,26 +182,34 @@ class Guard final {
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
   /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= StartTolerance;
-  now_us <= expires_utime, because a delayed robot reaches a boundary late; the measured state lies in X_0 = {x : |x -
-  initial_center| <= initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in no
-  set. With max_jitter_us, boundary_utime and now_us have to be within it of start_utime, too. kNothingPending and
-  kTooEarly change nothing. After any other refusal no plan is pending. The executing plan
-  continues unless the new one starts. It allocates nothing if it passes.
-  @param measured_state num_states entries in the model's units. */
+  now_us <= expires_utime, because a delayed robot reaches a boundary late; all of measured_state +- state_error lies
+  in X_0 = {x : |x - initial_center| <= initial_half_width}, compared as exact real numbers, and a part of it in the
+  hull of slice 0. NaN lies in no set. With max_jitter_us, boundary_utime and now_us have to be within it of
+  start_utime, too. kNothingPending and kTooEarly change nothing. After any other refusal no plan is pending. The
+  executing plan continues unless the new one starts. It allocates nothing if it passes.
+  @param measured_state num_states entries in the model's units. @param state_error of this measurement, likewise;
+  empty: GuardOptions::state_error. */
   [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::int64_t now_us,
-                                      std::span<const double> measured_state) noexcept;
+                                      std::span<const double> measured_state,
+                                      std::span<const double> state_error = {}) noexcept;
 
-  /** Checks the state measured after control step - 1 against the hull of slice `step`, and then, with max_jitter_us,
-  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of
-  the step before, or of TryStart) <= step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a
-  refusal no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock,
-  microseconds. */
-  [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
+  /** Checks that the state measured after control step - 1 has not left the hull of slice `step`: that a part of
+  measured_state +- state_error lies in it, compared as exact real numbers. Then checks, with max_jitter_us,
+  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of the step before, or of TryStart) <=
+  step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n);
+  it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us,
+                                   std::span<const double> state_error = {}) noexcept;
 
   /** Checks the step that was checked or started last once more, before its control is applied: for a robot that lets
   time pass in between. The state against X_0 and the hull of slice 0, or the hull of slice `step`; the time as Check
   does, with the step that has ended. After a refusal no plan is executing. Cost and allocations as Check. */
-  [[nodiscard]] GuardVerdict CheckAgain(std::span<const double> measured_state, std::int64_t now_us) noexcept;
+  [[nodiscard]] GuardVerdict CheckAgain(std::span<const double> measured_state, std::int64_t now_us,
+                                        std::span<const double> state_error = {}) noexcept;
+
+  /** Whether the task of the executing plan declares errors as large as these, num_states entries; empty: as declared.
+   */
+  [[nodiscard]] bool IsDeclared(std::span<const double> state_error) const noexcept;
 
   /** Whether Check of the same step and time would find them on schedule, whatever the state is: the step that ends has
   lasted as long as a step may. True without max_jitter_us or an executing plan. */
@@ -218,10 +236,11 @@ class Guard final {
   void Reset() noexcept { halted_ = false; }
   /** After a reload of the task: also accepts plans certified under this configuration and model. The certifier may not
   have taken the new task yet, so plans of the old one are accepted until the first plan of the new one arrives.
-  @param domain the domain of these plans; nothing: the domain in force stays. @param angles likewise.
+  @param domain the domain of these plans; nothing: the domain in force stays. @param angles, state_error likewise.
   @throws std::invalid_argument as the constructor. What throws changes nothing. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
-              const std::optional<std::vector<int>>& angles = {});
+              const std::optional<std::vector<int>>& angles = {},
+              const std::optional<std::vector<double>>& state_error = {});
   [[nodiscard]] bool halted() const { return halted_; }
 
   /** The control that may be applied after the last step that passed: num_inputs entries. Empty if no plan is
@@ -239,6 +258,7 @@ class Guard final {
     Digest config, model;
     std::optional<GuardDomain> domain;
     std::optional<Angles> angles;
+    std::optional<std::array<double, 16>> state_error;
   };
 
   [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, const Speaker& speaker, Bytes& bytes,
@@ -252,25 +272,28 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineDomain(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
-                                          std::span<const double> state) const;
-  [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
+                                          std::span<const double> state, std::span<const double> error) const;
+  [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us,
+                                         std::span<const double> error) const;
   [[nodiscard]] std::int64_t DueAfter(std::int64_t begin, int step) const;
   [[nodiscard]] GuardVerdict ExamineDue(const candidate_plan_t& plan, int step, std::int64_t due, const char* by,
                                         std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const;
-  [[nodiscard]] GuardVerdict ExamineAgain(std::span<const double> state, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineAgain(std::span<const double> state, std::int64_t now_us,
+                                          std::span<const double> error) const;
   [[nodiscard]] GuardVerdict ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const;
-  [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
+  [[nodiscard]] GuardVerdict ExamineMeasured(const Sensing& sensing, std::span<const double> state,
+                                             std::span<const double>& error) const;
 
   GuardOptions options_;
   std::vector<Task> expected_;  // by Expect
-  Angles angles_;               // of plans that are accepted now
+  Sensing sensing_;             // of plans that are accepted now
   std::optional<Authenticator> authenticator_;
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;  // plan_id
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
   std::unique_ptr<certified_plan_t> pending_, executing_;
-  Angles pending_angles_, executing_angles_;
+  Sensing pending_sensing_, executing_sensing_;
   int last_step_ = 0;                   // last checked step of the executing plan
   std::int64_t first_step_utime_ = 0;   // when the plan started
   std::int64_t last_step_utime_ = 0;    // when it was checked

@@ -74,6 +74,7 @@ Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
       guard_(options_.guard),
       reports_({options_.robot_state, options_.transition, options_.event}) {
   state_.reserve(kMostStates);
+  state_error_.reserve(kMostStates);
   step_began_at_.reserve(kMostStates);
   if (!options_.guard.keys) return;
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
@@ -124,6 +125,8 @@ void Supervisor::Measure() {
   is_measured_ = false;
   const std::span<const double> state = robot_.state();
   state_.assign(state.begin(), state.end());
+  const std::span<const double> error = robot_.state_error();
+  state_error_.assign(error.begin(), error.end());
   is_measured_ = true;
 }
 
@@ -227,6 +230,7 @@ std::span<const double> Supervisor::Boundary(std::int64_t utime, std::int64_t no
     if (IsExecuting()) ContinuePlan(utime);
     step_began_at_ = state_;
     step_began_us_ = now_us;
+    step_began_as_declared_ = guard_.IsDeclared(state_error_);
     is_under_way_ = IsExecuting();
   });
   ReportState(utime, ends);
@@ -250,13 +254,18 @@ void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
   const bool is_new = std::exchange(is_under_way_, false);
   if (is_new) {
     ++step_;
-    if (guard_.IsOnSchedule(step_, now_us)) ReportTransition(utime - options_.guard.step_us, now_us - step_began_us_);
+    if (guard_.IsOnSchedule(step_, now_us) && step_began_as_declared_ && guard_.IsDeclared(state_error_))
+      ReportTransition(utime - options_.guard.step_us, now_us - step_began_us_);
   }
-  const GuardVerdict verdict = is_new ? guard_.Check(step_, state_, now_us) : guard_.CheckAgain(state_, now_us);
+  const GuardVerdict verdict =
+      is_new ? guard_.Check(step_, state_, now_us, state_error_) : guard_.CheckAgain(state_, now_us, state_error_);
   if (verdict.ok()) {
     if (!is_new) return;
-    ++counts_.steps_inside;
-    return ReportEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
+    ++(verdict.is_inside() ? counts_.steps_inside : counts_.steps_consistent);
+    if (verdict.is_inside())
+      return ReportEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
+    return ReportEvent(utime, execution_event_t::STEP_CONSISTENT, plan_id, step_, verdict.value,
+                       "consistent with the certified slice, within the state error", verdict.coordinate);
   }
   halted_utime_ = now_us;
   const bool is_off = verdict.cause == GuardCause::kOffSchedule;
@@ -267,7 +276,7 @@ void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
 
 void Supervisor::StartPending(std::int64_t utime, std::int64_t now_us) {
   if (guard_.pending() == nullptr) return;
-  const GuardVerdict verdict = guard_.TryStart(utime, now_us, state_);
+  const GuardVerdict verdict = guard_.TryStart(utime, now_us, state_, state_error_);
   if (verdict.cause == GuardCause::kTooEarly) return;
   if (!verdict.ok()) return ReportRefusal(utime, verdict);
   step_ = 0;
@@ -350,8 +359,9 @@ void Supervisor::HoldIfMoving() {
 }
 
 void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
-                        const std::optional<std::vector<int>>& angles) {
-  guard_.Expect(config_digest, model_digest, std::move(domain), angles);
+                        const std::optional<std::vector<int>>& angles,
+                        const std::optional<std::vector<double>>& state_error) {
+  guard_.Expect(config_digest, model_digest, std::move(domain), angles, state_error);
 }
 
 void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) noexcept {
@@ -374,6 +384,7 @@ void Supervisor::ReportState(std::int64_t utime, bool ends) noexcept {
   message.executing_step = static_cast<std::int16_t>(Step());
   message.mode = IsExecuting() ? robot_state_t::EXECUTING : ends ? robot_state_t::FINISHED : robot_state_t::STANDING;
   message.num_states = SetValues(message.state, state_);
+  message.num_state_errors = SetValues(message.state_error, state_error_);
   reports_.Add(kRobotState, message);
 }
 

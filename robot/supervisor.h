@@ -12,9 +12,11 @@ call Boundary at every step boundary:
 
 Boundary does, in this order:
  1. FinishStep: if a plan is executing, sends the step that has ended as transition_t and checks the measured state
-    against the certified slice: STEP_INSIDE, or STEP_OUTSIDE, an emergency stop. A step that is further off its
-    schedule than the guard's max_jitter_us is OFF_SCHEDULE, an emergency stop that needs no reset. No transition_t is
-    sent for it, wherever it ended: it did not last as long as the model's step, so it is no observation of that;
+    against the certified slice: STEP_INSIDE, STEP_CONSISTENT, or STEP_OUTSIDE if it was left, an emergency stop. A step
+    that is further off its schedule than the guard's max_jitter_us is OFF_SCHEDULE, an emergency stop that needs no
+    reset. No transition_t is sent for it, wherever it ended: it did not last as long as the model's step, so it is no
+    observation of that. Nor is one sent if the state at one of its ends was measured with a larger error than the task
+    declares;
  2. a pending plan whose start_utime is this boundary takes over, in the middle of a plan or at rest: STARTED. If a
 check of the guard fails it is REFUSED, and the current plan goes on;
  3. otherwise the current plan goes on: TAIL_BEGUN where its braking tail begins, STANDING where it ends, with a hold;
@@ -98,6 +100,9 @@ class Supervisor final {
     virtual ~Robot() = default;
     /** The state that was measured last: num_states entries. */
     [[nodiscard]] virtual std::span<const double> state() const = 0;
+    /** How far the true state may be from state(), num_states entries, not negative: of an estimator, a stated multiple
+    of its standard deviations. Empty: as far as GuardOptions::state_error says. */
+    [[nodiscard]] virtual std::span<const double> state_error() const { return {}; }
     /** Come to rest by your own means, and hold until Boundary returns a control. In an emergency nothing certified is
     left to execute, whatever the speed is. */
     virtual void Hold() = 0;
@@ -112,7 +117,8 @@ class Supervisor final {
   };
 
   struct Counts {
-    std::int64_t boundaries = 0, steps = 0, steps_inside = 0, accepted = 0, started = 0, emergency_stops = 0;
+    std::int64_t boundaries = 0, steps = 0, steps_inside = 0, steps_consistent = 0, accepted = 0, started = 0,
+                 emergency_stops = 0;
     std::int64_t errors = 0;                      ///< ERROR_STOPs.
     std::int64_t failed_sends = 0;                ///< Calls of Robot::Send that threw.
     std::int64_t reports_lost = 0;                ///< Reports that will not be sent again, as too many waited.
@@ -141,7 +147,8 @@ class Supervisor final {
 
   /** Guard::Expect. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
-              const std::optional<std::vector<int>>& angles = {});
+              const std::optional<std::vector<int>>& angles = {},
+              const std::optional<std::vector<double>>& state_error = {});
 
   /** Sends an event. @param text one sentence. */
   void Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) noexcept;
@@ -194,7 +201,8 @@ class Supervisor final {
   std::int64_t step_utime_ = 0;                      // the boundary from which that control applies
   std::vector<double> step_began_at_;                // the state
   std::int64_t step_began_us_ = 0;                   // by the robot's clock
-  std::vector<double> state_;                        // measured last
+  bool step_began_as_declared_ = true;               // its error
+  std::vector<double> state_, state_error_;          // measured last
   bool is_measured_ = false;                         // in this call
   bool is_deciding_ = false, is_sending_ = false;    // a call is under way
   bool is_misused_ = false;                          // a function of the robot called what it may not

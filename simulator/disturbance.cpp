@@ -8,12 +8,21 @@
 
 namespace forereach {
 
+Disturbance::Disturbance(const Eigen::VectorXd& bounds, const std::string& kind, std::uint64_t seed)
+    : bounds_(bounds),
+      acts_(kind != "none" && !bounds.isZero(0)),
+      adversarial_(kind == "adversarial"),
+      random_(seed),
+      signs_(ToSize(bounds.size())) {}
+
 Disturbance::Disturbance(const Declaration& declaration, const RobotOptions& options)
-    : declaration_(declaration),
-      acts_(options.disturbance != "none" && declaration.IsDisturbed()),
-      adversarial_(options.disturbance == "adversarial"),
-      random_(static_cast<std::uint64_t>(options.disturbance_seed)),
-      signs_(ToSize(declaration.disturbance.size())) {}
+    : Disturbance(declaration.disturbance, options.disturbance, static_cast<std::uint64_t>(options.disturbance_seed)) {}
+
+Disturbance Disturbance::OfMeasurements(const Declaration& declaration, const RobotOptions& options) {
+  constexpr std::uint64_t kOtherNumbers = std::uint64_t{1} << 32;
+  return {declaration.state_error, options.sensor_error,
+          kOtherNumbers + static_cast<std::uint64_t>(options.disturbance_seed)};
+}
 
 void Disturbance::Add(std::span<double> next) {
   if (!acts_) return;
@@ -23,7 +32,7 @@ void Disturbance::Add(std::span<double> next) {
   }
   for (std::size_t k = 0; k < next.size(); ++k) {
     const double share = Share(k), unit = NextUp(std::abs(next[k])) - std::abs(next[k]);
-    next[k] += share * std::max(0.0, SubDown(declaration_.DisturbanceBound(static_cast<Eigen::Index>(k)), unit));
+    next[k] += share * std::max(0.0, SubDown(bounds_[static_cast<Eigen::Index>(k)], unit));
   }
 }
 

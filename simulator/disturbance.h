@@ -1,11 +1,14 @@
-/** What disturbs the simulated robot: w of x+ = f0(x, u) + r(x, u) + w, within declaration.disturbance.
+/** What disturbs the simulated robot: w of x+ = f0(x, u) + r(x, u) + w, within declaration.disturbance; and the error
+of its measurements, within declaration.state_error.
 
 x+ and f0 + r are rounded numbers. The draws keep one unit in the last place of f0 + r away from the bound, which leaves
 room for both roundings: the robot stays within the declaration in real arithmetic. */
 #pragma once
 
+#include <cstdint>
 #include <random>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "forereach/residual/declaration.h"
@@ -20,16 +23,19 @@ class Disturbance final {
 
   /** @param options robot.disturbance "none", "random" or "adversarial", and its seed. */
   Disturbance(const Declaration& declaration, const RobotOptions& options);
+  /** The error of a measurement: likewise by robot.sensor_error. */
+  [[nodiscard]] static Disturbance OfMeasurements(const Declaration& declaration, const RobotOptions& options);
 
-  /** Adds w to f0 + r, n entries. random: each w_k is uniform in [-bound, bound]. adversarial: w_k = bound or -bound;
-  all signs are drawn anew after 1 to kLongestHold steps, so that the errors of many steps add up. The draws depend on
-  the seed and the number of calls only, not on the standard library. */
+  /** Adds w to f0 + r, or the error to the true state, n entries. random: each w_k is uniform in [-bound, bound].
+  adversarial: w_k = bound or -bound; all signs are drawn anew after 1 to kLongestHold steps, so that the errors of many
+  steps add up. The draws depend on the seed and the number of calls only, not on the standard library. */
   void Add(std::span<double> next);
 
  private:
+  Disturbance(const Eigen::VectorXd& bounds, const std::string& kind, std::uint64_t seed);
   [[nodiscard]] double Share(std::size_t k);
 
-  const Declaration declaration_;
+  const Eigen::VectorXd bounds_;
   const bool acts_, adversarial_;
   std::mt19937_64 random_;
   std::vector<double> signs_;

@@ -8,9 +8,10 @@ namespace forereach {
 
 DriveCounts& DriveCounts::operator+=(const DriveCounts& other) {
   using Counts = DriveCounts;
-  for (const auto member : {&Counts::drives, &Counts::goals, &Counts::contacts, &Counts::limits, &Counts::steps,
-                            &Counts::outside, &Counts::stops, &Counts::emergency_stops, &Counts::proposed,
-                            &Counts::certified, &Counts::searches, &Counts::rounds, &Counts::lost_rounds})
+  for (const auto member :
+       {&Counts::drives, &Counts::goals, &Counts::contacts, &Counts::limits, &Counts::steps, &Counts::outside,
+        &Counts::consistent, &Counts::stops, &Counts::emergency_stops, &Counts::proposed, &Counts::certified,
+        &Counts::searches, &Counts::rounds, &Counts::lost_rounds})
     this->*member += other.*member;
   for (const auto& [cause, count] : other.abstained) abstained[cause] += count;
   for (const auto& [cause, count] : other.rejected) rejected[cause] += count;
@@ -27,7 +28,8 @@ DriveCounts CountsOf(const Lockstep& lockstep) {
   counts.contacts = of(robot, "contacts");
   counts.limits = of(robot, "limits_exceeded");
   counts.steps = of(robot, "steps_executed");
-  counts.outside = counts.steps - of(robot, "steps_inside_slice");
+  counts.consistent = of(robot, "steps_consistent");
+  counts.outside = counts.steps - of(robot, "steps_inside_slice") - counts.consistent;
   counts.stops = of(robot, "stops");
   counts.emergency_stops = of(robot, "emergency_stops");
   counts.proposed = of(planner, "proposed");

@@ -13,7 +13,8 @@ namespace forereach {
 struct DriveCounts {
   std::int64_t drives = 0, goals = 0;           ///< How many, and how many reached the goal
   std::int64_t contacts = 0, limits = 0;        ///< At boundaries: touched, beyond a limit of the task
-  std::int64_t steps = 0, outside = 0;          ///< Executed; their ends that do not lie in their certified slices
+  std::int64_t steps = 0, outside = 0;          ///< Executed; those at whose end the certified slice was left
+  std::int64_t consistent = 0;                  ///< Those that end outside it by no more than the state error
   std::int64_t stops = 0, emergency_stops = 0;  ///< Before the goal; those for a withdrawal
   std::int64_t proposed = 0, certified = 0;     ///< Candidates
   std::int64_t searches = 0;                    ///< With those that gave no candidate

@@ -42,6 +42,11 @@ GuardDomain DomainOf(const Config& config) {
           entries(domain.input.upper())};
 }
 
+std::vector<double> StateErrorOf(const Config& config) {
+  const Eigen::VectorXd& error = config.problem->declaration.state_error;
+  return {error.begin(), error.end()};
+}
+
 SupervisorOptions OptionsOf(const Config& config) {
   SupervisorOptions options;
   options.guard.num_states = config.problem->model->num_states();
@@ -55,6 +60,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
+  options.guard.state_error = StateErrorOf(config);
   options.guard.max_jitter_us = StepErrorUs(config.gate);
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
@@ -105,11 +111,13 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Pl
       limits_(*config.problem->model, config.problem->limits),
       disturbance_(config.problem->declaration, config.robot),
       jitter_(config),
+      sensor_(Disturbance::OfMeasurements(config.problem->declaration, config.robot)),
       period_us_(Microseconds(config.robot.step_period_ms)),
       brake_(BrakeOf(config_)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
       obstacles_(config),
       state_(config.robot.start),
+      measured_(state_),
       supervisor_(OptionsOf(config_), *this) {
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
@@ -149,8 +157,8 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
-  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config),
-                     config->problem->model->angles());
+  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config), config->problem->model->angles(),
+                     StateErrorOf(*config));
   logging::Info("plans certified under {} as it is now are accepted", config_.path);
 }
 
@@ -167,6 +175,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   if (moves)
     for (const int k : config_.problem->model->angles())
       state_[ToSize(k)] = std::remainder(state_[ToSize(k)], 2 * std::numbers::pi);
+  MeasureState();
   heard_utime_ = utime;
   const std::vector<double> room = LimitRoom(control);
   supervisor_.FinishStep(utime, now_us);
@@ -179,8 +188,14 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   LogProgress(utime);
 }
 
+void RobotSimNode::MeasureState() {
+  measured_ = state_;
+  sensor_.Add(measured_);
+}
+
 void RobotSimNode::Hold() {
   brake_.Apply(state_, 0, state_);
+  MeasureState();
   is_stopping_ = brake_.StepsToRest(state_, state_) > 0;
   brakes_since_utime_ = heard_utime_;
   if (!goal_reached_) ++stops_;
@@ -285,6 +300,7 @@ std::string RobotSimNode::Summary() const {
   summary["boundaries"] = counts.boundaries;
   summary["steps_executed"] = counts.steps;
   summary["steps_inside_slice"] = counts.steps_inside;
+  summary["steps_consistent"] = counts.steps_consistent;
   summary["contacts"] = contacts_;
   summary["limits_exceeded"] = limits_exceeded_;
   summary["goal_reached"] = goal_reached_;

@@ -3,7 +3,8 @@
 Step boundaries are due at t_j = t_0 + j * step_period, where t_0 is the first Tick, and come as early or late as
 robot.step_jitter says (step_jitter.h); messages carry the times at which they are due. At each boundary, in this order:
  1. The plant takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
-    turned into [-pi, pi], and the supervisor finishes the step.
+    turned into [-pi, pi], its state is measured, with an error by robot.sensor_error, and the supervisor finishes the
+    step. All that supervisor and bus see is the measured state.
  2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h),
     LIMIT_EXCEEDED for every limit of the task that does not hold at this boundary or, if it uses an input, with the
     control of the step that has ended, and GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
@@ -65,15 +66,17 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   /** Prints Summary() as one line. */
   void Stop() override;
 
-  /** One JSON object: boundaries, steps_executed, steps_inside_slice, contacts, limits_exceeded (counted at
-  each boundary), goal_reached, distance_to_goal (current, in metres; null without a goal), stops (before the goal,
-  emergency stops included), emergency_stops (for a withdrawal), plans_accepted, plans_started, plans_refused (count by
-  GuardCauseName), messages_not_sent. */
+  /** One JSON object: boundaries, steps_executed, steps_inside_slice, steps_consistent (with their slice, within the
+  state error), contacts, limits_exceeded (counted at each boundary), goal_reached, distance_to_goal (current, in
+  metres; null without a goal), stops (before the goal, emergency stops included), emergency_stops (for a withdrawal),
+  plans_accepted, plans_started, plans_refused (count by GuardCauseName), messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
-  [[nodiscard]] std::span<const double> state() const override { return state_; }
+  /** As it was measured last. */
+  [[nodiscard]] std::span<const double> state() const override { return measured_; }
 
  private:
+  void MeasureState();
   void Hold() override;
   [[nodiscard]] int StepsToRest(std::span<const double> lower, std::span<const double> upper) const override {
     return brake_.StepsToRest(lower, upper);
@@ -98,15 +101,15 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   const Plant plant_;
   const BodyPlaces places_;
   const LimitValues limits_;
-  Disturbance disturbance_;
+  Disturbance disturbance_, sensor_;
   StepJitter jitter_;
   const std::int64_t period_us_;
   const Brake brake_;
   Reloading<std::optional<Config>> reload_;
 
   ObstaclesInForce obstacles_;
-  std::vector<double> state_;
-  std::vector<double> state_before_;  // at the last boundary; empty before the first
+  std::vector<double> state_, measured_;  // the true one, and what the robot takes for it
+  std::vector<double> state_before_;      // at the last boundary; empty before the first
   std::optional<std::int64_t> start_utime_;
   std::int64_t offset_before_us_ = 0, offset_us_ = 0;  // of the last boundary, and of the next one
   std::int64_t next_progress_utime_ = 0;

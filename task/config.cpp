@@ -196,6 +196,12 @@ void RequireForCertifyingOnBus(const Config& config) {
                       ": gate.obstacles_lost_ms: missing. With `gate.obstacles: bus`, plans under way are withdrawn, "
                       "which is an emergency stop, once the obstacles have been unknown for this many milliseconds. "
                       "`never`: the robot executes its plan to the end, through whatever has come there");
+  if (config.gate.needs_robot_state && !config.problem->declaration.DeclaresStateError())
+    throw ConfigError(
+        config.path +
+        ": declaration.state_error: missing. Write under `declaration:` how far the true state may be from "
+        "the one that the robot measures, `state_error: {STATE: BOUND, ...}` in the unit of each state; "
+        "one that is not named is exact. Write `state_error: {}` if you mean 0 for all");
   const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
   if (moving != config.obstacles.end())
     throw ConfigError(fmt::format(

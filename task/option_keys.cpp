@@ -220,22 +220,25 @@ std::vector<Key> PlannerKeys() {
       planner.Number("time_limit_ms", "ms", UpTo(kHourMs), &PlannerOptions::time_limit_ms,
                      "Of one query, counted in steps of the model, 400 a millisecond; slow models take longer."),
       planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed, "Of the planner's random numbers."),
-      Optional(planner.Vector("initial_half_width", "of the state", kNotNegative, Size::kStates,
-                              &PlannerOptions::initial_half_width, "Half the width of each candidate's X0."),
-               "as task.initial_set"),
+      Optional(
+          planner.Vector(
+              "initial_half_width", "of the state", kNotNegative, Size::kStates, &PlannerOptions::initial_half_width,
+              "Half the width of each candidate's X0 without the state error, by which the planner widens it: how far "
+              "the state that is measured at the start may be from the predicted one."),
+          "as task.initial_set"),
   };
   std::ranges::move(LawKeys(), std::back_inserter(keys));
   return keys;
 }
 
-Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
-  Key key = robot.OneOf("disturbance", {"none", "random", "adversarial"}, &RobotOptions::disturbance,
-                        "In each step, within declaration.disturbance. random: of each state a uniform value. "
-                        "adversarial: of each state its bound, with signs that stay for 1 to 32 steps.");
-  key.read = [read = key.read](const Field& at, TaskDraft& draft) {
+// A kind of numbers within bounds of the declaration.
+Key WithinDeclared(const OptionRows<RobotOptions>& robot, const char* name, std::string RobotOptions::*kind,
+                   Eigen::VectorXd Declaration::*bounds, const char* bounds_name, const char* meaning) {
+  Key key = robot.OneOf(name, {"none", "random", "adversarial"}, kind, meaning);
+  key.read = [=, read = key.read](const Field& at, TaskDraft& draft) {
     read(at, draft);
-    if (draft.config.robot.disturbance != "none" && !draft.problem.declaration.IsDisturbed())
-      at.Fail(draft.config.robot.disturbance + ", and declaration.disturbance allows for none");
+    if (draft.config.robot.*kind != "none" && (draft.problem.declaration.*bounds).isZero(0))
+      at.Fail(draft.config.robot.*kind + ", and declaration." + bounds_name + " allows for none");
   };
   return key;
 }
@@ -319,10 +322,15 @@ std::vector<Key> RobotKeys() {
                    "bounds in task.between it is at most model.dt."),
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after it, even without the goal."),
-      RobotDisturbance(robot),
+      WithinDeclared(
+          robot, "disturbance", &RobotOptions::disturbance, &Declaration::disturbance, "disturbance",
+          "In each step, within declaration.disturbance. random: of each state a uniform value. adversarial: "
+          "of each state its bound, with signs that stay for 1 to 32 steps."),
+      WithinDeclared(robot, "sensor_error", &RobotOptions::sensor_error, &Declaration::state_error, "state_error",
+                     "By how much measured states are off the true ones, within declaration.state_error: likewise."),
       RobotJitter(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
-                    "Of the random numbers of both."),
+                    "Of the random numbers of disturbance, sensor_error and step_jitter."),
   };
 }
 

@@ -22,7 +22,7 @@ struct PlannerOptions {
   double braking = 2.5;         ///< m/s^2
   double time_limit_ms = 15;    ///< Of one OMPL query, as work: see MakeOmplProposer.
   int seed = 1;
-  std::vector<double> initial_half_width;  ///< Half-widths of each candidate's X0, one for each state.
+  std::vector<double> initial_half_width;  ///< Half-widths of each candidate's X0 without the state error, one a state.
 };
 
 }  // namespace forereach

@@ -15,12 +15,12 @@ struct RobotOptions {
   /** The emergency stop: how fast each of these states, of those of hold, goes to zero, in its unit per second. The
   others of hold are zero at once. */
   std::map<std::string, double> emergency_stop;
-  double step_period_ms = 40;        ///< The wall-clock time of one model step.
-  double time_limit_s = 40;          ///< The run ends at this time even without reaching the goal.
-  std::string disturbance = "none";  ///< What disturbs each step: none, random or adversarial (disturbance.h).
-  std::string step_jitter =
-      "none";                ///< How its steps are off their times: none, random or adversarial (step_jitter.h).
-  int disturbance_seed = 1;  ///< Of the random numbers of both.
+  double step_period_ms = 40;         ///< The wall-clock time of one model step.
+  double time_limit_s = 40;           ///< The run ends at this time even without reaching the goal.
+  std::string disturbance = "none";   ///< What disturbs each step: none, random or adversarial (disturbance.h).
+  std::string sensor_error = "none";  ///< What its measurements are off by, likewise.
+  std::string step_jitter = "none";   ///< How its steps are off their times, likewise (step_jitter.h).
+  int disturbance_seed = 1;           ///< Of the random numbers of all three.
 };
 
 }  // namespace forereach

@@ -89,7 +89,13 @@ std::string DeclarationKey(const TaskTemplate& task) {
       "  # The largest error of each successor in the data. PLACEHOLDER. If sensors err by up to e, add the line\n"
       "  # state_error: [e, ...]. It counts for the states before the steps, too.\n"
       "  noise_bound: " +
-      List(std::vector<std::string>(task.states.size(), "0.01")) + "\n";
+      List(std::vector<std::string>(task.states.size(), "0.01")) +
+      "\n"
+      "  # How far the true state may be from the one that the robot measures while it drives, by names, such as {" +
+      task.states.front().name +
+      ": 0.01}.\n"
+      "  # PLACEHOLDER: exact, as the simulated robot measures it.\n"
+      "  state_error: {}\n";
   return text;
 }
 

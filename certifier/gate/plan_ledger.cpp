@@ -76,10 +76,10 @@ void PlanLedger::Follow(const GateOptions& gate) {
   silence_us_ = gate.needs_robot_state ? std::optional(Microseconds(gate.robot_timeout_ms)) : std::nullopt;
 }
 
-void PlanLedger::Add(const certified_plan_t& certified, std::int64_t steady_us, const Angles& angles) {
+void PlanLedger::Add(const certified_plan_t& certified, std::int64_t steady_us, const Sensing& sensing) {
   ForgetEnded(steady_us);
   const auto whole = std::make_shared<const certified_plan_t>(certified);
-  KeepSlices({whole, angles});
+  KeepSlices({whole, sensing});
   const candidate_plan_t& plan = whole->plan;
   Record& record = Append(plan.plan_id, plan.num_steps);
   record.is_known = true;
@@ -167,8 +167,9 @@ std::optional<PlanLedger::Departure> PlanLedger::FindDeparture(const robot_state
   const bool follows = succession == Succession::kNewer && order.newest() &&
                        state.sequence - 1 == order.newest()->sequence && last.sender == sender;
   std::optional<Departure> departure;
-  if (executing && follows && last.plan_id >= 0) departure = Compare(last.plan_id, last.step + 1, measured);
-  if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured);
+  const std::span<const double> error(state.state_error, ToSize(state.num_state_errors));
+  if (executing && follows && last.plan_id >= 0) departure = Compare(last.plan_id, last.step + 1, measured, error);
+  if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured, error);
   // A late state does not tell where the robot is now.
   if (IsNews(succession) || succession == Succession::kRewound) {
     order.Take(position, StreamOrder::kNoHorizon);
@@ -188,18 +189,19 @@ std::optional<PlanLedger::Departure> PlanLedger::FindDeparture(const transition_
   return std::nullopt;
 }
 
-std::optional<PlanLedger::Departure> PlanLedger::Compare(std::int64_t plan_id, int step,
-                                                         std::span<const double> state) const {
+std::optional<PlanLedger::Departure> PlanLedger::Compare(std::int64_t plan_id, int step, std::span<const double> state,
+                                                         std::span<const double> state_error) const {
   const auto slices = FindSlices(plan_id);
   if (slices == measured_.slices.end()) return std::nullopt;
   const certified_plan_t& certified = *slices->certified;
   if (step < 0 || step > certified.plan.num_steps || std::ssize(state) != certified.plan.num_states)
     return std::nullopt;
-  for (int k = 0; k < certified.plan.num_states; ++k) {
-    const double value = state[ToSize(k)];
+  const Sensing& sensing = slices->sensing;
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    const double value = state[k], error = state_error.empty() ? sensing.state_error[k] : state_error[k];
     const double lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
-    if (!LiesWithin(value, lower, upper, slices->angles[ToSize(k)]))
-      return Departure{plan_id, step, k, value, lower, upper};
+    if (Conform(value, error, lower, upper, sensing.angles[k]) == Conformance::kLeft)
+      return Departure{plan_id, step, static_cast<int>(k), value, error, lower, upper};
   }
   return std::nullopt;
 }

@@ -1,6 +1,6 @@
 /** The ledger of certified plans. It remembers each one once, and answers three questions about them:
 
-    FindDeparture    Does a measured state lie outside its certified slice?
+    FindDeparture    Has the robot left a certified slice?
     FindStranger     Does the robot execute a plan that was not certified, or that it may not execute any more?
     Judge, TakeDue   Which plans may be executed, and how many of their controls still stand? What is withdrawn?
 
@@ -8,9 +8,9 @@ Memory: at most kPlans records, each of 0.3 kB while its plan is in force, and o
 A whole plan, 42 kB, is kept once, and only while something needs it: the slices of the last kSlices plans, the controls
 of the last kJudged plans that have not begun and of those that have. That is 4 MB.
 
-**Departures.** A state outside its certified slice refutes an assumption of the certificate: the model, the
-declaration, its noise bound, or the measurement. The robot's guard makes the same test. The certifier repeats it so
-that it certifies nothing more under a false assumption.
+**Departures.** A state that has left its certified slice, none of measured +- error lies in it, refutes an assumption
+of the certificate: the model, the declaration, its noise bound, or the measurement. The robot's guard makes the same
+test. The certifier repeats it so that it certifies nothing more under a false assumption.
 
 **Strangers.** A guard executes only certified plans and begins none after its certificate has expired. So a robot that
 reports another plan, a step that its plan does not have, or a plan that began too late, has no guard or a defective
@@ -94,7 +94,7 @@ class PlanLedger final {
   struct Departure {
     std::int64_t plan_id;
     int step, coordinate;
-    double value, lower, upper;
+    double value, error, lower, upper;
   };
   struct Stranger {
     std::int64_t plan_id;
@@ -112,9 +112,9 @@ class PlanLedger final {
   /** Uses new options from now on. */
   void Follow(const GateOptions& gate);
   /** Adds a plan that was certified and sent. Its slices replace those of a plan of the same plan_id, unless that plan
-  is executing: a guard does not accept the plan_id that it executes. @param angles the states that may differ by whole
-  turns: those of the model that it was certified with. @pre not IsFull(). Cost: a copy of the plan. */
-  void Add(const certified_plan_t& certified, std::int64_t steady_us, const Angles& angles = {});
+  is executing: a guard does not accept the plan_id that it executes. @param sensing what the task that it was certified
+  with says of measured states. @pre not IsFull(). Cost: a copy of the plan. */
+  void Add(const certified_plan_t& certified, std::int64_t steady_us, const Sensing& sensing = {});
   /** Another certifier is in charge: no plan is in force, and slices and states are forgotten. It is still known which
   plans were certified. */
   void StandBy();
@@ -122,9 +122,9 @@ class PlanLedger final {
   // ---- Departures.
 
   /** Tests a usable state against the slice of the step that it names. If the robot has advanced by one boundary while
-  executing, it also tests the state against the slice of the plan that was executing before. Nothing if the state lies
-  in the slices, or if the plan's slices are not remembered. @param sender of the message: only the same robot's states
-  and transitions are about one step. Cost O(n + kSlices). */
+  executing, it also tests the state against the slice of the plan that was executing before. Its error is the message's
+  or, if that has none, the declared one. Nothing if the slices were not left, or if the plan's are not remembered.
+  @param sender of the message: only the same robot's states and transitions are about one step. Cost O(n + kSlices). */
   [[nodiscard]] std::optional<Departure> FindDeparture(const robot_state_t& state, SenderId sender = {});
   /** Tests the end of a step that began at one of the last kPlaces received states against the slice after it. If the
   robot ends its plan or its guard stops it, its later states name no slice, so only the transition shows the departure.
@@ -202,7 +202,7 @@ class PlanLedger final {
   };
   struct Slices {
     Whole certified;
-    Angles angles;
+    Sensing sensing;
   };
   struct Place {
     std::int64_t utime = -1, plan_id = -1;  // plan -1: not executing
@@ -231,7 +231,8 @@ class PlanLedger final {
 
   void KeepSlices(Slices added);
   [[nodiscard]] std::deque<Slices>::const_iterator FindSlices(std::int64_t plan_id) const;
-  [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, std::span<const double> state) const;
+  [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, std::span<const double> state,
+                                                 std::span<const double> state_error = {}) const;
 
   [[nodiscard]] std::string WhyNot(Record& record, const robot_state_t& state) const;
 

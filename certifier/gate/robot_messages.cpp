@@ -15,6 +15,11 @@ std::string FaultOf(const robot_state_t& state, int num_states) {
   if (state.num_states != num_states) return fmt::format("{} states, the task has {}", state.num_states, num_states);
   if (!std::all_of(state.state, state.state + num_states, [](double value) { return std::isfinite(value); }))
     return "NaN or infinity in it";
+  if (state.num_state_errors != 0 && state.num_state_errors != num_states)
+    return fmt::format("{} errors of states, it has to have none or {}", state.num_state_errors, num_states);
+  if (!std::all_of(state.state_error, state.state_error + state.num_state_errors,
+                   [](double error) { return std::isfinite(error) && error >= 0; }))
+    return "an error of a state is negative, NaN or infinite";
   if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
     return fmt::format("unknown mode {}", state.mode);
   return {};
@@ -29,6 +34,12 @@ double LongerThanDt(std::int64_t duration_us, double dt) {
 }
 
 }  // namespace
+
+Sensing SensingOf(const Problem& problem) {
+  Sensing sensing{AnglesOf(problem.model->angles(), problem.model->num_states()), {}};
+  std::ranges::copy(problem.declaration.state_error, sensing.state_error.begin());
+  return sensing;
+}
 
 ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
   const NominalModel& model = *problem.model;

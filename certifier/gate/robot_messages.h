@@ -7,12 +7,17 @@
 #include "forereach/certify/problem.h"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/angle.h"
 
 namespace forereach {
 
-/** Why a state is unusable at any time: num_states other than the model's, an entry that is not finite, an unknown
-mode. Empty if it is usable. It does not check the stamp (stamp.h). */
+/** Why a state is unusable at any time: num_states other than the model's, an entry that is not finite, errors that are
+not one for each state, negative or not finite, an unknown mode. Empty if it is usable. It does not check the stamp
+(stamp.h). */
 [[nodiscard]] std::string FaultOf(const robot_state_t& state, int num_states);
+
+/** What a task says of measured states. */
+[[nodiscard]] Sensing SensingOf(const Problem& problem);
 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+

@@ -15,10 +15,11 @@ FoundFault PlainFault(std::int16_t cause, std::string why) {
 }
 
 FoundFault SliceLeft(const PlanLedger::Departure& departure) {
+  const std::string error = departure.error > 0 ? fmt::format(" +- {}", departure.error) : "";
   FoundFault found = PlainFault(
       fault_t::SLICE_LEFT,
-      fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]", departure.plan_id,
-                  departure.coordinate, departure.value, departure.step, departure.lower, departure.upper));
+      fmt::format("plan {}: state coordinate {} is {}{} at step {}, its certified slice is [{}, {}]", departure.plan_id,
+                  departure.coordinate, departure.value, error, departure.step, departure.lower, departure.upper));
   found.fault.plan_id = departure.plan_id;
   found.fault.step = static_cast<std::int16_t>(departure.step);
   found.fault.coordinate = static_cast<std::int16_t>(departure.coordinate);

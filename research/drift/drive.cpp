@@ -43,7 +43,8 @@ std::string Head(const Problem& problem, const std::string& transitions) {
          "}\n  input: {lower: " + List(problem.domain.input.lower()) +
          ", upper: " + List(problem.domain.input.upper()) +
          "}\ndeclaration:\n  lipschitz: {}\n  noise_bound: " + List(problem.declaration.noise_bound) +
-         "\n  disturbance: " + List(problem.declaration.disturbance) + "\ntransitions: " + transitions + "\n\n";
+         "\n  state_error: {}\n  disturbance: " + List(problem.declaration.disturbance) +
+         "\ntransitions: " + transitions + "\n\n";
 }
 
 // The same with each transition moved to begin at the origin, and a domain around the way to the goal: the car does not

@@ -172,6 +172,23 @@ std::string Refusal(void (*require)(const Config&), const Config& config) {
 
 std::string RefusalOnBus(const Config& config) { return Refusal(RequireForCertifyingOnBus, config); }
 
+const std::string kMeasuredTask = Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound");
+
+TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStateMayBeOff) {
+  const TaskFiles files;
+  const Config unsaid = files.Load(std::string(kTask) + "gate: {obstacles: task}\n");
+  EXPECT_THAT(RefusalOnBus(unsaid),
+              testing::AllOf(testing::StartsWith(unsaid.path + ": declaration.state_error: missing"),
+                             testing::HasSubstr("`state_error: {}` if you mean 0 for all")));
+  EXPECT_NO_THROW(RequireForCertifying(unsaid)) << "`forereach certify` measures nothing";
+  EXPECT_EQ(RefusalOnBus(files.Load(std::string(kTask) + "gate: {obstacles: task, arming: none}\n")), "");
+  for (const char* declared : {"{}", "{vx: 0.1}", "[0, 0, 0, 0]"})
+    EXPECT_EQ(RefusalOnBus(files.Load(
+                  Replaced(kTask, "  noise_bound", std::string("  state_error: ") + declared + "\n  noise_bound") +
+                  "gate: {obstacles: task}\n")),
+              "");
+}
+
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
   const TaskFiles files;
   const Config unsaid = files.Load(kTask);
@@ -181,7 +198,7 @@ TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
                                                    testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
   for (const auto& [word, source] : std::initializer_list<std::pair<std::string, ObstaclesSource>>{
            {"bus", ObstaclesSource::kBus}, {"task", ObstaclesSource::kTask}}) {
-    const Config config = files.Load(std::string(kTask) + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
+    const Config config = files.Load(kMeasuredTask + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
     EXPECT_EQ(config.gate.obstacles, source);
     EXPECT_EQ(RefusalOnBus(config), "");
   }
@@ -190,7 +207,7 @@ TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
 TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
   const TaskFiles files;
   const auto load = [&](const std::string& more) {
-    return files.Load(std::string(kTask) + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
+    return files.Load(kMeasuredTask + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
   };
   const Config unsaid = load("");
   EXPECT_FALSE(unsaid.gate.obstacles_lost_ms);
@@ -214,7 +231,7 @@ TEST(LoadConfig, TheDelayOfTheBusHasADefaultAndMayBeDeclared) {
 
 TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   const TaskFiles files;
-  const std::string task = std::string(kTask) + "gate: {obstacles: task}\n", line = "  between: samples\n";
+  const std::string task = kMeasuredTask + "gate: {obstacles: task}\n", line = "  between: samples\n";
   const Config unsaid = files.Load(Replaced(task, line, ""));
   EXPECT_FALSE(unsaid.says_between);
   EXPECT_FALSE(unsaid.problem->between);
@@ -321,8 +338,9 @@ TEST(LoadConfig, ReadsObstaclesThatMove) {
 
 TEST(LoadConfig, OnABusNoObstacleOfTheFileMoves) {
   const TaskFiles files;
-  const std::string moves = Replaced(
-      kTask, "radius: 0.8}}", "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
+  const std::string moves =
+      Replaced(kMeasuredTask, "radius: 0.8}}",
+               "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
   for (const char* source : {"bus", "task"}) {
     const Config config = files.Load(moves + "gate: {obstacles: " + source + ", obstacles_lost_ms: never}\n");
     EXPECT_THAT(RefusalOnBus(config), testing::AllOf(testing::StartsWith(config.path + ": task.obstacles[1].motion: "),

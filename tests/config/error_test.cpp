@@ -334,6 +334,8 @@ TEST_F(ErrorTest, AMissingKeyIsAnError) {
               StartsWith("task.yaml:8: declaration.noise_bound: missing: "));
   EXPECT_EQ(ErrorAfter("robot: {disturbance: random}\n"),
             "task.yaml:20: robot.disturbance: random, and declaration.disturbance allows for none");
+  EXPECT_EQ(ErrorAfter("robot: {sensor_error: adversarial}\n"),
+            "task.yaml:20: robot.sensor_error: adversarial, and declaration.state_error allows for none");
   EXPECT_THAT(files_.ErrorWith(", radius: 0.8", ""),
               StartsWith("task.yaml:18: task.obstacles[0].circle.radius: missing: "));
   EXPECT_EQ(ErrorAfter("planner: {source: policy}\n"),

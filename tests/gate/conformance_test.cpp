@@ -76,7 +76,7 @@ TEST_F(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
 
 TEST_F(ConformanceTest, AnAngleMayDifferByWholeTurns) {
   constexpr double kTurn = 2 * std::numbers::pi;
-  ledger_.Add(Plan(7), 0, Angles(0b10));
+  ledger_.Add(Plan(7), 0, {Angles(0b10)});
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1.5, 1.5)));
   EXPECT_FALSE(ledger_.FindDeparture(At(10, 7, 1, 1.5, 1.5 + kTurn)));
   EXPECT_FALSE(ledger_.FindDeparture(At(20, 7, 1, 1.5, 1.5 - 3 * kTurn)));
@@ -85,7 +85,39 @@ TEST_F(ConformanceTest, AnAngleMayDifferByWholeTurns) {
   EXPECT_TRUE(ledger_.FindDeparture(At(50, 7, 1, 1.5, 1 + kTurn))) << "at the end of the slice it cannot be told";
   ledger_.Add(Plan(8), 0);
   EXPECT_TRUE(ledger_.FindDeparture(At(60, 8, 1, 1.5, 1.5 + kTurn))) << "a plan of a task without angles";
-  ledger_.Add(Plan(8), 0, Angles(0b10));
+  ledger_.Add(Plan(8), 0, {Angles(0b10)});
+}
+
+TEST_F(ConformanceTest, ASliceIsLeftByMoreThanTheStateErrorOnly) {
+  Sensing sensing;
+  sensing.state_error = {0, 0.25};
+  ledger_.Add(Plan(7), 0, sensing);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1, 2.25)));
+  EXPECT_FALSE(ledger_.FindDeparture(At(10, 7, 1, 2, 0.75)));
+  const auto above = ledger_.FindDeparture(At(20, 7, 1, 1, std::nextafter(2.25, 3)));
+  ASSERT_TRUE(above);
+  EXPECT_EQ(above->coordinate, 1);
+  EXPECT_EQ(above->value, std::nextafter(2.25, 3));
+  EXPECT_EQ(above->error, 0.25);
+  EXPECT_EQ(above->upper, 2);
+  EXPECT_TRUE(ledger_.FindDeparture(At(30, 7, 1, 1, std::nextafter(0.75, 0))));
+  EXPECT_EQ(ledger_.FindDeparture(At(40, 7, 1, std::nextafter(2.0, 3.0), 1))->coordinate, 0) << "that one is exact";
+}
+
+TEST_F(ConformanceTest, AStateMayBringItsOwnError) {
+  Sensing sensing;
+  sensing.state_error = {0, 0.25};
+  ledger_.Add(Plan(7), 0, sensing);
+  const auto at = [](std::int64_t sequence, double y, double error) {
+    robot_state_t state = At(sequence, 7, 1, 1, y);
+    state.num_state_errors = 2;
+    state.state_error[1] = error;
+    return state;
+  };
+  EXPECT_FALSE(ledger_.FindDeparture(at(0, 2.5, 0.5)));
+  EXPECT_EQ(ledger_.FindDeparture(at(10, 2.5, 0.375))->error, 0.375);
+  EXPECT_TRUE(ledger_.FindDeparture(at(20, 2.125, 0))) << "measured better than declared";
+  EXPECT_FALSE(ledger_.FindDeparture(At(30, 7, 1, 1, 2.125)));
 }
 
 transition_t Step(std::int64_t utime, double x, double y) {
@@ -95,6 +127,15 @@ transition_t Step(std::int64_t utime, double x, double y) {
   transition.next_state[0] = x;
   transition.next_state[1] = y;
   return transition;
+}
+
+TEST_F(ConformanceTest, TheEndOfAStepMayBeOffByTheDeclaredError) {
+  Sensing sensing;
+  sensing.state_error = {0.25, 0};
+  ledger_.Add(Plan(7), 0, sensing);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
+  EXPECT_FALSE(ledger_.FindDeparture(Step(0, 2.25, 2)));
+  EXPECT_TRUE(ledger_.FindDeparture(Step(0, std::nextafter(2.25, 3), 2)));
 }
 
 TEST_F(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {

@@ -167,7 +167,8 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                                                          {"EMERGENCY_STOP", 13},
                                                          {"OFF_SCHEDULE", 14},
                                                          {"LIMIT_EXCEEDED", 15},
-                                                         {"ERROR_STOP", 16}}));
+                                                         {"ERROR_STOP", 16},
+                                                         {"STEP_CONSISTENT", 17}}));
   EXPECT_EQ(ConstantsOf("withdrawal_t"), (Constants{{"FALSIFIED", 1},
                                                     {"DOMAIN_EXIT", 2},
                                                     {"NO_FINITE_ENCLOSURE", 3},

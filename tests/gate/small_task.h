@@ -21,6 +21,7 @@ inline constexpr std::int64_t kNow = 1'700'000'000'000'000;
 
 inline Config SmallTask() {
   Problem problem = PaperPointMass(5);
+  problem.declaration.state_error = Vec({0, 0, 0, 0});
   problem.transitions.z = Eigen::MatrixXd{{0, 0, 1, 0, 0, 0}, {1, 2, -1, 0.5, 0.25, -0.5}};
   problem.transitions.x_next.resize(2, 4);
   for (int i = 0; i < 2; ++i) {

@@ -18,7 +18,11 @@ bool IsInside(double value, double lower, double upper) {
   return false;
 }
 
-TEST(LiesWithin, AcceptsAnAngleOnlyIfItIsInsideAfterWholeTurns) {
+bool LiesWithin(double value, double lower, double upper, bool is_angle) {
+  return Conform(value, 0, lower, upper, is_angle) == Conformance::kInside;
+}
+
+TEST(Conform, FindsAnAngleInsideOnlyIfItIsAfterWholeTurns) {
   TracedRandom random(641);
   int inside = 0, left_out = 0;
   for (int trial = 0; trial < 40'000; ++trial) {
@@ -43,7 +47,7 @@ TEST(LiesWithin, AcceptsAnAngleOnlyIfItIsInsideAfterWholeTurns) {
   EXPECT_GT(left_out, 0) << "of those that are inside by less than the rounding";
 }
 
-TEST(LiesWithin, ComparesExactlyWhereNoTurnIsNeeded) {
+TEST(Conform, ComparesExactlyWhereNoTurnIsNeeded) {
   for (const bool is_angle : {false, true}) {
     EXPECT_TRUE(LiesWithin(0.1, 0.1, 0.1, is_angle));
     EXPECT_TRUE(LiesWithin(0.1, -3, 0.1, is_angle));
@@ -59,7 +63,7 @@ TEST(LiesWithin, ComparesExactlyWhereNoTurnIsNeeded) {
 }
 
 // 0 after a turn is 2 pi, which is no double: it lies between two neighbours.
-TEST(LiesWithin, AcceptsATurnedNumberOnlyIfItsRoundingLiesInsideToo) {
+TEST(Conform, FindsATurnedNumberInsideOnlyIfItsRoundingIsToo) {
   const double above = std::nextafter(kTurn, 9), far_above = std::nextafter(above, 9), below = std::nextafter(kTurn, 0);
   ASSERT_LT(Real(kTurn), Turned(0, 1));
   ASSERT_LT(Turned(0, 1), Real(above));
@@ -69,6 +73,80 @@ TEST(LiesWithin, AcceptsATurnedNumberOnlyIfItsRoundingLiesInsideToo) {
   EXPECT_TRUE(LiesWithin(0, -far_above, -below, true));
   EXPECT_FALSE(LiesWithin(0, far_above, far_above + 1, true));
   EXPECT_FALSE(LiesWithin(0, below - 1, below, true));
+}
+
+// The nearest of the turned boxes decides.
+Conformance ExactConformance(double value, double error, double lower, double upper, bool is_angle) {
+  Conformance best = Conformance::kLeft;
+  for (int turns = is_angle ? -12 : 0; turns <= (is_angle ? 12 : 0); ++turns) {
+    const Real least = Turned(value, turns) - Real(error), most = Turned(value, turns) + Real(error);
+    if (Real(lower) <= least && most <= Real(upper)) return Conformance::kInside;
+    if (Real(lower) <= most && least <= Real(upper)) best = Conformance::kConsistent;
+  }
+  return best;
+}
+
+TEST(Conform, ComparesAStateWithItsErrorAsRealNumbers) {
+  TracedRandom random(1127);
+  std::map<Conformance, int> found;
+  for (int trial = 0; trial < 20'000; ++trial) {
+    const double lower = random.Uniform(-3, 3), upper = lower + random.Uniform(0, 1), error = random.Uniform(0, 1);
+    double value = (random.Integer(0, 1) ? lower : upper) + random.Integer(-1, 1) * error;
+    for (int i = random.Integer(-2, 2); i != 0; i += i < 0 ? 1 : -1) value = std::nextafter(value, i < 0 ? -99 : 99);
+    const Conformance conformance = Conform(value, error, lower, upper, false);
+    ASSERT_EQ(conformance, ExactConformance(value, error, lower, upper, false))
+        << value << " +- " << error << " in [" << lower << ", " << upper << "]";
+    ++found[conformance];
+  }
+  EXPECT_THAT(found, testing::SizeIs(3));
+  for (const auto& [conformance, count] : found) EXPECT_GT(count, 500);
+}
+
+TEST(Conform, GivesATurnedStateNoBetterAnswerThanItHas) {
+  TracedRandom random(1128);
+  std::map<Conformance, int> found;
+  int worse = 0;
+  for (int trial = 0; trial < 20'000; ++trial) {
+    const double lower = random.Uniform(-3, 3), upper = lower + random.Uniform(0, 0.5), error = random.Uniform(0, 0.5);
+    const double edge = (random.Integer(0, 1) ? lower : upper) + random.Integer(-1, 1) * error;
+    double value = edge + random.Integer(-3, 3) * kTurn;
+    for (int i = random.Integer(-3, 3); i != 0; i += i < 0 ? 1 : -1) value = std::nextafter(value, i < 0 ? -99 : 99);
+    const Conformance conformance = Conform(value, error, lower, upper, true),
+                      exact = ExactConformance(value, error, lower, upper, true);
+    ASSERT_GE(conformance, exact) << value << " +- " << error << " in [" << lower << ", " << upper << "]";
+    if (conformance != exact) {
+      EXPECT_EQ(Conform(value, error, lower - 1e-13, upper + 1e-13, true), exact)
+          << "it is missed by the rounding alone";
+      ++worse;
+    }
+    ++found[conformance];
+  }
+  EXPECT_GT(worse, 100);
+  for (const Conformance conformance : {Conformance::kInside, Conformance::kConsistent, Conformance::kLeft})
+    EXPECT_GT(found[conformance], 500);
+}
+
+TEST(Conform, ErrsOnTheSideOfLeftWhereANumberIsNone) {
+  for (const bool is_angle : {false, true}) {
+    for (const double bad : {kNaN, HUGE_VAL, -HUGE_VAL})
+      EXPECT_EQ(Conform(bad, 1, -100, 100, is_angle), Conformance::kLeft) << bad;
+    for (const double bad : {kNaN, -1e-300, -HUGE_VAL})
+      EXPECT_EQ(Conform(0, bad, -100, 100, is_angle), Conformance::kLeft) << bad;
+    EXPECT_EQ(Conform(0, 1, kNaN, 100, is_angle), Conformance::kLeft);
+    EXPECT_EQ(Conform(0, 1, -100, kNaN, is_angle), Conformance::kLeft);
+  }
+}
+
+TEST(SumAtMost, ComparesAsRealNumbersAndFailsWhereASumIsTooLarge) {
+  EXPECT_TRUE(SumAtMost(1, -1e-300, 1, 0));
+  EXPECT_FALSE(SumAtMost(1, 1e-300, 1, 0));
+  EXPECT_TRUE(SumAtMost(0.1, 0.2, 0.2, 0.1));
+  EXPECT_TRUE(SumAtMost(1e-300, 1, 1, 2e-300));
+  EXPECT_FALSE(SumAtMost(2e-300, 1, 1, 1e-300));
+  const double most = std::numeric_limits<double>::max();
+  EXPECT_FALSE(SumAtMost(most, most, most, most));
+  EXPECT_FALSE(SumAtMost(kNaN, 0, 1, 1));
+  EXPECT_FALSE(SumAtMost(0, 0, kNaN, 1));
 }
 
 TEST(TurnTowards, EnclosesTheTurnedNumber) {

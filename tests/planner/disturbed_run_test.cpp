@@ -72,6 +72,38 @@ INSTANTIATE_TEST_SUITE_P(Kinds, DisturbedRun,
                          testing::Values(std::pair("random", 1), std::pair("adversarial", 1),
                                          std::pair("adversarial", 2)));
 
+// The robot of the task without disturbances, whose sensors err.
+Config MeasuredTask(const std::string& sensor_error, int seed) {
+  Config config = Task("none", seed);
+  Problem problem = *config.problem;
+  problem.declaration.disturbance.setZero();
+  problem.declaration.state_error = Vec({0.02, 0.02, 0.004, 0.02, 0, 0.01});
+  config.robot.sensor_error = sensor_error;
+  config.planner.initial_half_width = {0.05, 0.06, 0.012, 0.045, 0.01, 0.022};
+  config.gate.learns = false;  // its transitions are measured, too
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  config.grounds = GroundsOf(DigestOf(std::string_view("measured run")), *config.problem, config.obstacles);
+  return config;
+}
+
+class MeasuredRun : public testing::TestWithParam<std::pair<const char*, int>> {};
+
+TEST_P(MeasuredRun, LeavesNoSliceAndStaysClear) {
+  const auto [sensor_error, seed] = GetParam();
+  const Ending run = Drive(MeasuredTask(sensor_error, seed));
+  SCOPED_TRACE(run.robot.dump() + run.planner.dump());
+  EXPECT_EQ(run.robot["contacts"], 0);
+  EXPECT_GT(run.robot["steps_executed"], 60);
+  const int inside = run.robot["steps_inside_slice"], consistent = run.robot["steps_consistent"];
+  EXPECT_EQ(inside + consistent, run.robot["steps_executed"]);
+  EXPECT_EQ(run.robot["goal_reached"], true);
+  EXPECT_EQ(run.faults, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, MeasuredRun,
+                         testing::Values(std::pair("random", 1), std::pair("adversarial", 1),
+                                         std::pair("adversarial", 2)));
+
 // A certifier that knows nothing of the disturbance stops the robot: its data contradict each other.
 TEST(UndeclaredDisturbance, StopsTheRobotBecauseItsDataContradictTheDeclaration) {
   Config config = Task("adversarial", 1);

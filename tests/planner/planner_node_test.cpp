@@ -3,6 +3,7 @@
 #include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/withdrawal_t.hpp"
 #include "task/canonical.h"
 #include "tests/planner/tasks.h"
@@ -124,6 +125,34 @@ TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
   state.state[3] = -config_.planner.initial_half_width[3];
   Tell(state);
   EXPECT_EQ(candidates_.size(), 1u);
+}
+
+// So that a guard, which asks for all of the measured state +- its error inside X0, lets it start.
+TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
+  Problem problem = *config_.problem;
+  problem.declaration.state_error = Vec({0.03, 0.1, 0, 0, 0, 0});
+  config_.problem = std::make_shared<const Problem>(std::move(problem));
+  node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+  robot_state_t state = Standing();
+  Tell(state);
+  ASSERT_EQ(candidates_.size(), 1u);
+  const std::vector<double>& given = config_.planner.initial_half_width;
+  EXPECT_EQ(candidates_[0].initial_half_width[0], AddUp(given[0], 0.03));
+  EXPECT_EQ(candidates_[0].initial_half_width[1], AddUp(given[1], 0.1));
+  EXPECT_EQ(candidates_[0].initial_half_width[2], given[2]);
+
+  node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+  state.num_state_errors = 6;
+  state.state_error[2] = 0.5;
+  Tell(state);
+  ASSERT_GE(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_.back().initial_half_width[0], given[0]) << "the state's own errors count instead";
+  EXPECT_EQ(candidates_.back().initial_half_width[2], AddUp(given[2], 0.5));
+  state.state_error[2] = -0.5;
+  const std::size_t before = candidates_.size();
+  node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+  Tell(state);
+  EXPECT_EQ(candidates_.size(), before) << "a state with such an error is none";
 }
 
 TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {

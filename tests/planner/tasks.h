@@ -20,6 +20,7 @@ inline Config Bicycle() {
   auto problem = std::make_shared<Problem>(
       WorldOf(MakeKinematicBicycle(0.1, 2.5), Box(Vec({-10, -15, -3, -0.5, -3, -0.48}), Vec({80, 15, 3, 12, 3, 0.48})),
               Within({10, 1})));
+  problem->declaration.state_error = Vec({0, 0, 0, 0, 0, 0});
   problem->declaration.lipschitz(2, 3) = 0.018;
   problem->declaration.lipschitz(2, 5) = 0.61;
   Config config;
@@ -40,6 +41,7 @@ inline Config Bicycle() {
 inline Config PointMass() {
   static const Laws laws = LawsOf("point_mass");
   auto problem = std::make_shared<Problem>(PaperPointMass(5.4, 2));
+  problem->declaration.state_error = Vec({0, 0, 0, 0});
   problem->domain.balls = {{{2, 3}, Vec({0, 0}), 5.4}};
   Config config;
   config.path = "point_mass";

@@ -67,7 +67,8 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
   Decide(Drive(0, true), decision_t::ABSTAIN_SAFETY, 6);
   Decide(Drive(1, false), decision_t::CERTIFIED, -1);
   Step(1, execution_event_t::STARTED, 0);
-  for (int step = 1; step <= 4; ++step) Step(1, execution_event_t::STEP_INSIDE, step);
+  for (int step = 1; step <= 3; ++step) Step(1, execution_event_t::STEP_INSIDE, step);
+  Step(1, execution_event_t::STEP_CONSISTENT, 4);
   Step(1, execution_event_t::STANDING, 4);
   robot_state_t state{.num_states = 4};
   state.state[1] = 1.8;

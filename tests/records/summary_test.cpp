@@ -33,9 +33,9 @@ void WriteRun(const std::string& path) {
   }
   int sequence = 0;
   using E = execution_event_t;
-  for (const std::int16_t kind :
-       {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE, E::TAIL_BEGUN, E::STANDING,
-        E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::LIMIT_EXCEEDED, E::GOAL_REACHED})
+  for (const std::int16_t kind : {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE,
+                                  E::TAIL_BEGUN, E::STANDING, E::STEP_OUTSIDE, E::STEP_CONSISTENT, E::STEP_CONSISTENT,
+                                  E::STANDING, E::CONTACT, E::LIMIT_EXCEEDED, E::GOAL_REACHED})
     writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind)));
   writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence + 4, E::STANDING)));
   robot_state_t state{.num_states = 4};
@@ -63,6 +63,9 @@ TEST(Summary, CountsAHandMadeLog) {
   EXPECT_EQ(summary.limits_exceeded, 1);
   EXPECT_EQ(summary.steps_inside, 3);
   EXPECT_EQ(summary.steps_outside, 1);
+  EXPECT_EQ(summary.steps_consistent, 2);
+  EXPECT_THAT(ToText(summary),
+              testing::ContainsRegex("steps in certified slice +3 of 6, 2 consistent .within the state error.\n"));
   EXPECT_EQ(summary.tails, 1);
   EXPECT_EQ(summary.stops, 3);
   EXPECT_EQ(summary.refused, 1);

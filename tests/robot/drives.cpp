@@ -32,12 +32,15 @@ std::string TextOf(const DriveCounts& all) {
                      all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
 }
 
-// Even seeds have an adversary, odd ones a disturbance at random, both within what the task declares.
+// Even seeds have an adversary, odd ones disturbances and errors of measurement at random, both within what the task
+// declares.
 DriveCounts Drive(Config config, int seed) {
   constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
   config.planner.seed = seed;
   config.robot.disturbance_seed = seed;
-  if (config.problem->declaration.IsDisturbed()) config.robot.disturbance = seed % 2 == 0 ? "adversarial" : "random";
+  const char* const kind = seed % 2 == 0 ? "adversarial" : "random";
+  if (config.problem->declaration.IsDisturbed()) config.robot.disturbance = kind;
+  if (!config.problem->declaration.state_error.isZero(0)) config.robot.sensor_error = kind;
   Lockstep lockstep(config, config, kStartUs);
   lockstep.Run();
   return CountsOf(lockstep);

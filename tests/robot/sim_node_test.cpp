@@ -779,6 +779,47 @@ TEST(RobotSim, APlanThatAnotherRoleSignedIsNotExecuted) {
   EXPECT_EQ(summary["plans_started"], 0);
 }
 
+// The plant is told the true states. The goal is out of the true position's reach, and not of the measured one's.
+TEST(RobotSim, MeasuresWithItsSensorErrorAndDrivesByTheTruth) {
+  for (const std::string kind : {"none", "random", "adversarial"}) {
+    SCOPED_TRACE(kind);
+    Config config = PointMassTask();
+    Problem problem = *config.problem;
+    problem.declaration.state_error = Eigen::Vector4d(0.02, 0.02, 0.01, 0);
+    config.problem = std::make_shared<const Problem>(problem);
+    config.robot.sensor_error = kind;
+    config.planner.goal = {0.021, 0};
+    config.planner.goal_radius = 0.0205;
+    std::vector<std::vector<double>> truth;
+    const std::unique_ptr<Target> target = MakeTarget(config);
+    Rig rig(config, [&](auto x, auto u, auto next) {
+      target->Step(x, u, next);
+      truth.emplace_back(next.begin(), next.end());
+    });
+    rig.RunTo(40);
+    EXPECT_EQ(rig.Count(kGoalReached), 0);
+    rig.Send(Plan(config, 1, 42, {0, 0, 0, 0}));
+    rig.RunTo(45);
+    ASSERT_EQ(rig.Count(kStarted), 1);
+    ASSERT_EQ(truth.size(), 3u);
+    double largest = 0;
+    for (int j = 0; j <= 45; ++j) {
+      const std::vector<double> measured = rig.StateAt(j), at_rest(4, 0.0);
+      const std::vector<double>& is = j > 42 ? truth[static_cast<std::size_t>(j - 43)] : at_rest;
+      for (std::size_t k = 0; k < 4; ++k)
+        EXPECT_LE(std::abs(measured[k] - is[k]), problem.declaration.state_error[static_cast<int>(k)]) << j;
+      largest = std::max(largest, std::abs(measured[0] - is[0]));
+    }
+    EXPECT_EQ(rig.transitions[0].state[0], rig.StateAt(42)[0]);
+    EXPECT_EQ(rig.transitions[0].next_state[0], rig.StateAt(43)[0]);
+    EXPECT_EQ(rig.Count(kInside), 3);
+    if (kind == "none")
+      EXPECT_EQ(largest, 0);
+    else
+      EXPECT_GT(largest, 0.019);
+  }
+}
+
 TEST(RobotSim, StopPrintsOneLineOfJson) {
   Rig rig(PointMassTask());
   rig.RunTo(2);
@@ -786,9 +827,9 @@ TEST(RobotSim, StopPrintsOneLineOfJson) {
   const std::string text = rig.printed();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
   const auto summary = nlohmann::json::parse(text);
-  for (const char* key :
-       {"boundaries", "steps_executed", "steps_inside_slice", "contacts", "limits_exceeded", "goal_reached",
-        "distance_to_goal", "stops", "plans_accepted", "plans_started", "plans_refused", "messages_not_sent"})
+  for (const char* key : {"boundaries", "steps_executed", "steps_inside_slice", "steps_consistent", "contacts",
+                          "limits_exceeded", "goal_reached", "distance_to_goal", "stops", "plans_accepted",
+                          "plans_started", "plans_refused", "messages_not_sent"})
     EXPECT_TRUE(summary.contains(key)) << key;
   EXPECT_EQ(summary["boundaries"], 3);
   EXPECT_EQ(summary["distance_to_goal"], 100);

@@ -15,6 +15,7 @@ constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs;
 class SupervisorTest : public testing::Test, protected Supervisor::Robot {
  protected:
   std::span<const double> state() const override { return state_; }
+  std::span<const double> state_error() const override { return state_error_; }
   void Hold() override { ++holds_; }
   void Reload() override { ++reloads_; }
   void Send(const std::string& channel, Bytes message) override {
@@ -43,7 +44,7 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
     return kinds;
   }
 
-  std::vector<double> state_{1, -2};
+  std::vector<double> state_{1, -2}, state_error_;
   int holds_ = 0, reloads_ = 0;
   std::vector<execution_event_t> events_;
   std::vector<robot_state_t> states_;
@@ -130,6 +131,75 @@ TEST_F(SupervisorTest, AStepWhoseEndsAreOffScheduleIsNoTransition) {
     EXPECT_EQ(transitions_.size(), sent);
     EXPECT_EQ(supervisor.counts().steps, static_cast<std::int64_t>(sent));
     EXPECT_EQ(supervisor.halted(), x == 77);
+  }
+}
+
+// The slices are +-11 and +-12 in state 0.
+TEST_F(SupervisorTest, GoesOnWhereAStateIsConsistentAndStopsWhereItsSliceIsLeft) {
+  SupervisorOptions options{TwoStates()};
+  options.guard.state_error = {0.5, 0};
+  Supervisor supervisor(options, *this);
+  supervisor.OnCertified(Sealed(SmallPlan()), At(0) - 1000);
+  state_error_ = {0.1, 0};
+  EXPECT_FALSE(supervisor.Boundary(At(0), At(0)).empty());
+  state_error_.clear();
+  state_[0] = 11.4;
+  EXPECT_FALSE(supervisor.Boundary(At(1), At(1)).empty());
+  EXPECT_EQ(events_[2].kind, execution_event_t::STEP_CONSISTENT);
+  EXPECT_EQ(events_[2].coordinate, 0);
+  EXPECT_EQ(events_[2].value, 11.4);
+  EXPECT_EQ(events_[2].step, 1);
+  EXPECT_EQ(GetText(events_[2].message), "consistent with the certified slice, within the state error");
+  EXPECT_EQ(supervisor.counts().steps_consistent, 1);
+  EXPECT_EQ(supervisor.counts().steps_inside, 0);
+  state_[0] = 12.6;
+  EXPECT_TRUE(supervisor.Boundary(At(2), At(2)).empty());
+  EXPECT_EQ(events_.back().kind, kOutside);
+  EXPECT_THAT(GetText(events_.back().message), HasSubstr("is 12.6 +- 0.5 at step 2, outside [-12, 12]"));
+  EXPECT_TRUE(supervisor.halted());
+  EXPECT_EQ(supervisor.counts().steps_consistent, 1);
+  EXPECT_EQ(transitions_.size(), 2u);
+}
+
+TEST_F(SupervisorTest, StatesBringTheirOwnErrorsOrNone) {
+  state_error_ = {0.25, 0.5};
+  (void)Boundary(-2);
+  state_error_.clear();
+  (void)Boundary(-1);
+  ASSERT_EQ(states_.size(), 2u);
+  EXPECT_EQ(states_[0].num_state_errors, 2);
+  EXPECT_EQ(states_[0].state_error[0], 0.25);
+  EXPECT_EQ(states_[0].state_error[1], 0.5);
+  EXPECT_EQ(states_[1].num_state_errors, 0);
+}
+
+TEST_F(SupervisorTest, APlanDoesNotStartWithAnErrorThatIsTooLargeOrNone) {
+  for (const std::vector<double>& bad :
+       std::vector<std::vector<double>>{{0.51, 0}, {-0.1, 0}, {0, std::numeric_limits<double>::quiet_NaN()}, {0}}) {
+    state_error_ = bad;
+    Supervisor supervisor(SupervisorOptions{TwoStates()}, *this);
+    supervisor.OnCertified(Sealed(SmallPlan()), At(0) - 1000);
+    EXPECT_TRUE(supervisor.Boundary(At(0), At(0)).empty());
+    EXPECT_EQ(events_.back().kind, kRefused);
+  }
+}
+
+// Learned transitions are taken to be measured as the task declares.
+TEST_F(SupervisorTest, AStepWithAnEndThatWasMeasuredWorseThanDeclaredIsNoTransition) {
+  SupervisorOptions options{TwoStates()};
+  options.guard.state_error = {0.1, 0};
+  using Error = std::vector<double>;
+  const Error none, as_declared{0.1, 0}, better{0.05, 0}, worse{std::nextafter(0.1, 1), 0};
+  for (const auto& [begin, end, sent] : std::initializer_list<std::tuple<Error, Error, std::size_t>>{
+           {none, none, 1}, {as_declared, none, 1}, {better, as_declared, 1}, {worse, none, 0}, {none, worse, 0}}) {
+    Supervisor supervisor(options, *this);
+    transitions_.clear();
+    supervisor.OnCertified(Sealed(SmallPlan()), At(0) - 1000);
+    state_error_ = begin;
+    EXPECT_FALSE(supervisor.Boundary(At(0), At(0)).empty());
+    state_error_ = end;
+    EXPECT_FALSE(supervisor.Boundary(At(1), At(1)).empty());
+    EXPECT_EQ(transitions_.size(), sent);
   }
 }
 

@@ -385,6 +385,39 @@ TEST_P(DisturbanceTest, StaysWithinItsBoundAndReachesIt) {
   EXPECT_FALSE(FindViolation(problem.declaration, Observe(*problem.model, made)));
 }
 
+// Also where the true state is far smaller than its error, or far larger.
+TEST_P(DisturbanceTest, MeasuresWithinTheStateErrorAndReachesIt) {
+  Declaration declaration;
+  declaration.state_error = Eigen::Vector4d(0.25, 0.03, 1e-300, 0);
+  RobotOptions options;
+  options.sensor_error = GetParam();
+  const std::vector<double> truth{1e-9, 1234.5, 1, 0.5};
+  std::vector<double> first, second;
+  for (std::vector<double>* errors : {&first, &second}) {
+    Disturbance sensor = Disturbance::OfMeasurements(declaration, options);
+    for (int i = 0; i < 1000; ++i) {
+      std::vector<double> measured = truth;
+      sensor.Add(measured);
+      for (std::size_t k = 0; k < 4; ++k) {
+        const mpq_class error = mpq_class(measured[k]) - mpq_class(truth[k]);
+        EXPECT_LE(abs(error), mpq_class(declaration.state_error[static_cast<Eigen::Index>(k)])) << k;
+      }
+      errors->push_back(measured[0] - truth[0]);
+    }
+  }
+  EXPECT_EQ(first, second) << "one seed";
+  const auto [least, largest] = std::ranges::minmax(first);
+  EXPECT_LT(least, -0.24);
+  EXPECT_GT(largest, 0.24);
+  if (GetParam() == "adversarial") {
+    EXPECT_TRUE(std::ranges::all_of(first, [](double error) { return std::abs(error) > 0.2499; })) << "at a corner";
+  }
+  options.sensor_error = "none";
+  std::vector<double> exact = truth;
+  Disturbance::OfMeasurements(declaration, options).Add(exact);
+  EXPECT_EQ(exact, truth);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, DisturbanceTest, testing::Values("random", "adversarial"));
 
 TEST(MakeTransitionsTest, RefusesWhatIsNotInsideTheDomain) {
