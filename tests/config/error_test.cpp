@@ -538,15 +538,15 @@ TEST_F(ErrorTest, TransitionsThatCannotBeReadAreAnError) {
 }
 
 TEST_F(ErrorTest, AFileThatIsNoTaskIsAnError) {
-  EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML: "));
-  EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML: "));
+  EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML; look at "));
+  EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML; look at "));
   EXPECT_EQ(files_.Error(""), "task.yaml:1: has no YAML document, has to have one");
   EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"),
             "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("   ,"), "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("just words\n"), "task.yaml:1: just words is not a map");
   EXPECT_EQ(files_.Error("? [a, b]\n: 1\n"), "task.yaml:1: a list is not a key");
-  EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML: "));
+  EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML; look at "));
   EXPECT_THAT(files_.Error(std::string((1 << 24) + 1, ' ')), HasSubstr("task.yaml: is larger than 16 MiB"));
 }
 
