@@ -235,6 +235,7 @@ void ReadModel(const Field& at, TaskDraft& draft) {
   draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
   draft.config.period = StepOf(model);
   draft.config.gate.longest_step_ms = draft.config.period * 1e3;
+  draft.config.robot.step_period_ms = std::min(draft.config.robot.step_period_ms, draft.config.period * 1e3);
 }
 
 Key ParameterRange() {

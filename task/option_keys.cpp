@@ -293,9 +293,10 @@ std::vector<Key> RobotKeys() {
           "all states of robot.hold are zero at once, at any speed, as no real robot can"),
       Number("robot.emergency_stop.<state>", "of the state, per second of the model", kPositive,
              "Its absolute value falls at least so fast. One of robot.hold."),
-      robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
-                   "Wall-clock time of a step. The certifier takes steps to last no longer than this or model.dt; with "
-                   "bounds in task.between it is at most model.dt."),
+      Optional(robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
+                            "Wall-clock time of a step. The certifier takes steps to last no longer than this or "
+                            "model.dt; with bounds in task.between it is at most model.dt."),
+               "40, or model.dt if that is less"),
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after it, even without the goal."),
       RobotDisturbance(robot),

@@ -15,8 +15,8 @@ struct RobotOptions {
   /** The emergency stop: how fast each of these states, of those of hold, goes to zero, in its unit per second. The
   others of hold are zero at once. */
   std::map<std::string, double> emergency_stop;
-  double step_period_ms = 40;        ///< The wall-clock time of one model step.
-  double time_limit_s = 40;          ///< The run ends at this time even without reaching the goal.
+  double step_period_ms = 40;  ///< The wall-clock time of one model step. In a task no longer than that by default.
+  double time_limit_s = 40;    ///< The run ends at this time even without reaching the goal.
   std::string disturbance = "none";  ///< What disturbs each step: none, random or adversarial (disturbance.h).
   int disturbance_seed = 1;          ///< Of its random numbers.
 };

@@ -302,6 +302,18 @@ TEST(LoadConfig, APlanHasToStopWhereTheTaskSaysWhatStandingIs) {
   EXPECT_TRUE(files.Load(says + "gate: {require_stop: false}\n").problem->rest.empty());
 }
 
+TEST(LoadConfig, AStepPeriodThatNobodyWroteIsNoLongerThanTheModels) {
+  const TaskFiles files;
+  EXPECT_EQ(files.Load().robot.step_period_ms, 40);
+  const std::string fast =
+      Replaced(Replaced(kTask, "dt: 0.15", "dt: 0.02"), "between: samples", "between: {acceleration: [1, 1]}");
+  EXPECT_EQ(files.Load(fast).robot.step_period_ms, 20);
+  EXPECT_EQ(files.Load(fast + "robot: {time_limit_s: 3}\n").robot.step_period_ms, 20);
+  EXPECT_EQ(files.Load(fast + "robot: {step_period_ms: 10}\n").robot.step_period_ms, 10);
+  EXPECT_THAT(files.Error(fast + "robot: {step_period_ms: 20.5}\n"),
+              HasSubstr("robot.step_period_ms: is 20.5, longer"));
+}
+
 TEST(LoadConfig, TheLongestStepIsTheModelsOrTheRobots) {
   const TaskFiles files;
   EXPECT_EQ(files.Load().gate.longest_step_ms, 150);
