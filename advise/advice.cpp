@@ -286,9 +286,10 @@ class Adviser {
       if (!std::isfinite(decision.margin)) return;
       changed = WithProblem(changed, [&](Problem& problem) {
         Limit& limit = problem.limits[ToSize(decision.coordinate)];
-        if (const auto reach = certifier_.limits().Reach(decision.coordinate, case_.plan(), tube_))
-          (decision.margin < decision.threshold ? limit.at_least : limit.at_most) =
-              decision.margin < decision.threshold ? reach->lower : reach->upper;
+        if (const auto reach = certifier_.limits().Reach(decision.coordinate, case_.plan(), tube_)) {
+          limit.at_least = std::min(limit.at_least, reach->lower);  // both sides: the other one may be exceeded, too
+          limit.at_most = std::max(limit.at_most, reach->upper);
+        }
       });
       wider.insert(decision.coordinate);
     }

@@ -26,6 +26,7 @@
 #include "task/config.h"
 #include "task/document.h"
 #include "task/draft.h"
+#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -161,6 +162,11 @@ class Examination final {
     KeepThoseInside();
     for (std::size_t l = 0; l < n; ++l) ExamineRange(l);
     if (rows_.empty()) return;
+    if (const auto wrapped = FindWrappedAngle(model_, problem_.transitions)) {
+      Add("model", LineOf(rows_[ToSize(wrapped->row)]) + ": " + wrapped->what, wrapped->advice);
+      problem_.transitions = {};
+      return;
+    }
     try {
       const Observations observations = Observe(model_, problem_.declaration, problem_.transitions);
       ExamineDeclaration(observations);
@@ -455,6 +461,14 @@ class Examination final {
             result_.states[k] + " begins at " + ToText(start[k]) + ", and the domain is [" + ToText(Lower(k)) + ", " +
                 ToText(Upper(k)) + "]: no plan is found from there",
             "begin in the domain, or widen it, if the declaration holds there");
+    const std::vector<double>& most = config_.planner.initial_half_width;
+    const bool is_driven = !config_.planner.goal.empty() && (config_.robot.hold || model_.text() == nullptr);
+    for (const int k : is_driven ? HeldStates(config_) : std::vector<int>())
+      if (ToSize(k) < most.size() && !(std::abs(start[ToSize(k)]) <= most[ToSize(k)]))
+        Remark("robot.start",
+               result_.states[ToSize(k)] + " begins at " + ToText(start[ToSize(k)]) +
+                   ", and robot.hold names it: the simulated robot stands at its start, so `forereach run` refuses it",
+               "begin with 0");
     const BodyPlaces places(model_, problem_.projection, problem_.body);
     const std::vector<BodyPart> parts = places.At({start.data(), start.size()});
     for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {

@@ -1,6 +1,7 @@
 #include "bus/authentic.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <stdexcept>
@@ -193,16 +194,27 @@ Authenticator::Authenticator(KeyRing keys, const std::optional<std::string>& bus
 std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, Bytes bytes, std::int64_t now_us) {
   FollowClock(now_us);
   const Authenticity authenticity = Classify(channel, bytes, now_us);
+  RefusalCounts refused;
   switch (authenticity) {
     case Authenticity::kAuthentic: return {authenticity, WithoutSignature(bytes)};
-    case Authenticity::kUnsigned: ++refusals_.unsigned_ones; break;
-    case Authenticity::kForged: ++refusals_.forged; break;
-    case Authenticity::kReplayed: ++refusals_.replayed; break;
-    case Authenticity::kForeign: ++refusals_.foreign; break;
-    case Authenticity::kOld: ++refusals_.old; break;
-    case Authenticity::kAhead: ++refusals_.ahead; break;
+    case Authenticity::kUnsigned: ++refused.unsigned_ones; break;
+    case Authenticity::kForged: ++refused.forged; break;
+    case Authenticity::kReplayed: ++refused.replayed; break;
+    case Authenticity::kForeign: ++refused.foreign; break;
+    case Authenticity::kOld: ++refused.old; break;
+    case Authenticity::kAhead: ++refused.ahead; break;
   }
+  Refusals one{refused, {}};
+  if (const auto spoken = channels_.find(channel); spoken != channels_.end())
+    one.by_role[spoken->second.speaker] = {refused, refused.old + refused.ahead == 0 ? 0 : Apart(bytes, now_us)};
+  refusals_ += one;
   return {authenticity, {}};
+}
+
+// @pre it has a trailer, which anybody may have written.
+std::int64_t Authenticator::Apart(Bytes bytes, std::int64_t now_us) {
+  constexpr std::int64_t kMost = INT64_MAX / 4;
+  return std::clamp(Trailer(bytes).counter(), -kMost, kMost) - std::clamp(now_us, -kMost, kMost);
 }
 
 // After the clock was set back, senders sign with times from before the start.
@@ -283,7 +295,21 @@ void Authenticator::CountTry(const GroupTag& tag) {
   ++doubt->tries;
 }
 
-std::string DescribeRefusals(const Refusals& refusals) {
+std::string DescribeClocks(const Refusals& refusals, const Refusals& before) {
+  std::string text;
+  for (const auto& [role, now] : refusals.by_role) {
+    const auto known = before.by_role.find(role);
+    const auto of_time = [](const RefusalCounts& counts) { return counts.old + counts.ahead; };
+    if (of_time(now.counts) == (known == before.by_role.end() ? 0 : of_time(known->second.counts))) continue;
+    const bool is_ahead = now.apart_us > 0;
+    text += std::string(text.empty() ? "" : "; ") + std::string(RoleName(role)) + "'s messages are signed " +
+            std::to_string(std::abs(now.apart_us) / 1'000'000) + " s " +
+            (is_ahead ? "ahead of the clock here" : "before the clock here, and before this start");
+  }
+  return text;
+}
+
+std::string DescribeRefusals(const RefusalCounts& refusals) {
   if (refusals.all() == 0) return "";
   std::string text = std::to_string(refusals.all()) + " (unsigned " + std::to_string(refusals.unsigned_ones) +
                      ", forged " + std::to_string(refusals.forged) + ", replayed " + std::to_string(refusals.replayed);

@@ -122,10 +122,10 @@ enum class Authenticity {
 };
 
 /** Numbers of refused messages by reason. */
-struct Refusals {
+struct RefusalCounts {
   std::int64_t unsigned_ones = 0, forged = 0, replayed = 0, foreign = 0, old = 0, ahead = 0;
 
-  Refusals& operator+=(const Refusals& more) {
+  RefusalCounts& operator+=(const RefusalCounts& more) {
     unsigned_ones += more.unsigned_ones;
     forged += more.forged;
     replayed += more.replayed;
@@ -137,8 +137,31 @@ struct Refusals {
   [[nodiscard]] std::int64_t all() const { return unsigned_ones + forged + replayed + foreign + old + ahead; }
 };
 
+/** The same in all, and by the role that speaks on their channel. */
+struct Refusals : RefusalCounts {
+  struct OfRole {
+    RefusalCounts counts;
+    std::int64_t apart_us = 0;  ///< Of the last old one or one ahead: when it was signed, less the receiver's clock.
+  };
+  std::map<Role, OfRole> by_role;
+
+  Refusals& operator+=(const Refusals& more) {
+    RefusalCounts::operator+=(more);
+    for (const auto& [role, of_role] : more.by_role) {
+      OfRole& sum = by_role[role];
+      sum.counts += of_role.counts;
+      if (of_role.apart_us != 0) sum.apart_us = of_role.apart_us;
+    }
+    return *this;
+  }
+};
+
 /** "3 (unsigned 1, forged 1, replayed 1)", with the other causes where there are any; empty if there are none. */
-[[nodiscard]] std::string DescribeRefusals(const Refusals& refusals);
+[[nodiscard]] std::string DescribeRefusals(const RefusalCounts& refusals);
+
+/** "perception's messages are signed 600 s ahead of the clock here", for each role of which messages were refused for
+their time since `before`; empty if there is none. */
+[[nodiscard]] std::string DescribeClocks(const Refusals& refusals, const Refusals& before);
 
 class Authenticator final {
  public:
@@ -182,6 +205,7 @@ class Authenticator final {
   [[nodiscard]] Authenticity Classify(const std::string& channel, Bytes bytes, std::int64_t now_us);
   void FollowClock(std::int64_t now_us);
   [[nodiscard]] Authenticity Timeliness(const Channel& channel, const Trailer& trailer, std::int64_t now_us) const;
+  [[nodiscard]] static std::int64_t Apart(Bytes bytes, std::int64_t now_us);
   [[nodiscard]] static bool Take(Channel& channel, const Trailer& trailer);
   [[nodiscard]] bool IsDoubted(const GroupTag& tag) const;
   void CountTry(const GroupTag& tag);

@@ -5,10 +5,13 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "bus/authentic_bus.h"
 #include "bus/log.h"
 #include "bus/reloading.h"
 #include "lcmtypes/printable.h"
+#include "lcmtypes/why_failed.h"
 
 namespace forereach {
 namespace {
@@ -39,10 +42,15 @@ class DatagramWatch final : public Node {
     return says_datagrams || says_refusals;
   }
   bool SayRefusals() {
-    const Refusals refused = bus_.refusals();
-    if (refused.all() == std::exchange(said_refused_, refused.all())) return false;
-    logging::Warn("from the network, since the start: messages that are not authentic and count for nothing: {}",
-                  DescribeRefusals(refused));
+    const Refusals refused = bus_.refusals(), before = std::exchange(said_refused_, refused);
+    if (refused.all() == before.all()) return false;
+    std::string by_role;
+    for (const auto& [role, of_role] : refused.by_role)
+      by_role += fmt::format("; {}: {}", RoleName(role), DescribeRefusals(of_role.counts));
+    const std::string clocks = DescribeClocks(refused, before);
+    logging::Warn("from the network, since the start: messages that are not authentic and count for nothing: {}{}{}{}",
+                  DescribeRefusals(refused), by_role,
+                  clocks.empty() ? "" : "; set the clocks, or look for replays: ", clocks);
     return true;
   }
   bool SayDatagrams() {
@@ -58,7 +66,8 @@ class DatagramWatch final : public Node {
 
   Node& node_;
   const Bus& bus_;
-  std::int64_t said_ = 0, said_refused_ = 0, next_us_ = 0;
+  Refusals said_refused_;
+  std::int64_t said_ = 0, next_us_ = 0;
 };
 
 }  // namespace
@@ -70,7 +79,7 @@ int Guarded(const std::string& name, const std::function<int()>& body) {
     std::cerr << name << ": " << PrintableLines(error.what()) << std::endl;
     return kExitBadInput;
   } catch (const std::exception& error) {
-    std::cerr << name << ": " << PrintableLines(error.what()) << std::endl;
+    std::cerr << name << ": " << PrintableLines(WhyFailed(error)) << std::endl;
     return 1;
   }
 }

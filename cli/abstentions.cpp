@@ -130,7 +130,7 @@ class AbstentionReader final : public TimelineUser {
 
 }  // namespace
 
-Abstentions AbstentionOf(const std::string& path, const std::string& config_path) {
+Abstentions AbstentionOf(const std::string& path, const std::string& config_path) try {
   const nlohmann::json json = ParseJson(ReadWhole(path, kLargestJsonFile));
   Abstentions read;
   read.tasks.push_back(
@@ -161,6 +161,8 @@ Abstentions AbstentionOf(const std::string& path, const std::string& config_path
   judged.initial_set = Zonotope::Enclose(Box(lower, upper));
   judged.obstacles = task.obstacles;
   return read;
+} catch (const nlohmann::json::exception& error) {
+  throw ConfigError(path + ": it " + DescribeJsonError(error));
 }
 
 Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files,

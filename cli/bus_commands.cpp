@@ -74,6 +74,18 @@ class CertifierConnection final {
   bool warned_ = false;
 };
 
+// Since the certifier's start.
+std::string DescribeRefused(const certifier_status_t& status) {
+  std::string text;
+  for (const auto& [count, what] : {std::pair{status.refused_unsigned, "unsigned"},
+                                    {status.refused_forged, "forged"},
+                                    {status.refused_replayed, "replayed or signed by another clock"},
+                                    {status.refused_foreign, "of another bus"},
+                                    {status.messages_refused, "of no use; its log says why"}})
+    if (count > 0) text += (text.empty() ? "messages refused: " : ", ") + std::to_string(count) + " " + what;
+  return text;
+}
+
 void Print(const certifier_status_t& status, bool json, bool is_signed) {
   if (json) {
     std::cout << JsonText(ToJson(status, is_signed)) << std::endl;
@@ -96,6 +108,7 @@ void Print(const certifier_status_t& status, bool json, bool is_signed) {
   if (status.obstacles_age_us >= 0)
     std::cout << "; the last message is " << status.obstacles_age_us / 1000 << " ms old";
   if (!status.obstacles_known) std::cout << "; not all are known";
+  if (const std::string refused = DescribeRefused(status); !refused.empty()) std::cout << "\n" << refused;
   std::cout << std::endl;
 }
 
@@ -123,24 +136,25 @@ int Send(const CommandArguments& options, std::int16_t kind) {
   command.kind = kind;
   SetText(command.source, "forereach");
   certifier.Send(command);
-  const auto refused = [](const certifier_status_t& status) {
-    return status.messages_refused + status.refused_unsigned + status.refused_forged + status.refused_replayed;
+  const bool resets = kind == command_t::RESET;
+  const auto is_done = [&](const certifier_status_t& status) {
+    return resets ? status.state != certifier_status_t::FAULT : status.version > before->version;
   };
-  const auto after = certifier.Await([&](const certifier_status_t& status) {
-    if (status.instance != before->instance) return false;
-    if (refused(status) > refused(*before)) return true;
-    return kind == command_t::RESET
-               ? status.utime >= command.utime
-               : status.version != before->version || status.failed_reloads != before->failed_reloads;
+  // What it refuses meanwhile may be anybody's: only what a command does answers it.
+  std::optional<certifier_status_t> last;
+  const auto answered = certifier.Await([&](const certifier_status_t& status) {
+    if (status.instance != before->instance || status.utime < command.utime) return false;
+    last = status;
+    return is_done(status) || status.failed_reloads > before->failed_reloads;
   });
-  if (!after) return NoCertifierAnswers(certifier.channels());
-  Print(*after, options.json, certifier.channels().keys.has_value());
-  const bool done =
-      kind == command_t::RESET ? after->state != certifier_status_t::FAULT : after->version > before->version;
-  if (!done && refused(*after) > refused(*before))
-    std::cerr << "forereach: the certifier refused the command; is it signed with the operator's key (--key)?"
+  if (!last) return NoCertifierAnswers(certifier.channels());
+  Print(*last, options.json, certifier.channels().keys.has_value());
+  if (!answered)
+    std::cerr << "forereach: the certifier has not done the " << (resets ? "reset" : "reload") << " within "
+              << kPatienceMs / 1000 << " s: it refuses a command without the operator's key (--key)"
+              << (resets ? ", and one that was sent before the fault" : "") << "; its log says which it refused"
               << std::endl;
-  return done ? 0 : 1;
+  return answered && is_done(*answered) ? 0 : 1;
 }
 
 Command BusCommand(const std::string& name, const std::string& purpose,

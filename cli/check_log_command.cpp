@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/each_run.h"
 #include "cli/offline.h"
 #include "records/check.h"
 #include "task/json_text.h"
@@ -12,12 +13,13 @@ namespace forereach {
 namespace {
 
 struct CheckLogArguments {
-  std::string directory;
+  std::string directory, config;
+  LogKey key;
   bool json = false;
 };
 
 int RunCheckLog(const CheckLogArguments& options) {
-  const std::vector<LogCheck> checks = CheckLogs(options.directory);
+  const std::vector<LogCheck> checks = CheckLogs(options.directory, options.config, options.key);
   std::cout << (options.json ? JsonText(ToJson(checks)) + "\n" : ToText(checks)) << std::flush;
   return std::ranges::all_of(checks, &LogCheck::whole_log) ? 0 : 1;
 }
@@ -26,12 +28,15 @@ int RunCheckLog(const CheckLogArguments& options) {
 
 Command CheckLogCommand() {
   const auto options = std::make_shared<CheckLogArguments>();
-  return {.name = kCheckLog.name,
-          .purpose = kCheckLog.purpose,
-          .footer = "Example:\n  forereach check-log run/log",
-          .options = {Required({"directory", &options->directory, "DIRECTORY", "The logger's directory"}),
-                      JsonFlag(options->json)},
-          .run = [options] { return RunCheckLog(*options); }};
+  Command command{.name = kCheckLog.name,
+                  .purpose = kCheckLog.purpose,
+                  .footer = "Example:\n  forereach check-log run/log",
+                  .options = {Required({"directory", &options->directory, "DIRECTORY", "The logger's directory"}),
+                              {"--config", &options->config, "FILE", kTaskOfRecords},
+                              JsonFlag(options->json)},
+                  .run = [options] { return RunCheckLog(*options); }};
+  AddKeyOptions(command.options, options->key);
+  return command;
 }
 
 }  // namespace forereach

@@ -29,6 +29,7 @@ struct DeclareArguments {
   std::string config, cover, check;
   std::string from = "equations";
   bool json = false, between = false, from_data = false;
+  double seconds = BetweenCommand{}.seconds;
   std::string noise = "declared", disturbance = "estimated";
   DataCommand data;
   SlopeBoundOptions search;
@@ -93,7 +94,7 @@ std::string NameOf(const Entry& entry, const std::vector<std::string>& names) {
   return names[static_cast<std::size_t>(entry.row)] + " by " + names[static_cast<std::size_t>(entry.column)];
 }
 
-// Rejects a slope without a finite bound. @throws std::runtime_error that names the slope and a box.
+// Rejects a slope without a finite bound. @throws std::invalid_argument that names the slope and a box.
 void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, const ResidualSlopes& slopes) {
   const std::vector<std::string> names = ArgumentNames(config);
   for (const SlopeBound& bound : bounds) {
@@ -102,11 +103,12 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))
         box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) +
                ", " + RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
-      throw std::runtime_error("no finite bound for the slope of " + NameOf(bound, names) + ": " +
-                               config.residual->name + " has none over " + box + ", found after " +
-                               std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " + config.path +
-                               " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, "
-                               "or raise --max-boxes if the box is wide");
+      throw std::invalid_argument(
+          "no finite bound for the slope of " + NameOf(bound, names) + ": " + config.residual->name +
+          " has none over " + box + ", found after " + std::to_string(bound.boxes) +
+          " boxes; take this box out of `domain` in " + config.path +
+          " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, "
+          "or raise --max-boxes if the box is wide");
     }
     if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
       throw ConfigError(config.path + ": domain: no point of its box satisfies its inequalities and balls");
@@ -344,6 +346,11 @@ Command DeclareCommand() {
                            "continuous time; positions: largest second differences of the task's transitions",
                    .one_of = {"equations", "positions"},
                    .needs = "--between"},
+                  {.name = "--seconds",
+                   .variable = &options->seconds,
+                   .help = "With --between: the bounds found by then, or by Ctrl-C, are printed; they are valid",
+                   .range = NumberRange{0.1, 1e6},
+                   .needs = "--between"},
                   {.name = "--from-data",
                    .variable = &options->from_data,
                    .help = "Propose a declaration from the task's transitions instead",
@@ -397,7 +404,8 @@ Command DeclareCommand() {
                   JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
       .run = [options] {
         if (options->between)
-          return DeclareBetween({options->config, options->from == "positions", options->json, options->search});
+          return DeclareBetween(
+              {options->config, options->from == "positions", options->json, options->search, options->seconds});
         if (options->from_data) {
           DataCommand& data = options->data;
           data.config = options->config;

@@ -5,10 +5,10 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/new_file.h"
 #include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
+#include "records/output_file.h"
 #include "records/result_json.h"
 
 namespace forereach {
@@ -55,7 +55,7 @@ bool IsDirectory(const ExportArguments& options, const NamedRuns& named) {
 void RequireNoOutput(const ExportArguments& options, const NamedRuns& named) {
   std::error_code error;
   if (!IsDirectory(options, named) || !fs::is_directory(options.output, error) || fs::is_symlink(options.output, error))
-    return RequireNewFile(options.output, false);
+    return static_cast<void>(OutputFile(options.output));
   if (!fs::is_empty(options.output, error))
     throw OutputError(options.output + ": the directory is not empty, and is not changed; choose another name");
 }

@@ -16,6 +16,7 @@
 #include "records/scatter.h"
 #include "task/config.h"
 #include "task/json_text.h"
+#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -126,6 +127,7 @@ int RunFit(const FitArguments& options) {
     throw ConfigError(config.path + ": model: " + problem.model->name() +
                       " is compiled; only the parameters of a model as text can be fitted");
   const Transitions transitions = LoadTransitions(FilesNamedBy(options.config).transitions, *problem.model);
+  RequireNoWrappedAngle(config.path, FilesNamedBy(options.config).transitions, *problem.model, transitions);
   Fit fit;
   try {
     fit = FitParameters(*text, transitions, NamesOf(options.names, *text));

@@ -10,6 +10,7 @@
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
 #include "cli/commands.h"
+#include "lcmtypes/why_failed.h"
 #include "task/config.h"
 
 namespace forereach {
@@ -47,7 +48,7 @@ class ObstaclesNode final : public Node {
     obstacles_ = config.obstacles;
     logging::Info("the obstacles of {} from now on", path_);
   } catch (const std::exception& error) {
-    logging::Error("not reloaded, the obstacles of before are sent: {}", error.what());
+    logging::Error("not reloaded, the obstacles of before are sent: {}", WhyFailed(error));
   }
 
  private:

@@ -40,11 +40,15 @@ inline constexpr OfflineCommand kReplay{
 inline constexpr OfflineCommand kAdvise{"advise",
                                         "Find what would have turned abstentions into certificates: exit 0 if each has "
                                         "such a change, 1 if not, 2 bad input"};
-inline constexpr OfflineCommand kReport{"report", "Summarise a recorded log, and draw it"};
+inline constexpr OfflineCommand kReport{
+    "report",
+    "Summarise a recorded log, and draw it: exit 0 if all of it could be read, 1 if it is damaged, 2 bad input"};
 inline constexpr OfflineCommand kCheckLog{
     "check-log",
     "Check a logger's directory for consistency: exit 0 if the event of every row of the database is unchanged in its "
-    "log and no log is damaged or unknown to the database, otherwise 1; logs deleted for the quota are not errors"};
+    "log, every row is the one that follows from its event, and no log is damaged or unknown to the database, "
+    "otherwise "
+    "1; logs deleted for the quota are not errors"};
 inline constexpr OfflineCommand kRun{
     "run",
     "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock: exit 0 if "

@@ -4,9 +4,11 @@
 #include <limits>
 #include <sstream>
 
+#include "advise/task_check.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "forereach/certify/explain.h"
+#include "lcmtypes/printable.h"
 #include "planner_bridge/certified_plan.h"
 #include "records/decision_json.h"
 #include "task/config.h"
@@ -35,16 +37,24 @@ std::string PositionText(const Eigen::VectorXd& position) {
   return text.str() + ")";
 }
 
+// What keeps every plan from being certified, by the examination of the task.
+std::string FindingsOf(const PlanArguments& options) {
+  std::string text;
+  for (const TaskFinding& finding : CheckTask({.config = options.config}).findings)
+    if (!finding.is_remark) text += "\n" + finding.place + finding.what + "\n    " + finding.advice;
+  return text;
+}
+
 int ReportFailure(const PlanArguments& options, const Config& config, const CertifiedPlan& plan) {
+  const std::string findings = FindingsOf(options);
   std::cerr << "forereach plan: no certified plan from task.initial_set with seed " << options.seed << ": ";
   if (plan.candidates == 0)
-    std::cerr << "none of " << config.planner.candidates
-              << " searches found a candidate; a smaller planner.clearance or "
-              << "a larger planner.time_limit_ms may help";
+    std::cerr << "none of " << config.planner.candidates << " searches found a candidate"
+              << (findings.empty() ? "; a smaller planner.clearance or a larger planner.time_limit_ms may help" : "");
   else
     std::cerr << plan.candidates << (plan.candidates == 1 ? " candidate was" : " candidates were")
               << " not certified, the last: " << Explain(plan.decision, *config.problem);
-  std::cerr << "; " << options.out << " is not written" << std::endl;
+  std::cerr << "; " << options.out << " is not written" << PrintableLines(findings) << std::endl;
   return 1;
 }
 

@@ -101,7 +101,7 @@ int WritePage(const ReportArguments& options) {
   if (run.parts.size() > 1) std::cout << ", " << run.parts.size() << " runs";
   std::cout << "\n";
   for (const std::string& note : run.notes) std::cout << Printable(note) << "\n";
-  return 0;
+  return run.damage.places == 0 ? 0 : 1;
 }
 
 }  // namespace
@@ -141,8 +141,7 @@ Command ReportCommand() {
                   JsonFlag(report.json)},
       .run = [options] {
         if (!options->out.empty()) return WritePage(*options);
-        Report(options->report, std::cout);
-        return 0;
+        return Report(options->report, std::cout) ? 0 : 1;
       }};
   options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, report.key);

@@ -1,5 +1,7 @@
 #include <iostream>
 
+#include <fmt/format.h>
+
 #include "bus/process.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
@@ -14,6 +16,15 @@ struct RunArguments {
   std::string config, directory, key, obstacles;
 };
 
+// What became of the planner's work: why a robot may not arrive.
+std::string DescribePlanning(const DriveCounts& counts) {
+  std::string causes;
+  for (const auto* by_cause : {&counts.abstained, &counts.rejected})
+    for (const auto& [cause, count] : *by_cause) causes += fmt::format(", {} {}", cause, count);
+  return fmt::format("the planner searched {} times and proposed {} plans, {} were certified{}; {} steps were driven",
+                     counts.searches, counts.proposed, counts.certified, causes, counts.steps);
+}
+
 int Run(const RunArguments& options) {
   Config config = LoadConfig(options.config);
   if (!options.directory.empty()) config.logger.directory = options.directory;
@@ -26,7 +37,8 @@ int Run(const RunArguments& options) {
   logger.Stop();
   const DriveCounts counts = CountsOf(lockstep);
   if (counts.goals == 0)
-    std::cerr << "forereach: " << options.config << ": the robot did not reach planner.goal; `forereach check "
+    std::cerr << "forereach: " << options.config
+              << ": the robot did not reach planner.goal: " << DescribePlanning(counts) << "; `forereach check "
               << options.config << "` says what may keep it, and `forereach report` what happened\n";
   const auto say = [&](std::int64_t count, const char* what) {
     if (count > 0) std::cerr << "forereach: " << options.config << ": the robot " << what << " (" << count << ")\n";

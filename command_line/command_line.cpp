@@ -61,6 +61,14 @@ std::string EmptyOption(const CLI::App& app) {
   return "";
 }
 
+// "--plan: 1 required FILE.csv missing", "--config: At Most 1 required but received 2".
+std::string Describe(const CLI::ParseError& error) {
+  const std::string text = Shown(error.what());
+  if (!dynamic_cast<const CLI::ArgumentMismatch*>(&error)) return text;
+  const std::string option = text.substr(0, text.find(':'));
+  return option + (text.ends_with("missing") ? ": its value is missing" : ": is given too often");
+}
+
 int Refuse(const CLI::App& app, const std::string& why) {
   std::cerr << app.get_name() << ": " << why << "\nRun with --help for more information." << std::endl;
   return kExitBadInput;
@@ -147,9 +155,9 @@ std::optional<int> ParseCommandLine(const Command& program, int argc, const char
     if (program.chosen) *program.chosen = app.get_subcommands().front()->get_name();
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
     const std::string unknown = UnknownArgument(app);
-    return Refuse(app, unknown.empty() ? Shown(error.what()) : unknown);
+    if (error.get_exit_code() == 0 && unknown.empty()) return app.exit(error);
+    return Refuse(app, unknown.empty() ? Describe(error) : unknown);
   }
 }
 

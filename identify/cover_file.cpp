@@ -164,7 +164,7 @@ CoverFile LoadCover(const std::string& path, const Config& config) {
     file.residual_digest = document.at("digests").at("residual").get<std::string>();
     file.cover_digest = document.at("digests").at("cover").get<std::string>();
   } catch (const Json::exception& error) {
-    throw ConfigError(path + ": not a cover of `forereach declare --cover`: " + error.what());
+    throw ConfigError(path + ": not a cover of `forereach declare --cover`: it " + DescribeJsonError(error));
   } catch (const ConfigError& error) {
     throw ConfigError(path + ": not a cover for this task: " + error.what());
   }

@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <iostream>
+#include <stdexcept>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
+#include "command_line/progress.h"
 #include "forereach/declare/motion_bound.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -70,7 +73,39 @@ std::vector<MotionRow> RowsOf(const Config& config, const std::vector<MotionBoun
   return rows;
 }
 
-MotionProposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
+// Ends the search after its time, which the bounds share, or at Ctrl-C. A second Ctrl-C ends the program.
+class SearchTime final {
+ public:
+  explicit SearchTime(double seconds) : seconds_(seconds) {
+    is_interrupted = 0;
+    std::signal(SIGINT, [](int) {
+      is_interrupted = 1;
+      std::signal(SIGINT, SIG_DFL);
+    });
+  }
+  ~SearchTime() { std::signal(SIGINT, SIG_DFL); }
+  SearchTime(const SearchTime&) = delete;
+  SearchTime& operator=(const SearchTime&) = delete;
+
+  bool IsOver(double done, double next) {
+    for (; told_ < static_cast<int>(kParts * done); ++told_) progress_.Advance();
+    return is_interrupted != 0 || passed() > seconds_ * next;
+  }
+  [[nodiscard]] double passed() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+ private:
+  static constexpr int kParts = 100;
+  static inline volatile std::sig_atomic_t is_interrupted = 0;
+
+  const double seconds_;
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  Progress progress_{"hundredths of the search", kParts};
+  int told_ = 0;
+};
+
+MotionProposal FromEquations(const Config& config, const BetweenCommand& command) {
   const Problem& problem = *config.problem;
   const std::vector<ExpressionText> places = problem.body.Coordinates();
   const auto flow = MakeFlow(*problem.model, places);
@@ -80,11 +115,12 @@ MotionProposal FromEquations(const Config& config, const SlopeBoundOptions& sear
   Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
   const Eigen::MatrixXd frame = FrameOf(problem);
-  const auto begin = std::chrono::steady_clock::now();
-  const MotionBounds bounds =
-      BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading, rest}, search);
+  SearchTime time(command.seconds);
+  const MotionBounds bounds = BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading,
+                                           rest, [&](double done, double next) { return time.IsOver(done, next); }},
+                                          command.search);
   MotionProposal proposal;
-  proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  proposal.seconds = time.passed();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
   proposal.source = "equations";
   proposal.remark = "Proven for the equations of " + problem.model->name() +
@@ -156,10 +192,12 @@ Json ToJson(const MotionProposal& proposal, const Config& config) {
 
 void PrintForPeople(const MotionProposal& proposal, const Config& config) {
   const bool proven = proposal.source == "equations";
-  std::string text = fmt::format("declare: motion between two samples, at most {} s apart, from the {}{}\n",
-                                 RoundedUp(LongestPeriod(config), kMotionDigits),
-                                 proven ? "equations of " + config.problem->model->name() : "logged positions",
-                                 AllReached(proposal.rows) ? "" : "; stopped at --max-boxes");
+  const double longest = LongestPeriod(config);
+  std::string text =
+      fmt::format("declare: motion between two samples, at most {} s apart, from the {}{}\n",
+                  longest == config.period ? ToText(longest) : RoundedUp(longest, kMotionDigits),
+                  proven ? "equations of " + config.problem->model->name() : "logged positions",
+                  AllReached(proposal.rows) ? "" : "; stopped before --gap, at --seconds, --max-boxes or Ctrl-C");
   for (const MotionRow& row : proposal.rows) {
     text += fmt::format(
         "  {:<10} at {} {:<9}{:<8}", row.name, proven ? "most" : "least",
@@ -174,16 +212,18 @@ void PrintForPeople(const MotionProposal& proposal, const Config& config) {
 
 }  // namespace
 
-int DeclareBetween(const BetweenCommand& command) {
+int DeclareBetween(const BetweenCommand& command) try {
   const Config config =
       LoadConfig(command.config, command.from_positions ? TransitionsFile::kRead : TransitionsFile::kIgnore);
-  const MotionProposal proposal =
-      command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
+  const MotionProposal proposal = command.from_positions ? FromPositions(config) : FromEquations(config, command);
   if (command.json)
     std::cout << JsonText(ToJson(proposal, config)) << std::endl;
   else
     PrintForPeople(proposal, config);
   return AllReached(proposal.rows) ? 0 : 1;
+} catch (const std::runtime_error& error) {
+  if (dynamic_cast<const BadInput*>(&error)) throw;
+  throw std::runtime_error(command.config + ": model: " + error.what());
 }
 
 }  // namespace forereach

@@ -12,6 +12,7 @@ struct BetweenCommand {
   bool from_positions = false;  ///< Otherwise from the model's equations.
   bool json = false;
   SlopeBoundOptions search;
+  double seconds = 45;  ///< For all bounds together. What is found by then, or by Ctrl-C, is printed.
 };
 
 /** Prints bounds for the key task.between of a task file, and what they rest on.

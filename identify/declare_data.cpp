@@ -16,6 +16,7 @@
 #include "identify/lone_slopes.h"
 #include "task/config.h"
 #include "task/json_text.h"
+#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -250,6 +251,8 @@ Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Confi
 
 int DeclareFromData(const DataCommand& command) {
   const Config config = LoadConfig(command.config);
+  RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
+                        config.problem->transitions);
   const Problem& problem = *config.problem;
   std::optional<Progress> progress(std::in_place, "parts of the work", 2 * ToSize(problem.model->num_states()));
   const ProposalOptions options{command.factor, command.estimate_noise, command.estimate_disturbance,

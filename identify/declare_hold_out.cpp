@@ -21,6 +21,7 @@
 #include "records/decision_json.h"
 #include "task/config.h"
 #include "task/json_text.h"
+#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -232,6 +233,8 @@ Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
 int DeclareHoldOut(const DataCommand& command) {
   const auto pictures = command.picture.empty() ? std::vector<std::string>() : PictureFiles(command.picture);
   const Config config = LoadConfig(command.config);
+  RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
+                        config.problem->transitions);
   const Problem& problem = *config.problem;
   if (command.blocks > problem.transitions.size())
     throw ConfigError(

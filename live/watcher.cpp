@@ -18,6 +18,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "lcmtypes/why_failed.h"
 #include "page/detail.h"
 #include "page/drawing_json.h"
 #include "records/log_trust.h"
@@ -232,7 +233,7 @@ void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
     Config again = read_again_();
     if (again.grounds.config == config && again.bus == task_.bus) UseTask(std::move(again));
   } catch (const std::exception& error) {
-    other_task_ += std::string(" (") + error.what() + ")";
+    other_task_ += " (" + WhyFailed(error) + ")";
   }
 }
 

@@ -120,7 +120,7 @@ Policy LoadPolicy(const std::string& path) try {
 } catch (const ConfigError& error) {
   throw PolicyError(error.what());
 } catch (const nlohmann::json::exception& error) {
-  throw PolicyError(path + ": " + error.what());
+  throw PolicyError(path + ": " + DescribeJsonError(error));
 }
 
 void SavePolicy(const std::string& path, const Policy& policy) {

@@ -10,7 +10,8 @@ namespace forereach {
 
 /** Draws a .svg, .png or .pdf file by the same drawing code.
 @param width, height pixels (of a .pdf points), 200 to 10000 each.
-@throws PictureError (picture.h) for another ending or size, or if the file cannot be written. */
+@throws PictureError (picture.h) for another ending or size, OutputError (output_file.h) if the file cannot be written:
+it is whole, or not there. */
 void DrawFile(const std::string& path, int width, int height, const std::function<void(_cairo*)>& draw);
 
 /** Begins a drawing: white, and the font of all. */

@@ -369,7 +369,7 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const 
       default: return ReadAllLogs({path}, config_path, key);
     }
   } catch (const nlohmann::json::exception& error) {
-    throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
+    throw ConfigError(path + ": not a decision of `forereach certify --json`: it " + DescribeJsonError(error));
   } catch (const std::invalid_argument& error) {
     throw ConfigError(path + ": " + error.what());
   }

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include <fmt/core.h>
 #include <fmt/ranges.h>
@@ -10,9 +14,12 @@
 
 #include "lcmtypes/printable.h"
 #include "records/database.h"
+#include "records/interpreter.h"
 #include "records/kept_tasks.h"
 #include "records/log_directory.h"
 #include "records/log_survey.h"
+#include "records/log_tasks.h"
+#include "records/row_check.h"
 
 namespace forereach {
 namespace {
@@ -21,8 +28,79 @@ constexpr std::size_t kMaxListed = 20;
 
 enum class Seen : std::uint8_t { kNot, kOther, kSame };
 
-void CheckEvents(EventLogReader& reader, const std::vector<LogReference>& references, std::vector<Seen>& seen) {
-  ForEachEvent(reader, [&](const LogEvent& event) {
+// What a log file leaves to the next one of its run.
+struct RowState {
+  Interpreter interpreter;
+  std::set<std::string> lossy;
+};
+
+class DirectoryCheck {
+ public:
+  DirectoryCheck(const std::string& path, const std::string& database, const std::string& config, const LogKey& key)
+      : directory_(path), kept_(path), database_(database), config_(config), key_(key) {}
+
+  [[nodiscard]] std::vector<LogCheck> CheckAll() {
+    std::vector<LogCheck> checks;
+    for (const RunRow& run : database_.Runs()) checks.push_back(Check(run));
+    for (const std::string& log : database_.LogsWithoutRun())
+      checks.push_back({.log_file = log,
+                        .log = directory_.Bytes(log) ? LogCheck::Log::kUnknown : LogCheck::Log::kMissing,
+                        .ended = false,
+                        .missing = EventsOf(database_.References(log))});
+    for (const std::string& log : directory_.Logs())
+      if (std::ranges::find(checks, log, &LogCheck::log_file) == checks.end())
+        checks.push_back({.log_file = log, .log = LogCheck::Log::kUnknown, .ended = false});
+    return checks;
+  }
+
+ private:
+  static std::vector<std::int64_t> EventsOf(const std::vector<LogReference>& references) {
+    std::vector<std::int64_t> events;
+    for (const LogReference& reference : references) events.push_back(reference.event_number);
+    return events;
+  }
+
+  LogCheck Check(const RunRow& run) {
+    LogCheck check;
+    check.log_file = run.log_file;
+    check.ended = run.end_utime.has_value();
+    for (const std::string& task : database_.ConfigDigests(run.log_file))
+      std::ranges::move(kept_.FindDamage(task), std::back_inserter(check.damaged_tasks));
+    const std::vector<LogReference> references = database_.References(run.log_file);
+    std::vector<Seen> seen(references.size(), Seen::kNot);
+    const bool is_there = directory_.Bytes(run.log_file).has_value();
+    std::optional<Interpreter> interpreter;
+    Rows derived;
+    const Rows recorded = is_there ? database_.Read(run.log_file) : Rows();
+    RowGrounds grounds = GroundsOf(run);
+    if (is_there) {
+      const BusOptions channels = ChannelsOf(run, check);
+      interpreter = InterpreterOf(run, channels, grounds);
+      grounds.misses_candidates = grounds.lossy.contains(channels.candidate);
+      EventLogReader reader(directory_.PathOf(run.log_file));
+      ForEachEvent(reader, [&](const LogEvent& event) {
+        Compare(event, references, seen);
+        interpreter->Observe(event, derived);
+      });
+      check.damage = reader.damage();
+      check.cut_bytes = reader.size() - reader.offset();
+    } else {
+      check.log = run.log_deleted_utime ? LogCheck::Log::kDeleted : LogCheck::Log::kMissing;
+    }
+    for (std::size_t i = 0; i < references.size(); ++i)
+      if (seen[i] == Seen::kSame)
+        ++check.whole;
+      else
+        (seen[i] == Seen::kOther ? check.changed : check.missing).push_back(references[i].event_number);
+    if (!is_there) return check;
+    grounds.knows_order &= check.damage.places == 0 && check.changed.empty() && check.missing.empty();
+    for (const auto* events : {&check.changed, &check.missing}) grounds.damaged.insert(events->begin(), events->end());
+    check.rows = CompareRows(recorded, derived, grounds);
+    if (grounds.knows_order) states_.emplace(run.log_file, RowState{*std::move(interpreter), grounds.lossy});
+    return check;
+  }
+
+  static void Compare(const LogEvent& event, const std::vector<LogReference>& references, std::vector<Seen>& seen) {
     auto row = std::ranges::lower_bound(references, event.number, {}, &LogReference::event_number);
     if (row == references.end() || row->event_number != event.number) return;
     const std::string digest = ToHex(DigestOf(event));
@@ -30,33 +108,43 @@ void CheckEvents(EventLogReader& reader, const std::vector<LogReference>& refere
       Seen& found = seen[static_cast<std::size_t>(row - references.begin())];
       found = std::max(found, row->digest == digest ? Seen::kSame : Seen::kOther);
     }
-  });
-}
-
-LogCheck Check(Database& database, const LogDirectory& directory, const RunRow& run) {
-  LogCheck check;
-  check.log_file = run.log_file;
-  check.ended = run.end_utime.has_value();
-  const KeptTasks kept(directory.path());
-  for (const std::string& task : database.ConfigDigests(run.log_file))
-    std::ranges::move(kept.FindDamage(task), std::back_inserter(check.damaged_tasks));
-  const std::vector<LogReference> references = database.References(run.log_file);
-  std::vector<Seen> seen(references.size(), Seen::kNot);
-  if (directory.Bytes(run.log_file)) {
-    EventLogReader reader(directory.PathOf(run.log_file));
-    CheckEvents(reader, references, seen);
-    check.damage = reader.damage();
-    check.cut_bytes = reader.size() - reader.offset();
-  } else {
-    check.log = run.log_deleted_utime ? LogCheck::Log::kDeleted : LogCheck::Log::kMissing;
   }
-  for (std::size_t i = 0; i < references.size(); ++i)
-    if (seen[i] == Seen::kSame)
-      ++check.whole;
-    else
-      (seen[i] == Seen::kOther ? check.changed : check.missing).push_back(references[i].event_number);
-  return check;
-}
+
+  // A logger that starts again knows less of the files before than the one that was killed.
+  [[nodiscard]] RowGrounds GroundsOf(const RunRow& run) {
+    RowGrounds grounds;
+    if (!run.end_utime) grounds.end = run.events;
+    grounds.knows_order = run.continues.empty() || (run.recovered.empty() && states_.contains(run.continues));
+    for (const auto& [channel, lost] : database_.LossesWithoutEvents(run.log_file)) grounds.lossy.insert(channel);
+    return grounds;
+  }
+
+  [[nodiscard]] BusOptions ChannelsOf(const RunRow& run, const LogCheck& check) const {
+    if (!run.robot.empty() && key_.file.empty() && !key_.none)
+      throw ConfigError(
+          fmt::format("{}: its logger had the keys of {}: name them with --key FILE (verify.pub is "
+                      "enough), or believe every message with --no-key",
+                      directory_.PathOf(run.log_file), run.robot));
+    const std::vector<std::string> log{directory_.PathOf(run.log_file)};
+    const LogSurvey survey = check.damaged_tasks.empty() ? Survey(log, LogOrder::kAny) : LogSurvey();
+    return forereach::ChannelsOf(survey, directory_.path(), config_, run.robot.empty() ? LogKey{.none = true} : key_);
+  }
+
+  [[nodiscard]] Interpreter InterpreterOf(const RunRow& run, const BusOptions& channels, RowGrounds& grounds) {
+    auto before = states_.extract(run.continues);
+    if (!before) return {channels, run.log_file, PublicKeysOf(channels)};
+    grounds.lossy.merge(before.mapped().lossy);
+    before.mapped().interpreter.Continue(run.log_file);
+    return std::move(before.mapped().interpreter);
+  }
+
+  const LogDirectory directory_;
+  const KeptTasks kept_;
+  Database database_;
+  const std::string& config_;
+  const LogKey& key_;
+  std::map<std::string, RowState> states_;  // by log file
+};
 
 std::string DescribeCheck(const LogCheck& check) {
   if (check.log == LogCheck::Log::kDeleted)
@@ -69,28 +157,37 @@ std::string DescribeCheck(const LogCheck& check) {
   };
   add(std::ssize(check.changed), "changed");
   add(std::ssize(check.missing), "missing");
+  add(std::ssize(check.rows), "rows other than their events say");
   add(check.damage.places, "damaged places");
   add(check.cut_bytes, "bytes of a cut tail");
   return text + (check.ended ? "" : ", not ended");
 }
 
+std::string More(std::size_t count) {
+  return count > kMaxListed ? fmt::format(" and {} more", count - kMaxListed) : "";
+}
+
 void List(std::string& text, const std::vector<std::int64_t>& events, const char* what) {
   if (events.empty()) return;
-  const auto shown = std::min(events.size(), kMaxListed);
-  text += fmt::format("  {}: event {}{}\n", what,
-                      fmt::join(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
-                      events.size() > shown ? fmt::format(" and {} more", events.size() - shown) : "");
+  const auto shown = static_cast<std::ptrdiff_t>(std::min(events.size(), kMaxListed));
+  text += fmt::format("  {}: event {}{}\n", what, fmt::join(events.begin(), events.begin() + shown, ", "),
+                      More(events.size()));
+}
+
+void ListRows(std::string& text, const std::vector<std::string>& rows) {
+  for (std::size_t i = 0; i < std::min(rows.size(), kMaxListed); ++i) text += fmt::format("  row: {}\n", rows[i]);
+  if (rows.size() > kMaxListed) text += fmt::format("  row:{}\n", More(rows.size()));
 }
 
 }  // namespace
 
 bool LogCheck::whole_log() const {
   if (log != Log::kThere) return log == Log::kDeleted;
-  return changed.empty() && missing.empty() && damaged_tasks.empty() && damage.places == 0 &&
+  return changed.empty() && missing.empty() && rows.empty() && damaged_tasks.empty() && damage.places == 0 &&
          (cut_bytes == 0 || !ended);
 }
 
-std::vector<LogCheck> CheckLogs(const std::string& path) {
+std::vector<LogCheck> CheckLogs(const std::string& path, const std::string& config, const LogKey& key) {
   const std::string file = (std::filesystem::path(path) / LogDirectory::kDatabase).string();
   std::error_code error;
   if (std::filesystem::is_regular_file(path, error))
@@ -99,15 +196,7 @@ std::vector<LogCheck> CheckLogs(const std::string& path) {
   if (!std::filesystem::is_regular_file(file, error))
     throw LogError(path + ": is no logger's directory: no decision database: " + file);
   if (KindOf(file) != FileKind::kDatabase) throw LogError(file + ": is no decision database");
-  const LogDirectory directory(path);
-  Database database(file);
-  std::vector<LogCheck> checks;
-  for (const RunRow& run : database.Runs()) checks.push_back(Check(database, directory, run));
-  for (const std::string& log : directory.Logs()) {
-    if (std::ranges::find(checks, log, &LogCheck::log_file) != checks.end()) continue;
-    checks.push_back({.log_file = log, .log = LogCheck::Log::kUnknown, .ended = false});
-  }
-  return checks;
+  return DirectoryCheck(path, file, config, key).CheckAll();
 }
 
 std::string ToText(const std::vector<LogCheck>& checks) {
@@ -117,6 +206,7 @@ std::string ToText(const std::vector<LogCheck>& checks) {
     if (check.log != LogCheck::Log::kThere) continue;
     List(text, check.changed, "changed");
     List(text, check.missing, "missing");
+    ListRows(text, check.rows);
     for (const std::string& damage : check.damaged_tasks) text += fmt::format("  task: {}\n", Printable(damage));
   }
   const auto faults = std::ranges::count_if(checks, [](const LogCheck& check) { return !check.whole_log(); });
@@ -136,6 +226,7 @@ nlohmann::json ToJson(const std::vector<LogCheck>& checks) {
                     {"whole", check.whole},
                     {"changed", check.changed},
                     {"missing", check.missing},
+                    {"rows", check.rows},
                     {"damaged_tasks", check.damaged_tasks},
                     {"damage", {{"places", check.damage.places}, {"bytes", check.damage.bytes}}},
                     {"cut_bytes", check.cut_bytes}});

@@ -1,4 +1,5 @@
-/** Checks a logger's directory: whether the logs have every event from which a row of the database was made. */
+/** Checks a logger's directory: whether the logs have every event from which a row of the database was made, and the
+database the rows that follow from the events. */
 #pragma once
 
 #include <cstdint>
@@ -9,6 +10,7 @@
 
 #include "lcmtypes/bad_input.h"
 #include "records/event_log.h"
+#include "records/log_trust.h"
 
 namespace forereach {
 
@@ -24,6 +26,7 @@ struct LogCheck {
   LogDamage damage{};                   ///< Of the log.
   std::int64_t cut_bytes = 0;           ///< Bytes behind the last whole record.
 
+  std::vector<std::string> rows{};           ///< A sentence for each row that differs (records/row_check.h).
   std::vector<std::string> damaged_tasks{};  ///< A sentence for each damaged kept task that its decisions name.
 
   /** True if nothing is changed or damaged, and nothing is missing except for the quota. */
@@ -31,9 +34,13 @@ struct LogCheck {
 };
 
 /** Checks every log that the database in `directory` lists, in the order of its runs. Behind them come logs with a
-logger's name that it does not list. A log that is being written may end in a cut tail, which is not a fault. Cost: one
-pass over each listed log. @throws BadInput if the database is missing, or it or a log cannot be read. */
-[[nodiscard]] std::vector<LogCheck> CheckLogs(const std::string& directory);
+logger's name, and logs of rows, that it does not list. A log that is being written may end in a cut tail, which is not
+a fault. Cost: two passes over each listed log.
+@param config the task file of the recording; empty: the one that the logger kept, or the default channels.
+@param key for the runs whose logger had keys.
+@throws BadInput if the database is missing, it or a log cannot be read, or a recording with keys is given none. */
+[[nodiscard]] std::vector<LogCheck> CheckLogs(const std::string& directory, const std::string& config = "",
+                                              const LogKey& key = {});
 
 /** Text for people: a line for each log file, a line for each changed or missing event, and a total. */
 [[nodiscard]] std::string ToText(const std::vector<LogCheck>& checks);

@@ -56,6 +56,26 @@ struct OrNull {
 template <class Number>
 OrNull(Number&) -> OrNull<Number>;
 
+// Why the last call failed.
+std::string WhySqlRefuses(sqlite3* handle) {
+  const int code = handle ? sqlite3_errcode(handle) : SQLITE_NOMEM;
+  switch (code) {
+    case SQLITE_NOMEM: return "there is not enough memory";
+    case SQLITE_FULL: return "the disk is full";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED: return "another program has locked it";
+    case SQLITE_READONLY:
+    case SQLITE_PERM: return "it may not be written: its owner and the directory's have to allow it";
+    case SQLITE_CANTOPEN: return "it cannot be opened, or not made: look at its path and the directory's owner";
+    case SQLITE_IOERR: return "the disk fails to read or write it";
+    case SQLITE_CORRUPT:
+      return "it is damaged; the next start of the logger makes a new one of the logs, if it is moved away";
+    case SQLITE_NOTADB: return "it is no database";
+    case SQLITE_CONSTRAINT: return "it refuses a row";
+    default: return fmt::format("its tables are not those of a decision database (SQLite's error {})", code);
+  }
+}
+
 // The columns of a row, in the order of its table or query.
 auto ColumnsOf(auto& row) {
   using Row = std::remove_const_t<std::remove_reference_t<decltype(row)>>;
@@ -89,7 +109,7 @@ class Database::Statement final {
  public:
   Statement(sqlite3* handle, const char* sql) : handle_(handle) {
     if (sqlite3_prepare_v3(handle, sql, -1, SQLITE_PREPARE_PERSISTENT, &statement_, nullptr) != SQLITE_OK)
-      throw DatabaseError(sqlite3_errmsg(handle));
+      throw DatabaseError(WhySqlRefuses(handle));
   }
   ~Statement() { sqlite3_finalize(statement_); }
   Statement(const Statement&) = delete;
@@ -109,7 +129,7 @@ class Database::Statement final {
     column_ = 0;
     const int result = sqlite3_step(statement_);
     if (result != SQLITE_ROW) sqlite3_reset(statement_);
-    if (result != SQLITE_ROW && result != SQLITE_DONE) throw DatabaseError(sqlite3_errmsg(handle_));
+    if (result != SQLITE_ROW && result != SQLITE_DONE) throw DatabaseError(WhySqlRefuses(handle_));
     return result == SQLITE_ROW;
   }
 
@@ -181,7 +201,11 @@ class Database::Statement final {
     std::string text;
     ReadNext(text);
     value.clear();
-    for (const auto& entry : ParseJson(text)) value.push_back(entry.is_null() ? kNoNumber : entry.get<double>());
+    try {
+      for (const auto& entry : ParseJson(text)) value.push_back(entry.is_null() ? kNoNumber : entry.get<double>());
+    } catch (const nlohmann::json::exception&) {
+      throw DatabaseError("a state in it is no list of numbers: " + text);
+    }
   }
   void ReadNext(std::optional<std::int64_t>& value) {
     value = IsNull() ? std::nullopt : std::optional(sqlite3_column_int64(statement_, column_));
@@ -203,7 +227,7 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
   const int result = sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   handle_.reset(handle);
   try {
-    if (result != SQLITE_OK) throw DatabaseError(handle ? sqlite3_errmsg(handle) : "out of memory");
+    if (result != SQLITE_OK) throw DatabaseError(WhySqlRefuses(handle));
     sqlite3_busy_timeout(handle, 2000);
     MakeOrCheck();
     // Where the file system allows no write-ahead log SQLite keeps its rollback journal, which is as safe and slower.
@@ -227,7 +251,7 @@ Database::~Database() = default;
 
 void Database::Execute(const char* sql) {
   if (sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK)
-    throw DatabaseError(sqlite3_errmsg(handle_.get()));
+    throw DatabaseError(WhySqlRefuses(handle_.get()));
 }
 
 void Database::MakeOrCheck() {
@@ -352,6 +376,13 @@ std::vector<LogReference> Database::References(const std::string& log_file) {
       UNION SELECT log_file, event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
       ORDER BY event_number)sql",
                               log_file);
+}
+
+std::vector<std::string> Database::LogsWithoutRun() {
+  return Select<std::string>(R"sql(
+      SELECT log_file FROM (SELECT log_file FROM decisions UNION SELECT log_file FROM execution_events
+                            UNION SELECT log_file FROM gaps)
+      WHERE log_file NOT IN (SELECT log_file FROM runs))sql");
 }
 
 std::set<std::string> Database::ConfigDigests(const std::string& log_file) {

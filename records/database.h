@@ -75,6 +75,9 @@ class Database final {
   different digests. @throws DatabaseError. */
   [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
 
+  /** The log files of rows that no run has. @throws DatabaseError. */
+  [[nodiscard]] std::vector<std::string> LogsWithoutRun();
+
   /** The config digests of a log file's decisions. @throws DatabaseError. */
   [[nodiscard]] std::set<std::string> ConfigDigests(const std::string& log_file);
 

@@ -14,6 +14,7 @@
 #include "records/database.h"
 #include "records/export_table.h"
 #include "records/log_survey.h"
+#include "records/log_tasks.h"
 #include "records/mcap.h"
 #include "records/message_json.h"
 #include "records/npz.h"

@@ -62,6 +62,21 @@ std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::str
   return tasks;
 }
 
+BusOptions ChannelsOf(const LogSurvey& survey, const std::string& directory, const std::string& given,
+                      const LogKey& key) {
+  std::vector<Config> task;
+  if (!given.empty()) {
+    task.push_back(LoadConfig(given, TransitionsFile::kIgnore));
+  } else {
+    const KeptTasks kept(directory);
+    for (auto digest = survey.order.begin(); digest != survey.order.end() && task.empty(); ++digest)
+      if (auto found = kept.Find(*digest, survey.configs.at(*digest).observations)) task.push_back(std::move(*found));
+  }
+  if (task.empty()) task.emplace_back();
+  key.Override(task, given);
+  return task.front().bus;
+}
+
 RunTasks::RunTasks(std::string given, LogKey key, bool is_many)
     : given_(std::move(given)), key_(std::move(key)), is_many_(is_many) {
   if (is_many && !given_.empty()) digest_ = LoadConfig(given_).grounds.config;

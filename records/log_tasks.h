@@ -24,6 +24,13 @@ The tasks have the key that `key` selects. @throws ConfigError also as LogKey::O
 [[nodiscard]] std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given,
                                           const LogKey& key);
 
+/** The channels and the key of a recording: those of the given task; else of the task that is kept next to the logs;
+else the defaults.
+@param directory of the logs. @param given the path of a task file, or empty.
+@throws ConfigError if a task cannot be read, or has a key that the command line does not name. */
+[[nodiscard]] BusOptions ChannelsOf(const LogSurvey& survey, const std::string& directory, const std::string& given,
+                                    const LogKey& key);
+
 /** Finds the tasks of one run after another. */
 class RunTasks final {
  public:

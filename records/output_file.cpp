@@ -42,7 +42,10 @@ bool Exists(const std::string& path) {
 OutputFile::OutputFile(std::string path, std::FILE* stream) : path_(std::move(path)), stream_(stream) {}
 
 OutputFile::OutputFile(std::string path, Existing existing) : path_(std::move(path)), existing_(existing) {
+  std::error_code error;
   if (existing_ == Existing::kKept && Exists(path_)) FailExists();
+  if (Exists(path_) && !std::filesystem::is_regular_file(path_, error))
+    throw OutputError(path_ + ": is no file that can be replaced; choose another name");
   const int descriptor = OpenPart(path_, part_);
   if (descriptor < 0) Fail();
   stream_ = ::fdopen(descriptor, "w+b");

@@ -23,6 +23,7 @@ class OutputFile final {
   enum class Existing { kKept, kReplaced };
 
   /** @param existing with kKept, a file that is there is an error and is not changed, also if it appears before Close.
+  With kReplaced, what is there and no file (a directory, a pipe, a device) is one.
   @throws OutputError if the file exists or cannot be created. */
   explicit OutputFile(std::string path, Existing existing = Existing::kKept);
   /** A file without a name, in the directory of `beside`, for data that do not fit into memory. @throws OutputError. */

@@ -5,24 +5,8 @@
 #include <utility>
 
 #include "forereach/decision_t.hpp"
-#include "records/kept_tasks.h"
 
 namespace forereach {
-
-BusOptions ChannelsOf(const LogSurvey& survey, const std::string& directory, const std::string& given,
-                      const LogKey& key) {
-  std::vector<Config> task;
-  if (!given.empty()) {
-    task.push_back(LoadConfig(given, TransitionsFile::kIgnore));
-  } else {
-    const KeptTasks kept(directory);
-    for (auto digest = survey.order.begin(); digest != survey.order.end() && task.empty(); ++digest)
-      if (auto found = kept.Find(*digest, survey.configs.at(*digest).observations)) task.push_back(std::move(*found));
-  }
-  if (task.empty()) task.emplace_back();
-  key.Override(task, given);
-  return task.front().bus;
-}
 
 RecordReader::RecordReader(const BusOptions& channels, RecordUser& user, std::function<void(std::int64_t)> on_bytes)
     : channels_(channels),

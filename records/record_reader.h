@@ -41,13 +41,6 @@ class RecordUser {
   virtual void OnGap(const GapRow&) {}
 };
 
-/** The channels and the key of a recording: those of the given task; else of the task that is kept next to the logs;
-else the defaults.
-@param directory of the logs. @param given the path of a task file, or empty.
-@throws ConfigError if a task cannot be read, or has a key that the command line does not name. */
-[[nodiscard]] BusOptions ChannelsOf(const LogSurvey& survey, const std::string& directory, const std::string& given,
-                                    const LogKey& key);
-
 class RecordReader final {
  public:
   /** @param user must outlive the reader. @param on_bytes is told of the bytes of each event; may be empty.

@@ -188,7 +188,7 @@ LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vect
   return maker.Finish(timeline);
 }
 
-void Report(const ReportOptions& options, std::ostream& out) {
+bool Report(const ReportOptions& options, std::ostream& out) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
   const std::vector<Config> tasks = TasksOf(options.logs, options.config, options.key);
@@ -208,13 +208,14 @@ void Report(const ReportOptions& options, std::ostream& out) {
     json["pictures"] = files;
     json["tubes_left_out"] = drawn.disagreements;
     out << JsonText(json, 2) << "\n";
-    return;
+    return summary.damage.places == 0;
   }
   out << ToText(summary);
   for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
   if (drawn.disagreements > 0)
     out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out",
                        drawn.disagreements);
+  return summary.damage.places == 0;
 }
 
 }  // namespace forereach

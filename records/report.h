@@ -36,7 +36,7 @@ struct ReportOptions {
 };
 
 /** Prints the summary of logs to `out`, as text or as one JSON document, and writes the picture.
-@throws BadInput, before anything is printed. */
-void Report(const ReportOptions& options, std::ostream& out);
+@return whether all of the logs could be read. @throws BadInput, before anything is printed. */
+[[nodiscard]] bool Report(const ReportOptions& options, std::ostream& out);
 
 }  // namespace forereach

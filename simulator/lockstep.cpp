@@ -1,10 +1,15 @@
 #include "simulator/lockstep.h"
 
+#include <cmath>
 #include <iostream>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "bus/bus_options.h"
 #include "bus/process.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
 
 namespace forereach {
 namespace {
@@ -15,6 +20,18 @@ Config OnOneBus(Config config) {
   config.bus.keys = AllKeysOf(config.bus);
   config.bus.url = "memq://";
   return config;
+}
+
+// The robot stands at its start, and the planner proposes nothing to one that only says so. A speed within a
+// candidate's X0 is one that a plan may start with.
+void RequireStanding(const Config& config) {
+  const std::vector<double>&start = config.robot.start, &half_width = config.planner.initial_half_width;
+  for (const int k : HeldStates(config))
+    if (!(std::abs(start[ToSize(k)]) <= half_width[ToSize(k)]))
+      throw ConfigError(fmt::format(
+          "{}: robot.start: {} is {}, and the simulated robot stands at its start: the states of robot.hold are zero "
+          "there, up to planner.initial_half_width; begin with 0",
+          config.path, config.problem->model->state_names()[ToSize(k)], ToText(start[ToSize(k)])));
 }
 
 }  // namespace
@@ -28,6 +45,7 @@ Lockstep::Lockstep(Config config, const Config& world, std::int64_t now_us, Plan
       planner_(config_, *bus_),
       robot_(config_, *bus_, std::cout, std::move(plant)),
       perception_(ObstacleSender::PeriodUs(config_.gate)) {
+  RequireStanding(config_);
   if (config_.gate.obstacles != ObstaclesSource::kBus) return;
   RequireSendable(world);
   perceived_ = BegunAt(now_us_, world.obstacles);

@@ -17,6 +17,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "lcmtypes/why_failed.h"
 #include "task/json_text.h"
 #include "task/step_time.h"
 
@@ -31,7 +32,7 @@ std::optional<Config> Load(const std::string& path, const BusOptions& in_force) 
   if (!why.empty()) throw ConfigError(path + ": " + why);
   return config;
 } catch (const std::exception& error) {
-  logging::Error("not reloaded: {}", error.what());
+  logging::Error("not reloaded: {}", WhyFailed(error));
   return std::nullopt;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -152,10 +153,10 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   RequireSteps(file, config, problem);
   if (problem.between) problem.between->period = LongestPeriod(config);
   if (problem.between || StepErrorUs(config.gate)) config.gate.step_us = StepUs(config);
-  if (problem.between && config.robot.step_period_ms > config.period * 1e3)
-    file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
+  if (config.gate.step_us != 0 && std::llround(config.robot.step_period_ms * 1e3) != config.gate.step_us)
+    file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", and has to be model.dt, " +
                                           ToText(config.period * 1e3) +
-                                          " ms, the time in which task.between bounds the motion");
+                                          " ms: task.between and a clock are about steps of this time");
   config.problem = std::make_shared<const Problem>(std::move(problem));
   return std::move(config);
 }

@@ -452,7 +452,10 @@ YAML::Node ParseYaml(const std::string& path, const std::string& text) {
       throw ConfigError(At(path, 1) + "has several YAML documents, has to have one");
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw ConfigError(At(path, LineOf(error.mark)) + "not valid YAML: " + error.msg + TabAdvice(text, error.mark.line));
+    throw ConfigError(At(path, LineOf(error.mark)) +
+                      "not valid YAML; look at indentation, brackets, quotes, colons "
+                      "and words with * or &, here and in the line before" +
+                      TabAdvice(text, error.mark.line));
   }
 }
 
@@ -607,7 +610,11 @@ Document::Document(const std::string& path, const std::string& named_by)
 
 Document::~Document() = default;
 
-void Document::Read(TaskDraft& draft, std::span<const Key> schema) { Checker(schema, draft).Check(*root_, ""); }
+void Document::Read(TaskDraft& draft, std::span<const Key> schema) try {
+  Checker(schema, draft).Check(*root_, "");
+} catch (const YAML::Exception& error) {
+  throw ConfigError(At(path_, LineOf(error.mark)) + "a value here has another form than its key wants");
+}
 
 Field Document::root() const { return Field(*root_); }
 

@@ -15,13 +15,28 @@ Json ParseJson(std::string_view text, int deepest) {
   std::vector<std::set<std::string>> keys;  // of the objects that are open
   return Json::parse(text, [&keys, deepest](int depth, Event event, Json& value) {
     if (depth > deepest)
-      throw Json::other_error::create(501, fmt::format("nested deeper than {} levels", deepest), nullptr);
+      throw Json::other_error::create(501, fmt::format("is nested deeper than {} levels", deepest), nullptr);
     if (event == Event::object_start) keys.emplace_back();
     if (event == Event::object_end) keys.pop_back();
     if (event == Event::key && !keys.back().insert(value.template get<std::string>()).second)
-      throw Json::other_error::create(501, "duplicate key " + value.dump(), nullptr);
+      throw Json::other_error::create(501, "has a duplicate key " + value.dump(), nullptr);
     return true;
   });
+}
+
+std::string DescribeJsonError(const std::exception& error) {
+  const std::string text = error.what();  // "[json.exception.parse_error.101] parse error at line 1, column 5: ..."
+  const auto after = [&](const std::string& mark) {
+    const std::size_t at = text.find(mark);
+    return at == std::string::npos ? std::string() : text.substr(at + mark.size());
+  };
+  if (dynamic_cast<const nlohmann::json::parse_error*>(&error)) {
+    const std::string place = after("parse error at ");
+    return "is no JSON at " + place.substr(0, place.find(':'));
+  }
+  if (dynamic_cast<const nlohmann::json::other_error*>(&error)) return after("] ");  // ours
+  if (dynamic_cast<const nlohmann::json::out_of_range*>(&error)) return "lacks a field or an entry that it has to have";
+  return "has a field with a value of another type than it has to have";
 }
 
 template <class Json>

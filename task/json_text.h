@@ -1,6 +1,7 @@
 /** JSON documents as text, and back. The reader, the writer and their templates are compiled in json_text.cpp alone. */
 #pragma once
 
+#include <exception>
 #include <string>
 #include <string_view>
 
@@ -16,6 +17,10 @@ overflow the stack where nlohmann copies or writes it; of two values with one ke
 @throws Json::exception, also for text that is not JSON. */
 template <class Json = nlohmann::json>
 [[nodiscard]] Json ParseJson(std::string_view text, int deepest = kDeepestJson);
+
+/** What an exception of ParseJson, or of a reader of its document, says of the file: "is no JSON at line 3, column 7".
+ */
+[[nodiscard]] std::string DescribeJsonError(const std::exception& error);
 
 /** On one line, or with an indent. Strings may have any bytes: those that are not UTF-8 are replaced by U+FFFD. */
 template <class Json = nlohmann::json>

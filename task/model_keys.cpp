@@ -256,6 +256,7 @@ void ReadModel(const Field& at, TaskDraft& draft) {
   ReadTiming(at, draft);
   draft.config.period = StepOf(model);
   draft.config.gate.longest_step_ms = draft.config.period * 1e3;
+  draft.config.robot.step_period_ms = draft.config.period * 1e3;
 }
 
 Key ParameterRange() {

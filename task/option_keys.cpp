@@ -317,9 +317,11 @@ std::vector<Key> RobotKeys() {
                       "0: steps are on time.",
                       [](const Field& at, TaskDraft& draft) { draft.config.gate.step_error_ms = at.Number(); }),
                "half of gate.max_clock_error_ms; without it certificates say that steps are on time"),
-      robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
-                   "Wall-clock time of a step. The certifier takes steps to last no longer than this or model.dt; with "
-                   "bounds in task.between it is at most model.dt."),
+      Optional(robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
+                            "Wall-clock time of a step. The certifier takes steps to last no longer than this or "
+                            "model.dt. With bounds in task.between, or a clock (robot.step_error_ms, "
+                            "gate.max_clock_error_ms), it is model.dt."),
+               "model.dt"),
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after it, even without the goal."),
       WithinDeclared(

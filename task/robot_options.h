@@ -15,7 +15,7 @@ struct RobotOptions {
   /** The emergency stop: how fast each of these states, of those of hold, goes to zero, in its unit per second. The
   others of hold are zero at once. */
   std::map<std::string, double> emergency_stop;
-  double step_period_ms = 40;         ///< The wall-clock time of one model step.
+  double step_period_ms = 40;         ///< The wall-clock time of one model step; in a task file model.dt by default.
   double time_limit_s = 40;           ///< The run ends at this time even without reaching the goal.
   std::string disturbance = "none";   ///< What disturbs each step: none, random or adversarial (disturbance.h).
   std::string sensor_error = "none";  ///< What its measurements are off by, likewise.

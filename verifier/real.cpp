@@ -120,6 +120,7 @@ long Real::exponent() const {
 }
 
 std::string Real::text() const {
+  if (!IsFinite()) return "no finite enclosure (a pole, the edge of a domain, or an angle of 2^16384 or more)";
   char digits[64];
   const Real number = middle();
   mpfr_snprintf(digits, sizeof digits, "%.17Rg", &number.value_->left);
@@ -158,15 +159,23 @@ FOREREACH_UNARY(abs, mpfi_abs)
 FOREREACH_UNARY(exp, mpfi_exp)
 FOREREACH_UNARY(log1p, mpfi_log1p)
 FOREREACH_UNARY(log, mpfi_log)
-FOREREACH_UNARY(sin, mpfi_sin)
-FOREREACH_UNARY(cos, mpfi_cos)
-FOREREACH_UNARY(tan, mpfi_tan)
 FOREREACH_UNARY(asin, mpfi_asin)
 FOREREACH_UNARY(acos, mpfi_acos)
 FOREREACH_UNARY(atan, mpfi_atan)
 FOREREACH_UNARY(tanh, mpfi_tanh)
 #undef FOREREACH_BINARY
 #undef FOREREACH_UNARY
+#define FOREREACH_OF_ANGLE(name, function)                                     \
+  Real name(const Real& a) {                                                   \
+    if (!(a.exponent() <= Real::kMaxAngleExponent)) return Real::Everything(); \
+    Real result{Real::Uninitialized{}};                                        \
+    function(result.value_, a.value_);                                         \
+    return result;                                                             \
+  }
+FOREREACH_OF_ANGLE(sin, mpfi_sin)
+FOREREACH_OF_ANGLE(cos, mpfi_cos)
+FOREREACH_OF_ANGLE(tan, mpfi_tan)
+#undef FOREREACH_OF_ANGLE
 
 Real max(const Real& a, const Real& b) {
   Real result{Real::Uninitialized{}};

@@ -65,7 +65,7 @@ class Real final {
   [[nodiscard]] double ToDouble(long shift = 0) const;
   /** The e with |x| < 2^e for the upper end of |x|; the least possible number for zero. */
   [[nodiscard]] long exponent() const;
-  /** The middle in decimal with 17 digits. */
+  /** The middle in decimal with 17 digits; without a finite enclosure, a sentence that says so. */
   [[nodiscard]] std::string text() const;
 
   Real& operator+=(const Real& other);
@@ -83,9 +83,11 @@ class Real final {
   /** log(1 + a). */
   friend Real log1p(const Real& a);
   friend Real log(const Real& a);
+  /** Everything from 2^kMaxAngleExponent on: the work to reduce an angle grows with its exponent. tan: also over a
+  pole. */
+  static constexpr long kMaxAngleExponent = 16384;
   friend Real sin(const Real& a);
   friend Real cos(const Real& a);
-  /** Unbounded over a pole. */
   friend Real tan(const Real& a);
   friend Real asin(const Real& a);
   friend Real acos(const Real& a);

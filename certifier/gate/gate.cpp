@@ -12,6 +12,7 @@
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
 #include "lcmtypes/seal.h"
+#include "lcmtypes/why_failed.h"
 
 namespace forereach {
 namespace {
@@ -91,7 +92,7 @@ GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Reje
   } catch (const std::exception& error) {
     decision.outcome = decision_t::REJECTED;
     decision.cause = decision_t::CAUSE_INTERNAL_ERROR;
-    SetText(decision.message, std::string("rejected: internal error: ") + error.what());
+    SetText(decision.message, "rejected: internal error: " + WhyFailed(error));
     answer.certified.reset();
   }
   if (answer.certified) ++certificates_;

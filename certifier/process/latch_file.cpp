@@ -54,7 +54,7 @@ Json ToJson(const LatchFile::Content& content) {
 Eigen::MatrixXd PairFrom(const Json& lists, std::size_t most) {
   const auto rows = lists.get<std::array<std::vector<double>, 2>>();
   if (rows[0].empty() || rows[0].size() > most || rows[0].size() != rows[1].size())
-    throw Json::other_error::create(501, "a pair of rows that do not fit", nullptr);
+    throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
   Eigen::MatrixXd matrix(2, static_cast<Eigen::Index>(rows[0].size()));
   for (Eigen::Index i = 0; i < 2; ++i)
     for (Eigen::Index k = 0; k < matrix.cols(); ++k)
@@ -66,7 +66,7 @@ LatchFile::Content ContentFrom(const Json& json) {
   LatchFile::Content content;
   if (const Json& fault = json.at("fault"); !fault.is_null()) {
     content.fault = Decoded<fault_t>(fault.at("fault_t").get<std::vector<std::uint8_t>>());
-    if (!content.fault) throw Json::other_error::create(501, "fault_t cannot be decoded", nullptr);
+    if (!content.fault) throw Json::other_error::create(501, "has a fault_t that cannot be decoded", nullptr);
     content.why = fault.at("message").get<std::string>();
   }
   for (const Json& entry : json.at("contradictions")) {
@@ -75,7 +75,7 @@ LatchFile::Content ContentFrom(const Json& json) {
     found.pair.lower = PairFrom(entry.at("residual_lower"), kMaxStates);
     found.pair.upper = PairFrom(entry.at("residual_upper"), kMaxStates);
     if (found.pair.lower.cols() != found.pair.upper.cols())
-      throw Json::other_error::create(501, "a pair of rows that do not fit", nullptr);
+      throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
     content.contradictions.push_back(std::move(found));
   }
   return content;
@@ -93,12 +93,12 @@ std::string TextOf(const LatchFile::Content& content) {
 // @throws Json::exception with the error.
 LatchFile::Content ContentOf(const std::string& text) {
   const Json json = ParseJson(text);
-  if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);
+  if (json.at("format") != kFormat) throw Json::other_error::create(501, "has another format", nullptr);
   if (json.at("version") != kVersion)
     throw Json::other_error::create(
-        501, fmt::format("its version is {}, this certifier knows {}", JsonText(json["version"]), kVersion), nullptr);
+        501, fmt::format("has version {}, this certifier knows {}", JsonText(json["version"]), kVersion), nullptr);
   if (json.at("digest") != ToHex(DigestOf(JsonText(json.at("content")))))
-    throw Json::other_error::create(501, "its digest is not that of its content", nullptr);
+    throw Json::other_error::create(501, "has another digest than its content", nullptr);
   return ContentFrom(json["content"]);
 }
 
@@ -216,7 +216,7 @@ std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   try {
     return ContentOf(text);
   } catch (const Json::exception& error) {
-    return Fail(path() + ": is damaged: " + error.what() + advice), std::nullopt;
+    return Fail(path() + ": is damaged: it " + DescribeJsonError(error) + advice), std::nullopt;
   }
 }
 

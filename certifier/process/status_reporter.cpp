@@ -1,6 +1,7 @@
 #include "certifier/process/status_reporter.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
@@ -94,7 +95,10 @@ certifier_status_t StatusReporter::Report(const Gate& gate, std::int64_t now_us,
   status.elapsed_p50_us = ElapsedPercentile(0.5);
   status.elapsed_p99_us = ElapsedPercentile(0.99);
   status.elapsed_max_us = ElapsedPercentile(1);
-  SetText(status.message, WhyNotOk(gate));
+  const Refusals refusals = parts_.bus.refusals();
+  const std::string clocks = DescribeClocks(refusals, std::exchange(refused_before_, refusals));
+  const std::string why = WhyNotOk(gate);
+  SetText(status.message, clocks.empty() ? why : clocks + (why.empty() ? "" : "; ") + why);
   counts.obstacles_refused = false;
   return status;
 }

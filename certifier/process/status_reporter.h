@@ -86,6 +86,7 @@ class StatusReporter final {
   std::int64_t last_us_ = 0, next_us_ = 0;        // by the steady clock
   std::int64_t reports_ = 0, reports_aside_ = 0;  // in charge, and not
   std::int64_t page_faults_ = 0;
+  Refusals refused_before_;                // at the last report
   std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring
   std::size_t decided_ = 0;
 };

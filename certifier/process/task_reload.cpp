@@ -5,6 +5,7 @@
 
 #include "bus/bus_options.h"
 #include "bus/log.h"
+#include "lcmtypes/why_failed.h"
 
 namespace forereach {
 namespace {
@@ -18,7 +19,7 @@ TaskReload::Loaded Load(const std::string& path, const BusOptions& in_force) try
   loaded.gate = std::make_unique<Gate>(loaded.config);
   return loaded;
 } catch (const std::exception& error) {
-  return {{}, nullptr, error.what()};
+  return {{}, nullptr, WhyFailed(error)};
 }
 
 }  // namespace

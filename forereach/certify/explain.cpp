@@ -18,12 +18,12 @@ std::string VariableName(const NominalModel& model, int index) {
   return model.variable_names()[ToSize(index)];
 }
 
+// What is reached, rounded away from its bound. The bound is shown as it was given.
+std::string Beyond(double reached, bool is_below) { return is_below ? RoundedDown(reached) : RoundedUp(reached); }
+
 std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
   using Exit = DomainExit::Kind;
-  // What is reached, away from the bound; the bound itself, towards it.
-  const bool below = exit.kind == Exit::kLower;
-  const std::string value = below ? RoundedDown(exit.value) : RoundedUp(exit.value);
-  const std::string bound = below ? RoundedUp(exit.bound) : RoundedDown(exit.bound);
+  const std::string value = Beyond(exit.value, exit.kind == Exit::kLower), bound = ToText(exit.bound);
   switch (exit.kind) {
     case Exit::kLower: return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
     case Exit::kUpper: return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
@@ -59,9 +59,9 @@ std::string ExplainLimit(const Decision& decision, const Problem& problem) {
   const std::string name = i < problem.limits.size() ? problem.limits[i].name : "limit " + std::to_string(i);
   const std::string where = "abstain S: at step " + std::to_string(decision.step) + " " + name;
   const bool below = decision.margin < decision.threshold;
-  const std::string limit = below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold);
+  const std::string limit = ToText(decision.threshold);
   if (!std::isfinite(decision.margin)) return where + " has no finite bound, its limit is " + limit;
-  return where + " may reach " + (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) +
+  return where + " may reach " + Beyond(decision.margin, below) +
          (below ? ", below its limit " : ", above its limit ") + limit;
 }
 
@@ -85,8 +85,7 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
       if (decision.cause == Cause::kNoStop) {
         const bool below = decision.margin < decision.threshold;
         return where + "the plan ends, and " + VariableName(model, decision.coordinate) + " reaches " +
-               (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) + "; standing is up to " +
-               (below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold));
+               Beyond(decision.margin, below) + "; standing is up to " + ToText(decision.threshold);
       }
       if (decision.cause == Cause::kBetween)
         return where + VariableName(model, decision.coordinate) + " turns by " + RoundedDown(decision.margin) +

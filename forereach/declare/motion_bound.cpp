@@ -31,9 +31,10 @@ std::optional<Interval> Intersection(const Interval& a, const Interval& b) {
 
 class MotionSearch {
  public:
-  // Values up to `least` are of no interest.
-  MotionSearch(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least)
-      : flow_(flow), quantity_(std::move(quantity)), options_(options) {
+  // Values up to `least` are of no interest. It ends where `stops` says so.
+  MotionSearch(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least,
+               const std::function<bool()>& stops)
+      : flow_(flow), quantity_(std::move(quantity)), options_(options), stops_(stops) {
     found_.lower = least;
   }
 
@@ -42,7 +43,7 @@ class MotionSearch {
     Push(region);
     while (true) {
       found_.upper = pieces_.top().bound;
-      if (IsEnough(found_.upper) || !Cut()) break;
+      if (IsEnough(found_.upper) || stops_() || !Cut()) break;
     }
     found_.reached = IsEnough(found_.upper);
     return found_;
@@ -166,6 +167,7 @@ class MotionSearch {
   const Flow& flow_;
   Quantity quantity_;
   const SlopeBoundOptions options_;
+  const std::function<bool()>& stops_;
   Arguments root_;
   Flow::Derivatives derivatives_;
   std::priority_queue<Piece> pieces_;
@@ -179,7 +181,13 @@ RangeWithSlopes Negated(RangeWithSlopes range) {
   return range;
 }
 
-[[noreturn]] void FailWithoutBound() {
+// Before the first bound is searched for.
+bool IsStopped(const SampledMotion& motion) { return motion.watch && motion.watch(0, 1); }
+
+[[noreturn]] void FailWithoutBound(const SampledMotion& motion) {
+  if (IsStopped(motion))
+    throw std::runtime_error(
+        "stopped before there was any bound on the motion between two samples; give it more time, or narrow `domain`");
   throw std::runtime_error(
       "no finite bound on the motion between two samples: the equations have none over the states that it can reach "
       "from the domain within one step; narrow `domain`");
@@ -190,11 +198,12 @@ RangeWithSlopes Negated(RangeWithSlopes range) {
 // The range of a quantity over a box. Where the equations have no finite enclosure over the whole of it, as if a
 // denominator were zero, they may have one over its pieces.
 Interval RangeOver(const SampledMotion& motion, const Quantity& quantity, const Arguments& box) {
+  const std::function<bool()> stops = [&] { return IsStopped(motion); };
   const auto largest = [&](const Quantity& side) {
     double upper = kInfinity;
     for (const std::size_t boxes : {300, 20'000})  // it need not be tight
       if (upper == kInfinity)
-        upper = MotionSearch(motion.flow, side, {.gap = 0.1, .max_boxes = boxes}, -kInfinity).Run(box).upper;
+        upper = MotionSearch(motion.flow, side, {.gap = 0.1, .max_boxes = boxes}, -kInfinity, stops).Run(box).upper;
     return upper;
   };
   return {-largest([&](const Flow::Derivatives& d) { return Negated(quantity(d)); }), largest(quantity)};
@@ -225,7 +234,7 @@ std::optional<Arguments> RangesOver(const SampledMotion& motion, Derivative deri
 
 Arguments RequiredRangesOver(const SampledMotion& motion, Derivative derivative, const Arguments& box) {
   if (auto ranges = RangesOver(motion, derivative, box)) return std::move(*ranges);
-  FailWithoutBound();
+  FailWithoutBound(motion);
 }
 
 // B with Z + [0, period] f(B) in B, so no motion that begins in Z leaves B within a period (Picard). `end` becomes a
@@ -278,7 +287,7 @@ Arguments Reachable(const SampledMotion& motion, const Arguments& start) {
   constexpr int kHalvings = 5;
   Arguments end;
   if (auto box = ReachableInParts(motion, start, motion.period, kHalvings, end)) return std::move(*box);
-  FailWithoutBound();
+  FailWithoutBound(motion);
 }
 
 // Cuts a range down to what it has in common with another one. False if that is nothing.
@@ -329,22 +338,32 @@ std::optional<Arguments> EndsOfLastStep(const SampledMotion& motion, const Argum
 
 // ---- Bounds.
 
+// Searches that are done, and all of them.
+struct Searches {
+  double done = 0, all = 1;
+};
+
 // The largest magnitude of any of the quantities.
-MotionBound BoundMagnitude(const Flow& flow, const std::vector<Quantity>& quantities,
-                           const std::vector<Arguments>& regions, const SlopeBoundOptions& options) {
+MotionBound BoundMagnitude(const SampledMotion& motion, const std::vector<Quantity>& quantities,
+                           const std::vector<Arguments>& regions, const SlopeBoundOptions& options,
+                           Searches& searches) {
+  const std::function<bool()> stops = [&] {
+    return motion.watch && motion.watch(searches.done / searches.all, (searches.done + 1) / searches.all);
+  };
   MotionBound all;
   for (const Quantity& quantity : quantities) {
     for (const Arguments& region : regions) {
       for (const bool negated : {false, true}) {
         const auto side = [&](const Flow::Derivatives& d) { return negated ? Negated(quantity(d)) : quantity(d); };
-        const MotionBound one = MotionSearch(flow, side, options, all.lower).Run(region);
+        const MotionBound one = MotionSearch(motion.flow, side, options, all.lower, stops).Run(region);
+        ++searches.done;
         all.upper = std::max(all.upper, one.upper);
         all.lower = std::max(all.lower, one.lower);
         all.boxes += one.boxes;
       }
     }
   }
-  if (!(all.upper < kInfinity)) FailWithoutBound();
+  if (!(all.upper < kInfinity)) FailWithoutBound(motion);
   all.reached = all.upper <= (1 + options.gap) * all.lower;
   return all;
 }
@@ -438,15 +457,17 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   }
   MotionBounds bounds;
   const auto p = ToSize(motion.projection.rows());
+  const std::size_t quantities_of_all = p + motion.flow.num_places() + (motion.heading < 0 ? 0 : 2);
+  Searches searches{0, static_cast<double>(2 * quantities_of_all * std::max<std::size_t>(regions.size(), 1))};
   for (std::size_t k = 0; k < p; ++k) {
     std::vector<Quantity> quantities{AccelerationAlong(motion.projection.row(static_cast<Eigen::Index>(k)))};
     for (std::size_t i = k; i < motion.flow.num_places(); i += p) quantities.push_back(AccelerationOfPlace(i));
-    bounds.acceleration.push_back(BoundMagnitude(motion.flow, quantities, regions, options));
+    bounds.acceleration.push_back(BoundMagnitude(motion, quantities, regions, options, searches));
   }
   if (motion.heading < 0) return bounds;
   const auto heading = ToSize(motion.heading);
-  bounds.turn_rate = BoundMagnitude(motion.flow, {First(heading)}, regions, options);
-  bounds.turn_acceleration = BoundMagnitude(motion.flow, {Second(heading)}, regions, options);
+  bounds.turn_rate = BoundMagnitude(motion, {First(heading)}, regions, options, searches);
+  bounds.turn_acceleration = BoundMagnitude(motion, {Second(heading)}, regions, options, searches);
   return bounds;
 }
 

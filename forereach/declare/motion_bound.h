@@ -4,6 +4,7 @@ reach between two samples. */
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,10 @@ struct MotionBounds {
   MotionBound turn_rate, turn_acceleration;  ///< Of the heading's first and second derivative; 0 without a heading.
 };
 
+/** Is asked again and again whether the search at hand ends now, with the bound that it has by then.
+@param done, next the share of all searches that is behind, without and with the one at hand. */
+using MotionWatch = std::function<bool(double done, double next)>;
+
 /** The motion between two samples, a period apart, of a plan that is certified. */
 struct SampledMotion {
   const Flow& flow;                   ///< Its places: those of points of a body, p coordinates each.
@@ -39,6 +44,7 @@ struct SampledMotion {
   int heading;                        ///< The state that is the heading; -1: none.
   /** A plan ends with |x_k| <= rest_k; infinite where nothing is known. n entries. */
   Eigen::VectorXd rest;
+  MotionWatch watch = {};  ///< None: every search runs to its end.
 };
 
 /** Bounds for every motion that is in the domain at its samples. A plan's last sample is not tested against the domain;
@@ -49,7 +55,8 @@ motion leaves a box B with Z + [0, period] f(B) in B within a period; without su
 of its halves, one after the other. B is cut down to what lies within period^2 / 8 sup |x_k''| of the chords from Z to
 E, in Z + [0, period] f(B), and in E - [0, period] f(B), as long as that helps. Where f or x'' has no finite enclosure
 over a box, it is enclosed over pieces.
-@throws std::runtime_error if there is no such B or no finite bound, for example over a pole of the tangent.
+@throws std::runtime_error if there is no such B or no finite bound, for example over a pole of the tangent, or none
+before the watch ended the search.
 @throws std::invalid_argument if a size is wrong. Cost: at most options.max_boxes evaluations for each bound. */
 [[nodiscard]] MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options = {});
 

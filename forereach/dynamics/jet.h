@@ -12,12 +12,13 @@ If f may be undefined at a point of the box (a division by zero, a logarithm of 
 #include <array>
 
 #include "forereach/numerics/interval.h"
+#include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach {
 
 struct Jet {
-  static constexpr int kMaxArguments = 16;
+  static constexpr int kMaxArguments = kMaxVariables;
   using Row = std::array<Interval, kMaxArguments>;
 
   Interval value{0.0}, slope{0.0};  ///< f and df/dc.

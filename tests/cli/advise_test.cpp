@@ -66,6 +66,28 @@ TEST_F(AdviseTest, TheBoundOfRestCoversBothSides) {
   }
 }
 
+// As for rest: vx is in [-0.25, 0.15] or [-0.15, 0.25] all the time, and its one limit has two sides.
+TEST_F(AdviseTest, AWiderLimitCoversBothSides) {
+  scratch_.Write("d.csv", "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,0,0,0,0,0,0,0,0\n");
+  scratch_.Write("plan.csv", "ax,ay\n0,0\n");
+  for (const auto& [center, least, most] : {std::tuple{"-0.05", "-0.25", "0.15"}, {"0.05", "-0.15", "0.25"}}) {
+    scratch_.Write("task.yaml",
+                   "model: {name: point_mass, dt: 0.1}\n"
+                   "domain: {state: {lower: [-9, -9, -9, -9], upper: [9, 9, 9, 9]}, input: {lower: [-1, -1], upper: "
+                   "[1, 1]}}\ndeclaration: {lipschitz: {}, noise_bound: [0, 0, 0, 0]}\ntransitions: d.csv\n"
+                   "task: {initial_set: {center: [0, 0, " +
+                       std::string(center) +
+                       ", 0], half_width: [0.1, 0.1, 0.2, 0]}, projection: [px, py], between: samples, limits: "
+                       "[{name: slow, that: vx, at_least: -0.01, at_most: 0.01}], obstacles: []}\n");
+    const std::string decision = scratch_ / "limits.json";
+    Forereach("certify --json --config " + (scratch_ / "task.yaml") + " --plan " + (scratch_ / "plan.csv") + " > " +
+              decision);
+    const std::string text = Forereach("advise " + decision + " 2>&1").text;
+    EXPECT_THAT(text, AllOf(HasSubstr("if its limits were wider: slow at least " + std::string(least)),
+                            HasSubstr(" at most " + std::string(most))));
+  }
+}
+
 TEST_F(AdviseTest, NamesWhatMakesTheDataConsistent) {
   const Output output = AdviseOn("bicycle_falsified.yaml", "bicycle_certified.csv");
   EXPECT_THAT(output.text, AllOf(HasSubstr("if larger slopes were declared: those of theta times 5.99"),

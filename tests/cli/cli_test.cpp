@@ -255,7 +255,7 @@ TEST(BadInput, ATaskFileIsTakenWithAndWithoutItsOption) {
       EXPECT_EQ(output.code, 2) << command << before;
       EXPECT_THAT(output.text, HasSubstr("none.yaml: cannot be read")) << command << before;
     }
-  EXPECT_THAT(Forereach("fit a.yaml --config b.yaml 2>&1").text, HasSubstr("--config: At Most 1 required"));
+  EXPECT_THAT(Forereach("fit a.yaml --config b.yaml 2>&1").text, HasSubstr("--config: is given too often"));
 }
 
 TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
@@ -273,11 +273,58 @@ TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
                {"certify --config x --plan y --jsn=3", "unknown option --jsn of certify; did you mean --json?"},
                {"certify --config x --plan y z", "unexpected argument z of certify"},
                {"certify --config x --plan y \"$(printf '\\033[2J')\"", "unexpected argument ?[2J of certify"},
+               {"nonsense --help", "unknown command nonsense; known here: certify, init, import"},
+               {"cetrify --help", "unknown command cetrify; did you mean certify?"},
+               {"certify --confg --help", "unknown option --confg of certify; did you mean --config?"},
+               {"certify --config x --plan", "--plan: its value is missing"},
                {"", "A subcommand is required"}};
   for (const auto& [arguments, sentence] : cases) {
     const Output output = Forereach(std::string(arguments) + " 2>&1 >/dev/null");
     EXPECT_EQ(output.code, 2) << arguments;
     EXPECT_THAT(output.text, HasSubstr(sentence)) << arguments;
+  }
+}
+
+// Forereach() looks for texts of libraries in what is said.
+TEST(BadInput, NonsenseInAFileIsNamedInWordsOfOurs) {
+  const ScratchDirectory scratch;
+  const std::string sqlite("SQLite format 3\0\x10\0\1\1\0\x40\x20\x20", 24);
+  const std::string contents[] = {"{",
+                                  "[1, ",
+                                  std::string("\0\xff\0", 3),
+                                  "{\"a\": 1}",
+                                  "a: [b",
+                                  "a: *b",
+                                  "\t- x: {y}",
+                                  "[[1]]",
+                                  "{\"inputs\": {\"config\": 3}, \"outcome\": []}",
+                                  sqlite + std::string(1000, 'x')};
+  const std::string task = " --config config/bicycle.yaml ", file = scratch / "decisions.sqlite";
+  const std::string commands[] = {"certify --plan config/plans/bicycle_certified.csv --config " + file,
+                                  "certify" + task + "--plan " + file,
+                                  "check --no-picture --config " + file,
+                                  "check-log " + scratch.path(),
+                                  "verify " + file,
+                                  "replay" + task + file,
+                                  "report" + task + file,
+                                  "advise " + file,
+                                  "export --format csv --out " + (scratch / "out") + " " + file,
+                                  "log list " + file,
+                                  "import --out " + (scratch / "out.csv") + " --dt 0.1 " + file,
+                                  "fit --config " + file,
+                                  "declare --config " + file,
+                                  "declare" + task + "--check " + file,
+                                  "plan --out " + (scratch / "plan.csv") + " --config " + file,
+                                  "run --config " + file,
+                                  "status --key " + file,
+                                  "keys --config " + file};
+  for (const std::string& content : contents) {
+    std::ofstream(file, std::ios::binary) << content;
+    for (const std::string& command : commands) {
+      const Output output = Forereach(command + " 2>&1 </dev/null");
+      EXPECT_THAT(output.code, AnyOf(1, 2)) << command << "\n" << content << "\n" << output.text;
+      EXPECT_FALSE(output.text.empty()) << command << "\n" << content;
+    }
   }
 }
 
@@ -342,6 +389,47 @@ TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
     const Output output = Forereach(arguments + " 2>&1 >/dev/null");
     EXPECT_EQ(output.code, 2) << arguments << "\n" << output.text;
     EXPECT_THAT(output.text, HasSubstr(sentence)) << arguments;
+  }
+}
+
+// Its name appears when it is whole. A pipe would wait for a reader, and a device would be replaced.
+TEST(OutputFiles, AreWholeOrNotThere) {
+  const ScratchDirectory scratch;
+  const std::string log = "tests/data/course.lcmlog --config tests/data/course.yaml";
+  const std::string full = "cd '" FOREREACH_SOURCE_DIR "'; ulimit -f 8; trap '' XFSZ; '" FOREREACH_PROGRAM "' ";
+  for (const std::string& arguments : {"report " + log + " --picture '" + (scratch / "a.svg") + "'",
+                                       "report " + log + " --picture '" + (scratch / "a.png") + "'",
+                                       "report " + log + " --picture '" + (scratch / "a.pdf") + "'",
+                                       "report " + log + " --out '" + (scratch / "a.html") + "'"}) {
+    const Output output = Shell(full + arguments + " 2>&1");
+    EXPECT_EQ(output.code, 2) << arguments << "\n" << output.text;
+    EXPECT_THAT(output.text, HasSubstr("cannot be written: File too large")) << arguments;
+    EXPECT_TRUE(std::filesystem::is_empty(scratch.path())) << arguments;
+  }
+  const std::string pipe = scratch / "pipe";
+  ASSERT_EQ(Shell("mkfifo '" + pipe + "'").code, 0);
+  for (const std::string& command : {"report " + log, std::string("export-model config/bicycle_text.yaml")}) {
+    const Output output = Forereach(command + " --force --out '" + pipe + "' 2>&1");
+    EXPECT_EQ(output.code, 2) << command << "\n" << output.text;
+    EXPECT_THAT(output.text, HasSubstr("pipe: is no file that can be replaced")) << command;
+  }
+  const Output exported = Forereach("export " + log + " --format jsonl --out '" + pipe + "' 2>&1");
+  EXPECT_THAT(exported.text, AllOf(HasSubstr("pipe: the file exists"), Not(HasSubstr("--force"))));
+  EXPECT_THAT(Forereach("report " + log + " --out '" + pipe + "' 2>&1").text, HasSubstr("or write --force"));
+}
+
+TEST(Report, OfADamagedLogExitsWithOne) {
+  const ScratchDirectory scratch;
+  std::string bytes = Read(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog");
+  scratch.Write("whole.lcmlog", bytes);
+  bytes.replace(bytes.size() / 2, 8, 8, '\0');  // a header or its content
+  bytes.replace(bytes.find("\xED\xA1\xDA\x01", bytes.size() / 3), 4, 4, '\0');
+  scratch.Write("damaged.lcmlog", bytes);
+  const std::string task = " --config tests/data/course.yaml";
+  for (const std::string& more :
+       {std::string(), std::string(" --json"), " --force --out '" + (scratch / "x.html") + "'"}) {
+    EXPECT_EQ(Forereach("report '" + (scratch / "whole.lcmlog") + "'" + task + more).code, 0) << more;
+    EXPECT_EQ(Forereach("report '" + (scratch / "damaged.lcmlog") + "'" + task + more).code, 1) << more;
   }
 }
 

@@ -213,6 +213,22 @@ certifier: {method: centred, zonotope_order: 5}
   EXPECT_EQ(Json::parse(Declare("--between --max-boxes 2000 --json").text)["entries"], document["entries"]);
 }
 
+TEST_F(DeclareTest, BetweenBoundsAsManyStatesAndInputsAsATaskMayHave) {
+  std::string states, inputs, rates;
+  for (int i = 0; i < 16; ++i) {
+    states += (i == 0 ? "x" : ", x") + std::to_string(i) + ": m";
+    rates +=
+        "    x" + std::to_string(i) + ": " + (i < 15 ? "x" + std::to_string(i + 1) : std::string("u0 - u7")) + "\n";
+  }
+  for (int i = 0; i < 8; ++i) inputs += (i == 0 ? "u" : ", u") + std::to_string(i) + ": m";
+  std::ofstream(task_) << TaskFor("model:\n  states: {" + states + "}\n  inputs: {" + inputs +
+                                      "}\n  parameters: {dt: 0.05}\n  integrator: rk4\n  rate:\n" + rates,
+                                  16, 8, "x0, x1");
+  const Output output = Declare("--between");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("x0''       at most 1.05277 "));
+}
+
 TEST_F(DeclareTest, BetweenExcludesWhatBelongsToTheResidual) {
   for (const char* options : {"--between --cover cover.json", "--between --check cover.json", "--from positions"})
     EXPECT_EQ(Forereach("declare --config config/demo.yaml " + std::string(options) + " 2>&1").code, 2) << options;

@@ -2,6 +2,7 @@
 #include "tests/test.h"
 
 #include "tests/cli/program.h"
+#include "tests/config/task_files.h"
 #include "tests/paths.h"
 
 namespace forereach::drive_test {
@@ -37,6 +38,60 @@ TEST_P(Drive, ReachesItsGoal) {
   // One that cannot stand is never without a plan before the goal.
   if (Read(FOREREACH_SOURCE_DIR "/" + task).find("hold: []") != std::string::npos) {
     EXPECT_EQ(robot["stops"], 0);
+  }
+}
+
+void CopyDrives(const ScratchDirectory& scratch) {
+  for (const char* part : {"drive", "models"})
+    std::filesystem::copy(std::string(FOREREACH_SOURCE_DIR "/config/") + part, scratch / part);
+}
+
+TEST(Run, RefusesAStartAtASpeedAndCheckNamesIt) {
+  const ScratchDirectory scratch;
+  CopyDrives(scratch);
+  const std::string task = Read(scratch / "drive/unicycle.yaml"), path = scratch / "drive/unicycle.yaml";
+  const auto with = [&](const char* speed) {
+    scratch.Write("drive/unicycle.yaml",
+                  Replaced(task, "start: [0, 0, 0, 0, 0]", std::string("start: [0, 0, 0, ") + speed + ", 0]"));
+  };
+  for (const char* speed : {"1", "-0.5", "0.021"}) {
+    with(speed);
+    const Output run = Forereach("run " + path + " --directory '" + (scratch / "log") + "' 2>&1");
+    EXPECT_EQ(run.code, 2) << run.text;
+    EXPECT_THAT(run.text, HasSubstr("unicycle.yaml: robot.start: v is " + std::string(speed)));
+    const Output check = Forereach("check " + path);
+    EXPECT_THAT(check.text, HasSubstr("robot.start: remark: v begins at " + std::string(speed)));
+  }
+  with("0.02");  // planner.initial_half_width
+  EXPECT_EQ(Forereach("run " + path + " --directory '" + (scratch / "log") + "' 2>&1").code, 0);
+}
+
+TEST(Run, SaysWhatBecameOfThePlansIfTheRobotDoesNotArrive) {
+  const ScratchDirectory scratch;
+  CopyDrives(scratch);
+  scratch.Write("drive/unicycle.yaml",
+                Replaced(Read(scratch / "drive/unicycle.yaml"), "time_limit_s: 60", "time_limit_s: 3"));
+  const Output run =
+      Forereach("run '" + (scratch / "drive/unicycle.yaml") + "' --directory '" + (scratch / "log") + "' 2>&1");
+  EXPECT_EQ(run.code, 1);
+  EXPECT_THAT(run.text, testing::ContainsRegex("did not reach planner.goal: the planner searched [1-9][0-9]* times and "
+                                               "proposed [1-9][0-9]* plans, [1-9][0-9]* were certified"));
+}
+
+// What keeps the start is said, and not what cannot help.
+TEST(Plan, FromWhereNoneIsPossibleSaysWhy) {
+  const ScratchDirectory scratch;
+  CopyDrives(scratch);
+  const std::string task = Read(scratch / "drive/unicycle.yaml"), path = scratch / "drive/unicycle.yaml";
+  const struct {
+    const char *center, *why;
+  } cases[] = {{"[2.5, 0.3, 0, 0, 0]", "task.obstacles[0]: the robot may touch it at the start"},
+               {"[-3, 0.3, 0, 0, 0]", "below its bound -1"}};
+  for (const auto& [center, why] : cases) {
+    scratch.Write("drive/unicycle.yaml", Replaced(task, "center: [0, 0, 0, 0, 0]", std::string("center: ") + center));
+    const Output plan = Forereach("plan " + path + " --out '" + (scratch / "plan.csv") + "' 2>&1");
+    EXPECT_EQ(plan.code, 1);
+    EXPECT_THAT(plan.text, AllOf(HasSubstr(why), Not(HasSubstr("planner.time_limit_ms may help"))));
   }
 }
 

@@ -46,6 +46,61 @@ TEST_F(FitCommandTest, ItsLineGoesIntoATaskFile) {
   EXPECT_EQ(document["states"][1]["rms_before"], 0);
 }
 
+// A heading that is wrapped at pi: every tool names the key, and none estimates from a jump of a turn.
+class WrappedHeading : public testing::Test {
+ protected:
+  // @param jump of the wrapped step in th; its unit.
+  void Write(double jump, const std::string& unit, const std::string& angles = "") const {
+    scratch_.Write("task.yaml", TaskFor("model:\n"
+                                        "  states: {th: " +
+                                            unit +
+                                            ", w: rad/s}\n"
+                                            "  inputs: {a: rad/s^2}\n"
+                                            "  parameters: {dt: 0.1, g: 0.5}\n"
+                                            "  next: {th: th + dt*w, w: w + g*dt*a}\n" +
+                                            angles,
+                                        2, 1, "w"));
+    std::string task = Read(task_);
+    for (const auto& [from, to] : {std::pair{"-1, -1", "-9, -9"}, {"1, 1", "9, 9"}}) task = Replaced(task, from, to);
+    scratch_.Write("task.yaml", task);
+    std::ostringstream rows("th,w,a,th_next,w_next\n", std::ios::ate);
+    for (int i = 0; i < 40; ++i) {
+      const double th = 0.01 * (i % 7), w = 0.1 * (i % 5), a = i % 2 == 0 ? 0.5 : -0.5;
+      rows << th << "," << w << "," << a << "," << th + 0.1 * w + (i == 11 ? jump : 0) << "," << w + 0.1 * a << "\n";
+    }
+    scratch_.Write("steps.csv", rows.str());
+  }
+  [[nodiscard]] std::vector<std::string> Tools() const {
+    std::vector<std::string> outputs;
+    for (const char* tool : {"check ", "fit ", "declare --from-data ", "declare --from-data --hold-out --blocks 4 "})
+      outputs.push_back(Forereach(tool + task_ + " 2>&1").text);
+    return outputs;
+  }
+
+  const ScratchDirectory scratch_;
+  const std::string task_ = scratch_ / "task.yaml";
+};
+
+TEST_F(WrappedHeading, IsNamedEverywhere) {
+  for (const double jump : {-6.2831853, 6.2831853, 6.0, -6.6}) {
+    Write(jump, "rad");
+    for (const std::string& text : Tools())
+      EXPECT_THAT(text, AllOf(HasSubstr("steps.csv:13: th differs from the model's next value by "),
+                              HasSubstr("about one turn, and model.angles does not name it"),
+                              HasSubstr("write `angles: [th]` under model"), Not(HasSubstr("noise_bound of th"))));
+  }
+}
+
+TEST_F(WrappedHeading, IsNoneInAnotherUnitOrByAnotherJumpOrOnceItIsNamed) {
+  const auto expect_none = [this] {
+    for (const std::string& text : Tools()) EXPECT_THAT(text, Not(HasSubstr("about one turn")));
+  };
+  Write(-6.2831853, "m"), expect_none();
+  Write(4, "rad"), expect_none();
+  Write(-8, "rad"), expect_none();
+  Write(-6.2831853, "rad", "  angles: [th]\n"), expect_none();
+}
+
 TEST_F(FitCommandTest, NamesParametersThatTheDataDoNotDetermine) {
   const std::string task = Read(task_);
   scratch_.Write("task.yaml",

@@ -1,15 +1,19 @@
 /** The `forereach` program as a person or a script calls it. */
 #pragma once
 
+#include "tests/library_texts.h"
 #include "tests/paths.h"
 #include "tests/scratch.h"
 #include "tests/shell.h"
 
 namespace forereach {
 
-/** Runs in the repository's root; `what` may use the shell's redirections. */
+/** Runs in the repository's root; `what` may use the shell's redirections. Nothing that it prints is a library's text.
+ */
 inline Output Forereach(const std::string& what) {
-  return Shell("cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what);
+  Output output = Shell("cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what);
+  ExpectNoTextOfALibrary(output.text);
+  return output;
 }
 
 }  // namespace forereach

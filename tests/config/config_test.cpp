@@ -104,7 +104,7 @@ TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   EXPECT_TRUE(config.planner.goal.empty());
   EXPECT_EQ(config.planner.initial_half_width, (std::vector<double>{0.1, 0.1, 0.1, 0.1}));
   EXPECT_EQ(config.robot.start, (std::vector<double>{0, 0, 1, 0}));
-  EXPECT_EQ(config.robot.step_period_ms, RobotOptions{}.step_period_ms);
+  EXPECT_EQ(config.robot.step_period_ms, 150) << "model.dt";
   EXPECT_FALSE(config.robot_residual);
   EXPECT_EQ(config.logger.directory, "log");
   EXPECT_EQ(config.logger.queue, LoggerOptions{}.queue);
@@ -361,6 +361,19 @@ TEST(LoadConfig, APlanHasToStopWhereTheTaskSaysWhatStandingIs) {
     EXPECT_EQ(rest[1].tolerance, 0.25);
   }
   EXPECT_TRUE(files.Load(says + "gate: {require_stop: false}\n").problem->rest.empty());
+}
+
+TEST(LoadConfig, AStepPeriodThatNobodyWroteIsNoLongerThanTheModels) {
+  const TaskFiles files;
+  EXPECT_EQ(files.Load().robot.step_period_ms, 150);
+  const std::string fast =
+      Replaced(Replaced(kTask, "dt: 0.15", "dt: 0.02"), "between: samples", "between: {acceleration: [1, 1]}");
+  EXPECT_EQ(files.Load(fast).robot.step_period_ms, 20);
+  EXPECT_EQ(files.Load(fast + "robot: {time_limit_s: 3}\n").robot.step_period_ms, 20);
+  EXPECT_EQ(files.Load(fast + "robot: {step_period_ms: 20}\n").robot.step_period_ms, 20);
+  EXPECT_THAT(files.Error(fast + "robot: {step_period_ms: 10}\n"), HasSubstr("is 10, and has to be model.dt, 20 ms"));
+  EXPECT_THAT(files.Error(fast + "robot: {step_period_ms: 20.5}\n"),
+              HasSubstr("robot.step_period_ms: is 20.5, and has to be model.dt"));
 }
 
 TEST(LoadConfig, TheLongestStepIsTheModelsOrTheRobots) {

@@ -213,7 +213,7 @@ TEST_F(ErrorTest, BoundsBetweenSamplesThatDoNotFitAreAnError) {
 
   EXPECT_THAT(files_.Error(Replaced(kTask, "between: samples", "between: {acceleration: [1, 1]}") +
                            "robot: {step_period_ms: 150.001}\n"),
-              HasSubstr(": robot.step_period_ms: is 150.001, longer than model.dt, 150 ms, the time in which"));
+              HasSubstr(": robot.step_period_ms: is 150.001, and has to be model.dt, 150 ms: task.between"));
   const auto turning = [&](const std::string& between) {
     const std::string body = "  body: {pose: [px, py, vx], parts: [{disc: {at: [1, 0], radius: 1}}]}";
     return files_.Error(Replaced(Replaced(kTask, "  projection: [px, py]", body), "between: samples",
@@ -555,15 +555,15 @@ TEST_F(ErrorTest, TransitionsThatCannotBeReadAreAnError) {
 }
 
 TEST_F(ErrorTest, AFileThatIsNoTaskIsAnError) {
-  EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML: "));
-  EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML: "));
+  EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML; look at "));
+  EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML; look at "));
   EXPECT_EQ(files_.Error(""), "task.yaml:1: has no YAML document, has to have one");
   EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"),
             "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("   ,"), "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("just words\n"), "task.yaml:1: just words is not a map");
   EXPECT_EQ(files_.Error("? [a, b]\n: 1\n"), "task.yaml:1: a list is not a key");
-  EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML: "));
+  EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML; look at "));
   EXPECT_THAT(files_.Error(std::string((1 << 24) + 1, ' ')), HasSubstr("task.yaml: is larger than 16 MiB"));
 }
 

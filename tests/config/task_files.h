@@ -2,6 +2,7 @@
 #pragma once
 
 #include "task/config.h"
+#include "tests/library_texts.h"
 #include "tests/test.h"
 
 namespace forereach {
@@ -65,7 +66,9 @@ class TaskFiles {
   }
   /** What LoadConfig says, with the directory cut off; empty if it accepts the file. */
   std::string Error(const std::string& task, const std::string& transitions = kTransitions) const {
-    return directory_.Cut(Thrown<ConfigError>([&] { (void)Load(task, transitions); }));
+    std::string error = directory_.Cut(Thrown<ConfigError>([&] { (void)Load(task, transitions); }));
+    ExpectNoTextOfALibrary(error);
+    return error;
   }
   /** The error of the good task file with `to` in the place of `from`. */
   std::string ErrorWith(const std::string& from, const std::string& to) const {

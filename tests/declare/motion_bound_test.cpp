@@ -49,6 +49,37 @@ TEST(MotionBound, OfAPointMassIsItsLargestControl) {
 }
 
 // Then no place moves at first, only after the speed has.
+// A watch that ends every search at once, and one that ends those of the second half: what is there by then is valid.
+TEST(MotionBound, HoldsWhenItsWatchEndsTheSearch) {
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  const Domain domain = BicycleDomain(12, 3, 0.36);
+  const auto flow = MakeFlow(*model);
+  const Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(2, 6);
+  const auto bound = [&](const MotionWatch& watch) {
+    return BoundMotion({*flow, domain, 0.1, projection, 2, NoRest(6), watch}, {.gap = kGap});
+  };
+  double last = 0;
+  const MotionBounds whole = bound([&](double done, double next) {
+    EXPECT_LE(last, done);
+    EXPECT_LT(done, next);
+    EXPECT_LE(next, 1);
+    last = done;
+    return false;
+  });
+  EXPECT_GT(last, 0.8);
+  for (const double from : {0.0, 0.5}) {
+    const MotionBounds ended = bound([&](double done, double next) { return next < 1 && done >= from; });
+    const auto expect_looser = [](const MotionBound& loose, const MotionBound& tight) {
+      EXPECT_GE(loose.upper, tight.upper);
+      EXPECT_LE(loose.boxes, tight.boxes);
+      EXPECT_LT(loose.upper, kInfinite);
+    };
+    for (std::size_t k = 0; k < 2; ++k) expect_looser(ended.acceleration[k], whole.acceleration[k]);
+    expect_looser(ended.turn_rate, whole.turn_rate);
+    EXPECT_FALSE(ended.acceleration[1].reached && from == 0);
+  }
+}
+
 TEST(MotionBound, BoundsAMotionThatBeginsAtRestByItsInputs) {
   const auto model = MakePointMass(0.15);
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, 0, 0), Eigen::Vector4d(9, 9, 0, 0), Eigen::Vector2d(2, 0.5));

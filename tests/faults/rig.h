@@ -121,6 +121,7 @@ class Rig final {
   const Options options_;
   ScratchDirectory scratch_;
   const std::string task_;
+  bool has_one_key_ring_ = true;
   std::string task_path_, key_path_, near_url_, far_url_, next_directory_, directory_, state_;
   Config config_;
   std::unique_ptr<Bus> heard_, signed_, open_;

@@ -165,6 +165,34 @@ TEST(Authentic, NothingFromAheadOfTheReceiversClock) {
   EXPECT_EQ(lenient.refusals().all(), 1);
 }
 
+TEST(Authentic, RefusalsAreCountedByTheRoleOfTheirChannelAndItsClockIsNamed) {
+  constexpr std::int64_t kTenMinutes = 600'000'000;
+  Authenticator authenticator = Receiver();
+  EXPECT_EQ(DescribeClocks(authenticator.refusals(), {}), "");
+  EXPECT_EQ(authenticator.Check("certifier", Signed(kClock + kTenMinutes), kClock).first, Authenticity::kAhead);
+  EXPECT_EQ(authenticator.Check("certifier", kMessage, kClock).first, Authenticity::kUnsigned);
+  EXPECT_EQ(authenticator.Check("nobody's", Signed(), kClock).first, Authenticity::kForged);
+  const Refusals before = authenticator.refusals();
+  EXPECT_EQ(before.all(), 3);
+  ASSERT_EQ(before.by_role.size(), 1u);
+  const Refusals::OfRole& certifier = before.by_role.at(Role::kCertifier);
+  EXPECT_EQ(certifier.counts.all(), 2);
+  EXPECT_EQ(certifier.counts.ahead, 1);
+  EXPECT_EQ(certifier.apart_us, kTenMinutes);
+  EXPECT_EQ(DescribeClocks(before, {}), "certifier's messages are signed 600 s ahead of the clock here");
+  EXPECT_EQ(DescribeClocks(before, before), "") << "none since";
+  EXPECT_EQ(authenticator.Check("certifier", Signed(kClock - kTenMinutes), kClock).first, Authenticity::kOld);
+  EXPECT_EQ(DescribeClocks(authenticator.refusals(), before),
+            "certifier's messages are signed 600 s before the clock here, and before this start");
+  EXPECT_EQ(authenticator.Check("certifier", Signed(std::numeric_limits<std::int64_t>::max()), kClock).first,
+            Authenticity::kAhead);
+  Refusals sum;
+  sum += authenticator.refusals();
+  sum += before;
+  EXPECT_EQ(sum.all(), 8);
+  EXPECT_EQ(sum.by_role.at(Role::kCertifier).counts.ahead, 3);
+}
+
 // Somebody keeps what was signed while a clock was ahead, for a receiver that starts later.
 TEST(Authentic, WhatWasSignedWhileAClockWasAheadCountsForNoReceiverThatStartsAfterwards) {
   const auto kept = Signed(kBegun + kHour);

@@ -6,8 +6,19 @@
 
 #include "bus/bus.h"
 #include "forereach/logger_status_t.hpp"
+#include "records/check.h"
+#include "tests/test.h"
 
 namespace forereach {
+
+/** Whatever happened to the logger, the rows that a directory has follow from the logs that it has. */
+inline void ExpectRowsOfTheLogs(const std::string& directory, const LogKey& key = {}) {
+  try {
+    for (const LogCheck& check : CheckLogs(directory, "", key)) EXPECT_THAT(check.rows, IsEmpty()) << ToText({check});
+  } catch (const BadInput& error) {  // a test that leaves no database, or none of ours
+    SUCCEED() << error.what();
+  }
+}
 
 inline constexpr std::int64_t kStart = 1'700'000'000'000'000;  // 2023-11-14 22:13:20 UTC
 

@@ -23,6 +23,8 @@ class DiskTest : public testing::Test {
     config_.logger.min_free_mb = 1;
   }
 
+  void TearDown() override { ExpectRowsOfTheLogs(config_.logger.directory); }
+
   LoggerNode& Start() {
     return node_.emplace(config_, bus_, out_, [this](const std::string&) { return free_bytes_; });
   }

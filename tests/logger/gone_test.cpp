@@ -188,7 +188,7 @@ TEST_F(DatabaseGoneTest, ADatabaseThatIsReplacedBySomethingElseWaitsUntilThatIsG
                  "no database, but something of more than a few bytes " + std::string(500, 'x'));
   Feed(600);
   EXPECT_EQ(last().state, logger_status_t::STALE);
-  EXPECT_THAT(Message(), HasSubstr("not a database"));
+  EXPECT_THAT(Message(), HasSubstr("it is no database"));
   fs::remove(scratch_ / "log/decisions.sqlite");
   Feed(1200);
   ExpectRowsAgain();

@@ -19,6 +19,7 @@ namespace forereach::logger_node_test {
 class LoggerNodeTest : public testing::Test {
  protected:
   LoggerNodeTest() { config_.logger.directory = scratch_ / "log"; }
+  void TearDown() override { ExpectRowsOfTheLogs(config_.logger.directory, {.file = config_.bus.key}); }
 
   Rows ReadRows() { return Database(scratch_ / "log/decisions.sqlite").Read(); }
   std::vector<RunRow> Runs() { return Database(scratch_ / "log/decisions.sqlite").Runs(); }

@@ -6,6 +6,7 @@
 
 #include "bus/process.h"
 #include "forereach/certifier_status_t.hpp"
+#include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -91,6 +92,27 @@ TEST_F(BusCommands, AReloadIsTakenOrItsErrorIsShown) {
   const Output status = Say("status");
   EXPECT_THAT(status.text, HasSubstr("hovercraft"));
   EXPECT_THAT(status.text, HasSubstr("version 2"));
+}
+
+// Strangers' datagrams are refused all the time.
+TEST_F(BusCommands, WhatAStrangerSaysMeanwhileAnswersNoCommand) {
+  const auto open = OpenBus(config_.bus.url);
+  std::atomic<bool> stop = false;
+  std::thread stranger([&] {
+    for (; !stop; std::this_thread::sleep_for(std::chrono::milliseconds(5)))
+      open->Publish(config_.bus.command, command_t{.utime = WallClockUs(), .kind = command_t::RELOAD});
+  });
+  const Output reload = Say("reload"), reset = Say("reset"), without_key = Say("reload", false);
+  stop = true;
+  stranger.join();
+  EXPECT_EQ(reload.code, 0) << reload.text;
+  EXPECT_THAT(reload.text, AllOf(HasSubstr("version 2"), Not(HasSubstr("--key"))));
+  EXPECT_EQ(reset.code, 0) << reset.text;
+  EXPECT_EQ(without_key.code, 1);
+  EXPECT_THAT(without_key.text, HasSubstr("has not done the reload within 3 s: it refuses a command without the "
+                                          "operator's key (--key)"));
+  EXPECT_THAT(Say("status").text,
+              AllOf(HasSubstr("version 2"), HasSubstr("messages refused: "), HasSubstr(" unsigned")));
 }
 
 TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {

@@ -388,8 +388,8 @@ INSTANTIATE_TEST_SUITE_P(
                "is damaged"},
         Damage{"NoFault", Edit("\"fault\":{", "\"fault\":null,\"no\":{"), "digest"},
         Damage{"AnotherDigit", Edit("\"fault_t\":[", "\"fault_t\":[1"), "digest"},
-        Damage{"AnotherVersion", Edit("\"version\":1", "\"version\":2"), "its version is 2, this certifier knows 1"},
-        Damage{"AnotherFormat", Edit("forereach latch", "forereach match"), "its format is another"},
+        Damage{"AnotherVersion", Edit("\"version\":1", "\"version\":2"), "it has version 2, this certifier knows 1"},
+        Damage{"AnotherFormat", Edit("forereach latch", "forereach match"), "it has another format"},
         Damage{"Fifo",
                [](const std::string& file) {
                  std::filesystem::remove(file);

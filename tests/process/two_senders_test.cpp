@@ -575,4 +575,19 @@ TEST_F(TwoRobotsTest, ATransitionThatWasSignedWhileAClockWasAheadDoesNotLatchThe
   EXPECT_EQ(status_.refused_replayed, 6) << "the heartbeat says it";
 }
 
+// 600 s apart: all that perception says is refused. The heartbeat says so while it lasts, and of whom.
+TEST_F(TwoRobotsTest, TheHeartbeatNamesARoleWhoseClockIsApart) {
+  for (const std::int64_t seconds : {600, -600}) {
+    Begin();
+    const obstacles_t obstacles{.utime = now_us_ + seconds * 1'000'000};
+    Speaking perception(*air_, Role::kPerception, 5);
+    For(kTimeout, [&] { perception.Say("OBSTACLES", obstacles, now_us_ + seconds * 1'000'000); });
+    EXPECT_THAT(GetText(status_.message),
+                testing::StartsWith(seconds > 0 ? "perception's messages are signed 600 s ahead of"
+                                                : "perception's messages are signed 600 s before"));
+    For(2 * kTimeout, [] {});
+    EXPECT_THAT(GetText(status_.message), testing::Not(HasSubstr("perception")));
+  }
+}
+
 }  // namespace forereach::two_senders_test

@@ -2,11 +2,14 @@
 
 #include <cctype>
 
+#include <sqlite3.h>
+
 #include "tests/test.h"
 
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/kept_tasks.h"
+#include "tests/keys.h"
 #include "tests/paths.h"
 #include "tests/records/logs.h"
 
@@ -110,12 +113,16 @@ TEST_F(CheckTest, WithoutADatabaseItSaysSoAndMakesNone) {
 TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
   const Config task = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
   KeptTasks(scratch_.path()).Keep(CopyTask(task));
+  decision_t decision = MakeDecision(MakeCandidate(0, 1), 0, decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+  SetDigest(decision.config_digest, task.grounds.config);
+  SetDigest(decision.observations_digest, task.grounds.observations);
+  EventLogWriter writer(log_);
+  writer.Append(9, "PLAN_DECISION", Encode(decision));
+  ASSERT_TRUE(writer.Flush());
   Rows rows;
-  DecisionRow& row = rows.decisions.emplace_back();
-  row.event = {"a.lcmlog", 0, ToHex(DigestOf(ReadLog(log_).events.front()))};
-  row.grounds[0] = ToHex(task.grounds.config);
-  ASSERT_EQ(database_.Write(rows, "a.lcmlog", 5), 1);
-  EXPECT_TRUE(Check().whole_log());
+  Interpreter({}, "a.lcmlog").Observe(ReadLog(log_).events.back(), rows);
+  ASSERT_EQ(database_.Write(rows, "a.lcmlog", 6), 1);
+  EXPECT_TRUE(Check().whole_log()) << ToText({Check()});
   const std::string transitions = KeptTasks(scratch_.path()).PathOf(task.grounds.config) + "/transitions-" +
                                   ToHex(task.grounds.observations) + ".csv";
   std::vector<std::uint8_t> bytes = ReadBytes(transitions);
@@ -129,6 +136,151 @@ TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
   ASSERT_EQ(check.damaged_tasks.size(), 1u);
   EXPECT_THAT(ToText({check}), HasSubstr("  task: "));
   EXPECT_EQ(ToJson({check})[0]["damaged_tasks"].size(), 1u);
+}
+
+// A log of candidates, decisions and execution events, each with its row, and with gaps.
+class RowsTest : public testing::Test {
+ protected:
+  RowsTest() {
+    EventLogWriter writer(log_);
+    std::int64_t utime = 1000;
+    const auto append = [&](const char* channel, const auto& message) {
+      writer.Append(utime += 10, channel, Encode(message));
+    };
+    for (std::int64_t i = 0; i < 4; ++i) {
+      const candidate_plan_t candidate = MakeCandidate(i, 100 + i);
+      append("PLAN_CANDIDATE", candidate);
+      decision_t decision = MakeDecision(candidate, 2 * i, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
+      decision.margin = 0.5;
+      append("PLAN_DECISION", decision);
+      execution_event_t event = MakeEvent(3 * i, execution_event_t::STEP_INSIDE);
+      event.num_states = 2;
+      event.state[0] = std::numeric_limits<double>::infinity();
+      event.state[1] = std::nan("");
+      append("EXECUTION_EVENT", event);
+    }
+    EXPECT_TRUE(writer.Flush());
+    Database database(path_);
+    Interpreter interpreter({}, "a.lcmlog");
+    Rows rows;
+    for (const LogEvent& event : ReadLog(log_).events) interpreter.Observe(event, rows);
+    rows.gaps.push_back({{"a.lcmlog", -1, ""}, "CAMERA", "", -1, -1, 7, 1, "queue"});
+    database.BeginRun("a.lcmlog", 1);
+    EXPECT_EQ(database.Write(rows, "a.lcmlog", 12), 4 + 4 + 6 + 1);
+    database.EndRun("a.lcmlog", 2);
+    database.Checkpoint();
+  }
+
+  void TearDown() override { EXPECT_TRUE(Check({}).empty()) << "what was damaged was made whole again"; }
+
+  // The rows of a statement's result, as texts.
+  std::vector<std::vector<std::string>> Sql(const std::string& statement) const {
+    sqlite3* handle = nullptr;
+    EXPECT_EQ(sqlite3_open(path_.c_str(), &handle), SQLITE_OK);
+    std::vector<std::vector<std::string>> rows;
+    const auto add = [](void* all, int count, char** values, char**) {
+      auto& row = static_cast<std::vector<std::vector<std::string>>*>(all)->emplace_back();
+      for (int i = 0; i < count; ++i) row.emplace_back(values[i] ? values[i] : "");
+      return 0;
+    };
+    EXPECT_EQ(sqlite3_exec(handle, statement.c_str(), add, &rows, nullptr), SQLITE_OK) << statement;
+    sqlite3_close(handle);
+    return rows;
+  }
+
+  // What is amiss in a copy of the database after the statement.
+  [[nodiscard]] std::vector<std::string> Check(const std::string& statement) const {
+    const std::string whole = scratch_ / "whole";
+    std::filesystem::copy_file(path_, whole);
+    if (!statement.empty()) Sql(statement);
+    std::vector<std::string> amiss;
+    for (const LogCheck& check : CheckLogs(scratch_.path()))
+      if (!check.whole_log()) amiss.push_back(ToText({check}));
+    for (const char* ending : {"-wal", "-shm"}) std::filesystem::remove(path_ + ending);
+    std::filesystem::rename(whole, path_);
+    return amiss;
+  }
+
+  const ScratchDirectory scratch_;
+  const std::string log_ = scratch_ / "a.lcmlog", path_ = scratch_ / "decisions.sqlite";
+};
+
+TEST_F(RowsTest, AnyOtherValueInARowIsSeen) {
+  int tried = 0;
+  for (const std::string table : {"decisions", "execution_events", "gaps"})
+    for (const auto& column : Sql("SELECT name, type FROM pragma_table_info('" + table + "')"))
+      for (const auto& row : Sql("SELECT rowid FROM " + table + " WHERE event_number IS NOT NULL")) {
+        const std::string& name = column[0];
+        const std::string other = name == "state"       ? "'[1]'"
+                                  : column[1] == "TEXT" ? "'other'"
+                                                        : "coalesce(" + name + ", 4) + 100";
+        ++tried;
+        EXPECT_EQ(Check("UPDATE " + table + " SET " + name + " = " + other + " WHERE rowid = " + row[0]).empty(), false)
+            << table << "." << name << " of " << row[0];
+      }
+  EXPECT_GT(tried, 200);
+}
+
+TEST_F(RowsTest, ADeletedRowIsSeen) {
+  for (const std::string table : {"decisions", "execution_events", "gaps", "runs"})
+    for (const auto& row :
+         Sql("SELECT rowid FROM " + table + (table == "gaps" ? " WHERE event_number IS NOT NULL" : "")))
+      EXPECT_FALSE(Check("DELETE FROM " + table + " WHERE rowid = " + row[0]).empty()) << table << " " << row[0];
+}
+
+TEST_F(RowsTest, AnAddedRowIsSeen) {
+  for (const std::string table : {"decisions", "execution_events", "gaps"})
+    for (const auto& row : Sql("SELECT log_file, event_number, event_digest FROM decisions UNION SELECT log_file, "
+                               "event_number, event_digest FROM execution_events"))
+      EXPECT_EQ(Check("CREATE TEMP TABLE added AS SELECT * FROM " + table +
+                      " LIMIT 1; UPDATE added SET event_number = " + row[1] + ", event_digest = '" + row[2] +
+                      "'; INSERT OR IGNORE INTO " + table + " SELECT * FROM added WHERE NOT EXISTS (SELECT 1 FROM " +
+                      table + " WHERE event_number = " + row[1] + ")")
+                    .empty(),
+                !Sql("SELECT 1 FROM " + table + " WHERE event_number = " + row[1]).empty())
+          << table << " " << row[1];
+}
+
+TEST_F(RowsTest, TheSentenceNamesTableEventAndColumn) {
+  EXPECT_THAT(Check("UPDATE decisions SET outcome = 'certified', margin = NULL WHERE event_number = 4"),
+              ElementsAre(AllOf(HasSubstr("  row: decisions, event 4: outcome certified, by its event abstain_safety; "
+                                          "margin nothing, by its event 0.5\n"),
+                                HasSubstr("1 rows other than their events say"))));
+  EXPECT_THAT(Check("DELETE FROM execution_events WHERE event_number = 5"),
+              ElementsAre(HasSubstr("row: execution_events, event 5: its row is missing")));
+  EXPECT_THAT(Check("DELETE FROM decisions; DELETE FROM execution_events; DELETE FROM gaps WHERE event_number > 0"),
+              ElementsAre(HasSubstr("14 rows other than their events say")));
+  EXPECT_THAT(Check("UPDATE decisions SET log_file = 'b.lcmlog' WHERE event_number = 4"),
+              ElementsAre(HasSubstr("its row is missing"), HasSubstr("b.lcmlog: missing, 1 rows have no event")));
+}
+
+TEST_F(RowsTest, WhatALoggerThatIsStillRunningHasNotWrittenYetIsNotMissing) {
+  const std::string unended = "UPDATE runs SET end_utime = NULL, events = 4; ";
+  EXPECT_THAT(Check(unended + "DELETE FROM decisions WHERE event_number >= 4"), IsEmpty());
+  EXPECT_THAT(Check(unended + "DELETE FROM decisions WHERE event_number >= 1"), testing::SizeIs(1));
+}
+
+// What the logger lost itself it may have counted otherwise than its log tells.
+TEST_F(RowsTest, AGapOfAChannelWithOtherLossesMayDiffer) {
+  const std::string other = "UPDATE gaps SET lost = 9 WHERE channel = 'EXECUTION_EVENT' AND event_number = 5";
+  EXPECT_THAT(Check(other), testing::SizeIs(1));
+  EXPECT_THAT(Check("UPDATE gaps SET channel = 'EXECUTION_EVENT' WHERE channel = 'CAMERA'; " + other), IsEmpty());
+  EXPECT_THAT(Check("UPDATE decisions SET latency_us = 7 WHERE event_number = 4"), testing::SizeIs(1));
+}
+
+TEST_F(RowsTest, OfARunWithKeysOnlyAuthenticMessagesHaveRows) {
+  const std::string keyed = "UPDATE runs SET robot = 'test'; ";
+  EXPECT_THROW((void)Check(keyed), ConfigError);
+  std::filesystem::rename(scratch_ / "whole", path_);
+  Sql(keyed);
+  EXPECT_TRUE(CheckLogs(scratch_.path(), "", {.none = true}).at(0).whole_log());
+  const std::string keys = MakeTestKeys(scratch_ / "keys");
+  EXPECT_EQ(CheckLogs(scratch_.path(), "", {.file = keys}).at(0).rows.size(), 14u) << "no message is signed";
+  Sql("DELETE FROM decisions; DELETE FROM execution_events; DELETE FROM gaps");
+  EXPECT_TRUE(CheckLogs(scratch_.path(), "", {.file = keys}).at(0).whole_log());
+  EXPECT_EQ(CheckLogs(scratch_.path(), "", {.none = true}).at(0).rows.size(), 14u);
+  Sql("UPDATE runs SET log_deleted_utime = 1");
+  std::filesystem::remove(log_);
 }
 
 }  // namespace forereach::check_test

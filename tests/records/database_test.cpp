@@ -178,7 +178,7 @@ TEST(Database, WritesAllOrNothing) {
   Sql(scratch / "d.sqlite",
       "CREATE TRIGGER full BEFORE INSERT ON gaps BEGIN SELECT RAISE(ABORT, 'database or disk is full'); END");
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), std::nullopt);
-  EXPECT_THAT(database.problem(), testing::HasSubstr("disk is full"));
+  EXPECT_THAT(database.problem(), testing::HasSubstr("d.sqlite: it refuses a row"));
   EXPECT_TRUE(database.Read().empty());
   Sql(scratch / "d.sqlite", "DROP TRIGGER full");
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);

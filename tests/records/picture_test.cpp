@@ -1,4 +1,5 @@
 #include "records/picture.h"
+#include "records/output_file.h"
 
 #include "tests/test.h"
 
@@ -59,8 +60,8 @@ TEST(Picture, SaysWhatItCannotWrite) {
   const ScratchDirectory scratch;
   EXPECT_THROW(DrawPicture({}, scratch / "a.jpg"), PictureError);
   EXPECT_THROW(DrawPicture({}, scratch / "a.png", 100, 800), PictureError);
-  EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.png"), PictureError);
-  EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.svg"), PictureError);
+  EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.png"), OutputError);
+  EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.svg"), OutputError);
 }
 
 TEST(Picture, FilesAreThoseOfTheNameOrRefusedWithASentence) {

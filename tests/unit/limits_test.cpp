@@ -35,6 +35,27 @@ class Limits : public testing::Test {
   Tube tube_;
 };
 
+// What is reached is rounded away from it.
+TEST_F(Limits, AreShownAsTheyWereGiven) {
+  EXPECT_THAT(Explain(Judge({AtMost("vx", 0.1)}), problem_), testing::EndsWith(", above its limit 0.1"));
+  EXPECT_THAT(Explain(Judge({AtLeast("vx", 1.1)}), problem_), testing::EndsWith(", below its limit 1.1"));
+  EXPECT_THAT(Explain(Judge({AtMost("vx", 1.23456789)}), problem_), testing::EndsWith("above its limit 1.23456789"));
+  EXPECT_THAT(Explain(Judge({AtMost("1/vx - vx", 1e-300)}), problem_), testing::EndsWith("above its limit 1e-300"));
+  problem_.limits = {};
+  const auto exit = [&](DomainExit::Kind kind, double bound) {
+    Decision decision{.outcome = Outcome::kDomain, .cause = Cause::kDomainExit, .step = 2};
+    decision.exit = {kind, 0, std::nextafter(bound, kind == DomainExit::Kind::kLower ? -9 : 9), bound};
+    return Explain(decision, problem_);
+  };
+  EXPECT_THAT(exit(DomainExit::Kind::kLower, 0.1), testing::EndsWith("px reaches 0.0999999, below its bound 0.1"));
+  EXPECT_THAT(exit(DomainExit::Kind::kUpper, 0.7), testing::EndsWith("px reaches 0.700001, above its bound 0.7"));
+  EXPECT_THAT(exit(DomainExit::Kind::kInequality, 0.7), testing::EndsWith("reaches 0.700001, above its bound 0.7"));
+  EXPECT_THAT(exit(DomainExit::Kind::kBall, 0.7), testing::EndsWith("reaches 0.700001, above its radius 0.7"));
+  Decision no_stop{.outcome = Outcome::kDomain, .cause = Cause::kNoStop, .step = 2};
+  no_stop.coordinate = 2, no_stop.margin = 0.2, no_stop.threshold = 0.1;
+  EXPECT_THAT(Explain(no_stop, problem_), testing::EndsWith("vx reaches 0.200001; standing is up to 0.1"));
+}
+
 TEST_F(Limits, AreClosedToTheLastBit) {
   const Decision above = Judge({AtMost("py", 90), AtMost("vx", 1, "speed")});
   EXPECT_EQ(above.outcome, Outcome::kSafety);

@@ -52,6 +52,14 @@ TEST(LimitOf, AFunctionWithoutABoundIsNotConfirmed) {
     EXPECT_NE(Judge(AtMost(that, 1e300)).status, Status::kConfirmed) << that;
 }
 
+TEST(LimitOf, AnAstronomicalAngleCannotBeVerified) {
+  for (const char* that : {"sin(2^(30*px)^3)", "cos(exp(exp(30*px)))", "tan((1e200*px)^64^64)"}) {
+    const Verdict verdict = Judge(AtMost(that, 7));
+    EXPECT_EQ(verdict.status, Status::kCannotVerify) << that;
+    EXPECT_THAT(verdict.failure.found, testing::HasSubstr("an angle of 2^16384 or more")) << that;
+  }
+}
+
 // x y over [-1, 1]^2 from a slice that is no box: enclosed by more than it reaches, so that neither is shown.
 TEST(LimitOf, ALimitThatIsNotShownExceededIsNotRefuted) {
   Certificate certificate = OneStep();

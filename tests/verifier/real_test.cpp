@@ -33,6 +33,23 @@ TEST(Real, TangentIsUnboundedOverItsPole) {
   EXPECT_TRUE(tan(Real::FromTo(1.4, 1.5)).IsFinite());
 }
 
+// Without a bound on the work, each of these takes minutes and gigabytes.
+TEST(Real, SineCosineAndTangentOfAnAstronomicalAngleAreNotComputed) {
+  const auto two_to_the = [](double e) { return exp(Real(e) * log(Real(2.0))); };
+  for (const auto& function : {+[](const Real& x) { return sin(x); }, +[](const Real& x) { return cos(x); },
+                               +[](const Real& x) { return tan(x); }}) {
+    for (const Real& angle : {two_to_the(1e15), -two_to_the(1e15), Real::FromTo(0.0, two_to_the(1e15)),
+                              two_to_the(16384.5), Real::Everything(), Real(std::nan(""))}) {
+      const Real value = function(angle);
+      EXPECT_FALSE(value.IsFinite());
+      EXPECT_EQ(IsAtMost(value, 1.0), Answer::kUnknown);
+      EXPECT_THAT(value.text(), testing::HasSubstr("no finite enclosure"));
+    }
+    EXPECT_TRUE(function(0x1p1023).IsFinite());
+    EXPECT_TRUE(function(0.0).IsFinite());
+  }
+}
+
 TEST(Real, AnIntervalHasItsEndsMiddleAndMagnitude) {
   const Real x = Real::FromTo(-1.0, 3.0);
   EXPECT_EQ(x.lower().ToDouble(), -1);

@@ -57,6 +57,14 @@ TEST_P(TextCertificates, OfAQuadrotorAreConfirmed) {
   ExpectConfirmed(QuadrotorText(GetParam()), random, Eigen::Vector4d(4.9, 0, 0, 0), 8);
 }
 
+// Anywhere in the domain the angle is astronomical, but not where the plans are.
+TEST_P(TextCertificates, OfAnAngleThatIsAstronomicalElsewhereAreConfirmed) {
+  TracedRandom random(93);
+  ExpectConfirmed(
+      TextModel({{"x", "x + 0.01*cos(2^(75*(x - 0.3))^3) + dt*u"}}, {"u"}, {{"dt", 0.1, 0.1}}, {}, Integrator::kNone),
+      random, Eigen::VectorXd::Zero(1), 3);
+}
+
 TEST_P(TextCertificates, OfManyFunctionsAreConfirmed) {
   TracedRandom random(92);
   const Lines equations{{"x", "0.5*tanh(y) + 0.1*atan(x*y) - 0.2*x*exp(-y^2)"},
