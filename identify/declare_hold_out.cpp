@@ -122,8 +122,8 @@ void WarnOfOutside(const std::vector<Trial>& trials) {
   std::string text;
   for (const Trial& trial : trials)
     if (trial.left() > 0)
-      text += (text.empty() ? "" : ", ") + OutsideText(trial.left(), trial.slices()) + " at factor " +
-              ToText(trial.factor);
+      text +=
+          (text.empty() ? "" : ", ") + OutsideText(trial.left(), trial.slices()) + " at factor " + ToText(trial.factor);
   if (!text.empty())
     std::cerr << "forereach: warning: outside the slices of their certificates lie " << text
               << ". A declaration whose slices lose the robot is false, whatever it certifies" << std::endl;
@@ -295,8 +295,8 @@ HeldOutSteps JudgeByHeldOut(const Config& config, const Declaration& declaration
   Trial trial;
   CertifyWindows(config, declaration, split, chosen, jobs, trial);
   found.stretches = trial.windows;
-  found.slices = trial.slices;
-  found.outside = trial.slices - trial.inside;
+  found.slices = trial.slices();
+  found.outside = trial.left();
   return found;
 }
 

@@ -195,9 +195,10 @@ class Guard final {
 
   /** Checks that the state measured after control step - 1 has not left the hull of slice `step`: that a part of
   measured_state +- state_error lies in it, compared as exact real numbers. Then checks, with max_jitter_us,
-  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of the step before, or of TryStart) <=
-  step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n);
-  it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of
+  the step before, or of TryStart) <= step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a
+  refusal no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock,
+  microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us,
                                    std::span<const double> state_error = {}) noexcept;
 

@@ -792,7 +792,7 @@ TEST(RobotSim, MeasuresWithItsSensorErrorAndDrivesByTheTruth) {
     config.planner.goal_radius = 0.0205;
     std::vector<std::vector<double>> truth;
     const std::unique_ptr<Target> target = MakeTarget(config);
-    Rig rig(config, [&](auto x, auto u, auto next) {
+    Rig rig(config, [&](auto x, auto u, auto next, double) {
       target->Step(x, u, next);
       truth.emplace_back(next.begin(), next.end());
     });
