@@ -204,10 +204,12 @@ std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, 
     case Authenticity::kOld: ++refused.old; break;
     case Authenticity::kAhead: ++refused.ahead; break;
   }
-  Refusals one{refused, {}};
-  if (const auto spoken = channels_.find(channel); spoken != channels_.end())
-    one.by_role[spoken->second.speaker] = {refused, refused.old + refused.ahead == 0 ? 0 : Apart(bytes, now_us)};
-  refusals_ += one;
+  refusals_.RefusalCounts::operator+=(refused);
+  if (const auto spoken = channels_.find(channel); spoken != channels_.end()) {
+    Refusals::OfRole& of_role = refusals_.by_role[spoken->second.speaker];
+    of_role.counts += refused;
+    if (refused.old + refused.ahead > 0) of_role.apart_us = Apart(bytes, now_us);
+  }
   return {authenticity, {}};
 }
 

@@ -40,7 +40,7 @@ std::string PositionText(const Eigen::VectorXd& position) {
 // What keeps every plan from being certified, by the examination of the task.
 std::string FindingsOf(const PlanArguments& options) {
   std::string text;
-  for (const TaskFinding& finding : CheckTask({.config = options.config}).findings)
+  for (const TaskFinding& finding : CheckTask({options.config, "", 0}).findings)
     if (!finding.is_remark) text += "\n" + finding.place + finding.what + "\n    " + finding.advice;
   return text;
 }

@@ -127,7 +127,8 @@ class DirectoryCheck {
                       directory_.PathOf(run.log_file), run.robot));
     const std::vector<std::string> log{directory_.PathOf(run.log_file)};
     const LogSurvey survey = check.damaged_tasks.empty() ? Survey(log, LogOrder::kAny) : LogSurvey();
-    return forereach::ChannelsOf(survey, directory_.path(), config_, run.robot.empty() ? LogKey{.none = true} : key_);
+    return forereach::ChannelsOf(survey, directory_.path(), config_,
+                                 run.robot.empty() ? LogKey{.file = "", .none = true} : key_);
   }
 
   [[nodiscard]] Interpreter InterpreterOf(const RunRow& run, const BusOptions& channels, RowGrounds& grounds) {
