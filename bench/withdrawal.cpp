@@ -177,6 +177,9 @@ nlohmann::json Measure(int rounds) {
   const Task clear = MakeTask(Scenario::kBicycle, kObservations),
              blocked = MakeBlockedTask(Scenario::kBicycle, kObservations);
   Config config = MakeConfig(clear);
+  const auto problem = std::make_shared<Problem>(*config.problem);
+  problem->declaration.state_error.setZero(problem->model->num_states());
+  config.problem = problem;
   config.gate.needs_robot_state = true;
   config.gate.obstacles = ObstaclesSource::kBus;
   config.gate.obstacles_lost_ms = kNeverLost;

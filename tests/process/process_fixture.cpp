@@ -39,6 +39,7 @@ declaration:
     vx: {vx: 0.092186775, vy: 0.075860540}
     vy: {vx: 0.075860540, vy: 0.092186775}
   noise_bound: [0, 0, 0, 0]
+  state_error: {}
 transitions: )" FOREREACH_SOURCE_DIR R"(/config/data/point_mass_100.csv
 task:
   initial_set: {center: [0, 0, 0, 0], half_width: [0.05, 0.05, 0.03, 0.03]}
