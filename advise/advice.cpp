@@ -185,6 +185,7 @@ void AddObservation(Problem& problem, const Eigen::VectorXd& z, const Eigen::Vec
   all.x_next.conservativeResize(row + 1, Eigen::NoChange);
   all.z.row(row) = z.transpose();
   all.x_next.row(row) = (next + residual).transpose();
+  ++all.num_learned;
   if (all.longer.size() > 0) {
     all.longer.conservativeResize(row + 1);
     all.longer[row] = 0;
@@ -467,7 +468,7 @@ class Adviser {
       const int t = std::min(most, steps) == 1 ? 0 : i * (steps - 1) / (std::min(most, steps) - 1);
       Eigen::VectorXd z(model_.num_variables());
       z << tube_.slice(t).CenterVector(), case_.controls.col(t);
-      if (!IsWithin(*case_.problem, {z.data(), ToSize(z.size())})) continue;
+      if (!IsWithin(*case_.problem, {z.data(), ToSize(z.size())}, true)) continue;
       const Allowed allowed(*case_.problem, known, z);
       std::vector<Case> after;
       for (const Eigen::VectorXd& outcome : allowed.Outcomes())
@@ -570,6 +571,7 @@ class Adviser {
     if (observation < 0 || observation >= case_.problem->transitions.size()) return;
     const Case changed = WithProblem(case_, [&](Problem& problem) {
       Transitions& all = problem.transitions;
+      if (all.IsLearned(observation)) --all.num_learned;
       const Eigen::Index behind = all.z.rows() - observation - 1;
       all.z.middleRows(observation, behind) = all.z.bottomRows(behind).eval();
       all.x_next.middleRows(observation, behind) = all.x_next.bottomRows(behind).eval();

@@ -191,7 +191,7 @@ class Examination final {
       const std::vector<Interval> point(z.begin(), z.end());
       const DomainExit exit = FindExit(problem_.domain, point);
       if (exit.kind == DomainExit::Kind::kNone)
-        (IsWithin(problem_, {z.data(), ToSize(z.size())}) ? rows_ : near_the_edge).push_back(i);
+        (IsWithin(problem_, {z.data(), ToSize(z.size())}, false) ? rows_ : near_the_edge).push_back(i);
       const bool is_ball = exit.kind == DomainExit::Kind::kBall;
       if (!is_ball && exit.kind != DomainExit::Kind::kInequality) continue;
       const std::size_t which = ToSize(exit.index) + (is_ball ? problem_.domain.inequalities.size() : 0);

@@ -34,6 +34,7 @@ std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>&
   Eigen::Index row = all.z.rows();
   all.z.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
   all.x_next.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
+  all.num_learned += static_cast<int>(learned.size());
   const Eigen::Index before = all.longer.size();
   all.longer.conservativeResize(all.z.rows());
   all.longer.tail(all.z.rows() - before).setZero();

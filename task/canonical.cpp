@@ -67,6 +67,7 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
   add("disturbance", declaration.disturbance);
   add("state_error", declaration.state_error);
   add("input_error", declaration.input_error);
+  if (declaration.given_are_exact && declaration.HasErrorInZ()) bytes.Text("given are exact");
   return bytes.digest();
 }
 

@@ -79,7 +79,7 @@ std::vector<int> KeepThoseWithin(const std::string& path, Problem& problem) {
   std::vector<int> rows;
   for (int i = 0; i < all.size(); ++i) {
     const Eigen::VectorXd z = all.z.row(i);
-    if (IsWithin(problem, {z.data(), ToSize(z.size())})) rows.push_back(i);
+    if (IsWithin(problem, {z.data(), ToSize(z.size())}, false)) rows.push_back(i);
   }
   if (rows.empty())
     throw ConfigError(path +

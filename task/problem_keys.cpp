@@ -157,6 +157,13 @@ std::vector<Key> DeclarationKeys() {
                     "`<state>_next`, all inside the domain, at least one row. Those whose declared errors may take "
                     "them out are left out.",
                     [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
+      Optional(Word("declaration.transitions_are", {"measured", "exact"},
+                    "measured: state_error and input_error are those of the file's transitions, too. exact: the file's "
+                    "are exact, as a simulation makes them, and the errors are those of the robot on the bus alone.",
+                    [](const Field& at, TaskDraft& draft) {
+                      draft.problem.declaration.given_are_exact = at.Text() == "exact";
+                    }),
+               "measured"),
   };
 }
 

@@ -370,7 +370,8 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
     const std::vector<Real> nominal = equations.Value(z);
-    std::vector<Real> errors = RecordErrors(z);
+    std::vector<Real> errors(ToSize(problem.model->num_states()));
+    if (!problem.declaration.given_are_exact || data.IsLearned(i)) errors = RecordErrors(z);
     AddDuration(i, z, nominal, errors);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {

@@ -53,7 +53,7 @@ void ValidateObservations(const Problem& problem) {
               std::to_string(variables));
   for (int i = 0; i < problem.transitions.size(); ++i) {
     const Eigen::VectorXd z = problem.transitions.z.row(i);
-    Require(IsWithin(problem, {z.data(), ToSize(z.size())}),
+    Require(IsWithin(problem, {z.data(), ToSize(z.size())}, problem.transitions.IsLearned(i)),
             "transition " + std::to_string(i) + ": lies outside the certification domain" +
                 (problem.declaration.HasErrorInZ() ? ", or may within the declared errors" : ""));
   }

@@ -8,8 +8,9 @@
 
 namespace forereach {
 
-bool IsWithin(const Problem& problem, std::span<const double> z) {
-  if (!problem.declaration.HasErrorInZ()) return problem.domain.Contains(z);
+bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned) {
+  const Declaration& declaration = problem.declaration;
+  if (!declaration.HasErrorInZ() || (declaration.given_are_exact && !is_learned)) return problem.domain.Contains(z);
   return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
 }
 
@@ -17,13 +18,13 @@ Learned Observe(const Problem& problem, std::span<const double> z, std::span<con
                 Observations& observed) {
   const auto finite = [](double value) { return std::isfinite(value); };
   if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
-  if (!IsWithin(problem, z)) return problem.domain.Contains(z) ? Learned::kNearTheEdge : Learned::kOutsideDomain;
+  if (!IsWithin(problem, z, true)) return problem.domain.Contains(z) ? Learned::kNearTheEdge : Learned::kOutsideDomain;
   const auto row = [](std::span<const double> values) {
     return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
   };
   try {
-    observed = Observe(*problem.model, problem.declaration, {row(z), row(next), Eigen::VectorXd::Constant(1, longer)},
-                       problem.timing);
+    observed = Observe(*problem.model, problem.declaration,
+                       {row(z), row(next), Eigen::VectorXd::Constant(1, longer), 1}, problem.timing);
   } catch (const AmbiguousAngle&) {
     return Learned::kAmbiguousAngle;
   } catch (const NoNominalValue& error) {

@@ -21,8 +21,8 @@ enum class Learned {
 };
 
 /** Whether the box around z (Declaration::BoxAround) provably lies in the domain: a transition that was recorded at z
-then counts. */
-[[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z);
+then counts. @param is_learned whether it was learned: given ones may be exact (Declaration::given_are_exact). */
+[[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned);
 
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. @param longer by how much the
 step lasted longer or shorter than dt, at most, s. Without a fault `observed` gets

@@ -22,6 +22,9 @@ struct Declaration {
   the units of the states and inputs. No entries: not declared, and then what is recorded is taken as exact, as with
   zeros. It counts beside sigma and w^ (docs/soundness.md, 3.16). */
   Eigen::VectorXd state_error = {}, input_error = {};
+  /** e is not that of the given transitions, which are exact, as those of a simulation are; of those that are learned
+  it is (Transitions::num_learned). */
+  bool given_are_exact = false;
 
   /** Whether some w^_k is not zero. */
   [[nodiscard]] bool IsDisturbed() const { return (disturbance.array() != 0).any(); }

@@ -54,7 +54,7 @@ class Observer final {
   // An enclosure for each state, valid until the next call. The step lasted by up to `longer` longer than dt or
   // shorter.
   const std::array<Interval, kMaxStates>& At(std::span<const double> z, std::span<const double> x_next, double longer,
-                                             int row) {
+                                             bool is_exact, int row) {
     model_.Linearize(z, linear_);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       const Interval& nominal = linear_.value[k];
@@ -62,7 +62,8 @@ class Observer final {
           IsAngle(k) ? ResidualOfAngle(x_next[k], nominal) : ResidualOf(x_next[k], UlpOf(x_next[k]), nominal);
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kLocation);
     }
-    if (has_errors_) BoundErrors(z);
+    if (has_errors_ && is_exact) error_.fill(0);
+    if (has_errors_ && !is_exact) BoundErrors(z);
     if (longer > 0) EncloseRate(z, longer);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
@@ -149,8 +150,8 @@ Observations Observe(const NominalModel& model, const Declaration& declaration, 
   for (int i = 0; i < count; ++i) {
     const Eigen::VectorXd z = transitions.z.row(i), x_next = transitions.x_next.row(i);
     if (!z.allFinite() || !x_next.allFinite()) Refuse(i, "not finite");
-    const auto& residual =
-        observer.At({z.data(), ToSize(z.size())}, {x_next.data(), ToSize(n)}, transitions.Longer(i), i);
+    const auto& residual = observer.At({z.data(), ToSize(z.size())}, {x_next.data(), ToSize(n)}, transitions.Longer(i),
+                                       declaration.given_are_exact && !transitions.IsLearned(i), i);
     for (int k = 0; k < n; ++k) {
       observations.lower(i, k) = residual[ToSize(k)].lower;
       observations.upper(i, k) = residual[ToSize(k)].upper;

@@ -12,6 +12,10 @@ struct Transitions {
   /** By how much each step lasted longer or shorter than dt, at most, in seconds; none: all lasted dt. */
   Eigen::VectorXd longer = {};
 
+  /** So many of the last rows were learned on a bus: the declared errors of what is recorded are theirs. */
+  int num_learned = 0;
+
+  [[nodiscard]] bool IsLearned(Eigen::Index row) const { return row >= z.rows() - num_learned; }
   /** That of one row. */
   [[nodiscard]] double Longer(Eigen::Index row) const { return longer.size() == 0 ? 0 : longer[row]; }
   [[nodiscard]] int size() const { return static_cast<int>(z.rows()); }
