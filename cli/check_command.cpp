@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "advise/hypotheses.h"
 #include "advise/task_check.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
@@ -88,7 +89,14 @@ void PrintFindings(const TaskCheck& check, std::ostream& out) {
     out << finding.place << (finding.is_remark ? "remark: " : "") << finding.what << "\n    " << finding.advice << "\n";
 }
 
-Json ToJson(const TaskCheck& check) {
+void PrintHypotheses(const std::vector<Hypothesis>& hypotheses, std::ostream& out) {
+  out << "a certificate of this task rests on this:\n";
+  for (const Hypothesis& each : hypotheses) out << "  " << each.what << "\n    upheld by: " << each.upheld_by << "\n";
+}
+
+Json ToJson(const TaskCheck& check, const std::vector<Hypothesis>& rests_on) {
+  Json hypotheses = Json::array();
+  for (const Hypothesis& each : rests_on) hypotheses.push_back({{"what", each.what}, {"upheld_by", each.upheld_by}});
   Json findings = Json::array(), coordinates = Json::array(), rows = Json::array();
   for (const TaskFinding& finding : check.findings)
     findings.push_back(
@@ -109,6 +117,7 @@ Json ToJson(const TaskCheck& check) {
           {"states", check.states},
           {"half_widths", check.half_widths},
           {"tube", check.tube},
+          {"hypotheses", hypotheses},
           {"good", !check.HasFindings()}};
 }
 
@@ -122,12 +131,14 @@ int Check(const CheckArguments& options) {
   const bool lacks_picture = !files.empty() && !check.is_planar;
   if (lacks_picture) files.clear();
   for (const std::string& file : files) DrawPicture(check.picture, file);
+  const std::vector<Hypothesis> rests_on = HypothesesOf(LoadConfig(options.check.config, TransitionsFile::kIgnore));
   if (options.json) {
-    std::cout << JsonText(ToJson(check)) << std::endl;
+    std::cout << JsonText(ToJson(check, rests_on)) << std::endl;
   } else {
     std::ostringstream out;
     PrintData(check, out);
     PrintTube(check, options, out);
+    PrintHypotheses(rests_on, out);
     PrintFindings(check, out);
     for (const std::string& file : files) out << "picture: " << file << "\n";
     std::cout << out.str() << std::flush;

@@ -97,8 +97,10 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
           Conformance worst = Conformance::kInside;
           for (int k = 0; k < problem->model->num_states(); ++k) {
             const Interval hull = tube.hull(t, k);
-            worst = std::max(worst, Conform(commands[i].states(k, t), declaration.VariableError(k), hull.lower,
-                                            hull.upper, problem->model->IsAngle(k)));
+            // How far what is recorded may be from the true state.
+            const double error = AddUp(declaration.noise_bound[k], declaration.VariableError(k));
+            worst = std::max(
+                worst, Conform(commands[i].states(k, t), error, hull.lower, hull.upper, problem->model->IsAngle(k)));
           }
           ++found_in[i][ToSize(static_cast<int>(worst))];
         }

@@ -120,7 +120,7 @@ TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {
 TEST_F(DeclareTest, BetweensLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
   const std::string body = "  body: {pose: [x, y, theta], parts: [{disc: {at: [1, 0], radius: 1}}]}\n",
                     unsaid = std::regex_replace(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"),
-                                                std::regex("  between: .*\n"), ""),
+                                                std::regex("  (between|step_period_ms): .*\n"), ""),
                     demo = Replaced(unsaid, "  projection: [x, y]\n", body);
   std::ofstream(task_) << demo;
   const Json document = Json::parse(Declare("--between --json").text);

@@ -264,8 +264,8 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
 
 // The bicycle of tests/data/field.yaml with this for its projection.
 std::string BicycleWith(const std::string& body) {
-  const std::string task =
-      std::regex_replace(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"), std::regex("  between: .*\n"), "");
+  const std::string task = std::regex_replace(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"),
+                                              std::regex("  (between|step_period_ms): .*\n"), "");
   return Replaced(Replaced(task, "  projection: [x, y]\n", body),
                   "\ntransitions: ../../config/data/demo_transitions.csv",
                   "\ntransitions: " FOREREACH_SOURCE_DIR "/config/data/demo_transitions.csv");

@@ -164,7 +164,7 @@ inline std::shared_ptr<Problem> Recorded(Random& random, const Problem& truth) {
     for (int l = 0; l < variables; ++l) data.z(i, l) += off(errors[l]);
     for (int k = 0; k < n; ++k) data.x_next(i, k) += off(errors[k]);
     const Eigen::VectorXd z = data.z.row(i);
-    if (IsWithin(*problem, View(z))) rows.push_back(i);
+    if (IsWithin(*problem, View(z), false)) rows.push_back(i);
   }
   if (rows.empty()) return std::make_shared<Problem>(truth);
   data = Transitions{data.z(rows, Eigen::all), data.x_next(rows, Eigen::all)};

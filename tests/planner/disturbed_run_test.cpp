@@ -78,6 +78,7 @@ Config MeasuredTask(const std::string& sensor_error, int seed) {
   Problem problem = *config.problem;
   problem.declaration.disturbance.setZero();
   problem.declaration.state_error = Vec({0.02, 0.02, 0.004, 0.02, 0, 0.01});
+  problem.declaration.given_are_exact = true;
   config.robot.sensor_error = sensor_error;
   config.planner.initial_half_width = {0.05, 0.06, 0.012, 0.045, 0.01, 0.022};
   config.gate.learns = false;  // its transitions are measured, too

@@ -131,6 +131,7 @@ TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
 TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
   Problem problem = *config_.problem;
   problem.declaration.state_error = Vec({0.03, 0.1, 0, 0, 0, 0});
+  problem.declaration.given_are_exact = true;
   config_.problem = std::make_shared<const Problem>(std::move(problem));
   node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
   robot_state_t state = Standing();

@@ -1,0 +1,90 @@
+#include "advise/hypotheses.h"
+
+#include <fmt/format.h>
+
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "task/step_time.h"
+
+namespace forereach {
+namespace {
+
+// "x 0.03, y 0.03": what is not zero.
+std::string Bounds(const std::vector<std::string>& names, const Eigen::VectorXd& bounds) {
+  std::string text;
+  for (Eigen::Index k = 0; k < bounds.size(); ++k)
+    if (bounds[k] != 0)
+      text += (text.empty() ? "" : ", ") + names[ToSize(static_cast<int>(k))] + " " + ToText(bounds[k]);
+  return text.empty() ? "nothing" : text;
+}
+
+void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
+  const StepTiming& timing = config.problem->timing;
+  if (const auto error = StepErrorUs(config.gate); error && *error > 0)
+    all.push_back({fmt::format("each step begins within {} ms of its time, by the plan's start and by its first step",
+                               ToText(static_cast<double>(*error) / 1e3)),
+                   "the guard, which ends the plan at one that does not"});
+  else
+    all.push_back({"steps are on time", error ? "the guard, which ends the plan at one that is not"
+                                              : "nobody: robot.step_error_ms is not given, so no clock is looked at"});
+  std::string set;
+  for (const int k : timing.set_at_steps)
+    set += (set.empty() ? "" : ", ") + config.problem->model->state_names()[ToSize(k)];
+  if (!set.empty())
+    all.push_back({"software sets " + set + " at the steps' boundaries", "declared (model.set_at_steps)"});
+  if (const auto clocks = config.gate.max_clock_error_ms)
+    all.push_back(
+        {fmt::format("the clocks of the robot and of the obstacles' sender differ by at most {} ms", ToText(*clocks)),
+         "the certifier, which holds every stamp against its arrival"});
+}
+
+void AddObstacles(const Config& config, std::vector<Hypothesis>& all) {
+  const GateOptions& gate = config.gate;
+  if (gate.obstacles != ObstaclesSource::kBus) {
+    all.push_back({"no obstacle is there but those of the task", "declared"});
+    return;
+  }
+  std::string lost = "never withdrawn";
+  if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms != kNeverLost)
+    lost = fmt::format("withdrawn after {} ms", ToText(*gate.obstacles_lost_ms));
+  all.push_back({"every obstacle is in the task or in the last message of perception",
+                 fmt::format("perception; after {} ms without it nothing is certified, and plans under way are {}",
+                             ToText(gate.obstacles_timeout_ms), lost)});
+}
+
+}  // namespace
+
+std::vector<Hypothesis> HypothesesOf(const Config& config) {
+  const Problem& problem = *config.problem;
+  const NominalModel& model = *problem.model;
+  const Declaration& declaration = problem.declaration;
+  std::vector<Hypothesis> all{
+      {"a measured state is off the true one by at most " + Bounds(model.state_names(), declaration.state_error),
+       declaration.DeclaresStateError() ? "declared; transitions that contradict each other refute it"
+                                        : "nobody: declaration.state_error is not given, so states are taken as exact"},
+      {"the first state lies in X0",
+       "the guard, which starts a plan only if all of the measured state +- its error does"},
+      {"the robot applies the plan's controls, one a step", "the guard, which hands out no others"}};
+  AddTimes(config, all);
+  all.push_back({"the residual changes by no more than declaration.lipschitz, on the whole domain",
+                 "declared; transitions of the file and of the bus that contradict it falsify it (F)"});
+  if (!declaration.noise_bound.isZero(0))
+    all.push_back({"recorded successors are off by at most " + Bounds(model.state_names(), declaration.noise_bound),
+                   "declared; transitions refute it likewise"});
+  if (declaration.given_are_exact)
+    all.push_back({"the transitions of the file are exact", "declared (declaration.transitions_are)"});
+  if (declaration.IsDisturbed())
+    all.push_back({"each step is disturbed by at most " + Bounds(model.state_names(), declaration.disturbance),
+                   "declared; transitions refute it likewise"});
+  if (problem.between)
+    all.push_back(
+        {"between two samples the motion keeps the bounds of task.between",
+         "declared; `forereach declare --between` proves it of the equations, and a turn that no motion within "
+         "them makes is not certified (D)"});
+  AddObstacles(config, all);
+  all.push_back({"a state that leaves its slice shows that one of these is false",
+                 "the guard, which halts, and the certifier, which latches it"});
+  return all;
+}
+
+}  // namespace forereach
