@@ -46,12 +46,11 @@ class RowComparison {
       const std::int64_t event = row.event.event_number;
       const auto again = missing.extract(event);
       const std::string how = again ? DescribeDifference(CellsOfRow(row), CellsOfRow(Adjusted(*again.mapped(), row)))
-                              : IsOpen(row) ? ""
-                                            : "no such row follows from it";
+                                    : "no such row follows from it";
       if (!how.empty()) Say(table, event, how);
     }
     for (const auto& [event, row] : missing)
-      if (event < grounds_.end && !IsOpen(*row)) Say(table, event, "its row is missing");
+      if (event < grounds_.end) Say(table, event, "its row is missing");
   }
 
   std::vector<std::string> sentences;
@@ -65,14 +64,6 @@ class RowComparison {
     return row.event.event_number >= 0 && !grounds_.damaged.contains(row.event.event_number);
   }
 
-  // Whether the log alone does not tell if there is such a row.
-  [[nodiscard]] static bool IsOpen(const DecisionRow&) { return false; }
-  [[nodiscard]] static bool IsOpen(const EventRow&) { return false; }
-  [[nodiscard]] bool IsOpen(const GapRow& row) const { return !grounds_.knows_order || IsLossy(row.channel); }
-  [[nodiscard]] bool IsLossy(const std::string& channel) const {
-    return grounds_.lossy.contains(channel) || grounds_.lossy.contains("*");
-  }
-
   // What is derived, with what does not follow from the log as it is recorded.
   [[nodiscard]] DecisionRow Adjusted(DecisionRow derived, const DecisionRow& recorded) const {
     if (std::isnan(derived.latency_us) && (!grounds_.knows_order || grounds_.misses_candidates))
@@ -80,9 +71,6 @@ class RowComparison {
     return derived;
   }
   [[nodiscard]] static const EventRow& Adjusted(const EventRow& derived, const EventRow&) { return derived; }
-  [[nodiscard]] const GapRow& Adjusted(const GapRow& derived, const GapRow& recorded) const {
-    return IsOpen(derived) ? recorded : derived;
-  }
 
   const RowGrounds& grounds_;
 };
@@ -93,7 +81,6 @@ std::vector<std::string> CompareRows(const Rows& recorded, const Rows& derived, 
   RowComparison comparison(grounds);
   comparison.Compare("decisions", recorded.decisions, derived.decisions);
   comparison.Compare("execution_events", recorded.events, derived.events);
-  comparison.Compare("gaps", recorded.gaps, derived.gaps);
   return std::move(comparison.sentences);
 }
 

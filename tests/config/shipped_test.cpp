@@ -184,7 +184,7 @@ TEST(Shipped, ARobotsPlanHasToEndStanding) {
     const Config config = LoadConfig(kDirectory + task + ".yaml");
     EXPECT_EQ(Decide(config, Eigen::MatrixXd::Zero(2, 6)).outcome, Outcome::kCertified) << task;
     Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(2, 6);
-    controls(0, 0) = 10, controls(0, 2) = -10;  // jerk: 1 m/s^2 for a while, and then it coasts
+    controls(0, 0) = 10, controls(0, 4) = -10;  // jerk: 1 m/s^2 for a while, and then it coasts
     const Decision decision = Decide(config, controls);
     EXPECT_EQ(decision.outcome, Outcome::kDomain) << task;
     EXPECT_EQ(decision.cause, Cause::kNoStop) << task;

@@ -133,7 +133,7 @@ TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
   problem.declaration.state_error = Vec({0.03, 0.1, 0, 0, 0, 0});
   problem.declaration.given_are_exact = true;
   config_.problem = std::make_shared<const Problem>(std::move(problem));
-  node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+  Start(config_);
   robot_state_t state = Standing();
   Tell(state);
   ASSERT_EQ(candidates_.size(), 1u);
@@ -142,7 +142,7 @@ TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
   EXPECT_EQ(candidates_[0].initial_half_width[1], AddUp(given[1], 0.1));
   EXPECT_EQ(candidates_[0].initial_half_width[2], given[2]);
 
-  node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+  Start(config_);
   state.num_state_errors = 6;
   state.state_error[2] = 0.5;
   Tell(state);
@@ -151,7 +151,7 @@ TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
   EXPECT_EQ(candidates_.back().initial_half_width[2], AddUp(given[2], 0.5));
   state.state_error[2] = -0.5;
   const std::size_t before = candidates_.size();
-  node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+  Start(config_);
   Tell(state);
   EXPECT_EQ(candidates_.size(), before) << "a state with such an error is none";
 }
