@@ -67,7 +67,7 @@ class Observer final {
     if (longer > 0) EncloseRate(z, longer);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
-      if (longer > 0) residual_[k] += OfDuration(z, longer, k);
+      if (longer > 0) residual_[k] += OfDuration(longer, k);
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kAround);
       if (IsAngle(k) && !IsWithinAQuarterTurn(residual_[k])) RefuseAngle(row, Name(k), residual_[k], error_[k]);
     }
@@ -93,7 +93,7 @@ class Observer final {
   }
 
   // What a step did more or less in state k because of its duration: delta g, and a share of r + w.
-  Interval OfDuration(std::span<const double> z, double longer, std::size_t k) {
+  Interval OfDuration(double longer, std::size_t k) {
     const auto around = [](double size) { return Interval(-size, size); };
     if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) > 0) return 0;
     if (const auto i = static_cast<Eigen::Index>(k); timing_.rate_bound.size() > 0 && timing_.rate_bound[i] < kInfinity)
