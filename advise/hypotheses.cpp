@@ -15,7 +15,7 @@ std::string Bounds(const std::vector<std::string>& names, const Eigen::VectorXd&
   for (Eigen::Index k = 0; k < bounds.size(); ++k)
     if (bounds[k] != 0)
       text += (text.empty() ? "" : ", ") + names[ToSize(static_cast<int>(k))] + " " + ToText(bounds[k]);
-  return text.empty() ? "nothing" : text;
+  return text;
 }
 
 void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
@@ -59,7 +59,9 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   const NominalModel& model = *problem.model;
   const Declaration& declaration = problem.declaration;
   std::vector<Hypothesis> all{
-      {"a measured state is off the true one by at most " + Bounds(model.state_names(), declaration.state_error),
+      {declaration.state_error.isZero(0)
+           ? "a measured state is the true one"
+           : "a measured state is off the true one by at most " + Bounds(model.state_names(), declaration.state_error),
        declaration.DeclaresStateError() ? "declared; transitions that contradict each other refute it"
                                         : "nobody: declaration.state_error is not given, so states are taken as exact"},
       {"the first state lies in X0",
