@@ -50,8 +50,8 @@ class Certifier final {
   using Learned = forereach::Learned;
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
   noise bound, and its disturbance within the declared one. @param longer by how much the step lasted longer or shorter
-  than dt, at most, s. Do not call it while Certify runs. Cost: about a
-  microsecond; if Compact has not been called for 256 transitions, it also builds an index.
+  than dt, at most, s. Do not call it while Certify runs. Cost: about a microsecond; some more where `longer` is not 0,
+  because the model's text is read anew. If Compact has not been called for 256 transitions, it also builds an index.
   @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next, double longer = 0);
   /** Number of learned transitions that are not in the index yet. */

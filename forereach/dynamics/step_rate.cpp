@@ -15,12 +15,6 @@ FOREREACH_ARITHMETIC_BEGIN
 namespace forereach {
 namespace {
 
-std::vector<std::string> NamesOf(std::span<const ModelText::Variable> variables) {
-  std::vector<std::string> names;
-  for (const ModelText::Variable& variable : variables) names.push_back(variable.name);
-  return names;
-}
-
 // x + factor rate, for each state.
 std::vector<Symbol> Moved(std::span<const Symbol> x, const Symbol& factor, std::span<const Symbol> rate) {
   std::vector<Symbol> moved;
@@ -53,7 +47,7 @@ StepRate::StepRate(const ModelText& text) {
   const auto dt = std::ranges::find(text.parameters, "dt", &ModelText::Parameter::name);
   if (dt == text.parameters.end()) throw std::invalid_argument("model " + text.name + ": there is no parameter dt");
   dt_ = ToSize(dt - text.parameters.begin());
-  const ExpressionNames names{NamesOf(text.states), NamesOf(text.inputs), text.parameters, text.definitions};
+  const ExpressionNames names = NamesOf(text);
   ProgramDraft draft(static_cast<int>(names.states.size()),
                      static_cast<int>(names.states.size() + names.inputs.size()));
   const Symbol h = Symbol::Parameter(draft, static_cast<int>(dt_));

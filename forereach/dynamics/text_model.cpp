@@ -81,7 +81,7 @@ std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
     Refuse(text, std::to_string(text.equations.size()) + " equations for " + std::to_string(states) + " states");
   const double dt = StepOf(text);
 
-  const ExpressionNames names{NamesIn(text.states), NamesIn(text.inputs), text.parameters, text.definitions};
+  const ExpressionNames names = NamesOf(text);
   const auto program = std::make_shared<ProgramDraft>(MakeProgram(names, text.equations));
   if (text.integrator == ModelText::Integrator::kEuler) AddEulerStep(text, *program);
   try {

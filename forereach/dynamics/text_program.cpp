@@ -68,6 +68,13 @@ ExpressionNames NamesOf(const NominalModel& model) {
   return names;
 }
 
+ExpressionNames NamesOf(const ModelText& text) {
+  ExpressionNames names{{}, {}, text.parameters, text.definitions};
+  for (const ModelText::Variable& state : text.states) names.states.push_back(state.name);
+  for (const ModelText::Variable& input : text.inputs) names.inputs.push_back(input.name);
+  return names;
+}
+
 std::vector<Symbol> ValuesAt(std::span<const Symbol> states, const ExpressionNames& names,
                              std::span<const ExpressionText> expressions, ProgramDraft& program) {
   Known known;

@@ -15,6 +15,8 @@ namespace forereach {
 
 /** States, inputs and parameters of a model, and the definitions of the text that it was made from. */
 [[nodiscard]] ExpressionNames NamesOf(const NominalModel& model);
+/** Those of a text. */
+[[nodiscard]] ExpressionNames NamesOf(const ModelText& text);
 
 /** The program whose value k is expressions[k], without derivatives. Its variables are the states, then the inputs; its
 parameters have the order of the names.

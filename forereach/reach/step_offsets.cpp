@@ -33,7 +33,8 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing, co
   for (int k = 0; k < n; ++k) {
     const auto i = ToSize(k);
     const bool is_declared = bound.size() > 0 && bound[k] < kInfinity;
-    Require(bound.size() == 0 || bound[k] >= 0, "rate bound: " + ToText(is_declared ? bound[k] : -1) + " is negative");
+    Require(bound.size() == 0 || bound[k] >= 0,
+            "rate bound: " + ToText(bound.size() == 0 ? 0 : bound[k]) + " is negative or no number");
     kind_[i] = std::ranges::count(timing.set_at_steps, k) > 0 ? Kind::kBySoftware
                : is_declared                                  ? Kind::kDeclared
                                                               : Kind::kByEquations;

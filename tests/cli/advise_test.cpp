@@ -44,48 +44,38 @@ TEST_F(AdviseTest, NamesTheBoundOfTheDomain) {
               HasSubstr("if the domain, and with it the declaration, reached farther: a to 4.41"));
 }
 
+// Advice on one step of a point mass whose vx begins within 0.2 of `center` and stays there. @param bound YAML of the
+// task.
+std::string AdviceOnOneStep(const ScratchDirectory& scratch, const std::string& center, const std::string& bound) {
+  scratch.Write("d.csv", "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,0,0,0,0,0,0,0,0\n");
+  scratch.Write("plan.csv", "ax,ay\n0,0\n");
+  scratch.Write("task.yaml",
+                "model: {name: point_mass, dt: 0.1}\n"
+                "domain: {state: {lower: [-9, -9, -9, -9], upper: [9, 9, 9, 9]}, input: {lower: [-1, -1], upper: "
+                "[1, 1]}}\ndeclaration: {lipschitz: {}, noise_bound: [0, 0, 0, 0]}\ntransitions: d.csv\n"
+                "task: {initial_set: {center: [0, 0, " +
+                    center + ", 0], half_width: [0.1, 0.1, 0.2, 0]}, projection: [px, py], between: samples, " + bound +
+                    ", obstacles: []}\n");
+  const std::string decision = scratch / "decision.json";
+  Forereach("certify --json --config " + (scratch / "task.yaml") + " --plan " + (scratch / "plan.csv") + " > " +
+            decision);
+  return Forereach("advise " + decision + " 2>&1").text;
+}
+
 // vx ends in [-0.25, 0.15], or the mirror image of it, and has to be in [-0.01, 0.01].
 TEST_F(AdviseTest, TheBoundOfRestCoversBothSides) {
-  scratch_.Write("d.csv", "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,0,0,0,0,0,0,0,0\n");
-  scratch_.Write("plan.csv", "ax,ay\n0,0\n");
-  for (const char* center : {"-0.05", "0.05"}) {
-    scratch_.Write("task.yaml",
-                   "model: {name: point_mass, dt: 0.1}\n"
-                   "domain: {state: {lower: [-9, -9, -9, -9], upper: [9, 9, 9, 9]}, input: {lower: [-1, -1], upper: "
-                   "[1, 1]}}\ndeclaration: {lipschitz: {}, noise_bound: [0, 0, 0, 0]}\ntransitions: d.csv\n"
-                   "task: {initial_set: {center: [0, 0, " +
-                       std::string(center) +
-                       ", 0], half_width: [0.1, 0.1, 0.2, 0]}, projection: [px, py], between: samples, rest: {vx: "
-                       "0.01}, obstacles: []}\n");
-    const std::string decision = scratch_ / "rest.json";
-    Forereach("certify --json --config " + (scratch_ / "task.yaml") + " --plan " + (scratch_ / "plan.csv") + " > " +
-              decision);
-    EXPECT_THAT(Forereach("advise " + decision + " 2>&1").text,
+  for (const char* center : {"-0.05", "0.05"})
+    EXPECT_THAT(AdviceOnOneStep(scratch_, center, "rest: {vx: 0.01}"),
                 HasSubstr("it would be certified\n    if standing allowed vx up to 0.25"))
         << center;
-  }
 }
 
 // As for rest: vx is in [-0.25, 0.15] or [-0.15, 0.25] all the time, and its one limit has two sides.
 TEST_F(AdviseTest, AWiderLimitCoversBothSides) {
-  scratch_.Write("d.csv", "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,0,0,0,0,0,0,0,0\n");
-  scratch_.Write("plan.csv", "ax,ay\n0,0\n");
-  for (const auto& [center, least, most] : {std::tuple{"-0.05", "-0.25", "0.15"}, {"0.05", "-0.15", "0.25"}}) {
-    scratch_.Write("task.yaml",
-                   "model: {name: point_mass, dt: 0.1}\n"
-                   "domain: {state: {lower: [-9, -9, -9, -9], upper: [9, 9, 9, 9]}, input: {lower: [-1, -1], upper: "
-                   "[1, 1]}}\ndeclaration: {lipschitz: {}, noise_bound: [0, 0, 0, 0]}\ntransitions: d.csv\n"
-                   "task: {initial_set: {center: [0, 0, " +
-                       std::string(center) +
-                       ", 0], half_width: [0.1, 0.1, 0.2, 0]}, projection: [px, py], between: samples, limits: "
-                       "[{name: slow, that: vx, at_least: -0.01, at_most: 0.01}], obstacles: []}\n");
-    const std::string decision = scratch_ / "limits.json";
-    Forereach("certify --json --config " + (scratch_ / "task.yaml") + " --plan " + (scratch_ / "plan.csv") + " > " +
-              decision);
-    const std::string text = Forereach("advise " + decision + " 2>&1").text;
-    EXPECT_THAT(text, AllOf(HasSubstr("if its limits were wider: slow at least " + std::string(least)),
-                            HasSubstr(" at most " + std::string(most))));
-  }
+  for (const auto& [center, least, most] : {std::tuple{"-0.05", "-0.25", "0.15"}, {"0.05", "-0.15", "0.25"}})
+    EXPECT_THAT(AdviceOnOneStep(scratch_, center, "limits: [{name: slow, that: vx, at_least: -0.01, at_most: 0.01}]"),
+                AllOf(HasSubstr("if its limits were wider: slow at least " + std::string(least)),
+                      HasSubstr(" at most " + std::string(most))));
 }
 
 TEST_F(AdviseTest, NamesWhatMakesTheDataConsistent) {

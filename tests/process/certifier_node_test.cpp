@@ -1438,6 +1438,13 @@ TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
     EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what));
   }
 
+  // The robot's guard keeps the bound that it started with.
+  Copy([](const std::string& text) {
+    return std::regex_replace(text, std::regex("\nrobot:\n"), "\nrobot:\n  step_error_ms: 5\n");
+  });
+  Reload(*node);
+  EXPECT_THAT(GetText(status_.message), testing::HasSubstr("robot.step_error_ms cannot change while"));
+
   Copy([](const std::string& text) {
     return std::regex_replace(text, std::regex("gate: \\{"), "gate: {state: elsewhere, ");
   });
