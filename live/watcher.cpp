@@ -33,9 +33,14 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kNumbersOfATube = 20'000;
 constexpr std::size_t kMostLearned = 200'000;
-constexpr std::int64_t kReadsAgainAfterUs = 2'000'000;
-constexpr std::int64_t kForgetsAfterUs = 3'000'000;  // that a certifier was in charge
+constexpr std::uint64_t kReadsAgainAfterUs = 2'000'000;
+constexpr std::uint64_t kForgetsAfterUs = 3'000'000;  // that a certifier was in charge
 constexpr std::size_t kInATick = 2 * Watcher::kDecisions;
+
+// Both may be any number. Their difference, taken without a sign, does not overflow.
+std::uint64_t TimeApart(std::int64_t a, std::int64_t b) {
+  return static_cast<std::uint64_t>(std::max(a, b)) - static_cast<std::uint64_t>(std::min(a, b));
+}
 
 std::vector<std::uint8_t> Copy(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
 
@@ -209,7 +214,8 @@ bool Watcher::TakeState(const LogEvent& event) {
 bool Watcher::TakeStatus(const LogEvent& event) {
   const auto status = Decoded<certifier_status_t>(event.message());
   if (!status) return false;
-  const bool keeps = status_ && IsInCharge(status_->second) && event.utime - status_->first < kForgetsAfterUs;
+  const bool keeps =
+      status_ && IsInCharge(status_->second) && TimeApart(event.utime, status_->first) < kForgetsAfterUs;
   if (!IsInCharge(*status) && keeps) return true;  // another one stands by
   status_.emplace(event.utime, *status);
   if (IsInCharge(*status)) ReadAgainFor(GetDigest(status->config_digest), event.utime);
@@ -222,10 +228,7 @@ void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
     other_task_.clear();
     return;
   }
-  // Both may be any number. Their difference, taken without a sign, does not overflow.
-  const auto [earlier, later] = std::minmax(now_us, tried_us_);
-  const std::uint64_t apart = static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
-  if (config == tried_ || (tried_us_ != 0 && apart < std::uint64_t{kReadsAgainAfterUs})) return;
+  if (config == tried_ || (tried_us_ != 0 && TimeApart(now_us, tried_us_) < kReadsAgainAfterUs)) return;
   tried_ = config;
   tried_us_ = now_us;
   other_task_ = "the certifier's task file is not " + task_.path + " as it is now: tubes and names may be wrong";

@@ -232,7 +232,8 @@ TEST_F(LateCommandTest, ScatterIsADisturbanceAndKeepsTheRobotInItsSlices) {
   EXPECT_GT(row["scatter"], 0.05);
   EXPECT_TRUE(row["trades"][0]["slopes"].is_null()) << "the same place and command, and another step";
   const std::string hold_out = Declare("--hold-out --json").text;
-  for (const Json& factor : Json::parse(hold_out.substr(0, hold_out.rfind('}') + 1))["factors"])
+  const Json report = Json::parse(hold_out.substr(0, hold_out.rfind('}') + 1));
+  for (const Json& factor : report["factors"])
     if (factor["factor"] >= 1.5) {
       EXPECT_EQ(factor["states_inside"], factor["states"]) << factor["factor"];
     }
