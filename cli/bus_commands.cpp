@@ -136,7 +136,8 @@ int ShowStatus(const CommandArguments& options) {
 // Why a command is not done, by the last heartbeat after it.
 std::string WhyNotDone(bool resets, const certifier_status_t& before, const certifier_status_t& last) {
   if (!resets && last.version > before.version)
-    return "a task file was read again since, and it is not --config as it is here: another one, or from before a change";
+    return "a task file was read again since, and it is not --config as it is here: another one, or from before a "
+           "change";
   if (!resets && last.failed_reloads > before.failed_reloads)
     return "a reload has failed since, for the reason above; a heartbeat does not say whose";
   return fmt::format(

@@ -47,7 +47,7 @@ const showFigures = () => {
   const abstained = of((name) => name.startsWith('abstain')), certified = outcomes.certified ?? 0;
   const cards = [
     ['Decisions', counted(counts.decisions), counts.not_shown > 0 ? `${counted(counts.not_shown)} too fast to be listed` : ''],
-    ['Certified', percent(certified, counts.decisions), counted(certified)],
+    ['Certified', percent(certified, counts.decisions), `${counted(certified)}, if the declaration is true`],
     ['Abstained', counted(abstained), listed(new Map(Object.entries(counts.by_cause ?? {}).map(([name, n]) => [name.replaceAll('_', ' '), n])))],
     ['Rejected', counted(outcomes.rejected ?? 0), ''],
     ['Gate', certifier ? duration(certifier.elapsed_us.p50) : '\u2013', certifier ? `median; p99 ${duration(certifier.elapsed_us.p99)}` : ''],

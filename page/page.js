@@ -206,7 +206,7 @@ const figuresOf = (run) => {
   const times = (sorted) => (sorted.length ? `p99 ${duration(quantile(sorted, .99))}, most ${duration(sorted.at(-1))}` : 'not measured');
   return [
     ['Decisions', counted(run.size), run.size === run.count ? 'all' : `of ${counted(run.count)}`],
-    ['Certified', percent(of('certified'), run.size), counted(of('certified'))],
+    ['Certified', percent(of('certified'), run.size), `${counted(of('certified'))}, if the declaration is true`],
     ['Abstained', percent(abstained, run.size),
       [...outcomes].filter(([name]) => name.startsWith('abstain')).map(([name, n]) => `${outcomeLabel(name).replace(/^abstain,? /, '')} ${counted(n)}`).join(', ')],
     ['Rejected', percent(of('rejected'), run.size), counted(of('rejected'))],

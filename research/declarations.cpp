@@ -78,11 +78,12 @@ std::vector<Table> TestTables(const Scope& scope) {
     table.rows.push_back(
         {times + ": below the knee", {}, Exactly(Rejections(scope, Layout::kBelowKnee, factor)), 0, ""});
   }
-  table.rows.push_back({"S under bounded noise, at step",
-                        {Mark::kOurs, Paper("incorrect.noisy.step")},
-                        {},
-                        0,
-                        "not reproduced: the paper's plan, data and underestimate are not in its text; `kept` has ours"});
+  table.rows.push_back(
+      {"S under bounded noise, at step",
+       {Mark::kOurs, Paper("incorrect.noisy.step")},
+       {},
+       0,
+       "not reproduced: the paper's plan, data and underestimate are not in its text; `kept` has ours"});
   return {table};
 }
 
@@ -311,12 +312,13 @@ std::vector<Table> GridTables(const Scope&, const Results&) {
                                   std::min(of_mass(2, 3), of_mass(3, 2))}},
               of_heading[] = {{"bicycle, heading by v", "by_speed", bicycle.by_speed, of_bicycle(2, 3)},
                               {"bicycle, heading by delta", "by_steering", bicycle.by_steering, of_bicycle(2, 5)}};
-  Table table{"Certified declarations",
-              "L_cert by the paper's fixed grids, rounded upward to nine decimals, as the paper says that it rounds. It "
-              "prints three of the point mass's entries rounded to nearest, below the value: a slip, which its margin "
-              "does not have. Proved bounds, which are slightly lower, are in declare.md. Margin: the least difference "
-              "of a deployed entry and a certified one.",
-              {}};
+  Table table{
+      "Certified declarations",
+      "L_cert by the paper's fixed grids, rounded upward to nine decimals, as the paper says that it rounds. It "
+      "prints three of the point mass's entries rounded to nearest, below the value: a slip, which its margin "
+      "does not have. Proved bounds, which are slightly lower, are in declare.md. Margin: the least difference "
+      "of a deployed entry and a certified one.",
+      {}};
   const auto add = [&](std::span<const Entry> entries, const std::string& system, const char* name) {
     double margin = kInfinity;
     for (const auto& [what, key, certified, deployed] : entries) {

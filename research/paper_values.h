@@ -15,8 +15,7 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kDegradation = "Nominal-model degradation",
                                   kLimits = "Short-horizon lower-bound scan", kAssumptions = "Affine control example",
                                   kEstimators = "Slope-estimator declarations",
-                                  kBudget = "Table, CP-SLS-MPC budget by N",
-                                  kFamilies = "Table, Operative assumptions",
+                                  kBudget = "Table, CP-SLS-MPC budget by N", kFamilies = "Table, Operative assumptions",
                                   kConfigurations = "Table, Configurations";
 
 inline constexpr PaperValue kPaperValues[] = {

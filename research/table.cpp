@@ -58,8 +58,7 @@ std::optional<Errors> ErrorsOf(const Row& row) {
   const double deviation =
       paper->deviation < 0 && !paper->same_as.empty() ? Paper(paper->same_as).deviation : paper->deviation;
   if (deviation < 0) return std::nullopt;
-  return Errors{deviation * deviation / kPaperSeeds,
-                row.ours.deviation * row.ours.deviation / row.ours.seeds};
+  return Errors{deviation * deviation / kPaperSeeds, row.ours.deviation * row.ours.deviation / row.ours.seeds};
 }
 
 // Of the difference of means.
@@ -98,8 +97,8 @@ std::string InWords(const JointTest& test) {
   return test.left_out > 0 ? text + ". Left out: " + Count(test.left_out, "row") + " that others decide." : text + ".";
 }
 
-// Of a figure of the paper, over the rows that hold it: what agreement is worth is the least of their marks, and the word
-// the worst.
+// Of a figure of the paper, over the rows that hold it: what agreement is worth is the least of their marks, and the
+// word the worst.
 struct FigureCount {
   Mark mark = Mark::kNotGiven;
   Word word = Word::kNone;

@@ -13,9 +13,9 @@ namespace forereach::research {
 struct PaperValue {
   std::string_view key;
   double value;
-  int decimals;            ///< As printed
-  std::string_view where;  ///< The table or section it is from
-  double deviation = -1;   ///< Over the ten seeds, where printed
+  int decimals;                   ///< As printed
+  std::string_view where;         ///< The table or section it is from
+  double deviation = -1;          ///< Over the ten seeds, where printed
   std::string_view same_as = {};  ///< The key under which the paper prints the same figure with more digits
 };
 
@@ -103,8 +103,8 @@ struct JointTest {
 
 /** The rows, then the joint test in words where the table has rows to compare. */
 [[nodiscard]] std::string ToMarkdown(const Table& table);
-/** The number of the paper's figures by mark and word, as a table: each figure once, however many rows hold it, with the
-worst of their words. Those that are 0, 1 or a whole number have lines of their own: they are easily met. */
+/** The number of the paper's figures by mark and word, as a table: each figure once, however many rows hold it, with
+the worst of their words. Those that are 0, 1 or a whole number have lines of their own: they are easily met. */
 [[nodiscard]] std::string CountInMarkdown(const std::vector<Table>& tables);
 /** table,what,mark,paper,ours,deviation,low,high,difference,word,why: one line for each row, with a header line. Low
 and high are Student's interval over the seeds (statistics.h). */

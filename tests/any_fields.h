@@ -58,12 +58,13 @@ class AnyFields final {
     using Limits = std::numeric_limits<Number>;
     const std::uint64_t bits = random_();
     if constexpr (std::is_floating_point_v<Number>) {
-      const std::array special{Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(), 0.0,   -0.0, -1.0, 1e-300,
-                               Limits::max(),       Limits::lowest(),   Limits::denorm_min(), 1e21, 0.5,  1e9,  12345.6789};
+      const std::array special{
+          Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(),  0.0,  -0.0, -1.0, 1e-300,
+          Limits::max(),       Limits::lowest(),   Limits::denorm_min(), 1e21, 0.5,  1e9,  12345.6789};
       return bits % 2 ? special[(bits >> 1) % special.size()] : std::bit_cast<Number>(random_());
     } else {
-      const std::array special{Limits::min(), Limits::max(), Number{0}, Number{1}, static_cast<Number>(-1),
-                               static_cast<Number>(bits >> 60)};
+      const std::array special{Limits::min(), Limits::max(),           Number{0},
+                               Number{1},     static_cast<Number>(-1), static_cast<Number>(bits >> 60)};
       return bits % 2 ? special[(bits >> 1) % special.size()] : static_cast<Number>(random_());
     }
   }
@@ -84,14 +85,19 @@ std::vector<std::uint8_t> AnyMessage(std::mt19937_64& random, const LogEvent& ev
 /** A message on a channel of the default names, a few or all of whose fields are any numbers. */
 inline LogEvent AnyEvent(std::mt19937_64& random, LogEvent event) {
   using Make = std::vector<std::uint8_t> (*)(std::mt19937_64&, const LogEvent&, double);
-  static constexpr std::pair<std::string_view, Make> kTypes[] = {
-      {"PLAN_CANDIDATE", AnyMessage<candidate_plan_t>}, {"PLAN_CERTIFIED", AnyMessage<certified_plan_t>},
-      {"PLAN_DECISION", AnyMessage<decision_t>},        {"PLAN_WITHDRAWN", AnyMessage<withdrawal_t>},
-      {"ROBOT_STATE", AnyMessage<robot_state_t>},       {"OBSTACLES", AnyMessage<obstacles_t>},
-      {"TRANSITION", AnyMessage<transition_t>},         {"FAULT", AnyMessage<fault_t>},
-      {"CERTIFIER_STATUS", AnyMessage<certifier_status_t>}, {"LOGGER_STATUS", AnyMessage<logger_status_t>},
-      {"EXECUTION_EVENT", AnyMessage<execution_event_t>},   {"PLAN_ADVICE", AnyMessage<advice_t>},
-      {"COMMAND", AnyMessage<command_t>}};
+  static constexpr std::pair<std::string_view, Make> kTypes[] = {{"PLAN_CANDIDATE", AnyMessage<candidate_plan_t>},
+                                                                 {"PLAN_CERTIFIED", AnyMessage<certified_plan_t>},
+                                                                 {"PLAN_DECISION", AnyMessage<decision_t>},
+                                                                 {"PLAN_WITHDRAWN", AnyMessage<withdrawal_t>},
+                                                                 {"ROBOT_STATE", AnyMessage<robot_state_t>},
+                                                                 {"OBSTACLES", AnyMessage<obstacles_t>},
+                                                                 {"TRANSITION", AnyMessage<transition_t>},
+                                                                 {"FAULT", AnyMessage<fault_t>},
+                                                                 {"CERTIFIER_STATUS", AnyMessage<certifier_status_t>},
+                                                                 {"LOGGER_STATUS", AnyMessage<logger_status_t>},
+                                                                 {"EXECUTION_EVENT", AnyMessage<execution_event_t>},
+                                                                 {"PLAN_ADVICE", AnyMessage<advice_t>},
+                                                                 {"COMMAND", AnyMessage<command_t>}};
   const auto [channel, make] = kTypes[random() % std::size(kTypes)];
   if (random() % 2 == 0) event.channel = channel;
   const double share = std::array{.0, .003, .1, 1.}[random() % 4];

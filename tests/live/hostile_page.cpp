@@ -1,6 +1,6 @@
-/** forereach_hostile_page [any]: serves a live page of messages whose texts try to become elements and scripts, and whose
-numbers are the largest there are. Prints its address, and ends with its standard input. With `any` it answers each line
-of that, a seed, with a line of news, after messages whose fields hold any numbers. */
+/** forereach_hostile_page [any]: serves a live page of messages whose texts try to become elements and scripts, and
+whose numbers are the largest there are. Prints its address, and ends with its standard input. With `any` it answers
+each line of that, a seed, with a line of news, after messages whose fields hold any numbers. */
 #include <iostream>
 #include <limits>
 #include <random>

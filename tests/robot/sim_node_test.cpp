@@ -2,8 +2,8 @@
 
 #include "tests/test.h"
 
-#include "bus/log.h"
 #include "bus/authentic_bus.h"
+#include "bus/log.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
