@@ -110,8 +110,8 @@ void PrintForPeople(const Advised& all, const Totals& totals) {
       [](const RecordedAbstention& abstention, const AbstentionAdvice& advice) { PrintForPeople(abstention, advice); });
   for (const std::string& missing : all.named.missing) std::cout << Printable(missing) << "\n";
   std::cout << "advise: " << totals.abstentions << " abstentions and rejections, " << totals.turned
-            << " have a change that turns them, verified by certifying again; " << totals.certified << " were certified"
-            << DescribePassedOver(totals.passed_over) << "\n";
+            << " have a change that turns them, verified by certifying again; " << totals.certified
+            << " were certified, if the declaration is true" << DescribePassedOver(totals.passed_over) << "\n";
   for (const auto& [change, count] : totals.by_change) std::cout << "  " << change << ": " << count << "\n";
   const auto places = PlacesOf(all);
   if (!places.empty()) std::cout << "where one more observation would turn most of them\n";

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "bus/authentic.h"
 #include "bus/bus_options.h"
 #include "bus/keys.h"
@@ -36,7 +38,9 @@ struct CommandArguments {
 class CertifierConnection final {
  public:
   explicit CertifierConnection(const CommandArguments& options)
-      : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
+      : CertifierConnection(options, LoadConfig(options.config, TransitionsFile::kIgnore)) {}
+  CertifierConnection(const CommandArguments& options, const Config& task)
+      : task_(task.grounds.config), channels_(task.bus) {
     options.bus.Override(channels_);
     channels_ = WithKeys(std::move(channels_), Role::kOperator);
     if (!channels_.keys) std::cerr << "forereach: warning: " << kUnsignedWarning << std::endl;
@@ -66,8 +70,11 @@ class CertifierConnection final {
 
   void Send(const command_t& command) { bus_->Publish(channels_.command, command); }
   [[nodiscard]] const BusOptions& channels() const { return channels_; }
+  /** Of the task file as it is here. */
+  [[nodiscard]] const Digest& task() const { return task_; }
 
  private:
+  const Digest task_;
   BusOptions channels_;
   std::unique_ptr<Bus> bus_;
   std::vector<certifier_status_t> heard_;
@@ -126,7 +133,21 @@ int ShowStatus(const CommandArguments& options) {
   return status->level == certifier_status_t::OK ? 0 : 1;
 }
 
-// Sends a command, and shows the heartbeat that answers it.
+// Why a command is not done, by the last heartbeat after it.
+std::string WhyNotDone(bool resets, const certifier_status_t& before, const certifier_status_t& last) {
+  if (!resets && last.version > before.version)
+    return "a task file was read again since, and it is not --config as it is here: another one, or from before a "
+           "change";
+  if (!resets && last.failed_reloads > before.failed_reloads)
+    return "a reload has failed since, for the reason above; a heartbeat does not say whose";
+  return fmt::format(
+      "the certifier has not done the {} within {} s: it refuses a command without the operator's key (--key){}; its "
+      "log says which it refused",
+      resets ? "reset" : "reload", kPatienceMs / 1000, resets ? ", and one that was sent before the fault" : "");
+}
+
+// Sends a command, and shows the heartbeat that answers it. Others may send commands meanwhile, and a heartbeat names
+// none: what answers is the effect. A reload is done when the certifier has read this very file after the command.
 int Send(const CommandArguments& options, std::int16_t kind) {
   CertifierConnection certifier(options);
   const auto before = certifier.Await();
@@ -138,23 +159,19 @@ int Send(const CommandArguments& options, std::int16_t kind) {
   certifier.Send(command);
   const bool resets = kind == command_t::RESET;
   const auto is_done = [&](const certifier_status_t& status) {
-    return resets ? status.state != certifier_status_t::FAULT : status.version > before->version;
+    return resets ? status.state != certifier_status_t::FAULT
+                  : status.version > before->version && GetDigest(status.config_digest) == certifier.task();
   };
-  // What it refuses meanwhile may be anybody's: only what a command does answers it.
   std::optional<certifier_status_t> last;
   const auto answered = certifier.Await([&](const certifier_status_t& status) {
     if (status.instance != before->instance || status.utime < command.utime) return false;
     last = status;
-    return is_done(status) || status.failed_reloads > before->failed_reloads;
+    return is_done(status);
   });
   if (!last) return NoCertifierAnswers(certifier.channels());
   Print(*last, options.json, certifier.channels().keys.has_value());
-  if (!answered)
-    std::cerr << "forereach: the certifier has not done the " << (resets ? "reset" : "reload") << " within "
-              << kPatienceMs / 1000 << " s: it refuses a command without the operator's key (--key)"
-              << (resets ? ", and one that was sent before the fault" : "") << "; its log says which it refused"
-              << std::endl;
-  return answered && is_done(*answered) ? 0 : 1;
+  if (!answered) std::cerr << "forereach: " << WhyNotDone(resets, *before, *last) << std::endl;
+  return answered ? 0 : 1;
 }
 
 Command BusCommand(const std::string& name, const std::string& purpose,

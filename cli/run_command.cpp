@@ -21,8 +21,10 @@ std::string DescribePlanning(const DriveCounts& counts) {
   std::string causes;
   for (const auto* by_cause : {&counts.abstained, &counts.rejected})
     for (const auto& [cause, count] : *by_cause) causes += fmt::format(", {} {}", cause, count);
-  return fmt::format("the planner searched {} times and proposed {} plans, {} were certified{}; {} steps were driven",
-                     counts.searches, counts.proposed, counts.certified, causes, counts.steps);
+  return fmt::format(
+      "the planner searched {} times and proposed {} plans, {} were certified under the declaration{}; {} steps were "
+      "driven",
+      counts.searches, counts.proposed, counts.certified, causes, counts.steps);
 }
 
 int Run(const RunArguments& options) {

@@ -176,9 +176,10 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
          "  It is no bound for other roads, other days, or a plan that goes where nobody has driven. It is of one row, "
          "for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor of slopes "
          "learned from all data.\n"
-         "certified, half-width: the recorded commands of held-out stretches as plans, from task.initial_set's "
-         "half-widths\n  about the recorded state, among the task's obstacles; the median over the stretches of a "
-         "position's half-width after\n  "
+         "certified, half-width: if the declaration with this factor is true, the recorded commands of held-out "
+         "stretches\n"
+         "  as plans, from task.initial_set's half-widths about the recorded state, among the task's obstacles; the "
+         "median over\n  the stretches of a position's half-width after "
       << command.steps
       << " steps (inf: the tube leaves the domain before).\n"
          "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "
@@ -218,7 +219,7 @@ Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
               .x = {},
               .series = {{"blocks with a contradiction", {}},
                          {"their bound, " + ToText(100 * command.confidence) + " %", {}},
-                         {"stretches certified", {}},
+                         {"stretches certified, if the declaration is true", {}},
                          {"states inside or consistent with their slice", {}}}};
   for (const Trial& trial : trials) {
     chart.x.push_back(trial.factor);

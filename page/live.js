@@ -2,8 +2,8 @@
 'use strict';
 (() => {
 const {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, clockText,
-  listed, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn, placeOf, centerOf,
-  drawObstacle, showView, startView, drawTube, showLegend} = ForeReach;
+  listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn, placeOf,
+  centerOf, drawObstacle, showView, startView, drawTube, showLegend} = ForeReach;
 
 const MOST = {decisions: 120, faults: 60, withdrawals: 60, events: 60, gaps: 60, places: 600};
 const REFUSED_US = 3e6;  // as long is an abstention drawn
@@ -47,7 +47,7 @@ const showFigures = () => {
   const abstained = of((name) => name.startsWith('abstain')), certified = outcomes.certified ?? 0;
   const cards = [
     ['Decisions', counted(counts.decisions), counts.not_shown > 0 ? `${counted(counts.not_shown)} too fast to be listed` : ''],
-    ['Certified', percent(certified, counts.decisions), counted(certified)],
+    ['Certified', percent(certified, counts.decisions), `${counted(certified)}, if the declaration is true`],
     ['Abstained', counted(abstained), listed(new Map(Object.entries(counts.by_cause ?? {}).map(([name, n]) => [name.replaceAll('_', ' '), n])))],
     ['Rejected', counted(outcomes.rejected ?? 0), ''],
     ['Gate', certifier ? duration(certifier.elapsed_us.p50) : '\u2013', certifier ? `median; p99 ${duration(certifier.elapsed_us.p99)}` : ''],
@@ -64,7 +64,7 @@ const showFigures = () => {
   fillList('facts', robot ? [
     ['Mode', robot.mode],
     ['Plan', robot.plan === '-1' ? 'none' : `${robot.plan}, step ${robot.step}`],
-    ['State', robot.state.map((x, k) => `${state.beginning.states[k] ?? k} ${number(x ?? NaN, 4)}`).join(', ')],
+    ['State', robot.state.map((x, k) => `${state.beginning.states[k] ?? k} ${number(x, 4)}`).join(', ')],
     ['Measured', `${clockText(robot.utime)} UTC${age(robot.heard) > 1e6 ? `, ${(age(robot.heard) / 1e6).toFixed(0)} s ago` : ''}`],
   ] : [['State', 'not heard']]);
 };
@@ -99,7 +99,7 @@ const showDecisions = () => {
     chip.style.background = outcomeColor(decision.outcome);
     outcome.append(chip, outcomeLabel(decision.outcome));
     return [button, outcome, decision.cause === 'none' ? '' : decision.cause.replaceAll('_', ' '), decision.step < 0 ? '' : String(decision.step),
-      `${decision.plan.slice(-7)} ${decision.source}`, duration(decision.elapsed ?? NaN), decision.message];
+      `${decision.plan.slice(-7)} ${decision.source}`, duration(decision.elapsed), decision.message];
   }));
   markChosen();
 };
@@ -131,6 +131,10 @@ const choose = (decision) => {
   view.scene = view.whole = null;
   byId('svg').replaceChildren();
   markChosen();
+  draw('the drawing');
+};
+const showDrawing = () => {
+  const decision = state.chosen;
   if (followed()) {
     showNow();
     return;
@@ -226,9 +230,22 @@ const showNow = () => {
 };
 
 // ---- News.
+const PARTS = {
+  'the state': [['state', 'trust'], showState],
+  'the figures': [['figures', 'facts'], showFigures],
+  'the trend': [['trend'], showTrend],
+  'the decisions': [['decisions'], showDecisions],
+  'the other records': [['faults', 'withdrawals', 'gaps', 'events'], showOthers],
+  'the drawing': [['drawing'], showDrawing],
+};
+const due = new Set();  // those that could not be drawn: with the next news again
+const draw = (...names) => {
+  for (const name of names)
+    if (drawPart(name, ...PARTS[name])) due.delete(name); else due.add(name);
+};
+
 let key = 0;
 const take = (news) => {
-  state.heard = performance.now();
   state.now = news.now;
   if (news.obstacles) state.obstacles = news.obstacles;
   for (const decision of news.decisions ?? []) {
@@ -237,18 +254,17 @@ const take = (news) => {
   }
   state.trend = state.trend.slice(-5000);
   for (const [name, most] of Object.entries(MOST)) if (news[name]) state[name] = state[name].concat(news[name]).slice(-most);
-  showState();
-  showFigures();
-  showTrend();
-  if (news.decisions) showDecisions();
-  if (news.faults || news.withdrawals || news.events || news.gaps) showOthers();
-  if (followed()) showNow();
+  state.heard = performance.now();
+  const names = new Set(['the state', 'the figures', 'the trend', ...due]);
+  if (news.decisions) names.add('the decisions');
+  if (news.faults || news.withdrawals || news.events || news.gaps) names.add('the other records');
+  if (followed()) names.add('the drawing');
+  draw(...names);
   document.body.dataset.ready = 'yes';
 };
 
 const problem = (text) => {
-  byId('problem').textContent = text;
-  byId('problem').hidden = !text;
+  tell('the connection', text);
   document.body.classList.toggle('lost', Boolean(text));
 };
 
@@ -271,12 +287,12 @@ const start = () => {
     state.trend = [];
     problem('');
   });
-  source.addEventListener('message', (event) => take(JSON.parse(event.data)));
+  source.addEventListener('message', (event) => drawPart('anything', ['main'], () => take(JSON.parse(event.data))));
   // What is not fresh is not shown as if it were.
   const check = () => {
     const seconds = (performance.now() - state.heard) / 1000;
     if (seconds > 2) problem(`The connection to forereach live is lost: what you see is ${state.heard ? `${seconds.toFixed(0)} s old` : 'nothing yet'}.`);
-    else if (!byId('problem').hidden) problem('');
+    else problem('');
   };
   setInterval(check, 500);
 };

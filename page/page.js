@@ -2,7 +2,7 @@
 'use strict';
 (() => {
 const {OUTCOMES, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf, timeText, clockText,
-  listed, drawChart, axis, legend, fillTable, fillList, unitsOf, view, canBeDrawn, startView, drawTube, showLegend} = ForeReach;
+  listed, drawPart, drawChart, axis, legend, fillTable, fillList, unitsOf, view, canBeDrawn, startView, drawTube, showLegend} = ForeReach;
 
 // ---- Columns: base64 of zlib's format, each in an element of its own.
 const ARRAYS = {i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
@@ -206,7 +206,7 @@ const figuresOf = (run) => {
   const times = (sorted) => (sorted.length ? `p99 ${duration(quantile(sorted, .99))}, most ${duration(sorted.at(-1))}` : 'not measured');
   return [
     ['Decisions', counted(run.size), run.size === run.count ? 'all' : `of ${counted(run.count)}`],
-    ['Certified', percent(of('certified'), run.size), counted(of('certified'))],
+    ['Certified', percent(of('certified'), run.size), `${counted(of('certified'))}, if the declaration is true`],
     ['Abstained', percent(abstained, run.size),
       [...outcomes].filter(([name]) => name.startsWith('abstain')).map(([name, n]) => `${outcomeLabel(name).replace(/^abstain,? /, '')} ${counted(n)}`).join(', ')],
     ['Rejected', percent(of('rejected'), run.size), counted(of('rejected'))],
@@ -499,7 +499,7 @@ const newRow = () => {
 // The height of the scrolled area is bounded; beyond it, a pixel of scrolling is more than a pixel of rows.
 const scrollFactor = () => Math.max(1, grid.order.length * rowHeight() / MOST_PIXELS);
 
-const showRows = (run) => {
+const showRows = (run) => drawPart('the decisions', ['grid'], () => {
   const box = byId('grid'), height = rowHeight(), count = grid.order.length, factor = scrollFactor();
   byId('space').style.height = `${Math.min(count * height, MOST_PIXELS)}px`;
   box.setAttribute('aria-rowcount', String(count));
@@ -526,7 +526,7 @@ const showRows = (run) => {
     row.title = narrow.matches ? '' : textAt(run.decisions.message, i);
   });
   box.setAttribute('aria-activedescendant', grid.chosen >= 0 ? `row-${grid.chosen}` : '');
-};
+});
 
 const choose = (run, place, {scroll = true} = {}) => {
   if (grid.order.length === 0) return;
@@ -607,8 +607,8 @@ const showEnvelope = (detail, task) => {
   const [lower, upper] = detail?.hull ?? [[], []], [low, up] = detail?.envelope ?? [[], []];
   byId('envelope').hidden = lower.length === 0;
   if (lower.length === 0) return;
-  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} \u2026 ${number(b ?? NaN, 4)}`);
-  const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, \u00b1${number(detail.nearest_distance[k] ?? NaN, 3)} by its distance` : '');
+  const range = (a, b) => (a === undefined ? '' : `${number(a, 4)} \u2026 ${number(b, 4)}`);
+  const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, \u00b1${number(detail.nearest_distance[k], 3)} by its distance` : '');
   fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual', 'nearest observation'],
     lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k]), nearest(k)]));
 };
@@ -628,7 +628,7 @@ const showAdvice = (run, i, advise) => {
   byId('advice-lines').replaceChildren(...parts);
 };
 
-const showDetail = (run, i) => {
+const showDetail = (run, i) => drawPart('the chosen decision', ['detail'], () => {
   const d = run.decisions, detail = run.drawings.ofRow.get(i);
   const config = nameAt(d.config, i), task = run.raw.tasks.find((each) => each.digest === config);
   const outcome = nameAt(d.outcome, i), cause = nameAt(d.cause, i), digest = hexAt(d.digest.values, i);
@@ -665,7 +665,7 @@ const showDetail = (run, i) => {
   showLegend(outcomeColor(outcome), detail);
   drawTube({units: unitsOf(run.drawings.tubes, detail), bodies: bodiesOf(run.drawings, detail), detail, outcome, binding: outcome === 'rejected' ? -1 : d.obstacle.values[i],
     set: run.drawings.sets[detail.obstacles] ?? []});
-};
+});
 
 // ---- Filters.
 const timeFrom = (id, otherwise) => {
@@ -717,21 +717,25 @@ const start = async () => {
     (run.count ? `, ${timeText(from)} to ${timeText(to)} UTC` : '') + (before ? `. Before: ${data.before.name}` : '');
   document.title = `ForeReach report: ${data.run.name}`;
   fillChoices(run);
-  const showSummary = () => {
+  const groups = [['robot', 'By robot', (name) => name || '(no name)'], ['source', 'By source', (name) => name || '(no name)'],
+    ['config', 'By task, with its config digest', (digest) => taskLabel(run, digest)],
+    ['obstacle', 'By the obstacle that decided', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`)]];
+  const choosePassing = () => {
     const filters = readFilters();
     select(run, filters);
     if (before) select(before, filters, {withTime: false});
     byId('shown').textContent = `${counted(run.size)} of ${counted(run.count)} decisions`;
-    showFigures(run, before);
-    showTrend(run);
-    showCauses(run, before);
-    showSteps(run);
-    showTimes(run);
-    showGroups(run, before, 'by-robot', 'By robot', 'robot', (name) => name || '(no name)');
-    showGroups(run, before, 'by-source', 'By source', 'source', (name) => name || '(no name)');
-    showGroups(run, before, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
-    showGroups(run, before, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));
-    showOthers(run);
+  };
+  const showSummary = () => {
+    if (!drawPart('what passes the filters', ['main'], choosePassing)) return;
+    drawPart('the figures', ['figures'], () => showFigures(run, before));
+    drawPart('the trend', ['trend'], () => showTrend(run));
+    drawPart('the causes', ['causes'], () => showCauses(run, before));
+    drawPart('the steps', ['steps'], () => showSteps(run));
+    drawPart('the times', ['tail', 'times'], () => showTimes(run));
+    for (const [name, caption, label] of groups)
+      drawPart(`the decisions by ${name}`, [`by-${name}`], () => showGroups(run, before, `by-${name}`, caption, name, label));
+    drawPart('the other records', OTHERS, () => showOthers(run));
   };
   const showDecisions = () => {
     sortRows(run);

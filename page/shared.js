@@ -24,20 +24,45 @@ const make = (tag, text, className) => {
   if (className) element.className = className;
   return element;
 };
-const counted = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
+// A field of a message may be any number, and JSON has null for those that are not finite: these take all of them.
 const number = (x, digits = 6) =>
-  Number.isNaN(x) ? '\u2013' : x === Infinity ? '\u221e' : x === -Infinity ? '\u2212\u221e' : String(Number(x.toPrecision(digits)));
+  typeof x !== 'number' || Number.isNaN(x) ? '\u2013' : x === Infinity ? '\u221e' : x === -Infinity ? '\u2212\u221e' : String(Number(x.toPrecision(digits)));
+const counted = (n) => (Number.isSafeInteger(n) ? String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f') : number(n));
 const percent = (part, whole) => (whole > 0 ? `${(100 * part / whole).toFixed(1)} %` : '\u2013');
 const duration = (us) => {
   if (!Number.isFinite(us)) return number(us);
   return us < 1000 ? `${number(us, 4)} \u00b5s` : us < 1e6 ? `${number(us / 1e3, 4)} ms` : `${number(us / 1e6, 4)} s`;
 };
-// Microseconds since the epoch. Times beyond a calendar stay numbers.
-const dateOf = (us) => (Math.abs(us) <= 8.64e18 / 1e3 ? new Date(us / 1000) : null);
-const timeText = (us) => dateOf(us)?.toISOString().replace('T', ' ').replace('Z', '') ?? `${us} \u00b5s`;
-const clockText = (us) => dateOf(us)?.toISOString().slice(11, 23) ?? `${us} \u00b5s`;
+// Microseconds since the epoch. Times before the year 0 or after 9999 stay numbers.
+const dateOf = (us) => (typeof us === 'number' && -62167219200e6 <= us && us < 253402300800e6 ? new Date(us / 1000) : null);
+const timeText = (us) => dateOf(us)?.toISOString().replace('T', ' ').replace('Z', '') ?? duration(us);
+const clockText = (us) => dateOf(us)?.toISOString().slice(11, 23) ?? duration(us);
 
 const listed = (counts) => [...counts].sort((a, b) => b[1] - a[1]).map(([name, n]) => `${name} ${counted(n)}`).join(', ');
+
+// ---- Parts of a page. One that cannot be drawn is marked, and the page says so until it can be: nothing old passes for new.
+const problems = new Map();
+const tell = (name, problem) => {
+  if (problem) problems.set(name, problem); else problems.delete(name);
+  const text = [...problems.values()].join(' ');
+  if (byId('problem').textContent !== text) byId('problem').textContent = text;
+  byId('problem').hidden = !text;
+};
+const failedAt = new Map();
+// @return whether `draw` has drawn the part of this name, which the elements `ids` show.
+const drawPart = (name, ids, draw) => {
+  try {
+    draw();
+    failedAt.delete(name);
+    tell(name, '');
+  } catch (error) {
+    console.error(error);
+    if (!failedAt.has(name)) failedAt.set(name, new Date().toISOString().slice(11, 19));
+    tell(name, `Not shown anew since ${failedAt.get(name)} UTC: ${name} (${error.message}).`);
+  }
+  for (const id of ids) byId(id).classList.toggle('old', failedAt.has(name));
+  return !failedAt.has(name);
+};
 
 // ---- Charts.
 const charts = {};
@@ -199,7 +224,7 @@ const startView = () => {
   byId('closer').addEventListener('click', () => zoom(.7));
   byId('wider').addEventListener('click', () => zoom(1 / .7));
   byId('whole').addEventListener('click', showWhole);
-  byId('step').addEventListener('input', showStep);
+  byId('step').addEventListener('input', () => drawPart('the step', ['stage'], showStep));
   new ResizeObserver(() => { if (view.whole) showView(); }).observe(svg);
 };
 
@@ -282,6 +307,6 @@ const showLegend = (color, detail) => {
 };
 
 return {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf,
-  timeText, clockText, listed, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn,
+  timeText, clockText, listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn,
   placeOf, centerOf, drawObstacle, showView, showWhole, startView, drawTube, showLegend};
 })();

@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bus/log.h"
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
@@ -213,12 +214,27 @@ void PlannerNode::BeginStop(int valid_steps, std::int64_t now_us) {
   BeginRound(last_state_, lead_steps, true);
 }
 
+void PlannerNode::LogLostRounds() const {
+  std::string causes;
+  for (const auto* by_cause : {&abstained_, &rejected_})
+    for (const auto& [cause, count] : *by_cause) causes += fmt::format(", {} {}", cause, count);
+  logging::Warn(
+      "{} rounds in a row without a certificate; since the start {} searches, {} without a plan{}. {}", kLostRounds,
+      searches_, fruitless_searches_, causes,
+      2 * fruitless_searches_ > searches_
+          ? "No plan stays in the domain and ends at rest: planner.stop has to bring the robot to rest within "
+            "planner.tail_steps, by feedback if it falls without"
+          : "`forereach check` says what keeps plans from certificates, `forereach advise` what would turn these");
+}
+
 void PlannerNode::EndRound(bool certified) {
   if (round_->awaited_plan >= 0) ++unanswered_;
   if (certified) {
     waiting_start_ = round_->start_utime;
+    lost_in_a_row_ = 0;
   } else {
     ++fruitless_rounds_;
+    if (round_->searches > 0 && ++lost_in_a_row_ == kLostRounds) LogLostRounds();
     refused_center_ = round_->center;
   }
   round_.reset();

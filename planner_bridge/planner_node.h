@@ -68,6 +68,9 @@ class PlannerNode final : public Node {
   /** Prints Summary() on one line. */
   void Stop() override;
 
+  /** As many rounds in a row without a certificate are logged, with the causes and where to look. */
+  static constexpr int kLostRounds = 20;
+
   /** One JSON object: proposed, certified, abstained and rejected (counts by cause), advised (abstentions from which it
   has learned by the certifier's advice), unanswered, withdrawn (plans),
   rounds, stopping_rounds, rounds_without_certificate, searches_without_result, messages_ignored, messages_not_sent. */
@@ -105,6 +108,7 @@ class PlannerNode final : public Node {
   [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;
   void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
+  void LogLostRounds() const;
   void SearchOnce(std::int64_t now_us);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
   [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
@@ -137,6 +141,7 @@ class PlannerNode final : public Node {
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
                stopping_rounds_ = 0, withdrawals_ = 0, advised_ = 0, fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
+  int lost_in_a_row_ = 0;                                     // rounds that searched and found no certificate
 };
 
 }  // namespace forereach

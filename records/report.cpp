@@ -159,7 +159,7 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
     return found == summary.abstained.end() ? std::int64_t{0} : found->second;
   };
   std::vector<std::string> numbers{fmt::format("{} plans proposed", summary.proposed),
-                                   fmt::format("{} certified", summary.certified)};
+                                   fmt::format("{} certified under the declaration", summary.certified)};
   const auto add = [&numbers](std::int64_t count, const char* name) {
     if (count > 0) numbers.push_back(fmt::format("{} {}", count, name));
   };

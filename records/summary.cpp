@@ -64,10 +64,10 @@ std::string ToText(const Summary& summary) {
     text += fmt::format("{:<26}{}\n", name, value);
   };
   line("plans proposed", std::to_string(summary.proposed));
-  line("  certified",
-       std::to_string(summary.certified) + (summary.holds.empty()          ? ""
-                                            : summary.holds == "all_times" ? " (at all times)"
-                                                                           : " (at the sample instants only)"));
+  line("  certified", fmt::format("{} ({}if the declaration is true)", summary.certified,
+                                  summary.holds.empty()          ? ""
+                                  : summary.holds == "all_times" ? "at all times, "
+                                                                 : "at the sample instants only, "));
   line("  abstained", std::to_string(Total(summary.abstained)) + Listed(summary.abstained));
   line("  rejected", std::to_string(Total(summary.rejected)) + Listed(summary.rejected));
   line("decision latency", Microseconds(summary.latency_us));

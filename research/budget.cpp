@@ -64,6 +64,12 @@ Estimate Median(std::vector<double> values) {
   return Exactly(*middle);
 }
 
+// What a budget has beside drift and tube; all plans have the same.
+Estimate Alpha(const Pooled& pooled) {
+  if (pooled.total.empty()) return {};
+  return Exactly(pooled.total[0] - pooled.drift[0] - pooled.tube[0]);
+}
+
 constexpr const char* kWhy = "weights, their bandwidth and the drift rate are ours: cp_sls.h";
 
 void AddRowsOf(int observations, const Pooled& pooled, std::vector<Row>& rows) {
@@ -82,6 +88,7 @@ void AddRowsOf(int observations, const Pooled& pooled, std::vector<Row>& rows) {
                   Exactly(pooled.meaningful),
                   0,
                   kWhy});
+  row("alpha", Mark::kTaken, "alpha", Alpha(pooled), 2);
   row("median drift (TV)", Mark::kOurs, "drift", Median(pooled.drift), 2);
   row("median tube", Mark::kOurs, "tube", Median(pooled.tube), 2);
   row("median total", Mark::kOurs, "total", Median(pooled.total), 2);

@@ -113,6 +113,11 @@ std::vector<Table> DegradationTables(const Scope& scope, const Results& results)
                           crossing ? Exactly(*crossing) : Estimate{},
                           3,
                           "the paper does not say what degrades, nor how much of it it declares"});
+    table.rows.push_back({system->name + ": cells of the scan",
+                          {Mark::kOurs, Paper("degradation." + system->name + ".cells")},
+                          Exactly(static_cast<double>(percents.size())),
+                          0,
+                          "the paper does not state its cells"});
     table.rows.push_back({system->name + ": false certificates, all groups", {}, Exactly(false_certificates), 0, ""});
     table.rows.insert(table.rows.end(), rows.begin(), rows.end());
   }

@@ -145,13 +145,14 @@ Table FalseByGroup(const Scope& scope, const Results& results) {
 
 std::vector<Table> ExitTables(const Scope& scope, const Results& results) {
   double plans = 0, exits = 0, prefixes = 0, complete = 0, covered = 0, undecided = 0, wrong = 0;
-  int decisions = 0, rejections = 0;
+  int decisions = 0, rejections = 0, late = 0;
   for (const Cell& cell : BothChannels(scope)) {
     const CellResult& result = results.Of(cell);
     ++decisions;
     rejections += result[0].falsified == result[0].plans;
     for (const Tally& tally : result) {
       plans += tally.plans, exits += tally.domain, prefixes += tally.prefix_covered, undecided += tally.undecided;
+      late += tally.domain_steps[static_cast<std::size_t>(cell.system->horizon)];
       complete += tally.complete(), covered += tally.covered, wrong += tally.false_certificates();
     }
   }
@@ -161,6 +162,7 @@ std::vector<Table> ExitTables(const Scope& scope, const Results& results) {
            {{"plans", {Mark::kOurs, Paper("exits.queries")}, Exactly(plans), 0, why},
             {"of these D", {Mark::kOurs, Paper("exits.domain")}, Exactly(exits), 0, why},
             {"D / plans", {Mark::kOurs, Paper("exits.fraction")}, Exactly(exits / plans), 3, why, true},
+            {"D after the horizon", {Mark::kOurs, Paper("exits.after_horizon")}, Exactly(late), 0, why},
             {"prefixes of D that contain every rollout", {}, Exactly(prefixes), 0, ""},
             {"complete tubes", {}, Exactly(complete), 0, ""},
             {"of these contain every rollout", {}, Exactly(covered), 0, ""},

@@ -15,7 +15,8 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kDegradation = "Nominal-model degradation",
                                   kLimits = "Short-horizon lower-bound scan", kAssumptions = "Affine control example",
                                   kEstimators = "Slope-estimator declarations",
-                                  kBudget = "Table, CP-SLS-MPC budget by N";
+                                  kBudget = "Table, CP-SLS-MPC budget by N", kFamilies = "Table, Operative assumptions",
+                                  kConfigurations = "Table, Configurations";
 
 inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.B.coverage", 1.000, 3, kMain},
@@ -24,10 +25,10 @@ inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.B.certified", 0, 3, kText},
     {"point_mass.C.coverage", 1.000, 3, kText},
     {"point_mass.C.recall", 0.998, 3, kMain},
-    {"bicycle.B.coverage", 1.000, 3, kMain},
+    {"bicycle.B.coverage", 1.000, 3, kMain, -1, "bicycle.B.coverage.400"},
     {"bicycle.B.domain", 0.947, 3, kMain},
     {"bicycle.B.safety", 0.053, 3, kMain},
-    {"bicycle.C.recall", 0.983, 3, kMain},
+    {"bicycle.C.recall", 0.983, 3, kMain, -1, "bicycle.C.recall.400"},
 
     {"bicycle.C.recall.25", 0.4899, 4, kSeeds, 0.1251},
     {"bicycle.C.recall.50", 0.7850, 4, kSeeds, 0.0857},
@@ -104,10 +105,14 @@ inline constexpr PaperValue kPaperValues[] = {
     {"budget.400.tube", 15.76, 2, kBudget},
     {"budget.400.total", 30.55, 2, kBudget},
     {"budget.nonvacuous", 0, 0, kBudget},
+    {"budget.150.alpha", 0.10, 2, kBudget},
+    {"budget.200.alpha", 0.10, 2, kBudget},
+    {"budget.400.alpha", 0.10, 2, kBudget},
 
     {"exits.queries", 186000, 0, kDomainCheck},
     {"exits.domain", 39807, 0, kDomainCheck},
     {"exits.fraction", 39807.0 / 186000, 3, kDomainCheck},
+    {"exits.after_horizon", 0, 0, kDomainCheck},
     {"pairwise.decisions", 140, 0, kPairwise},
     {"pairwise.rejections", 0, 0, kPairwise},
 
@@ -120,18 +125,21 @@ inline constexpr PaperValue kPaperValues[] = {
 
     {"scalar.certified", 0, 3, kSensitivity},
     {"scalar.domain", 1, 3, kSensitivity},
-    {"noise.recall.0", 0.983, 3, kSensitivity},
+    {"noise.recall.0", 0.983, 3, kSensitivity, -1, "bicycle.C.recall.400"},
     {"noise.recall.3.3", 0.867, 3, kSensitivity},
     {"median_residual", 8.33e-5, 7, kProtocol},
     {"noise.envelope_part", 3.4e-4, 5, kProtocol},
 
     {"incorrect.halved.rejections", 9, 0, kIncorrect},
+    {"incorrect.noisy.step", 7, 0, kIncorrect},
 
     {"norms.point_mass", 18.481, 3, kNorms},
     {"norms.bicycle", 11.368, 3, kNorms},
 
     {"degradation.point_mass", 16.638, 3, kDegradation},
     {"degradation.bicycle", 1.386, 3, kDegradation},
+    {"degradation.point_mass.cells", 49, 0, kConfigurations},
+    {"degradation.bicycle.cells", 60, 0, kConfigurations},
 
     {"width.pairs", 64, 0, kLimits},
     {"width.positive", 64, 0, kLimits},
@@ -139,6 +147,7 @@ inline constexpr PaperValue kPaperValues[] = {
     {"width.k", 2, 0, kLimits},
     {"width.largest", 0.039228, 6, kLimits},
 
+    {"families", 6, 0, kFamilies},
     {"affine.linear.refuted", 0, 3, kAssumptions},
     {"affine.linear.B.coverage", 1, 3, kAssumptions},
     {"affine.linear.C.coverage", 1, 3, kAssumptions},
@@ -170,6 +179,14 @@ inline constexpr PaperValue kPaperValues[] = {
     {"grids.velocity_cross", 0.050577964, 9, kGrids},
     {"grids.by_speed", 0.011965171, 9, kGrids},
     {"grids.by_steering", 0.407688551, 9, kGrids},
+    {"margins.point_mass", 0.001896193, 9, kGrids},
+    {"margins.bicycle", 0.005961239, 9, kGrids},
+    {"deployed.position_diagonal", 0.006914008, 9, kGrids},
+    {"deployed.position_cross", 0.005689541, 9, kGrids},
+    {"deployed.velocity_diagonal", 0.092186775, 9, kGrids},
+    {"deployed.velocity_cross", 0.075860540, 9, kGrids},
+    {"deployed.by_speed", 0.017926410, 9, kGrids},
+    {"deployed.by_steering", 0.609638820, 9, kGrids},
 
     {"chunks.fixed_grid.rate.25", 0.237, 3, kChunks, 0.02433},
     {"chunks.fixed_grid.recall.25", 0.356, 3, kChunks, 0.03650},

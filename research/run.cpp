@@ -46,6 +46,7 @@ definitions under which these figures of the paper come out: the recall of group
 of D and S in group B, of both systems. Agreement with these figures is by construction and confirms nothing. Every row
 has a mark:
 - *exact*: the paper's text fixes every input, so the figure has to come out to the last digit;
+- *taken*: an input of ours, copied from the text;
 - *fitted*: one of the figures above, or one that follows from it; the figures of two other methods, regional
   calibration and the plug-in Gaussian, whose reading was chosen by them among those that `readings` tables; and the
   slack of parameter boxes by the paper's grid, by which the parameters in the box were chosen;
@@ -59,7 +60,9 @@ Nothing in the certifier was fitted: none of its constants was chosen for a figu
 Beside the mark is a word. *Same*: ours, rounded, has the paper's digits. *Near*: it has not, both spreads over seeds
 are known, and the means differ by at most twice the standard error of their difference. *Off*: neither, or there is no
 plan to measure ours on; then the last column says why. Were the true means equal, 6 to 8 % of the rows with
-both spreads would be off by chance. Rows by mark and word:
+both spreads would be off by chance. Each figure of the paper counts once here, with the worst word of its rows; the
+spread of a figure that is printed twice is that of either place. Figures that are 0, 1 or a whole number are easily met,
+and stand apart.
 
 )" + CountInMarkdown(tables) +
          R"(

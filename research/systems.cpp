@@ -107,19 +107,28 @@ const System& SystemNamed(const std::string& name) {
   throw std::invalid_argument("system: " + name + " is not point_mass or bicycle");
 }
 
-double MedianResidual(const System& system, int count) {
-  Random random{0x6d656469616e};
+double MedianResidual(const System& system, int points) {
   const Box& region = system.data_region;
-  std::vector<double> z(static_cast<std::size_t>(region.dim())), next(static_cast<std::size_t>(system.num_states()));
-  std::vector<double> residual(next.size()), sizes(static_cast<std::size_t>(count));
-  for (double& size : sizes) {
-    for (int l = 0; l < region.dim(); ++l)
-      z[static_cast<std::size_t>(l)] = random.Uniform(region.lower()[l], region.upper()[l]);
-    system.step(z, residual, next);
-    size = 0;
-    for (const double r : residual) size = std::max(size, std::abs(r));
+  const auto n = static_cast<std::size_t>(system.num_states());
+  std::vector<double> z(static_cast<std::size_t>(region.dim())), residual(n), next(n), sizes;
+  std::vector<int> axes;  // on which the residual depends
+  for (int l = 0; l < region.dim(); ++l) {
+    z[static_cast<std::size_t>(l)] = (region.lower()[l] + region.upper()[l]) / 2;
+    if (system.deployed.col(l).any()) axes.push_back(l);
   }
-  const auto middle = sizes.begin() + count / 2;
+  std::vector<int> digits(axes.size(), 0);
+  for (bool done = false; !done;) {
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      z[static_cast<std::size_t>(axes[i])] =
+          region.lower()[axes[i]] + (region.upper()[axes[i]] - region.lower()[axes[i]]) * (digits[i] + 0.5) / points;
+    system.step(z, residual, next);
+    sizes.push_back(std::abs(*std::ranges::max_element(residual, {}, [](double r) { return std::abs(r); })));
+    const auto rises = std::ranges::find_if(digits, [&](int digit) { return digit + 1 < points; });
+    std::fill(digits.begin(), rises, 0);
+    done = rises == digits.end();
+    if (!done) ++*rises;
+  }
+  const auto middle = sizes.begin() + std::ssize(sizes) / 2;
   std::nth_element(sizes.begin(), middle, sizes.end());
   return *middle;
 }

@@ -51,7 +51,8 @@ struct System {
 /** By its name. @throws std::invalid_argument for another. */
 [[nodiscard]] const System& SystemNamed(const std::string& name);
 
-/** The median of |r*(z)|_inf over `count` points drawn uniformly from the data region. */
-[[nodiscard]] double MedianResidual(const System& system, int count = 100'001);
+/** The median of |r*(z)|_inf over the data region, by the middles of `points` cells on each axis on which r* depends.
+ */
+[[nodiscard]] double MedianResidual(const System& system, int points = 1000);
 
 }  // namespace forereach::research

@@ -54,9 +54,11 @@ struct Errors {
 };
 std::optional<Errors> ErrorsOf(const Row& row) {
   const std::optional<PaperValue>& paper = row.paper.value();
-  if (!paper || paper->deviation < 0 || row.ours.seeds < 2) return std::nullopt;
-  return Errors{paper->deviation * paper->deviation / kPaperSeeds,
-                row.ours.deviation * row.ours.deviation / row.ours.seeds};
+  if (!paper || row.ours.seeds < 2) return std::nullopt;
+  const double deviation =
+      paper->deviation < 0 && !paper->same_as.empty() ? Paper(paper->same_as).deviation : paper->deviation;
+  if (deviation < 0) return std::nullopt;
+  return Errors{deviation * deviation / kPaperSeeds, row.ours.deviation * row.ours.deviation / row.ours.seeds};
 }
 
 // Of the difference of means.
@@ -95,6 +97,13 @@ std::string InWords(const JointTest& test) {
   return test.left_out > 0 ? text + ". Left out: " + Count(test.left_out, "row") + " that others decide." : text + ".";
 }
 
+// Of a figure of the paper, over the rows that hold it: what agreement is worth is the least of their marks, and the
+// word the worst.
+struct FigureCount {
+  Mark mark = Mark::kNotGiven;
+  Word word = Word::kNone;
+};
+
 std::string Quoted(const std::string& text) {
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -129,6 +138,7 @@ Estimate EstimateOf(const std::vector<std::optional<double>>& of_each_seed) {
 const char* NameOf(Mark mark) {
   switch (mark) {
     case Mark::kExact: return "exact";
+    case Mark::kTaken: return "taken";
     case Mark::kFitted: return "fitted";
     case Mark::kOurs: return "ours";
     case Mark::kNotGiven: break;
@@ -164,7 +174,8 @@ Word WordOf(const Row& row) {
 std::string ReasonOf(const Row& row) {
   if (WordOf(row) != Word::kOff) return "";
   if (!row.reason.empty()) return row.reason;
-  return row.ours.mean ? "scenario bounds are ours" : "no plan to measure it on";
+  if (!row.ours.mean) return "no plan to measure it on";
+  return row.paper.mark() == Mark::kFitted ? "searched for, and not met" : "scenario bounds are ours";
 }
 
 JointTest TestJointly(const Table& table) {
@@ -204,19 +215,34 @@ std::string ToMarkdown(const Table& table) {
 }
 
 std::string CountInMarkdown(const std::vector<Table>& tables) {
-  std::string text = "| rows | same | near | off | all |\n|---|---|---|---|---|\n";
-  for (const Mark mark : kMarks) {
-    std::map<Word, int> count;
-    int all = 0;
-    for (const Table& table : tables)
-      for (const Row& row : table.rows)
-        if (row.paper.mark() == mark) ++count[WordOf(row)], ++all;
-    text.append("| ").append(NameOf(mark)).append(" |");
-    for (const Word word : {Word::kSame, Word::kNear, Word::kOff})
-      text.append(mark == Mark::kNotGiven ? "" : ' ' + std::to_string(count[word])).append(" |");
-    text.append(1, ' ').append(std::to_string(all)).append(" |\n");
-  }
-  return text;
+  std::map<std::pair<std::string_view, bool>, FigureCount> figures;  // by key, and whether it is easily met
+  int not_given = 0;
+  for (const Table& table : tables)
+    for (const Row& row : table.rows) {
+      const std::optional<PaperValue>& paper = row.paper.value();
+      if (!paper) {
+        ++not_given;
+        continue;
+      }
+      const bool is_easy = paper->decimals == 0 || paper->value == 0 || paper->value == 1;
+      FigureCount& figure = figures[{paper->same_as.empty() ? paper->key : paper->same_as, is_easy}];
+      figure.word = std::max(figure.word, WordOf(row));
+      if (figure.mark == Mark::kNotGiven || row.paper.mark() == Mark::kFitted) figure.mark = row.paper.mark();
+    }
+  std::string text = "| figures | same | near | off | all |\n|---|---|---|---|---|\n";
+  for (const Mark mark : kMarks)
+    for (const bool is_easy : {false, true}) {
+      if (mark == Mark::kNotGiven) continue;
+      std::map<Word, int> count;
+      int all = 0;
+      for (const auto& [key, figure] : figures)
+        if (figure.mark == mark && key.second == is_easy) ++count[figure.word], ++all;
+      if (all == 0) continue;
+      text.append("| ").append(NameOf(mark)).append(is_easy ? ": 0, 1 or a whole number |" : " |");
+      for (const Word word : {Word::kSame, Word::kNear, Word::kOff}) text += ' ' + std::to_string(count[word]) + " |";
+      text += ' ' + std::to_string(all) + " |\n";
+    }
+  return text + "| rows without a figure of the paper | | | | " + std::to_string(not_given) + " |\n";
 }
 
 std::string ToCsv(const std::vector<Table>& tables) {

@@ -13,9 +13,10 @@ namespace forereach::research {
 struct PaperValue {
   std::string_view key;
   double value;
-  int decimals;            ///< As printed
-  std::string_view where;  ///< The table or section it is from
-  double deviation = -1;   ///< Over the ten seeds, where printed
+  int decimals;                   ///< As printed
+  std::string_view where;         ///< The table or section it is from
+  double deviation = -1;          ///< Over the ten seeds, where printed
+  std::string_view same_as = {};  ///< The key under which the paper prints the same figure with more digits
 };
 
 /** Those of paper_values.h. @throws std::invalid_argument for an unknown key. */
@@ -27,11 +28,12 @@ struct PaperValue {
 enum class Mark {
   kNotGiven,  ///< The paper prints no value
   kExact,     ///< The paper's text fixes every input, so the figure has to come out to the last digit
+  kTaken,     ///< An input of ours, which we took from the paper: agreement says that it was copied rightly
   kFitted,    ///< A definition was searched for under which this figure comes out: agreement confirms nothing
   kOurs       ///< Depends on definitions that the paper does not give and that were not fitted to this figure
 };
-inline constexpr Mark kMarks[] = {Mark::kExact, Mark::kFitted, Mark::kOurs, Mark::kNotGiven};
-/** "exact", "fitted", "ours" or "not given". */
+inline constexpr Mark kMarks[] = {Mark::kExact, Mark::kTaken, Mark::kFitted, Mark::kOurs, Mark::kNotGiven};
+/** "exact", "taken", "fitted", "ours" or "not given". */
 [[nodiscard]] const char* NameOf(Mark mark);
 
 /** The paper's figure for a row. There is none without a mark. */
@@ -63,7 +65,7 @@ struct Row {
   Reference paper;
   Estimate ours;
   int decimals = 3;      ///< Where the paper has none
-  std::string reason;    ///< Why it may differ; without one, that the scenario bounds are ours
+  std::string reason;    ///< Why it may differ; without one, what its mark says
   bool follows = false;  ///< From other rows of its table, ours and the paper's both: joint tests leave it out
 };
 
@@ -101,7 +103,8 @@ struct JointTest {
 
 /** The rows, then the joint test in words where the table has rows to compare. */
 [[nodiscard]] std::string ToMarkdown(const Table& table);
-/** The number of rows by mark and word, as a table. */
+/** The number of the paper's figures by mark and word, as a table: each figure once, however many rows hold it, with
+the worst of their words. Those that are 0, 1 or a whole number have lines of their own: they are easily met. */
 [[nodiscard]] std::string CountInMarkdown(const std::vector<Table>& tables);
 /** table,what,mark,paper,ours,deviation,low,high,difference,word,why: one line for each row, with a header line. Low
 and high are Student's interval over the seeds (statistics.h). */

@@ -25,6 +25,8 @@ namespace forereach {
 namespace {
 
 constexpr std::int64_t kProgressUs = 1'000'000;
+constexpr std::int64_t kRefusedStarts = 10;  // so many are no accident
+const std::string_view kOutsideX0 = GuardCauseName(GuardCause::kOutsideInitialSet);
 
 std::optional<Config> Load(const std::string& path, const BusOptions& in_force) try {
   Config config = LoadConfig(path);
@@ -187,6 +189,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
   if (supervisor_.Boundary(utime, now_us, ends).empty() && ends && !is_stopping_) ++finished_boundaries_;
   LogProgress(utime);
+  LogRefusedStarts();
 }
 
 void RobotSimNode::MeasureState() {
@@ -215,6 +218,9 @@ void RobotSimNode::BrakeUntil(std::int64_t utime) {
 }
 
 void RobotSimNode::Send(const std::string& channel, Bytes message) {
+  if (channel == config_.bus.event && !said_refusals_)
+    if (const auto event = Decoded<execution_event_t>(message); event && event->kind == execution_event_t::REFUSED)
+      if (const std::string why = GetText(event->message); why.starts_with(kOutsideX0)) last_refusal_ = why;
   if (!bus_.Publish(channel, message)) throw std::runtime_error("the bus does not take it");
 }
 
@@ -223,6 +229,21 @@ void RobotSimNode::LogProgress(std::int64_t utime) {
   next_progress_utime_ = utime + kProgressUs;
   logging::Info("{} steps driven, {} inside their slices, {:.1f} m to the goal{}", supervisor_.counts().steps,
                 supervisor_.counts().steps_inside, DistanceToGoal(), supervisor_.control().empty() ? ", standing" : "");
+}
+
+// Plans are controls: nothing in them steers back a robot that the target or a disturbance drives off.
+void RobotSimNode::LogRefusedStarts() {
+  const Supervisor::Counts& counts = supervisor_.counts();
+  const auto refused = counts.refused.find(std::string(kOutsideX0));
+  if (said_refusals_ || refused == counts.refused.end() || refused->second < kRefusedStarts ||
+      3 * refused->second < counts.started)
+    return;
+  said_refusals_ = true;
+  logging::Warn(
+      "{} plans were refused at their start and {} began: the robot is not in the set X0 where the planner expects it, "
+      "brakes, and begins again. Nothing steers it back within a plan. Widen planner.initial_half_width, or let plans "
+      "take over sooner (planner.lead_steps). The last: {}",
+      refused->second, counts.started, last_refusal_);
 }
 
 void RobotSimNode::OnObstacles(const Received& received) {

@@ -69,7 +69,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   /** One JSON object: boundaries, steps_executed, steps_inside_slice, steps_consistent (with their slice, within the
   state error), contacts, limits_exceeded (counted at each boundary), goal_reached, distance_to_goal (current, in
   metres; null without a goal), stops (before the goal, emergency stops included), emergency_stops (for a withdrawal),
-  plans_accepted, plans_started, plans_refused (count by GuardCauseName), messages_not_sent. */
+  plans_accepted, plans_started, plans_refused (count by GuardCauseName), messages_not_sent.
+  If many plans are refused at their start, since the robot is outside their X0, it logs so once, with the key. */
   [[nodiscard]] std::string Summary() const;
 
   /** As it was measured last. */
@@ -91,6 +92,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   [[nodiscard]] std::vector<Contact> Contacts(std::int64_t utime, bool moved) const;
   void OnObstacles(const Received& received);
   void ReportGoal(std::int64_t utime);
+  void LogRefusedStarts();
   void LogProgress(std::int64_t utime);
   [[nodiscard]] Eigen::VectorXd Position() const;
   [[nodiscard]] double DistanceToGoal() const;
@@ -113,6 +115,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   std::optional<std::int64_t> start_utime_;
   std::int64_t offset_before_us_ = 0, offset_us_ = 0;  // of the last boundary, and of the next one
   std::int64_t next_progress_utime_ = 0;
+  std::string last_refusal_;  // of a plan at its start, since the state was outside its X0
+  bool said_refusals_ = false;
   bool is_stopping_ = false;
   std::int64_t heard_utime_ = 0;  // of the message or boundary that is being handled
   std::int64_t brakes_since_utime_ = 0;

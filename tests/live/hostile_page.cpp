@@ -1,7 +1,9 @@
-/** forereach_hostile_page: serves a live page of messages whose texts try to become elements and scripts, and whose
-numbers are the largest there are. Prints its address, and ends with its standard input. */
+/** forereach_hostile_page [any]: serves a live page of messages whose texts try to become elements and scripts, and
+whose numbers are the largest there are. Prints its address, and ends with its standard input. With `any` it answers
+each line of that, a seed, with a line of news, after messages whose fields hold any numbers. */
 #include <iostream>
 #include <limits>
+#include <random>
 #include <string>
 
 #include "forereach/certified_plan_t.hpp"
@@ -9,6 +11,7 @@ numbers are the largest there are. Prints its address, and ends with its standar
 #include "forereach/fault_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "live/web_server.h"
+#include "tests/any_fields.h"
 #include "tests/live/live_fixture.h"
 
 namespace forereach {
@@ -64,10 +67,26 @@ void SendHostile(Watcher& watcher) {
   }
 }
 
+// News of the recorded course, some of whose messages hold any numbers.
+void TellAny(Watcher& watcher) {
+  const std::vector<LogEvent> events = CourseEvents();
+  Watcher::Cursor cursor;
+  std::string line;
+  for (std::size_t next = 0; std::getline(std::cin, line);) {
+    std::mt19937_64 random(std::stoull(line));
+    for (std::size_t count = 1 + random() % 16; count > 0; --count) {
+      const LogEvent& event = events[next++ % events.size()];
+      watcher.Take(random() % 2 ? event : AnyEvent(random, event));
+    }
+    watcher.Tick(random() % 4 ? events[next % events.size()].utime : static_cast<std::int64_t>(random()));
+    std::cout << watcher.Since(cursor) << std::endl;
+  }
+}
+
 }  // namespace
 }  // namespace forereach
 
-int main() {
+int main(int argc, char**) {
   using namespace forereach;
   Config task = CourseTask();
   task.path = kEvil;
@@ -75,6 +94,7 @@ int main() {
   watcher.Tick(1);
   const WebServer server(watcher, 0);
   std::cout << "http://127.0.0.1:" << server.port() << "/" << std::endl;
+  if (argc > 1) return TellAny(watcher), 0;
   SendHostile(watcher);
   std::cin.get();
 }

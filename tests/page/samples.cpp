@@ -1,4 +1,5 @@
-/** forereach_page_samples hostile|many|empty FILE.html [COUNT]: pages of invented runs, for tests in a browser. */
+/** forereach_page_samples hostile|many|empty FILE.html [COUNT]: pages of invented runs, for tests in a browser.
+forereach_page_samples any FILE.lcmlog SEED: a log of the recorded course, some of whose messages hold any numbers. */
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -8,6 +9,8 @@
 #include <string>
 
 #include "page/write.h"
+#include "tests/any_fields.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {
@@ -103,16 +106,29 @@ PageRun Hostile() {
   return run;
 }
 
+void WriteAny(const std::string& path, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  EventLogReader reader(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog");
+  EventLogWriter writer(path);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent) {
+    const LogEvent taken = random() % 4 ? event : AnyEvent(random, event);
+    writer.Append(taken.utime, taken.channel, taken.data);
+  }
+  if (!writer.Flush()) throw LogError(writer.problem());
+}
+
 }  // namespace
 }  // namespace forereach
 
 int main(int argc, char** argv) {
   using namespace forereach;
   const std::string kind = argc > 2 ? argv[1] : "";
-  if (kind != "hostile" && kind != "many" && kind != "empty") {
-    std::cerr << "usage: forereach_page_samples hostile|many|empty FILE.html [COUNT]\n";
+  if (kind != "hostile" && kind != "many" && kind != "empty" && (kind != "any" || argc < 4)) {
+    std::cerr << "usage: forereach_page_samples hostile|many|empty FILE.html [COUNT], or any FILE.lcmlog SEED\n";
     return 2;
   }
+  if (kind == "any") return WriteAny(argv[2], std::stoull(argv[3])), 0;
   const PageRun run = kind == "hostile" ? Hostile()
                       : kind == "many"  ? Many(argc > 3 ? std::stoi(argv[3]) : 100'000)
                                         : PageRun{};

@@ -2,6 +2,7 @@
 
 #include "tests/test.h"
 
+#include "bus/log.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/withdrawal_t.hpp"
@@ -398,6 +399,29 @@ TEST_F(PlannerNodeTest, StopsAfterSoManyCandidatesAndBeginsAnewWithTheNextState)
   now_ = kNow + kPeriod;
   Tell(Standing());
   EXPECT_EQ(candidates_.size(), 4u);
+}
+
+// A robot that its laws do not bring to rest, or a declaration that allows too much.
+TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
+  config_.planner.candidates = 1;
+  Start(config_);
+  const auto lose = [&](int rounds) {
+    testing::internal::CaptureStdout();  // the log's, where it is not set up
+    for (int i = 0; i < rounds; ++i) {
+      now_ += kPeriod;
+      Tell(Standing());
+      Say(Decision(candidates_.back(), decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
+      Run(3);
+    }
+    logging::Flush();
+    return testing::internal::GetCapturedStdout();
+  };
+  EXPECT_THAT(lose(PlannerNode::kLostRounds - 1), Not(HasSubstr("without a certificate")));
+  EXPECT_THAT(lose(1),
+              AllOf(HasSubstr("20 rounds in a row without a certificate; since the start 20 searches, 0 without "
+                              "a plan, domain_exit 20"),
+                    HasSubstr("forereach advise")));
+  EXPECT_THAT(lose(30), Not(HasSubstr("without a certificate"))) << "it has been said";
 }
 
 TEST_F(PlannerNodeTest, SendsNothingThatWouldComeTooLate) {

@@ -115,6 +115,25 @@ TEST_F(BusCommands, WhatAStrangerSaysMeanwhileAnswersNoCommand) {
               AllOf(HasSubstr("version 2"), HasSubstr("messages refused: "), HasSubstr(" unsigned")));
 }
 
+// Others reload, too: only this very file in force is an answer.
+TEST_F(BusCommands, AReloadOfAnotherFileOrAFailedOneOfOthersIsNoAnswer) {
+  const std::string mine = scratch_.Write("mine.yaml", ReadWhole(path_, 1 << 20) + "\n# another\n");
+  const auto reload_of = [&](const std::string& path) {
+    return Forereach("reload --config '" + path + "' --lcm-url '" + config_.bus.url + "' --key '" + key_ + "' 2>&1");
+  };
+  const Output other = reload_of(mine);
+  EXPECT_EQ(other.code, 1) << other.text;
+  EXPECT_THAT(other.text, AllOf(HasSubstr("version 2"), HasSubstr("it is not --config as it is here")));
+  scratch_.Write("task.yaml", "model: {name: hovercraft}\n");
+  const Output failed = reload_of(mine);
+  EXPECT_EQ(failed.code, 1) << failed.text;
+  EXPECT_THAT(failed.text, AllOf(HasSubstr("hovercraft"), HasSubstr("a heartbeat does not say whose")));
+  std::filesystem::copy_file(mine, path_, std::filesystem::copy_options::overwrite_existing);
+  const Output done = reload_of(mine);
+  EXPECT_EQ(done.code, 0) << done.text;
+  EXPECT_THAT(done.text, HasSubstr("version 3"));
+}
+
 TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {
   const auto open = OpenBus(config_.bus.url);
   robot_state_t state{.utime = WallClockUs(), .mode = robot_state_t::STANDING, .num_states = 4};

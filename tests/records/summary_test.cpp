@@ -64,6 +64,7 @@ TEST(Summary, CountsAHandMadeLog) {
   EXPECT_EQ(summary.steps_inside, 3);
   EXPECT_EQ(summary.steps_outside, 1);
   EXPECT_EQ(summary.steps_consistent, 2);
+  EXPECT_THAT(ToText(summary), testing::ContainsRegex("certified +70 .*if the declaration is true"));
   EXPECT_THAT(ToText(summary),
               testing::ContainsRegex("steps in certified slice +3 of 6, 2 consistent .within the state error.\n"));
   EXPECT_EQ(summary.tails, 1);

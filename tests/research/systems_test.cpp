@@ -54,6 +54,14 @@ TEST(Systems, NormRatiosAreThePapersToTheDigit) {
   EXPECT_EQ(std::round(NormRatio(BicycleSystem(), BicycleSystem().deployed / 1.5) * 1000), 11368);
 }
 
+// Nearly half of the bicycle's region has next to no residual, so points drawn at random miss its median by a quarter.
+TEST(Systems, TheMedianResidualIsThatOfTheRegionAndNotOfPointsDrawn) {
+  const double median = MedianResidual(BicycleSystem());
+  EXPECT_NEAR(median, 1.079e-4, 1e-7);
+  EXPECT_NEAR(MedianResidual(BicycleSystem(), 500) / median, 1, 0.005);
+  EXPECT_NEAR(MedianResidual(PointMassSystem(), 250) / MedianResidual(PointMassSystem()), 1, 0.001);
+}
+
 TEST(Systems, NamesAreKnown) {
   EXPECT_EQ(&SystemNamed("bicycle"), &BicycleSystem());
   EXPECT_EQ(&SystemNamed("point_mass"), &PointMassSystem());

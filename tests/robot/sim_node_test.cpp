@@ -3,6 +3,7 @@
 #include "tests/test.h"
 
 #include "bus/authentic_bus.h"
+#include "bus/log.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -444,6 +445,40 @@ TEST(RobotSim, APlanForAnotherStateIsRefusedAndTheOldOneGoesOn) {
   EXPECT_EQ(rig.states[3].executing_step, 2);
   EXPECT_EQ(rig.Count(kTailBegun), 1);
   EXPECT_EQ(rig.Summary()["plans_refused"]["outside_initial_set"], 1);
+}
+
+// Nothing steers the robot to where its plans begin.
+TEST(RobotSim, SaysOnceAndWithTheKeyThatManyPlansAreRefusedAtTheirStart) {
+  const Config config = PointMassTask();
+  RunningRig rig(config);
+  const auto said = [&](int first, int last) {
+    testing::internal::CaptureStdout();  // the log's, where it is not set up
+    for (int k = first; k <= last; ++k) rig.Send(Plan(config, k, k, {5, 0, 0, 0})), rig.RunTo(k);
+    logging::Flush();
+    return testing::internal::GetCapturedStdout();
+  };
+  EXPECT_THAT(said(1, 9), Not(HasSubstr("refused at their start"))) << "a few may be";
+  EXPECT_THAT(said(10, 10), AllOf(HasSubstr("10 plans were refused at their start and 0 began"),
+                                  HasSubstr("planner.initial_half_width"), HasSubstr("not inside X0 = 5 +- ")));
+  EXPECT_THAT(said(11, 40), Not(HasSubstr("refused at their start"))) << "it has been said";
+}
+
+TEST(RobotSim, AFewRefusedStartsAmongManyAreNoNews) {
+  const Config config = PointMassTask();
+  RunningRig rig(config);
+  testing::internal::CaptureStdout();
+  for (int k = 1; k <= 60; ++k) {
+    std::vector<double> z = rig.StateAt(k - 1), next = z;
+    z.insert(z.end(), {1.0, 0.0});
+    if (k > 1) config.problem->model->Evaluate(z, next);
+    if (k % 5 == 0) next[0] += 5;
+    rig.Send(Plan(config, k, k, next));
+    rig.RunTo(k);
+  }
+  logging::Flush();
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), Not(HasSubstr("refused at their start")));
+  EXPECT_EQ(rig.Summary()["plans_refused"]["outside_initial_set"], 12);
+  EXPECT_EQ(rig.Summary()["plans_started"], 48);
 }
 
 TEST(RobotSim, APlanThatArrivesAfterItsStartIsNotStarted) {
