@@ -289,14 +289,22 @@ bool AllFinite(const std::vector<SecondDerivative>& hessian) {
 // The ends of what encloses either bound.
 Bounds Outermost(const Bounds& bounds) { return {bounds.lower.lower(), bounds.upper.upper()}; }
 
-// The record's generator that is nearest to d, unless d is nearer to nothing.
+// The record's generator that is nearest to d, unless d is nearer to nothing, in shares of the record's half-widths:
+// the middle of a wide coordinate may be off by far more than a narrow one's.
 int NearestGenerator(const RecordedSet& recorded, const std::vector<Real>& column) {
   Eigen::VectorXd rounded(recorded.center.size());
   for (Eigen::Index k = 0; k < rounded.size(); ++k) rounded[k] = column[ToSize(k)].ToDouble();
+  const Eigen::VectorXd half_width = recorded.generators.cwiseAbs().rowwise().sum();
+  const auto size = [&](const Eigen::VectorXd& away) {
+    double sum = 0;
+    for (Eigen::Index k = 0; k < away.size(); ++k)
+      if (away[k] != 0) sum += std::abs(away[k]) / half_width[k];
+    return sum;
+  };
   int nearest = -1;
-  double least = rounded.lpNorm<1>();
+  double least = size(rounded);
   for (Eigen::Index j = 0; j < recorded.generators.cols(); ++j)
-    if (const double away = (recorded.generators.col(j) - rounded).lpNorm<1>(); away < least)
+    if (const double away = size(recorded.generators.col(j) - rounded); away < least)
       least = away, nearest = static_cast<int>(j);
   return nearest;
 }

@@ -102,6 +102,26 @@ bool IsSame(const Expression& expression, int one, int other) {  // NOLINT(misc-
   return a.kind == Kind::kWholePower || a.b < 0 ? a.b == b.b : IsSame(expression, a.b, b.b);
 }
 
+// Whether the part at `node` is the part at `factor`, or a product with it.
+bool HasFactor(const Expression& expression, int node, int factor) {  // NOLINT(misc-no-recursion): as deep as the text
+  if (IsSame(expression, node, factor)) return true;
+  const Expression::Node& product = expression.nodes[ToSize(node)];
+  return product.kind == Kind::kMultiply &&
+         (HasFactor(expression, product.a, factor) || HasFactor(expression, product.b, factor));
+}
+
+// Whether the node stands in a product with the part at `factor`. A node is an operand of a later one.
+bool IsMultipliedBy(const Expression& expression, std::size_t node, int factor) {
+  auto at = static_cast<int>(node);
+  for (std::size_t i = node + 1; i < expression.nodes.size(); ++i) {
+    const Expression::Node& product = expression.nodes[i];
+    if (product.kind != Kind::kMultiply || (product.a != at && product.b != at)) continue;
+    if (HasFactor(expression, product.a == at ? product.b : product.a, factor)) return true;
+    at = static_cast<int>(i);
+  }
+  return false;
+}
+
 // The smoothing that a node is, over the ranges of all nodes.
 std::optional<SharpSmoothing> SmoothingAt(const Expression& expression, std::size_t i, std::span<const Value> values,
                                           const NameList& names) {
@@ -112,9 +132,7 @@ std::optional<SharpSmoothing> SmoothingAt(const Expression& expression, std::siz
     if (!range.Contains(0) || !(0 < width.lower && width.upper < range.HalfWidthUpper())) return std::nullopt;
     SharpSmoothing sharp{NameOf(nodes[i]), nodes[i].line, nodes[i].column, "", width.upper, range};
     if (nodes[ToSize(argument)].kind == Kind::kName) sharp.argument = names.all()[ToSize(nodes[ToSize(argument)].a)];
-    for (const Expression::Node& product : nodes)
-      if (product.kind == Kind::kMultiply && (ToSize(product.a) == i || ToSize(product.b) == i))
-        sharp.is_square |= IsSame(expression, ToSize(product.a) == i ? product.b : product.a, argument);
+    sharp.is_square = IsMultipliedBy(expression, i, argument);
     return sharp;
   };
   if (nodes[i].kind != Kind::kCall) return std::nullopt;

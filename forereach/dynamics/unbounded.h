@@ -33,9 +33,9 @@ is at least that, is many times what the remainder needs. */
 struct SharpSmoothing {
   std::string operation;  ///< hypot or sqrt.
   int line = 0, column = 0;
-  std::string argument;  ///< a as it is written, if it is a name; otherwise empty.
-  double width = 0;      ///< c
-  Interval range;        ///< of a
+  std::string argument;    ///< a as it is written, if it is a name; otherwise empty.
+  double width = 0;        ///< c
+  Interval range;          ///< of a
   bool is_square = false;  ///< It is multiplied by a: that is signed_square(a), smoothed.
 };
 

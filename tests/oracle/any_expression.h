@@ -16,7 +16,7 @@ smooth_gate too, which models may not use. */
 inline std::string AnyExpression(Random& random, const std::vector<std::string>& leaves, int depth,
                                  bool gates) {  // NOLINT(misc-no-recursion): not deep
   static const std::vector<std::string> unary{"sin",  "cos", "tan", "asin", "acos", "atan",
-                                              "sqrt", "exp", "log", "tanh", "abs", "signed_square"};
+                                              "sqrt", "exp", "log", "tanh", "abs",  "signed_square"};
   static const std::vector<std::string> binary{"atan2", "min", "max", "hypot"};
   const auto one_of = [&](const std::vector<std::string>& all) {
     return all[static_cast<std::size_t>(random.Below(static_cast<int>(all.size())))];

@@ -107,7 +107,8 @@ struct OneSecond {
 TEST_P(TextCertificates, OfQuadraticDragAreConfirmedFromRest) {
   const OneSecond second;
   forereach::Tube tube;
-  const auto smoothed = ProblemOf(Rov(kSmoothedDrag, GetParam()), 3), squared = ProblemOf(Rov(kSquareDrag, GetParam()), 3);
+  const auto smoothed = ProblemOf(Rov(kSmoothedDrag, GetParam()), 3),
+             squared = ProblemOf(Rov(kSquareDrag, GetParam()), 3);
   EXPECT_EQ(Certifier(smoothed).Certify(second.plan, second.start, {}, tube).outcome, Outcome::kDomain);
   for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
     squared->method = method;
@@ -116,7 +117,8 @@ TEST_P(TextCertificates, OfQuadraticDragAreConfirmedFromRest) {
     Certificate certificate = CertificateOf(certifier, second.plan, second.start, {}, tube);
     const Verifier judge(squared, MethodOf(*squared));
     EXPECT_EQ(judge.Verify(certificate).status, Status::kConfirmed);
-    certificate.slices.back().upper[4] -= 1e-6;
+    RecordedSlice& last = certificate.slices.back();  // a good part too narrow: the verifier's remainder may be tighter
+    last.upper[4] -= 0.3 * (last.upper[4] - last.lower[4]);
     EXPECT_EQ(judge.Verify(certificate).status, Status::kRefuted);
   }
   // Rollouts of 256 bits from corners and from inside.
@@ -125,7 +127,8 @@ TEST_P(TextCertificates, OfQuadraticDragAreConfirmedFromRest) {
   for (int rollout = 0; rollout < 20; ++rollout) {
     std::vector<Real> z;
     for (int k = 0; k < 8; ++k)
-      z.push_back(Real(second.start.center(k)) + Real(0.03) * Real(rollout < 8 ? random.Sign() : random.Uniform(-1, 1)));
+      z.push_back(Real(second.start.center(k)) +
+                  Real(0.03) * Real(rollout < 8 ? random.Sign() : random.Uniform(-1, 1)));
     for (const double u : second.controls.col(0)) z.emplace_back(u);
     for (int t = 1; t <= 20; ++t) {
       std::ranges::copy(equations->Value(z), z.begin());
@@ -153,13 +156,14 @@ TEST(SignedSquare, OneStepContainsTheRangeOnBothSidesOfZero) {
         const Zonotope start = Zonotope::FromBox(Vec({c}), Vec({r}));
         ASSERT_EQ(certifier.Certify(plan, start, {}, tube).outcome, Outcome::kCertified) << c << " +- " << r;
         const Certificate certificate = CertificateOf(certifier, plan, start, {}, tube);
-        EXPECT_EQ(Verifier(problem, MethodOf(*problem)).Verify(certificate).status, Status::kConfirmed) << c << ", " << r;
+        EXPECT_EQ(Verifier(problem, MethodOf(*problem)).Verify(certificate).status, Status::kConfirmed)
+            << c << ", " << r;
         for (const double part : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
           const Real x = Real(c) + Real(part) * Real(r), next = x * abs(x);
           ASSERT_TRUE(CertainlyAtMost(tube.hull(1, 0).lower, next)) << c << " +- " << r;
           ASSERT_TRUE(CertainlyAtMost(next, tube.hull(1, 0).upper)) << c << " +- " << r;
         }
-        EXPECT_LE(tube.half_width(1)[0], 2 * std::abs(c) * r + r * r + 1e-14) << c << " +- " << r;
+        EXPECT_LE(tube.half_width(1)[0], 2 * std::abs(c) * r + r * r + 1e-13) << c << " +- " << r;
       }
 }
 
