@@ -22,10 +22,12 @@ std::shared_ptr<Problem> ProblemOf(const ModelText& text, double reach) {
 }
 
 // Certifies random plans. All of what is certified has to be confirmed.
-void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorXd& input, int steps) {
+void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorXd& input, int steps,
+                     double step_error = 0) {
   for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
     const auto problem = ProblemOf(text, 1.3);
     problem->method = method;
+    problem->timing.error = step_error;
     const Certifier certifier(problem);
     const Verifier judge(problem, MethodOf(*problem));
     forereach::Tube tube;
@@ -79,6 +81,13 @@ TEST_P(TextCertificates, WithAParameterThatIsAnIntervalAreConfirmed) {
   ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "k*u"}, {"v", "-k*v*abs(v + 2)"}}, {"u"},
                             {{"dt", 0.1, 0.1}, {"k", 0.19, 0.21}}, {}, GetParam()),
                   random, Eigen::VectorXd::Constant(1, 0.1), 8);
+}
+
+TEST_P(TextCertificates, OfStepsOffTheirTimesAreConfirmed) {
+  TracedRandom random(95);
+  ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "u"}, {"v", "u - 0.3*v*x"}}, {"u"},
+                            {{"dt", 0.1, 0.1}}, {}, GetParam()),
+                  random, Eigen::VectorXd::Constant(1, 0.1), 8, 0.02);
 }
 
 // A BlueROV2 (von Benzon et al., J. Mar. Sci. Eng. 10(12), 2022) without roll and pitch; `drag` of a speed is its
