@@ -13,6 +13,7 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -305,6 +306,7 @@ class Examination final {
       for (int k = 0; k < model_.num_states(); ++k) widths.push_back(slice.HalfWidthUpper(k));
     }
     ExamineEnd(decision, tube);
+    ExamineSmoothing(decision, plan, tube);
     ExamineRest(tube);
     ExamineLimits(plan, initial_set);
     ExamineStart(*certifier, initial_set);
@@ -352,6 +354,29 @@ class Examination final {
     Add(key,
         fmt::format("the tube of {}, without obstacles, ends at step {}: {}", PlanName(), tube.length(), result_.tube),
         advice, is_remark);
+  }
+
+  // The widest slice is mostly the last.
+  void ExamineSmoothing(const Decision& decision, const Plan& plan, const Tube& tube) {
+    const int t = std::min(tube.length(), plan.num_steps - 1);
+    std::vector<Interval> box;
+    for (int k = 0; k < model_.num_states(); ++k) box.push_back(tube.hull(t, k));
+    for (const double u : plan.input(t)) box.emplace_back(u);
+    for (const SharpSmoothing& sharp : FindSharp(model_, box)) {
+      const std::string argument = sharp.argument.empty() ? "its argument" : sharp.argument;
+      Add("model",
+          fmt::format("{} at line {}, column {} smooths the absolute value of {} within {}, and at step {} {} may be "
+                      "anywhere in [{}, {}]: its second derivative there reaches {}, and the bound on it widens "
+                      "the tube",
+                      sharp.operation, sharp.line, sharp.column, argument, Up(sharp.width), t, argument,
+                      Down(sharp.range.lower), Up(sharp.range.upper), Down(1 / sharp.width)),
+          sharp.is_square ? fmt::format("write signed_square({0}) for {0} times it: the same without smoothing, with a "
+                                        "second derivative of at most 2",
+                                        sharp.argument.empty() ? "a" : sharp.argument)
+                          : "smooth over a wider range, as far as the declaration of the residual allows; a number "
+                            "times its own absolute value is signed_square",
+          decision.outcome == Outcome::kCertified);
+    }
   }
 
   [[nodiscard]] std::string PlanName() const {

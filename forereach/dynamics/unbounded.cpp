@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_models.h"
@@ -92,7 +93,67 @@ Value Apply(const Expression::Node& node, std::span<const Value> earlier, std::s
   return value;
 }
 
-Value Evaluate(const Expression& expression, std::span<const Value> names) {
+// Whether the parts of an expression that end at two of its nodes are the same text.
+bool IsSame(const Expression& expression, int one, int other) {  // NOLINT(misc-no-recursion): as deep as the text
+  const Expression::Node &a = expression.nodes[ToSize(one)], &b = expression.nodes[ToSize(other)];
+  if (a.kind != b.kind || a.number != b.number || (a.kind == Kind::kCall && a.function != b.function)) return false;
+  if (a.kind == Kind::kNumber || a.kind == Kind::kName) return a.a == b.a;
+  if (!IsSame(expression, a.a, b.a)) return false;
+  return a.kind == Kind::kWholePower || a.b < 0 ? a.b == b.b : IsSame(expression, a.b, b.b);
+}
+
+// Whether the part at `node` is the part at `factor`, or a product with it.
+bool HasFactor(const Expression& expression, int node, int factor) {  // NOLINT(misc-no-recursion): as deep as the text
+  if (IsSame(expression, node, factor)) return true;
+  const Expression::Node& product = expression.nodes[ToSize(node)];
+  return product.kind == Kind::kMultiply &&
+         (HasFactor(expression, product.a, factor) || HasFactor(expression, product.b, factor));
+}
+
+// Whether the node stands in a product with the part at `factor`. A node is an operand of a later one.
+bool IsMultipliedBy(const Expression& expression, std::size_t node, int factor) {
+  auto at = static_cast<int>(node);
+  for (std::size_t i = node + 1; i < expression.nodes.size(); ++i) {
+    const Expression::Node& product = expression.nodes[i];
+    if (product.kind != Kind::kMultiply || (product.a != at && product.b != at)) continue;
+    if (HasFactor(expression, product.a == at ? product.b : product.a, factor)) return true;
+    at = static_cast<int>(i);
+  }
+  return false;
+}
+
+// The smoothing that a node is, over the ranges of all nodes.
+std::optional<SharpSmoothing> SmoothingAt(const Expression& expression, std::size_t i, std::span<const Value> values,
+                                          const NameList& names) {
+  const std::vector<Expression::Node>& nodes = expression.nodes;
+  const auto is_constant = [&](int node) { return values[ToSize(node)].states == 0; };
+  const auto of = [&](int argument, const Interval& width) -> std::optional<SharpSmoothing> {
+    const Interval& range = values[ToSize(argument)].range;
+    if (!range.Contains(0) || !(0 < width.lower && width.upper < range.HalfWidthUpper())) return std::nullopt;
+    SharpSmoothing sharp{NameOf(nodes[i]), nodes[i].line, nodes[i].column, "", width.upper, range};
+    if (nodes[ToSize(argument)].kind == Kind::kName) sharp.argument = names.all()[ToSize(nodes[ToSize(argument)].a)];
+    sharp.is_square = IsMultipliedBy(expression, i, argument);
+    return sharp;
+  };
+  if (nodes[i].kind != Kind::kCall) return std::nullopt;
+  if (nodes[i].function == Function::kHypot) {
+    const int width = is_constant(nodes[i].a) ? nodes[i].a : nodes[i].b;
+    const int argument = width == nodes[i].a ? nodes[i].b : nodes[i].a;
+    return is_constant(width) && !is_constant(argument) ? of(argument, abs(values[ToSize(width)].range)) : std::nullopt;
+  }
+  const Expression::Node& sum = nodes[ToSize(nodes[i].a)];
+  if (nodes[i].function != Function::kSqrt || sum.kind != Kind::kAdd) return std::nullopt;
+  const int square = is_constant(sum.a) ? sum.b : sum.a, rest = square == sum.a ? sum.b : sum.a;
+  const Expression::Node& power = nodes[ToSize(square)];
+  const bool is_square = (power.kind == Kind::kWholePower && power.b == 2) ||
+                         (power.kind == Kind::kMultiply && IsSame(expression, power.a, power.b));
+  return is_square && is_constant(rest) && !is_constant(square) ? of(power.a, sqrt(values[ToSize(rest)].range))
+                                                                : std::nullopt;
+}
+
+// @param sharp if not null, gets what is found in the expression.
+Value Evaluate(const Expression& expression, std::span<const Value> names, const NameList& known,
+               std::vector<SharpSmoothing>* sharp) {
   std::vector<Value> values;
   std::vector<Interval> ranges;
   for (const Expression::Node& node : expression.nodes) {
@@ -104,11 +165,14 @@ Value Evaluate(const Expression& expression, std::span<const Value> names) {
       values.push_back(Apply(node, values, ranges));
     ranges.push_back(values.back().range);
   }
+  for (std::size_t i = 0; sharp != nullptr && i < values.size(); ++i)
+    if (auto found = SmoothingAt(expression, i, values, known)) sharp->push_back(std::move(*found));
   return values.back();
 }
 
 // The equations over a box of variables.
-std::vector<Value> Equations(const ModelText& text, const NominalModel& model, std::span<const Interval> box) {
+std::vector<Value> Equations(const ModelText& text, const NominalModel& model, std::span<const Interval> box,
+                             std::vector<SharpSmoothing>* sharp = nullptr) {
   NameList names(model.variable_names());
   std::vector<Value> values;
   for (int l = 0; l < model.num_variables(); ++l)
@@ -118,12 +182,12 @@ std::vector<Value> Equations(const ModelText& text, const NominalModel& model, s
     static_cast<void>(names.Add(name));
   }
   for (const auto& [name, value] : text.definitions) {
-    values.push_back(Evaluate(ParseExpression(value, names), values));
+    values.push_back(Evaluate(ParseExpression(value, names), values, names, sharp));
     static_cast<void>(names.Add(name));
   }
   std::vector<Value> equations;
   for (const ExpressionText& equation : text.equations)
-    equations.push_back(Evaluate(ParseExpression(equation, names), values));
+    equations.push_back(Evaluate(ParseExpression(equation, names), values, names, sharp));
   return equations;
 }
 
@@ -147,6 +211,12 @@ std::optional<Unbounded> FindUnbounded(const NominalModel& model, std::span<cons
     if (const auto cause = CauseIn(rates, state)) return cause;
   }
   return std::nullopt;
+}
+
+std::vector<SharpSmoothing> FindSharp(const NominalModel& model, std::span<const Interval> box) {
+  std::vector<SharpSmoothing> sharp;
+  if (const std::optional<ModelText> text = TextOf(model)) static_cast<void>(Equations(*text, model, box, &sharp));
+  return sharp;
 }
 
 }  // namespace forereach

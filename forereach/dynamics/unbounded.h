@@ -27,4 +27,19 @@ Ranges are by intervals, as the certifier's. Not for the certify step: it parses
 [[nodiscard]] std::optional<Unbounded> FindUnbounded(const NominalModel& model, std::span<const Interval> box,
                                                      int state);
 
+/** hypot(a, c) or sqrt(a^2 + d), c = sqrt(d) a constant, where a may be zero in a box in which it is known only up to
+more than c. Its second derivative by a is 1 / c at a = 0 and falls off within c, so over the box the bound on it, which
+is at least that, is many times what the remainder needs. */
+struct SharpSmoothing {
+  std::string operation;  ///< hypot or sqrt.
+  int line = 0, column = 0;
+  std::string argument;    ///< a as it is written, if it is a name; otherwise empty.
+  double width = 0;        ///< c
+  Interval range;          ///< of a
+  bool is_square = false;  ///< It is multiplied by a: that is signed_square(a), smoothed.
+};
+
+/** All of them, in the order of evaluation at the start of a step; each once. @pre as FindUnbounded. */
+[[nodiscard]] std::vector<SharpSmoothing> FindSharp(const NominalModel& model, std::span<const Interval> box);
+
 }  // namespace forereach

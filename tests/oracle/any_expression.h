@@ -16,7 +16,7 @@ smooth_gate too, which models may not use. */
 inline std::string AnyExpression(Random& random, const std::vector<std::string>& leaves, int depth,
                                  bool gates) {  // NOLINT(misc-no-recursion): not deep
   static const std::vector<std::string> unary{"sin",  "cos", "tan", "asin", "acos", "atan",
-                                              "sqrt", "exp", "log", "tanh", "abs"};
+                                              "sqrt", "exp", "log", "tanh", "abs",  "signed_square"};
   static const std::vector<std::string> binary{"atan2", "min", "max", "hypot"};
   const auto one_of = [&](const std::vector<std::string>& all) {
     return all[static_cast<std::size_t>(random.Below(static_cast<int>(all.size())))];
@@ -47,7 +47,7 @@ class TameExpression {
     if (depth == 0 || random_.Coin(0.1)) return Leaf();
     if (random_.Coin(0.03)) return Bold(depth - 1);
     const std::string a = (*this)(depth - 1);
-    switch (random_.Below(22)) {
+    switch (random_.Below(23)) {
       case 0:
       case 1: return a + " + " + (*this)(depth - 1);
       case 2:
@@ -69,6 +69,7 @@ class TameExpression {
       case 18: return "exp(-(" + a + ")^2)";
       case 19: return "log(1.2 + (" + a + ")^2)";
       case 20: return "hypot(" + a + ", 0.3)";
+      case 21: return "0.5*signed_square(sin(" + a + ") - 0.5)";
       default: return "tanh(" + a + ")";
     }
   }

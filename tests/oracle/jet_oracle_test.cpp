@@ -56,6 +56,12 @@ const std::array kFunctions{
             return Derivatives{t, slope, Real(-2) * t * slope};
           },
           -30, 30},
+    Unary{"signed_square", [](const Jet& a) { return SignedSquare(a); },
+          [](const Real& x) {
+            const Real sign = x < Real(0) ? Real(-1) : Real(1);
+            return Derivatives{sign * x * x, Real(2) * sign * x, Real(2) * sign};
+          },
+          -3, 3},
     Unary{"sqrt", [](const Jet& a) { return sqrt(a); },
           [](const Real& x) {
             const Real root = sqrt(x);

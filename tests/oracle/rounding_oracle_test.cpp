@@ -23,7 +23,7 @@ Real TanCurvature(const Real& t) { return Real(2) * t * (Real(1) + t * t); }
 
 namespace forereach::rounding_oracle_test {
 
-constexpr int kOutputs = 16;
+constexpr int kOutputs = 16;  // as many as a program has
 
 // Every function, of p in [-0.4, 0.4] and q in [0.5, 3].
 template <class T>
@@ -42,7 +42,7 @@ void AllFunctions(const T& p, const T& q, std::span<T> next) {
   next[11] = abs(p + q) * p;
   next[12] = max(p, q + T(2)) * p;
   next[13] = min(p, -q) * q;
-  next[14] = pow(p, 2) * log(q);
+  next[14] = SignedSquare(p) * log(q);
   next[15] = sqrt(T(1) - p * p);
 }
 

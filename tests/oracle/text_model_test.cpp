@@ -179,11 +179,12 @@ bool IsInside(const Real& x, const Interval& range) {
 }
 
 ModelText Everything(Integrator integrator) {
-  return TextModel(
-      {{"x", "sin(x*y) + exp(-z^2)*tanh(u) + atan2(y + 3, x) + sqrt(z^2 + 1)/(2 + x)"},
-       {"y", "log(4 + x)*acos(y/4) - asin(z/4) + max(x + 3, y)*min(z - 3, u) + abs(x + 2)*c"},
-       {"z", "atan(x*z) + tan(y/3)*(1 + tan(y/3)^2) + (x + 3)^-3 + (2 + z)^c + hypot(x, y + 3) + cos(u)*z*z*z"}},
-      {"u"}, {{"dt", 0.1, 0.1}, {"c", 0.75, 0.75}}, {}, integrator);
+  return TextModel({{"x", "sin(x*y) + exp(-z^2)*tanh(u) + atan2(y + 3, x) + sqrt(z^2 + 1)/(2 + x)"},
+                    {"y", "log(4 + x)*acos(y/4) - asin(z/4) + max(x + 3, y)*min(z - 3, u) + abs(x + 2)*c"},
+                    {"z",
+                     "atan(x*z) + tan(y/3)*(1 + tan(y/3)^2) + (x + 3)^-3 + (2 + z)^c + hypot(x, y + 3) + "
+                     "signed_square(x - 2) + cos(u)*z*z*z"}},
+                   {"u"}, {{"dt", 0.1, 0.1}, {"c", 0.75, 0.75}}, {}, integrator);
 }
 
 class StagesTest : public testing::TestWithParam<std::tuple<int, Integrator>> {};
@@ -312,6 +313,27 @@ TEST(StepRate, SaysWhatDoesNotDependOnTheDuration) {
   const StepRate rate(TextModel({{"x", "x + dt*y"}, {"y", "y + u"}}, {"u"}, {{"dt", 0.1, 0.1}}, {}, Integrator::kNone));
   EXPECT_TRUE(rate.UsesDuration(0));
   EXPECT_FALSE(rate.UsesDuration(1));
+}
+
+// By the form of each equation: x plus terms that are h times what does not depend on h.
+TEST(StepRate, SaysWhatIsInProportionToTheDuration) {
+  const auto is_proportional = [](const std::string& equation, Integrator integrator) {
+    const ModelText text = TextModel({{"x", equation}, {"y", "y + dt*u"}}, {"u"}, {{"dt", 0.1, 0.1}, {"k", 1, 2}},
+                                     {{"half", "dt/2"}}, integrator);
+    const bool is = StepRate(text).IsProportional(0);
+    EXPECT_EQ(verifier::EquationsOf(text)->IsProportional(0), is) << equation;
+    return is;
+  };
+  for (const char* yes : {"x + dt*y", "dt*sin(x) + x", "x - dt/k*tan(y)", "x + dt*y + half*u - 3*half*x^2", "x",
+                          "x + (dt*y - dt*(u - x))", "x + dt*dt*y/half", "x - -dt*exp(y)", "x + dt"})
+    EXPECT_TRUE(is_proportional(yes, Integrator::kNone)) << yes;
+  for (const char* no : {"x + dt*y + dt*half*u", "y + dt*x", "x + dt*sin(dt*y)", "x + dt*abs(dt*y)", "x + max(dt*y, u)",
+                         "2*x + dt*y", "x*exp(-dt)", "x + y", "dt*y", "x + dt^2*y/half", "x + y*dt/(dt + 1)"})
+    EXPECT_FALSE(is_proportional(no, Integrator::kNone)) << no;
+  EXPECT_TRUE(is_proportional("x*y - u", Integrator::kEuler));
+  EXPECT_FALSE(is_proportional("x*y - u*dt", Integrator::kEuler));
+  EXPECT_FALSE(is_proportional("x*y - u", Integrator::kMidpoint));
+  EXPECT_FALSE(is_proportional("x*y - u", Integrator::kRk4));
 }
 
 // Every second derivative by the variables of a kink or a jump has no bound, even if each side of it is affine.

@@ -77,6 +77,8 @@ TEST(Expression, OperatorsBindAsInMathematics) {
       {"log(v)", std::log(kV)},
       {"tanh(y)", std::tanh(kY)},
       {"abs(y)", -kY},
+      {"signed_square(y)", -kY * kY},
+      {"signed_square(x)", kX * kX},
       {"atan2(y, x)", std::atan2(kY, kX)},
       {"min(x, y)", kY},
       {"max(x, y)", kX},

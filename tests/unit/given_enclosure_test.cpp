@@ -27,17 +27,18 @@ class Velocities final : public ResidualEnclosure {
   double slope_, width_;
 };
 
-std::shared_ptr<const Problem> PointMassProblem() {
+std::shared_ptr<const Problem> PointMassProblem(double step_error) {
   auto problem = std::make_shared<Problem>(WorldOf(MakePointMass(0.125), Within({10, 10, 10, 10}), Within({1, 1})));
   problem->declaration = {};
   problem->transitions = {};
+  problem->timing.error = step_error;
   return problem;
 }
 
 class GivenEnclosure : public testing::Test {
  protected:
-  Decision Certify(const ResidualEnclosure& residual) {
-    const Certifier certifier(PointMassProblem(), residual);
+  Decision Certify(const ResidualEnclosure& residual, double step_error = 0) {
+    const Certifier certifier(PointMassProblem(step_error), residual);
     EXPECT_EQ(certifier.num_observations(), 0u);
     EXPECT_FALSE(certifier.uses_hull_distance());
     EXPECT_FALSE(certifier.violation());
@@ -62,6 +63,13 @@ TEST_F(GivenEnclosure, ASlopeContractsWhatAnIntervalCannot) {
   EXPECT_EQ(Certify(Velocities(-0.5, 0)).outcome, Outcome::kCertified);
   for (int t = 0; t <= 8; ++t) EXPECT_NEAR(tube_.half_width(t)[2], 0.0625 * std::pow(0.5, t), 1e-12);
   EXPECT_EQ(Certify(Velocities(2, 0)).outcome, Outcome::kDomain);  // threefold in each step
+}
+
+// A step that lasts a quarter longer has a quarter more of the residual, and that is up to half of the width.
+TEST_F(GivenEnclosure, AStepOffItsTimeHasMoreOfWhatASlopeBounds) {
+  EXPECT_EQ(Certify(Velocities(-0.5, 0), 0.03125).outcome, Outcome::kCertified);
+  EXPECT_NEAR(tube_.half_width(1)[2], 0.0625 * 0.5 * 1.25, 1e-12);
+  EXPECT_GE(tube_.half_width(1)[2], 0.0625 * 0.5 * 1.25);
 }
 
 TEST_F(GivenEnclosure, InvertedBoundsProveThatNoResidualIsAdmissible) {

@@ -32,6 +32,34 @@ TEST(FindUnbounded, NamesTheFunctionItsPlaceAndItsArgument) {
   EXPECT_EQ(found->argument, Interval(-0.25, 0.5));
 }
 
+// v in the box, and the model's function of it.
+std::vector<SharpSmoothing> Sharp(const std::string& equation, const Interval& v) {
+  return FindSharp(*MakeTextModel(Of(equation)), std::array{Interval(2, 3), Interval(0.5, 0.75), v, Interval(0)});
+}
+
+TEST(FindSharp, NamesASmoothingThatIsNarrowerThanTheBoxAndMeetsZero) {
+  for (const char* equation : {"x + dt*v*hypot(v, 0.25)", "x - dt*(hypot(0.25, v)*v)", "x + v*sqrt(v^2 + 0.0625)",
+                               "x + sqrt(0.0625 + v*v)*v"}) {
+    const auto found = Sharp(equation, {-0.5, 1});
+    ASSERT_EQ(found.size(), 1u) << equation;
+    EXPECT_NEAR(found[0].width, 0.25, 1e-15);
+    EXPECT_EQ(found[0].argument, "v");
+    EXPECT_EQ(found[0].range, Interval(-0.5, 1));
+    EXPECT_TRUE(found[0].is_square) << equation;
+  }
+  EXPECT_EQ(Sharp("x + dt*v*hypot(v, 0.25)", {-0.5, 1})[0].column, 10);
+  EXPECT_FALSE(Sharp("x + w*hypot(v, 0.25)", {-0.5, 1})[0].is_square);
+  EXPECT_EQ(Sharp("x + w*hypot(v - 0.1, 0.25)", {-0.5, 1})[0].argument, "");
+}
+
+TEST(FindSharp, IsSilentWhereTheBoxIsNarrowOrAwayFromZero) {
+  EXPECT_TRUE(Sharp("x + v*hypot(v, 0.25)", {-0.25, 0.25}).empty());
+  EXPECT_EQ(Sharp("x + v*hypot(v, 0.25)", {-0.25, 0.26}).size(), 1u);
+  EXPECT_TRUE(Sharp("x + v*hypot(v, 0.25)", {0x1p-30, 1}).empty());
+  EXPECT_TRUE(Sharp("x + hypot(v, w) + hypot(1, 2) + sqrt(v + 4) + sqrt(v^2 + w) + hypot(v, 0)", {0x1p-30, 1}).empty());
+  EXPECT_TRUE(Sharp("x + signed_square(v)", {-1, 1}).empty());
+}
+
 struct Case {
   const char *equation, *operation;
   Interval meets, misses;  // of v

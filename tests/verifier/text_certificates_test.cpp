@@ -22,10 +22,12 @@ std::shared_ptr<Problem> ProblemOf(const ModelText& text, double reach) {
 }
 
 // Certifies random plans. All of what is certified has to be confirmed.
-void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorXd& input, int steps) {
+void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorXd& input, int steps,
+                     double step_error = 0) {
   for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
     const auto problem = ProblemOf(text, 1.3);
     problem->method = method;
+    problem->timing.error = step_error;
     const Certifier certifier(problem);
     const Verifier judge(problem, MethodOf(*problem));
     forereach::Tube tube;
@@ -79,6 +81,99 @@ TEST_P(TextCertificates, WithAParameterThatIsAnIntervalAreConfirmed) {
   ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "k*u"}, {"v", "-k*v*abs(v + 2)"}}, {"u"},
                             {{"dt", 0.1, 0.1}, {"k", 0.19, 0.21}}, {}, GetParam()),
                   random, Eigen::VectorXd::Constant(1, 0.1), 8);
+}
+
+TEST_P(TextCertificates, OfStepsOffTheirTimesAreConfirmed) {
+  TracedRandom random(95);
+  ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "u"}, {"v", "u - 0.3*v*x"}}, {"u"},
+                            {{"dt", 0.1, 0.1}}, {}, GetParam()),
+                  random, Eigen::VectorXd::Constant(1, 0.1), 8, 0.02);
+}
+
+// A BlueROV2 (von Benzon et al., J. Mar. Sci. Eng. 10(12), 2022) without roll and pitch; `drag` of a speed is its
+// quadratic part.
+ModelText Rov(const std::function<std::string(const std::string&)>& drag, Integrator integrator) {
+  return TextModel({{"x", "u*cos(psi) - v*sin(psi)"},
+                    {"y", "u*sin(psi) + v*cos(psi)"},
+                    {"z", "w"},
+                    {"psi", "r"},
+                    {"u", "(fx + 24.2*v*r - 4.03*u - 18.18*" + drag("u") + ")/17"},
+                    {"v", "(fy - 17*u*r - 6.22*v - 21.66*" + drag("v") + ")/24.2"},
+                    {"w", "(fz - 5.18*w - 36.99*" + drag("w") + ")/26.07"},
+                    {"r", "(n - 7.2*u*v - 0.07*r - 1.55*" + drag("r") + ")/0.28"}},
+                   {"fx", "fy", "fz", "n"}, {{"dt", 0.05, 0.05}}, {}, integrator);
+}
+const auto kSmoothedDrag = [](const std::string& speed) { return speed + "*hypot(" + speed + ", 0.01)"; };
+const auto kSquareDrag = [](const std::string& speed) { return "signed_square(" + speed + ")"; };
+
+struct OneSecond {
+  Eigen::MatrixXd controls = Eigen::Vector4d(4, 1, -2, 0.1).replicate(1, 20);
+  Plan plan{controls.data(), 4, 20, 4, {}};
+  Zonotope start = Zonotope::FromBox(Vec({0, 0, 0, 0.5, 0, 0, 0, 0}), Eigen::VectorXd::Constant(8, 0.03));
+};
+
+// From rest, where every speed has either sign.
+TEST_P(TextCertificates, OfQuadraticDragAreConfirmedFromRest) {
+  const OneSecond second;
+  forereach::Tube tube;
+  const auto smoothed = ProblemOf(Rov(kSmoothedDrag, GetParam()), 3),
+             squared = ProblemOf(Rov(kSquareDrag, GetParam()), 3);
+  EXPECT_EQ(Certifier(smoothed).Certify(second.plan, second.start, {}, tube).outcome, Outcome::kDomain);
+  for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
+    squared->method = method;
+    const Certifier certifier(squared);
+    ASSERT_EQ(certifier.Certify(second.plan, second.start, {}, tube).outcome, Outcome::kCertified);
+    Certificate certificate = CertificateOf(certifier, second.plan, second.start, {}, tube);
+    const Verifier judge(squared, MethodOf(*squared));
+    EXPECT_EQ(judge.Verify(certificate).status, Status::kConfirmed);
+    RecordedSlice& last = certificate.slices.back();  // a good part too narrow: the verifier's remainder may be tighter
+    last.upper[4] -= 0.3 * (last.upper[4] - last.lower[4]);
+    EXPECT_EQ(judge.Verify(certificate).status, Status::kRefuted);
+  }
+  // Rollouts of 256 bits from corners and from inside.
+  const auto equations = EquationsOf(*squared->model);
+  TracedRandom random(94);
+  for (int rollout = 0; rollout < 20; ++rollout) {
+    std::vector<Real> z;
+    for (int k = 0; k < 8; ++k)
+      z.push_back(Real(second.start.center(k)) +
+                  Real(0.03) * Real(rollout < 8 ? random.Sign() : random.Uniform(-1, 1)));
+    for (const double u : second.controls.col(0)) z.emplace_back(u);
+    for (int t = 1; t <= 20; ++t) {
+      std::ranges::copy(equations->Value(z), z.begin());
+      for (int k = 0; k < 8; ++k) {
+        ASSERT_TRUE(CertainlyAtMost(tube.hull(t, k).lower, z[static_cast<std::size_t>(k)])) << t;
+        ASSERT_TRUE(CertainlyAtMost(z[static_cast<std::size_t>(k)], tube.hull(t, k).upper)) << t;
+      }
+    }
+  }
+}
+
+// Of boxes that reach to zero, over it, and to next to it.
+TEST(SignedSquare, OneStepContainsTheRangeOnBothSidesOfZero) {
+  const auto problem = ProblemOf(TextModel({{"x", "signed_square(x)"}}, {"u"}, {{"dt", 0.1, 0.1}}), 3);
+  problem->declaration.lipschitz.setZero();
+  problem->declaration.noise_bound.setZero();
+  const Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(1, 1);
+  const Plan plan{controls.data(), 1, 1, 1, {}};
+  for (const double r : {0x1p-60, 0x1p-32, 0x1p-10, 0.5})
+    for (const double c : {0.0, r, -r, r * (1 + 0x1p-40), -r * (1 - 0x1p-40), 2 * r, 0x1p-31, -0x1p-29, 0.25, -2.0})
+      for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
+        problem->method = method;
+        const Certifier certifier(problem);
+        forereach::Tube tube;
+        const Zonotope start = Zonotope::FromBox(Vec({c}), Vec({r}));
+        ASSERT_EQ(certifier.Certify(plan, start, {}, tube).outcome, Outcome::kCertified) << c << " +- " << r;
+        const Certificate certificate = CertificateOf(certifier, plan, start, {}, tube);
+        EXPECT_EQ(Verifier(problem, MethodOf(*problem)).Verify(certificate).status, Status::kConfirmed)
+            << c << ", " << r;
+        for (const double part : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+          const Real x = Real(c) + Real(part) * Real(r), next = x * abs(x);
+          ASSERT_TRUE(CertainlyAtMost(tube.hull(1, 0).lower, next)) << c << " +- " << r;
+          ASSERT_TRUE(CertainlyAtMost(next, tube.hull(1, 0).upper)) << c << " +- " << r;
+        }
+        EXPECT_LE(tube.half_width(1)[0], 2 * std::abs(c) * r + r * r + 1e-13) << c << " +- " << r;
+      }
 }
 
 // Records of the heading of a robot that turns through pi: as it was, or wrapped.

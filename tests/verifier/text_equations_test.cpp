@@ -73,6 +73,8 @@ void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int
     // Over a box the texts' order of operations may cost some width.
     for (std::size_t k = 0; k < rate.size(); ++k)
       EXPECT_TRUE(trial % 2 == 0 ? AreEqual(rate[k], rate_by_hand[k]) : Inside(rate_by_hand[k], rate[k])) << k;
+    for (int k = 0; k < static_cast<int>(rate.size()); ++k)
+      EXPECT_EQ(text.IsProportional(k), by_hand.IsProportional(k)) << k;
   }
 }
 
@@ -119,6 +121,10 @@ const std::vector<Formula>& Formulas() {
        [](const Real& x) { return -one / sqr(x); }},
       {"tanh(x)", -4, 4, [](const Real& x) { return tanh(x); }, [](const Real& x) { return one - sqr(tanh(x)); },
        [](const Real& x) { return -two * tanh(x) * (one - sqr(tanh(x))); }},
+      {"signed_square(x)", 0, 9, [](const Real& x) { return sqr(x); }, [](const Real& x) { return two * x; },
+       [](const Real&) { return two; }},
+      {"signed_square(x)", -9, 0, [](const Real& x) { return -sqr(x); }, [](const Real& x) { return -two * x; },
+       [](const Real&) { return -two; }},
       {"abs(x)", 0, 9, [](const Real& x) { return x; }, [](const Real&) { return one; },
        [](const Real&) { return Real(); }},
       {"abs(x)", -9, 0, [](const Real& x) { return -x; }, [](const Real&) { return -one; },
