@@ -285,7 +285,9 @@ std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us, SenderId sen
 }
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
-  const std::string fault = FaultOf(state, certifier_.problem().model->num_states());
+  const Problem& problem = certifier_.problem();
+  std::string fault = FaultOf(state, problem.model->num_states());
+  if (fault.empty()) fault = WiderThanDeclared(state, problem);
   return fault.empty() ? CheckFresh(state.utime, now_us) : fault;
 }
 
