@@ -15,6 +15,7 @@
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
 #include "forereach/certify/rates.h"
+#include "forereach/declare/flow.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -174,6 +175,7 @@ class Examination final {
       const Observations observations = Observe(model_, problem_.declaration, problem_.transitions);
       ExamineDeclaration(observations);
       ExamineRates();
+      ExamineCurvature();
     } catch (const AmbiguousAngle& error) {
       Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
           "the angle's unit has to be rad; a row of another unit, a lost step or a wrong model shows like this");
@@ -255,7 +257,31 @@ class Examination final {
     }
   }
 
-  // Rows in which a state changes faster than is declared, those of one bound in one finding, worst first.
+  // Rows that exceed one bound, in one finding, worst first.
+  struct Exceeding {
+    std::string key, begin;  // what is exceeded, up to the number of rows
+    double bound;
+    std::string advice;  // before the least bound that would do
+    bool is_remark;
+  };
+
+  void AddExceeding(const Exceeding& what, std::vector<std::pair<double, int>> exceeding) {  // value, line
+    if (exceeding.empty()) return;
+    std::ranges::stable_sort(exceeding, std::greater{}, &std::pair<double, int>::first);
+    std::string lines;
+    for (std::size_t i = 0; i < std::min(exceeding.size(), kMostLines); ++i) {
+      const auto& [value, line] = exceeding[i];
+      lines += fmt::format("{}line {}: {}", i == 0 ? "" : ", ", line, Down(value)) +
+               (what.bound > 0 ? " (" + Down(DivDown(value, what.bound)) + " times)" : "");
+    }
+    if (exceeding.size() > kMostLines) lines += fmt::format(", and {} more", exceeding.size() - kMostLines);
+    Add(what.key,
+        fmt::format("{} in {} of {}{}: {}", what.begin, Count(std::ssize(exceeding), "transition"), result_.data,
+                    what.is_remark ? "" : ", so nothing can be certified", lines),
+        what.advice + " " + Up(exceeding.front().first) + " at least", what.is_remark);
+  }
+
+  // Rows in which a state changes faster than is declared.
   void ExamineRates() {
     const RateBounds rates(problem_);
     std::vector<Eigen::VectorXd> shown;
@@ -264,30 +290,62 @@ class Examination final {
       shown.push_back(rates.Shown({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())}, 0, false));
     }
     for (const RateBounds::Bound& bound : rates.bounds()) {
-      std::vector<std::pair<double, int>> exceeding;  // rate, line
+      std::vector<std::pair<double, int>> exceeding;
       for (std::size_t i = 0; i < shown.size(); ++i)
         if (shown[i][bound.state] > bound.rate)
           exceeding.emplace_back(shown[i][bound.state], FileLine(static_cast<Eigen::Index>(i)));
-      if (!exceeding.empty()) AddExceeding(bound, exceeding);
+      const std::string& name = result_.states[ToSize(bound.state)];
+      AddExceeding({bound.key, fmt::format("{} changes faster than {} a second", name, ToText(bound.rate)), bound.rate,
+                    "look at these lines and at the bound's unit, which is that of " + name +
+                        " per second. If the lines are right, declare",
+                    false},
+                   std::move(exceeding));
     }
   }
 
-  void AddExceeding(const RateBounds::Bound& bound, std::vector<std::pair<double, int>>& exceeding) {
-    std::ranges::stable_sort(exceeding, std::greater{}, &std::pair<double, int>::first);
-    const auto described = [&](const std::pair<double, int>& one) {
-      return fmt::format("line {}: {}", one.second, Down(one.first)) +
-             (bound.rate > 0 ? " (" + Down(DivDown(one.first, bound.rate)) + " times)" : "");
-    };
-    std::string lines;
-    for (std::size_t i = 0; i < std::min(exceeding.size(), kMostLines); ++i)
-      lines += (i == 0 ? "" : ", ") + described(exceeding[i]);
-    if (exceeding.size() > kMostLines) lines += fmt::format(", and {} more", exceeding.size() - kMostLines);
-    const std::string& name = result_.states[ToSize(bound.state)];
-    Add(bound.key,
-        fmt::format("{} changes faster than {} a second in {} of {}, so nothing can be certified: {}", name,
-                    ToText(bound.rate), Count(std::ssize(exceeding), "transition"), result_.data, lines),
-        "look at these lines and at the bound's unit, which is that of " + name +
-            " per second. If the lines are right, declare " + Up(exceeding.front().first) + " at least");
+  // Rows that curve more than is declared if the velocity at their begin is what the equations say: a remark, since no
+  // key declares that it is (docs/soundness.md, 1).
+  void ExamineCurvature() {
+    const std::unique_ptr<Flow> flow = problem_.between ? MakeFlow(model_) : nullptr;
+    if (!flow) return;
+    const Interval dt(config_.period);
+    Flow::Derivatives derivatives;
+    for (Eigen::Index k = 0; k < problem_.projection.rows(); ++k) {
+      const double bound = problem_.between->acceleration[k];
+      std::vector<std::pair<double, int>> exceeding;
+      for (Eigen::Index i = 0; i < problem_.transitions.size(); ++i) {
+        const Eigen::VectorXd z = problem_.transitions.z.row(i);
+        const std::vector<Interval> box = TrueBox(z);
+        flow->Enclose(box, derivatives);
+        Interval off(0.0);  // y(t + dt) - y(t) - dt y'(t)
+        for (int l = 0; l < model_.num_states(); ++l)
+          if (const double p = problem_.projection(k, l); p != 0)
+            off += Interval(p) * (TrueNext(i, l) - box[ToSize(l)] - dt * derivatives.first[ToSize(l)].value);
+        const double least = std::max({off.lower, -off.upper, 0.0});
+        const double shown = (Interval(2) * Interval(least) / (dt * dt)).lower;
+        if (shown > bound) exceeding.emplace_back(shown, FileLine(i));
+      }
+      AddExceeding(
+          {"task.between.acceleration",
+           fmt::format("coordinate {} curves by more than {} m/s^2, if its velocity is what the equations say,", k,
+                       ToText(bound)),
+           bound, "look at these lines and at the bound's unit; if the equations' velocity is the robot's, declare",
+           true},
+          std::move(exceeding));
+    }
+  }
+
+  [[nodiscard]] bool IsExact() const { return problem_.declaration.given_are_exact; }
+  [[nodiscard]] std::vector<Interval> TrueBox(const Eigen::VectorXd& z) const {
+    const std::span<const double> recorded(z.data(), ToSize(z.size()));
+    return IsExact() ? std::vector<Interval>(recorded.begin(), recorded.end())
+                     : problem_.declaration.BoxAround(recorded);
+  }
+  [[nodiscard]] Interval TrueNext(Eigen::Index i, int l) const {
+    const double next = problem_.transitions.x_next(i, l), unit = NextUp(std::abs(next)) - std::abs(next);
+    const double error =
+        AddUp(AddUp(IsExact() ? 0 : problem_.declaration.VariableError(l), unit), problem_.declaration.noise_bound[l]);
+    return {SubDown(next, error), AddUp(next, error)};
   }
 
   [[nodiscard]] int FileLine(Eigen::Index i) const { return static_cast<int>(rows_[ToSize(i)]) + 2; }

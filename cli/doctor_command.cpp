@@ -17,6 +17,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bus/authentic.h"
 #include "bus/bus.h"
 #include "bus/bus_options.h"
 #include "bus/process.h"
@@ -252,9 +253,8 @@ Command DoctorCommand() {
                   .run = [options] {
                     if (options->listen > 0 && options->config.empty())
                       throw ConfigError("--listen needs the task of the robot: give --config");
-                    const Config config = options->config.empty()
-                                              ? Config()
-                                              : LoadConfig(options->config, TransitionsFile::kIgnore);
+                    const Config config =
+                        options->config.empty() ? Config() : LoadConfig(options->config, TransitionsFile::kIgnore);
                     BusOptions bus = config.bus;
                     options->bus.Override(bus);
                     return options->listen > 0 ? Measure(config, bus, options->listen, options->json)

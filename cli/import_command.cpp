@@ -323,8 +323,8 @@ void PrintShare(const Share& share, double period) {
 
 // ---- How late commands act
 
-constexpr int kMostDelay = 30;     // rows
-constexpr double kMostSteps = 3;   // of dt
+constexpr int kMostDelay = 30;    // rows
+constexpr double kMostSteps = 3;  // of dt
 
 CommandDelay DelayOf(const std::vector<Source>& sources, const Problem& problem, const ImportOptions& import) {
   std::vector<const LogTable*> tables;
@@ -343,8 +343,7 @@ std::string Rows(int count) { return fmt::format("{} row{}", count, count == 1 ?
 std::string Sentence(const CommandDelay& delay) {
   if (delay.error.empty() || (delay.least == 0 && delay.largest + 1 == std::ssize(delay.error)))
     return "how late commands act cannot be told: the inputs vary too little, or the model is off by more than they do";
-  if (delay.IsKnown())
-    return delay.best == 0 ? "commands act at once" : "commands act " + Rows(delay.best) + " late";
+  if (delay.IsKnown()) return delay.best == 0 ? "commands act at once" : "commands act " + Rows(delay.best) + " late";
   return fmt::format("commands act {} to {} late: which of them cannot be told", delay.least, Rows(delay.largest));
 }
 
@@ -354,10 +353,11 @@ void PrintDelay(const CommandDelay& delay, const NominalModel& model) {
   for (std::size_t d = 0; d < delay.error.size(); ++d)
     std::cout << fmt::format("  {:>3} rows late: {}\n", d, Listed(model.state_names(), delay.error[d]));
   if (delay.least > 0)
-    std::cout << "Shift them with --command-delay " << delay.best
-              << ": a certificate then is about inputs as they act, and whoever sends plans has to send each command so "
-                 "much earlier.\nOr model it: for a delay of one dt, a state `held` with `held: u` in model.next, and "
-                 "`held` for u in the other equations.\n";
+    std::cout
+        << "Shift them with --command-delay " << delay.best
+        << ": a certificate then is about inputs as they act, and whoever sends plans has to send each command so "
+           "much earlier.\nOr model it: for a delay of one dt, a state `held` with `held: u` in model.next, and "
+           "`held` for u in the other equations.\n";
 }
 
 Json ToJson(const CommandDelay& delay) {
@@ -373,7 +373,8 @@ Json ToJson(const CommandDelay& delay) {
 int ShiftBy(const ImportArguments& options, const std::optional<CommandDelay>& delay) {
   if (!delay) {
     const auto [value, problem] = ParseNumber(options.command_delay);
-    if (options.command_delay != "none" && (!problem.empty() || !(value >= 0 && value <= 1e6) || std::floor(value) != value))
+    if (options.command_delay != "none" &&
+        (!problem.empty() || !(value >= 0 && value <= 1e6) || std::floor(value) != value))
       Refuse("command-delay", "'" + options.command_delay + "' is no whole number of rows, nor auto");
     return options.command_delay == "none" ? 0 : static_cast<int>(value);
   }

@@ -11,6 +11,10 @@
 namespace forereach {
 namespace {
 
+// What is neither is nonsense, which may come from anybody.
+constexpr std::int64_t kLatest = std::int64_t{1} << 60, kLongest = std::int64_t{3'600'000'000};
+bool IsTime(std::int64_t utime) { return -kLatest <= utime && utime <= kLatest; }
+
 // To tenths, up.
 double MillisecondsUp(double us) { return std::ceil(us / 100) / 10; }
 
@@ -19,6 +23,7 @@ std::string Milliseconds(std::int64_t us) { return ToText(static_cast<double>(us
 }  // namespace
 
 void StepTimes::HearStep(std::int64_t utime, std::int64_t duration_us) {
+  if (!IsTime(utime) || duration_us < 0 || duration_us > kLongest) return;
   if (utime != next_utime_) off_us_ = 0;
   next_utime_ = utime + step_us_;
   off_us_ += duration_us - step_us_;
@@ -27,6 +32,7 @@ void StepTimes::HearStep(std::int64_t utime, std::int64_t duration_us) {
 }
 
 void StepTimes::HearStamp(std::int64_t utime, std::int64_t arrival_us) {
+  if (!IsTime(utime)) return;
   const std::int64_t delay = arrival_us - utime;
   least_delay_us_ = stamps_ == 0 ? delay : std::min(least_delay_us_, delay);
   largest_delay_us_ = stamps_ == 0 ? delay : std::max(largest_delay_us_, delay);
@@ -47,8 +53,8 @@ std::optional<double> StepTimes::ClockErrorMs(double delay_ms) const {
 std::string StepTimes::Text(double seconds, double delay_ms) const {
   std::string text;
   if (const auto error = StepErrorMs())
-    text += fmt::format("steps: {} in {} s, boundaries up to {} from their times\n      -> robot.step_error_ms: {}\n", steps_,
-                        ToText(seconds), Milliseconds(step_error_us_), ToText(*error));
+    text += fmt::format("steps: {} in {} s, boundaries up to {} from their times\n      -> robot.step_error_ms: {}\n",
+                        steps_, ToText(seconds), Milliseconds(step_error_us_), ToText(*error));
   else
     text += fmt::format("steps: none in {} s: let the robot drive meanwhile\n", ToText(seconds));
   if (const auto error = ClockErrorMs(delay_ms))
@@ -59,7 +65,8 @@ std::string StepTimes::Text(double seconds, double delay_ms) const {
         ToText(*error));
   else
     text += fmt::format("clocks: neither states nor obstacles in {} s\n", ToText(seconds));
-  return text + fmt::format("Proposed is {} times the largest that was measured; what was not heard may be larger.\n", kMargin);
+  return text + fmt::format("Proposed is {} times the largest that was measured; what was not heard may be larger.\n",
+                            kMargin);
 }
 
 }  // namespace forereach

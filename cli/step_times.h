@@ -1,5 +1,6 @@
-/** How far a robot's steps are from their times, and the stamps of messages from their arrival, as messages show it: what
-`robot.step_error_ms` and `gate.max_clock_error_ms` have to be at least. It proves nothing of what was not heard. */
+/** How far a robot's steps are from their times, and the stamps of messages from their arrival, as messages show it:
+what `robot.step_error_ms` and `gate.max_clock_error_ms` have to be at least. It proves nothing of what was not heard.
+*/
 #pragma once
 
 #include <cstdint>

@@ -32,8 +32,8 @@ struct GateOptions {
   bool needs_robot_state = true;   ///< Certifies only while the robot's state is heard.
   double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;
-  /** How far the clocks of robot and obstacles' sender may differ. Without it no obstacle may move. Stamps of states and obstacles are held to it at their arrival
-  (gate/stream_clock.h). */
+  /** How far the clocks of robot and obstacles' sender may differ. Without it no obstacle may move. Stamps of states
+  and obstacles are held to it at their arrival (gate/stream_clock.h). */
   std::optional<double> max_clock_error_ms;
   /** How far the boundary of a step may be from its time, on the robot's clock: from the plan's start and from the
   first step's. kAnyTime: steps are taken at any time. Nothing: not said; no certifier whose robot arms it starts. The

@@ -234,9 +234,7 @@ std::string RobotKey(const TaskTemplate& task) {
       "  step_error_ms: any\n";
   if (task.laws || !held.empty()) return text + "  hold: " + List(held) + "\n" + EmergencyStop(task, held);
   held = {task.states.back().name};
-  return text +
-         "#   hold: " +
-         List(held) +
+  return text + "#   hold: " + List(held) +
          "\n"
          "#   emergency_stop: " +
          Bounds({{held[0], 1}}) + "  # how fast its brakes take it to zero, in its unit per second\n";

@@ -41,9 +41,10 @@ FoundFault DeclarationFalsified(const Violation& violation) {
   FoundFault found = PlainFault(
       fault_t::DECLARATION_FALSIFIED,
       second < 0
-          ? fmt::format("the executed transition {} contradicts a declared rate: state coordinate {} changes by at least "
-                        "{} a second, {} is declared",
-                        first, coordinate, difference, bound)
+          ? fmt::format(
+                "the executed transition {} contradicts a declared rate: state coordinate {} changes by at least "
+                "{} a second, {} is declared",
+                first, coordinate, difference, bound)
           : fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} "
                         "differs by {}, the declaration allows {}",
                         second, first, coordinate, difference, bound));

@@ -197,9 +197,9 @@ TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
                       robot);
   };
   const Config unsaid = with("");
-  EXPECT_THAT(RefusalOnBus(unsaid), testing::AllOf(testing::StartsWith(unsaid.path + ": robot.step_error_ms: missing"),
-                                                   testing::HasSubstr("forereach doctor"),
-                                                   testing::HasSubstr("`step_error_ms: any`")));
+  EXPECT_THAT(RefusalOnBus(unsaid),
+              testing::AllOf(testing::StartsWith(unsaid.path + ": robot.step_error_ms: missing"),
+                             testing::HasSubstr("forereach doctor"), testing::HasSubstr("`step_error_ms: any`")));
   EXPECT_NO_THROW(RequireForCertifying(unsaid)) << "`forereach certify` executes nothing";
   EXPECT_EQ(RefusalOnBus(with("", "obstacles: task, arming: none")), "");
   for (const char* said : {"0", "2.5", "any"})
@@ -208,8 +208,9 @@ TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
   EXPECT_THAT(RefusalOnBus(with("", "obstacles: task, max_clock_error_ms: 20")),
               testing::HasSubstr("robot.step_error_ms: missing"))
       << "it is not taken from that of the clocks";
-  EXPECT_THAT([&] { static_cast<void>(with("robot: {step_error_ms: any}\n", "obstacles: task, max_clock_error_ms: 20")); },
-              ThrowsMessage<ConfigError>(testing::HasSubstr("robot.step_error_ms: any, and with gate.max_clock_error_ms")));
+  EXPECT_THAT(
+      [&] { static_cast<void>(with("robot: {step_error_ms: any}\n", "obstacles: task, max_clock_error_ms: 20")); },
+      ThrowsMessage<ConfigError>(testing::HasSubstr("robot.step_error_ms: any, and with gate.max_clock_error_ms")));
 }
 
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
@@ -274,8 +275,7 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   EXPECT_EQ(bounds.problem->between->acceleration, Numbers({3.5, 0}));
   EXPECT_EQ(bounds.problem->between->period, 0.15);
   for (const auto& [error_ms, period] : {std::pair{"0.001", 0.150001}, {"10", 0.16}}) {
-    const double longer = files
-                              .Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "any", error_ms))
+    const double longer = files.Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "any", error_ms))
                               .problem->between->period;
     EXPECT_GE(longer, period);
     EXPECT_LE(longer, period * (1 + 0x1p-51));

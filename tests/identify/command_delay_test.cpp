@@ -47,9 +47,9 @@ class CommandDelayTest : public testing::Test {
   }
 
   std::mt19937 random_{20261};
-  Problem problem_ = WorldOf(MakeTextModel(TextModel({{"p", "p + dt*v + dt*dt/2*u"}, {"v", "v + dt*u"}}, {"u"},
-                                                     {{"dt", 0.1, 0.1}})),
-                             Within({99, 9}), Within({1}));
+  Problem problem_ =
+      WorldOf(MakeTextModel(TextModel({{"p", "p + dt*v + dt*dt/2*u"}, {"v", "v + dt*u"}}, {"u"}, {{"dt", 0.1, 0.1}})),
+              Within({99, 9}), Within({1}));
   ImportOptions options_;
 };
 

@@ -782,6 +782,34 @@ class ArmedNodeTest : public CertifierNodeTest {
   std::int64_t next_plan_id_ = 1, sequence_ = 0;
 };
 
+// By what it claims no state would be outside its slice.
+TEST_F(ArmedNodeTest, AStateWithALargerErrorThanDeclaredIsNotTakenForKnown) {
+  Problem problem = *config_.problem;
+  problem.declaration.state_error = Eigen::Vector4d(0.25, 0, 0, 0);
+  config_.problem = std::make_shared<const Problem>(problem);
+  Restart();
+  const auto say = [&](double error) {
+    robot_state_t state = State();
+    state.num_state_errors = 4;
+    state.state_error[0] = error;
+    bus_->Publish("ROBOT_STATE", state);
+    Run();
+  };
+  say(std::nextafter(0.25, 1));
+  EXPECT_EQ(node_->watch().state(), Watch::State::kDisarmed);
+  say(0.25);
+  EXPECT_EQ(node_->watch().state(), Watch::State::kArmed);
+  EXPECT_EQ(node_->gate().CheckRobotState(
+                [&] {
+                  robot_state_t state = State();
+                  state.num_state_errors = 4;
+                  state.state_error[2] = 1e-9;
+                  return state;
+                }(),
+                now_us_),
+            "the error of vx is 1e-09, and declaration.state_error is 0");
+}
+
 TEST_F(ArmedNodeTest, CertifiesNothingBeforeItHasHeardTheRobot) {
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
   EXPECT_EQ(status_.back().level, certifier_status_t::STALE);
