@@ -333,8 +333,12 @@ CommandDelay DelayOf(const std::vector<Source>& sources, const Problem& problem,
     tables.push_back(&source.table);
     if (source.log.typical_spacing > 0) spacing = std::min(spacing, source.log.typical_spacing);
   }
-  return EstimateDelay(tables, problem, import,
-                       static_cast<int>(std::min<double>(kMostDelay, std::ceil(kMostSteps * import.period / spacing))));
+  const double most = std::min<double>(kMostDelay, std::ceil(kMostSteps * import.period / spacing));
+  try {
+    return EstimateDelay(tables, problem, import, static_cast<int>(most));
+  } catch (const ConfigError&) {
+    return {};  // the logs begin too coarsely
+  }
 }
 
 std::string Rows(int count) { return fmt::format("{} row{}", count, count == 1 ? "" : "s"); }

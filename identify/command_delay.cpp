@@ -28,6 +28,15 @@ std::map<int, Eigen::VectorXd> ErrorsOf(const LogTable& table, const Problem& pr
   return errors;
 }
 
+// The first rows of a log.
+LogTable Beginning(const LogTable& table, Eigen::Index rows) {
+  LogTable first = table;
+  first.values.conservativeResize(rows, Eigen::NoChange);
+  first.lines.resize(ToSize(rows));
+  first.after_loss.resize(ToSize(rows));
+  return first;
+}
+
 // The root mean square without the mean, over the lines that all have. @return their number.
 int AddSpreads(const std::vector<std::map<int, Eigen::VectorXd>>& by_delay, std::vector<Eigen::MatrixXd>& sums) {
   int count = 0;
@@ -73,13 +82,18 @@ CommandDelay EstimateDelay(std::span<const LogTable* const> tables, const Proble
   CommandDelay delay;
   Eigen::VectorXd size = Eigen::VectorXd::Zero(n);
   int count = 0;
-  for (const LogTable* table : tables) {
+  Eigen::Index left = CommandDelay::kMostRows;
+  for (const LogTable* whole : tables) {
+    const Eigen::Index rows = std::min(left, whole->values.rows());
+    if (rows == 0) continue;
+    left -= rows;
+    const LogTable table = Beginning(*whole, rows);
     std::vector<std::map<int, Eigen::VectorXd>> by_delay;
     double rows_in_step = 1;
     for (options.command_delay = 0; options.command_delay <= most; ++options.command_delay)
-      by_delay.push_back(ErrorsOf(*table, problem, options, size));
+      by_delay.push_back(ErrorsOf(table, problem, options, size));
     options.command_delay = 0;
-    if (const double spacing = Import(*table, problem, options).typical_spacing; spacing > 0)
+    if (const double spacing = Import(table, problem, options).typical_spacing; spacing > 0)
       rows_in_step = std::max(options.period / spacing, 1.0);
     const int found = AddSpreads(by_delay, sums);
     count += found;

@@ -15,7 +15,8 @@ s_k the root mean square of state k without its mean, for N steps that do not ov
 namespace forereach {
 
 struct CommandDelay {
-  static constexpr double kOdds = 8;      ///< e^8, about 3000 to 1.
+  static constexpr double kOdds = 8;                 ///< e^8, about 3000 to 1.
+  static constexpr Eigen::Index kMostRows = 20'000;  ///< Of all logs, from the first on.
   static constexpr double kLeast = 0.02;  ///< One per cent of s: a smaller difference may be the model's own.
 
   std::vector<Eigen::VectorXd> error;  ///< s of each state, by the delay in rows: 0, 1, ...; empty if no step is known.
@@ -27,7 +28,7 @@ struct CommandDelay {
 };
 
 /** @param tables of logs, with the columns that Import takes. @param most the largest delay that is tried. Cost: `most`
-+ 1 imports. @throws as Import. */
++ 1 imports of up to kMostRows rows. @throws as Import. */
 [[nodiscard]] CommandDelay EstimateDelay(std::span<const LogTable* const> tables, const Problem& problem,
                                          ImportOptions options, int most);
 
