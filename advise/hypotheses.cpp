@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/rates.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "task/step_time.h"
@@ -25,8 +26,9 @@ void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
                                ToText(static_cast<double>(*error) / 1e3)),
                    "the guard, which ends the plan at one that does not"});
   else
-    all.push_back({"steps are on time", error ? "the guard, which ends the plan at one that is not"
-                                              : "nobody: robot.step_error_ms is not given, so no clock is looked at"});
+    all.push_back(
+        {"steps are on time", error ? "the guard, which ends the plan at one that is not"
+                                    : "nobody: robot.step_error_ms is not given, or any, so no clock is looked at"});
   std::string set;
   for (const int k : timing.set_at_steps)
     set += (set.empty() ? "" : ", ") + config.problem->model->state_names()[ToSize(k)];
@@ -81,8 +83,11 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   if (problem.between)
     all.push_back(
         {"between two samples the motion keeps the bounds of task.between",
-         "declared; `forereach declare --between` proves it of the equations, and a turn that no motion within "
-         "them makes is not certified (D)"});
+         "declared; `forereach declare --between` proves it of the equations. Transitions that turn faster than "
+         "turn_rate falsify it (F), a plan that does is not certified (D)"});
+  if (RateBounds(problem).bounds().size() > (problem.between && problem.body.heading >= 0 ? 1U : 0U))
+    all.push_back(
+        {"states change no faster than model.rate_bound", "declared; transitions and plans refute it likewise"});
   AddObstacles(config, all);
   all.push_back({"a state that leaves its slice shows that one of these is false",
                  "the guard, which halts, and the certifier, which latches it"});

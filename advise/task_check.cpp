@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <random>
 #include <stdexcept>
@@ -13,6 +14,8 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/rates.h"
+#include "forereach/declare/flow.h"
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -36,6 +39,7 @@ constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
 constexpr int kSamples = 2000;                 // of the domain, for the length of a step
 constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
 constexpr double kShareBeyond = 0.05;          // of the data's range
+constexpr std::size_t kMostLines = 20;         // that a finding lists
 
 std::string Up(double x) { return RoundedUp(x, 4); }
 std::string Down(double x) { return RoundedDown(x, 4); }
@@ -171,6 +175,8 @@ class Examination final {
     try {
       const Observations observations = Observe(model_, problem_.declaration, problem_.transitions);
       ExamineDeclaration(observations);
+      ExamineRates();
+      ExamineCurvature();
     } catch (const AmbiguousAngle& error) {
       Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
           "the angle's unit has to be rad; a row of another unit, a lost step or a wrong model shows like this");
@@ -252,6 +258,97 @@ class Examination final {
     }
   }
 
+  // Rows that exceed one bound, in one finding, worst first.
+  struct Exceeding {
+    std::string key, begin;  // what is exceeded, up to the number of rows
+    double bound;
+    std::string advice;  // before the least bound that would do
+    bool is_remark;
+  };
+
+  void AddExceeding(const Exceeding& what, std::vector<std::pair<double, int>> exceeding) {  // value, line
+    if (exceeding.empty()) return;
+    std::ranges::stable_sort(exceeding, std::greater{}, &std::pair<double, int>::first);
+    std::string lines;
+    for (std::size_t i = 0; i < std::min(exceeding.size(), kMostLines); ++i) {
+      const auto& [value, line] = exceeding[i];
+      lines += fmt::format("{}line {}: {}", i == 0 ? "" : ", ", line, Down(value)) +
+               (what.bound > 0 ? " (" + Down(DivDown(value, what.bound)) + " times)" : "");
+    }
+    if (exceeding.size() > kMostLines) lines += fmt::format(", and {} more", exceeding.size() - kMostLines);
+    Add(what.key,
+        fmt::format("{} in {} of {}{}: {}", what.begin, Count(std::ssize(exceeding), "transition"), result_.data,
+                    what.is_remark ? "" : ", so nothing can be certified", lines),
+        what.advice + " " + Up(exceeding.front().first) + " at least", what.is_remark);
+  }
+
+  // Rows in which a state changes faster than is declared.
+  void ExamineRates() {
+    const RateBounds rates(problem_);
+    std::vector<Eigen::VectorXd> shown;
+    for (Eigen::Index i = 0; i < problem_.transitions.size() && !rates.bounds().empty(); ++i) {
+      const Eigen::VectorXd z = problem_.transitions.z.row(i), next = problem_.transitions.x_next.row(i);
+      shown.push_back(rates.Shown({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())}, 0, false));
+    }
+    for (const RateBounds::Bound& bound : rates.bounds()) {
+      std::vector<std::pair<double, int>> exceeding;
+      for (std::size_t i = 0; i < shown.size(); ++i)
+        if (shown[i][bound.state] > bound.rate)
+          exceeding.emplace_back(shown[i][bound.state], FileLine(static_cast<Eigen::Index>(i)));
+      const std::string& name = result_.states[ToSize(bound.state)];
+      AddExceeding({bound.key, fmt::format("{} changes faster than {} a second", name, ToText(bound.rate)), bound.rate,
+                    "look at these lines and at the bound's unit, which is that of " + name +
+                        " per second. If the lines are right, declare",
+                    false},
+                   std::move(exceeding));
+    }
+  }
+
+  // Rows that curve more than is declared if the velocity at their begin is what the equations say: a remark, since no
+  // key declares that it is (docs/soundness.md, 1).
+  void ExamineCurvature() {
+    const std::unique_ptr<Flow> flow = problem_.between ? MakeFlow(model_) : nullptr;
+    if (!flow) return;
+    const Interval dt(config_.period);
+    Flow::Derivatives derivatives;
+    for (Eigen::Index k = 0; k < problem_.projection.rows(); ++k) {
+      const double bound = problem_.between->acceleration[k];
+      std::vector<std::pair<double, int>> exceeding;
+      for (Eigen::Index i = 0; i < problem_.transitions.size(); ++i) {
+        const Eigen::VectorXd z = problem_.transitions.z.row(i);
+        const std::vector<Interval> box = TrueBox(z);
+        flow->Enclose(box, derivatives);
+        Interval off(0.0);  // y(t + dt) - y(t) - dt y'(t)
+        for (int l = 0; l < model_.num_states(); ++l)
+          if (const double p = problem_.projection(k, l); p != 0)
+            off += Interval(p) * (TrueNext(i, l) - box[ToSize(l)] - dt * derivatives.first[ToSize(l)].value);
+        const double least = std::max({off.lower, -off.upper, 0.0});
+        const double shown = (Interval(2) * Interval(least) / (dt * dt)).lower;
+        if (shown > bound) exceeding.emplace_back(shown, FileLine(i));
+      }
+      AddExceeding(
+          {"task.between.acceleration",
+           fmt::format("coordinate {} curves by more than {} m/s^2, if its velocity is what the equations say,", k,
+                       ToText(bound)),
+           bound, "look at these lines and at the bound's unit; if the equations' velocity is the robot's, declare",
+           true},
+          std::move(exceeding));
+    }
+  }
+
+  [[nodiscard]] bool IsExact() const { return problem_.declaration.given_are_exact; }
+  [[nodiscard]] std::vector<Interval> TrueBox(const Eigen::VectorXd& z) const {
+    const std::span<const double> recorded(z.data(), ToSize(z.size()));
+    return IsExact() ? std::vector<Interval>(recorded.begin(), recorded.end())
+                     : problem_.declaration.BoxAround(recorded);
+  }
+  [[nodiscard]] Interval TrueNext(Eigen::Index i, int l) const {
+    const double next = problem_.transitions.x_next(i, l), unit = NextUp(std::abs(next)) - std::abs(next);
+    const double error =
+        AddUp(AddUp(IsExact() ? 0 : problem_.declaration.VariableError(l), unit), problem_.declaration.noise_bound[l]);
+    return {SubDown(next, error), AddUp(next, error)};
+  }
+
   [[nodiscard]] int FileLine(Eigen::Index i) const { return static_cast<int>(rows_[ToSize(i)]) + 2; }
 
   void RemarkOnSlack() {
@@ -293,7 +390,7 @@ class Examination final {
       return;
     }
     if (certifier->violation()) {
-      ExplainViolation(*certifier->violation());
+      if (certifier->violation()->second >= 0) ExplainViolation(*certifier->violation());  // else ExamineRates did
       return;
     }
     RemarkOnSlack();
@@ -345,6 +442,9 @@ class Examination final {
       advice +=
           "keep the domain and task.initial_set away from where the equations have no bound (docs/expressions.md, "
           "\"Kinks and poles\")";
+    } else if (decision.cause == Cause::kBetween) {
+      key = KeyOfRate(problem_, decision.coordinate);
+      advice += "declare a larger rate, in the unit of the state per second";
     } else {
       if (decision.exit.kind == DomainExit::Kind::kLower || decision.exit.kind == DomainExit::Kind::kUpper)
         key =

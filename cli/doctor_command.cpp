@@ -17,13 +17,20 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bus/authentic.h"
 #include "bus/bus.h"
 #include "bus/bus_options.h"
 #include "bus/process.h"
 #include "bus/udp_receiver.h"
 #include "cli/commands.h"
+#include "cli/step_times.h"
+#include "forereach/obstacles_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "lcmtypes/codec.h"
 #include "task/config.h"
 #include "task/json_text.h"
+#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -150,6 +157,47 @@ Check CheckKeys(const BusOptions& bus) {
   }
 }
 
+// Hears what a robot and perception send, and sends nothing.
+StepTimes Listen(const Config& config, BusOptions channels, double seconds) {
+  channels.keys = PublicKeysOf(channels);
+  const std::unique_ptr<Bus> bus = OpenBus(channels, Role::kOperator);
+  StepTimes times(StepUs(config));
+  const auto bytes = [&](const Received& received) {
+    return channels.keys ? received.bytes : WithoutSignature(received.raw);
+  };
+  bus->Subscribe(channels.transition, [&](const Received& received) {
+    if (const auto step = Decoded<transition_t>(bytes(received))) times.HearStep(step->utime, step->duration_us);
+  });
+  bus->Subscribe(channels.robot_state, [&](const Received& received) {
+    if (const auto state = Decoded<robot_state_t>(bytes(received))) times.HearStamp(state->utime, received.utime);
+  });
+  bus->Subscribe(channels.obstacles, [&](const Received& received) {
+    if (const auto seen = Decoded<obstacles_t>(bytes(received))) times.HearStamp(seen->utime, received.utime);
+  });
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (std::chrono::steady_clock::now() < end) bus->Dispatch(50);
+  return times;
+}
+
+int Measure(const Config& config, const BusOptions& bus, double seconds, bool json) {
+  const StepTimes times = Listen(config, bus, seconds);
+  const auto step = times.StepErrorMs(), clocks = times.ClockErrorMs(bus.delay_ms);
+  if (json)
+    std::cout << JsonText({{"seconds", seconds},
+                           {"steps", times.steps()},
+                           {"step_error_us", times.step_error_us()},
+                           {"stamps", times.stamps()},
+                           {"least_delay_us", times.least_delay_us()},
+                           {"largest_delay_us", times.largest_delay_us()},
+                           {"margin", StepTimes::kMargin},
+                           {"robot.step_error_ms", step ? nlohmann::json(*step) : nlohmann::json(nullptr)},
+                           {"gate.max_clock_error_ms", clocks ? nlohmann::json(*clocks) : nlohmann::json(nullptr)}})
+              << std::endl;
+  else
+    std::cout << times.Text(seconds, bus.delay_ms) << std::flush;
+  return step && clocks ? 0 : 1;
+}
+
 int Diagnose(const BusOptions& bus, bool json) {
   const std::string& url = bus.url;
   const std::map<std::string, std::string> versions{
@@ -190,19 +238,27 @@ Command DoctorCommand() {
   struct DoctorArguments {
     std::string config;
     BusArguments bus;
+    double listen = 0;
     bool json = false;
   };
   const auto options = std::make_shared<DoctorArguments>();
   Command command{.name = "doctor",
                   .purpose = "Check the bus (route, buffers, a round trip), and print what to do",
                   .options = {{"--config", &options->config, "FILE", "A task file, to check its bus and its keys"},
+                              {"--listen", &options->listen, "SECONDS",
+                               "Instead measure for so long how far a driving robot's steps are from their times and "
+                               "stamps from their arrival, and propose robot.step_error_ms and gate.max_clock_error_ms",
+                               NumberRange{0, 1e6}},
                               JsonFlag(options->json)},
                   .run = [options] {
-                    BusOptions bus = options->config.empty()
-                                         ? BusOptions()
-                                         : LoadConfig(options->config, TransitionsFile::kIgnore).bus;
+                    if (options->listen > 0 && options->config.empty())
+                      throw ConfigError("--listen needs the task of the robot: give --config");
+                    const Config config =
+                        options->config.empty() ? Config() : LoadConfig(options->config, TransitionsFile::kIgnore);
+                    BusOptions bus = config.bus;
                     options->bus.Override(bus);
-                    return Diagnose(bus, options->json);
+                    return options->listen > 0 ? Measure(config, bus, options->listen, options->json)
+                                               : Diagnose(bus, options->json);
                   }};
   options->bus.AddTo(command.options);
   return command;

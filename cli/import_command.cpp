@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iomanip>
 #include <iostream>
 #include <map>
@@ -17,6 +18,7 @@
 #include "command_line/progress.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "identify/command_delay.h"
 #include "identify/import.h"
 #include "identify/units.h"
 #include "lcmtypes/printable.h"
@@ -32,6 +34,7 @@ using Json = nlohmann::json;
 struct ImportArguments {
   std::string config, out, time, time_unit = "s", delimiter = "auto", comment = "#", header;
   std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
+  std::string command_delay = "none";
   std::optional<double> rate, from, until;
   double tolerance_ms = 0.001;
   bool input_mean = false, overlapping = false, keep_few = false, json = false;
@@ -318,6 +321,72 @@ void PrintShare(const Share& share, double period) {
                 : Remedy(share.main_cause));
 }
 
+// ---- How late commands act
+
+constexpr int kMostDelay = 30;    // rows
+constexpr double kMostSteps = 3;  // of dt
+
+CommandDelay DelayOf(const std::vector<Source>& sources, const Problem& problem, const ImportOptions& import) {
+  std::vector<const LogTable*> tables;
+  double spacing = import.period;
+  for (const Source& source : sources) {
+    tables.push_back(&source.table);
+    if (source.log.typical_spacing > 0) spacing = std::min(spacing, source.log.typical_spacing);
+  }
+  const double most = std::min<double>(kMostDelay, std::ceil(kMostSteps * import.period / spacing));
+  try {
+    return EstimateDelay(tables, problem, import, static_cast<int>(most));
+  } catch (const ConfigError&) {
+    return {};  // the logs begin too coarsely
+  }
+}
+
+std::string Rows(int count) { return fmt::format("{} row{}", count, count == 1 ? "" : "s"); }
+
+// What is known of the delay, in a sentence.
+std::string Sentence(const CommandDelay& delay) {
+  if (delay.error.empty() || (delay.least == 0 && delay.largest + 1 == std::ssize(delay.error)))
+    return "how late commands act cannot be told: the inputs vary too little, or the model is off by more than they do";
+  if (delay.IsKnown()) return delay.best == 0 ? "commands act at once" : "commands act " + Rows(delay.best) + " late";
+  return fmt::format("commands act {} to {} late: which of them cannot be told", delay.least, Rows(delay.largest));
+}
+
+void PrintDelay(const CommandDelay& delay, const NominalModel& model) {
+  std::cout << "Commands: by the model's error, " << Sentence(delay) << ".\n";
+  if (delay.error.empty() || delay.largest == 0) return;
+  for (std::size_t d = 0; d < delay.error.size(); ++d)
+    std::cout << fmt::format("  {:>3} rows late: {}\n", d, Listed(model.state_names(), delay.error[d]));
+  if (delay.least > 0)
+    std::cout
+        << "Shift them with --command-delay " << delay.best
+        << ": a certificate then is about inputs as they act, and whoever sends plans has to send each command so "
+           "much earlier.\nOr model it: for a delay of one dt, a state `held` with `held: u` in model.next, and "
+           "`held` for u in the other equations.\n";
+}
+
+Json ToJson(const CommandDelay& delay) {
+  Json errors = Json::array();
+  for (const Eigen::VectorXd& error : delay.error) errors.push_back(error);
+  return {{"rows", delay.IsKnown() ? Json(delay.best) : Json(nullptr)},
+          {"least", delay.least},
+          {"largest", delay.largest},
+          {"model_error", errors}};
+}
+
+// The rows of --command-delay N; of auto what the logs say.
+int ShiftBy(const ImportArguments& options, const std::optional<CommandDelay>& delay) {
+  if (!delay) {
+    const auto [value, problem] = ParseNumber(options.command_delay);
+    if (options.command_delay != "none" &&
+        (!problem.empty() || !(value >= 0 && value <= 1e6) || std::floor(value) != value))
+      Refuse("command-delay", "'" + options.command_delay + "' is no whole number of rows, nor auto");
+    return options.command_delay == "none" ? 0 : static_cast<int>(value);
+  }
+  if (options.command_delay != "auto") return 0;
+  if (!delay->IsKnown()) Refuse("command-delay", "auto: " + Sentence(*delay) + "; give a number of rows");
+  return delay->best;
+}
+
 // Without --time and --rate, a column of this name has the stamps.
 void FindTime(ImportArguments& options) {
   constexpr const char* kUsual = "time";
@@ -336,7 +405,7 @@ int RunImport(ImportArguments options) {
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const NominalModel& model = *config.problem->model;
   const std::vector<std::string> columns = ColumnsOf(options, model);
-  const ImportOptions import = ImportOptionsOf(options, config);
+  ImportOptions import = ImportOptionsOf(options, config);
   std::vector<Source> sources;
   Transitions all{Eigen::MatrixXd(0, model.num_variables()), Eigen::MatrixXd(0, model.num_states())};
   std::optional<Progress> progress(std::in_place, "logs read", options.logs.size());
@@ -344,15 +413,22 @@ int RunImport(ImportArguments options) {
     Source& source = sources.emplace_back();
     source.table = ReadLog(path, columns, FormatOf(options));
     source.log = Import(source.table, *config.problem, import);
+    progress->Advance();
+  }
+  progress.reset();
+  std::optional<CommandDelay> delay;
+  if (options.command_delay == "none" || options.command_delay == "auto")
+    if (model.num_inputs() > 0) delay = DelayOf(sources, *config.problem, import);
+  import.command_delay = ShiftBy(options, delay);
+  for (Source& source : sources) {
+    if (import.command_delay > 0) source.log = Import(source.table, *config.problem, import);
     const Transitions& found = source.log.transitions;
     const Eigen::Index before = all.z.rows();
     all.z.conservativeResize(before + found.z.rows(), Eigen::NoChange);
     all.x_next.conservativeResize(before + found.z.rows(), Eigen::NoChange);
     all.z.bottomRows(found.z.rows()) = found.z;
     all.x_next.bottomRows(found.z.rows()) = found.x_next;
-    progress->Advance();
   }
-  progress.reset();
   const Share share = ShareOf(sources);
   const bool writes = all.size() > 0 && (options.keep_few || !share.IsFew());
   if (writes) SaveTransitions(options.out, model, all);
@@ -362,12 +438,16 @@ int RunImport(ImportArguments options) {
                   {"rows", share.rows},
                   {"rows_used", share.used},
                   {"logs", Json::array()}};
+    document["command_delay"] = delay ? ToJson(*delay) : Json(nullptr);
+    document["shifted_by"] = import.command_delay;
     document["out"] = writes ? Json(options.out) : Json(nullptr);
     for (const Source& source : sources) document["logs"].push_back(ToJson(source, columns));
     std::cout << JsonText(document) << std::endl;
   } else {
     for (const Source& source : sources) PrintForPeople(source, columns, options);
     PrintErrors(sources, options, model);
+    if (delay) PrintDelay(*delay, model);
+    if (import.command_delay > 0) std::cout << "Each command counts " << Rows(import.command_delay) << " later.\n";
     std::cout << "import: " << all.size() << " transitions of " << ToText(config.period) << " s"
               << (writes ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
     PrintShare(share, config.period);
@@ -429,6 +509,8 @@ Command ImportCommand() {
                    .variable = &options->input_mean,
                    .help = "Take the mean of each input over the step, however it changes",
                    .excludes = "--input-tolerance"},
+                  {"--command-delay", &options->command_delay, "auto|N",
+                   "Commands act so many rows after theirs; auto: as many as the model's error says"},
                   {"--overlapping", &options->overlapping, "",
                    "Start a transition at each sample; by default where the one before it ended"},
                   {"--keep-few", &options->keep_few, "",

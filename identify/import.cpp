@@ -156,6 +156,13 @@ class Importer {
                                table_.values(samples_[i].row, first_column_ + variable));
   }
 
+  // The input that acts from sample i on.
+  [[nodiscard]] double CommandAt(std::size_t i, Eigen::Index variable) const {
+    for (int d = 0; d < options_.command_delay; ++d)
+      if (samples_[i].begins_piece || i-- == 0) return std::numeric_limits<double>::quiet_NaN();
+    return Value(i, variable);
+  }
+
   [[nodiscard]] long double TargetOf(std::size_t i) const { return samples_[i].time + options_.period; }
 
   // How far the stamps of samples i and j may be off t_i + dt by the rounding of decimals to doubles.
@@ -181,7 +188,7 @@ class Importer {
   // Sets `input` to that of the step. False with the cause counted if the step has none.
   bool FindInput(std::size_t i, std::size_t j, std::span<double> input, std::span<double> deviation) {
     for (Eigen::Index l = 0; l < m_; ++l) {
-      const auto at = [&](std::size_t row) { return Value(row, n_ + l); };
+      const auto at = [&](std::size_t sample) { return CommandAt(sample, n_ + l); };
       long double sum = 0;
       for (std::size_t row = i; row < j; ++row) {
         if (!std::isfinite(at(row))) {

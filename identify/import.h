@@ -36,6 +36,9 @@ struct ImportOptions {
   std::vector<long double> factors;  ///< Of each state, then each input: model's value = factor * logged value.
   Eigen::VectorXd input_tolerance;   ///< In the model's units, not negative.
   bool input_mean = false;
+  /** The robot follows a command so many samples after its row: the input of a row is that of so many samples before it
+  in its piece, and no number where there is none. */
+  int command_delay = 0;
   /** Every sample may start a transition. Otherwise the next one starts where the last one ended, or, behind a sample
   that starts none, at the next sample. */
   bool overlapping = false;

@@ -163,8 +163,9 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   const auto add = [&numbers](std::int64_t count, const char* name) {
     if (count > 0) numbers.push_back(fmt::format("{} {}", count, name));
   };
-  add(abstained("pairwise"), "abstained F");
-  add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
+  add(abstained("pairwise") + abstained("bound"), "abstained F");
+  add(abstained("domain_exit") + abstained("no_finite_enclosure") + abstained("no_stop") + abstained("between"),
+      "abstained D");
   add(abstained("obstacle") + abstained("limit"), "abstained S");
   add(abstained("no_obstacles"), "abstained without obstacles");
   if (summary.latency_us.WasMeasured())

@@ -118,12 +118,10 @@ void FillStanding(TaskDraft& draft) {
 }
 
 // The errors that StepOffsets allows, with the key's name.
-void RequireSteps(const Document& file, const Config& config, const Problem& problem) try {
+void RequireSteps(const Document& file, const Problem& problem) try {
   static_cast<void>(StepOffsets(*problem.model, problem.timing, problem.declaration.disturbance));
 } catch (const std::invalid_argument& error) {
-  const char* key = config.gate.step_error_ms ? "robot.step_error_ms" : "gate.max_clock_error_ms";
-  const char* what = config.gate.step_error_ms ? "" : "half of it is for the robot's steps (robot.step_error_ms): ";
-  file.Fail(key, std::string(what) + error.what());
+  file.Fail("robot.step_error_ms", error.what());
 }
 
 Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
@@ -150,9 +148,13 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   }
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
   problem.timing.error = StepErrorSeconds(config);
-  RequireSteps(file, config, problem);
+  RequireSteps(file, problem);
+  const bool knows_time = config.gate.max_clock_error_ms.has_value();
+  if (knows_time && config.gate.step_error_ms == kAnyTime)
+    file.Fail("robot.step_error_ms",
+              "any, and with gate.max_clock_error_ms obstacles move: a certificate has to know when the steps are");
   if (problem.between) problem.between->period = LongestPeriod(config);
-  if (problem.between || StepErrorUs(config.gate)) config.gate.step_us = StepUs(config);
+  if (problem.between || knows_time || StepErrorUs(config.gate)) config.gate.step_us = StepUs(config);
   if (config.gate.step_us != 0 && std::llround(config.robot.step_period_ms * 1e3) != config.gate.step_us)
     file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", and has to be model.dt, " +
                                           ToText(config.period * 1e3) +
@@ -203,6 +205,12 @@ void RequireForCertifyingOnBus(const Config& config) {
         ": declaration.state_error: missing. Write under `declaration:` how far the true state may be from "
         "the one that the robot measures, `state_error: {STATE: BOUND, ...}` in the unit of each state; "
         "one that is not named is exact. Write `state_error: {}` if you mean 0 for all");
+  if (config.gate.needs_robot_state && !config.gate.step_error_ms)
+    throw ConfigError(
+        config.path +
+        ": robot.step_error_ms: missing. Write under `robot:` how far the boundaries of steps may be from their times, "
+        "in ms, which `forereach doctor` measures: the guard ends a plan that is further off. Or write `step_error_ms: "
+        "any`: nobody looks at a clock, and certificates hold for steps that are on time");
   const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
   if (moving != config.obstacles.end())
     throw ConfigError(fmt::format(

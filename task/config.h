@@ -75,8 +75,8 @@ struct NamedFiles {
 /** What a command needs before it certifies anew: the task has task.between, or is of the paper's method. */
 void RequireForCertifying(const Config& config);
 /** What a process needs before it certifies on a bus: the same, the task has gate.obstacles and, if a robot's state
-arms the gate, declaration.state_error, and no obstacle of the file moves. A motion in a file begins with the plan; on a
-bus `forereach obstacles` sends it with the time that it begins. */
+arms the gate, declaration.state_error and robot.step_error_ms, and no obstacle of the file moves. A motion in a file
+begins with the plan; on a bus `forereach obstacles` sends it with the time that it begins. */
 void RequireForCertifyingOnBus(const Config& config);
 ///@}
 

@@ -18,6 +18,9 @@ enum class ObstaclesSource {
 /** A value of GateOptions::obstacles_lost_ms. */
 inline constexpr double kNeverLost = std::numeric_limits<double>::infinity();
 
+/** A value of GateOptions::step_error_ms. */
+inline constexpr double kAnyTime = std::numeric_limits<double>::infinity();
+
 struct GateOptions {
   double max_age_ms = 500;
   double max_ahead_ms = 50;
@@ -29,12 +32,12 @@ struct GateOptions {
   bool needs_robot_state = true;   ///< Certifies only while the robot's state is heard.
   double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;
-  /** How far the clocks of robot and obstacles' sender may differ; without step_error_ms half of it is for
-  the robot's steps. Without it no obstacle may move. Stamps of states and obstacles are held to it at their arrival
-  (gate/stream_clock.h). */
+  /** How far the clocks of robot and obstacles' sender may differ. Without it no obstacle may move. Stamps of states
+  and obstacles are held to it at their arrival (gate/stream_clock.h). */
   std::optional<double> max_clock_error_ms;
   /** How far the boundary of a step may be from its time, on the robot's clock: from the plan's start and from the
-  first step's. Nothing: not said (StepErrorUs in step_time.h). The key is robot.step_error_ms. */
+  first step's. kAnyTime: steps are taken at any time. Nothing: not said; no certifier whose robot arms it starts. The
+  key is robot.step_error_ms. */
   std::optional<double> step_error_ms;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.

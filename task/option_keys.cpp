@@ -67,13 +67,11 @@ std::vector<Key> GateKeys() {
                   "After this time without one the robot's state is lost."),
       gate.Number("max_clock_jump_ms", "ms", UpTo(kHourMs), &GateOptions::max_clock_jump_ms,
                   "If the wall clock moves by more against the monotonic clock, a fault is latched."),
-      Optional(
-          gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
-                      "How far the clocks of the robot and of the obstacles' sender may differ. Without "
-                      "`robot.step_error_ms`, half of it is for the robot's steps instead. Moving obstacles need this "
-                      "key. A robot's state or obstacles that arrive further from their "
-                      "stamp, less `bus.delay_ms`, keep the certifier from certifying until one arrives inside."),
-          "no obstacle may move"),
+      Optional(gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
+                           "How far the clocks of the robot and of the obstacles' sender may differ. Moving "
+                           "obstacles need this key. A robot's state or obstacles that arrive further from their "
+                           "stamp, less `bus.delay_ms`, keep the certifier from certifying until one arrives inside."),
+               "no obstacle may move"),
       gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
                         "bus: task.obstacles and those of the last OBSTACLES message; nothing is certified "
                         "before the first one or while they are unknown. task: task.obstacles alone; "
@@ -311,12 +309,17 @@ std::vector<Key> RobotKeys() {
       Number("robot.emergency_stop.<state>", "of the state, per second of the model", kPositive,
              "Its absolute value falls at least so fast. One of robot.hold."),
       Optional(Number("robot.step_error_ms", "ms", Between(0, kHourMs),
-                      "How far the boundary of a step may be from its time on the robot's clock, counted from the "
+                      "Required where the robot's state arms the certifier. How far the boundary of a step may be from "
+                      "its time on the robot's clock, counted from the "
                       "plan's start and from its first step; below half of model.dt. The robot's guard stops a plan at "
                       "a step that is further off or lasts longer by more, and certificates hold for all steps within. "
                       "0: steps are on time.",
                       [](const Field& at, TaskDraft& draft) { draft.config.gate.step_error_ms = at.Number(); }),
-               "half of gate.max_clock_error_ms; without it certificates say that steps are on time"),
+               "certificates say that steps are on time"),
+      Word("robot.step_error_ms", {"any"},
+           "Steps are taken at any time, and nobody looks at a clock: certificates hold for steps on time. Not with "
+           "gate.max_clock_error_ms.",
+           [](const Field&, TaskDraft& draft) { draft.config.gate.step_error_ms = kAnyTime; }),
       Optional(robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
                             "Wall-clock time of a step. The certifier takes steps to last no longer than this or "
                             "model.dt. With bounds in task.between, or a clock (robot.step_error_ms, "

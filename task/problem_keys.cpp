@@ -419,7 +419,7 @@ std::vector<Key> BetweenKeys() {
                "samples with `certifier.method: paper`"),
       Map("task.between",
           "Certificates hold at all times. These bound the true motion from one sample to the next, at most model.dt "
-          "and half of gate.max_clock_error_ms later. `forereach declare --between` proposes them.",
+          "and robot.step_error_ms later. `forereach declare --between` proposes them.",
           ReadBetween),
       Required(Vector("task.between.acceleration", "m/s^2", kNotNegative, Size::kSafety,
                       "The largest absolute second derivative of each safety coordinate, of the frame and of every "

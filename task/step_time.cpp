@@ -15,14 +15,12 @@ double SecondsUp(std::int64_t us) { return DivUp(static_cast<double>(us), 1e6); 
 }  // namespace
 
 std::optional<std::int64_t> StepErrorUs(const GateOptions& options) {
-  if (options.step_error_ms) return MicrosecondsOf(*options.step_error_ms);
-  if (options.max_clock_error_ms) return MicrosecondsOf(*options.max_clock_error_ms) / 2;
-  return std::nullopt;
+  if (!options.step_error_ms || *options.step_error_ms == kAnyTime) return std::nullopt;
+  return MicrosecondsOf(*options.step_error_ms);
 }
 
 std::int64_t ScheduleErrorUs(const GateOptions& options) {
-  const std::int64_t clocks = MicrosecondsOf(options.max_clock_error_ms.value_or(0));
-  return options.step_error_ms ? clocks + MicrosecondsOf(*options.step_error_ms) : clocks;
+  return MicrosecondsOf(options.max_clock_error_ms.value_or(0)) + StepErrorUs(options).value_or(0);
 }
 
 std::int64_t StepUs(const Config& config) { return std::llround(config.period * 1e6); }

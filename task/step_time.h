@@ -9,8 +9,8 @@
 namespace forereach {
 
 /** How far a boundary may be from start_utime + t step_us, and from the first step's time + t step_us, on the robot's
-own clock, in microseconds: robot.step_error_ms, or half of gate.max_clock_error_ms. The guard stops a plan at a step
-that is further off, or has lasted longer than step_us by more. Nothing: no clock is looked at. */
+own clock, in microseconds: robot.step_error_ms. The guard stops a plan at a step that is further off, or has lasted
+longer than step_us by more. Nothing, also for `any`: no clock is looked at. */
 [[nodiscard]] std::optional<std::int64_t> StepErrorUs(const GateOptions& options);
 
 /** How far a boundary may be from its time on the clock of the obstacles' stamps, microseconds: what the robot's clock

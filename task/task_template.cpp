@@ -228,12 +228,13 @@ std::string EmergencyStop(const TaskTemplate& task, const std::vector<std::strin
 std::string RobotKey(const TaskTemplate& task) {
   std::vector<std::string> held = task.laws ? task.laws->held : Velocities(task.states);
   std::string text = "# The robot, and the simulated one: the states that are zero while it stands.\n";
-  if (task.laws || !held.empty()) return text + "robot:\n  hold: " + List(held) + "\n" + EmergencyStop(task, held);
+  text +=
+      "robot:\n"
+      "  # How far its steps are from their times, ms; `forereach doctor` measures it. PLACEHOLDER: nobody looks.\n"
+      "  step_error_ms: any\n";
+  if (task.laws || !held.empty()) return text + "  hold: " + List(held) + "\n" + EmergencyStop(task, held);
   held = {task.states.back().name};
-  return text +
-         "# robot:\n"
-         "#   hold: " +
-         List(held) +
+  return text + "#   hold: " + List(held) +
          "\n"
          "#   emergency_stop: " +
          Bounds({{held[0], 1}}) + "  # how fast its brakes take it to zero, in its unit per second\n";

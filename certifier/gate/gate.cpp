@@ -24,7 +24,8 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
               static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP &&
               static_cast<int>(Cause::kLimit) == decision_t::CAUSE_LIMIT &&
-              static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN);
+              static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN &&
+              static_cast<int>(Cause::kBound) == decision_t::CAUSE_BOUND);
 
 }  // namespace
 
@@ -284,7 +285,9 @@ std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us, SenderId sen
 }
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
-  const std::string fault = FaultOf(state, certifier_.problem().model->num_states());
+  const Problem& problem = certifier_.problem();
+  std::string fault = FaultOf(state, problem.model->num_states());
+  if (fault.empty()) fault = WiderThanDeclared(state, problem);
   return fault.empty() ? CheckFresh(state.utime, now_us) : fault;
 }
 

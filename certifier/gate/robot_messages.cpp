@@ -25,6 +25,16 @@ std::string FaultOf(const robot_state_t& state, int num_states) {
   return {};
 }
 
+std::string WiderThanDeclared(const robot_state_t& state, const Problem& problem) {
+  if (!problem.declaration.DeclaresStateError()) return {};
+  for (int k = 0; k < state.num_state_errors; ++k)
+    if (const double most = problem.declaration.state_error[k]; !(state.state_error[k] <= most))
+      return fmt::format("the error of {} is {}, and declaration.state_error is {}",
+                         problem.model->state_names()[static_cast<std::size_t>(k)], ToText(state.state_error[k]),
+                         ToText(most));
+  return {};
+}
+
 namespace {
 
 // How far the duration is from dt, in seconds, from above. A clock of microseconds is off by one at each end.

@@ -16,6 +16,10 @@ not one for each state, negative or not finite, an unknown mode. Empty if it is 
 (stamp.h). */
 [[nodiscard]] std::string FaultOf(const robot_state_t& state, int num_states);
 
+/** Why a certifier does not take a state for known: an error of it is larger than the declared one, which its
+certificates and its comparison with the slices rest on. Empty if none is. @pre FaultOf is empty. */
+[[nodiscard]] std::string WiderThanDeclared(const robot_state_t& state, const Problem& problem);
+
 /** What a task says of measured states. */
 [[nodiscard]] Sensing SensingOf(const Problem& problem);
 

@@ -159,7 +159,8 @@ DriftDrives DriveOnDrift(const std::string& task, int seed) {
   driven.counts = CountsOf(lockstep);
   driven.most = car.most();
   driven.beyond_between = !IsWithin(driven.most, *config.problem->between);
-  driven.faulted = driven.counts.abstained.contains("pairwise") || driven.counts.rejected.contains("fault");
+  driven.faulted = driven.counts.abstained.contains("pairwise") || driven.counts.abstained.contains("bound") ||
+                   driven.counts.rejected.contains("fault");
   return driven;
 }
 

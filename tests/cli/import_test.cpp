@@ -268,6 +268,57 @@ TEST_F(ForeignLogTest, ARowOfDecimalCommasBetweenCommasIsNamed) {
   EXPECT_THAT(Import(header_ + Rows(0, 3) + "0.3,2.4,8.3,1,0\n" + Rows(4, 8)).text, Not(HasSubstr("decimal comma")));
 }
 
+// ---- How late commands act: v' = u in steps of 0.15 s, and each command acts one row later.
+
+class LateCommandTest : public ImportCommandTest {
+ protected:
+  void Record(bool varies) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> any(-1, 1);
+    std::string log = "time,px,py,vx,vy,ax,ay\n";
+    double px = 0, vx = 0, acts = 0.25;
+    for (int i = 0; i < 80; ++i) {
+      const double ax = varies ? any(random) : 0.25;
+      log += fmt::format("{},{},0,{},0,{},0\n", 0.15 * i, px, vx, ax);
+      px += 0.15 * vx + 0.15 * 0.15 / 2 * acts;
+      vx += 0.15 * acts;
+      acts = ax;
+    }
+    scratch_.Write("log.csv", log);
+  }
+};
+
+TEST_F(LateCommandTest, IsSaidWithTheErrorByDelayAndMayBeShifted) {
+  Record(true);
+  const Output said = Import(log_);
+  EXPECT_EQ(said.code, 0) << said.text;
+  EXPECT_THAT(said.text,
+              AllOf(HasSubstr("Commands: by the model's error, commands act 1 row late.\n    0 rows late: px 0.00"),
+                    HasSubstr("Shift them with --command-delay 1"), HasSubstr("`held: u`")));
+  const Output shifted = Import("--command-delay auto " + log_);
+  EXPECT_EQ(shifted.code, 0) << shifted.text;
+  EXPECT_THAT(shifted.text, HasSubstr("Each command counts 1 row later."));
+  const Problem problem = *LoadConfig(scratch_ / "task.yaml").problem;
+  EXPECT_EQ(problem.transitions.size(), 78) << "nothing is known of the first row's command";
+  for (Eigen::Index i = 0; i < problem.transitions.size(); ++i)
+    EXPECT_NEAR(problem.transitions.x_next(i, 2) - problem.transitions.z(i, 2), 0.15 * problem.transitions.z(i, 4),
+                1e-9);
+  const Json json = Json::parse(
+      Forereach("import --json --command-delay 1 --config " + scratch_ / "task.yaml" + " --out " + out_ + " " + log_)
+          .text);
+  EXPECT_EQ(json["shifted_by"], 1);
+  EXPECT_TRUE(json["command_delay"].is_null()) << "it was said";
+}
+
+TEST_F(LateCommandTest, CannotBeToldWhereTheInputDoesNotVary) {
+  Record(false);
+  EXPECT_THAT(Import(log_).text, HasSubstr("how late commands act cannot be told: the inputs vary too little"));
+  const Output output = Import("--command-delay auto " + log_);
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("--command-delay: auto: how late commands act cannot be told"));
+  EXPECT_THAT(Import("--command-delay 1.5 " + log_).text, HasSubstr("'1.5' is no whole number of rows, nor auto"));
+}
+
 // ---- docs/data.md: its commands are run, in a folder of their own.
 
 TEST(DataDocument, CommandsPrintWhatItSays) {

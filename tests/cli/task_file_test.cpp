@@ -389,6 +389,53 @@ TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
   EXPECT_EQ(Check().code, 0) << Check().text;
 }
 
+// A bar that turns on the spot in steps of 1 s.
+TEST_F(CheckTest, NamesEveryRowThatTurnsFasterThanDeclaredWorstFirst) {
+  const auto with = [&](const std::string& rate) {
+    scratch_.Write("task.yaml", R"(model:
+  {states: {x: m, y: m, th: rad}, inputs: {w: rad/s}, parameters: {dt: 1}, next: {x: x, y: y, th: th + dt*w}}
+domain: {state: {lower: [-9, -9, -9], upper: [9, 9, 9]}, input: {lower: [-4], upper: [4]}}
+declaration: {lipschitz: {}, noise_bound: [0, 0, 0]}
+transitions: steps.csv
+task:
+  initial_set: {center: [0, 0, 0], half_width: [0, 0, 0]}
+  body: {pose: [x, y, th], parts: [{hull: {points: [[-1.2, 0], [1.2, 0]]}}]}
+  between: {acceleration: [0, 0], turn_rate: )" +
+                                    rate +
+                                    R"(, turn_acceleration: 0}
+  obstacles: [{circle: {center: [0, 1], radius: 0.05}}]
+gate: {obstacles: task}
+)");
+    scratch_.Write("steps.csv", "x,y,th,w,x_next,y_next,th_next\n0,0,0,1.5,0,0,1.5\n0,0,0,0,0,0,0\n0,0,3,-3,0,0,0\n");
+    return Check();
+  };
+  const Output output = with("0.5");
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text,
+              HasSubstr(task_ +
+                        ":9: task.between.turn_rate: th changes faster than 0.5 a second in 2 "
+                        "transitions of " +
+                        (scratch_ / "steps.csv") +
+                        ", so nothing can be certified: line 4: 2.999 (5.999 times), line 2: 1.499 (2.999 times)"));
+  EXPECT_THAT(output.text, HasSubstr("declare 3 at least")) << output.text;
+  EXPECT_THAT(with("2").text, HasSubstr("in 1 transition of"));
+  EXPECT_EQ(with("3").code, 0) << with("3").text;
+}
+
+// 0.5 m/s^2 in a step of 0.15 s from rest: 0.005 m more than the velocity says, which are 0.444 m/s^2 over the step.
+TEST_F(CheckTest, RemarksOnRowsThatCurveMoreThanDeclaredByTheVelocityOfTheEquations) {
+  const auto with = [&](const std::string& acceleration) {
+    WriteTask("between: samples", "between: {acceleration: [" + acceleration + ", 4]}");
+    return Check();
+  };
+  const Output output = with("0.125");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr(":19: task.between.acceleration: remark: coordinate 0 curves by more than 0.125 "
+                                     "m/s^2, if its velocity is what the equations say, in 1 transition of " +
+                                     (scratch_ / "steps.csv") + ": line 2: 0.4444 (3.555 times)"));
+  EXPECT_THAT(with("0.5").text, Not(HasSubstr("curves by more")));
+}
+
 TEST_F(CheckTest, PrintsNoShareOfTheDeclarationWhereNothingIsDeclared) {
   const auto with = [&](const std::string& noise_bound) {
     WriteTask("[0.01, 0.01, 0.01, 0.01]", noise_bound);

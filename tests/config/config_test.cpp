@@ -172,7 +172,8 @@ std::string Refusal(void (*require)(const Config&), const Config& config) {
 
 std::string RefusalOnBus(const Config& config) { return Refusal(RequireForCertifyingOnBus, config); }
 
-const std::string kMeasuredTask = Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound");
+const std::string kMeasuredTask =
+    Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound") + std::string("robot: {step_error_ms: any}\n");
 
 TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStateMayBeOff) {
   const TaskFiles files;
@@ -185,8 +186,31 @@ TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStateMayBeOff) {
   for (const char* declared : {"{}", "{vx: 0.1}", "[0, 0, 0, 0]"})
     EXPECT_EQ(RefusalOnBus(files.Load(
                   Replaced(kTask, "  noise_bound", std::string("  state_error: ") + declared + "\n  noise_bound") +
-                  "gate: {obstacles: task}\n")),
+                  "robot: {step_error_ms: any}\ngate: {obstacles: task}\n")),
               "");
+}
+
+TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
+  const TaskFiles files;
+  const auto with = [&](const std::string& robot, const std::string& gate = "obstacles: task") {
+    return files.Load(Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound") + "gate: {" + gate + "}\n" +
+                      robot);
+  };
+  const Config unsaid = with("");
+  EXPECT_THAT(RefusalOnBus(unsaid),
+              testing::AllOf(testing::StartsWith(unsaid.path + ": robot.step_error_ms: missing"),
+                             testing::HasSubstr("forereach doctor"), testing::HasSubstr("`step_error_ms: any`")));
+  EXPECT_NO_THROW(RequireForCertifying(unsaid)) << "`forereach certify` executes nothing";
+  EXPECT_EQ(RefusalOnBus(with("", "obstacles: task, arming: none")), "");
+  for (const char* said : {"0", "2.5", "any"})
+    EXPECT_EQ(RefusalOnBus(with(std::string("robot: {step_error_ms: ") + said + "}\n")), "");
+  EXPECT_EQ(with("robot: {step_error_ms: any}\n").problem->timing.error, 0);
+  EXPECT_THAT(RefusalOnBus(with("", "obstacles: task, max_clock_error_ms: 20")),
+              testing::HasSubstr("robot.step_error_ms: missing"))
+      << "it is not taken from that of the clocks";
+  EXPECT_THAT(
+      [&] { static_cast<void>(with("robot: {step_error_ms: any}\n", "obstacles: task, max_clock_error_ms: 20")); },
+      ThrowsMessage<ConfigError>(testing::HasSubstr("robot.step_error_ms: any, and with gate.max_clock_error_ms")));
 }
 
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
@@ -250,10 +274,8 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   ASSERT_TRUE(bounds.problem->between);
   EXPECT_EQ(bounds.problem->between->acceleration, Numbers({3.5, 0}));
   EXPECT_EQ(bounds.problem->between->period, 0.15);
-  for (const auto& [error_ms, period] : {std::pair{"0.001", 0.15}, {"20", 0.16}}) {  // half of it is the robot's
-    const double longer = files
-                              .Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "obstacles: task",
-                                             std::string("obstacles: task, max_clock_error_ms: ") + error_ms))
+  for (const auto& [error_ms, period] : {std::pair{"0.001", 0.150001}, {"10", 0.16}}) {
+    const double longer = files.Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "any", error_ms))
                               .problem->between->period;
     EXPECT_GE(longer, period);
     EXPECT_LE(longer, period * (1 + 0x1p-51));

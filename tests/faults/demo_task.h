@@ -31,8 +31,10 @@ clocks differ by up to this, ms, and steps take the time of the model. */
 inline std::string DemoTaskOnTheBus(int clocks = 0) {
   const std::string error = clocks > 0 ? ", max_clock_error_ms: " + std::to_string(clocks) : "";
   std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1500" + error + "}");
-  if (const std::string period = "step_period_ms: 50"; clocks > 0)
-    task.replace(task.find(period), period.size(), "step_period_ms: 100\n  step_error_ms: 10");
+  if (const std::string period = "step_period_ms: 50", error = "step_error_ms: any"; clocks > 0) {
+    task.replace(task.find(period), period.size(), "step_period_ms: 100");
+    task.replace(task.find(error), error.size(), "step_error_ms: 10");
+  }
   const std::size_t begin = task.find("  obstacles:\n"), end = task.find("\n\n", begin);
   return task.replace(begin, end - begin, "  obstacles: []");
 }

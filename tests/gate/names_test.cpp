@@ -151,7 +151,8 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                                {"NO_OBSTACLES", 27},
                                {"SECOND_CERTIFIER", 28},
                                {"LATCH_UNWRITABLE", 29},
-                               {"BETWEEN", 30}}));
+                               {"BETWEEN", 30},
+                               {"BOUND", 31}}));
   EXPECT_EQ(ConstantsOf("execution_event_t"), (Constants{{"ACCEPTED", 1},
                                                          {"REFUSED", 2},
                                                          {"STARTED", 3},
@@ -178,7 +179,8 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                                                     {"UNKNOWN_PLAN", 7},
                                                     {"LIMIT", 8},
                                                     {"OBSTACLES_LOST", 9},
-                                                    {"BETWEEN", 30}}));
+                                                    {"BETWEEN", 30},
+                                                    {"BOUND", 31}}));
   EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},

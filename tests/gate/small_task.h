@@ -34,6 +34,7 @@ inline Config SmallTask() {
   Config config;
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)};
   config.gate.needs_robot_state = false;
+  config.gate.step_error_ms = kAnyTime;
   config.gate.obstacles = ObstaclesSource::kTask;
   config.says_between = true;
   config.grounds = GroundsOf(DigestOf(std::string_view("small task")), problem, config.obstacles);

@@ -326,6 +326,41 @@ TEST_F(LatchTest, AsManyContradictionsFitAsAreAllowed) {
   EXPECT_EQ(read->contradictions.back().pair.z, pair.z);
 }
 
+// A transition that changes vx by 2 m/s in a step contradicts a bound on its rate, and its residual nothing.
+TEST_F(LatchTest, ADeclaredRateThatATransitionContradictsStaysSoOverRestartsAndResets) {
+  const auto declare = [&](double rate) {
+    Problem problem = *config_.problem;
+    problem.timing.rate_bound = Eigen::Vector4d(INFINITY, INFINITY, rate, INFINITY);
+    config_.problem = std::make_shared<const Problem>(problem);
+  };
+  declare(1);
+  Begin();
+  SayState();
+  transition_t transition{.num_states = 4, .num_inputs = 2, .input = {2, 0}};
+  const Eigen::VectorXd z = (Eigen::VectorXd(6) << 0, 0, 0, 0, 2, 0).finished();
+  config_.problem->model->Evaluate({z.data(), 6}, {transition.next_state, 4});
+  bus_->Publish("TRANSITION", transition);
+  Run();
+  ASSERT_FALSE(faults_.empty());
+  EXPECT_EQ(faults_.back().cause, fault_t::DECLARATION_FALSIFIED);
+  EXPECT_THAT(GetText(faults_.back().message), HasSubstr("contradicts a declared rate"));
+  EXPECT_EQ(faults_.back().second_observation, -1);
+  Reset();
+  SayState();
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_BOUND);
+  Begin();
+  Reset();
+  SayState();
+  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  declare(2 - 1e-9);
+  Begin();
+  SayState();
+  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  declare(2);
+  Begin();
+  ExpectArmed();
+}
+
 TEST_F(LatchTest, RefusesADirectoryThatAnotherCertifierUses) {
   Begin();
   EXPECT_THAT([&] { const LatchFile second(directory_); },

@@ -63,6 +63,7 @@ planner:
 robot:
   start: [0, 0, 0, 0]
   step_period_ms: 100
+  step_error_ms: any
   residual: {name: velocity_knee}
   time_limit_s: )" +
          std::to_string(time_limit_s) + "\n";

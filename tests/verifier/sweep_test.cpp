@@ -306,8 +306,27 @@ TEST(BetweenSamples, ATurnThatNoMotionMakesIsRefuted) {
     }
     ExpectConfirmed(Judge(AtAllTimes(Curving(0, 0, 8 - 4 * kHair), body), certificate));
     ExpectRefuted(Judge(AtAllTimes(Curving(0, 0, 8 - 5 * kHair), body), certificate), 0,
-                  "the least turn of px from the slice to the next");
+                  "the least change of px from the slice to the next");
   }
+}
+
+// A transition changes py, the heading, by 1 in half a second.
+TEST(BetweenSamples, DataThatTurnFasterThanDeclaredAreRefuted) {
+  const auto with = [](double turn_rate, double rate_bound = INFINITY) {
+    auto problem = AtAllTimes(Curving(0, 0, turn_rate), Corner(1, 0.5, 0));
+    problem->transitions.z(0, kVy) = 2;
+    problem->transitions.x_next(0, 1) = 1;
+    problem->transitions.x_next(0, kVy) = 2;
+    problem->timing.rate_bound = Eigen::Vector4d(INFINITY, rate_bound, INFINITY, INFINITY);
+    Certificate certificate = Driving();
+    certificate.schedule.step_us = 500'000;
+    return Judge(problem, certificate);
+  };
+  constexpr double kHair = 0x1p-30;
+  ExpectConfirmed(with(2));
+  ExpectRefuted(with(2 - kHair), -1, "no known transition changes py faster than is declared");
+  ExpectConfirmed(with(3, 2));
+  ExpectRefuted(with(3, 2 - kHair), -1, "no known transition changes py faster");
 }
 
 TEST(BetweenSamples, ARecordedClearanceIsThatOfTheMotionAfterTheSample) {
