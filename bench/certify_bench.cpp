@@ -21,6 +21,7 @@
 #include "bench/text_models.h"
 #include "bench/without_rounding.h"
 #include "forereach/certify/batch.h"
+#include "forereach/dynamics/models/named_models.h"
 
 namespace forereach::bench {
 namespace {
@@ -164,6 +165,29 @@ void RegisterTextModels() {
   add("quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); });
 }
 
+// The same calls with steps up to a twentieth off their times, beside those of steps on time (docs/soundness.md, 3.15).
+void RegisterOffsets() {
+  using Integrator = ModelText::Integrator;
+  const auto add = [](const char* name, auto make) {
+    for (const bool is_off : {false, true})
+      benchmark::RegisterBenchmark((std::string("steps/") + name + (is_off ? "/off_their_times" : "/on_time")).c_str(),
+                                   [make, is_off](State& state) {
+                                     const Task task = make();
+                                     Problem problem = *task.problem;
+                                     if (is_off) problem.timing.error = StepOf(*problem.model) / 20;
+                                     RunCertify(state, Certifier(std::make_shared<Problem>(problem)), task);
+                                   })
+          ->Unit(benchmark::kMicrosecond);
+  };
+  add("bicycle", [] { return CachedTask(Scenario::kBicycle, 400); });
+  add("point_mass", [] { return CachedTask(Scenario::kPointMass, 400); });
+  add("bicycle_text", [] { return MakeBicycleTextTask(BicycleText(Integrator::kEuler), 400); });
+  add("bicycle_midpoint_next", [] { return MakeBicycleTextTask(BicycleMidpointText(), 400); });
+  add("bicycle_midpoint", [] { return MakeBicycleTextTask(BicycleText(Integrator::kMidpoint), 400); });
+  add("bicycle_rk4", [] { return MakeBicycleTextTask(BicycleText(Integrator::kRk4), 400); });
+  add("quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); });
+}
+
 void RegisterBatch() {
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   for (unsigned threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1)
@@ -183,6 +207,7 @@ void RegisterAll(int largest) {
   RegisterNominalTube();
   RegisterWorlds();
   RegisterTextModels();
+  RegisterOffsets();
   RegisterBatch();
 }
 

@@ -80,8 +80,7 @@ class AbstentionReader final : public TimelineUser {
       abstention.missing = "its candidate is not of this task's sizes";
       return;
     }
-    for (const std::string& why : {WhyNoSchedule(*candidate, task.gate), WhyNoStep(*candidate, task.gate)})
-      if (abstention.missing.empty()) abstention.missing = why;
+    abstention.missing = WhyNoSchedule(*candidate, task.gate);
     if (!abstention.missing.empty()) return;
     Case& judged = abstention.judged;
     try {

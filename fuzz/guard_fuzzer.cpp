@@ -26,7 +26,7 @@ GuardOptions Options(bool with_key) {
   options.keys = Keys(true);
   options.bus_name = "bus";
   options.domain = GuardDomain{{-12, -5}, {12, 5}, {-3}, {3}};
-  options.max_jitter_us = kJitterUs;
+  options.step_error_us = kJitterUs;
   return options;
 }
 

@@ -77,8 +77,7 @@ std::string AddTube(const Certifier& certifier, const JudgedCandidate& judged, c
 
 std::string WhyNotJudged(const candidate_plan_t& candidate, const Config& task) {
   if (!HasSizes(candidate, *task.problem->model)) return "its candidate is not of its task's sizes";
-  if (std::string why = WhyNoSchedule(candidate, task.gate); !why.empty()) return why;
-  return WhyNoStep(candidate, task.gate);
+  return WhyNoSchedule(candidate, task.gate);
 }
 
 void Describe(const Certifier& certifier, const JudgedCandidate& judged, const Decision& again, const Tube& tube,

@@ -99,8 +99,7 @@ class CertificateReader final : public TimelineUser {
       return;
     }
     certificate.name += fmt::format(", plan {} of {}", certified.plan.plan_id, GetText(certified.plan.source));
-    if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
-    certificate.missing = WhyNoStep(certified.plan, task.gate);
+    certificate.missing = WhyNoSchedule(certified.plan, task.gate);
     if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);

@@ -250,8 +250,8 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   require("num_states", options_.num_states, kMaxPlanStates);
   require("num_inputs", options_.num_inputs, kMaxPlanInputs);
   require("step_us", options_.step_us, INT64_MAX);
-  if (options_.max_jitter_us && *options_.max_jitter_us < 0)
-    throw std::invalid_argument("GuardOptions: max_jitter_us is " + std::to_string(*options_.max_jitter_us) +
+  if (options_.step_error_us && *options_.step_error_us < 0)
+    throw std::invalid_argument("GuardOptions: step_error_us is " + std::to_string(*options_.step_error_us) +
                                 ", it must not be negative");
   RequireDomain(options_.domain, options_);
   sensing_ = {AnglesOf(options_.angles, options_.num_states), ErrorOf(options_.state_error, options_.num_states)};
@@ -307,7 +307,7 @@ GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, co
 }
 
 std::int64_t StartTolerance(const GuardOptions& options) {
-  return std::min(options.step_us / 2, options.max_jitter_us.value_or(INT64_MAX));
+  return std::min(options.step_us / 2, options.step_error_us.value_or(INT64_MAX));
 }
 
 GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
@@ -573,17 +573,17 @@ std::int64_t Guard::DueAfter(std::int64_t begin, int step) const {
 GuardVerdict Guard::ExamineDue(const candidate_plan_t& plan, int step, std::int64_t due, const char* by,
                                std::int64_t now_us) const {
   const std::uint64_t apart = Apart(now_us, due);
-  if (apart <= static_cast<std::uint64_t>(*options_.max_jitter_us)) return {};
+  if (apart <= static_cast<std::uint64_t>(*options_.step_error_us)) return {};
   const bool late = now_us > due;
   return RefuseAt(GuardCause::kOffSchedule, step, -1, static_cast<double>(apart) * (late ? 1 : -1),
-                  static_cast<double>(*options_.max_jitter_us),
+                  static_cast<double>(*options_.step_error_us),
                   Sentence("plan %" PRId64 ": step %d was due at %" PRId64 " us%s, it is %" PRIu64
                            " us too %s, at most %" PRId64 " us are allowed",
-                           plan.plan_id, step, due, by, apart, late ? "late" : "early", *options_.max_jitter_us));
+                           plan.plan_id, step, due, by, apart, late ? "late" : "early", *options_.step_error_us));
 }
 
 GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const {
-  if (!options_.max_jitter_us) return {};
+  if (!options_.step_error_us) return {};
   GuardVerdict verdict = ExamineDue(plan, step, DueAfter(plan.start_utime, step), "", now_us);
   if (!verdict.ok() || step == 0) return verdict;
   return ExamineDue(plan, step, DueAfter(first_step_utime_, step), " by the first step", now_us);
@@ -591,15 +591,15 @@ GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int
 
 // Of the step that ends: its motion is bounded for so long.
 GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const {
-  if (!options_.max_jitter_us || now_us <= began_utime) return {};
+  if (!options_.step_error_us || now_us <= began_utime) return {};
   const candidate_plan_t& plan = executing_->plan;
   const std::uint64_t lasted = Apart(now_us, began_utime);
   const std::uint64_t most =
-      static_cast<std::uint64_t>(options_.step_us) + static_cast<std::uint64_t>(*options_.max_jitter_us);
+      static_cast<std::uint64_t>(options_.step_us) + static_cast<std::uint64_t>(*options_.step_error_us);
   if (lasted <= most) return {};
   return RefuseAt(
       GuardCause::kOffSchedule, step, -1, static_cast<double>(lasted) - static_cast<double>(plan.step_us),
-      static_cast<double>(*options_.max_jitter_us),
+      static_cast<double>(*options_.step_error_us),
       Sentence("plan %" PRId64 ": the step before step %d lasted %" PRIu64 " us, at most %" PRIu64 " us are allowed",
                plan.plan_id, step, lasted, most));
 }

@@ -7,7 +7,7 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
     TryStart  -> at the plan's start boundary, with the state inside X_0: the plan executes from step 0 and replaces
                  the plan before it
     Check     -> after each control: the state has not left X_t, so the next control may be applied. With
-                 GuardOptions::max_jitter_us also: the step is on time and has not lasted too long
+                 GuardOptions::step_error_us also: the step is on time and has not lasted too long
     CheckAgain -> the same once more, if time has passed since Check
     Withdraw  -> controls of a plan stand no longer: a pending plan is dropped, and of the executing one only the
                  controls before `standing_steps` may still be applied
@@ -84,7 +84,7 @@ enum class GuardCause {
   kTooLate,
   kOutsideInitialSet,
   // TryStart and Check
-  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, from the first step's
+  kOffSchedule,  ///< With step_error_us: further than this from start_utime + step * step_us, from the first step's
                  ///< time + step * step_us, or from step_us after the last step.
   kWrongStateSize,
   kWrongStateError,  ///< An error of the state is negative or not finite, or there is not one for each state.
@@ -155,10 +155,10 @@ struct GuardOptions {
   /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us and of the first step's
   time + t * step_us, and no later than this after step_us from the last step, microseconds, not negative. It is the
   task's robot.step_error_ms (task/step_time.h): certificates hold for steps within it. */
-  std::optional<std::int64_t> max_jitter_us = {};
+  std::optional<std::int64_t> step_error_us = {};
 };
 
-/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or max_jitter_us if that is
+/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or step_error_us if that is
 less. Microseconds. */
 [[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
 
@@ -184,7 +184,7 @@ class Guard final {
   /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= StartTolerance;
   now_us <= expires_utime, because a delayed robot reaches a boundary late; all of measured_state +- state_error lies
   in X_0 = {x : |x - initial_center| <= initial_half_width}, compared as exact real numbers, and a part of it in the
-  hull of slice 0. NaN lies in no set. With max_jitter_us, boundary_utime and now_us have to be within it of
+  hull of slice 0. NaN lies in no set. With step_error_us, boundary_utime and now_us have to be within it of
   start_utime, too. kNothingPending and kTooEarly change nothing. After any other refusal no plan is pending. The
   executing plan continues unless the new one starts. It allocates nothing if it passes.
   @param measured_state num_states entries in the model's units. @param state_error of this measurement, likewise;
@@ -194,9 +194,9 @@ class Guard final {
                                       std::span<const double> state_error = {}) noexcept;
 
   /** Checks that the state measured after control step - 1 has not left the hull of slice `step`: that a part of
-  measured_state +- state_error lies in it, compared as exact real numbers. Then checks, with max_jitter_us,
-  |now_us - start_utime - step * step_us| <= max_jitter_us, the same from the time of TryStart, and now_us - (that of
-  the step before, or of TryStart) <= step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a
+  measured_state +- state_error lies in it, compared as exact real numbers. Then checks, with step_error_us,
+  |now_us - start_utime - step * step_us| <= step_error_us, the same from the time of TryStart, and now_us - (that of
+  the step before, or of TryStart) <= step_us + step_error_us. Call it for step = 1, 2, .. T in this order. After a
   refusal no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock,
   microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us,
@@ -213,7 +213,7 @@ class Guard final {
   [[nodiscard]] bool IsDeclared(std::span<const double> state_error) const noexcept;
 
   /** Whether Check of the same step and time would find them on schedule, whatever the state is: the step that ends has
-  lasted as long as a step may. True without max_jitter_us or an executing plan. */
+  lasted as long as a step may. True without step_error_us or an executing plan. */
   [[nodiscard]] bool IsOnSchedule(int step, std::int64_t now_us) const noexcept;
 
   /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed

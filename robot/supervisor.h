@@ -13,7 +13,7 @@ call Boundary at every step boundary:
 Boundary does, in this order:
  1. FinishStep: if a plan is executing, sends the step that has ended as transition_t and checks the measured state
     against the certified slice: STEP_INSIDE, STEP_CONSISTENT, or STEP_OUTSIDE if it was left, an emergency stop. A step
-    that is further off its schedule than the guard's max_jitter_us is OFF_SCHEDULE, an emergency stop that needs no
+    that is further off its schedule than the guard's step_error_us is OFF_SCHEDULE, an emergency stop that needs no
     reset. No transition_t is sent for it, wherever it ended: it did not last as long as the model's step, so it is no
     observation of that. Nor is one sent if the state at one of its ends was measured with a larger error than the task
     declares;
@@ -49,7 +49,7 @@ executing is not affected by Expect.
 - A boundary whose state could not be measured sends no robot_state_t, and leaves out its sequence number.
 - Boundary checks state and time again if FinishStep was called before it. So a control is returned only if the guard
   has checked the state and the time of that call, whatever was called or threw before. The time is checked only with
-  GuardOptions::max_jitter_us.
+  GuardOptions::step_error_us.
 - If your program throws between the calls (a clock, a receiver), this object does not know it: hold until Boundary
   returns a control.
 
@@ -136,7 +136,7 @@ class Supervisor final {
   std::string OnCommand(Bytes message, std::int64_t now_us) noexcept;
 
   /** Handles a step boundary. @param utime the boundary's time. @param now_us later than that if the robot was held up;
-  a plan that has expired meanwhile is refused, and with the guard's max_jitter_us the plan under way ends where now_us
+  a plan that has expired meanwhile is refused, and with the guard's step_error_us the plan under way ends where now_us
   is too late. @param ends the robot ends its run: no further plan starts, and at rest it reports FINISHED.
   @return the control to apply until the next boundary, num_inputs entries, valid until the next call of this object;
   empty: hold. */

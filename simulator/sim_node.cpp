@@ -62,7 +62,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
   options.guard.state_error = StateErrorOf(config);
-  options.guard.max_jitter_us = StepErrorUs(config.gate);
+  options.guard.step_error_us = StepErrorUs(config.gate);
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;

@@ -71,6 +71,38 @@ class AlongArithmetic final {
   std::span<const Jet> variables_;
 };
 
+// For Evaluate: how a number scales with the duration, the last variable.
+class ScalingArithmetic final {
+ public:
+  struct Number {
+    std::optional<int> degree;  // it is proportional to this power of the duration
+    int state = -1;             // it is this variable plus what is of degree 1
+  };
+
+  explicit ScalingArithmetic(int duration) : duration_(duration) {}
+
+  [[nodiscard]] Number Apply(const Tape::Operation& operation, const Number* a, const Number* b) const {
+    const auto is_moved = [](const Number* x, const Number* by) { return x->state >= 0 && by->degree == 1; };
+    switch (operation.op) {
+      case Op::kVariable: return operation.index == duration_ ? Number{1} : Number{0, operation.index};
+      case Op::kAdd:
+        if (is_moved(a, b)) return {{}, a->state};
+        return is_moved(b, a) ? Number{{}, b->state} : Equal(*a, *b);
+      case Op::kSubtract: return is_moved(a, b) ? Number{{}, a->state} : Equal(*a, *b);
+      case Op::kMultiply: return a->degree && b->degree ? Power(*a->degree + *b->degree) : Number();
+      case Op::kDivide: return a->degree && b->degree ? Power(*a->degree - *b->degree) : Number();
+      case Op::kNegate: return {a->degree};
+      default: return (a == nullptr || a->degree == 0) && (b == nullptr || b->degree == 0) ? Number{0} : Number();
+    }
+  }
+
+ private:
+  static Number Equal(const Number& a, const Number& b) { return a.degree == b.degree ? Number{a.degree} : Number(); }
+  static Number Power(int degree) { return -9 <= degree && degree <= 9 ? Number{degree} : Number(); }
+
+  int duration_;
+};
+
 class TextEquations final : public Equations {
  public:
   explicit TextEquations(const ModelText& model)
@@ -82,7 +114,10 @@ class TextEquations final : public Equations {
       parameters_.emplace_back(lower, upper);
     }
     if (!stages_.empty() && dt_ < 0) throw ExpressionError("an integrator needs the parameter dt");
-    if (dt_ >= 0) formulas_in_dt_ = FormulasOf(model, "dt");
+    if (dt_ < 0) return;
+    formulas_in_dt_ = FormulasOf(model, "dt");
+    scaling_ = Evaluate(formulas_in_dt_.tape, formulas_in_dt_.results,
+                        ScalingArithmetic(static_cast<int>(model.states.size() + model.inputs.size())));
   }
 
   bool IsExact() const override {
@@ -145,6 +180,12 @@ class TextEquations final : public Equations {
     return AlongArithmetic::Slopes(sum);
   }
 
+  // Of an integrator only Euler's x + dt x', if the rate x' does not use dt.
+  bool IsProportional(int k) const override {
+    if (scaling_.empty() || stages_.size() > 1) return false;
+    return stages_.empty() ? scaling_[ToSize(k)].state == k : scaling_[ToSize(k)].degree == 0;
+  }
+
  private:
   [[nodiscard]] std::vector<Real> Parameters() const {
     std::vector<Real> ranges;
@@ -190,6 +231,7 @@ class TextEquations final : public Equations {
   }
 
   Formulas formulas_, formulas_in_dt_;
+  std::vector<ScalingArithmetic::Number> scaling_;
   std::vector<Stage> stages_;
   std::size_t num_states_;
   std::vector<std::pair<double, double>> parameters_;

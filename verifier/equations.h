@@ -41,6 +41,9 @@ class Equations {
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
   /** For each state the derivative of x+ by the step's duration, where that is in `duration` instead of dt. */
   [[nodiscard]] virtual std::vector<Real> Rate(std::span<const Real> z, const Real& duration) const = 0;
+  /** Whether x+_k - x_k is the step's duration times what does not depend on it, so that the derivative is
+  (x+_k - x_k) / dt: true where docs/soundness.md, 3.15, says so, and only there. */
+  [[nodiscard]] virtual bool IsProportional(int k) const = 0;
 };
 
 /** The equations of TextOf(model) (forereach/dynamics/models/named_models.h); null if there is no text.

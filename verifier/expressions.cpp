@@ -19,14 +19,23 @@ struct Function {
   int arguments;
   std::optional<Op> op;
 };
-constexpr std::array kFunctions{Function{"sin", 1, Op::kSin},      Function{"cos", 1, Op::kCos},
-                                Function{"tan", 1, Op::kTan},      Function{"asin", 1, Op::kAsin},
-                                Function{"acos", 1, Op::kAcos},    Function{"atan", 1, Op::kAtan},
-                                Function{"sqrt", 1, Op::kSqrt},    Function{"exp", 1, Op::kExp},
-                                Function{"log", 1, Op::kLog},      Function{"tanh", 1, Op::kTanh},
-                                Function{"abs", 1, Op::kAbs},      Function{"smooth_gate", 1, Op::kSmoothGate},
-                                Function{"atan2", 2, Op::kAtan2},  Function{"min", 2, Op::kMin},
-                                Function{"max", 2, Op::kMax},      Function{"softplus", 2, Op::kSoftplus},
+constexpr std::array kFunctions{Function{"sin", 1, Op::kSin},
+                                Function{"cos", 1, Op::kCos},
+                                Function{"tan", 1, Op::kTan},
+                                Function{"asin", 1, Op::kAsin},
+                                Function{"acos", 1, Op::kAcos},
+                                Function{"atan", 1, Op::kAtan},
+                                Function{"sqrt", 1, Op::kSqrt},
+                                Function{"exp", 1, Op::kExp},
+                                Function{"log", 1, Op::kLog},
+                                Function{"tanh", 1, Op::kTanh},
+                                Function{"abs", 1, Op::kAbs},
+                                Function{"smooth_gate", 1, Op::kSmoothGate},
+                                Function{"signed_square", 1, Op::kSignedSquare},
+                                Function{"atan2", 2, Op::kAtan2},
+                                Function{"min", 2, Op::kMin},
+                                Function{"max", 2, Op::kMax},
+                                Function{"softplus", 2, Op::kSoftplus},
                                 Function{"hypot", 2, std::nullopt}};
 
 const Function* FindFunction(std::string_view name) {

@@ -146,6 +146,7 @@ Real ValueOf(const Tape::Operation& operation, const Real& a, const Real& b) {
     case Op::kLog: return log(a);
     case Op::kTanh: return tanh(a);
     case Op::kAbs: return abs(a);
+    case Op::kSignedSquare: return SignedSquare(a);
     case Op::kAtan2: return atan2(a, b);
     case Op::kMin: return min(a, b);
     case Op::kMax: return max(a, b);
@@ -320,6 +321,7 @@ Jet Rules::Derive(const Tape::Operation& operation, Real value, const Jet& a) co
       const Real slope = one - sqr(value);
       return Chain(value, slope, Real(-2.0) * value * slope, a);
     }
+    case Op::kSignedSquare: return Chain(std::move(value), Real(2.0) * abs(a.value), Real(2.0) * Sign(a.value), a);
     case Op::kAbs: return Larger(std::move(value), a, Negative(a));
     case Op::kSmoothGate: return Chain(std::move(value), GateSlope(a.value), GateBend(a.value), a);
     default: break;

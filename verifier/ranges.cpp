@@ -29,6 +29,8 @@ Real LogisticAt(const Real& u) { return Real(1.0) / (Real(1.0) + exp(-u)); }
 Real LogisticSlopeAt(const Real& u) { return LogisticAt(u) * LogisticAt(-u); }
 Real EntropyAt(const Real& u) { return LogAt(u) - u * LogisticAt(u); }
 
+Real SignedSquareAt(const Real& a) { return a * abs(a); }
+
 Real TangentBendAt(const Real& t) { return Real(2.0) * t * (Real(1.0) + sqr(t)); }
 
 }  // namespace
@@ -50,6 +52,12 @@ Real SoftRamp(const Real& x, const Real& t) {
 Real Logistic(const Real& u) { return RangeOf(LogisticAt, u, {}); }
 Real LogisticSlope(const Real& u) { return RangeOf(LogisticSlopeAt, u, {0.0}); }
 Real SoftRampByTemperature(const Real& u) { return RangeOf(EntropyAt, u, {0.0}); }
+
+Real SignedSquare(const Real& a) { return RangeOf(SignedSquareAt, a, {}); }
+Real Sign(const Real& a) {
+  const Real one(1.0), less(-1.0);
+  return CertainlyBelow(0.0, a) ? one : CertainlyBelow(a, 0.0) ? less : Hull(less, one);
+}
 
 Real TangentBend(const Real& t) { return RangeOf(TangentBendAt, t, {}); }
 

@@ -21,6 +21,10 @@ SoftRamp by t. */
 [[nodiscard]] Real LogisticSlope(const Real& u);
 [[nodiscard]] Real SoftRampByTemperature(const Real& u);
 
+/** a |a|, which increases; and 1 for a > 0, -1 for a < 0, from -1 to 1 if 0 is in a: half of its second derivative. */
+[[nodiscard]] Real SignedSquare(const Real& a);
+[[nodiscard]] Real Sign(const Real& a);
+
 /** tan'' = 2 t (1 + t^2) of the tangent t. */
 [[nodiscard]] Real TangentBend(const Real& t);
 

@@ -30,7 +30,8 @@ enum class Op {
   kLog,
   kTanh,
   kAbs,
-  kAtan2,  ///< The angle of the point (b, a).
+  kSignedSquare,  ///< a |a|
+  kAtan2,         ///< The angle of the point (b, a).
   kMin,
   kMax,
   kSoftplus,   ///< b log(1 + exp(a / b)), b > 0.

@@ -504,7 +504,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   }
 
   const RecordedSet* const recorded = options.follow ? &(*options.follow)[tube.slices.size()] : nullptr;
-  const Offset offset = OffsetOf(query, step.envelope, recorded);
+  const Offset offset = OffsetOf(query, step, recorded);
   std::vector<Real> slack(ToSize(n));
   Slice next = Image(query, offset, slack);
   const Real half(0.5);
@@ -542,16 +542,36 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   return std::nullopt;
 }
 
+// d x+ / d dt over the slice. Where x+ - x is in proportion to the duration it is (x+ - x) / dt, with x+ - x in
+// f0(c) - c + (J - I) G b + remainder; elsewhere it is over the hull.
+std::vector<Real> TubeMaker::Rates(const Query& query, const std::vector<Bounds>& remainder) const {
+  const Real dt(StepOf(*problem_.model)), most = Real(2.0) * Real(problem_.timing.error);
+  std::vector<Real> rate = equations_.Rate(query.hull, Around(dt, most)), moved = equations_.Value(query.center);
+  const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
+  std::vector<Real> spread(rate.size());
+  for (const std::vector<Real>& column : query.slice.columns) {
+    std::vector<Real> change(rate.size());
+    for (std::size_t k = 0; k < change.size(); ++k) change[k] = -column[k];
+    for (const auto& [output, variable, value] : jacobian)
+      if (ToSize(variable) < change.size()) change[ToSize(output)] += value * column[ToSize(variable)];
+    for (std::size_t k = 0; k < change.size(); ++k) spread[k] += abs(change[k]);
+  }
+  for (std::size_t k = 0; k < rate.size(); ++k)
+    if (equations_.IsProportional(static_cast<int>(k)))
+      rate[k] =
+          Around(moved[k] - query.center[k] + Real::FromTo(remainder[k].lower, remainder[k].upper), spread[k]) / dt;
+  return rate;
+}
+
 // Any d is sound, since what it differs from E g counts as spread: the record's is the one by which its slices hold.
-TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const std::vector<Bounds>& envelope,
-                                      const RecordedSet* recorded) const {
+TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, const RecordedSet* recorded) const {
+  const std::vector<Bounds>& envelope = step.envelope;
   const std::size_t n = envelope.size();
   Offset offset{std::vector<Real>(n), std::vector<Real>(n)};
   const StepTiming& timing = problem_.timing;
   if (timing.error == 0) return offset;
   const Real error(timing.error), dt(StepOf(*problem_.model)), ends(query.t == 0 ? 1.0 : 2.0);
-  const Real most = Real(2.0) * error;
-  const std::vector<Real> rate = equations_.Rate(query.hull, Around(dt, most));
+  const std::vector<Real> rate = Rates(query, step.remainder);
   const auto is_set = [&](std::size_t k) { return std::ranges::count(timing.set_at_steps, static_cast<int>(k)) > 0; };
   const auto declared = [&](std::size_t k) {
     return timing.rate_bound.size() > 0 ? timing.rate_bound[static_cast<Eigen::Index>(k)] : kNone;

@@ -121,8 +121,8 @@ class TubeMaker final {
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                    std::vector<Real>& errors) const;
   struct Offset;
-  [[nodiscard]] Offset OffsetOf(const Query& query, const std::vector<Bounds>& envelope,
-                                const RecordedSet* recorded) const;
+  [[nodiscard]] std::vector<Real> Rates(const Query& query, const std::vector<Bounds>& remainder) const;
+  [[nodiscard]] Offset OffsetOf(const Query& query, const Step& step, const RecordedSet* recorded) const;
   [[nodiscard]] Slice Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 

@@ -26,6 +26,9 @@ Schedule ScheduleOf(const candidate_plan_t& candidate, const GateOptions& option
 }
 
 std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options) {
+  if (options.step_us != 0 && candidate.step_us != options.step_us)
+    return fmt::format("step_us is {}, must be {}, model.dt: the model says what a step of this time does",
+                       candidate.step_us, options.step_us);
   if (!options.max_clock_error_ms) return {};
   const std::int64_t longest = std::min(Microseconds(options.longest_step_ms), Schedule::kLongest);
   if (candidate.step_us < 1 || candidate.step_us > longest)
@@ -33,12 +36,6 @@ std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& 
   if (candidate.start_utime < -Schedule::kLatest || candidate.start_utime > Schedule::kLatest)
     return fmt::format("start_utime is {}, must be within 2^60 of the epoch", candidate.start_utime);
   return {};
-}
-
-std::string WhyNoStep(const candidate_plan_t& candidate, const GateOptions& options) {
-  if (options.step_us == 0 || candidate.step_us == options.step_us) return {};
-  return fmt::format("step_us is {}, must be {}, model.dt: the model says what a step of this time does",
-                     candidate.step_us, options.step_us);
 }
 
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {

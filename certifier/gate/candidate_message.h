@@ -26,13 +26,10 @@ Certifier::Require to say. */
 schedule. Whether the candidate's times are within the bounds of a schedule is for WhyNoSchedule to say. */
 [[nodiscard]] Schedule ScheduleOf(const candidate_plan_t& candidate, const GateOptions& options);
 
-/** Why the candidate's times are no schedule: step_us is not 1 to the task's longest step, or start_utime is further
-than Schedule::kLatest from the epoch. Empty if they are one, and without gate.max_clock_error_ms. */
+/** Why the candidate's times are no schedule of the task. Where certificates rest on when steps are
+(GateOptions::step_us): step_us is not model.dt. With gate.max_clock_error_ms also: step_us is not 1 to the task's
+longest step, or start_utime is further than Schedule::kLatest from the epoch. Empty if they are one. */
 [[nodiscard]] std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options);
-
-/** Why step_us is none of the task: it is not model.dt where certificates rest on when steps are
-(GateOptions::step_us). Empty if it is. */
-[[nodiscard]] std::string WhyNoStep(const candidate_plan_t& candidate, const GateOptions& options);
 
 /** X_0. @throws std::invalid_argument if num_states is not 1 to 16, or as Zonotope::FromBox does. */
 [[nodiscard]] Zonotope InitialSetOf(const candidate_plan_t& candidate);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -112,8 +113,8 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
-  for (const std::string& why : {WhyNoSchedule(candidate, options_), WhyNoStep(candidate, options_)})
-    if (!why.empty()) return Rejection{decision_t::CAUSE_WRONG_DIMENSION, why};
+  if (std::string why = WhyNoSchedule(candidate, options_); !why.empty())
+    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, std::move(why)};
   return CheckSource(candidate, now_us);
 }
 
@@ -212,7 +213,6 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noe
   try {
     // The task may have been read again, with another dt.
     if (!WhyNoSchedule(candidate, options_).empty()) return {};
-    if (!WhyNoStep(candidate, options_).empty()) return {};
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.all());

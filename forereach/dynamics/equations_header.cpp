@@ -37,6 +37,7 @@ std::string Variable(const std::string& name, std::size_t index) {
 
 std::string CallText(Function function, const std::string& a, const std::string& b) {
   switch (function) {
+    case Function::kSignedSquare: return "SignedSquare(" + a + ")";
     case Function::kHypot: return "sqrt(pow(" + a + ", 2) + pow(" + b + ", 2))";
     case Function::kSoftplus: return "Softplus(" + a + ", " + b + ")";
     case Function::kSmoothGate: return "SmoothGate(" + a + ")";
@@ -211,10 +212,12 @@ std::string EquationsHeader(const ModelText& text, const std::string& name, cons
     throw ExportError(text.file + ": model: its values and derivatives are " + std::to_string(size) +
                       " operations, more than the " + std::to_string(kMostCompiled) +
                       " that compilers finish with in a minute");
-  const std::string parameters = std::to_string(text.parameters.size());
+  const std::string parameters = std::to_string(text.parameters.size()), lines = Writer(text).Lines();
+  const bool has_signed_squares = lines.find("SignedSquare(") != std::string::npos;
   return "/** " + InComment(origin) + "\n\nStates: " + InComment(UnitsOf(text.states)) +
          ". Inputs: " + InComment(UnitsOf(text.inputs)) + ". */\n" +
-         "#pragma once\n\n#include <algorithm>\n#include <array>\n#include <cmath>\n#include <span>\n\n"
+         "#pragma once\n\n#include <algorithm>\n#include <array>\n#include <cmath>\n#include <span>\n\n" +
+         std::string(has_signed_squares ? "#include \"forereach/dynamics/saturation.h\"\n" : "") +
          "#include \"forereach/numerics/compilation.h\"\n\n"
          "struct " +
          StructName(name) + " {\n" + "  static constexpr int kStates = " + std::to_string(text.states.size()) +
@@ -234,7 +237,7 @@ std::string EquationsHeader(const ModelText& text, const std::string& name, cons
          "    using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cos, std::exp, std::log, std::max, "
          "std::min,\n"
          "        std::pow, std::sin, std::sqrt, std::tan, std::tanh;\n" +
-         Writer(text).Lines() + "  }\n};\n";
+         std::string(has_signed_squares ? "    using forereach::SignedSquare;\n" : "") + lines + "  }\n};\n";
 }
 
 }  // namespace forereach

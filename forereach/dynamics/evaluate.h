@@ -69,9 +69,11 @@ void Evaluate(const Program& program, std::span<const unsigned char> needed, std
       case Op::kAtan2: values[i] = atan2(a, b); break;
       case Op::kTanh: values[i] = tanh(a); break;
       case Op::kAbs: values[i] = abs(a); break;
+      case Op::kSignedSquare: values[i] = SignedSquare(a); break;
       case Op::kMin: values[i] = min(a, b); break;
       case Op::kMax: values[i] = max(a, b); break;
-      case Op::kSign: values[i] = sign(a); break;
+      case Op::kSign:
+      case Op::kSlopeOfAbs: values[i] = sign(a); break;
       case Op::kStep: values[i] = step(a); break;
       case Op::kKink: values[i] = kink(a); break;
       case Op::kCut: values[i] = cut(a, b); break;

@@ -125,9 +125,11 @@ FOREREACH_INLINE double ValueOf(const Operation& n, double a, double b) {
     case Op::kAtan2: return std::atan2(a, b);
     case Op::kTanh: return std::tanh(a);
     case Op::kAbs: return std::abs(a);
+    case Op::kSignedSquare: return a * std::abs(a);
     case Op::kMin: return std::min(a, b);
     case Op::kMax: return std::max(a, b);
-    case Op::kSign: return a > 0 ? 1 : a < 0 ? -1 : 0;
+    case Op::kSign:
+    case Op::kSlopeOfAbs: return a > 0 ? 1 : a < 0 ? -1 : 0;
     case Op::kStep: return a > 0 ? 1 : 0;
     case Op::kKink:
     case Op::kCut: return 0;
@@ -167,6 +169,8 @@ FOREREACH_INLINE PlainInterval RangeOf(const Operation& n, const PlainInterval& 
     case Op::kAtan2: return Plain(atan2(exact(a), exact(b)));
     case Op::kTanh: return Plain(tanh(exact(a)));
     case Op::kAbs: return Plain(abs(exact(a)));
+    case Op::kSignedSquare: return {a.lower * std::abs(a.lower), a.upper * std::abs(a.upper)};
+    case Op::kSlopeOfAbs: return {a.lower > kNearZero ? 1.0 : -1.0, a.upper < -kNearZero ? -1.0 : 1.0};
     case Op::kMin: return Plain(min(exact(a), exact(b)));
     case Op::kMax: return Plain(max(exact(a), exact(b)));
     case Op::kSign: return Plain(sign(exact(a)));

@@ -14,23 +14,13 @@ namespace {
 using Kind = Expression::Kind;
 using Node = Expression::Node;
 
-constexpr NamedFunction kFunctions[] = {{"sin", Function::kSin, 1},
-                                        {"cos", Function::kCos, 1},
-                                        {"tan", Function::kTan, 1},
-                                        {"asin", Function::kAsin, 1},
-                                        {"acos", Function::kAcos, 1},
-                                        {"atan", Function::kAtan, 1},
-                                        {"sqrt", Function::kSqrt, 1},
-                                        {"exp", Function::kExp, 1},
-                                        {"log", Function::kLog, 1},
-                                        {"tanh", Function::kTanh, 1},
-                                        {"abs", Function::kAbs, 1},
-                                        {"atan2", Function::kAtan2, 2},
-                                        {"min", Function::kMin, 2},
-                                        {"max", Function::kMax, 2},
-                                        {"hypot", Function::kHypot, 2},
-                                        {"softplus", Function::kSoftplus, 2},
-                                        {"smooth_gate", Function::kSmoothGate, 1}};
+constexpr NamedFunction kFunctions[] = {
+    {"sin", Function::kSin, 1},     {"cos", Function::kCos, 1},           {"tan", Function::kTan, 1},
+    {"asin", Function::kAsin, 1},   {"acos", Function::kAcos, 1},         {"atan", Function::kAtan, 1},
+    {"sqrt", Function::kSqrt, 1},   {"exp", Function::kExp, 1},           {"log", Function::kLog, 1},
+    {"tanh", Function::kTanh, 1},   {"abs", Function::kAbs, 1},           {"atan2", Function::kAtan2, 2},
+    {"min", Function::kMin, 2},     {"max", Function::kMax, 2},           {"signed_square", Function::kSignedSquare, 1},
+    {"hypot", Function::kHypot, 2}, {"softplus", Function::kSoftplus, 2}, {"smooth_gate", Function::kSmoothGate, 1}};
 constexpr std::string_view kPiName = "pi";
 
 bool IsLetter(char c) { return ('a' <= c && c <= 'z') || ('A' <= c && c <= 'Z') || c == '_'; }

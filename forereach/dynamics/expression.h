@@ -60,9 +60,10 @@ enum class Function : unsigned char {
   kAtan2,  ///< atan2(y, x)
   kMin,
   kMax,
-  kHypot,      ///< sqrt(a^2 + b^2)
-  kSoftplus,   ///< softplus(x, temperature), see saturation.h
-  kSmoothGate  ///< smooth_gate(e), see saturation.h
+  kSignedSquare,  ///< a |a|
+  kHypot,         ///< sqrt(a^2 + b^2)
+  kSoftplus,      ///< softplus(x, temperature), see saturation.h
+  kSmoothGate     ///< smooth_gate(e), see saturation.h
 };
 
 struct NamedFunction {
@@ -149,6 +150,7 @@ T Call(Function function, const T& a, const T& b) {
     case Function::kLog: return log(a);
     case Function::kTanh: return tanh(a);
     case Function::kAbs: return abs(a);
+    case Function::kSignedSquare: return SignedSquare(a);
     case Function::kAtan2: return atan2(a, b);
     case Function::kMin: return min(a, b);
     case Function::kMax: return max(a, b);

@@ -127,6 +127,10 @@ Jet abs(const Jet& a) {
   return Composed(a, {abs(a.value), kAnySign, Interval::Entire()});
 }
 
+Jet SignedSquare(const Jet& a) {
+  return Composed(a, {SignedSquare(a.value), Interval(2) * abs(a.value), Interval(2) * sign(a.value)});
+}
+
 Jet max(const Jet& a, const Jet& b) {
   if (a.value.lower > b.value.upper) return a;
   if (b.value.lower > a.value.upper) return b;

@@ -46,6 +46,8 @@ struct Jet {
 [[nodiscard]] Jet operator/(const Jet& a, const Jet& b);
 [[nodiscard]] Jet operator-(const Jet& a);
 [[nodiscard]] Jet abs(const Jet& a);
+/** a |a|: its second derivative by a is -2, 2, or at 0 whatever is between. */
+[[nodiscard]] Jet SignedSquare(const Jet& a);
 [[nodiscard]] Jet min(const Jet& a, const Jet& b);
 [[nodiscard]] Jet max(const Jet& a, const Jet& b);
 [[nodiscard]] Jet sqrt(const Jet& a);

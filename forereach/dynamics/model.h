@@ -10,6 +10,7 @@ d_z = states + inputs entries.
 
 #include <array>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -54,6 +55,8 @@ struct ModelNames {
   std::shared_ptr<const ModelText> text = {};  ///< What the model was made from; null if it was compiled.
   std::vector<int> angles = {};                ///< The states that are angles (angles.h), by their indices, ascending.
 };
+
+class StepRate;
 
 class NominalModel {
  public:
@@ -128,10 +131,14 @@ class NominalModel {
                    ImageSums& sums, InstructionSet instructions = BestInstructionSet()) const noexcept = 0;
 
  private:
+  friend std::shared_ptr<const StepRate> RateOf(const NominalModel& model);
+
   Program program_;
   std::vector<Interval> ranges_;
   std::vector<double> middles_;
   ModelNames names_;
+  mutable std::once_flag rate_is_made_;
+  mutable std::shared_ptr<const StepRate> rate_;
 };
 
 }  // namespace forereach

@@ -45,15 +45,20 @@ enum class Op : unsigned char {
   kAtan2,         ///< atan2(a, b), the angle of the point (b, a) in (-pi, pi]
   kTanh,          ///< tanh a
   kAbs,           ///< |a|
+  kSignedSquare,  ///< a |a|
   kMin,           ///< min(a, b)
   kMax,           ///< max(a, b)
   kSign,          ///< 1 where a > 0, -1 where a < 0
   kStep,          ///< 1 where a > 0, 0 where a < 0
+  kSlopeOfAbs,    ///< kSign in second derivatives: where |a| < kNearZero, from -1 to 1
   kKink,          ///< 0 where a is not 0, and no number at 0: the derivative of kSign and kStep
   kCut,           ///< 0, and no number where a = 0 and b <= 0: the jump of atan2(a, b)
   kSoftplus,      ///< b log(1 + e^(a/b)); has no derivative here, so it is for residuals only
   kSmoothGate     ///< e^(-1/a) where a > 0, 0 elsewhere; likewise
 };
+
+/** Plain arithmetic does not tell the sign of a number that is nearer to zero. */
+inline constexpr double kNearZero = 0x1p-30;
 
 /** One operation. Its operands are earlier nodes. */
 struct Operation {
@@ -277,6 +282,7 @@ class Symbol {
   friend constexpr Symbol atan2(Symbol y, Symbol x) { return Binary(Op::kAtan2, y, x); }
   friend constexpr Symbol tanh(Symbol a) { return a.Unary(Op::kTanh); }
   friend constexpr Symbol abs(Symbol a) { return a.Unary(Op::kAbs); }
+  friend constexpr Symbol SignedSquare(Symbol a) { return a.Unary(Op::kSignedSquare); }
   friend constexpr Symbol min(Symbol a, Symbol b) { return Binary(Op::kMin, a, b); }
   friend constexpr Symbol max(Symbol a, Symbol b) { return Binary(Op::kMax, a, b); }
   friend constexpr Symbol Softplus(Symbol x, Symbol temperature) { return Binary(Op::kSoftplus, x, temperature); }
@@ -308,7 +314,7 @@ class Symbol {
 };
 
 // The derivatives of all wanted nodes by one variable. `slopes`: the slope 1 + t^2 of a tangent t has its own
-// derivative, which is exact over intervals.
+// derivative, which is exact over intervals; and they are second derivatives, in which |a| has kSlopeOfAbs.
 constexpr ProgramDraft::Derivatives ProgramDraft::DifferentiateAll(short variable,
                                                                    std::span<const unsigned char> wanted, bool slopes) {
   Derivatives d(wanted.size(), kZero);
@@ -362,7 +368,8 @@ constexpr int ProgramDraft::DerivativeOf(int i, short variable, const Derivative
     }
     case Op::kTanh:
       return da == kZero ? kZero : Product(Add({Op::kSubtract, Constant(1), Add({Op::kSquare, i, -1})}), da);
-    case Op::kAbs: return da == kZero ? kZero : Product(Add({Op::kSign, n.a, -1}), da);
+    case Op::kAbs: return da == kZero ? kZero : Product(Add({slopes ? Op::kSlopeOfAbs : Op::kSign, n.a, -1}), da);
+    case Op::kSignedSquare: return da == kZero ? kZero : Product(Constant(2), Product(Add({Op::kAbs, n.a, -1}), da));
     case Op::kMin:
     case Op::kMax: {
       if (da == kZero && db == kZero) return kZero;
@@ -373,6 +380,7 @@ constexpr int ProgramDraft::DerivativeOf(int i, short variable, const Derivative
     }
     case Op::kSign:
     case Op::kStep:
+    case Op::kSlopeOfAbs:
     case Op::kKink: return da == kZero ? kZero : Product(Add({Op::kKink, n.a, -1}), da);
     case Op::kCut: return da == kZero && db == kZero ? kZero : i;
     case Op::kSoftplus:

@@ -68,6 +68,7 @@ class Analysis {
         return Error::Both(error(n.a), error(n.b),
                            [&](double a, double b) { return Product(Size(n.a), a, Size(n.b), b); });
       case Op::kSquare:
+      case Op::kSignedSquare:
         return Error::Both(error(n.a), error(n.a),
                            [&](double a, double b) { return Product(Size(n.a), a, Size(n.a), b); });
       case Op::kDivide:
@@ -119,6 +120,7 @@ class Analysis {
       case Op::kStep:
       case Op::kKink:  // exact where no rounding carries the operand to the kink
         return Error::Each(error(n.a), [&](double a) { return kink(Widened(n.a, a)).IsFinite() ? 0 : infinity; });
+      case Op::kSlopeOfAbs: return {infinity, error(n.a).box <= kNearZero ? 0 : infinity};
       case Op::kCut:
         return Error::Both(error(n.a), error(n.b), [&](double a, double b) {
           return cut(Widened(n.a, a), Widened(n.b, b)).IsFinite() ? 0 : infinity;

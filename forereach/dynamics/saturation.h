@@ -1,5 +1,5 @@
-/** The functions SmoothGate and Softplus, and the ranges of them and of their first and second derivatives over
-intervals.
+/** The functions SignedSquare, SmoothGate and Softplus, and the ranges of them and of their first and second
+derivatives over intervals.
 
 Each function is monotone between extrema with a closed form, so the ranges are exact up to outward rounding. */
 #pragma once
@@ -11,6 +11,18 @@ Each function is monotone between extrema with a closed form, so the ranges are 
 FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
+
+/** t |t|: increasing, with the derivative 2 |t|, which is Lipschitz with the constant 2. */
+template <class T>
+T SignedSquare(const T& t) {
+  using std::abs;
+  return t * abs(t);
+}
+inline Interval SignedSquare(const Interval& x) {
+  if (!x.IsFinite()) return Interval::Entire();
+  return {x.lower < 0 ? -MulUp(x.lower, x.lower) : MulDown(x.lower, x.lower),
+          x.upper < 0 ? -MulDown(x.upper, x.upper) : MulUp(x.upper, x.upper)};
+}
 
 /** exp(-1/e) for e > 0, and 0 for e <= 0. All derivatives vanish at 0. */
 template <class T>

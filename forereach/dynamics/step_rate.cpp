@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/text_program.h"
@@ -41,6 +43,50 @@ std::vector<Symbol> EndOf(const ModelText& text, const ExpressionNames& names, c
   return end;
 }
 
+// How each node of a program scales with the parameter h: as h^degree for all h > 0, or in no way that is known.
+// docs/soundness.md, 3.15.
+class Scaling final {
+ public:
+  Scaling(const Program& program, int h) : program_(program) {
+    for (const Operation& n : program.nodes) degree_.push_back(DegreeOf(n, h));
+  }
+
+  // Whether the node is z_k plus terms of degree 1.
+  [[nodiscard]] bool IsProportional(int node, int k) const {
+    const Operation& n = program_.node(node);
+    const auto moves = [&](int i) { return degree_[ToSize(i)] == 1; };
+    switch (n.op) {
+      case Op::kVariable: return n.a == k;
+      case Op::kAdd: return (moves(n.b) && IsProportional(n.a, k)) || (moves(n.a) && IsProportional(n.b, k));
+      case Op::kSubtract: return moves(n.b) && IsProportional(n.a, k);
+      default: return false;
+    }
+  }
+
+ private:
+  using Degree = std::optional<int>;
+
+  [[nodiscard]] Degree DegreeOf(const Operation& n, int h) const {
+    const Degree a = n.has_first() ? degree_[ToSize(n.a)] : Degree(0);
+    const Degree b = n.has_second() ? degree_[ToSize(n.b)] : Degree(0);
+    if (!a || !b) return {};
+    switch (n.op) {
+      case Op::kParameter: return n.a == h ? 1 : 0;
+      case Op::kAdd:
+      case Op::kSubtract: return *a == *b ? a : Degree();
+      case Op::kMultiply: return Bounded(*a + *b);
+      case Op::kDivide: return Bounded(*a - *b);
+      case Op::kNegate: return a;
+      default: return *a == 0 && *b == 0 ? a : Degree();
+    }
+  }
+
+  static Degree Bounded(int degree) { return -9 <= degree && degree <= 9 ? Degree(degree) : Degree(); }
+
+  const Program& program_;
+  std::vector<Degree> degree_;
+};
+
 }  // namespace
 
 StepRate::StepRate(const ModelText& text) {
@@ -51,17 +97,37 @@ StepRate::StepRate(const ModelText& text) {
   ProgramDraft draft(static_cast<int>(names.states.size()),
                      static_cast<int>(names.states.size() + names.inputs.size()));
   const Symbol h = Symbol::Parameter(draft, static_cast<int>(dt_));
-  SetValues(EndOf(text, names, h, draft), draft);
+  const std::vector<Symbol> end = EndOf(text, names, h, draft);
+  SetValues(end, draft);
+  const Program step = draft.View();
+  const Scaling scaling(step, static_cast<int>(dt_));
+  for (std::size_t k = 0; k < end.size(); ++k)
+    is_proportional_.push_back(scaling.IsProportional(end[k].node(), static_cast<int>(k)));
   draft.DifferentiateBy(static_cast<int>(dt_));
   program_ = std::make_shared<const ProgramDraft>(std::move(draft));
   const Program program = program_->View();
-  needed_.assign(program.nodes.size(), 0);
-  for (const int node : program.value) {
-    needed_[ToSize(node)] = 1;
+  for (const int node : program.value)
     uses_duration_.push_back(!(program.node(node) == Operation{Op::kConstant, -1, -1, 0}));
+  Need(std::vector<unsigned char>(end.size(), 1));
+  for (const auto& [name, lower, upper] : text.parameters) parameters_.emplace_back(lower, upper);
+}
+
+StepRate StepRate::Of(std::span<const unsigned char> states) const {
+  StepRate some = *this;
+  some.Need(states);
+  return some;
+}
+
+void StepRate::Need(std::span<const unsigned char> states) {
+  const Program program = program_->View();
+  states_.clear();
+  needed_.assign(program.nodes.size(), 0);
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    if (states[k] == 0) continue;
+    states_.push_back(static_cast<int>(k));
+    needed_[ToSize(program.value[k])] = 1;
   }
   MarkOperands(program.nodes, needed_);
-  for (const auto& [name, lower, upper] : text.parameters) parameters_.emplace_back(lower, upper);
 }
 
 void StepRate::Enclose(std::span<const Interval> box, const Interval& duration,
@@ -72,7 +138,7 @@ void StepRate::Enclose(std::span<const Interval> box, const Interval& duration,
   parameters[dt_] = duration;
   const std::span all(FOREREACH_ON_STACK(Interval, program.size), ToSize(program.size));
   Evaluate<Interval>(program, needed_, std::span<const Interval>(parameters), box, all);
-  for (std::size_t k = 0; k < rate.size(); ++k) rate[k] = all[ToSize(program.value[k])];
+  for (const int k : states_) rate[ToSize(k)] = all[ToSize(program.value[ToSize(k)])];
 }
 
 }  // namespace forereach

@@ -36,17 +36,26 @@ class StepRate final {
 
   /** Whether the end of state k depends on the duration at all: false for a step that says nothing of it. */
   [[nodiscard]] bool UsesDuration(int k) const { return uses_duration_[static_cast<std::size_t>(k)]; }
+  /** Whether f0^h_k(z) - z_k is h times a number that does not depend on h, by the form of the equations: then
+  f0^h_k(z) = z_k + h / dt (f0_k(z) - z_k), as in an Euler step. docs/soundness.md, 3.15, has the rules. */
+  [[nodiscard]] bool IsProportional(int k) const { return is_proportional_[static_cast<std::size_t>(k)]; }
+
+  /** The same for some states: Enclose leaves the others' entries alone. @param states n marks. */
+  [[nodiscard]] StepRate Of(std::span<const unsigned char> states) const;
 
   /** Sets rate[k] to an interval that contains d f0^h_k(z) / d h for every z in the box and h in `duration`; infinite
   where there is none. Allocates nothing. @param box d_z intervals. @param rate n entries. Cost O(operations). */
   void Enclose(std::span<const Interval> box, const Interval& duration, std::span<Interval> rate) const noexcept;
 
  private:
+  void Need(std::span<const unsigned char> states);
+
   std::shared_ptr<const ProgramDraft> program_;
+  std::vector<int> states_;  // those that Enclose bounds
   std::vector<unsigned char> needed_;
   std::vector<Interval> parameters_;
   std::size_t dt_ = 0;  // its place among the parameters
-  std::vector<bool> uses_duration_;
+  std::vector<bool> uses_duration_, is_proportional_;
 };
 
 }  // namespace forereach

@@ -229,15 +229,16 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
 
   record.envelope.has_slope = false;
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
-  OffsetSpread offset;
-  const bool is_punctual = offsets_.AreZero();
-  if (!is_punctual)
-    if (const int k = offsets_.Enclose(hull, record.envelope, is_first, offset); k >= 0)
-      return {StepResult::Status::kNoFiniteEnclosure, {}, k};
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums, instructions_);
+  OffsetSpread offset;
+  const bool is_punctual = offsets_.AreZero();
+  if (!is_punctual) {
+    const StepSoFar step{slice, hull, half_width, expansion, error, record.remainder, record.envelope, is_first};
+    if (const int k = offsets_.Add(step, offset, next, sums, instructions_); k >= 0)
+      return {StepResult::Status::kNoFiniteEnclosure, {}, k};
+  }
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
-  if (!is_punctual && !is_first) StepOffsets::SubtractFromLast(offset, next, sums);
   std::array<double, kMaxStates> box_half_width;
   const double* added = is_punctual ? disturbance_.data() : offset.half_width.data();
   if (!Join(expansion, error, record, sums, added, next, box_half_width.data(), next_half_width))

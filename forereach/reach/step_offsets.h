@@ -3,20 +3,23 @@
 Boundary t is at the time s_t = s_0 + t dt + j_t, with j_0 = 0 and |j_t| <= E, so step t lasts dt + j_{t+1} - j_t and
     x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,    |e| <= |j_{t+1} - j_t| (|r| + w^) /
 dt: beyond dt the residual and the disturbance add no more than in proportion. With d some double next to E g, j_t = E
-b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. The last generator of X_t, t > 0, is
-that of b_t. The step subtracts d from its image and appends d as the generator of b_{t+1}, so offsets do not add up:
-what stays of them is how g changes from step to step. docs/soundness.md, 3.15. */
+b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. Where the end of a state moves in
+proportion to the duration (StepRate::IsProportional), g = (f0(x_t, u_t) - x_t) / dt, which the step has bounded
+already. The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as the
+generator of b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step.
+docs/soundness.md, 3.15. */
 #pragma once
 
 #include <array>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "forereach/dynamics/expansion.h"
 #include "forereach/dynamics/model.h"
+#include "forereach/dynamics/rounding.h"
 #include "forereach/dynamics/step_rate.h"
+#include "forereach/numerics/instruction_set.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/sets/eigen.h"
 #include "forereach/sets/zonotope.h"
@@ -29,6 +32,18 @@ struct OffsetSpread {
   std::array<double, kMaxStates> half_width;  ///< Bounds on all that is added without correlation.
 };
 
+/** A step up to the image of its slice, from which follows what the offsets add. */
+struct StepSoFar {
+  const Zonotope& slice;                ///< X_t
+  std::span<const PlainInterval> hull;  ///< that of Z_t, d_z intervals rounded to nearest
+  const double* half_width;             ///< upper bounds on the half-widths of the hull of X_t
+  const Expansion& expansion;
+  const StepError& error;
+  const Remainder& remainder;
+  const ResidualBounds& residual;
+  bool is_first;  ///< j_t = 0.
+};
+
 class StepOffsets final {
  public:
   /** @param disturbance w^, n entries or none. @throws std::invalid_argument if a number is out of its range, the error
@@ -39,24 +54,30 @@ class StepOffsets final {
   /** Nothing is ever off: E = 0. */
   [[nodiscard]] bool AreZero() const { return error_ == 0; }
 
-  /** Sets `spread` for a step from a slice with this hull, d_z intervals rounded to nearest. Returns the first
-  coordinate that has no finite bound, -1 if all have. Allocates nothing.
-  @param residual bounds of r over the slice. @param is_first j_t = 0. */
-  [[nodiscard]] int Enclose(std::span<const PlainInterval> hull, const ResidualBounds& residual, bool is_first,
-                            OffsetSpread& spread) const noexcept;
+  /** Sets `spread`; unless the step is the first, subtracts d from the last generator of the image, adds the rounding
+  to its slack, and updates `sums`. Returns the first coordinate that has no finite bound, -1 if all have. Allocates
+  nothing. @param image what Map made of the slice, and nothing else yet. Cost O(n m) for m generators, and the
+  operations of the rates that the step itself does not bound. */
+  [[nodiscard]] int Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
+                        InstructionSet instructions) const noexcept;
 
-  /** Subtracts d from the last generator of an image and adds the rounding to its slack; updates `sums`. */
-  static void SubtractFromLast(const OffsetSpread& spread, Zonotope& image, ImageSums& sums) noexcept;
   /** Appends d as a generator, and adds it to the half-widths of the hull. */
   static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept;
 
  private:
-  enum class Kind { kBySoftware, kDeclared, kByEquations };
+  using PerState = std::array<double, kMaxStates>;
+
+  [[nodiscard]] int AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
+                              ImageSums& sums) const noexcept;
+  void EncloseByIntervals(std::span<const PlainInterval> hull, PerState& middle, PerState& reach) const noexcept;
+
   double error_, period_ = 0;
   Interval duration_{0};
-  std::array<Kind, kMaxStates> kind_{};
-  std::array<double, kMaxStates> rate_bound_{}, disturbance_{};
-  std::optional<StepRate> rate_;
+  // Of each state E / dt where its rate counts, rounded up, and where that follows from the step itself; E V_k where
+  // V_k is declared; w^.
+  PerState share_{}, by_step_{}, declared_{}, disturbance_{};
+  std::optional<StepRate> rate_;  // of the others
+  std::vector<int> by_intervals_;
   std::size_t states_;
 };
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -109,22 +109,18 @@ class Observer final {
   }
 
   void EncloseRate(std::span<const double> z, double longer) {
-    if (!step_rate_) {
-      const std::optional<ModelText> text = TextOf(model_);
-      rate_.fill(Interval::Entire());
-      if (!text) return;
-      step_rate_.emplace(*text);
-    }
+    rate_.fill(Interval::Entire());
+    const std::shared_ptr<const StepRate> rate = RateOf(model_);
+    if (!rate) return;
     const double dt = StepOf(model_);
-    step_rate_->Enclose(declaration_.BoxAround(z), {SubDown(dt, longer), AddUp(dt, longer)},
-                        {rate_.data(), ToSize(model_.num_states())});
+    rate->Enclose(declaration_.BoxAround(z), {SubDown(dt, longer), AddUp(dt, longer)},
+                  {rate_.data(), ToSize(model_.num_states())});
   }
 
   const NominalModel& model_;
   const Declaration& declaration_;
   const StepTiming& timing_;
   const bool has_errors_;
-  std::optional<StepRate> step_rate_;  // made when it is needed
   std::array<Interval, kMaxStates> rate_;
   Linearization linear_;
   std::array<Interval, kMaxStates> residual_;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/numerics/interval.h"
@@ -26,12 +27,9 @@ class ColumnScores {
     FOREREACH_INLINE explicit Writer(ColumnScores& scores) : scores_(scores) {}
     /** Writes the next four scores. @param sum |g|_1 of each column. @param largest |g|_inf of each column. */
     FOREREACH_INLINE void Add(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
-      const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so changing its bits cannot give NaN
-      const LaneMask bits = (Bits(score) & ~LaneMask{127, 127, 127, 127}) | index_;
-      const LaneMask nonzero = largest > AllLanes(0);
-      nonzero_ -= nonzero;
+      StoreLanes(Scores(sum, largest, index_), &scores_.scores_[first_column]);
+      nonzero_ -= largest > AllLanes(0);
       index_ -= LaneMask{4, 4, 4, 4};
-      StoreLanes(nonzero ? FromBits(bits) : AllLanes(-1), &scores_.scores_[first_column]);
     }
     /** Writes the padding. Call it after all `count` columns. */
     FOREREACH_INLINE void Finish(std::size_t count) {
@@ -45,14 +43,35 @@ class ColumnScores {
 
    private:
     ColumnScores& scores_;
-    LaneMask nonzero_{}, index_{kMaxGenerators, kMaxGenerators - 1, kMaxGenerators - 2, kMaxGenerators - 3};
+    LaneMask nonzero_{}, index_ = kFirstIndices;
   };
+
+  /** Writes the scores of columns first_column .. count - 1, the last of all, again. @pre first_column is a multiple of
+  kLaneCount, and the columns are four at most. @param sum, largest as in Writer::Add. */
+  FOREREACH_INLINE void Rewrite(std::size_t first_column, std::size_t count, const Lanes& sum, const Lanes& largest) {
+    const auto index = static_cast<std::int64_t>(first_column);
+    double* const at = &scores_[first_column];
+    const Lanes scores = Scores(sum, largest, kFirstIndices - LaneMask{index, index, index, index});
+    const Lanes after = FirstLanes(scores, count - first_column, -1),
+                before = FirstLanes(LoadLanes(at), count - first_column, -1);
+    const LaneMask more = (before >= AllLanes(0)) - (after >= AllLanes(0));
+    num_nonzero_ += static_cast<int>((more[0] + more[1]) + (more[2] + more[3]));
+    StoreLanes(FirstLanes(scores, count - first_column, kInfinity), at);
+  }
 
   /** One score for each column, padded with infinity to a multiple of kBlock. */
   [[nodiscard]] const double* data() const { return scores_.data(); }
   [[nodiscard]] int num_nonzero() const { return num_nonzero_; }
 
  private:
+  static constexpr LaneMask kFirstIndices{kMaxGenerators, kMaxGenerators - 1, kMaxGenerators - 2, kMaxGenerators - 3};
+
+  FOREREACH_INLINE static Lanes Scores(const Lanes& sum, const Lanes& largest, const LaneMask& index) {
+    const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so changing its bits cannot give NaN
+    const LaneMask bits = (Bits(score) & ~LaneMask{127, 127, 127, 127}) | index;
+    return largest > AllLanes(0) ? FromBits(bits) : AllLanes(-1);
+  }
+
   int num_nonzero_;
   alignas(32) std::array<double, (kMaxGenerators + kBlock - 1) / kBlock * kBlock> scores_;
 };

@@ -69,7 +69,7 @@ SupervisorOptions OptionsFor(const Config& config) {
                    config.grounds.config, config.grounds.model};
   options.guard.keys = TestKeys("campaign");
   options.guard.bus_name = kBusName;
-  options.guard.max_jitter_us = kJitterUs;
+  options.guard.step_error_us = kJitterUs;
   return options;
 }
 

@@ -432,7 +432,7 @@ TEST(GuardCheck, AfterARefusalNothingIsExecuting) {
 
 TEST(GuardCheck, AgainItLooksAtTheSameSliceAndAtTheTime) {
   GuardOptions options = TwoStates();
-  options.max_jitter_us = 3000;
+  options.step_error_us = 3000;
   const auto after = [&](int steps, const State& state, std::int64_t late_us) {
     Guard guard(options);
     EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
@@ -459,7 +459,7 @@ TEST(GuardCheck, AgainItLooksAtTheSameSliceAndAtTheTime) {
 TEST(GuardCheck, AgainItLooksAtHowLongTheStepBeforeHasLasted) {
   for (const bool too_long : {false, true}) {
     GuardOptions options = TwoStates();
-    options.max_jitter_us = 3000;
+    options.step_error_us = 3000;
     Guard guard(options);
     EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
     EXPECT_TRUE(guard.TryStart(kStart, kStart - 1000, State{1, -2}).ok());
@@ -477,7 +477,7 @@ TEST(GuardCheck, StepsAreOnTimeByTheFirstStepToo) {
     for (const std::int64_t off : {-3000, 3000})
       for (const bool too_far : {false, true}) {
         GuardOptions options = TwoStates();
-        options.max_jitter_us = 3000;
+        options.step_error_us = 3000;
         Guard guard(options);
         EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
         EXPECT_TRUE(guard.TryStart(kStart, kStart + first, State{1, -2}).ok());
@@ -493,7 +493,7 @@ TEST(GuardCheck, StepsAreOnTimeByTheFirstStepToo) {
 TEST(GuardCheck, AgainAtTheFirstStepItBeginsThen) {
   for (const bool too_early : {false, true}) {
     GuardOptions options = TwoStates();
-    options.max_jitter_us = 3000;
+    options.step_error_us = 3000;
     Guard guard(options);
     EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
     EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
@@ -527,7 +527,7 @@ constexpr std::int64_t kJitter = 3000, kMost = std::numeric_limits<std::int64_t>
 
 Guard OnTime(std::int64_t jitter_us = kJitter) {
   GuardOptions options = TwoStates();
-  options.max_jitter_us = jitter_us;
+  options.step_error_us = jitter_us;
   return Guard(options);
 }
 

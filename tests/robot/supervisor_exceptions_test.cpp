@@ -62,7 +62,7 @@ SupervisorOptions OnTime() {
   options.guard.num_states = 2;
   options.guard.num_inputs = 1;
   options.guard.step_us = kPlanStepUs;
-  options.guard.max_jitter_us = kJitterUs;
+  options.guard.step_error_us = kJitterUs;
   return options;
 }
 

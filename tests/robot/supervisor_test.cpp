@@ -78,7 +78,7 @@ TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
 
 TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
   SupervisorOptions options{TwoStates()};
-  options.guard.max_jitter_us = 3000;
+  options.guard.step_error_us = 3000;
   Supervisor supervisor(options, *this);
   const auto boundary = [&](int j, std::int64_t late) { return supervisor.Boundary(At(j), At(j) + late); };
   supervisor.OnCertified(Sealed(SmallPlan(7)), At(0) - 1000);
@@ -120,7 +120,7 @@ TEST_F(SupervisorTest, AStepWhoseEndsAreOffScheduleIsNoTransition) {
                      {3000, -2000, 1000, 1, 1}, {3000, -2000, 1001, 1, 0}, {{}, 0, 30'000, 1, 1}};
   for (const auto& [jitter, begin_late, end_late, x, sent] : cases) {
     SCOPED_TRACE(std::to_string(begin_late) + " " + std::to_string(end_late));
-    options.guard.max_jitter_us = jitter;
+    options.guard.step_error_us = jitter;
     Supervisor supervisor(options, *this);
     transitions_.clear();
     state_[0] = 1;

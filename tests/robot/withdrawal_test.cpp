@@ -360,7 +360,7 @@ TEST_F(SupervisorWithdrawTest, APlanThatStartsBetweenTheBoundariesDoesNotTakeOve
     brake_.emplace(std::vector<double>{kFarthest, 0});
     SupervisorOptions options;
     options.guard = TwoStates();
-    options.guard.max_jitter_us = kJitter;
+    options.guard.step_error_us = kJitter;
     Supervisor::Robot& robot = *this;
     supervisor_.emplace(options, robot);
     holds_ = 0;

@@ -9,6 +9,7 @@
 #include "forereach/dynamics/equations_model.h"
 #include "forereach/dynamics/models/kinematic_bicycle.h"
 #include "forereach/dynamics/models/point_mass.h"
+#include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 
@@ -104,6 +105,13 @@ std::optional<ModelText> TextOf(const NominalModel& model) {
   text.equations = Texts(named->next);
   for (const int angle : model.angles()) text.angles.push_back(model.state_names()[ToSize(angle)]);
   return text;
+}
+
+std::shared_ptr<const StepRate> RateOf(const NominalModel& model) {
+  std::call_once(model.rate_is_made_, [&] {
+    if (const std::optional<ModelText> text = TextOf(model)) model.rate_ = std::make_shared<const StepRate>(*text);
+  });
+  return model.rate_;
 }
 
 }  // namespace forereach

@@ -54,4 +54,8 @@ says what the next state is. */
 /** The model as text: its own, or that of its row with its parameters. Not set if there is neither. */
 [[nodiscard]] std::optional<ModelText> TextOf(const NominalModel& model);
 
+/** How the ends of the model's steps move with their duration (step_rate.h), made at the first call for this model.
+Null without a text. Any number of threads may call it. @throws as StepRate. */
+[[nodiscard]] std::shared_ptr<const StepRate> RateOf(const NominalModel& model);
+
 }  // namespace forereach
