@@ -203,8 +203,10 @@ class Adviser {
     const Decision& decision = judgement_.decision;
     switch (decision.outcome) {
       case Outcome::kFalsified:
-        AdviseLargerSlopes();
-        AdviseNoise();
+        if (decision.cause == Cause::kPairwise) {
+          AdviseLargerSlopes();
+          AdviseNoise();
+        }
         AdviseOutlier(decision.first_observation);
         AdviseOutlier(decision.second_observation);
         break;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <random>
 #include <stdexcept>
@@ -13,6 +14,7 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/rates.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -35,6 +37,7 @@ constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
 constexpr int kSamples = 2000;                 // of the domain, for the length of a step
 constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
 constexpr double kShareBeyond = 0.05;          // of the data's range
+constexpr std::size_t kMostLines = 20;         // that a finding lists
 
 std::string Up(double x) { return RoundedUp(x, 4); }
 std::string Down(double x) { return RoundedDown(x, 4); }
@@ -170,6 +173,7 @@ class Examination final {
     try {
       const Observations observations = Observe(model_, problem_.declaration, problem_.transitions);
       ExamineDeclaration(observations);
+      ExamineRates();
     } catch (const AmbiguousAngle& error) {
       Add("transitions", LineOf(rows_[ToSize(error.row())]) + ": " + error.what(),
           "the angle's unit has to be rad; a row of another unit, a lost step or a wrong model shows like this");
@@ -251,6 +255,41 @@ class Examination final {
     }
   }
 
+  // Rows in which a state changes faster than is declared, those of one bound in one finding, worst first.
+  void ExamineRates() {
+    const RateBounds rates(problem_);
+    std::vector<Eigen::VectorXd> shown;
+    for (Eigen::Index i = 0; i < problem_.transitions.size() && !rates.bounds().empty(); ++i) {
+      const Eigen::VectorXd z = problem_.transitions.z.row(i), next = problem_.transitions.x_next.row(i);
+      shown.push_back(rates.Shown({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())}, 0, false));
+    }
+    for (const RateBounds::Bound& bound : rates.bounds()) {
+      std::vector<std::pair<double, int>> exceeding;  // rate, line
+      for (std::size_t i = 0; i < shown.size(); ++i)
+        if (shown[i][bound.state] > bound.rate)
+          exceeding.emplace_back(shown[i][bound.state], FileLine(static_cast<Eigen::Index>(i)));
+      if (!exceeding.empty()) AddExceeding(bound, exceeding);
+    }
+  }
+
+  void AddExceeding(const RateBounds::Bound& bound, std::vector<std::pair<double, int>>& exceeding) {
+    std::ranges::stable_sort(exceeding, std::greater{}, &std::pair<double, int>::first);
+    const auto described = [&](const std::pair<double, int>& one) {
+      return fmt::format("line {}: {}", one.second, Down(one.first)) +
+             (bound.rate > 0 ? " (" + Down(DivDown(one.first, bound.rate)) + " times)" : "");
+    };
+    std::string lines;
+    for (std::size_t i = 0; i < std::min(exceeding.size(), kMostLines); ++i)
+      lines += (i == 0 ? "" : ", ") + described(exceeding[i]);
+    if (exceeding.size() > kMostLines) lines += fmt::format(", and {} more", exceeding.size() - kMostLines);
+    const std::string& name = result_.states[ToSize(bound.state)];
+    Add(bound.key,
+        fmt::format("{} changes faster than {} a second in {} of {}, so nothing can be certified: {}", name,
+                    ToText(bound.rate), Count(std::ssize(exceeding), "transition"), result_.data, lines),
+        "look at these lines and at the bound's unit, which is that of " + name +
+            " per second. If the lines are right, declare " + Up(exceeding.front().first) + " at least");
+  }
+
   [[nodiscard]] int FileLine(Eigen::Index i) const { return static_cast<int>(rows_[ToSize(i)]) + 2; }
 
   void RemarkOnSlack() {
@@ -292,7 +331,7 @@ class Examination final {
       return;
     }
     if (certifier->violation()) {
-      ExplainViolation(*certifier->violation());
+      if (certifier->violation()->second >= 0) ExplainViolation(*certifier->violation());  // else ExamineRates did
       return;
     }
     RemarkOnSlack();
@@ -343,6 +382,9 @@ class Examination final {
       advice +=
           "keep the domain and task.initial_set away from where the equations have no bound (docs/expressions.md, "
           "\"Kinks and poles\")";
+    } else if (decision.cause == Cause::kBetween) {
+      key = KeyOfRate(problem_, decision.coordinate);
+      advice += "declare a larger rate, in the unit of the state per second";
     } else {
       if (decision.exit.kind == DomainExit::Kind::kLower || decision.exit.kind == DomainExit::Kind::kUpper)
         key =

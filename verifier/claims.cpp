@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 #include "verifier/containment.h"
 #include "verifier/separation.h"
@@ -60,7 +61,7 @@ class SliceCheck {
     for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
     if (!failure_ && recorded_.has_generators) CheckGenerators();
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
-    if (step_ && !failure_) CheckTurn();
+    if (step_ && !failure_) CheckRates();
     if (!step_ && !certificate_.is_remainder) CheckRest();
     if (!failure_) CheckRadius();
     if (!failure_ && t_ >= certificate_.first_step) CheckLimits();
@@ -129,27 +130,35 @@ class SliceCheck {
     return std::pair(center - half_width, center + half_width);
   }
 
-  // Some motion within task.between leads from a state of this slice to one of the next. The recorded hulls are
-  // compared, as the certifier does: the derived slices may be narrower.
-  void CheckTurn() {
+  // Some motion within the declared rates leads from a state of this slice to one of the next.
+  void CheckRates() {
     const int heading = problem_.body.heading;
-    if (!problem_.between || heading < 0 || certificate_.slices.empty()) return;
-    const auto here = HullOf(recorded_, heading), next = HullOf(certificate_.slices[ToSize(t_ + 1)], heading);
+    if (problem_.between && heading >= 0)
+      CheckChange(heading, Real(problem_.between->turn_rate) * Real(problem_.between->period));
+    const StepTiming& timing = problem_.timing;
+    const Real longest = Real(StepOf(*problem_.model)) + Real(2.0) * Real(timing.error);
+    for (int k = 0; k < timing.rate_bound.size(); ++k)
+      if (std::isfinite(timing.rate_bound[k])) CheckChange(k, Real(timing.rate_bound[k]) * longest);
+  }
+
+  // The recorded hulls are compared, as the certifier does: the derived slices may be narrower.
+  void CheckChange(int state, const Real& most) {
+    if (certificate_.slices.empty()) return;
+    const auto here = HullOf(recorded_, state), next = HullOf(certificate_.slices[ToSize(t_ + 1)], state);
     if (!here || !next) return;
     const Real lower = next->first - here->second, upper = next->second - here->first;
     const auto least = [&](const Real& turns) { return max(lower - turns, turns - upper); };
-    Real turn = least(0.0);
-    if (problem_.model->IsAngle(heading)) {
+    Real change = least(0.0);
+    if (problem_.model->IsAngle(state)) {
       const Real whole = Real(2.0) * Real::Pi();
       if (!CertainlyAtMost(upper, whole) || !CertainlyAtMost(-whole, lower)) return;
-      turn = min(turn, min(least(whole), least(-whole)));
+      change = min(change, min(least(whole), least(-whole)));
     }
-    const Real most = Real(problem_.between->turn_rate) * Real(problem_.between->period);
-    // The certifier rounds its hulls outward, the turn down and the bound up. This is above what that takes.
+    // The certifier rounds its hulls outward, the change down and the bound up. This is above what that takes.
     const Real rounding = Real(0x1p-40) * (most + here->first.magnitude() + here->second.magnitude() +
                                            next->first.magnitude() + next->second.magnitude());
-    claims_.AtMost(turn, most + rounding, most, [&] {
-      return "the least turn of " + name(heading) + " from the slice to the next is one that task.between allows";
+    claims_.AtMost(change, most + rounding, most, [&] {
+      return "the least change of " + name(state) + " from the slice to the next is one that its declared rate allows";
     });
   }
 

@@ -23,6 +23,8 @@ double UlpOf(double x) { return std::nextafter(std::abs(x), kNone) - std::abs(x)
 
 // By how much the record of an angle may be off: two units in the last place of 2 pi, or one of its own.
 constexpr double kAngleUnit = 0x1p-49;
+// More than the certifier rounds the rate that a transition shows.
+constexpr double kRateRounding = 0x1p-40;
 
 // What is nearest to zero of the numbers that differ from this by whole turns, if it is at most a quarter of a turn
 // with the error: then no other is within three times that. Otherwise everything.
@@ -394,6 +396,41 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
     for (const auto& [output, variable, value] : equations.First(z))
       sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
   }
+}
+
+std::optional<Failure> TubeMaker::FindTooFast(const KnownRows& known) const {
+  const Transitions& data = problem_.transitions;
+  const Declaration& declaration = problem_.declaration;
+  const NominalModel& model = *problem_.model;
+  const double dt = StepOf(model);
+  std::optional<Failure> failure;
+  const auto test = [&](int i, int k, double rate, bool is_angle) {
+    const double x = data.z(i, k), x_next = data.x_next(i, k);
+    Real change = abs(Real(x_next) - Real(x));
+    if (is_angle) {
+      const Real turn = Real(2.0) * Real::Pi();
+      change = abs(change - Real(std::round((change / turn).ToDouble())) * turn);
+      change = min(change, turn - change);
+    }
+    const bool is_exact = declaration.given_are_exact && !data.IsLearned(i);
+    const Real recorded(is_exact ? 0 : declaration.VariableError(k));
+    const Real error = recorded + recorded + Real(declaration.noise_bound[k]) +
+                       Real(is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next));
+    const Real longest = Real(dt) + Real(data.Longer(i)), most = Real(rate) * longest;
+    const Real rounding = Real(kRateRounding) * (most + Real(std::abs(x)) + Real(std::abs(x_next)) + error);
+    if (!CertainlyBelow(most + rounding, change - error)) return;
+    failure = Failure{-1, "no known transition changes " + model.state_names()[ToSize(k)] + " faster than is declared",
+                      ((change - error) / longest).text(), "at most " + Real(rate).text(), true};
+  };
+  for (int i = 0; i < data.size() && !failure && dt > 0; ++i) {
+    if (!known.Contains(i)) continue;
+    const Eigen::VectorXd& rates = problem_.timing.rate_bound;
+    for (int k = 0; k < rates.size(); ++k)
+      if (rates[k] < kNone) test(i, k, rates[k], model.IsAngle(k));
+    if (const int heading = problem_.body.heading; problem_.between && heading >= 0)
+      test(i, heading, problem_.between->turn_rate, model.IsAngle(heading));
+  }
+  return failure;
 }
 
 // With x+ - r(z) = f0(z) + w and z the true one, within e of the recorded one, as x+ is: e_k for x+, L e for r, and for

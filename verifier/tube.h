@@ -107,6 +107,9 @@ class TubeMaker final {
   [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls,
                           const TubeOptions& options) const;
 
+  /** A known transition in which a state changes faster than is declared, by more than the certifier's rounding. */
+  [[nodiscard]] std::optional<Failure> FindTooFast(const KnownRows& known) const;
+
  private:
   struct Query;
   struct Row;

@@ -98,7 +98,8 @@ std::vector<advice_change_t> ChangesFor(const Abstained& abstained, Tube& tube, 
     case Cause::kPairwise:
     case Cause::kNoFiniteEnclosure:
     case Cause::kNoStop:
-    case Cause::kBetween: return {};
+    case Cause::kBetween:
+    case Cause::kBound: return {};
   }
   return {};
 }

@@ -24,7 +24,8 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
               static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP &&
               static_cast<int>(Cause::kLimit) == decision_t::CAUSE_LIMIT &&
-              static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN);
+              static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN &&
+              static_cast<int>(Cause::kBound) == decision_t::CAUSE_BOUND);
 
 }  // namespace
 

@@ -20,7 +20,8 @@ static_assert(static_cast<int>(Cause::kPairwise) == withdrawal_t::FALSIFIED &&
               static_cast<int>(Cause::kObstacle) == withdrawal_t::OBSTACLE &&
               static_cast<int>(Cause::kNoStop) == withdrawal_t::NO_STOP &&
               static_cast<int>(Cause::kLimit) == withdrawal_t::LIMIT &&
-              static_cast<int>(Cause::kBetween) == withdrawal_t::BETWEEN);
+              static_cast<int>(Cause::kBetween) == withdrawal_t::BETWEEN &&
+              static_cast<int>(Cause::kBound) == withdrawal_t::BOUND);
 
 withdrawal_t Unjudged(std::int16_t cause, const std::string& why) {
   withdrawal_t message{};

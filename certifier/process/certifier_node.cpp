@@ -85,9 +85,11 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
         "be outside the domain",
         config.left_out);
   if (const auto& violation = gate_->certifier().violation())
-    logging::Warn(
-        "observations {} and {} contradict the declaration: every candidate will be answered ABSTAIN_FALSIFIED (F)",
-        violation->first, violation->second);
+    logging::Warn("{}: every candidate will be answered ABSTAIN_FALSIFIED (F)",
+                  violation->second < 0
+                      ? fmt::format("transition {} contradicts a declared rate", violation->first)
+                      : fmt::format("observations {} and {} contradict the declaration", violation->first,
+                                    violation->second));
   if (gate_->certifier().uses_hull_distance())
     logging::Warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                   LipschitzEnvelope::kMaxExactColumns);

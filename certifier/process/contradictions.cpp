@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "forereach/certify/rates.h"
 #include "forereach/residual/consistency.h"
 
 namespace forereach {
@@ -11,9 +12,13 @@ bool IsSame(const Contradictions::Pair& a, const Contradictions::Pair& b) {
   return a.model == b.model && a.pair.z == b.pair.z && a.pair.lower == b.pair.lower && a.pair.upper == b.pair.upper;
 }
 
-bool Contradicts(const Contradictions::Pair& one, const Digest& model, const Declaration& declaration) {
-  return one.model == model && one.pair.num_states() == declaration.lipschitz.rows() &&
-         one.pair.z.cols() == declaration.lipschitz.cols() && FindViolation(declaration, one.pair);
+bool Contradicts(const Contradictions::Pair& one, const Digest& model, const Problem& problem) {
+  const Declaration& declaration = problem.declaration;
+  if (one.model != model || one.pair.num_states() != declaration.lipschitz.rows() ||
+      one.pair.z.cols() != declaration.lipschitz.cols())
+    return false;
+  return one.pair.size() == 1 ? RateBounds(problem).FindExceeded(one.pair.lower.row(0)) != nullptr
+                              : FindViolation(declaration, one.pair).has_value();
 }
 
 }  // namespace
@@ -27,7 +32,7 @@ void Contradictions::Follow(const Config& config) {
 
 void Contradictions::Add(Pair pair) {
   if (std::ranges::any_of(pairs_, [&](const Pair& known) { return IsSame(known, pair); })) return;
-  contradict_in_force_ = contradict_in_force_ || Contradicts(pair, model_, problem_->declaration);
+  contradict_in_force_ = contradict_in_force_ || Contradicts(pair, model_, *problem_);
   pairs_.push_back(std::move(pair));
 }
 
@@ -41,7 +46,7 @@ void Contradictions::AddReported(const Digest& model, const Digest& declaration)
 
 bool Contradictions::Contradict(const Config& config) const {
   return WasReported(config) || std::ranges::any_of(pairs_, [&](const Pair& one) {
-           return Contradicts(one, config.grounds.model, config.problem->declaration);
+           return Contradicts(one, config.grounds.model, *config.problem);
          });
 }
 

@@ -3,7 +3,8 @@
 It holds two kinds of evidence:
  - pairs of observations of one model, which this certifier has learned or found in its latch file. A pair contradicts
    every declaration of that model under which its two residuals differ by more than the declaration allows
-   (residual/consistency.h);
+   (residual/consistency.h). A single row is a transition with the rates that it shows, which contradicts every smaller
+   bound on them (certify/rates.h);
  - digests of declarations that the certifier in charge has reported as contradicted while this one stood by. Its
    heartbeat does not carry the observations.
 

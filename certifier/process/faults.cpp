@@ -37,16 +37,21 @@ FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger) {
 }
 
 FoundFault DeclarationFalsified(const Violation& violation) {
+  const auto& [first, second, coordinate, difference, bound] = violation;
   FoundFault found = PlainFault(
       fault_t::DECLARATION_FALSIFIED,
-      fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} differs "
-                  "by {}, the declaration allows {}",
-                  violation.second, violation.first, violation.coordinate, violation.difference, violation.bound));
-  found.fault.coordinate = static_cast<std::int16_t>(violation.coordinate);
-  found.fault.first_observation = violation.first;
-  found.fault.second_observation = violation.second;
-  found.fault.value = violation.difference;
-  found.fault.upper = violation.bound;
+      second < 0
+          ? fmt::format("the executed transition {} contradicts a declared rate: state coordinate {} changes by at least "
+                        "{} a second, {} is declared",
+                        first, coordinate, difference, bound)
+          : fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} "
+                        "differs by {}, the declaration allows {}",
+                        second, first, coordinate, difference, bound));
+  found.fault.coordinate = static_cast<std::int16_t>(coordinate);
+  found.fault.first_observation = first;
+  found.fault.second_observation = second;
+  found.fault.value = difference;
+  found.fault.upper = bound;
   return found;
 }
 

@@ -23,7 +23,8 @@ struct FoundFault {
 [[nodiscard]] FoundFault SliceLeft(const PlanLedger::Departure& departure);
 /** UNCERTIFIED_PLAN: the robot executes what no certifier has issued. */
 [[nodiscard]] FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger);
-/** DECLARATION_FALSIFIED: an executed transition, the pair's second observation, contradicts the declaration. */
+/** DECLARATION_FALSIFIED: an executed transition, the second observation of the pair, contradicts the declaration; or,
+without a second one, the first contradicts a declared rate. */
 [[nodiscard]] FoundFault DeclarationFalsified(const Violation& violation);
 
 }  // namespace forereach

@@ -52,11 +52,12 @@ Json ToJson(const LatchFile::Content& content) {
 }
 
 Eigen::MatrixXd PairFrom(const Json& lists, std::size_t most) {
-  const auto rows = lists.get<std::array<std::vector<double>, 2>>();
-  if (rows[0].empty() || rows[0].size() > most || rows[0].size() != rows[1].size())
+  const auto rows = lists.get<std::vector<std::vector<double>>>();
+  if (rows.empty() || rows.size() > 2 || rows[0].empty() || rows[0].size() > most ||
+      rows[0].size() != rows.back().size())
     throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
-  Eigen::MatrixXd matrix(2, static_cast<Eigen::Index>(rows[0].size()));
-  for (Eigen::Index i = 0; i < 2; ++i)
+  Eigen::MatrixXd matrix(std::ssize(rows), static_cast<Eigen::Index>(rows[0].size()));
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
     for (Eigen::Index k = 0; k < matrix.cols(); ++k)
       matrix(i, k) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)];
   return matrix;
@@ -74,7 +75,8 @@ LatchFile::Content ContentFrom(const Json& json) {
     found.pair.z = PairFrom(entry.at("z"), kMaxVariables);
     found.pair.lower = PairFrom(entry.at("residual_lower"), kMaxStates);
     found.pair.upper = PairFrom(entry.at("residual_upper"), kMaxStates);
-    if (found.pair.lower.cols() != found.pair.upper.cols())
+    if (found.pair.lower.cols() != found.pair.upper.cols() || found.pair.lower.rows() != found.pair.upper.rows() ||
+        found.pair.lower.rows() != found.pair.z.rows())
       throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
     content.contradictions.push_back(std::move(found));
   }

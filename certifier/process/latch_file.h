@@ -26,7 +26,8 @@ class LatchFile final {
   static constexpr std::size_t kBytes = 65536;
   static constexpr std::size_t kMostContradictions = 16;  ///< As many fit, with the largest model.
 
-  /** Two observations that contradict a declaration of that model. */
+  /** Two observations that contradict a declaration of that model, or one transition with the rates that it shows
+  (Certifier::Contradiction). */
   struct Contradiction {
     Digest model;
     Observations pair;

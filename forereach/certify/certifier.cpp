@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "forereach/dynamics/angles.h"
 #include "forereach/numerics/arithmetic.h"
 #include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"
@@ -72,17 +71,17 @@ ObservationStore MakeStore(const Problem& problem) {
                           upper, options);
 }
 
-Decision Falsified(int step, int coordinate) {
+Decision Falsified(int step, int coordinate, Cause cause = Cause::kPairwise) {
   Decision decision;
   decision.outcome = Outcome::kFalsified;
-  decision.cause = Cause::kPairwise;
+  decision.cause = cause;
   decision.step = step;
   decision.coordinate = coordinate;
   return decision;
 }
 
 Decision Falsified(const Violation& violation) {
-  Decision decision = Falsified(-1, violation.coordinate);
+  Decision decision = Falsified(-1, violation.coordinate, violation.second < 0 ? Cause::kBound : Cause::kPairwise);
   decision.first_observation = violation.first;
   decision.second_observation = violation.second;
   decision.margin = violation.difference;
@@ -123,19 +122,48 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
 
 Certifier::Observed::Observed(const Problem& problem) : store(MakeStore(problem)), known(store.snapshot()) {}
 
+namespace {
+
+std::span<const double> EntriesOf(const Eigen::VectorXd& vector) { return {vector.data(), ToSize(vector.size())}; }
+
+}  // namespace
+
+// Of the problem's transitions the one that exceeds a bound by the largest factor.
+void Certifier::TestRates() {
+  const Transitions& data = problem_->transitions;
+  for (int i = 0; i < data.size() && !rates_.bounds().empty(); ++i) {
+    const Eigen::VectorXd z = data.z.row(i), next = data.x_next.row(i);
+    const Eigen::VectorXd shown = rates_.Shown(EntriesOf(z), EntriesOf(next), data.Longer(i), data.IsLearned(i));
+    const auto found = rates_.FindViolation(shown, i);
+    if (!found || (too_fast_ && FactorOf(found->difference, found->bound) <=
+                                    FactorOf(too_fast_->violation.difference, too_fast_->violation.bound)))
+      continue;
+    too_fast_ = TooFast{*found, {z.transpose(), shown.transpose(), shown.transpose()}};
+  }
+  if (!violation_ && too_fast_) violation_ = too_fast_->violation;
+}
+
+Observations Certifier::Contradiction() const {
+  return violation_->second < 0 ? too_fast_->shown : observed_->known.Contradiction();
+}
+
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
       limits_(*problem_),
+      rates_(*problem_),
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
       propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
-                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
+                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {
+  TestRates();
+}
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
       limits_(*problem_),
+      rates_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
 
@@ -145,10 +173,16 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   const auto entries = [](const Eigen::MatrixXd& one_row) {
     return std::span<const double>(one_row.data(), ToSize(one_row.size()));
   };
-  if (observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0)
-    return Learned::kOutsideDomain;
+  const int id = observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id;
+  if (id < 0) return Learned::kOutsideDomain;
   observed_->known = observed_->store.snapshot();
+  if (!too_fast_ && !rates_.bounds().empty()) {
+    const Eigen::RowVectorXd shown = rates_.Shown(z, next, longer, true);
+    if (const auto found = rates_.FindViolation(shown, id))
+      too_fast_ = TooFast{*found, {observed.z, shown, shown}};
+  }
   violation_ = observed_->known.violation();
+  if (!violation_ && too_fast_) violation_ = too_fast_->violation;
   return Learned::kAdded;
 }
 
@@ -236,37 +270,21 @@ Decision Certifier::JudgeSafety(const Plan& plan, std::span<const Obstacle> obst
   return limits.outcome == Outcome::kNone || is_touched_before ? among_obstacles : limits;
 }
 
-namespace {
-
-// The least |b - a - 2 pi i| over a and b in the intervals, from below; i is an integer for an angle and 0 otherwise.
-double LeastTurn(const Interval& a, const Interval& b, bool is_angle) noexcept {
-  const auto least = [](const Interval& difference) { return std::max(difference.lower, -difference.upper); };
-  const Interval difference = b - a;
-  if (!is_angle) return std::max(least(difference), 0.0);
-  // Farther apart than one turn, two turns or more may be nearer: nothing is claimed then.
-  if (difference.lower < -kTurn.upper || kTurn.upper < difference.upper) return 0;
-  return std::max(std::min({least(difference), least(difference - kTurn), least(difference + kTurn)}), 0.0);
-}
-
-}  // namespace
-
 Decision Certifier::JudgeBetween(const Tube& tube) const noexcept {
   Decision decision;
-  const int heading = problem_->body.heading;
-  if (!problem_->between || heading < 0) return decision;
-  const double most = MulUp(problem_->between->turn_rate, problem_->between->period);
-  const bool is_angle = problem_->model->IsAngle(heading);
-  for (int t = 0; t < tube.length(); ++t) {
-    const double least = LeastTurn(tube.hull(t, heading), tube.hull(t + 1, heading), is_angle);
-    if (!(least > most)) continue;
-    decision.outcome = Outcome::kDomain;
-    decision.cause = Cause::kBetween;
-    decision.step = t;
-    decision.coordinate = heading;
-    decision.margin = least;
-    decision.threshold = most;
-    break;
-  }
+  for (int t = 0; t < tube.length(); ++t)
+    for (const RateBounds::Bound& bound : rates_.bounds()) {
+      const int k = bound.state;
+      const double least = LeastChange(tube.hull(t, k), tube.hull(t + 1, k), bound.is_angle);
+      if (!(least > bound.change)) continue;
+      decision.outcome = Outcome::kDomain;
+      decision.cause = Cause::kBetween;
+      decision.step = t;
+      decision.coordinate = k;
+      decision.margin = least;
+      decision.threshold = bound.change;
+      return decision;
+    }
   return decision;
 }
 

@@ -13,6 +13,7 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 #include "forereach/certify/learned.h"
 #include "forereach/certify/limits.h"
 #include "forereach/certify/problem.h"
+#include "forereach/certify/rates.h"
 #include "forereach/certify/safety.h"
 #include "forereach/reach/propagator.h"
 #include "forereach/residual/enclosure.h"
@@ -38,11 +39,13 @@ class Certifier final {
 
   [[nodiscard]] const Problem& problem() const { return *problem_; }
   [[nodiscard]] const Projection& projection() const { return safety_.placement().projection(); }
-  /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Learned
-  observations are numbered after those of the problem. */
+  /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Otherwise, with
+  the second observation -1, the transition that contradicts a declared bound on a rate (rates.h): `difference` is the
+  least rate that it shows. Learned observations are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
-  /** The two observations of violation(). @pre violation() has a value. */
-  [[nodiscard]] Observations Contradiction() const { return observed_->known.Contradiction(); }
+  /** The two observations of violation(); of a single transition its z and, as lower and upper, the rates that it
+  shows. @pre violation() has a value. */
+  [[nodiscard]] Observations Contradiction() const;
   [[nodiscard]] std::size_t num_observations() const { return observed_ ? observed_->known.size() : 0; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
   [[nodiscard]] bool uses_hull_distance() const { return observed_ && observed_->known.uses_hull_distance(); }
@@ -98,9 +101,9 @@ class Certifier final {
   the problem's limits hold at the samples.
 
   The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
-  ends the run. After the horizon, the first step from whose slice no motion within the declared turn rate leads into
-  the next slice (D, kBetween): the bounds of `Problem::between` contradict the model there, and would prove what is not
-  so. Then the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then S (JudgeSafety): the
+  ends the run. After the horizon, the first step from whose slice no motion within the declared rates leads into the
+  next slice (D, kBetween): the turn rate of `Problem::between` or a bound of `Problem::timing` contradicts the model
+  there, and would prove what is not so. Then the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then S (JudgeSafety): the
   first sample or step t at which a limit or an obstacle fails. X_T is not tested against the domain.
   @param tube receives the slices. @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
@@ -110,12 +113,19 @@ class Certifier final {
 
  private:
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
-  /** Outcome kNone unless a step turns the heading by more than Between::turn_rate allows, whatever the states in its
-  two slices. */
+  /** Outcome kNone unless a step changes a state by more than its declared rate allows, whatever the states in its two
+  slices. */
   [[nodiscard]] Decision JudgeBetween(const Tube& tube) const noexcept;
   /** Outcome kNone if the last slice is provably at rest. */
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
 
+  void TestRates();
+
+  // A transition that contradicts a bound on a rate.
+  struct TooFast {
+    Violation violation;
+    Observations shown;
+  };
   struct Observed {
     explicit Observed(const Problem& problem);
 
@@ -126,6 +136,8 @@ class Certifier final {
   std::shared_ptr<const Problem> problem_;
   SafetyTest safety_;
   LimitTest limits_;
+  RateBounds rates_;
+  std::optional<TooFast> too_fast_;
   std::optional<Observed> observed_;  // none where an enclosure was given; propagator_ refers to it
   std::optional<Violation> violation_;
   Propagator propagator_;

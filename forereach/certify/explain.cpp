@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/rates.h"
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -36,8 +37,12 @@ std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
   return "no constraint of the domain is violated";
 }
 
-std::string ExplainFalsified(const Decision& decision, const NominalModel& model) {
-  const std::string coordinate = VariableName(model, decision.coordinate);
+std::string ExplainFalsified(const Decision& decision, const Problem& problem) {
+  const std::string coordinate = VariableName(*problem.model, decision.coordinate);
+  if (decision.cause == Cause::kBound)
+    return "abstain F: in transition " + std::to_string(decision.first_observation) + " " + coordinate +
+           " changes by at least " + RoundedDown(decision.margin) + " a second, " +
+           KeyOfRate(problem, decision.coordinate) + " declares " + ToText(decision.threshold) + " at most";
   if (decision.first_observation < 0)
     return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
            " agrees with all observations and the declaration";
@@ -78,7 +83,7 @@ std::string ExplainSafety(const Decision& decision, const Problem& problem) {
 std::string Sentence(const Decision& decision, const Problem& problem) {
   const NominalModel& model = *problem.model;
   switch (decision.outcome) {
-    case Outcome::kFalsified: return ExplainFalsified(decision, model);
+    case Outcome::kFalsified: return ExplainFalsified(decision, problem);
     case Outcome::kDomain: {
       const std::string where = "abstain D: at step " + std::to_string(decision.step) + " ";
       if (decision.cause == Cause::kDomainExit) return where + ExplainExit(decision.exit, model);
@@ -88,9 +93,9 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
                Beyond(decision.margin, below) + "; standing is up to " + ToText(decision.threshold);
       }
       if (decision.cause == Cause::kBetween)
-        return where + VariableName(model, decision.coordinate) + " turns by " + RoundedDown(decision.margin) +
-               " rad at least, and task.between declares " + RoundedUp(decision.threshold) +
-               " at most: one of the two is wrong";
+        return where + VariableName(model, decision.coordinate) + " changes by " + RoundedDown(decision.margin) +
+               " at least, and " + KeyOfRate(problem, decision.coordinate) + " allows " +
+               RoundedUp(decision.threshold) + " at most: one of the two is wrong";
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:

@@ -12,7 +12,8 @@ class LipschitzEnvelope;
 
 /** A proof that observations i = first and j = second contradict the declaration in coordinate k:
     |r~_ik - r~_jk| >= difference > bound >= sum_l L_kl |z_il - z_jl| + 2 (sigma_k + w^_k).
-Each observation has its own error and its own disturbance, so both count twice. */
+Each observation has its own error and its own disturbance, so both count twice. With second = -1 it is a proof that
+transition i alone contradicts a declared bound on a rate of state k (certify/rates.h). */
 struct Violation {
   int first, second, coordinate;
   double difference, bound;

@@ -250,7 +250,7 @@ class MotionTrial {
       problem->between->period += winds_.Uniform(0, 0.05);  // what a step may last longer
     const auto told = std::make_shared<Problem>(*problem);
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
-    if (untold_ == Untold::kTurn && told->between) told->between->turn_rate = told->between->turn_acceleration = 0;
+    if (untold_ == Untold::kTurn && told->between) told->between->turn_acceleration = 0;
     if (untold_ == Untold::kBody) told->body = Body();
     if (untold_ == Untold::kLateness && told->between) told->between->period = period;
     const Certifier certifier(told);

@@ -190,7 +190,10 @@ inline void Shift(Random& random, Problem& problem) {
     if (random.Coin(0.2)) problem.timing.set_at_steps.push_back(k);
     if (rate.UsesDuration(k) && !random.Coin(0.2)) continue;
     if (problem.timing.rate_bound.size() == 0) problem.timing.rate_bound.setConstant(n, kInfinity);
-    problem.timing.rate_bound[k] = random.Uniform(0, 2);
+    // The data keep it.
+    const Transitions& data = problem.transitions;
+    const double fastest = (data.x_next.col(k) - data.z.col(k)).cwiseAbs().maxCoeff() / StepOf(*problem.model);
+    problem.timing.rate_bound[k] = fastest * random.Uniform(1, 2) + 1e-9;
   }
 }
 

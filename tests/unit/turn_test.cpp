@@ -56,8 +56,8 @@ TEST_F(Turn, ThatNoMotionWithinTheDeclaredRateMakesIsAbstainedFrom) {
   EXPECT_NEAR(d.margin, 3.1, 1e-12);
   EXPECT_LE(d.margin, 3.1);
   EXPECT_EQ(d.threshold, 0.5);
-  EXPECT_THAT(Explain(d, problem_), HasSubstr("abstain D: at step 1 th turns by 3.09"));
-  EXPECT_THAT(Explain(d, problem_), HasSubstr("task.between declares 0.5"));
+  EXPECT_THAT(Explain(d, problem_), HasSubstr("abstain D: at step 1 th changes by 3.09"));
+  EXPECT_THAT(Explain(d, problem_), HasSubstr("task.between.turn_rate allows 0.5"));
 }
 
 TEST_F(Turn, OfExactlyTheDeclaredRateIsAllowedInBothDirections) {

@@ -1,0 +1,86 @@
+#include "forereach/certify/rates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "forereach/dynamics/angles.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+// A recorded successor is known to its last unit, an angle to that of a turn taken off (observations.h).
+double UnitOf(double recorded, bool is_angle) {
+  const double unit = NextUp(std::abs(recorded)) - std::abs(recorded);
+  return is_angle ? std::max(unit, kAngleUnit) : unit;
+}
+
+Interval RecordedWithin(double x, double error) { return {SubDown(x, error), AddUp(x, error)}; }
+
+}  // namespace
+
+double LeastChange(const Interval& a, const Interval& b, bool is_angle) noexcept {
+  const auto least = [](const Interval& difference) { return std::max(difference.lower, -difference.upper); };
+  Interval difference = b - a;
+  if (!is_angle) return std::max(least(difference), 0.0);
+  // After these turns the middle is half a turn or less from 0, up to rounding: with one turn more or less, no other
+  // number of turns brings it nearer.
+  difference = difference - Interval(std::round(difference.Middle() / kTurn.lower)) * kTurn;
+  return std::max(std::min({least(difference), least(difference - kTurn), least(difference + kTurn)}), 0.0);
+}
+
+RateBounds::RateBounds(const Problem& problem) : problem_(&problem), period_(StepOf(*problem.model)) {
+  const auto add = [&](int state, double rate, double longest, const std::string& key) {
+    if (rate < kInfinity) bounds_.push_back({state, rate, MulUp(rate, longest), key, problem.model->IsAngle(state)});
+  };
+  const double longest = AddUp(period_, MulUp(2, problem.timing.error));
+  for (int k = 0; period_ > 0 && k < problem.timing.rate_bound.size(); ++k)
+    add(k, problem.timing.rate_bound[k], longest, "model.rate_bound." + problem.model->state_names()[ToSize(k)]);
+  if (const int heading = problem.body.heading; problem.between && heading >= 0)
+    add(heading, problem.between->turn_rate, problem.between->period, "task.between.turn_rate");
+}
+
+Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const double> next, double longer,
+                                  bool is_learned) const {
+  Eigen::VectorXd shown = Eigen::VectorXd::Zero(std::ssize(next));
+  if (!(period_ > 0)) return shown;  // a model without steps of a duration
+  const Declaration& declaration = problem_->declaration;
+  const bool is_exact = declaration.given_are_exact && !is_learned;
+  for (const Bound& bound : bounds_) {
+    const auto k = ToSize(bound.state);
+    const double error = is_exact ? 0 : declaration.VariableError(bound.state);
+    const double of_next = AddUp(AddUp(error, declaration.noise_bound[bound.state]), UnitOf(next[k], bound.is_angle));
+    const double change = LeastChange(RecordedWithin(z[k], error), RecordedWithin(next[k], of_next), bound.is_angle);
+    shown[bound.state] = DivDown(change, AddUp(period_, longer));
+  }
+  return shown;
+}
+
+const RateBounds::Bound* RateBounds::FindExceeded(const Eigen::VectorXd& shown) const {
+  const Bound* worst = nullptr;
+  double factor = 0;
+  for (const Bound& bound : bounds_) {
+    if (!(shown[bound.state] > bound.rate)) continue;
+    if (const double by = FactorOf(shown[bound.state], bound.rate); worst == nullptr || by > factor)
+      worst = &bound, factor = by;
+  }
+  return worst;
+}
+
+std::optional<Violation> RateBounds::FindViolation(const Eigen::VectorXd& shown, int transition) const {
+  const Bound* exceeded = FindExceeded(shown);
+  if (exceeded == nullptr) return std::nullopt;
+  return Violation{transition, -1, exceeded->state, shown[exceeded->state], exceeded->rate};
+}
+
+std::string KeyOfRate(const Problem& problem, int state) {
+  const RateBounds all(problem);
+  const RateBounds::Bound* least = nullptr;
+  for (const RateBounds::Bound& bound : all.bounds())
+    if (bound.state == state && (least == nullptr || bound.rate < least->rate)) least = &bound;
+  return least == nullptr ? "" : least->key;
+}
+
+}  // namespace forereach
