@@ -22,6 +22,7 @@ not one for each state, negative or not finite, an unknown mode. Empty if it is 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
   double longer = 0;            ///< By how much the step lasted longer or shorter than dt, at most, s.
+  double by_clock = 0;          ///< The same by its clock, also where `longer` does not look at it.
   std::string refusal;          ///< What keeps it from being learned. Empty if nothing does.
 };
 

@@ -52,9 +52,10 @@ TEST_F(Rates, ATransitionThatTurnsFasterThanDeclaredFalsifies) {
   EXPECT_LE(d.margin, 6);
   EXPECT_NEAR(d.margin, 6, 1e-14);
   EXPECT_EQ(d.threshold, 0.5);
-  EXPECT_EQ(Explain(d, problem),
-            "abstain F: in transition 1 th changes by at least 5.99999 a second, task.between.turn_rate declares 0.5 at "
-            "most");
+  EXPECT_EQ(
+      Explain(d, problem),
+      "abstain F: in transition 1 th changes by at least 5.99999 a second, task.between.turn_rate declares 0.5 at "
+      "most");
 }
 
 // The declared rate, and the nearest numbers beyond what the successor's last unit leaves open.
@@ -72,7 +73,8 @@ TEST_F(Rates, WithinTheErrorsOfTheRecordAreNotRefuted) {
   Problem problem = Bar(0.5, {0.5});
   problem.declaration.state_error = Vec({0, 0, 0.0625});
   problem.declaration.noise_bound = Vec({0, 0, 0.125});
-  EXPECT_NE(Decide(problem).cause, Cause::kBound) << "0.25 more: twice the state's error, and the noise of the successor";
+  EXPECT_NE(Decide(problem).cause, Cause::kBound)
+      << "0.25 more: twice the state's error, and the noise of the successor";
   problem.transitions.z(0, 2) = -0x1p-40;
   EXPECT_EQ(Decide(problem).cause, Cause::kBound);
   problem.declaration.given_are_exact = true;
@@ -127,8 +129,11 @@ TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
   ASSERT_TRUE(certifier.violation());
   EXPECT_EQ(certifier.violation()->first, 2);
   EXPECT_EQ(certifier.violation()->second, -1);
-  EXPECT_EQ(certifier.Contradiction().size(), 1);
-  EXPECT_EQ(certifier.Contradiction().lower(0, 2), certifier.violation()->difference);
+  const Transitions shown = certifier.Contradiction();
+  ASSERT_EQ(shown.size(), 1);
+  EXPECT_EQ(shown.num_learned, 1);
+  EXPECT_EQ(shown.x_next(0, 2), 0.375);
+  EXPECT_EQ(shown.longer[0], 0.2);
   certifier.Learn(z, next, 0.25);
   EXPECT_TRUE(certifier.violation()) << "it does not become true again";
 }
@@ -154,8 +159,8 @@ TEST_F(Rates, ThatAMotionWithinAllBoundsCanShowAreNeverRefuted) {
       Rational end = true_begin + Rational(way) * (change + Rational(e) + Rational(sigma));
       if (is_angle) end += Rational(std::round(uniform(-2, 2))) * Rational(2 * std::numbers::pi);
       Eigen::VectorXd z = Vec({0, 0, begin, 0}), next = Vec({0, 0, end.get_d()});
-      return RateBounds(problem).FindViolation(
-          RateBounds(problem).Shown({z.data(), 4}, {next.data(), 3}, longer, true), 0);
+      return RateBounds(problem).FindViolation(RateBounds(problem).Shown({z.data(), 4}, {next.data(), 3}, longer, true),
+                                               0);
     };
     ASSERT_FALSE(record(1)) << "trial " << trial;
     // Beyond half a turn a faster motion may be a slower one the other way round.
