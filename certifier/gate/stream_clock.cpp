@@ -21,8 +21,8 @@ std::string Lag(std::int64_t lag_us) {
 
 std::optional<ClockBounds> ClockBoundsOf(const Config& config) {
   if (!config.gate.max_clock_error_ms) return std::nullopt;
-  return ClockBounds{Microseconds(*config.gate.max_clock_error_ms), Microseconds(config.bus.delay_ms),
-                     StepErrorUs(config.gate).value_or(0)};
+  const std::int64_t error_us = Microseconds(*config.gate.max_clock_error_ms);
+  return ClockBounds{error_us, Microseconds(config.bus.delay_ms), ScheduleErrorUs(config.gate) - error_us};
 }
 
 std::string WhyOff(const Arrival& arrival, const ClockBounds& bounds) {

@@ -2,8 +2,9 @@
 
 A certificate among obstacles that move says where robot and obstacles are at one time. The robot's states and the
 obstacles are stamped by two clocks, and the certifier can compare both with its own: with s the stamp of a message and
-a its arrival, both microseconds since the Unix epoch, E gate.max_clock_error_ms, D bus.delay_ms and S how far a
-boundary may be off its time (StepErrorUs), a sender that keeps what the task declares has
+a its arrival, both microseconds since the Unix epoch, E gate.max_clock_error_ms, D bus.delay_ms and S
+robot.step_error_ms, or 0 where that is not given because E counts for steps, too (ScheduleErrorUs), a sender that keeps
+what the task declares has
 
     -E <= a - s <= E + D                                     of each message of obstacles
     -E - S <= a - s <= E + S + D                             of each state of the robot
