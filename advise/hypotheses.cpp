@@ -19,6 +19,32 @@ std::string Bounds(const std::vector<std::string>& names, const Eigen::VectorXd&
   return text;
 }
 
+// Who may find what is declared of states false.
+std::string WhoRefutesStateError(const Config& config) {
+  const Declaration& declaration = config.problem->declaration;
+  if (!declaration.DeclaresStateError())
+    return "nobody: declaration.state_error is not given, so states are taken as exact";
+  if (!declaration.given_are_exact) return "declared; transitions that contradict each other refute it";
+  return config.gate.learns ? "declared; learned transitions that contradict others refute it"
+                            : "declared, and refuted by nobody: the file's transitions are exact, and none is learned";
+}
+
+void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
+  const NominalModel& model = *config.problem->model;
+  const Eigen::VectorXd& bound = config.problem->timing.rate_bound;
+  std::string rates, angles;
+  for (Eigen::Index k = 0; k < bound.size(); ++k)
+    if (bound[k] < kInfinity)
+      rates += (rates.empty() ? "" : ", ") + model.state_names()[ToSize(static_cast<int>(k))] + " " + ToText(bound[k]);
+  if (!rates.empty())
+    all.push_back({"no state changes faster, a second, than " + rates,
+                   "declared (model.rate_bound); a transition that shows more falsifies it (F)"});
+  for (const int k : model.angles()) angles += (angles.empty() ? "" : ", ") + model.state_names()[ToSize(k)];
+  if (!angles.empty())
+    all.push_back({"no step turns " + angles + " by three quarters of a turn or more beyond the model",
+                   "declared (model.angles); a transition that seems off by more than a quarter of a turn is refused"});
+}
+
 void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
   const StepTiming& timing = config.problem->timing;
   if (const auto error = StepErrorUs(config.gate); error && *error > 0)
@@ -64,14 +90,18 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
       {declaration.state_error.isZero(0)
            ? "a measured state is the true one"
            : "a measured state is off the true one by at most " + Bounds(model.state_names(), declaration.state_error),
-       declaration.DeclaresStateError() ? "declared; transitions that contradict each other refute it"
-                                        : "nobody: declaration.state_error is not given, so states are taken as exact"},
+       WhoRefutesStateError(config)},
       {"the first state lies in X0",
        "the guard, which starts a plan only if all of the measured state +- its error does"},
       {"the robot applies the plan's controls, one a step", "the guard, which hands out no others"}};
   AddTimes(config, all);
+  if (StepErrorUs(config.gate))
+    all.push_back({"the robot's clock runs true while a plan is executed",
+                   "declared; the guard sees that it was set only if a step is off its time then"});
+  AddRatesAndTurns(config, all);
   all.push_back({"the residual changes by no more than declaration.lipschitz, on the whole domain",
-                 "declared; transitions of the file and of the bus that contradict it falsify it (F)"});
+                 std::string("declared; transitions of the file ") + (config.gate.learns ? "and of the bus " : "") +
+                     "that contradict it falsify it (F)"});
   if (!declaration.noise_bound.isZero(0))
     all.push_back({"recorded successors are off by at most " + Bounds(model.state_names(), declaration.noise_bound),
                    "declared; transitions refute it likewise"});

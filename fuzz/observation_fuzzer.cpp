@@ -157,7 +157,7 @@ void CheckStore(const Scene& scene, std::vector<double>& said) {
   store.Compact();
   const auto snapshot = store.snapshot();
   if (const auto& violation = snapshot.violation())
-    Require(FindViolation(scene.declaration, snapshot.Contradiction()).has_value());
+    for (const int id : {violation->first, violation->second}) Require(std::ranges::count(snapshot.ids(), id) == 1);
   else
     Require(!keeps_all || !FindViolation(scene.declaration, scene.all));
   said.push_back(static_cast<double>(snapshot.size()));

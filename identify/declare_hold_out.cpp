@@ -81,7 +81,10 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
   const Certifier certifier(problem);
   const int steps = static_cast<int>(commands.front().controls.cols()), inputs = problem->model->num_inputs();
   const Schedule schedule = ScheduleFromZero(config, steps);
-  const Eigen::VectorXd half_width = (config.initial_set.upper() - config.initial_set.lower()) / 2;
+  Eigen::VectorXd half_width = (config.initial_set.upper() - config.initial_set.lower()) / 2;
+  if (!declaration.given_are_exact)  // the true state of a recorded one
+    for (int k = 0; k < problem->model->num_states(); ++k)
+      half_width[k] = std::max(half_width[k], declaration.VariableError(k));
   std::vector<Plan> plans;
   std::vector<Zonotope> initial_sets;
   for (const Commands& each : commands) {
@@ -177,9 +180,9 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
          "for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor of slopes "
          "learned from all data.\n"
          "certified, half-width: if the declaration with this factor is true, the recorded commands of held-out "
-         "stretches\n"
-         "  as plans, from task.initial_set's half-widths about the recorded state, among the task's obstacles; the "
-         "median over\n  the stretches of a position's half-width after "
+         "stretches\n  as plans, from task.initial_set's half-widths, or the state error where that is larger, about "
+         "the recorded state,\n  among the task's obstacles; the median over the stretches of a position's half-width "
+         "after "
       << command.steps
       << " steps (inf: the tube leaves the domain before).\n"
          "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "

@@ -605,8 +605,14 @@ GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int
 }
 
 bool Guard::IsDeclared(std::span<const double> state_error) const noexcept {
-  return std::ranges::equal(state_error, std::span(executing_sensing_.state_error).first(state_error.size()),
-                            std::less_equal());
+  if (state_error.empty()) return true;
+  if (std::ssize(state_error) != options_.num_states) return false;
+  const auto allows = [&](const std::array<double, 16>& declared) {
+    return std::ranges::equal(state_error, std::span(declared).first(state_error.size()), std::less_equal());
+  };
+  return allows(executing_sensing_.state_error) && allows(sensing_.state_error) &&
+         std::ranges::all_of(expected_,
+                             [&](const Task& task) { return !task.state_error || allows(*task.state_error); });
 }
 
 bool Guard::IsOnSchedule(int step, std::int64_t now_us) const noexcept {
@@ -623,24 +629,22 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
   if (standing_steps_ && step > *standing_steps_)
     return Refuse(GuardCause::kWithdrawn,
                   Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
-  const Angles& angles = executing_sensing_.angles;
-  GuardVerdict verdict = ExamineMeasured(executing_sensing_, state, error), slice;
-  if (verdict.ok()) verdict = slice = CheckSlice(*executing_, angles, step, state, error);
-  if (verdict.ok()) verdict = ExamineTime(executing_->plan, step, now_us);
+  // No slice says where the robot is at another time.
+  GuardVerdict verdict = ExamineTime(executing_->plan, step, now_us);
   if (verdict.ok()) verdict = ExamineDuration(step, last_step_utime_, now_us);
-  return verdict.ok() ? slice : verdict;
+  if (verdict.ok()) verdict = ExamineMeasured(executing_sensing_, state, error);
+  return verdict.ok() ? CheckSlice(*executing_, executing_sensing_.angles, step, state, error) : verdict;
 }
 
 GuardVerdict Guard::ExamineAgain(std::span<const double> state, std::int64_t now_us,
                                  std::span<const double> error) const {
   if (!executing_) return Refuse(GuardCause::kNotExecuting, Sentence("no plan is executing"));
   const Angles& angles = executing_sensing_.angles;
-  GuardVerdict verdict = ExamineMeasured(executing_sensing_, state, error), slice;
-  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, angles, state, error);
-  if (verdict.ok()) verdict = slice = CheckSlice(*executing_, angles, last_step_, state, error);
-  if (verdict.ok()) verdict = ExamineTime(executing_->plan, last_step_, now_us);
+  GuardVerdict verdict = ExamineTime(executing_->plan, last_step_, now_us);
   if (verdict.ok() && last_step_ > 0) verdict = ExamineDuration(last_step_, step_before_utime_, now_us);
-  return verdict.ok() ? slice : verdict;
+  if (verdict.ok()) verdict = ExamineMeasured(executing_sensing_, state, error);
+  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, angles, state, error);
+  return verdict.ok() ? CheckSlice(*executing_, angles, last_step_, state, error) : verdict;
 }
 
 GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us,

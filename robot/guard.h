@@ -193,23 +193,23 @@ class Guard final {
                                       std::span<const double> measured_state,
                                       std::span<const double> state_error = {}) noexcept;
 
-  /** Checks that the state measured after control step - 1 has not left the hull of slice `step`: that a part of
-  measured_state +- state_error lies in it, compared as exact real numbers. Then checks, with step_error_us,
-  |now_us - start_utime - step * step_us| <= step_error_us, the same from the time of TryStart, and now_us - (that of
-  the step before, or of TryStart) <= step_us + step_error_us. Call it for step = 1, 2, .. T in this order. After a
-  refusal no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock,
-  microseconds. */
+  /** Checks first, with step_error_us, |now_us - start_utime - step * step_us| <= step_error_us, the same from the time
+  of TryStart, and now_us - (that of the step before, or of TryStart) <= step_us + step_error_us. Then checks that the
+  state measured after control step - 1 has not left the hull of slice `step`: that a part of measured_state +-
+  state_error lies in it, compared as exact real numbers. No slice says where the robot is at another time, so a step
+  that is off its time halts nothing. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing.
+  Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us,
                                    std::span<const double> state_error = {}) noexcept;
 
   /** Checks the step that was checked or started last once more, before its control is applied: for a robot that lets
-  time pass in between. The state against X_0 and the hull of slice 0, or the hull of slice `step`; the time as Check
-  does, with the step that has ended. After a refusal no plan is executing. Cost and allocations as Check. */
+  time pass in between. The time as Check does, with the step that has ended; the state against X_0 and the hull of
+  slice 0, or the hull of slice `step`. After a refusal no plan is executing. Cost and allocations as Check. */
   [[nodiscard]] GuardVerdict CheckAgain(std::span<const double> measured_state, std::int64_t now_us,
                                         std::span<const double> state_error = {}) noexcept;
 
-  /** Whether the task of the executing plan declares errors as large as these, num_states entries; empty: as declared.
-   */
+  /** Whether the task of the executing plan, and every one that is accepted now or expected, declares errors as large
+  as these, num_states entries; empty: as declared. */
   [[nodiscard]] bool IsDeclared(std::span<const double> state_error) const noexcept;
 
   /** Whether Check of the same step and time would find them on schedule, whatever the state is: the step that ends has
@@ -237,6 +237,7 @@ class Guard final {
   void Reset() noexcept { halted_ = false; }
   /** After a reload of the task: also accepts plans certified under this configuration and model. The certifier may not
   have taken the new task yet, so plans of the old one are accepted until the first plan of the new one arrives.
+  The task's step error has to be GuardOptions::step_error_us, which stays.
   @param domain the domain of these plans; nothing: the domain in force stays. @param angles, state_error likewise.
   @throws std::invalid_argument as the constructor. What throws changes nothing. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},

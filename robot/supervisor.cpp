@@ -76,6 +76,7 @@ Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
   state_.reserve(kMostStates);
   state_error_.reserve(kMostStates);
   step_began_at_.reserve(kMostStates);
+  step_began_within_.reserve(kMostStates);
   if (!options_.guard.keys) return;
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
                          Speakers{{options_.fault, kFaults}, {options_.command, kCommands}}, std::nullopt);
@@ -230,7 +231,7 @@ std::span<const double> Supervisor::Boundary(std::int64_t utime, std::int64_t no
     if (IsExecuting()) ContinuePlan(utime);
     step_began_at_ = state_;
     step_began_us_ = now_us;
-    step_began_as_declared_ = guard_.IsDeclared(state_error_);
+    step_began_within_ = state_error_;
     is_under_way_ = IsExecuting();
   });
   ReportState(utime, ends);
@@ -254,7 +255,7 @@ void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
   const bool is_new = std::exchange(is_under_way_, false);
   if (is_new) {
     ++step_;
-    if (guard_.IsOnSchedule(step_, now_us) && step_began_as_declared_ && guard_.IsDeclared(state_error_))
+    if (guard_.IsOnSchedule(step_, now_us) && guard_.IsDeclared(step_began_within_) && guard_.IsDeclared(state_error_))
       ReportTransition(utime - options_.guard.step_us, now_us - step_began_us_);
   }
   const GuardVerdict verdict =

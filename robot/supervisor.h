@@ -14,9 +14,9 @@ Boundary does, in this order:
  1. FinishStep: if a plan is executing, sends the step that has ended as transition_t and checks the measured state
     against the certified slice: STEP_INSIDE, STEP_CONSISTENT, or STEP_OUTSIDE if it was left, an emergency stop. A step
     that is further off its schedule than the guard's step_error_us is OFF_SCHEDULE, an emergency stop that needs no
-    reset. No transition_t is sent for it, wherever it ended: it did not last as long as the model's step, so it is no
-    observation of that. Nor is one sent if the state at one of its ends was measured with a larger error than the task
-    declares;
+    reset, wherever the robot is: no slice is about that time. No transition_t is sent for it: it did not last as long
+    as the model's step, so it is no observation of that. Nor is one sent if the state at one of its ends was measured
+    with a larger error than the task declares, or one that Expect was told of;
  2. a pending plan whose start_utime is this boundary takes over, in the middle of a plan or at rest: STARTED. If a
 check of the guard fails it is REFUSED, and the current plan goes on;
  3. otherwise the current plan goes on: TAIL_BEGUN where its braking tail begins, STANDING where it ends, with a hold;
@@ -201,7 +201,7 @@ class Supervisor final {
   std::int64_t step_utime_ = 0;                      // the boundary from which that control applies
   std::vector<double> step_began_at_;                // the state
   std::int64_t step_began_us_ = 0;                   // by the robot's clock
-  bool step_began_as_declared_ = true;               // its error
+  std::vector<double> step_began_within_;            // its error
   std::vector<double> state_, state_error_;          // measured last
   bool is_measured_ = false;                         // in this call
   bool is_deciding_ = false, is_sending_ = false;    // a call is under way

@@ -160,6 +160,8 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
+  if (StepErrorUs(config->gate) != StepErrorUs(config_.gate))  // the guard keeps its own
+    return logging::Error("not reloaded: robot.step_error_ms cannot change while the robot runs");
   supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config), config->problem->model->angles(),
                      StateErrorOf(*config));
   logging::Info("plans certified under {} as it is now are accepted", config_.path);

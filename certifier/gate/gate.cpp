@@ -297,7 +297,7 @@ std::string Gate::Learn(Bytes bytes) {
   if (!message) return fmt::format("not a transition_t of {} bytes", EncodedSize<transition_t>());
   const ExecutedTransition transition = FromMessage(*message, certifier_.problem());
   if (!transition.refusal.empty()) return transition.refusal;
-  if (const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer);
+  if (const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer, transition.by_clock);
       learned != Learned::kAdded)
     return Explain(learned);
   grounds_.observations = ChainedDigest(grounds_.observations, bytes);

@@ -181,6 +181,14 @@ std::optional<PlanLedger::Departure> PlanLedger::FindDeparture(const robot_state
   return departure;
 }
 
+void PlanLedger::SeeStop(const execution_event_t& event, SenderId sender) {
+  Place& last = measured_.last;
+  const bool is_stop = event.kind == execution_event_t::ERROR_STOP || event.kind == execution_event_t::EMERGENCY_STOP ||
+                       event.kind == execution_event_t::OFF_SCHEDULE || event.kind == execution_event_t::HALTED;
+  const bool is_here = event.step == last.step || event.step == last.step + 1;
+  if (is_stop && is_here && event.plan_id == last.plan_id && sender == last.sender) last.plan_id = -1;
+}
+
 std::optional<PlanLedger::Departure> PlanLedger::FindDeparture(const transition_t& transition, SenderId sender) const {
   if (transition.num_states < 0 || transition.num_states > static_cast<int>(std::size(transition.next_state)))
     return std::nullopt;

@@ -126,6 +126,11 @@ class PlanLedger final {
   or, if that has none, the declared one. Nothing if the slices were not left, or if the plan's are not remembered.
   @param sender of the message: only the same robot's states and transitions are about one step. Cost O(n + kSlices). */
   [[nodiscard]] std::optional<Departure> FindDeparture(const robot_state_t& state, SenderId sender = {});
+  /** Takes the robot's word that it has stopped the plan that it executed when it was last heard, in that step or at
+  its end: FindDeparture does not compare the next state with that plan's next slice, because the robot has left its
+  controls. What a false word hides is what a robot that says it stands hides, too. It hides no state of a plan that the
+  robot says it executes, and no transition. */
+  void SeeStop(const execution_event_t& event, SenderId sender);
   /** Tests the end of a step that began at one of the last kPlaces received states against the slice after it. If the
   robot ends its plan or its guard stops it, its later states name no slice, so only the transition shows the departure.
   The transition may arrive after the state that reports the stop. Cost O(n + kPlaces + kSlices). */

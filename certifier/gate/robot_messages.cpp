@@ -63,13 +63,12 @@ ExecutedTransition FromMessage(const transition_t& message, const Problem& probl
   transition.z.assign(message.state, message.state + n);
   transition.z.insert(transition.z.end(), message.input, message.input + m);
   transition.next.assign(message.next_state, message.next_state + n);
-  if (const double error = problem.timing.error; error > 0) {
-    const double dt = StepOf(model), most = AddUp(MulUp(2, error), 2e-6);
-    transition.longer = LongerThanDt(message.duration_us, dt);
-    if (transition.longer > most)
-      transition.refusal = fmt::format("the step lasted {} us, further from model.dt, {} s, than two errors of {} s",
-                                       message.duration_us, ToText(dt), ToText(error));
-  }
+  const double dt = StepOf(model), error = problem.timing.error;
+  transition.by_clock = LongerThanDt(message.duration_us, dt);
+  if (error > 0) transition.longer = transition.by_clock;
+  if (transition.longer > MostLonger(problem.timing))
+    transition.refusal = fmt::format("the step lasted {} us, further from model.dt, {} s, than two errors of {} s",
+                                     message.duration_us, ToText(dt), ToText(error));
   return transition;
 }
 

@@ -26,6 +26,7 @@ certificates and its comparison with the slices rest on. Empty if none is. @pre 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
   double longer = 0;            ///< By how much the step lasted longer or shorter than dt, at most, s.
+  double by_clock = 0;          ///< The same by its clock, also where `longer` does not look at it.
   std::string refusal;          ///< What keeps it from being learned. Empty if nothing does.
 };
 

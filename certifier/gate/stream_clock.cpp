@@ -4,6 +4,7 @@
 
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/text.h"
+#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -20,7 +21,8 @@ std::string Lag(std::int64_t lag_us) {
 
 std::optional<ClockBounds> ClockBoundsOf(const Config& config) {
   if (!config.gate.max_clock_error_ms) return std::nullopt;
-  return ClockBounds{Microseconds(*config.gate.max_clock_error_ms), Microseconds(config.bus.delay_ms)};
+  const std::int64_t error_us = Microseconds(*config.gate.max_clock_error_ms);
+  return ClockBounds{error_us, Microseconds(config.bus.delay_ms), ScheduleErrorUs(config.gate) - error_us};
 }
 
 std::string WhyOff(const Arrival& arrival, const ClockBounds& bounds) {
@@ -39,7 +41,7 @@ std::string WhyOff(const Arrival& arrival, const ClockBounds& bounds) {
 
 std::string WhyApart(const Arrival& robot, const Arrival& obstacles, const ClockBounds& bounds) {
   const std::int64_t of_robot = robot.at_us - robot.utime, of_obstacles = obstacles.at_us - obstacles.utime;
-  const std::int64_t most = bounds.error_us + bounds.delay_us;
+  const std::int64_t most = bounds.error_us + bounds.delay_us + bounds.step_us;
   if (std::abs(of_robot - of_obstacles) <= most) return {};
   return "the clocks of the robot and of the obstacles' sender are apart: their messages arrive " + Lag(of_robot) +
          " and " + Lag(of_obstacles) + " their stamps" + Allowed(most);

@@ -46,7 +46,7 @@ void Watch::SeeRobot(std::int64_t now_us) {
 void Watch::SeeStamps(const std::optional<Arrival>& robot, const std::optional<Arrival>& obstacles) {
   std::string why;
   if (const auto& bounds = options_.clocks; bounds && robot) {
-    if (why = WhyOff(*robot, *bounds); !why.empty())
+    if (why = WhyOff(*robot, bounds->OfRobot()); !why.empty())
       why = "the robot's clock is " + why;
     else if (obstacles && WhyOff(*obstacles, *bounds).empty())
       why = WhyApart(*robot, *obstacles, *bounds);

@@ -323,12 +323,13 @@ void CertifierNode::Learn(Bytes transition) {
   latch_.Store();  // also where another fault stays
 }
 
-// The robot answers a withdrawal. Its other events are for people and records.
+// The robot answers a withdrawal, or has stopped. Its other events are for people and records.
 void CertifierNode::OnEvent(const Received& received) {
   LookAtCharge();
   events_.Hear(received.sender, received.utime);
   const auto event = Decoded<execution_event_t>(received.bytes);
   if (!event) return Refuse(channels_.event, "not an execution_event_t");
+  plans_.SeeStop(*event, received.sender);
   if (event->kind != execution_event_t::WITHDRAWN) return;
   // Events are rare, so of two robots one alone may be heard here.
   for (const SoleSender* stream : {&events_, &robot_})

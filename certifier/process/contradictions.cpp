@@ -1,24 +1,53 @@
 #include "certifier/process/contradictions.h"
 
 #include <algorithm>
+#include <span>
+#include <stdexcept>
 
+#include "forereach/certify/learned.h"
 #include "forereach/certify/rates.h"
+#include "forereach/numerics/size.h"
 #include "forereach/residual/consistency.h"
 
 namespace forereach {
 namespace {
 
-bool IsSame(const Contradictions::Pair& a, const Contradictions::Pair& b) {
-  return a.model == b.model && a.pair.z == b.pair.z && a.pair.lower == b.pair.lower && a.pair.upper == b.pair.upper;
+bool IsSame(const Contradictions::Evidence& a, const Contradictions::Evidence& b) {
+  return a.model == b.model && a.rows.z == b.rows.z && a.rows.x_next == b.rows.x_next &&
+         a.rows.longer == b.rows.longer && a.rows.num_learned == b.rows.num_learned;
 }
 
-bool Contradicts(const Contradictions::Pair& one, const Digest& model, const Problem& problem) {
+std::span<const double> Values(const Eigen::VectorXd& row) { return {row.data(), ToSize(row.size())}; }
+
+// Whether every row is an observation under this task. One that is not says nothing.
+bool AllCount(const Transitions& rows, const Problem& problem) {
+  for (int i = 0; i < rows.size(); ++i)
+    if (!IsWithin(problem, Values(rows.z.row(i)), rows.IsLearned(i)) || rows.longer[i] > MostLonger(problem.timing))
+      return false;
+  return true;
+}
+
+bool ExceedsARate(const Transitions& rows, const Problem& problem) {
+  const RateBounds rates(problem);
+  for (int i = 0; i < rows.size(); ++i) {
+    const Eigen::VectorXd shown =
+        rates.Shown(Values(rows.z.row(i)), Values(rows.x_next.row(i)), rows.longer[i], rows.IsLearned(i));
+    if (rates.FindExceeded(shown) != nullptr) return true;
+  }
+  return false;
+}
+
+bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const Problem& problem) try {
   const Declaration& declaration = problem.declaration;
-  if (one.model != model || one.pair.num_states() != declaration.lipschitz.rows() ||
-      one.pair.z.cols() != declaration.lipschitz.cols())
+  Transitions rows = one.rows;
+  if (one.model != model || rows.x_next.cols() != declaration.lipschitz.rows() ||
+      rows.z.cols() != declaration.lipschitz.cols() || !AllCount(rows, problem))
     return false;
-  return one.pair.size() == 1 ? RateBounds(problem).FindExceeded(one.pair.lower.row(0)) != nullptr
-                              : FindViolation(declaration, one.pair).has_value();
+  if (!(problem.timing.error > 0)) rows.longer.setZero();  // steps are on time
+  return FindViolation(declaration, Observe(*problem.model, declaration, rows, problem.timing)) ||
+         ExceedsARate(rows, problem);
+} catch (const std::invalid_argument&) {  // of Observe: they say nothing under this task
+  return false;
 }
 
 }  // namespace
@@ -30,10 +59,10 @@ void Contradictions::Follow(const Config& config) {
   contradict_in_force_ = Contradict(config);
 }
 
-void Contradictions::Add(Pair pair) {
-  if (std::ranges::any_of(pairs_, [&](const Pair& known) { return IsSame(known, pair); })) return;
-  contradict_in_force_ = contradict_in_force_ || Contradicts(pair, model_, *problem_);
-  pairs_.push_back(std::move(pair));
+void Contradictions::Add(Evidence one) {
+  if (std::ranges::any_of(evidence_, [&](const Evidence& known) { return IsSame(known, one); })) return;
+  contradict_in_force_ = contradict_in_force_ || Contradicts(one, model_, *problem_);
+  evidence_.push_back(std::move(one));
 }
 
 void Contradictions::AddReported(const Digest& model, const Digest& declaration) {
@@ -45,7 +74,7 @@ void Contradictions::AddReported(const Digest& model, const Digest& declaration)
 }
 
 bool Contradictions::Contradict(const Config& config) const {
-  return WasReported(config) || std::ranges::any_of(pairs_, [&](const Pair& one) {
+  return WasReported(config) || std::ranges::any_of(evidence_, [&](const Evidence& one) {
            return Contradicts(one, config.grounds.model, *config.problem);
          });
 }

@@ -1,10 +1,11 @@
 /** What is known to contradict declarations, and survives what a reload or a reset forgets.
 
 It holds two kinds of evidence:
- - pairs of observations of one model, which this certifier has learned or found in its latch file. A pair contradicts
-   every declaration of that model under which its two residuals differ by more than the declaration allows
-   (residual/consistency.h). A single row is a transition with the rates that it shows, which contradicts every smaller
-   bound on them (certify/rates.h);
+ - transitions of one model, which this certifier has learned or found in its latch file. They are kept as they were
+   recorded, and observed anew under each task (residual/observations.h), whose errors of states, inputs and durations
+   say what they show. Two contradict every declaration that allows less than their residuals differ
+   (residual/consistency.h), each one every smaller bound on the rates that it shows (certify/rates.h). Under a task
+   that would not have learned them they say nothing;
  - digests of declarations that the certifier in charge has reported as contradicted while this one stood by. Its
    heartbeat does not carry the observations.
 
@@ -23,7 +24,7 @@ namespace forereach {
 
 class Contradictions final {
  public:
-  using Pair = LatchFile::Contradiction;
+  using Evidence = LatchFile::Contradiction;
   static constexpr std::size_t kMostReported = 16;  ///< Of more reported declarations the oldest is forgotten.
 
   explicit Contradictions(const Config& config) { Follow(config); }
@@ -31,8 +32,9 @@ class Contradictions final {
   /** Puts this task's declaration in force. */
   void Follow(const Config& config);
 
-  /** Adds evidence. What is known already is not added again. Cost of a pair: O(n m). */
-  void Add(Pair pair);
+  /** Adds evidence. What is known already is not added again. Cost: two evaluations of the
+  model. */
+  void Add(Evidence one);
   void AddReported(const Digest& model, const Digest& declaration);
 
   /** Whether any evidence contradicts the declaration of this task, or that in force. */
@@ -41,10 +43,10 @@ class Contradictions final {
   /** Whether the declaration of this task was reported as contradicted. */
   [[nodiscard]] bool WasReported(const Config& config) const;
 
-  [[nodiscard]] const std::vector<Pair>& pairs() const { return pairs_; }
+  [[nodiscard]] const std::vector<Evidence>& evidence() const { return evidence_; }
 
  private:
-  std::vector<Pair> pairs_;                          // at most one for each version of the task
+  std::vector<Evidence> evidence_;                   // at most one for each version of the task
   std::vector<std::pair<Digest, Digest>> reported_;  // model, declaration
   Digest model_{}, declaration_digest_{};            // in force
   std::shared_ptr<const Problem> problem_;           // in force

@@ -24,7 +24,7 @@ void FaultLatch::Flush() {
 }
 
 LatchFile::Content FaultLatch::Content() const {
-  LatchFile::Content content{std::nullopt, "", contradictions_.pairs()};
+  LatchFile::Content content{std::nullopt, "", contradictions_.evidence()};
   if (watch_.fault()) content.fault = fault_, content.why = watch_.fault()->why;
   return content;
 }
@@ -68,7 +68,8 @@ void FaultLatch::Check() {
 bool FaultLatch::Forget() {
   if (!file_ || !watch_.fault()) return true;
   if (!file_->ready()) Open();
-  const bool is_forgotten = file_->ready() && file_->Put({std::nullopt, "", contradictions_.pairs()}) && file_->Flush();
+  const bool is_forgotten =
+      file_->ready() && file_->Put({std::nullopt, "", contradictions_.evidence()}) && file_->Flush();
   TellWatch();
   return is_forgotten;
 }

@@ -45,9 +45,10 @@ Json ToJson(const LatchFile::Content& content) {
   if (content.fault) json["fault"] = {{"message", content.why}, {"fault_t", Encode(*content.fault)}};
   for (const LatchFile::Contradiction& found : content.contradictions)
     json["contradictions"].push_back({{"model", found.model},
-                                      {"z", ToJson(found.pair.z)},
-                                      {"residual_lower", ToJson(found.pair.lower)},
-                                      {"residual_upper", ToJson(found.pair.upper)}});
+                                      {"z", ToJson(found.rows.z)},
+                                      {"next", ToJson(found.rows.x_next)},
+                                      {"longer", ToJson(found.rows.longer)},
+                                      {"learned", found.rows.num_learned}});
   return json;
 }
 
@@ -72,11 +73,12 @@ LatchFile::Content ContentFrom(const Json& json) {
   }
   for (const Json& entry : json.at("contradictions")) {
     LatchFile::Contradiction found{entry.at("model").get<Digest>(), {}};
-    found.pair.z = PairFrom(entry.at("z"), kMaxVariables);
-    found.pair.lower = PairFrom(entry.at("residual_lower"), kMaxStates);
-    found.pair.upper = PairFrom(entry.at("residual_upper"), kMaxStates);
-    if (found.pair.lower.cols() != found.pair.upper.cols() || found.pair.lower.rows() != found.pair.upper.rows() ||
-        found.pair.lower.rows() != found.pair.z.rows())
+    found.rows.z = PairFrom(entry.at("z"), kMaxVariables);
+    found.rows.x_next = PairFrom(entry.at("next"), kMaxStates);
+    found.rows.longer = PairFrom(entry.at("longer"), 1);
+    found.rows.num_learned = entry.at("learned").get<int>();
+    if (found.rows.x_next.rows() != found.rows.size() || found.rows.longer.size() != found.rows.size() ||
+        found.rows.num_learned < 0 || found.rows.num_learned > found.rows.size())
       throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
     content.contradictions.push_back(std::move(found));
   }

@@ -1,4 +1,4 @@
-/** The state that survives the end of a certifier: the latched fault, and the observations that contradict a
+/** The state that survives the end of a certifier: the latched fault, and the transitions that contradict a
 declaration.
 
 One file, latch.json, in a directory that belongs to one robot, locked while a certifier lives. The file always has the
@@ -15,7 +15,7 @@ A file that does not exist holds nothing: a person may delete it. No other damag
 #include <vector>
 
 #include "forereach/fault_t.hpp"
-#include "forereach/residual/observations.h"
+#include "forereach/residual/transitions.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -26,11 +26,11 @@ class LatchFile final {
   static constexpr std::size_t kBytes = 65536;
   static constexpr std::size_t kMostContradictions = 16;  ///< As many fit, with the largest model.
 
-  /** Two observations that contradict a declaration of that model, or one transition with the rates that it shows
-  (Certifier::Contradiction). */
+  /** Two transitions that contradict a declaration of that model, or one that contradicts a declared rate, as they were
+  recorded (Certifier::Contradiction): what they show depends on what is declared of their errors. */
   struct Contradiction {
     Digest model;
-    Observations pair;
+    Transitions rows;
   };
   struct Content {
     std::optional<fault_t> fault;

@@ -135,16 +135,46 @@ void Certifier::TestRates() {
     const Eigen::VectorXd z = data.z.row(i), next = data.x_next.row(i);
     const Eigen::VectorXd shown = rates_.Shown(EntriesOf(z), EntriesOf(next), data.Longer(i), data.IsLearned(i));
     const auto found = rates_.FindViolation(shown, i);
-    if (!found || (too_fast_ && FactorOf(found->difference, found->bound) <=
-                                    FactorOf(too_fast_->violation.difference, too_fast_->violation.bound)))
+    if (!found ||
+        (too_fast_ && FactorOf(found->difference, found->bound) <= FactorOf(too_fast_->difference, too_fast_->bound)))
       continue;
-    too_fast_ = TooFast{*found, {z.transpose(), shown.transpose(), shown.transpose()}};
+    too_fast_ = found;
   }
-  if (!violation_ && too_fast_) violation_ = too_fast_->violation;
+  if (!violation_) violation_ = too_fast_;
 }
 
-Observations Certifier::Contradiction() const {
-  return violation_->second < 0 ? too_fast_->shown : observed_->known.Contradiction();
+Transitions Certifier::Contradiction() const {
+  const Transitions& given = problem_->transitions;
+  Transitions rows{Eigen::MatrixXd(0, given.z.cols()), Eigen::MatrixXd(0, given.x_next.cols())};
+  const auto add = [&](const Eigen::RowVectorXd& z, const Eigen::RowVectorXd& next, double longer, bool is_learned) {
+    const Eigen::Index row = rows.z.rows();
+    rows.z.conservativeResize(row + 1, Eigen::NoChange);
+    rows.x_next.conservativeResize(row + 1, Eigen::NoChange);
+    rows.longer.conservativeResize(row + 1);
+    rows.z.row(row) = z, rows.x_next.row(row) = next, rows.longer[row] = longer;
+    rows.num_learned += is_learned ? 1 : 0;
+  };
+  const auto [first, second] = std::minmax(violation_->first, violation_->second);
+  for (const int id : {first, second}) {
+    if (id < 0) continue;
+    if (id < given.size()) {
+      add(given.z.row(id), given.x_next.row(id), given.Longer(id), given.IsLearned(id));
+    } else if (const auto record = std::ranges::lower_bound(learned_, id, {}, &Record::id);
+               record != learned_.end() && record->id == id) {
+      const auto row = [](const std::vector<double>& values) {
+        return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
+      };
+      add(row(record->z), row(record->next), record->longer, true);
+    }
+  }
+  return rows;
+}
+
+// The store drops observations for want of room, but none with a contradiction among them.
+void Certifier::ForgetDropped() {
+  if (violation_ || learned_.size() <= 2 * observed_->known.size()) return;
+  const std::vector<int> kept = observed_->known.ids();
+  std::erase_if(learned_, [&](const Record& record) { return !std::ranges::binary_search(kept, record.id); });
 }
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
@@ -167,7 +197,8 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
 
-Learned Certifier::Learn(std::span<const double> z, std::span<const double> next, double longer) {
+Learned Certifier::Learn(std::span<const double> z, std::span<const double> next, double longer,
+                         std::optional<double> by_clock) {
   Observations observed;
   if (const Learned learned = Observe(*problem_, z, next, longer, observed); learned != Learned::kAdded) return learned;
   const auto entries = [](const Eigen::MatrixXd& one_row) {
@@ -175,13 +206,12 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   };
   const int id = observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id;
   if (id < 0) return Learned::kOutsideDomain;
+  learned_.push_back({id, {z.begin(), z.end()}, {next.begin(), next.end()}, by_clock.value_or(longer)});
   observed_->known = observed_->store.snapshot();
-  if (!too_fast_ && !rates_.bounds().empty()) {
-    const Eigen::RowVectorXd shown = rates_.Shown(z, next, longer, true);
-    if (const auto found = rates_.FindViolation(shown, id)) too_fast_ = TooFast{*found, {observed.z, shown, shown}};
-  }
+  if (!too_fast_ && !rates_.bounds().empty()) too_fast_ = rates_.FindViolation(rates_.Shown(z, next, longer, true), id);
   violation_ = observed_->known.violation();
-  if (!violation_ && too_fast_) violation_ = too_fast_->violation;
+  if (!violation_) violation_ = too_fast_;
+  ForgetDropped();
   return Learned::kAdded;
 }
 

@@ -43,9 +43,9 @@ class Certifier final {
   the second observation -1, the transition that contradicts a declared bound on a rate (rates.h): `difference` is the
   least rate that it shows. Learned observations are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
-  /** The two observations of violation(); of a single transition its z and, as lower and upper, the rates that it
-  shows. @pre violation() has a value. */
-  [[nodiscard]] Observations Contradiction() const;
+  /** The one or two transitions of violation() as they were recorded, whatever is declared of them; of learned ones
+  `longer` is that of their clock. @pre violation() has a value. */
+  [[nodiscard]] Transitions Contradiction() const;
   [[nodiscard]] std::size_t num_observations() const { return observed_ ? observed_->known.size() : 0; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
   [[nodiscard]] bool uses_hull_distance() const { return observed_ && observed_->known.uses_hull_distance(); }
@@ -53,10 +53,12 @@ class Certifier final {
   using Learned = forereach::Learned;
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
   noise bound, and its disturbance within the declared one. @param longer by how much the step lasted longer or shorter
-  than dt, at most, s. Do not call it while Certify runs. Cost: about a microsecond; some more where `longer` is not 0,
-  because the model's text is read anew. If Compact has not been called for 256 transitions, it also builds an index.
-  @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
-  Learned Learn(std::span<const double> z, std::span<const double> next, double longer = 0);
+  than dt, at most, s. @param by_clock the same by its clock, where steps are declared to be on time and the clock does
+  not count: for Contradiction alone. Do not call it while Certify runs. Cost: about a microsecond; some more where
+  `longer` is not 0, because the model's text is read anew. If Compact has not been called for 256 transitions, it also
+  builds an index. @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
+  Learned Learn(std::span<const double> z, std::span<const double> next, double longer = 0,
+                std::optional<double> by_clock = {});
   /** Number of learned transitions that are not in the index yet. */
   [[nodiscard]] int num_unindexed() const { return observed_->store.tail_size(); }
   /** Builds an index that includes them. It may run in its own thread at any time; the next Learn uses the new
@@ -121,11 +123,13 @@ class Certifier final {
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
 
   void TestRates();
+  void ForgetDropped();
 
-  // A transition that contradicts a bound on a rate.
-  struct TooFast {
-    Violation violation;
-    Observations shown;
+  // A learned transition as it was recorded, by the id of its observation.
+  struct Record {
+    int id;
+    std::vector<double> z, next;
+    double longer;
   };
   struct Observed {
     explicit Observed(const Problem& problem);
@@ -138,8 +142,9 @@ class Certifier final {
   SafetyTest safety_;
   LimitTest limits_;
   RateBounds rates_;
-  std::optional<TooFast> too_fast_;
-  std::optional<Observed> observed_;  // none where an enclosure was given; propagator_ refers to it
+  std::optional<Violation> too_fast_;  // a transition that contradicts a bound on a rate
+  std::vector<Record> learned_;        // those whose observations are kept, and some more; in the order of their ids
+  std::optional<Observed> observed_;   // none where an enclosure was given; propagator_ refers to it
   std::optional<Violation> violation_;
   Propagator propagator_;
 };

@@ -24,6 +24,10 @@ enum class Learned {
 then counts. @param is_learned whether it was learned: given ones may be exact (Declaration::given_are_exact). */
 [[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned);
 
+/** By how much the step of a learned transition may have been longer or shorter than dt, at most, s: two errors of its
+boundaries, and two units of a clock of microseconds. Where steps are on time, their duration is not looked at. */
+[[nodiscard]] double MostLonger(const StepTiming& timing);
+
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. @param longer by how much the
 step lasted longer or shorter than dt, at most, s. Without a fault `observed` gets
 the enclosure of its residual, one row. Cost: one evaluation of the model. */

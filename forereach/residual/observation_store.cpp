@@ -91,12 +91,11 @@ void ObservationStore::Snapshot::Enclose(const QuerySet& query, ResidualBounds& 
 
 std::size_t ObservationStore::Snapshot::size() const { return generation_->indexed.ids.size() + ToSize(tail_size_); }
 
-Observations ObservationStore::Snapshot::Contradiction() const {
-  const Known all = generation_->All(tail_size_);
-  std::vector<int> rows;
-  for (std::size_t i = 0; i < all.ids.size(); ++i)
-    if (all.ids[i] == violation_->first || all.ids[i] == violation_->second) rows.push_back(static_cast<int>(i));
-  return Select(all.observations, rows);
+std::vector<int> ObservationStore::Snapshot::ids() const {
+  std::vector<int> ids = generation_->indexed.ids;
+  ids.insert(ids.end(), generation_->in_tail.ids.begin(), generation_->in_tail.ids.begin() + tail_size_);
+  std::ranges::sort(ids);
+  return ids;
 }
 
 bool ObservationStore::Snapshot::uses_hull_distance() const { return generation_->envelope.uses_hull_distance(); }

@@ -47,8 +47,8 @@ class ObservationStore final {
     [[nodiscard]] std::size_t size() const;
     /** A provable contradiction among the observations, by their ids: then no residual is admissible. */
     [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
-    /** The two observations of violation(), as far as the budget has kept them. @pre there is one. */
-    [[nodiscard]] Observations Contradiction() const;
+    /** The ids of those that the budget has kept, in ascending order. */
+    [[nodiscard]] std::vector<int> ids() const;
     /** As LipschitzEnvelope's. */
     [[nodiscard]] bool uses_hull_distance() const;
 

@@ -6,11 +6,14 @@
 #include <map>
 #include <string>
 
+#include "advise/hypotheses.h"
 #include "cli/gate_advice.h"
 #include "forereach/certify/explain.h"
+#include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 #include "lcmtypes/names.h"
 #include "tests/advise/answered.h"
+#include "tests/gate/small_task.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/tries.h"
@@ -19,6 +22,7 @@ namespace forereach::advice_test {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 Case AnyCase(Random& random) {
   const bool bicycle = random.Coin();
@@ -247,6 +251,38 @@ TEST(Advise, EveryAdviceDoesWhatItSays) {
     EXPECT_GT(turned[cause], 0) << cause;
   for (const char* cause : {"domain_exit", "obstacle", "no_stop", "limit"})
     EXPECT_GT(turned[cause], abstentions[cause] / 2) << cause;
+}
+
+// ---- What a certificate rests on.
+
+TEST(Hypotheses, NameThoseWhoUpholdThemAndNobodyElse) {
+  Config config = SmallTask();
+  Problem problem = *config.problem;
+  problem.declaration.state_error.setConstant(0.1);
+  const auto upheld = [&](const std::string& what) {
+    config.problem = std::make_shared<const Problem>(problem);
+    for (const Hypothesis& each : HypothesesOf(config))
+      if (each.what.find(what) != std::string::npos) return each.upheld_by;
+    return std::string();
+  };
+  EXPECT_THAT(upheld("declaration.lipschitz"), HasSubstr("of the file and of the bus"));
+  EXPECT_THAT(upheld("a measured state"), HasSubstr("that contradict each other"));
+  problem.declaration.given_are_exact = true;
+  EXPECT_THAT(upheld("a measured state"), HasSubstr("learned transitions"));
+  config.gate.learns = false;
+  EXPECT_THAT(upheld("a measured state"), HasSubstr("refuted by nobody"));
+  EXPECT_THAT(upheld("declaration.lipschitz"), Not(HasSubstr("of the bus")));
+  EXPECT_EQ(upheld("changes faster"), "");
+  problem.timing.rate_bound = Vec({kInfinity, 2, kInfinity, kInfinity});
+  EXPECT_THAT(upheld("changes faster, a second, than py 2"), HasSubstr("model.rate_bound"));
+  EXPECT_EQ(upheld("clock"), "");
+  config.gate.step_error_ms = 5;
+  EXPECT_THAT(upheld("clock runs true"), HasSubstr("declared"));
+  EXPECT_EQ(upheld("turn"), "");
+  problem.model = MakeKinematicBicycle(0.1, 2.5, {2});
+  problem.timing.rate_bound = {};
+  problem.declaration.state_error = {};
+  EXPECT_THAT(upheld("turns theta by three quarters"), HasSubstr("model.angles"));
 }
 
 }  // namespace forereach::advice_test

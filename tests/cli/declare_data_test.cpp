@@ -249,6 +249,25 @@ TEST_F(LateCommandTest, ScatterTakenForNoiseLosesTheRobotAndIsSaid) {
   EXPECT_THAT(Declare("--hold-out --by u").text, Not(HasSubstr("at factor 5")));
 }
 
+// The first true state of a stretch is as far from the recorded one as any.
+TEST(HoldOut, ARecordWithinTheDeclaredErrorLiesInItsSlices) {
+  const ScratchDirectory scratch;
+  std::ostringstream rows("p,u,p_next\n", std::ios::ate);
+  for (int i = 0; i < 40; ++i) rows << (i % 2 == 0 ? "-0.0499,0,0.0499\n" : "0.0499,0,-0.0499\n");
+  scratch.Write("steps.csv", rows.str());
+  scratch.Write("task.yaml",
+                "model: {states: {p: m}, inputs: {u: m/s}, parameters: {dt: 0.1}, next: {p: p + dt*u}}\n"
+                "domain: {state: {lower: [-5], upper: [5]}, input: {lower: [-2], upper: [2]}}\n"
+                "declaration: {lipschitz: {}, noise_bound: [0], state_error: {p: 0.05}}\n"
+                "transitions: steps.csv\ngate: {obstacles: task}\n"
+                "task: {initial_set: {center: [0], half_width: [0.01]}, projection: [p], between: samples, "
+                "obstacles: [{box: {lower: [4], upper: [5]}}]}\n");
+  const Output output =
+      Forereach("declare --config " + scratch / "task.yaml" + " --from-data --hold-out --blocks 4 --steps 5 2>&1");
+  EXPECT_THAT(output.text, HasSubstr("factor"));
+  EXPECT_THAT(output.text, Not(HasSubstr("outside the slices"))) << output.text;
+}
+
 TEST_F(LateCommandTest, CheckSaysHowManyStepsLieOutside) {
   const auto check = [&] { return Forereach("check " + scratch_ / "task.yaml" + " 2>&1").text; };
   Declared("lipschitz: {x: {u: 0.1}}\n  noise_bound: [0.13]");

@@ -28,6 +28,15 @@ robot_state_t At(std::int64_t sequence, std::int64_t plan_id, int step, double x
   return state;
 }
 
+transition_t Step(std::int64_t utime, double x, double y) {
+  transition_t transition{};
+  transition.utime = utime;
+  transition.num_states = 2;
+  transition.next_state[0] = x;
+  transition.next_state[1] = y;
+  return transition;
+}
+
 class ConformanceTest : public testing::Test {
  protected:
   PlanLedger ledger_{{}, 0};
@@ -57,6 +66,54 @@ TEST_F(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
   EXPECT_EQ(departure->plan_id, 7);
   EXPECT_EQ(departure->step, 1);
   EXPECT_FALSE(ledger_.FindDeparture(At(5, 8, 0, 0.5, 1.5))) << "with messages missing between, it cannot tell";
+}
+
+// By a hold the robot left the plan before the boundary, so it need not be where the plan leads.
+TEST_F(ConformanceTest, APlanThatTheRobotSaysItHasStoppedIsNotJudgedWhereAnotherStarts) {
+  certified_plan_t next = Plan(8);
+  next.slice_upper[0][0] = next.slice_upper[0][1] = 9;
+  struct {
+    std::int16_t kind;
+    std::int64_t plan_id;
+    int step;
+    SenderId sender;
+    bool judged;
+  } const cases[] = {{execution_event_t::ERROR_STOP, 7, 0, {}, false},
+                     {execution_event_t::EMERGENCY_STOP, 7, 0, {}, false},
+                     {execution_event_t::HALTED, 7, 0, {}, false},
+                     {execution_event_t::OFF_SCHEDULE, 7, 1, {}, false},
+                     {execution_event_t::OFF_SCHEDULE, 7, 2, {}, true},
+                     {execution_event_t::STEP_OUTSIDE, 7, 1, {}, true},
+                     {execution_event_t::STEP_INSIDE, 7, 1, {}, true},
+                     {execution_event_t::ERROR_STOP, 6, 0, {}, true},
+                     {execution_event_t::ERROR_STOP, 7, 0, SenderId(1), true}};
+  for (const auto& [kind, plan_id, step, sender, judged] : cases) {
+    PlanLedger ledger({}, 0);
+    ledger.Add(Plan(7), 0);
+    ledger.Add(next, 0);
+    EXPECT_FALSE(ledger.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
+    execution_event_t event{};
+    event.kind = kind;
+    event.plan_id = plan_id;
+    event.step = static_cast<std::int16_t>(step);
+    ledger.SeeStop(event, sender);
+    EXPECT_EQ(ledger.FindDeparture(At(1, 8, 0, 0.5, 1.5)).has_value(), judged) << kind << " " << plan_id << " " << step;
+    EXPECT_TRUE(ledger.FindDeparture(At(2, 8, 1, 0.5, 9))) << "the next plan is judged as any";
+  }
+}
+
+// What a robot says of a stop hides neither its own slice nor the end of a step that it reports.
+TEST_F(ConformanceTest, AStopHidesNoDepartureThatIsReported) {
+  ledger_.Add(Plan(7), 0);
+  ledger_.Add(Plan(8), 0);
+  EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
+  execution_event_t event{};
+  event.kind = execution_event_t::ERROR_STOP;
+  event.plan_id = 7;
+  ledger_.SeeStop(event, {});
+  EXPECT_EQ(ledger_.FindDeparture(Step(0, 100, 100))->plan_id, 7) << "the whole step";
+  EXPECT_EQ(ledger_.FindDeparture(At(1, 8, 0, 0.5, 1.5))->plan_id, 8);
+  EXPECT_EQ(ledger_.FindDeparture(At(20, 7, 1, 0.5, 1.5))->plan_id, 7) << "it goes on with it";
 }
 
 TEST_F(ConformanceTest, StandingAndUnknownPlansAreNotJudged) {
@@ -118,15 +175,6 @@ TEST_F(ConformanceTest, AStateMayBringItsOwnError) {
   EXPECT_EQ(ledger_.FindDeparture(at(10, 2.5, 0.375))->error, 0.375);
   EXPECT_TRUE(ledger_.FindDeparture(at(20, 2.125, 0))) << "measured better than declared";
   EXPECT_FALSE(ledger_.FindDeparture(At(30, 7, 1, 1, 2.125)));
-}
-
-transition_t Step(std::int64_t utime, double x, double y) {
-  transition_t transition{};
-  transition.utime = utime;
-  transition.num_states = 2;
-  transition.next_state[0] = x;
-  transition.next_state[1] = y;
-  return transition;
 }
 
 TEST_F(ConformanceTest, TheEndOfAStepMayBeOffByTheDeclaredError) {

@@ -50,6 +50,10 @@ TEST(StreamClockTest, TheBoundsAreTheTasksAndWithoutAClockErrorThereAreNone) {
   ASSERT_TRUE(ClockBoundsOf(config));
   EXPECT_EQ(ClockBoundsOf(config)->error_us, 60'000);
   EXPECT_EQ(ClockBoundsOf(config)->delay_us, 10'000) << "the default";
+  EXPECT_EQ(ClockBoundsOf(config)->OfRobot().error_us, 60'000) << "half of it is for the robot's steps";
+  config.gate.step_error_ms = 20;
+  EXPECT_EQ(ClockBoundsOf(config)->OfRobot().error_us, 80'000);
+  EXPECT_EQ(ClockBoundsOf(config)->error_us, 60'000) << "of the obstacles' sender";
   config.bus.delay_ms = 0.5;
   EXPECT_EQ(ClockBoundsOf(config)->delay_us, 500);
 }

@@ -130,6 +130,23 @@ TEST(WatchTest, IsArmedOnlyWhileTheNewestStampsAreInside) {
   EXPECT_FALSE(watch.WhyNot());
 }
 
+// Its stamp is when the boundary is due.
+TEST(WatchTest, ARobotMayMeasureAStateAsFarOffItsStampAsAStepMayBe) {
+  Watch watch({true, 1'000'000, 200, ClockBounds{60'000, 10'000, 20'000}});
+  watch.SeeRobot(0);
+  const auto why = [&](std::int64_t robot_late_us, std::int64_t obstacles_late_us) {
+    watch.SeeStamps(Arrival{0, robot_late_us}, Arrival{0, obstacles_late_us});
+    return watch.WhyNot() ? watch.WhyNot()->why : "";
+  };
+  EXPECT_EQ(why(-80'000, -10'000), "");
+  EXPECT_THAT(why(-80'001, -20'000),
+              HasSubstr("ahead: the last message arrived 80.001 ms before its stamp, at most 80 ms"));
+  EXPECT_EQ(why(90'000, 0), "");
+  EXPECT_THAT(why(90'001, 20'000), HasSubstr("at most 90 ms"));
+  EXPECT_EQ(why(50'000, -40'000), "");
+  EXPECT_THAT(why(50'000, -40'001), HasSubstr("are apart"));
+}
+
 TEST(WatchTest, WithoutAClockErrorStampsAreNotCompared) {
   Watch watch(kOptions);
   watch.SeeRobot(0);

@@ -97,9 +97,9 @@ class LatchTest : public testing::Test {
     Falsify();
     node_.reset();
   }
-  void Falsify() {
+  void Falsify(std::int64_t duration_us = 150'000) {
     const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
-    transition_t transition{.num_states = 4, .num_inputs = 2};
+    transition_t transition{.duration_us = duration_us, .num_states = 4, .num_inputs = 2};
     std::copy_n(z.data(), 4, transition.state);
     config_.problem->model->Evaluate({z.data(), 6}, {transition.next_state, 4});
     transition.next_state[2] += 0.01;
@@ -249,6 +249,67 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
   ExpectArmed();
 }
 
+// What a transition shows depends on the errors that are declared of what is recorded and of when.
+TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmallerOnes) {
+  Begin();
+  SayState();
+  Falsify(170'000);  // vx by 0.01, in a step that lasted 0.02 s longer, which was not looked at
+  const Problem exact = *config_.problem;
+  const auto is_falsified = [&](const std::function<void(Problem&)>& declare) {
+    Problem problem = exact;
+    declare(problem);
+    config_.problem = std::make_shared<const Problem>(problem);
+    Begin();
+    Reset();
+    SayState();
+    return Ask().outcome == decision_t::ABSTAIN_FALSIFIED;
+  };
+  const auto with_state_error = [&](double e, bool given_are_exact) {
+    return is_falsified([&](Problem& problem) {
+      problem.declaration.state_error.setConstant(e);
+      problem.declaration.given_are_exact = given_are_exact;
+    });
+  };
+  EXPECT_TRUE(with_state_error(0.0024, false)) << "before and after each of the two steps";
+  EXPECT_FALSE(with_state_error(0.0026, false));
+  EXPECT_TRUE(with_state_error(0.0048, true)) << "of the learned one alone";
+  EXPECT_FALSE(with_state_error(0.0052, true));
+  const auto with_input_error = [&](double e) {
+    return is_falsified([&](Problem& problem) { problem.declaration.input_error = Vec({e, 0}); });
+  };
+  EXPECT_TRUE(with_input_error(0.03)) << "times dt, of two";
+  EXPECT_FALSE(with_input_error(0.035));
+  const auto with_timing = [&](double error, double rate) {
+    return is_falsified([&](Problem& problem) {
+      problem.timing.error = error;
+      problem.timing.rate_bound = Vec({kInfinity, kInfinity, rate, kInfinity});
+    });
+  };
+  EXPECT_TRUE(with_timing(0.02, 0.48));
+  EXPECT_FALSE(with_timing(0.02, 0.52)) << "it may have done so in 0.02 s";
+  EXPECT_FALSE(with_timing(0.009, 0.1)) << "no step of such a task lasts so long";
+  EXPECT_TRUE(is_falsified([](Problem&) {})) << "nothing is forgotten";
+}
+
+TEST_F(LatchTest, ATransitionOutsideTheDomainSaysNothing) {
+  FalsifyAndEnd();
+  Problem problem = *config_.problem;
+  problem.domain.state = Box(Vec({-9, -9, -9, -9}), Vec({9, 9, 9, 9}));
+  config_.problem = std::make_shared<const Problem>(problem);
+  Begin();
+  Reset();
+  SayState();
+  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  problem.domain.state = Box(Vec({-9, -9, -9, 0.4}), Vec({9, 9, 9, 9}));  // the file's first transition
+  problem.transitions.z = problem.transitions.z.bottomRows(1).eval();
+  problem.transitions.x_next = problem.transitions.x_next.bottomRows(1).eval();
+  config_.problem = std::make_shared<const Problem>(problem);
+  Begin();
+  Reset();
+  SayState();
+  EXPECT_NE(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+}
+
 // The guard leaves a plan whose certificate names the digest of the file's transitions.
 TEST_F(LatchTest, NoPlanOfAPredecessorStandsUnderAFalsifiedDeclaration) {
   Begin();
@@ -316,14 +377,18 @@ TEST_F(LatchTest, AsManyContradictionsFitAsAreAllowed) {
   content.why = std::string(400, '"');
   content.fault.emplace();
   std::ranges::fill(content.fault->message, 255);
-  const Observations pair{Eigen::MatrixXd::Constant(2, 24, longest), Eigen::MatrixXd::Constant(2, 16, longest),
-                          Eigen::MatrixXd::Constant(2, 16, longest)};
-  content.contradictions.resize(LatchFile::kMostContradictions, {Digest{255}, pair});
+  const Transitions rows{Eigen::MatrixXd::Constant(2, 24, longest), Eigen::MatrixXd::Constant(2, 16, longest),
+                         Eigen::VectorXd::Constant(2, longest), 1};
+  content.contradictions.resize(LatchFile::kMostContradictions, {Digest{255}, rows});
   ASSERT_TRUE(file.Put(content) && file.Flush()) << file.why_not();
   const auto read = file.Read();
   ASSERT_TRUE(read) << file.why_not();
   EXPECT_EQ(read->why, content.why);
-  EXPECT_EQ(read->contradictions.back().pair.z, pair.z);
+  const Transitions& back = read->contradictions.back().rows;
+  EXPECT_EQ(back.z, rows.z);
+  EXPECT_EQ(back.x_next, rows.x_next);
+  EXPECT_EQ(back.longer, rows.longer);
+  EXPECT_EQ(back.num_learned, 1);
 }
 
 // A transition that changes vx by 2 m/s in a step contradicts a bound on its rate, and its residual nothing.

@@ -590,10 +590,19 @@ TEST(GuardSchedule, AStepLastsNoLongerThanTheJitterAllows) {
   }
 }
 
-TEST(GuardSchedule, AStateOutsideItsSliceHaltsOffTheScheduleToo) {
-  Guard guard = ExecutingOnTime();
-  EXPECT_EQ(guard.Check(1, State{100, 0}, kMost).cause, GuardCause::kOutsideSlice);
-  EXPECT_TRUE(guard.halted());
+// A robot that moves has gone on meanwhile, and no certificate says where to.
+TEST(GuardSchedule, AStepOffItsTimeEndsThePlanAloneWhereverTheRobotIs) {
+  for (const bool again : {false, true}) {
+    for (const auto& [late, cause] :
+         {std::pair(kJitter, GuardCause::kOutsideSlice), std::pair(kJitter + 1, GuardCause::kOffSchedule)}) {
+      Guard guard = ExecutingOnTime();
+      if (again) ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
+      const std::int64_t now = kStart + kStep + late;
+      EXPECT_EQ((again ? guard.CheckAgain(State{100, 0}, now) : guard.Check(1, State{100, 0}, now)).cause, cause);
+      EXPECT_EQ(guard.halted(), cause == GuardCause::kOutsideSlice) << late;
+      EXPECT_EQ(guard.executing(), nullptr);
+    }
+  }
 }
 
 TEST(GuardSchedule, AStartIsWithinTheJitterToo) {

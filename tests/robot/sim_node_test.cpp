@@ -965,4 +965,46 @@ TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
   }
 }
 
+// Its guard keeps the step error that it began with.
+TEST(RobotSim, ATaskWithAnotherStepErrorIsNotTaken) {
+  const ScratchDirectory scratch;
+  const std::string path = scratch / "task.yaml";
+  const auto write = [&](const std::string& step_error_ms) {
+    std::ifstream shipped(FOREREACH_SOURCE_DIR "/config/point_mass.yaml");
+    std::string text{std::istreambuf_iterator<char>(shipped), {}};
+    text = std::regex_replace(text, std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/");
+    text = std::regex_replace(text, std::regex("\\nrobot:\\n"),
+                              "\nrobot:\n  start: [0, 0, 0, 0]\n  step_error_ms: " + step_error_ms + "\n");
+    std::ofstream(path) << text;
+    Config config = LoadConfig(path);
+    config.robot.step_period_ms = 40;
+    return config;
+  };
+  Rig rig(write("10"));
+  int at = 0;
+  const auto reload = [&] {
+    const command_t command{.utime = BoundaryTime(at), .kind = command_t::RELOAD};
+    rig.SendRaw("COMMAND", Bytes(Encode(command)));
+    rig.RunTo(++at);
+    while (reloads_under_way > 0) std::this_thread::yield();
+    rig.RunTo(++at);
+  };
+  std::int64_t id = 0;
+  for (const auto& [step_error_ms, kind] : {std::pair("12", kRefused), {"10.0", kAccepted}}) {
+    const Config config = write(step_error_ms);
+    reload();
+    certified_plan_t plan = Plan(config, ++id, at + 3, config.robot.start);
+    for (int t = 0; t <= plan.plan.num_steps; ++t)
+      for (int k = 0; k < plan.plan.num_states; ++k) {
+        plan.slice_lower[t][k] = config.problem->domain.state.lower()[k];
+        plan.slice_upper[t][k] = config.problem->domain.state.upper()[k];
+      }
+    rig.Send(plan);
+    rig.RunTo(++at);
+    ASSERT_FALSE(rig.events.empty());
+    EXPECT_EQ(rig.events.back().kind, kind) << GetText(rig.events.back().message);
+    if (kind == kRefused) EXPECT_THAT(GetText(rig.events.back().message), testing::StartsWith("config_digest"));
+  }
+}
+
 }  // namespace forereach::sim_node_test

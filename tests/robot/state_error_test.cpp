@@ -251,4 +251,11 @@ TEST(GuardStateError, APlanOfAnotherTaskBringsItsOwn) {
   EXPECT_TRUE(guard.Check(1, State{11.25, 0}, kNow).ok());
 }
 
+TEST(GuardStateError, OfAnotherSizeIsNotTheDeclaredOne) {
+  const Guard guard(TwoStates());
+  EXPECT_TRUE(guard.IsDeclared({}));
+  for (const std::size_t size : {1, 2, 3, 16, 17, 40})
+    EXPECT_EQ(guard.IsDeclared(std::vector<double>(size)), size == 2) << size;
+}
+
 }  // namespace forereach::state_error_test

@@ -2,6 +2,7 @@
 
 #include "tests/test.h"
 
+#include "certifier/gate/plan_ledger.h"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "tests/keys.h"
@@ -14,7 +15,10 @@ constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs;
 // A robot whose state the test sets, and its supervisor. Boundary j lies at kStart + j * kStep.
 class SupervisorTest : public testing::Test, protected Supervisor::Robot {
  protected:
-  std::span<const double> state() const override { return state_; }
+  std::span<const double> state() const override {
+    if (fails_) throw std::runtime_error("the sensor does not answer");
+    return state_;
+  }
   std::span<const double> state_error() const override { return state_error_; }
   void Hold() override { ++holds_; }
   void Reload() override { ++reloads_; }
@@ -22,6 +26,7 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
     if (channel == "EXECUTION_EVENT") events_.push_back(*Decoded<execution_event_t>(message));
     if (channel == "ROBOT_STATE") states_.push_back(*Decoded<robot_state_t>(message));
     if (channel == "TRANSITION") transitions_.push_back(*Decoded<transition_t>(message));
+    if (hears_) hears_(channel, message);
   }
 
   static std::int64_t At(int boundary) { return kStart + boundary * kStep; }
@@ -45,7 +50,9 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
   }
 
   std::vector<double> state_{1, -2}, state_error_;
+  bool fails_ = false;
   int holds_ = 0, reloads_ = 0;
+  std::function<void(const std::string&, Bytes)> hears_;
   std::vector<execution_event_t> events_;
   std::vector<robot_state_t> states_;
   std::vector<transition_t> transitions_;
@@ -84,7 +91,9 @@ TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
   supervisor.OnCertified(Sealed(SmallPlan(7)), At(0) - 1000);
   EXPECT_FALSE(boundary(0, 3000).empty());
   EXPECT_FALSE(boundary(1, 3000).empty());
+  state_[0] = 77;  // it has moved on
   EXPECT_TRUE(boundary(2, 3001).empty());
+  state_[0] = 1;
   EXPECT_EQ(holds_, 1);
   EXPECT_FALSE(supervisor.halted());
   EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kInside, kTailBegun, kOffSchedule));
@@ -130,7 +139,54 @@ TEST_F(SupervisorTest, AStepWhoseEndsAreOffScheduleIsNoTransition) {
     supervisor.FinishStep(At(1), At(1) + end_late);
     EXPECT_EQ(transitions_.size(), sent);
     EXPECT_EQ(supervisor.counts().steps, static_cast<std::int64_t>(sent));
-    EXPECT_EQ(supervisor.halted(), x == 77);
+    EXPECT_EQ(supervisor.halted(), x == 77 && sent == 1) << "it was on time, and left its slice";
+  }
+}
+
+// Of a robot that moves, and whose next plan starts at the boundary after which the one before it would have gone on.
+TEST_F(SupervisorTest, TheCertifierHearsOfAStopBeforeTheStateThatWouldLookLikeADeparture) {
+  constexpr double kSpeed = 10;  // m/s
+  SupervisorOptions options{TwoStates()};
+  options.guard.step_error_us = 5000;
+  const auto moving = [](std::int64_t plan_id, int from, double begin, double half_width) {
+    certified_plan_t plan = SmallPlan(plan_id);
+    plan.plan.start_utime = At(from);
+    plan.expires_utime = At(from + 1);
+    plan.plan.initial_center[0] = begin;
+    plan.plan.initial_half_width[0] = half_width;
+    for (int t = 0; t <= 3; ++t) {
+      const double middle = begin + kSpeed * 0.04 * t, half = half_width + 0.051;
+      plan.slice_lower[t][0] = middle - half, plan.slice_upper[t][0] = middle + half;
+    }
+    Seal(plan);
+    return plan;
+  };
+  for (const bool throws : {false, true}) {
+    Supervisor supervisor(options, *this);
+    PlanLedger ledger({}, 0);
+    const certified_plan_t first = moving(7, 0, 0, 0.01), second = moving(8, 2, throws ? 0.5 : 0.8, 0.1);
+    ledger.Add(first, 0);
+    ledger.Add(second, 0);
+    bool left = false;
+    hears_ = [&](const std::string& channel, Bytes message) {
+      if (channel == "EXECUTION_EVENT") ledger.SeeStop(*Decoded<execution_event_t>(message), {});
+      if (channel == "TRANSITION") left |= ledger.FindDeparture(*Decoded<transition_t>(message)).has_value();
+      if (channel == "ROBOT_STATE") left |= ledger.FindDeparture(*Decoded<robot_state_t>(message)).has_value();
+    };
+    const auto boundary = [&](int j, std::int64_t late, double x) {
+      state_ = {x, -2};
+      return !supervisor.Boundary(At(j), At(j) + late).empty();
+    };
+    supervisor.OnCertified(Encode(first), At(0) - 30'000);
+    EXPECT_TRUE(boundary(0, -5000, 0));
+    supervisor.OnCertified(Encode(second), At(0) + 1000);
+    EXPECT_TRUE(boundary(1, -1000, 0.44));
+    fails_ = throws;
+    if (throws) supervisor.OnCertified({}, At(1) + 500);
+    fails_ = false;
+    EXPECT_TRUE(boundary(2, 4000, throws ? 0.5 : 0.89)) << "late by the first plan's first step, and by a stop";
+    EXPECT_EQ(events_.back().kind, kStarted);
+    EXPECT_FALSE(left) << throws;
   }
 }
 
@@ -200,6 +256,25 @@ TEST_F(SupervisorTest, AStepWithAnEndThatWasMeasuredWorseThanDeclaredIsNoTransit
     state_error_ = end;
     EXPECT_FALSE(supervisor.Boundary(At(1), At(1)).empty());
     EXPECT_EQ(transitions_.size(), sent);
+  }
+}
+
+// The certifier may have read the task again before or after this robot.
+TEST_F(SupervisorTest, AStepIsNoTransitionWhereATaskThatIsExpectedDeclaresSmallerErrors) {
+  SupervisorOptions options{TwoStates()};
+  options.guard.state_error = {0.1, 0};
+  for (const auto& [begin, end, sent] : std::initializer_list<std::tuple<double, double, std::size_t>>{
+           {0.01, 0.01, 1}, {0.05, 0.01, 0}, {0.01, 0.05, 0}}) {
+    Supervisor supervisor(options, *this);
+    transitions_.clear();
+    supervisor.OnCertified(Sealed(SmallPlan()), At(0) - 1000);
+    state_error_ = {begin, 0};
+    EXPECT_FALSE(supervisor.Boundary(At(0), At(0)).empty());
+    supervisor.Expect(DigestOf("second"), DigestOf("model"), {}, {}, std::vector{0.01, 0.0});
+    supervisor.Expect(DigestOf("third"), DigestOf("model"), {}, {}, std::vector{0.2, 0.0});
+    state_error_ = {end, 0};
+    EXPECT_FALSE(supervisor.Boundary(At(1), At(1)).empty());
+    EXPECT_EQ(transitions_.size(), sent) << begin << " " << end;
   }
 }
 

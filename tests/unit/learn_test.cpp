@@ -196,6 +196,36 @@ TEST_F(LearnTest, AnAngleIsLearnedWithAnyTurnsThatCanBeTold) {
   EXPECT_TRUE(certifier.violation()) << "0.32 rad after a turn contradict -0.08 rad and sigma";
 }
 
+TEST_F(LearnTest, AContradictionIsTheTransitionsAsTheyWereRecordedHoweverFewAreKept) {
+  problem_.max_observations = 20;
+  for (int i = 0; i < kBase; ++i) {
+    const Eigen::VectorXd z = Draw();
+    Add(problem_, z, Next(z));
+  }
+  Certifier certifier(std::make_shared<Problem>(problem_));
+  for (int i = 0; i < kLearned; ++i) {
+    const Eigen::VectorXd z = Draw();
+    ASSERT_EQ(Learn(certifier, z, Next(z)), Learned::kAdded);
+    if (i % 50 == 0) certifier.Compact();
+  }
+  const Eigen::VectorXd z = Draw(), first = Next(z), second = Next(z, 0.01);
+  certifier.Learn({z.data(), 8}, {first.data(), 6}, 0, 0.25);
+  EXPECT_FALSE(certifier.violation());
+  certifier.Learn({z.data(), 8}, {second.data(), 6});
+  ASSERT_TRUE(certifier.violation());
+  const Transitions rows = certifier.Contradiction();
+  ASSERT_EQ(rows.size(), 2);
+  EXPECT_EQ(rows.x_next.row(1).transpose(), second);
+  EXPECT_EQ(rows.longer[1], 0);
+  if (rows.z.row(0).transpose() == z) {  // or another one that is near
+    EXPECT_EQ(rows.x_next.row(0).transpose(), first);
+    EXPECT_EQ(rows.longer[0], 0.25);
+  }
+  problem_.transitions = rows;
+  problem_.transitions.longer.setZero();
+  EXPECT_TRUE(Certifier(std::make_shared<Problem>(problem_)).violation());
+}
+
 TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {
   for (int i = 0; i < kBase; ++i) {
     const Eigen::VectorXd z = Draw();

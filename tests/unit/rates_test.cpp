@@ -129,8 +129,11 @@ TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
   ASSERT_TRUE(certifier.violation());
   EXPECT_EQ(certifier.violation()->first, 2);
   EXPECT_EQ(certifier.violation()->second, -1);
-  EXPECT_EQ(certifier.Contradiction().size(), 1);
-  EXPECT_EQ(certifier.Contradiction().lower(0, 2), certifier.violation()->difference);
+  const Transitions shown = certifier.Contradiction();
+  ASSERT_EQ(shown.size(), 1);
+  EXPECT_EQ(shown.num_learned, 1);
+  EXPECT_EQ(shown.x_next(0, 2), 0.375);
+  EXPECT_EQ(shown.longer[0], 0.2);
   certifier.Learn(z, next, 0.25);
   EXPECT_TRUE(certifier.violation()) << "it does not become true again";
 }
