@@ -500,7 +500,9 @@ TEST(GuardCheck, AgainAtTheFirstStepItBeginsThen) {
     EXPECT_TRUE(guard.CheckAgain(State{1, -2}, kStart + 2500).ok());
     const GuardVerdict verdict = guard.Check(1, State{0, 0}, kStart + kStep - 500 - too_early);
     EXPECT_EQ(verdict.ok(), !too_early);
-    if (too_early) EXPECT_THAT(verdict.message, HasSubstr("us by the first step, it is 3001 us too early"));
+    if (too_early) {
+      EXPECT_THAT(verdict.message, HasSubstr("us by the first step, it is 3001 us too early"));
+    }
   }
 }
 
@@ -596,7 +598,9 @@ TEST(GuardSchedule, AStepOffItsTimeEndsThePlanAloneWhereverTheRobotIs) {
     for (const auto& [late, cause] :
          {std::pair(kJitter, GuardCause::kOutsideSlice), std::pair(kJitter + 1, GuardCause::kOffSchedule)}) {
       Guard guard = ExecutingOnTime();
-      if (again) ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
+      if (again) {
+        ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
+      }
       const std::int64_t now = kStart + kStep + late;
       EXPECT_EQ((again ? guard.CheckAgain(State{100, 0}, now) : guard.Check(1, State{100, 0}, now)).cause, cause);
       EXPECT_EQ(guard.halted(), cause == GuardCause::kOutsideSlice) << late;

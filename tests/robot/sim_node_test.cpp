@@ -1,5 +1,7 @@
 #include "simulator/sim_node.h"
 
+#include <regex>
+
 #include "tests/test.h"
 
 #include "bus/authentic_bus.h"
@@ -1003,7 +1005,9 @@ TEST(RobotSim, ATaskWithAnotherStepErrorIsNotTaken) {
     rig.RunTo(++at);
     ASSERT_FALSE(rig.events.empty());
     EXPECT_EQ(rig.events.back().kind, kind) << GetText(rig.events.back().message);
-    if (kind == kRefused) EXPECT_THAT(GetText(rig.events.back().message), testing::StartsWith("config_digest"));
+    if (kind == kRefused) {
+      EXPECT_THAT(GetText(rig.events.back().message), testing::StartsWith("config_digest"));
+    }
   }
 }
 
