@@ -277,6 +277,7 @@ std::string Remedy(Dropped cause) {
     case Dropped::kNoInput: return "write these fields as decimal numbers";
     case Dropped::kInputChanges: return "give --input-mean or --input-tolerance";
     case Dropped::kOutsideDomain: return "widen the task's domain, or give the columns' units with --unit";
+    case Dropped::kNearTheEdge: return "widen the task's domain";
     case Dropped::kNoNominalValue: return "mend the model's equations there";
     case Dropped::kAmbiguousAngle: return "record in rad, or with a smaller model.dt";
     case Dropped::kRepeatedRow:
