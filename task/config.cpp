@@ -119,7 +119,7 @@ void FillStanding(TaskDraft& draft) {
 
 // The errors that StepOffsets allows, with the key's name.
 void RequireSteps(const Document& file, const Config& config, const Problem& problem) try {
-  static_cast<void>(StepOffsets(*problem.model, problem.timing, problem.declaration.disturbance));
+  static_cast<void>(StepOffsets(*problem.model, problem.timing));
 } catch (const std::invalid_argument& error) {
   const char* key = config.gate.step_error_ms ? "robot.step_error_ms" : "gate.max_clock_error_ms";
   const char* what = config.gate.step_error_ms ? "" : "half of it is for the robot's steps (robot.step_error_ms): ";

@@ -18,12 +18,12 @@ std::shared_ptr<const NominalModel> Cart() {
 }
 
 void ExpectRefusedTiming(const NominalModel& model, const StepTiming& timing, const std::string& what) {
-  EXPECT_THAT([&] { StepOffsets(model, timing, {}); }, ThrowsMessage<std::invalid_argument>(HasSubstr(what)));
+  EXPECT_THAT([&] { StepOffsets(model, timing); }, ThrowsMessage<std::invalid_argument>(HasSubstr(what)));
 }
 
 TEST(StepOffsets, AreRefusedWhereTheyAreOutOfRange) {
   const auto model = MakePointMass(0.125);
-  EXPECT_NO_THROW(StepOffsets(*model, {.error = std::nextafter(0.0625, 0.0)}, {}));
+  EXPECT_NO_THROW(StepOffsets(*model, {.error = std::nextafter(0.0625, 0.0)}));
   ExpectRefusedTiming(*model, {.error = 0.0625}, "is not below half of the step");
   ExpectRefusedTiming(*model, {.error = -0x1p-30}, "negative");
   ExpectRefusedTiming(*model, {.error = kInfinity}, "not finite");
@@ -36,10 +36,10 @@ TEST(StepOffsets, AreRefusedWhereTheyAreOutOfRange) {
 
 TEST(StepOffsets, NeedToKnowHowEachStateMovesWithTime) {
   const auto model = Cart();
-  EXPECT_NO_THROW(StepOffsets(*model, {}, {}));
+  EXPECT_NO_THROW(StepOffsets(*model, {}));
   ExpectRefusedTiming(*model, {.error = 0.01}, "how v moves with time");
-  EXPECT_NO_THROW(StepOffsets(*model, {.error = 0.01, .set_at_steps = {1}}, {}));
-  EXPECT_NO_THROW(StepOffsets(*model, {.error = 0.01, .rate_bound = Vec({kInfinity, 3})}, {}));
+  EXPECT_NO_THROW(StepOffsets(*model, {.error = 0.01, .set_at_steps = {1}}));
+  EXPECT_NO_THROW(StepOffsets(*model, {.error = 0.01, .rate_bound = Vec({kInfinity, 3})}));
 }
 
 // A cart at 2 m/s: its position is off by 2 m/s times the last offset, however many steps there were, and v only by
