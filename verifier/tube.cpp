@@ -385,6 +385,13 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
   const Transitions& data = problem.transitions;
   disturbance_.resize(ToSize(problem.model->num_states()));
   std::ranges::copy(problem.declaration.disturbance, disturbance_.begin());
+  unexpected_ = disturbance_;
+  for (std::size_t k = 0; k < unexpected_.size(); ++k)
+    for (std::size_t l = 0; l < input_error_.size(); ++l)
+      if (!input_error_[l].IsZero())
+        unexpected_[k] += Real(problem.declaration.lipschitz(static_cast<Eigen::Index>(k),
+                                                             static_cast<Eigen::Index>(unexpected_.size() + l))) *
+                          input_error_[l];
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
@@ -484,20 +491,15 @@ Real TubeMaker::Growth(const Real& share) const {
   return share * sum;
 }
 
-// What inputs that are off by their errors add to f0 and to the residual: the largest slopes over all that may act,
-// times the errors. Not finite where f0 has no bound there.
+// What inputs that are off by their errors add to f0: the largest slopes over all that may act, times the errors. Not
+// finite where f0 has no bound there.
 std::vector<Real> TubeMaker::InputSpread(const Query& query) const {
   const std::size_t n = query.slice.center.size();
   std::vector<Real> spread(n);
   if (std::ranges::all_of(input_error_, [](const Real& error) { return error.IsZero(); })) return spread;
   const std::vector<Real> values = equations_.Value(query.acted);
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < n; ++k)
     if (!values[k].IsFinite()) spread[k] = Real::Everything();
-    for (std::size_t l = 0; l < input_error_.size(); ++l)
-      spread[k] +=
-          Real(problem_.declaration.lipschitz(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(n + l))) *
-          input_error_[l];
-  }
   for (const auto& [output, variable, slope] : equations_.First(query.acted))
     if (const std::size_t l = ToSize(variable); l >= n && !input_error_[l - n].IsZero())
       spread[ToSize(output)] += slope.IsFinite() ? slope.magnitude() * input_error_[l - n] : Real::Everything();
@@ -609,7 +611,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real h = half * abs(upper - lower) + disturbance_[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
+    if (const Real h = half * abs(upper - lower) + unexpected_[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
         !h.IsZero())
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
@@ -684,8 +686,7 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
     } else if (declared(k) < kNone) {
       offset.spread[k] = ends * (error * Real(declared(k)) + abs(offset.column[k]));
     } else {
-      const Real unexpected =
-          max(abs(envelope[k].lower), abs(envelope[k].upper)) + disturbance_[k] + input_spread[k];
+      const Real unexpected = max(abs(envelope[k].lower), abs(envelope[k].upper)) + unexpected_[k];
       offset.spread[k] = ends * (moved[k] - offset.column[k]).magnitude() + growth * unexpected;
     }
   }

@@ -136,8 +136,9 @@ class TubeMaker final {
   const Problem& problem_;
   const Equations& equations_;
   Method method_;
-  /** The declared disturbance, one entry for each state, and the errors of the inputs. */
-  std::vector<Real> disturbance_, input_error_;
+  /** The declared disturbance, one entry for each state; the errors of the inputs; and the disturbance with what these
+  add to the residual. */
+  std::vector<Real> disturbance_, input_error_, unexpected_;
   /** By this power of a step's duration grows what the model does not know. */
   int power_;
   /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor

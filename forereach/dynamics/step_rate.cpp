@@ -154,9 +154,9 @@ class WithoutDuration final {
   [[nodiscard]] Left Same(const Operation& n, const Left& a, const Left& b) const {
     constexpr std::size_t kMostNodes = 4096;  // the search is quadratic
     if (a.node < 0 || (n.has_second() && b.node < 0) || program_.nodes.size() > kMostNodes) return {};
-    for (int i = 0; i < static_cast<int>(uses_h_.size()); ++i) {
+    for (int i = 0; i < program_.size; ++i) {
       const Operation& other = program_.node(i);
-      const bool is_same_second = !n.has_second() || other.b == b.node;  // of a cosine b is no operand, of a power a number
+      const bool is_same_second = !n.has_second() || other.b == b.node;  // of a cosine b is no operand
       if (other.op == n.op && other.a == a.node && is_same_second && (n.op != Op::kPower || other.b == n.b))
         return {i, {}};
     }

@@ -15,16 +15,16 @@ ActedInputs::ActedInputs(const Declaration& declaration) {
 }
 
 void ActedInputs::Spread(const NominalModel& model, std::span<const Interval> box,
-                         std::array<double, kMaxStates>& spread) const noexcept {
-  spread = of_residual;
+                         std::array<double, kMaxStates>& of_model) const noexcept {
+  of_model = {};
   Linearization linear;
   model.LinearizeOver(box, linear);
   const int n = model.num_states();
   for (std::size_t k = 0; k < ToSize(n); ++k)
-    if (!linear.value[k].IsFinite()) spread[k] = kInfinity;
+    if (!linear.value[k].IsFinite()) of_model[k] = kInfinity;
   for (const auto& [k, l, slope] : linear.jacobian()) {
     if (l < n || error[l - n] == 0) continue;
-    double& sum = spread[ToSize(k)];
+    double& sum = of_model[ToSize(k)];
     sum = AddUp(sum, slope.IsFinite() ? MulUp(slope.Magnitude(), error[l - n]) : kInfinity);
   }
 }

@@ -3,7 +3,7 @@ the slice,
 
     |f0_k(x, u) + r_k(x, u) - f0_k(x, u_t) - r_k(x, u_t)| <= sum_l (sup |d f0_k / d u_l| + L_kl) e_l,
 
-with the supremum over the hull of the slice and u_t +- e. The step counts it as it does a disturbance.
+with the supremum over the hull of the slice and u_t +- e. The step counts both as it does a disturbance.
 docs/soundness.md, 3.17. */
 #pragma once
 
@@ -29,10 +29,10 @@ struct ActedInputs {
 
   [[nodiscard]] bool AreExact() const { return error.size() == 0; }
 
-  /** Sets the bound of each state, rounded up; infinite where f0 or its slope by an input with an error has no bound.
+  /** Sets what they add to f0, rounded up; infinite where f0 or its slope by an input with an error has no bound.
   Allocates nothing. @param box the hull of the states, and u_t +- e. @pre !AreExact(). */
   void Spread(const NominalModel& model, std::span<const Interval> box,
-              std::array<double, kMaxStates>& spread) const noexcept;
+              std::array<double, kMaxStates>& of_model) const noexcept;
 };
 
 }  // namespace forereach

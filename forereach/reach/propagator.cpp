@@ -36,7 +36,9 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
       order_(zonotope_order),
       method_(method),
       instructions_(instructions) {
-  std::ranges::copy(disturbance, disturbance_.begin());
+  std::ranges::copy(disturbance, unexpected_.begin());
+  for (std::size_t k = 0; k < ToSize(model.num_states()) && !inputs_.AreExact(); ++k)
+    unexpected_[k] = AddUp(unexpected_[k], inputs_.of_residual[k]);
   const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width, so one table of errors
   // holds for all steps: docs/soundness.md, 3.6.
@@ -91,8 +93,9 @@ void Propagator::AddInputs(std::span<const PlainInterval> hull, Disturbed& all) 
     box[l] = Interval(hull[l].lower) + Interval(-e, e);
     all.hull[l] = {box[l].lower, box[l].upper};
   }
-  inputs_.Spread(model_, {box.data(), hull.size()}, all.of_inputs);
-  for (std::size_t k = 0; k < n; ++k) all.by_all[k] = AddUp(disturbance_[k], all.of_inputs[k]);
+  inputs_.Spread(model_, {box.data(), hull.size()}, all.of_model);
+  all.by_all = {};
+  for (std::size_t k = 0; k < n; ++k) all.by_all[k] = AddUp(unexpected_[k], all.of_model[k]);
 }
 
 namespace {
@@ -252,7 +255,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   Disturbed disturbed;
   const bool is_punctual = offsets_.AreZero(), is_exact = inputs_.AreExact();
   if (!is_exact) AddInputs(hull, disturbed);
-  const double* const disturbance = is_exact ? disturbance_.data() : disturbed.by_all.data();
+  const double* const disturbance = is_exact ? unexpected_.data() : disturbed.by_all.data();
   if (!is_punctual) {
     const StepSoFar step{slice,
                          is_exact ? hull : std::span<const PlainInterval>(disturbed.hull.data(), hull.size()),
@@ -261,8 +264,9 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
                          error,
                          record.remainder,
                          record.envelope,
+                         unexpected_.data(),
+                         is_exact ? kNothing.data() : disturbed.of_model.data(),
                          disturbance,
-                         is_exact ? kNothing.data() : disturbed.of_inputs.data(),
                          is_first};
     if (const int k = offsets_.Add(step, offset, next, sums, instructions_); k >= 0)
       return {StepResult::Status::kNoFiniteEnclosure, {}, k};

@@ -78,9 +78,9 @@ class Propagator final {
                                                           std::span<const PlainInterval> hull, StepRecord& record,
                                                           Zonotope& next, double* next_half_width,
                                                           bool is_first) const noexcept;
-  // What disturbs one step: w^, and what the errors of its inputs may add.
+  // What disturbs one step whose inputs have errors: what they add to f0, and that with unexpected_.
   struct Disturbed {
-    std::array<double, kMaxStates> by_all, of_inputs;
+    std::array<double, kMaxStates> of_model, by_all;
     std::array<PlainInterval, kMaxVariables> hull;  // with the inputs that may act
   };
   [[gnu::noinline]] void AddInputs(std::span<const PlainInterval> hull, Disturbed& all) const noexcept;
@@ -95,7 +95,7 @@ class Propagator final {
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;
-  std::array<double, kMaxStates> disturbance_{};
+  std::array<double, kMaxStates> unexpected_{};  // w^, and what the errors of the inputs add to the residual
   ActedInputs inputs_;
   StepOffsets offsets_;
   int order_;

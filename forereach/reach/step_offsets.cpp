@@ -150,13 +150,13 @@ int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope
     const Lanes reach = LoadLanes(&away[k]) + LoadLanes(&step.error.value[k]) + LoadLanes(image.slacks() + k) +
                         LoadLanes(step.slice.slacks() + k) + LoadLanes(&step.remainder.half_width[k]) +
                         AllLanes(4 * kUnitRoundoff) * value + LoadLanes(step.of_inputs + k);
-    const Lanes growth = LoadLanes(&growths[k]), by_step = LoadLanes(&by_step_[k]), w = LoadLanes(step.disturbance + k);
+    const Lanes growth = LoadLanes(&growths[k]), by_step = LoadLanes(&by_step_[k]), w = LoadLanes(step.unexpected + k);
     const Lanes column = Abs(LoadLanes(&spread.column[k]));
     const Lanes off =
         by_step > AllLanes(0) ? by_step * reach + AllLanes(4 * kUnitRoundoff) * column : LoadLanes(&around[k]);
     Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (LoadLanes(&most[k]) + w);
     added = growth > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
-    StoreLanes(w + added, &spread.half_width[k]);
+    StoreLanes(LoadLanes(step.disturbance + k) + added, &spread.half_width[k]);
     return column + added < AllLanes(kInfinity);
   };
   if (HoldsForFirst(states_, is_finite)) return -1;

@@ -42,9 +42,9 @@ struct StepSoFar {
   const StepError& error;
   const Remainder& remainder;
   const ResidualBounds& residual;
-  /** n upper bounds each, readable up to kMaxStates: on what disturbs the step, w^ and what its inputs' errors add, and
-  on what these errors add to f0. */
-  const double *disturbance, *of_inputs;
+  /** Upper bounds on w^ with what the errors of the inputs add to the residual, on what they add to f0, and on the sum of both; readable up to
+  kMaxStates. */
+  const double *unexpected, *of_inputs, *disturbance;
   bool is_first;  ///< j_t = 0.
 };
 
