@@ -32,11 +32,12 @@ void AddGrowth(const Problem& problem, std::vector<Hypothesis>& all) {
   };
   const auto states = std::views::iota(0, problem.model->num_states());
   if (timing.error == 0 || std::ranges::none_of(states, follows_equations)) return;
-  all.push_back({fmt::format("in a step of duration h what the model does not know differs from that of dt by at most "
-                             "((1 + |h - dt|/dt)^{} - 1) of its bounds",
-                             RateOf(*problem.model)->power()),
-                 "declared by robot.step_error_ms: no part of the residual is larger than their sum and cancelled at dt; "
-                 "model.rate_bound instead says nothing of it"});
+  all.push_back(
+      {fmt::format("in a step of duration h what the model does not know differs from that of dt by at most "
+                   "((1 + |h - dt|/dt)^{} - 1) of its bounds",
+                   RateOf(*problem.model)->power()),
+       "declared by robot.step_error_ms: no part of the residual is larger than their sum and cancelled at dt; "
+       "model.rate_bound instead says nothing of it"});
 }
 
 void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
@@ -88,10 +89,9 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
                                         : "nobody: declaration.state_error is not given, so states are taken as exact"},
       {"the first state lies in X0",
        "the guard, which starts a plan only if all of the measured state +- its error does"},
-      {declaration.input_error.isZero(0)
-           ? "the robot applies the plan's controls, one a step"
-           : "the robot applies the plan's controls, one a step, off by at most " +
-                 Bounds(model.input_names(), declaration.input_error),
+      {declaration.input_error.isZero(0) ? "the robot applies the plan's controls, one a step"
+                                         : "the robot applies the plan's controls, one a step, off by at most " +
+                                               Bounds(model.input_names(), declaration.input_error),
        declaration.input_error.isZero(0) ? "the guard, which hands out no others"
                                          : "the guard, which hands out no others, and declaration.input_error"}};
   AddTimes(config, all);

@@ -49,8 +49,8 @@ class ModelTarget final : public Target {
     rate_.value().Enclose({point.data(), z.size()}, dt, std::span(rate).first(next.size()));
     for (std::size_t k = 0; k < next.size(); ++k)
       if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) == 0)
-        next[k] += longer * rate[k].Middle() +
-                   (std::pow(1 + longer / dt, powers_[k]) - 1) * static_cast<double>(residual[k]);
+        next[k] +=
+            longer * rate[k].Middle() + (std::pow(1 + longer / dt, powers_[k]) - 1) * static_cast<double>(residual[k]);
   }
 
  private:

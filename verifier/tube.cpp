@@ -611,7 +611,8 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real h = half * abs(upper - lower) + unexpected_[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
+    if (const Real h =
+            half * abs(upper - lower) + unexpected_[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
         !h.IsZero())
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
@@ -653,10 +654,9 @@ std::vector<Real> TubeMaker::Rates(const Query& query, const std::vector<Bounds>
   }
   for (std::size_t k = 0; k < rate.size(); ++k)
     if (equations_.IsProportional(static_cast<int>(k)))
-      rate[k] =
-          Around(moved[k] - query.center[k] + Real::FromTo(remainder[k].lower, remainder[k].upper),
-                 spread[k] + input_spread[k]) /
-          dt;
+      rate[k] = Around(moved[k] - query.center[k] + Real::FromTo(remainder[k].lower, remainder[k].upper),
+                       spread[k] + input_spread[k]) /
+                dt;
   return rate;
 }
 

@@ -182,8 +182,7 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   observed_->known = observed_->store.snapshot();
   if (!too_fast_ && !rates_.bounds().empty()) {
     const Eigen::RowVectorXd shown = rates_.Shown(z, next, longer, true);
-    if (const auto found = rates_.FindViolation(shown, id))
-      too_fast_ = TooFast{*found, {observed.z, shown, shown}};
+    if (const auto found = rates_.FindViolation(shown, id)) too_fast_ = TooFast{*found, {observed.z, shown, shown}};
   }
   violation_ = observed_->known.violation();
   if (!violation_ && too_fast_) violation_ = too_fast_->violation;

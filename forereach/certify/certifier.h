@@ -32,8 +32,8 @@ class Certifier final {
   explicit Certifier(std::shared_ptr<const Problem> problem);
 
   /** Certifies with the bounds of `residual`: a certificate is as sound as they are. Of the problem's declaration only
-  the disturbance is read, and transitions and limits on observations are not; an input_error is refused. There are no observations and there is no
-  violation.
+  the disturbance is read, and transitions and limits on observations are not; an input_error is refused. There are no
+  observations and there is no violation.
   @param residual must outlive the certifier. Errors as above, for the other parts of the problem. */
   Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual);
 
@@ -103,8 +103,9 @@ class Certifier final {
   The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
   ends the run. After the horizon, the first step from whose slice no motion within the declared rates leads into the
   next slice (D, kBetween): the turn rate of `Problem::between` or a bound of `Problem::timing` contradicts the model
-  there, and would prove what is not so. Then the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then S (JudgeSafety): the
-  first sample or step t at which a limit or an obstacle fails. X_T is not tested against the domain.
+  there, and would prove what is not so. Then the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop,
+  step T). Then S (JudgeSafety): the first sample or step t at which a limit or an obstacle fails. X_T is not tested
+  against the domain.
   @param tube receives the slices. @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
   it, each with its own tube. */

@@ -41,14 +41,14 @@ class StepRate final {
   [[nodiscard]] bool IsProportional(int k) const { return is_proportional_[static_cast<std::size_t>(k)]; }
 
   /** Whether f0^0_k(z) = z_k, or f0^h_k(z) tends to it with h, by the form of the equations: a step of no duration
-  leaves state k where it is. Otherwise some number in the equations stands for the duration, and dt does not say how the
-  state moves. False also where the form does not show it. docs/soundness.md, 3.15, has the rules. */
+  leaves state k where it is. Otherwise some number in the equations stands for the duration, and dt does not say how
+  the state moves. False also where the form does not show it. docs/soundness.md, 3.15, has the rules. */
   [[nodiscard]] bool BeginsAtState(int k) const { return begins_at_state_[static_cast<std::size_t>(k)]; }
 
   /** q: one more than the order of the integrator, 2 for Euler, 3 for midpoint, 5 for rk4; and 2 for `next`. */
   [[nodiscard]] int power() const { return power_; }
-  /** (1 + share)^q - 1, rounded up: by so much of |r| + w^ may the residual and the disturbance of a step whose duration
-  differs from dt by `share` of it differ from those of dt. */
+  /** (1 + share)^q - 1, rounded up: by so much of |r| + w^ may the residual and the disturbance of a step whose
+  duration differs from dt by `share` of it differ from those of dt. */
   [[nodiscard]] double Growth(double share) const noexcept;
 
   /** The same for some states: Enclose leaves the others' entries alone. @param states n marks. */

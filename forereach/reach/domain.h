@@ -68,9 +68,9 @@ class DomainTest final {
   /** @param domain must outlive this object. @param input_error m entries, finite and not negative, or none: zeros. */
   explicit DomainTest(const Domain& domain, const Eigen::VectorXd& input_error = {});
 
-  /** FindExit for the box {(x, u) : |x - center| <= half_width, |u - input| <= input_error}. Plain arithmetic decides for a box that is inside
-  by a margin; directed rounding decides otherwise. @param center, half_width n entries; kMaxStates entries must be
-  readable.
+  /** FindExit for the box {(x, u) : |x - center| <= half_width, |u - input| <= input_error}. Plain arithmetic decides
+  for a box that is inside by a margin; directed rounding decides otherwise. @param center, half_width n entries;
+  kMaxStates entries must be readable.
   @param input m entries. */
   [[nodiscard]] FOREREACH_INLINE DomainExit FindExit(const double* center, const double* half_width,
                                                      std::span<const double> input) const noexcept {

@@ -92,12 +92,14 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing)
       continue;
     }
     const auto require = [&](bool is_said, const std::string& why) {
-      Require(is_said, "step error: how " + model.state_names()[i] + " moves with time is not in the model's equations, " +
-                           why + ": declare model.rate_bound, or say in model.set_at_steps that software sets it");
+      Require(is_said, "step error: how " + model.state_names()[i] +
+                           " moves with time is not in the model's equations, " + why +
+                           ": declare model.rate_bound, or say in model.set_at_steps that software sets it");
     };
     require(rate && rate->UsesDuration(k), "which do not use dt");
-    require(rate->BeginsAtState(k), "which with dt = 0 do not leave it as it is, so that some number in them holds for "
-                                    "one duration only");
+    require(rate->BeginsAtState(k),
+            "which with dt = 0 do not leave it as it is, so that some number in them holds for "
+            "one duration only");
     growth_once_[i] = rate->Growth(share);
     growth_twice_[i] = rate->Growth(MulUp(2, share));
     if (rate->IsProportional(k)) {

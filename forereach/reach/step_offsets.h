@@ -4,10 +4,10 @@ Boundary t is at the time s_t = s_0 + t dt + j_t, with j_0 = 0 and |j_t| <= E, s
     x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,
     |e| <= ((1 + |j_{t+1} - j_t| / dt)^q - 1) (|r| + w^):
 residual and disturbance change by no more than the power q of the duration does (StepRate::Growth). With d some double
-next to E g, j_t = E b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. Where the end of a state moves in
-proportion to the duration (StepRate::IsProportional), g = (f0(x_t, u_t) - x_t) / dt, which the step has bounded
-already. The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as the
-generator of b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step.
+next to E g, j_t = E b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. Where the end of a
+state moves in proportion to the duration (StepRate::IsProportional), g = (f0(x_t, u_t) - x_t) / dt, which the step has
+bounded already. The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as
+the generator of b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step.
 docs/soundness.md, 3.15. */
 #pragma once
 
@@ -42,8 +42,8 @@ struct StepSoFar {
   const StepError& error;
   const Remainder& remainder;
   const ResidualBounds& residual;
-  /** Upper bounds on w^ with what the errors of the inputs add to the residual, on what they add to f0, and on the sum of both; readable up to
-  kMaxStates. */
+  /** Upper bounds on w^ with what the errors of the inputs add to the residual, on what they add to f0, and on the sum
+  of both; readable up to kMaxStates. */
   const double *unexpected, *of_inputs, *disturbance;
   bool is_first;  ///< j_t = 0.
 };

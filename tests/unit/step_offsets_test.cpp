@@ -51,8 +51,8 @@ std::shared_ptr<const NominalModel> Equation(const std::string& of_x, Integrator
 
 // A number that was identified for steps of dt says nothing of others, whatever stands beside it.
 TEST(StepOffsets, AreRefusedWhereANumberHoldsForOneDurationOnly) {
-  for (const char* baked : {"c*x + dt*u", "c*x + (dt - dt)", "c*x + 1e-300*dt", "x + dt*((c - 1)*x/dt)", "x + c*v + dt*u",
-                            "x + dt*log(dt)*v", "x + dt*v/(v*dt)"})
+  for (const char* baked : {"c*x + dt*u", "c*x + (dt - dt)", "c*x + 1e-300*dt", "x + dt*((c - 1)*x/dt)",
+                            "x + c*v + dt*u", "x + dt*log(dt)*v", "x + dt*v/(v*dt)"})
     ExpectRefusedTiming(*Equation(baked), Off(), "do not leave it as it is");
   for (const char* said : {"x + dt*v", "v*dt + (x - dt*c*sin(x))", "x + dt*(v + dt/2*u)", "x + dt*(v + dt*dt*u/c)",
                            "x + v*c*(1 - exp(-dt/c))", "x + v/(2 + c)*(sin(x + v*dt) - sin(x))", "x + dt*dt/dt*v",
@@ -82,8 +82,9 @@ TEST(StepOffsets, CoverAResidualThatGrowsAsTheIntegratorsErrorDoes) {
     const Certifier certifier(std::make_shared<Problem>(problem));
     const Eigen::MatrixXd controls = Eigen::MatrixXd::Constant(1, 2, 10);
     Tube tube;
-    EXPECT_EQ(certifier.Certify({controls.data(), 1, 2, 1}, Zonotope::FromBox(Vec({0, 0}), Vec({0, 0})), {}, tube).outcome,
-              Outcome::kCertified);
+    EXPECT_EQ(
+        certifier.Certify({controls.data(), 1, 2, 1}, Zonotope::FromBox(Vec({0, 0}), Vec({0, 0})), {}, tube).outcome,
+        Outcome::kCertified);
     return std::pair(tube.hull(1, 0), tube.hull(2, 0));
   };
   const auto [first, second] = reach(Integrator::kEuler);
@@ -99,8 +100,8 @@ TEST(StepOffsets, CoverAResidualThatGrowsAsTheIntegratorsErrorDoes) {
 
 // x+ = x + u / 8, and u may be off by 1/2.
 Problem Driven(const Eigen::VectorXd& input_error) {
-  Problem problem = WorldOf(MakeTextModel(TextModel({{"x", "x + dt*u"}}, {"u"}, {{"dt", 0.125, 0.125}})), Within(Vec({5})),
-                            Within(Vec({2})));
+  Problem problem = WorldOf(MakeTextModel(TextModel({{"x", "x + dt*u"}}, {"u"}, {{"dt", 0.125, 0.125}})),
+                            Within(Vec({5})), Within(Vec({2})));
   problem.projection = Eigen::MatrixXd::Identity(1, 1);
   problem.transitions = {Eigen::MatrixXd::Zero(1, 2), Eigen::MatrixXd::Zero(1, 1)};
   problem.declaration.given_are_exact = true;
@@ -117,8 +118,8 @@ Driving Drive(const Problem& problem, double u, double half_width = 0) {
   const Certifier certifier(std::make_shared<Problem>(problem));
   const Eigen::MatrixXd controls = Eigen::MatrixXd::Constant(1, 8, u);
   Tube tube;
-  const Decision decision = certifier.Certify({controls.data(), 1, 8, 1},
-                                              Zonotope::FromBox(Vec({0}), Vec({half_width})), {}, tube);
+  const Decision decision =
+      certifier.Certify({controls.data(), 1, 8, 1}, Zonotope::FromBox(Vec({0}), Vec({half_width})), {}, tube);
   return {decision, tube.hull(tube.length(), 0)};
 }
 
