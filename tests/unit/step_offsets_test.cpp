@@ -12,6 +12,8 @@
 
 namespace forereach::step_offsets_test {
 
+using Integrator = ModelText::Integrator;
+
 // x' = v for 0.125 s, and u sets v at once.
 std::shared_ptr<const NominalModel> Cart() {
   return MakeTextModel(TextModel({{"x", "x + dt*v"}, {"v", "v + u"}}, {"u"}, {{"dt", 0.125, 0.125}}));
