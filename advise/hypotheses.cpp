@@ -1,8 +1,13 @@
 #include "advise/hypotheses.h"
 
+#include <algorithm>
+#include <ranges>
+
 #include <fmt/format.h>
 
 #include "forereach/certify/rates.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "task/step_time.h"
@@ -45,6 +50,23 @@ void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
                    "declared (model.angles); a transition that seems off by more than a quarter of a turn is refused"});
 }
 
+// What is assumed of a residual in a step that is off its time, where some state's rate is that of the equations.
+void AddGrowth(const Problem& problem, std::vector<Hypothesis>& all) {
+  const StepTiming& timing = problem.timing;
+  const auto follows_equations = [&](int k) {
+    return std::ranges::count(timing.set_at_steps, k) == 0 &&
+           !(timing.rate_bound.size() > 0 && timing.rate_bound[k] < kInfinity);
+  };
+  const auto states = std::views::iota(0, problem.model->num_states());
+  if (timing.error == 0 || std::ranges::none_of(states, follows_equations)) return;
+  all.push_back(
+      {fmt::format("in a step of duration h what the model does not know differs from that of dt by at most "
+                   "((1 + |h - dt|/dt)^{} - 1) of its bounds",
+                   RateOf(*problem.model)->power()),
+       "declared by robot.step_error_ms: no part of the residual is larger than their sum and cancelled at dt; "
+       "model.rate_bound instead says nothing of it"});
+}
+
 void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
   const StepTiming& timing = config.problem->timing;
   if (const auto error = StepErrorUs(config.gate); error && *error > 0)
@@ -55,6 +77,7 @@ void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
     all.push_back(
         {"steps are on time", error ? "the guard, which ends the plan at one that is not"
                                     : "nobody: robot.step_error_ms is not given, or any, so no clock is looked at"});
+  AddGrowth(*config.problem, all);
   std::string set;
   for (const int k : timing.set_at_steps)
     set += (set.empty() ? "" : ", ") + config.problem->model->state_names()[ToSize(k)];
@@ -93,7 +116,11 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
        WhoRefutesStateError(config)},
       {"the first state lies in X0",
        "the guard, which starts a plan only if all of the measured state +- its error does"},
-      {"the robot applies the plan's controls, one a step", "the guard, which hands out no others"}};
+      {declaration.input_error.isZero(0) ? "the robot applies the plan's controls, one a step"
+                                         : "the robot applies the plan's controls, one a step, off by at most " +
+                                               Bounds(model.input_names(), declaration.input_error),
+       declaration.input_error.isZero(0) ? "the guard, which hands out no others"
+                                         : "the guard, which hands out no others, and declaration.input_error"}};
   AddTimes(config, all);
   if (StepErrorUs(config.gate))
     all.push_back({"the robot's clock runs true while a plan is executed",

@@ -22,9 +22,14 @@ namespace {
 
 class ModelTarget final : public Target {
  public:
-  ModelTarget(std::shared_ptr<const NominalModel> model, StepTiming timing, std::optional<TextFunction> residual)
+  ModelTarget(std::shared_ptr<const NominalModel> model, StepTiming timing, std::optional<TextFunction> residual,
+              std::uint64_t seed)
       : model_(std::move(model)), timing_(std::move(timing)), residual_(std::move(residual)) {
-    if (timing_.error > 0) rate_.emplace(TextOf(*model_).value());
+    if (timing_.error <= 0) return;
+    rate_.emplace(TextOf(*model_).value());
+    std::mt19937_64 random(seed ^ 0x706f776572);
+    for (int k = 0; k < model_->num_states(); ++k)
+      powers_.push_back(1 + static_cast<int>(random() % static_cast<std::uint64_t>(rate_->power())));
   }
 
   void Step(std::span<const double> x, std::span<const double> u, std::span<double> next,
@@ -44,7 +49,8 @@ class ModelTarget final : public Target {
     rate_.value().Enclose({point.data(), z.size()}, dt, std::span(rate).first(next.size()));
     for (std::size_t k = 0; k < next.size(); ++k)
       if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) == 0)
-        next[k] += longer * (rate[k].Middle() + static_cast<double>(residual[k]) / dt);
+        next[k] +=
+            longer * rate[k].Middle() + (std::pow(1 + longer / dt, powers_[k]) - 1) * static_cast<double>(residual[k]);
   }
 
  private:
@@ -52,6 +58,7 @@ class ModelTarget final : public Target {
   StepTiming timing_;
   std::optional<TextFunction> residual_;
   std::optional<StepRate> rate_;
+  std::vector<int> powers_;  // of the duration, by which each state's residual grows
 };
 
 TextFunction FunctionOf(const ParametricResidual& residual, const NominalModel& model) {
@@ -101,7 +108,8 @@ std::unique_ptr<Target> MakeTarget(const Config& config) {
   } catch (const std::invalid_argument& error) {
     throw ConfigError(config.path + ": robot.residual: " + config.robot_residual->name + ": " + error.what());
   }
-  return std::make_unique<ModelTarget>(config.problem->model, config.problem->timing, std::move(residual));
+  return std::make_unique<ModelTarget>(config.problem->model, config.problem->timing, std::move(residual),
+                                       static_cast<std::uint64_t>(config.robot.disturbance_seed));
 }
 
 Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,

@@ -23,8 +23,9 @@ class Target {
   virtual ~Target() = default;
 
   /** Sets `next` to x+. @param x n entries. @param u m entries. @param next n entries; it may be x itself. @param
-  longer how much longer than dt the step lasts, s: the state moves on by the rate of the model and the residual in
-  proportion, as Problem::timing allows; 0 where its error is 0. */
+  longer how much longer than dt the step lasts, s: the state moves on by the rate of the model, and the residual grows
+  with a power of the duration, from 1 to the highest that docs/soundness.md, 3.15, allows; 0 where the timing's error
+  is 0. The powers of the states are drawn by robot.disturbance_seed. */
   virtual void Step(std::span<const double> x, std::span<const double> u, std::span<double> next,
                     double longer = 0) const = 0;
 };

@@ -119,7 +119,7 @@ void FillStanding(TaskDraft& draft) {
 
 // The errors that StepOffsets allows, with the key's name.
 void RequireSteps(const Document& file, const Problem& problem) try {
-  static_cast<void>(StepOffsets(*problem.model, problem.timing, problem.declaration.disturbance));
+  static_cast<void>(StepOffsets(*problem.model, problem.timing));
 } catch (const std::invalid_argument& error) {
   file.Fail("robot.step_error_ms", error.what());
 }

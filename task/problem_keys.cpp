@@ -124,9 +124,10 @@ std::vector<Key> DeclarationKeys() {
       "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,
       "e by names: each state that is recorded differs from the true one by at most this, before a step and after it. "
       "What it makes of f0 and the residual is derived; noise_bound is for other errors of the successor.");
-  const auto input_error =
-      ErrorKeys("input", Size::kInputs, &Declaration::input_error, &SchemaScope::inputs,
-                "The same of each input: how far the one that is recorded may be off the one that acted.");
+  const auto input_error = ErrorKeys(
+      "input", Size::kInputs, &Declaration::input_error, &SchemaScope::inputs,
+      "The same of each input: how far the one that is recorded, or that the plan gives, may be off the one that "
+      "acted.");
   return {
       Required(Map("declaration", "The bounds on the residual.")),
       Required(Map("declaration.lipschitz",

@@ -193,8 +193,12 @@ class SliceCheck {
   void CheckLimits() {
     if (problem_.limits.empty()) return;
     std::vector<Real> input(ToSize(problem_.model->num_inputs()));
-    for (std::size_t l = 0; step_ && l < input.size(); ++l)
-      input[l] = certificate_.controls(static_cast<Eigen::Index>(l), t_);
+    for (std::size_t l = 0; step_ && l < input.size(); ++l) {
+      const auto i = static_cast<Eigen::Index>(l);
+      const Real planned(certificate_.controls(i, t_)),
+          error(problem_.declaration.VariableError(slice_.dim() + static_cast<int>(l)));
+      input[l] = Real::FromTo(planned - error, planned + error);
+    }
     const std::vector<Enclosed> functions = functions_.limits.Over(slice_, input);
     for (std::size_t i = 0; i < functions.size() && !failure_; ++i) {
       if (!step_ && functions_.limits.UsesInput(i)) continue;

@@ -34,6 +34,13 @@ Real WithoutTurns(const Real& observed, const Real& error) {
   return CertainlyAtMost(abs(nearest) + error, Real(0.25) * turn) ? nearest : Real::Everything();
 }
 
+// One more than the order of the integrator, and 2 for the next state itself.
+int PowerOf(const NominalModel& model) {
+  const std::optional<ModelText> text = TextOf(model);
+  if (text && text->integrator == ModelText::Integrator::kMidpoint) return 3;
+  return text && text->integrator == ModelText::Integrator::kRk4 ? 5 : 2;
+}
+
 bool IsZeroColumn(const std::vector<Real>& column) {
   return std::ranges::all_of(column, [](const Real& entry) { return entry.IsZero(); });
 }
@@ -347,14 +354,18 @@ struct TubeMaker::Query {
   int t;
   const Slice& slice;
   std::vector<Real> center, half_width, hull;
+  std::vector<Real> acted;  // the hull, with all inputs that may act
 
-  Query(int step, const Slice& set, const Eigen::VectorXd& input) : t(step), slice(set), center(set.center) {
+  Query(int step, const Slice& set, const Eigen::VectorXd& input, const std::vector<Real>& input_error)
+      : t(step), slice(set), center(set.center) {
     for (int k = 0; k < set.dim(); ++k) half_width.push_back(set.HalfWidth(k));
     for (const double u : input) {
       center.emplace_back(u);
       half_width.emplace_back();
     }
-    hull = Box(Real(1.0));
+    hull = acted = Box(Real(1.0));
+    const std::size_t n = slice.center.size();
+    for (std::size_t l = 0; l < input_error.size(); ++l) acted[n + l] = Around(center[n + l], input_error[l]);
   }
 
   /** The hull scaled about its center. */
@@ -372,10 +383,23 @@ struct TubeMaker::Offset {
 };
 
 TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method method)
-    : problem_(problem), equations_(equations), method_(method), remainder_rounding_(RemainderRounding()) {
+    : problem_(problem),
+      equations_(equations),
+      method_(method),
+      input_error_(ToSize(problem.model->num_inputs())),
+      power_(PowerOf(*problem.model)),
+      remainder_rounding_(RemainderRounding()) {
+  std::ranges::copy(problem.declaration.input_error, input_error_.begin());
   const Transitions& data = problem.transitions;
   disturbance_.resize(ToSize(problem.model->num_states()));
   std::ranges::copy(problem.declaration.disturbance, disturbance_.begin());
+  unexpected_ = disturbance_;
+  for (std::size_t k = 0; k < unexpected_.size(); ++k)
+    for (std::size_t l = 0; l < input_error_.size(); ++l)
+      if (!input_error_[l].IsZero())
+        unexpected_[k] += Real(problem.declaration.lipschitz(static_cast<Eigen::Index>(k),
+                                                             static_cast<Eigen::Index>(unexpected_.size() + l))) *
+                          input_error_[l];
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
@@ -465,13 +489,39 @@ std::vector<Real> TubeMaker::RecordErrors(const std::vector<Real>& z) const {
   return errors;
 }
 
-// A step that lasted by up to delta longer or shorter: what that moved the state, and delta / dt of r + w, where |r| is
-// at most what is seen of it, what hides it, and that share itself.
+// (1 + share)^q - 1 = share (1 + (1 + share) + ... + (1 + share)^(q - 1)).
+Real TubeMaker::Growth(const Real& share) const {
+  Real power(1.0), sum;
+  for (int i = 0; i < power_; ++i) {
+    sum += power;
+    power = power * (Real(1.0) + share);
+  }
+  return share * sum;
+}
+
+// What inputs that are off by their errors add to f0: the largest slopes over all that may act, times the errors. Not
+// finite where f0 has no bound there.
+std::vector<Real> TubeMaker::InputSpread(const Query& query) const {
+  const std::size_t n = query.slice.center.size();
+  std::vector<Real> spread(n);
+  if (std::ranges::all_of(input_error_, [](const Real& error) { return error.IsZero(); })) return spread;
+  const std::vector<Real> values = equations_.Value(query.acted);
+  for (std::size_t k = 0; k < n; ++k)
+    if (!values[k].IsFinite()) spread[k] = Real::Everything();
+  for (const auto& [output, variable, slope] : equations_.First(query.acted))
+    if (const std::size_t l = ToSize(variable); l >= n && !input_error_[l - n].IsZero())
+      spread[ToSize(output)] += slope.IsFinite() ? slope.magnitude() * input_error_[l - n] : Real::Everything();
+  return spread;
+}
+
+// A step that lasted by up to delta longer or shorter: what that moved the state, and the growth of r + w, where |r| is
+// at most what is seen of it, what hides it, and that growth itself. Of an angle it must not hide three quarters of a
+// turn.
 void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                             std::vector<Real>& errors) const {
   if (problem_.transitions.Longer(i) == 0) return;
   const Declaration& declaration = problem_.declaration;
-  const Real longer(problem_.transitions.Longer(i)), dt(StepOf(*problem_.model)), share = longer / dt;
+  const Real longer(problem_.transitions.Longer(i)), dt(StepOf(*problem_.model)), growth = Growth(longer / dt);
   std::vector<Real> box;
   for (std::size_t l = 0; l < z.size(); ++l)
     box.push_back(Around(z[l], Real(declaration.VariableError(static_cast<Eigen::Index>(l)))));
@@ -490,10 +540,13 @@ void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector
     const Real seen = is_angle && difference.IsFinite() ? WithoutTurns(difference, errors[k]) : difference;
     const Real moved = longer * rate[k].magnitude(),
                unit(is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next));
-    const Real hidden =
-        errors[k] + unit + Real(declaration.noise_bound[row]) + disturbance_[k] + moved + share * disturbance_[k];
-    const Real most = (seen.magnitude() + hidden) / (Real(1.0) - share);
-    errors[k] += rate[k].IsFinite() ? moved + share * (most + disturbance_[k]) : Real::Everything();
+    const Real off = unit + Real(declaration.noise_bound[row]) + disturbance_[k];
+    const Real hidden = errors[k] + off + moved + growth * disturbance_[k];
+    const Real most = (seen.magnitude() + hidden) / (Real(1.0) - growth);
+    const Real turned = errors[k] + moved + growth * (Real(1.5) * Real::Pi() + off + disturbance_[k]);
+    const bool is_told = !is_angle || (difference.IsFinite() && WithoutTurns(difference, turned).IsFinite());
+    const bool is_known = rate[k].IsFinite() && CertainlyBelow(growth, Real(1.0)) && is_told;
+    errors[k] += is_known ? moved + growth * (most + disturbance_[k]) : Real::Everything();
   }
 }
 
@@ -525,14 +578,16 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
       slice = SliceOf((*options.follow)[ToSize(t)]);
       slice.offset = tube.recorded_offsets.back();
     }
-    tube.failure = Advance(tube, Query(t, slice, controls.col(t)), options);
+    tube.failure = Advance(tube, Query(t, slice, controls.col(t), input_error_), options);
   }
   return tube;
 }
 
 std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const TubeOptions& options) const {
   const int n = query.slice.dim();
-  if (const auto failure = LeavesDomain(query.t, query.center, query.half_width)) return failure;
+  std::vector<Real> reach = query.half_width;
+  for (std::size_t l = 0; l < input_error_.size(); ++l) reach[ToSize(n) + l] += input_error_[l];
+  if (const auto failure = LeavesDomain(query.t, query.center, reach)) return failure;
   const auto no_bound = [&](const std::string& what) {
     return Failure{query.t, what + " has no finite enclosure", "", ""};
   };
@@ -549,7 +604,8 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   }
 
   const RecordedSet* const recorded = options.follow ? &(*options.follow)[tube.slices.size()] : nullptr;
-  const Offset offset = OffsetOf(query, step, recorded);
+  const std::vector<Real> input_spread = InputSpread(query);
+  const Offset offset = OffsetOf(query, step, input_spread, recorded);
   std::vector<Real> slack(ToSize(n));
   Slice next = Image(query, offset, slack);
   const Real half(0.5);
@@ -563,7 +619,9 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real h = half * abs(upper - lower) + disturbance_[ToSize(k)] + offset.spread[ToSize(k)]; !h.IsZero())
+    if (const Real h =
+            half * abs(upper - lower) + unexpected_[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
+        !h.IsZero())
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }
@@ -588,10 +646,11 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
 }
 
 // d x+ / d dt over the slice. Where x+ - x is in proportion to the duration it is (x+ - x) / dt, with x+ - x in
-// f0(c) - c + (J - I) G b + remainder; elsewhere it is over the hull.
-std::vector<Real> TubeMaker::Rates(const Query& query, const std::vector<Bounds>& remainder) const {
+// f0(c) - c + (J - I) G b + remainder and what the inputs' errors add; elsewhere it is over the hull.
+std::vector<Real> TubeMaker::Rates(const Query& query, const std::vector<Bounds>& remainder,
+                                   const std::vector<Real>& input_spread) const {
   const Real dt(StepOf(*problem_.model)), most = Real(2.0) * Real(problem_.timing.error);
-  std::vector<Real> rate = equations_.Rate(query.hull, Around(dt, most)), moved = equations_.Value(query.center);
+  std::vector<Real> rate = equations_.Rate(query.acted, Around(dt, most)), moved = equations_.Value(query.center);
   const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
   std::vector<Real> spread(rate.size());
   for (const std::vector<Real>& column : query.slice.columns) {
@@ -603,20 +662,23 @@ std::vector<Real> TubeMaker::Rates(const Query& query, const std::vector<Bounds>
   }
   for (std::size_t k = 0; k < rate.size(); ++k)
     if (equations_.IsProportional(static_cast<int>(k)))
-      rate[k] =
-          Around(moved[k] - query.center[k] + Real::FromTo(remainder[k].lower, remainder[k].upper), spread[k]) / dt;
+      rate[k] = Around(moved[k] - query.center[k] + Real::FromTo(remainder[k].lower, remainder[k].upper),
+                       spread[k] + input_spread[k]) /
+                dt;
   return rate;
 }
 
 // Any d is sound, since what it differs from E g counts as spread: the record's is the one by which its slices hold.
-TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, const RecordedSet* recorded) const {
+TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, const std::vector<Real>& input_spread,
+                                      const RecordedSet* recorded) const {
   const std::vector<Bounds>& envelope = step.envelope;
   const std::size_t n = envelope.size();
   Offset offset{std::vector<Real>(n), std::vector<Real>(n)};
   const StepTiming& timing = problem_.timing;
   if (timing.error == 0) return offset;
   const Real error(timing.error), dt(StepOf(*problem_.model)), ends(query.t == 0 ? 1.0 : 2.0);
-  const std::vector<Real> rate = Rates(query, step.remainder);
+  const std::vector<Real> rate = Rates(query, step.remainder, input_spread);
+  const Real growth = Growth(ends * error / dt);
   const auto is_set = [&](std::size_t k) { return std::ranges::count(timing.set_at_steps, static_cast<int>(k)) > 0; };
   const auto declared = [&](std::size_t k) {
     return timing.rate_bound.size() > 0 ? timing.rate_bound[static_cast<Eigen::Index>(k)] : kNone;
@@ -632,8 +694,8 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
     } else if (declared(k) < kNone) {
       offset.spread[k] = ends * (error * Real(declared(k)) + abs(offset.column[k]));
     } else {
-      const Real unexpected = max(abs(envelope[k].lower), abs(envelope[k].upper)) + disturbance_[k];
-      offset.spread[k] = ends * ((moved[k] - offset.column[k]).magnitude() + error * unexpected / dt);
+      const Real unexpected = max(abs(envelope[k].lower), abs(envelope[k].upper)) + unexpected_[k];
+      offset.spread[k] = ends * (moved[k] - offset.column[k]).magnitude() + growth * unexpected;
     }
   }
   return offset;

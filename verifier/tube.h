@@ -3,7 +3,7 @@ and (set-envelope), implemented directly. It shares data types with the certifie
 
 For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h + w)] >,
 with w the declared bound on the disturbance. It counts twice, for different steps: an observation's r~_i differs from
-r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. */
+r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So is it by inputs that are off. */
 #pragma once
 
 #include <limits>
@@ -118,22 +118,29 @@ class TubeMaker final {
   [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,
                                                     const std::vector<Real>& half_width) const;
   [[nodiscard]] std::vector<Real> RecordErrors(const std::vector<Real>& z) const;
+  [[nodiscard]] Real Growth(const Real& share) const;
+  [[nodiscard]] std::vector<Real> InputSpread(const Query& query) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                    std::vector<Real>& errors) const;
   struct Offset;
-  [[nodiscard]] std::vector<Real> Rates(const Query& query, const std::vector<Bounds>& remainder) const;
-  [[nodiscard]] Offset OffsetOf(const Query& query, const Step& step, const RecordedSet* recorded) const;
+  [[nodiscard]] std::vector<Real> Rates(const Query& query, const std::vector<Bounds>& remainder,
+                                        const std::vector<Real>& input_spread) const;
+  [[nodiscard]] Offset OffsetOf(const Query& query, const Step& step, const std::vector<Real>& input_spread,
+                                const RecordedSet* recorded) const;
   [[nodiscard]] Slice Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;
   const Equations& equations_;
   Method method_;
-  /** The declared disturbance, one entry for each state. */
-  std::vector<Real> disturbance_;
+  /** The declared disturbance, one entry for each state; the errors of the inputs; and the disturbance with what these
+  add to the residual. */
+  std::vector<Real> disturbance_, input_error_, unexpected_;
+  /** By this power of a step's duration grows what the model does not know. */
+  int power_;
   /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
   included; e_ik is what the declared errors of the record may add. [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;

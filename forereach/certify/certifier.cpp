@@ -185,7 +185,8 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
       propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
-                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {
+                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing,
+                  ActedInputs(problem_->declaration)) {
   TestRates();
 }
 
@@ -195,7 +196,10 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       limits_(*problem_),
       rates_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
-                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {}
+                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {
+  forereach::Require(problem_->declaration.input_error.isZero(0),
+                     "declaration: input_error counts by lipschitz, which does not bound a residual of another kind");
+}
 
 Learned Certifier::Learn(std::span<const double> z, std::span<const double> next, double longer,
                          std::optional<double> by_clock) {

@@ -47,7 +47,8 @@ std::string Explain(Learned learned) {
     case Learned::kNearTheEdge:
       return "within the declared errors of states and inputs it may lie outside the certification domain";
     case Learned::kNoNominalSlope:
-      return "the nominal model has no finite derivative within the declared errors of states and inputs there";
+      return "the nominal model has no finite derivative within the declared errors of states and inputs there, or the "
+             "step was so far off its time that nothing bounds the residual";
     case Learned::kNoNominalValue: return "the nominal model has no finite value there";
     case Learned::kAmbiguousAngle:
       return "an angle is more than a quarter of a turn away from the nominal model's, so its turns cannot be told";

@@ -48,7 +48,10 @@ std::optional<TextEnclosure> FunctionsOf(const Problem& problem) {
 }  // namespace
 
 LimitTest::LimitTest(const Problem& problem)
-    : limits_(Validated(problem.limits)), num_inputs_(problem.model->num_inputs()), functions_(FunctionsOf(problem)) {}
+    : limits_(Validated(problem.limits)),
+      num_inputs_(problem.model->num_inputs()),
+      input_error_(problem.declaration.input_error.begin(), problem.declaration.input_error.end()),
+      functions_(FunctionsOf(problem)) {}
 
 // Visits the range of each limit's function at sample t, until the visitor says that it is enough. After the last
 // sample no input is applied, so functions of an input have no value there.
@@ -60,7 +63,7 @@ void LimitTest::ForEach(const Plan& plan, const Tube& tube, int t, Visit visit) 
   std::array<AffineEnclosure, kMaxLimits> values;
   functions_->Enclose(slice.center(), tube.half_width(t),
                       is_last ? std::span(kNoInput.data(), ToSize(num_inputs_)) : plan.input(t),
-                      {values.data(), limits_.size()});
+                      {values.data(), limits_.size()}, input_error_);
   for (std::size_t i = 0; i < limits_.size(); ++i)
     if (!(is_last && functions_->UsesInput(static_cast<int>(i))) && visit(i, RangeOver(slice, values[i]))) return;
 }

@@ -37,6 +37,7 @@ class LimitTest final {
 
   std::vector<Limit> limits_;
   int num_inputs_;
+  std::vector<double> input_error_;         // of the inputs that act; none where they are exact
   std::optional<TextEnclosure> functions_;  // none without limits
 };
 

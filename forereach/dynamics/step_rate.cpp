@@ -87,9 +87,125 @@ class Scaling final {
   std::vector<Degree> degree_;
 };
 
+// What is left of each node of a program in a step of no duration, h = 0: a number, or a node without h that it equals.
+// docs/soundness.md, 3.15.
+class WithoutDuration final {
+ public:
+  WithoutDuration(const Program& program, int h) : program_(program) {
+    for (int i = 0; i < program.size; ++i) {
+      const Operation& n = program.node(i);
+      uses_h_.push_back(n.op == Op::kParameter ? n.a == h
+                                               : (n.has_first() && Uses(n.a)) || (n.has_second() && Uses(n.b)));
+      left_.push_back(Uses(i) ? LeftOf(n) : n.op == Op::kConstant ? Left{i, n.constant} : Left{i, {}});
+      is_finite_.push_back(!Uses(i) || left_[ToSize(i)].IsKnown() || StaysFinite(n));
+    }
+  }
+
+  [[nodiscard]] bool Uses(int node) const { return uses_h_[ToSize(node)]; }
+
+  // Whether the node is z_k.
+  [[nodiscard]] bool IsVariable(int node, int k) const {
+    const int same = left_[ToSize(node)].node;
+    return same >= 0 && program_.node(same) == Operation{Op::kVariable, k, -1, 0};
+  }
+
+ private:
+  struct Left {
+    int node = -1;
+    std::optional<double> number;
+
+    [[nodiscard]] bool IsKnown() const { return node >= 0 || number; }
+    [[nodiscard]] bool Is(double value) const { return number == value; }
+  };
+
+  [[nodiscard]] Left LeftOf(const Operation& n) const {
+    const Left none, zero{-1, 0}, a = n.has_first() ? left_[ToSize(n.a)] : none,
+                                  b = n.has_second() ? left_[ToSize(n.b)] : none;
+    switch (n.op) {
+      case Op::kParameter: return zero;
+      case Op::kAdd: return a.Is(0) ? b : b.Is(0) ? a : Same(n, a, b);
+      case Op::kSubtract:
+        if (b.Is(0)) return a;
+        return (a.node >= 0 && a.node == b.node) || (a.number && a.number == b.number) ? zero : Same(n, a, b);
+      case Op::kMultiply:
+        if ((a.Is(0) && is_finite_[ToSize(n.b)]) || (b.Is(0) && is_finite_[ToSize(n.a)])) return zero;
+        return a.Is(1) ? b : b.Is(1) ? a : Same(n, a, b);
+      case Op::kDivide:
+        if (a.Is(0) && !Uses(n.b)) return zero;
+        return b.Is(1) ? a : Same(n, a, b);
+      case Op::kPower: return a.Is(0) && n.b > 0 ? zero : Same(n, a, b);
+      case Op::kCos:
+      case Op::kExp: return a.Is(0) ? Left{-1, 1} : Same(n, a, b);
+      case Op::kNegate:
+      case Op::kSquare:
+      case Op::kSin:
+      case Op::kTan:
+      case Op::kSqrt:
+      case Op::kAsin:
+      case Op::kAtan:
+      case Op::kTanh:
+      case Op::kAbs:
+      case Op::kSignedSquare: return a.Is(0) ? zero : Same(n, a, b);
+      default: return Same(n, a, b);
+    }
+  }
+
+  // The same operation on what is left of its operands, where the program has it.
+  [[nodiscard]] Left Same(const Operation& n, const Left& a, const Left& b) const {
+    constexpr std::size_t kMostNodes = 4096;  // the search is quadratic
+    if (a.node < 0 || (n.has_second() && b.node < 0) || program_.nodes.size() > kMostNodes) return {};
+    for (int i = 0; i < program_.size; ++i) {
+      const Operation& other = program_.node(i);
+      const bool is_same_second = !n.has_second() || other.b == b.node;  // of a cosine b is no operand
+      if (other.op == n.op && other.a == a.node && is_same_second && (n.op != Op::kPower || other.b == n.b))
+        return {i, {}};
+    }
+    return {};
+  }
+
+  // Whether the operation has a value wherever its operands have one.
+  [[nodiscard]] bool StaysFinite(const Operation& n) const {
+    if (!is_finite_[ToSize(n.a)] || (n.has_second() && !is_finite_[ToSize(n.b)])) return false;
+    switch (n.op) {
+      case Op::kAdd:
+      case Op::kSubtract:
+      case Op::kMultiply:
+      case Op::kNegate:
+      case Op::kSquare:
+      case Op::kSin:
+      case Op::kCos:
+      case Op::kExp:
+      case Op::kAtan:
+      case Op::kTanh:
+      case Op::kAbs:
+      case Op::kSignedSquare:
+      case Op::kMin:
+      case Op::kMax: return true;
+      case Op::kPower: return n.b > 0;
+      case Op::kDivide: return !Uses(n.b);
+      default: return false;
+    }
+  }
+
+  const Program& program_;
+  std::vector<bool> uses_h_;
+  std::vector<Left> left_;
+  std::vector<bool> is_finite_;
+};
+
+int PowerOf(ModelText::Integrator integrator) {
+  switch (integrator) {
+    case ModelText::Integrator::kMidpoint: return 3;
+    case ModelText::Integrator::kRk4: return 5;
+    case ModelText::Integrator::kNone:
+    case ModelText::Integrator::kEuler: break;
+  }
+  return 2;
+}
+
 }  // namespace
 
-StepRate::StepRate(const ModelText& text) {
+StepRate::StepRate(const ModelText& text) : power_(PowerOf(text.integrator)) {
   const auto dt = std::ranges::find(text.parameters, "dt", &ModelText::Parameter::name);
   if (dt == text.parameters.end()) throw std::invalid_argument("model " + text.name + ": there is no parameter dt");
   dt_ = ToSize(dt - text.parameters.begin());
@@ -98,11 +214,19 @@ StepRate::StepRate(const ModelText& text) {
                      static_cast<int>(names.states.size() + names.inputs.size()));
   const Symbol h = Symbol::Parameter(draft, static_cast<int>(dt_));
   const std::vector<Symbol> end = EndOf(text, names, h, draft);
+  const std::vector<Symbol> equations = ValuesAt(StatesOf(draft), names, text.equations, draft);
   SetValues(end, draft);
   const Program step = draft.View();
   const Scaling scaling(step, static_cast<int>(dt_));
-  for (std::size_t k = 0; k < end.size(); ++k)
-    is_proportional_.push_back(scaling.IsProportional(end[k].node(), static_cast<int>(k)));
+  const WithoutDuration without(step, static_cast<int>(dt_));
+  // x + h f with f finite where it is finite at all.
+  const bool is_integrated = text.integrator != ModelText::Integrator::kNone &&
+                             std::ranges::none_of(equations, [&](const Symbol& f) { return without.Uses(f.node()); });
+  for (std::size_t k = 0; k < end.size(); ++k) {
+    const int node = end[k].node(), state = static_cast<int>(k);
+    is_proportional_.push_back(scaling.IsProportional(node, state));
+    begins_at_state_.push_back(is_integrated || is_proportional_.back() || without.IsVariable(node, state));
+  }
   draft.DifferentiateBy(static_cast<int>(dt_));
   program_ = std::make_shared<const ProgramDraft>(std::move(draft));
   const Program program = program_->View();
@@ -110,6 +234,12 @@ StepRate::StepRate(const ModelText& text) {
     uses_duration_.push_back(!(program.node(node) == Operation{Op::kConstant, -1, -1, 0}));
   Need(std::vector<unsigned char>(end.size(), 1));
   for (const auto& [name, lower, upper] : text.parameters) parameters_.emplace_back(lower, upper);
+}
+
+double StepRate::Growth(double share) const noexcept {
+  double growth = 0;  // (1 + growth)(1 + share) - 1
+  for (int i = 0; i < power_; ++i) growth = AddUp(AddUp(growth, share), MulUp(growth, share));
+  return growth;
 }
 
 StepRate StepRate::Of(std::span<const unsigned char> states) const {

@@ -3,7 +3,7 @@ d dt, enclosed over boxes.
 
 With f0^h the step of duration h, f0^(dt + delta)(z) - f0^dt(z) = delta g for some g in d f0^h(z) / d h, |h - dt| <=
 |delta|. For an Euler step this is the rate x' itself; for midpoint, Runge-Kutta and `next` it is derived from the text
-of the step. */
+of the step. What the model does not know grows with a power of the duration: Growth. */
 #pragma once
 
 #include <memory>
@@ -40,6 +40,17 @@ class StepRate final {
   f0^h_k(z) = z_k + h / dt (f0_k(z) - z_k), as in an Euler step. docs/soundness.md, 3.15, has the rules. */
   [[nodiscard]] bool IsProportional(int k) const { return is_proportional_[static_cast<std::size_t>(k)]; }
 
+  /** Whether f0^0_k(z) = z_k, or f0^h_k(z) tends to it with h, by the form of the equations: a step of no duration
+  leaves state k where it is. Otherwise some number in the equations stands for the duration, and dt does not say how
+  the state moves. False also where the form does not show it. docs/soundness.md, 3.15, has the rules. */
+  [[nodiscard]] bool BeginsAtState(int k) const { return begins_at_state_[static_cast<std::size_t>(k)]; }
+
+  /** q: one more than the order of the integrator, 2 for Euler, 3 for midpoint, 5 for rk4; and 2 for `next`. */
+  [[nodiscard]] int power() const { return power_; }
+  /** (1 + share)^q - 1, rounded up: by so much of |r| + w^ may the residual and the disturbance of a step whose
+  duration differs from dt by `share` of it differ from those of dt. */
+  [[nodiscard]] double Growth(double share) const noexcept;
+
   /** The same for some states: Enclose leaves the others' entries alone. @param states n marks. */
   [[nodiscard]] StepRate Of(std::span<const unsigned char> states) const;
 
@@ -55,7 +66,8 @@ class StepRate final {
   std::vector<unsigned char> needed_;
   std::vector<Interval> parameters_;
   std::size_t dt_ = 0;  // its place among the parameters
-  std::vector<bool> uses_duration_, is_proportional_;
+  std::vector<bool> uses_duration_, is_proportional_, begins_at_state_;
+  int power_;
 };
 
 }  // namespace forereach

@@ -44,15 +44,19 @@ TextEnclosure::TextEnclosure(const ExpressionNames& names, std::span<const Expre
   for (const auto& [name, lower, upper] : names.parameters) parameters_.emplace_back(lower, upper);
 }
 
+// An input that is an interval counts as a parameter that is one does: all of this holds for each of its values.
 // The slope is some double in the derivative's interval. What the derivative differs from it counts as offset, and so
 // does the remainder. A state that is a point adds nothing, whatever the derivatives.
 void TextEnclosure::Enclose(std::span<const double> center, std::span<const double> half_width,
-                            std::span<const double> input, std::span<AffineEnclosure> values) const noexcept {
+                            std::span<const double> input, std::span<AffineEnclosure> values,
+                            std::span<const double> input_error) const noexcept {
   const Program program = program_->View();
   const std::size_t n = center.size();
   std::array<Interval, kMaxVariables> box;
   std::ranges::copy(center, box.begin());
   std::ranges::copy(input, box.begin() + static_cast<std::ptrdiff_t>(n));
+  for (std::size_t l = 0; l < input_error.size(); ++l)
+    if (input_error[l] != 0) box[n + l] += Around(input_error[l]);
   const std::span<const Interval> z(box.data(), n + input.size());
   const std::span all(FOREREACH_ON_STACK(Interval, program.size), ToSize(program.size));
   const std::span<const Interval> parameters(parameters_);

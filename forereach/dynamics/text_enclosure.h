@@ -37,11 +37,12 @@ class TextEnclosure final {
   /** Whether expression k names an input, itself or through a definition. */
   [[nodiscard]] bool UsesInput(int k) const { return uses_input_[ToSize(k)]; }
 
-  /** Encloses every expression over the box {x : |x - center| <= half_width} for one input, and for all values of the
-  parameters. @param center, half_width n entries, finite and not negative. @param input m entries. @param values
+  /** Encloses every expression over the box {x : |x - center| <= half_width} for one input, or for all that are within
+  its error, and for all values of the parameters. @param center, half_width n entries, finite and not negative.
+  @param input m entries. @param input_error m entries, finite and not negative, or none: zeros. @param values
   num_values() entries. Cost O(operations); it allocates nothing. */
   void Enclose(std::span<const double> center, std::span<const double> half_width, std::span<const double> input,
-               std::span<AffineEnclosure> values) const noexcept;
+               std::span<AffineEnclosure> values, std::span<const double> input_error = {}) const noexcept;
 
  private:
   std::shared_ptr<const ProgramDraft> program_;

@@ -81,7 +81,7 @@ bool Domain::Contains(std::span<const double> z) const noexcept {
   return FindExit(*this, {point.data(), z.size()}).kind == DomainExit::Kind::kNone;
 }
 
-DomainTest::DomainTest(const Domain& domain)
+DomainTest::DomainTest(const Domain& domain, const Eigen::VectorXd& input_error)
     : domain_(domain),
       num_states_(ToSize(domain.state.dim())),
       size_(num_states_ + ToSize(domain.input.dim())),
@@ -90,6 +90,12 @@ DomainTest::DomainTest(const Domain& domain)
   std::ranges::copy(domain.state.upper(), state_upper_.begin());
   std::ranges::copy(domain.input.lower(), input_lower_.begin());
   std::ranges::copy(domain.input.upper(), input_upper_.begin());
+  std::ranges::copy(input_error, input_error_.begin());
+  for (std::size_t l = 0; l < ToSize(domain.input.dim()); ++l) {
+    if (input_error_[l] == 0) continue;
+    input_lower_[l] = AddUp(input_lower_[l], input_error_[l]);
+    input_upper_[l] = SubDown(input_upper_[l], input_error_[l]);
+  }
 }
 
 // Whether inequalities and balls hold by more than the rounding of plain arithmetic; false leaves it open. d_z entries
@@ -125,6 +131,7 @@ DomainExit DomainTest::FindExitOf(const double* center, const double* half_width
   std::copy_n(center, num_states_, middle.begin());
   std::ranges::copy(input, middle.begin() + num_states_);
   std::copy_n(half_width, num_states_, reach.begin());
+  std::copy_n(input_error_.begin(), input.size(), reach.begin() + num_states_);
   if (inside_box && MeetsConstraintsWell(middle.data(), reach.data())) return {};
   std::array<Interval, kMaxVariables> box;
   for (std::size_t l = 0; l < size_; ++l) box[l] = {SubDown(middle[l], reach[l]), AddUp(middle[l], reach[l])};

@@ -65,12 +65,12 @@ values within a rounding error of the bound. NaN is outside. Cost O(d_z) for eac
 /** A fast form of FindExit for the boxes of the certify step. */
 class DomainTest final {
  public:
-  /** @param domain must outlive this object. */
-  explicit DomainTest(const Domain& domain);
+  /** @param domain must outlive this object. @param input_error m entries, finite and not negative, or none: zeros. */
+  explicit DomainTest(const Domain& domain, const Eigen::VectorXd& input_error = {});
 
-  /** FindExit for the box {(x, input) : |x - center| <= half_width}. Plain arithmetic decides for a box that is inside
-  by a margin; directed rounding decides otherwise. @param center, half_width n entries; kMaxStates entries must be
-  readable.
+  /** FindExit for the box {(x, u) : |x - center| <= half_width, |u - input| <= input_error}. Plain arithmetic decides
+  for a box that is inside by a margin; directed rounding decides otherwise. @param center, half_width n entries;
+  kMaxStates entries must be readable.
   @param input m entries. */
   [[nodiscard]] FOREREACH_INLINE DomainExit FindExit(const double* center, const double* half_width,
                                                      std::span<const double> input) const noexcept {
@@ -107,7 +107,8 @@ class DomainTest final {
   std::size_t num_states_, size_;
   bool is_box_;
   std::array<double, kMaxStates> state_lower_{}, state_upper_{};
-  std::array<double, kMaxInputs> input_lower_, input_upper_;
+  std::array<double, kMaxInputs> input_lower_, input_upper_;  // of the input itself, without its error
+  std::array<double, kMaxInputs> input_error_{};
 };
 
 }  // namespace forereach

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "forereach/numerics/size.h"
 #include "forereach/residual/lipschitz_row.h"
@@ -26,15 +27,18 @@ bool IsNegligible(const StepError& error) {
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-                       InstructionSet instructions, const StepTiming& timing)
+                       InstructionSet instructions, const StepTiming& timing, ActedInputs inputs)
     : model_(model),
-      domain_(domain),
+      domain_(domain, inputs.error),
       residual_(residual),
-      offsets_(model, timing, disturbance),
+      inputs_(std::move(inputs)),
+      offsets_(model, timing),
       order_(zonotope_order),
       method_(method),
       instructions_(instructions) {
-  std::ranges::copy(disturbance, disturbance_.begin());
+  std::ranges::copy(disturbance, unexpected_.begin());
+  for (std::size_t k = 0; k < ToSize(model.num_states()) && !inputs_.AreExact(); ++k)
+    unexpected_[k] = AddUp(unexpected_[k], inputs_.of_residual[k]);
   const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width, so one table of errors
   // holds for all steps: docs/soundness.md, 3.6.
@@ -77,6 +81,21 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
     expansion.hessian[e] = {range.lower, range.upper};
     error.hessian[e] = 0;
   }
+}
+
+void Propagator::AddInputs(std::span<const PlainInterval> hull, Disturbed& all) const noexcept {
+  const auto n = ToSize(model_.num_states());
+  std::ranges::copy(hull, all.hull.begin());
+  std::array<Interval, kMaxVariables> box;
+  for (std::size_t l = 0; l < hull.size(); ++l) box[l] = Interval(NextDown(hull[l].lower), NextUp(hull[l].upper));
+  for (std::size_t l = n; l < hull.size(); ++l) {
+    const double e = inputs_.error[static_cast<Eigen::Index>(l - n)];
+    box[l] = Interval(hull[l].lower) + Interval(-e, e);
+    all.hull[l] = {box[l].lower, box[l].upper};
+  }
+  inputs_.Spread(model_, {box.data(), hull.size()}, all.of_model);
+  all.by_all = {};
+  for (std::size_t k = 0; k < n; ++k) all.by_all[k] = AddUp(unexpected_[k], all.of_model[k]);
 }
 
 namespace {
@@ -232,15 +251,29 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums, instructions_);
   OffsetSpread offset;
-  const bool is_punctual = offsets_.AreZero();
+  constexpr std::array<double, kMaxStates> kNothing{};
+  Disturbed disturbed;
+  const bool is_punctual = offsets_.AreZero(), is_exact = inputs_.AreExact();
+  if (!is_exact) AddInputs(hull, disturbed);
+  const double* const disturbance = is_exact ? unexpected_.data() : disturbed.by_all.data();
   if (!is_punctual) {
-    const StepSoFar step{slice, hull, half_width, expansion, error, record.remainder, record.envelope, is_first};
+    const StepSoFar step{slice,
+                         is_exact ? hull : std::span<const PlainInterval>(disturbed.hull.data(), hull.size()),
+                         half_width,
+                         expansion,
+                         error,
+                         record.remainder,
+                         record.envelope,
+                         unexpected_.data(),
+                         is_exact ? kNothing.data() : disturbed.of_model.data(),
+                         disturbance,
+                         is_first};
     if (const int k = offsets_.Add(step, offset, next, sums, instructions_); k >= 0)
       return {StepResult::Status::kNoFiniteEnclosure, {}, k};
   }
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   std::array<double, kMaxStates> box_half_width;
-  const double* added = is_punctual ? disturbance_.data() : offset.half_width.data();
+  const double* added = is_punctual ? disturbance : offset.half_width.data();
   if (!Join(expansion, error, record, sums, added, next, box_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
   AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), box_half_width.data(), order_, instructions_);

@@ -6,7 +6,8 @@ with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder 
 middle, half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope).
 w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
 defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
-f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_offsets.h says what is added. */
+f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_offsets.h says what is added; where the
+inputs that act may be off the plan's, acted_inputs.h does. */
 #pragma once
 
 #include <array>
@@ -16,6 +17,7 @@ f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_o
 #include "forereach/dynamics/model.h"
 #include "forereach/dynamics/rounding.h"
 #include "forereach/numerics/instruction_set.h"
+#include "forereach/reach/acted_inputs.h"
 #include "forereach/reach/domain.h"
 #include "forereach/reach/step_offsets.h"
 #include "forereach/residual/enclosure.h"
@@ -47,11 +49,13 @@ class Propagator final {
  public:
   /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
   slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
-  @param disturbance w^, n entries or none. @param instructions changes the computing time only.
+  @param disturbance w^, n entries or none. @param instructions changes the computing time only. @param inputs how far
+  those that act may be off.
   @throws std::invalid_argument as StepOffsets. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
              const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {});
+             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {},
+             ActedInputs inputs = {});
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
@@ -74,6 +78,12 @@ class Propagator final {
                                                           std::span<const PlainInterval> hull, StepRecord& record,
                                                           Zonotope& next, double* next_half_width,
                                                           bool is_first) const noexcept;
+  // What disturbs one step whose inputs have errors: what they add to f0, and that with unexpected_.
+  struct Disturbed {
+    std::array<double, kMaxStates> of_model, by_all;
+    std::array<PlainInterval, kMaxVariables> hull;  // with the inputs that may act
+  };
+  [[gnu::noinline]] void AddInputs(std::span<const PlainInterval> hull, Disturbed& all) const noexcept;
   // The step without model, envelope and reduction.
   [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
                                                        StepRecord& record, Zonotope& next, double* next_half_width,
@@ -85,7 +95,8 @@ class Propagator final {
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;
-  std::array<double, kMaxStates> disturbance_{};
+  std::array<double, kMaxStates> unexpected_{};  // w^, and what the errors of the inputs add to the residual
+  ActedInputs inputs_;
   StepOffsets offsets_;
   int order_;
   Method method_;

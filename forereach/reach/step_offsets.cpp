@@ -64,7 +64,7 @@ FOREREACH_INLINE void Compare(const Zonotope& slice, const double* column, bool 
 
 }  // namespace
 
-StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing, const Eigen::VectorXd& disturbance)
+StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing)
     : error_(timing.error), states_(ToSize(model.num_states())) {
   const int n = model.num_states();
   const Eigen::VectorXd& bound = timing.rate_bound;
@@ -79,7 +79,6 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing, co
                                     ToText(period_) + " s: steps could change their order");
   const double most = MulUp(2, error_), share = DivUp(error_, period_);
   duration_ = {SubDown(period_, most), AddUp(period_, most)};
-  std::ranges::copy(disturbance, disturbance_.begin());
   const std::shared_ptr<const StepRate> rate = RateOf(model);
   std::vector<unsigned char> by_intervals(states_, 0);
   for (int k = 0; k < n; ++k) {
@@ -92,12 +91,17 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing, co
       declared_[i] = MulUp(error_, bound[k]);
       continue;
     }
-    Require(
-        rate && rate->UsesDuration(k),
-        "step error: how " + model.state_names()[i] +
-            " moves with time is not in the model's equations, which do not use dt: declare model.rate_bound, or say "
-            "in model.set_at_steps that software sets it");
-    share_[i] = share;
+    const auto require = [&](bool is_said, const std::string& why) {
+      Require(is_said, "step error: how " + model.state_names()[i] +
+                           " moves with time is not in the model's equations, " + why +
+                           ": declare model.rate_bound, or say in model.set_at_steps that software sets it");
+    };
+    require(rate && rate->UsesDuration(k), "which do not use dt");
+    require(rate->BeginsAtState(k),
+            "which with dt = 0 do not leave it as it is, so that some number in them holds for "
+            "one duration only");
+    growth_once_[i] = rate->Growth(share);
+    growth_twice_[i] = rate->Growth(MulUp(2, share));
     if (rate->IsProportional(k)) {
       by_step_[i] = share;
     } else {
@@ -141,19 +145,20 @@ int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope
   if (step.residual.has_slope) AddSlopes(step, most);
   Compare(step.slice, spread.column.data(), step.is_first, image, sums, away.data());
   const Lanes ends = AllLanes(step.is_first ? 1 : 2);  // |j_{t+1} - j_t| / E at most
+  const PerState& growths = step.is_first ? growth_once_ : growth_twice_;
   const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
     const Lanes value = Abs(LoadLanes(&step.expansion.value[k])) + Abs(LoadLanes(step.slice.centers() + k)) +
                         Abs(LoadLanes(&step.remainder.center[k]));
     const Lanes reach = LoadLanes(&away[k]) + LoadLanes(&step.error.value[k]) + LoadLanes(image.slacks() + k) +
                         LoadLanes(step.slice.slacks() + k) + LoadLanes(&step.remainder.half_width[k]) +
-                        AllLanes(4 * kUnitRoundoff) * value;
-    const Lanes share = LoadLanes(&share_[k]), by_step = LoadLanes(&by_step_[k]), w = LoadLanes(&disturbance_[k]);
+                        AllLanes(4 * kUnitRoundoff) * value + LoadLanes(step.of_inputs + k);
+    const Lanes growth = LoadLanes(&growths[k]), by_step = LoadLanes(&by_step_[k]), w = LoadLanes(step.unexpected + k);
     const Lanes column = Abs(LoadLanes(&spread.column[k]));
     const Lanes off =
         by_step > AllLanes(0) ? by_step * reach + AllLanes(4 * kUnitRoundoff) * column : LoadLanes(&around[k]);
-    Lanes added = ends * (off + share * (LoadLanes(&most[k]) + w) + LoadLanes(&declared_[k]));
-    added = share > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
-    StoreLanes(w + added, &spread.half_width[k]);
+    Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (LoadLanes(&most[k]) + w);
+    added = growth > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
+    StoreLanes(LoadLanes(step.disturbance + k) + added, &spread.half_width[k]);
     return column + added < AllLanes(kInfinity);
   };
   if (HoldsForFirst(states_, is_finite)) return -1;

@@ -1,12 +1,13 @@
 /** Steps whose boundaries are off the plan's schedule: what that adds to a step of the tube.
 
 Boundary t is at the time s_t = s_0 + t dt + j_t, with j_0 = 0 and |j_t| <= E, so step t lasts dt + j_{t+1} - j_t and
-    x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,    |e| <= |j_{t+1} - j_t| (|r| + w^) /
-dt: beyond dt the residual and the disturbance add no more than in proportion. With d some double next to E g, j_t = E
-b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. Where the end of a state moves in
-proportion to the duration (StepRate::IsProportional), g = (f0(x_t, u_t) - x_t) / dt, which the step has bounded
-already. The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as the
-generator of b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step.
+    x_{t+1} = f0(x_t, u_t) + r + w + (j_{t+1} - j_t) g + e,    g in d f0 / d dt,
+    |e| <= ((1 + |j_{t+1} - j_t| / dt)^q - 1) (|r| + w^):
+residual and disturbance change by no more than the power q of the duration does (StepRate::Growth). With d some double
+next to E g, j_t = E b_t, (j_{t+1} - j_t) g in d b_{t+1} - d b_t + [-1, 1] |b_{t+1} - b_t| |E g - d|. Where the end of a
+state moves in proportion to the duration (StepRate::IsProportional), g = (f0(x_t, u_t) - x_t) / dt, which the step has
+bounded already. The last generator of X_t, t > 0, is that of b_t. The step subtracts d from its image and appends d as
+the generator of b_{t+1}, so offsets do not add up: what stays of them is how g changes from step to step.
 docs/soundness.md, 3.15. */
 #pragma once
 
@@ -41,15 +42,17 @@ struct StepSoFar {
   const StepError& error;
   const Remainder& remainder;
   const ResidualBounds& residual;
+  /** Upper bounds on w^ with what the errors of the inputs add to the residual, on what they add to f0, and on the sum
+  of both; readable up to kMaxStates. */
+  const double *unexpected, *of_inputs, *disturbance;
   bool is_first;  ///< j_t = 0.
 };
 
 class StepOffsets final {
  public:
-  /** @param disturbance w^, n entries or none. @throws std::invalid_argument if a number is out of its range, the error
-  is not below half of the model's dt, or neither rate_bound nor the equations say how state k moves with time; the
-  message names it. */
-  StepOffsets(const NominalModel& model, const StepTiming& timing, const Eigen::VectorXd& disturbance);
+  /** @throws std::invalid_argument if a number is out of its range, the error is not below half of the model's dt, or
+  neither rate_bound nor the equations say how state k moves with time; the message names it. */
+  StepOffsets(const NominalModel& model, const StepTiming& timing);
 
   /** Nothing is ever off: E = 0. */
   [[nodiscard]] bool AreZero() const { return error_ == 0; }
@@ -73,9 +76,9 @@ class StepOffsets final {
 
   double error_, period_ = 0;
   Interval duration_{0};
-  // Of each state E / dt where its rate counts, rounded up, and where that follows from the step itself; E V_k where
-  // V_k is declared; w^.
-  PerState share_{}, by_step_{}, declared_{}, disturbance_{};
+  // Of each state where its rate counts: the growth of what the model does not know, if one end is off and if both are;
+  // E / dt, rounded up, where the rate follows from the step itself. E V_k where V_k is declared.
+  PerState growth_once_{}, growth_twice_{}, by_step_{}, declared_{};
   std::optional<StepRate> rate_;  // of the others
   std::vector<int> by_intervals_;
   std::size_t states_;

@@ -67,9 +67,10 @@ class Observer final {
     if (longer > 0) EncloseRate(z, longer);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
-      if (longer > 0) residual_[k] += OfDuration(longer, k);
+      const Interval seen = residual_[k];
+      if (longer > 0) residual_[k] += OfDuration(longer, k, MostResidual(longer, k));
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kAround);
-      if (IsAngle(k) && !IsWithinAQuarterTurn(residual_[k])) RefuseAngle(row, Name(k), residual_[k], error_[k]);
+      if (IsAngle(k)) RequireTurns(seen, x_next[k], longer, k, row);
     }
     return residual_;
   }
@@ -92,27 +93,47 @@ class Observer final {
         error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
   }
 
-  // What a step did more or less in state k because of its duration: delta g, and a share of r + w.
-  Interval OfDuration(double longer, std::size_t k) {
-    const auto around = [](double size) { return Interval(-size, size); };
+  // What a step did more or less in state k because of its duration, delta g and growth (|r| + w), if |r| is at most
+  // this.
+  [[nodiscard]] Interval OfDuration(double longer, std::size_t k, double most) const {
+    const auto around = [](double size) { return size < kInfinity ? Interval(-size, size) : Interval::Entire(); };
     if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) > 0) return 0;
     if (const auto i = static_cast<Eigen::Index>(k); timing_.rate_bound.size() > 0 && timing_.rate_bound[i] < kInfinity)
       return around(MulUp(longer, timing_.rate_bound[i]));
-    const double moved = MulUp(longer, rate_[k].Magnitude()), share = DivUp(longer, StepOf(model_));
-    if (!(share < 1)) return Interval::Entire();
-    // |r| is at most what is seen of it, what hides it, and the share itself.
     const double w = declaration_.DisturbanceBound(static_cast<Eigen::Index>(k));
+    return around(AddUp(MulUp(longer, rate_[k].Magnitude()), MulUp(growth_, AddUp(most, w))));
+  }
+
+  // |r_k| is at most what is seen of it, what hides it, and its growth. Infinite where it may have doubled.
+  [[nodiscard]] double MostResidual(double longer, std::size_t k) const {
+    if (!(growth_ < 1)) return kInfinity;
+    const auto i = static_cast<Eigen::Index>(k);
+    const double moved = MulUp(longer, rate_[k].Magnitude());
     const double hidden =
-        AddUp(AddUp(declaration_.ObservationError(static_cast<Eigen::Index>(k)), moved), MulUp(share, w));
-    const double most = DivUp(AddUp(residual_[k].Magnitude(), hidden), SubDown(1, share));
-    return around(AddUp(moved, MulUp(share, AddUp(most, w))));
+        AddUp(AddUp(declaration_.ObservationError(i), moved), MulUp(growth_, declaration_.DisturbanceBound(i)));
+    return DivUp(AddUp(residual_[k].Magnitude(), hidden), SubDown(1, growth_));
+  }
+
+  // Another number of turns would leave three quarters of one or more for r + w + eta, whatever the duration added to
+  // these: docs/soundness.md, 3.14.
+  void RequireTurns(const Interval& seen, double x_next, double longer, std::size_t k, int row) const {
+    Interval within = seen;
+    if (longer > 0) {
+      const double unit = std::max(UlpOf(x_next), kAngleUnit);
+      const double most = AddUp(MulUp(3, kTurn.upper / 4), declaration_.ObservationError(static_cast<Eigen::Index>(k)));
+      within += OfDuration(longer, k, AddUp(most, unit));
+    }
+    if (!IsWithinAQuarterTurn(within))
+      RefuseAngle(row, Name(k), seen, longer > 0 ? within.HalfWidthUpper() : error_[k]);
   }
 
   void EncloseRate(std::span<const double> z, double longer) {
     rate_.fill(Interval::Entire());
+    growth_ = kInfinity;
     const std::shared_ptr<const StepRate> rate = RateOf(model_);
     if (!rate) return;
     const double dt = StepOf(model_);
+    growth_ = rate->Growth(DivUp(longer, dt));
     rate->Enclose(declaration_.BoxAround(z), {SubDown(dt, longer), AddUp(dt, longer)},
                   {rate_.data(), ToSize(model_.num_states())});
   }
@@ -122,6 +143,7 @@ class Observer final {
   const StepTiming& timing_;
   const bool has_errors_;
   std::array<Interval, kMaxStates> rate_;
+  double growth_ = 0;
   Linearization linear_;
   std::array<Interval, kMaxStates> residual_;
   std::array<double, kMaxStates> error_{};

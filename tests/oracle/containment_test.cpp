@@ -123,7 +123,7 @@ std::vector<Real> Rolled(Random& random, const Problem& problem, const Admissibl
 class Containment : public testing::TestWithParam<std::tuple<bool, bool, bool>> {};
 
 // Half of the problems know their transitions from a robot that records with errors, and the rollouts are those of the
-// true ones.
+// true ones, under inputs that are off the plan's by the same errors.
 TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
   const auto [bicycle, disturbed, shifted] = GetParam();
   TracedRandom random(801 + bicycle), winds(811 + bicycle), records(841 + bicycle);
@@ -161,7 +161,8 @@ TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
           }
           if (t == tube.length()) break;
           std::vector<Real> z = x;
-          for (const double u : query.plan().input(t)) z.emplace_back(u);
+          for (int l = 0; l < query.controls.rows(); ++l)
+            z.push_back(ActedInput(records, *problem, l, query.controls(l, t)));
           x = Rolled(winds, *problem, residual, z, offset);
         }
       }

@@ -188,7 +188,7 @@ inline void Shift(Random& random, Problem& problem) {
   problem.timing.error = StepOf(*problem.model) * std::ldexp(random.Uniform(0.5, 1), -random.Integer(2, 8));
   for (int k = 0; k < n; ++k) {
     if (random.Coin(0.2)) problem.timing.set_at_steps.push_back(k);
-    if (rate.UsesDuration(k) && !random.Coin(0.2)) continue;
+    if (rate.UsesDuration(k) && rate.BeginsAtState(k) && !random.Coin(0.2)) continue;
     if (problem.timing.rate_bound.size() == 0) problem.timing.rate_bound.setConstant(n, kInfinity);
     // The data keep it.
     const Transitions& data = problem.transitions;
@@ -202,14 +202,21 @@ inline Real AnyOffset(Random& random, const Problem& problem) {
   return Real(problem.timing.error) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
 }
 
+/** An input that acts where the plan has u: off by the declared error or by anything within it. */
+inline Real ActedInput(Random& random, const Problem& problem, int l, double u) {
+  const Eigen::VectorXd& error = problem.declaration.input_error;
+  if (error.size() == 0) return u;
+  return Real(u) + Real(error[l]) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+}
+
 /** f0(z) + r + w for a step that lasts `longer` than dt: the residual and the disturbance do what they may meanwhile,
-or the state moves by what is declared of its rate.
+which is to grow with the square of the duration, or the state moves by what is declared of its rate.
 @param unexpected r + w. @param most bounds on |r| + w^. */
 inline std::vector<Real> LongerSuccessor(Random& random, const Problem& problem, const std::vector<Real>& z,
                                          const std::vector<Real>& unexpected, const std::vector<Real>& most,
                                          const Real& longer) {
   const bool bicycle = problem.model->num_states() == 6;
-  const Real dt(StepOf(bicycle));
+  const Real dt(StepOf(bicycle)), share = abs(longer) / dt;
   const StepTiming& timing = problem.timing;
   std::vector<Real> next = NominalSuccessor(bicycle, z), of_duration = NominalSuccessor(bicycle, z, dt + longer);
   for (std::size_t k = 0; k < next.size(); ++k) {
@@ -219,7 +226,7 @@ inline std::vector<Real> LongerSuccessor(Random& random, const Problem& problem,
       if (timing.rate_bound.size() > 0 && timing.rate_bound[i] < kInfinity)
         next[k] += way * abs(longer) * Real(timing.rate_bound[i]);
       else
-        next[k] = of_duration[k] + way * abs(longer) * most[k] / dt;
+        next[k] = of_duration[k] + way * share * (Real(2) + share) * most[k];
     }
     next[k] += unexpected[k];
   }

@@ -386,6 +386,44 @@ TEST(Observe, RefusesAnAngleIfItsErrorsReachAQuarterOfATurn) {
   EXPECT_THAT(Thrown<AmbiguousAngle>([&] { observe(1.25); }), testing::HasSubstr("theta is 1.25 +- 0.5 rad away"));
 }
 
+// theta+ = theta at a standstill, in a step of 1/2 s that may have been 10 % longer: 0.21 of three quarters of a turn
+// may have been added, which leaves 0.581 to be seen. Where a third may have been added, nothing is left.
+TEST(Observe, RefusesAnAngleIfTheDurationMayHideItsTurns) {
+  const auto model = MakeKinematicBicycle(0.5, 2, {2});
+  const Declaration declaration{Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+  const StepTiming timing{.error = 0.1};
+  const auto observe = [&](double next, double longer) {
+    Transitions data{Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6), Eigen::VectorXd::Constant(1, longer)};
+    data.x_next(0, 2) = next;
+    return Observe(*model, declaration, data, timing);
+  };
+  constexpr double kPi = std::numbers::pi, kHair = 1e-12;
+  const double left = kPi / 2 - 0.21 * 1.5 * kPi, third = 0.5 * (std::sqrt(4 / 3.) - 1);
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_NO_THROW(observe(sign * (left - kHair), 0.05));
+    EXPECT_THROW(observe(sign * (left + kHair), 0.05), AmbiguousAngle);
+  }
+  EXPECT_NO_THROW(observe(0, third - kHair));
+  EXPECT_THROW(observe(0, third + kHair), AmbiguousAngle);
+  EXPECT_THROW(observe(0, 0.45), AmbiguousAngle);
+  // A residual of 3.31 in a step that lasted 1.9 times as long ends where one of 0.0057 would.
+  EXPECT_THROW(observe(1.9 * 3.31, 0.45), AmbiguousAngle);
+}
+
+// Nothing bounds a residual that may have doubled.
+TEST(Observe, SaysNothingIfTheDurationMayHaveDoubledTheResidual) {
+  const auto model = MakePointMass(0.5);
+  const Declaration declaration{Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
+  const double twice = 0.5 * (std::sqrt(2.0) - 1);
+  const auto observe = [&](double longer) {
+    return Observe(*model, declaration,
+                   {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Ones(1, 4), Eigen::VectorXd::Constant(1, longer)},
+                   {.error = 0.2});
+  };
+  EXPECT_NO_THROW(observe(twice - 1e-12));
+  EXPECT_THROW(observe(twice + 1e-12), NoNominalValue);
+}
+
 // One coordinate, columns of L as given, exactly known residuals.
 struct Sample {
   Declaration declaration;

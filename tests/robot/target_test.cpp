@@ -165,6 +165,36 @@ TEST(Target, WithoutResidualItIsTheNominalModel) {
   }
 }
 
+// x' = u = 1 with a residual of 1/4: in a step that is a tenth longer or shorter it is that of some power of the
+// duration, from 1 to the integrator's order and one, and each of these is some seed's.
+TEST(Target, LetsItsResidualGrowWithAPowerOfTheDuration) {
+  using Integrator = ModelText::Integrator;
+  for (const auto& [integrator, most] : {std::pair(Integrator::kEuler, 2), std::pair(Integrator::kRk4, 5)}) {
+    Problem problem = WorldOf(MakeTextModel(TextModel({{"x", "u"}}, {"u"}, {{"dt", 0.5, 0.5}}, {}, integrator)),
+                              Within({9}), Within({2}));
+    problem.timing.error = 0.05;
+    Config config = Task(problem, ResidualText{"push", {}, {}, {{"x", {"0.25*u"}}}});
+    std::set<int> seen;
+    for (int seed = 0; seed < 60; ++seed) {
+      config.robot.disturbance_seed = seed;
+      const std::unique_ptr<Target> target = MakeTarget(config);
+      const auto grown = [&](double longer) {
+        const std::array<double, 1> x{0}, u{1};
+        std::array<double, 1> next, on_time;
+        target->Step(x, u, on_time);
+        target->Step(x, u, next, longer);
+        return next[0] - on_time[0] - longer;
+      };
+      int power = 1;
+      while (power <= most && std::abs(grown(0.05) - 0.25 * (std::pow(1.1, power) - 1)) > 1e-12) ++power;
+      ASSERT_LE(power, most);
+      EXPECT_NEAR(grown(-0.05), 0.25 * (std::pow(0.9, power) - 1), 1e-12);
+      seen.insert(power);
+    }
+    EXPECT_EQ(static_cast<int>(seen.size()), most);
+  }
+}
+
 TEST(Target, StepsWithInputAndOutputInOneArray) {
   const std::unique_ptr<Target> target = MakeTarget(Bicycle());
   const std::vector<double> z{1, 2, 0.3, 20, 0.5, 0.3, 1, -0.5};
