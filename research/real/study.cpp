@@ -332,8 +332,7 @@ Learned Learn(const Fitted& fitted, const LearnOptions& options) {
     KeepOnly(RowsWithoutResidual(learned), *problem);
   } else {
     declaration.noise_bound = fitted.state_error.array() + kRounding;
-    declaration.disturbance =
-        (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
+    declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
     if (options.slopes)
       learned.explained = SetSlopes(declaration, *problem->model, all, fitted.felt);
     else
@@ -478,18 +477,18 @@ std::vector<HiddenState> HiddenStates(const Fitted& fitted, const Drive& drive) 
     const double aside = (z[kY] - last[kY]) * std::cos(z[kYaw]) - (z[kX] - last[kX]) * std::sin(z[kYaw]);
     hidden.row(j) << aside, last[kR], last[kBefore], last[kThrottle], steps.z(i + 1, kSteer);
   }
-  const Eigen::VectorXd speed = steps.z.col(kV)(rows);
-  const Eigen::MatrixXd left = errors(rows, Eigen::all);
-  const Eigen::RowVectorXd before = left.colwise().norm();
+  const Eigen::MatrixXd known = steps.z(rows, fitted.felt), left = errors(rows, Eigen::all);
+  // The rms of each state's errors, but for lines in the states of the model and in hidden ones.
+  const auto rest = [&](const std::vector<int>& columns) -> Eigen::RowVectorXd {
+    Eigen::MatrixXd states(count, known.cols() + std::ssize(columns));
+    states << known, hidden(Eigen::all, columns);
+    Eigen::MatrixXd lines(count, 1 + 2 * states.cols());
+    lines << Eigen::VectorXd::Ones(count), states, states.array().colwise() * known.col(0).array();
+    return (left - lines * lines.colPivHouseholderQr().solve(left)).colwise().norm();
+  };
+  const Eigen::RowVectorXd before = rest({}).cwiseMax(1e-300);
   const auto without = [&](const std::string& name, const std::vector<int>& columns) -> HiddenState {
-    Eigen::MatrixXd lines(count, 1 + 2 * std::ssize(columns));
-    lines.col(0).setOnes();
-    for (Eigen::Index c = 0; c < std::ssize(columns); ++c) {
-      lines.col(1 + 2 * c) = hidden.col(columns[ToSize(c)]);
-      lines.col(2 + 2 * c) = hidden.col(columns[ToSize(c)]).cwiseProduct(speed);
-    }
-    const Eigen::MatrixXd rest = left - lines * lines.colPivHouseholderQr().solve(left);
-    return {name, (rest.colwise().norm().array() / before.array().max(1e-300)).transpose()};
+    return {name, rest(columns).cwiseQuotient(before)};
   };
   return {without("motion aside in the step before", {0}),   without("yaw rate a step before", {1}),
           without("steering command two steps before", {2}), without("throttle a step before", {3}),

@@ -134,11 +134,12 @@ take state_error. Cost: about a millisecond a window. */
 /** What a state that the model of car.yaml lacks would explain of the errors of the best fit to a drive. */
 struct HiddenState {
   std::string name;
-  Eigen::VectorXd left;  ///< rms of each state's error without its line in the hidden state, over that of the fit.
+  Eigen::VectorXd left;  ///< rms of each state's error but for the lines, over that without the hidden state.
 };
 
-/** Each alone, then all: the line is in the state, in its product with the speed, and has an offset. Only steps count
-of which the one before and the one after were recorded, too. */
+/** Each alone, then all. The lines are the best ones in the states and inputs that the model has, in the hidden state
+and in the products of all these with the speed. Only steps count of which the one before and the one after were
+recorded, too. */
 [[nodiscard]] std::vector<HiddenState> HiddenStates(const Fitted& fitted, const Drive& drive);
 
 }  // namespace forereach::research
