@@ -352,7 +352,7 @@ TEST_F(RealTest, TheCommandWritesTablesAndATaskThatOthersRead) {
   const std::string csv = Read(out / "real.csv");
   const auto left_out = RowsOf(csv, "leave one out"), others = RowsOf(csv, "others"),
              quantiles = RowsOf(csv, "quantile");
-  ASSERT_EQ(left_out.size(), 12u) << "six for each drive";
+  ASSERT_EQ(left_out.size(), 14u) << "seven for each drive";
   int judged = 0, by_itself = 0;
   for (const auto& row : left_out) {
     by_itself += row.at("learned from") == row.at("judged by");
@@ -362,6 +362,9 @@ TEST_F(RealTest, TheCommandWritesTablesAndATaskThatOthersRead) {
       judged += std::stoi(row.at("covered steps"));
   }
   EXPECT_EQ(by_itself, 4);
+  const auto itself = RowsOf(csv, "itself");
+  ASSERT_EQ(itself.size(), 2 * quantiles.size());
+  for (const auto& row : itself) EXPECT_EQ(row.at("learned from"), row.at("judged by"));
   ASSERT_EQ(others.size(), 3u);
   EXPECT_EQ(others.front().at("learned from"), "run_a and run_b");
   EXPECT_EQ(others.back().at("learned from"), "run_c");
