@@ -16,18 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is tried, and what of it in a quick look.
-struct Grid {
-  std::vector<double> quantiles{0.9, 0.95, 0.98, 0.985, 0.99, 0.995, 1}, slope_quantiles{0.9, 0.98, 0.995},
-      factors{1, 1.5, 2};
-  std::vector<int> sizes{50, 100, 200, 400};
-  std::vector<double> changes{0.1, 0.2, 0.3, 0.5}, change_quantiles{0.985, 1};
-};
-const Grid kWhole, kQuick{{0.9, 0.985, 1}, {0.995}, {1, 2}, {100}, {0.2}, {1}};
+const std::vector<double> kQuantiles{0.9, 0.95, 0.97, 0.98, 0.985, 0.9875, 0.99, 0.995, 1}, kFew{0.9, 0.985, 1};
 
-constexpr int kShort = 5, kLong = 10;  // steps of a window
-constexpr double kGentle = 0.3;        // change of steering from step to step, where each way is shown by itself
-constexpr double kChosen = 0.985;      // the quantile of the tables that vary something else, and of the task
+constexpr int kSteps = 5;          // of a window
+constexpr double kChosen = 0.985;  // the quantile of every table that does not vary it
 
 std::string Text(const char* format, double value) {
   char text[64];
@@ -40,10 +32,9 @@ std::string Percent(int part, int whole) { return whole > 0 ? Text("%.2f", 100.0
 // ---- trials
 
 struct Trial {
-  std::string table, learned_from, judged_by;
-  LearnOptions options;
-  double factor;    // on the slopes
-  Learned learned;  // from the first part, if there are two
+  std::string table, learned_from, judged_by, way;
+  double quantile = kChosen;
+  Learned learned;  // of the last that were added up
   Judgement judged;
 };
 
@@ -53,73 +44,58 @@ struct Field {
   std::string (*text)(const Trial&);
 };
 
-template <std::size_t corridor>
-std::string CertifiedIn(const Trial& trial) {
-  return Percent(trial.judged.certified(corridor), static_cast<int>(trial.judged.windows.size()));
-}
 template <int k>
 std::string Disturbance(const Trial& trial) {
   return Text("%.4g", trial.learned.problem->declaration.disturbance[k]);
 }
+template <int k>
+std::string Growth(const Trial& trial) {
+  return trial.learned.growth.size() > k ? Text("%.4g", trial.learned.growth[k]) : "0";
+}
 
 const Field kLearnedFrom{"learned from", [](const Trial&t) { return t.learned_from; }},
     kJudgedBy{"judged by", [](const Trial&t) { return t.judged_by; }},
+    kWay{"declared", [](const Trial&t) { return t.way; }},
     kCount{"N", [](const Trial&t) { return std::to_string(t.learned.transitions); }},
-    kQuantile{"quantile", [](const Trial&t) { return Text("%.4g", t.options.quantile); }},
-    kFactor{"factor on L", [](const Trial&t) { return t.options.slopes ? Text("%g", t.factor) : "L = 0"; }},
-    kLargestSlope{"largest slope",
-                  [](const Trial&t) { return Text("%.3g", t.learned.problem->declaration.lipschitz.maxCoeff()); }},
-    kChange{"steering, at most",
-            [](const Trial&t) { return Text("%.2g", t.learned.problem->domain.inequalities.front().bound); }},
+    kQuantile{"quantile", [](const Trial&t) { return Text("%.4g", t.quantile); }},
     kLeftOut{"left out", [](const Trial&t) { return std::to_string(t.learned.left_out); }},
-    kSteps{"steps", [](const Trial&t) { return std::to_string(t.judged.steps); }},
+    kSteps_{"steps", [](const Trial&t) { return std::to_string(t.judged.steps); }},
+    kCovered{
+        "covered, %",
+        [](const Trial&t) { return Percent(t.judged.transitions, t.judged.outside_domain + t.judged.transitions); }},
+    kJudged{"covered steps", [](const Trial&t) { return std::to_string(t.judged.transitions); }},
     kWindows{"windows", [](const Trial&t) { return std::to_string(t.judged.windows.size()); }},
-    kComplete{"complete",
+    kComplete{"complete, %",
               [](const Trial&t) { return Percent(t.judged.complete(), static_cast<int>(t.judged.windows.size())); }},
     kInside{"inside, %", [](const Trial&t) { return Percent(t.judged.inside(), t.judged.slices()); }},
     kHalfWidth{"half-width, m", [](const Trial&t) { return Text("%.3f", t.judged.HalfWidth()); }},
-    kLargest{"largest, m", [](const Trial&t) { return Text("%.3f", t.judged.LargestHalfWidth()); }},
     kDistance{"driven, m", [](const Trial&t) { return Text("%.2f", t.judged.Distance()); }},
-    kContradicting{"contradictions, per thousand",
-                   [](const Trial&t) {
-                     return Text("%.1f", 1000.0 * t.judged.contradicting / std::max(1, t.judged.transitions));
-                   }},
-    kBeyond{"errors above sigma + w, per thousand",
-            [](const Trial&t) { return Text("%.1f", 1000.0 * t.judged.beyond / std::max(1, t.judged.transitions)); }},
-    kOutside{"outside the domain, %", [](const Trial&t) {
-               return Percent(t.judged.outside_domain, t.judged.outside_domain + t.judged.transitions);
-             }};
-const Field kCertified[] = {{"certified in 0.1 m, %", CertifiedIn<0>},
-                            {"0.15 m, %", CertifiedIn<1>},
-                            {"0.2 m, %", CertifiedIn<2>},
-                            {"0.3 m, %", CertifiedIn<3>}};
+    kContradicting{"contradictions, per thousand", [](const Trial&t) {
+                     return t.judged.transitions == 0
+                                ? "none"
+                                : Text("%.1f", 1000.0 * t.judged.contradicting / t.judged.transitions);
+                   }};
+const std::vector<Field> kOutcome{kJudged,   kCovered, kWindows,   kComplete,
+                                  kDistance, kInside,  kHalfWidth, kContradicting};
 
 std::vector<Field> AllFields() {
   std::vector<Field> all{{"table", [](const Trial& t) { return t.table; }},
                          kLearnedFrom,
                          kJudgedBy,
+                         kWay,
                          kCount,
                          kQuantile,
-                         kFactor,
-                         kLargestSlope,
-                         kChange,
                          kLeftOut,
-                         kSteps,
-                         kWindows,
-                         kComplete,
-                         kInside,
-                         kHalfWidth,
-                         kLargest,
-                         kDistance,
-                         kContradicting,
-                         kBeyond,
-                         kOutside};
-  all.insert(all.end(), std::begin(kCertified), std::end(kCertified));
+                         kSteps_};
+  all.insert(all.end(), kOutcome.begin(), kOutcome.end());
   all.insert(all.end(), {{"w of x", Disturbance<0>},
-                         {"w of y", Disturbance<1>},
                          {"w of yaw", Disturbance<2>},
                          {"w of v", Disturbance<3>},
-                         {"w of r", Disturbance<4>}});
+                         {"w of r", Disturbance<4>},
+                         {"growth of x", Growth<0>},
+                         {"growth of yaw", Growth<2>},
+                         {"growth of v", Growth<3>},
+                         {"growth of r", Growth<4>}});
   return all;
 }
 
@@ -150,130 +126,92 @@ std::string Markdown(const std::vector<Trial>& trials, const std::string& table,
 
 // ---- the study
 
-using Stretches = std::vector<Stretch>;
-
-void Append(Stretches& all, const Stretches& more) { all.insert(all.end(), more.begin(), more.end()); }
-
-// Learns from one part and judges by another.
-struct Fold {
-  std::string learned_from, judged_by;
-  Fitted fitted;
-  Stretches judge;
-};
+const char* const kConstant = "one w";
+const char* const kGrowing = "w that grows";
 
 struct Study {
-  Problem driving = DrivingProblem();
-  std::vector<Drive> drives, others;
-  std::string names;
-  Grid grid;
+  const Problem driving = DrivingProblem();
+  std::vector<Drive> drives, at_stamps, others;  // the second: the first, with commands where the log has them
   std::vector<Trial> trials;
-  Fit fit;  // to the first of the two parts
+  std::vector<std::pair<std::string, std::vector<HiddenState>>> hidden;  // of each drive
 
-  [[nodiscard]] Stretches BlocksOfAll(bool odd) const {
-    Stretches all;
-    for (const Drive& drive : drives) Append(all, Blocks(drive, odd));
+  [[nodiscard]] static std::string NamesOf(const std::vector<Stretch>& stretches) {
+    std::string names;
+    for (const Stretch& stretch : stretches) names += (names.empty() ? "" : " and ") + stretch.drive->name;
+    return names;
+  }
+  [[nodiscard]] static std::vector<Stretch> AllBut(const std::vector<Drive>& drives, const std::string& name) {
+    std::vector<Stretch> all;
+    for (const Drive& drive : drives)
+      if (drive.name != name) all.push_back(Whole(drive).front());
     return all;
   }
-  // Alternate blocks of all drives, either way: the trials' counts are those of both together.
-  [[nodiscard]] std::vector<Fold> BothWays(const Problem& problem, int most = 0) const {
-    std::vector<Fold> folds;
-    for (const bool odd : {false, true})
-      folds.push_back({names, "the blocks between", FitTo(problem, BlocksOfAll(odd), most), BlocksOfAll(!odd)});
-    return folds;
-  }
 
-  // One trial for each factor and length of windows.
-  void Try(const std::string& table, const std::vector<Fold>& folds, const LearnOptions& options,
-           const std::vector<double>& factors, const std::vector<int>& lengths) {
-    std::vector<Learned> learned;
-    learned.reserve(folds.size());
-    for (const Fold& fold : folds) learned.push_back(Learn(fold.fitted, options));
-    if (!std::ranges::all_of(learned, &Learned::explained)) return;
-    for (const double factor : factors)
-      for (const int steps : lengths) {
-        Trial& trial = trials.emplace_back();
-        trial.table = table;
-        trial.learned_from = folds.front().learned_from;
-        trial.judged_by = folds.front().judged_by;
-        trial.options = options;
-        trial.factor = factor;
-        trial.judged.steps = steps;
-        for (std::size_t i = 0; i < folds.size(); ++i) {
-          const Learned scaled = WithSlopesTimes(learned[i], factor);
-          trial.judged.Add(Judge(scaled, folds[i].judge, steps));
-          if (i == 0) trial.learned = scaled;
-        }
-      }
+  void Add(const std::string& table, const std::vector<Stretch>& from, const Drive& by, const std::string& way,
+           const Learned& learned, double quantile = kChosen) {
+    trials.push_back({table, NamesOf(from), by.name, way, quantile, learned, Judge(learned, Whole(by), kSteps)});
   }
-
-  void Run() {
-    const std::vector<Fold> folds = BothWays(driving);
-    for (const double quantile : grid.quantiles) Try("quantile", folds, {.quantile = quantile}, {1}, {kShort, kLong});
-    for (const double quantile : grid.slope_quantiles)
-      Try("slopes", folds, {.quantile = quantile, .slopes = true}, grid.factors, {kShort});
-    for (const int size : grid.sizes) Try("size", BothWays(driving, size), {.quantile = kChosen}, {1}, {kShort});
-    Try("size", folds, {.quantile = kChosen}, {1}, {kShort});
-    for (const double change : grid.changes) {
-      const std::vector<Fold> gentle = BothWays(DrivingProblem(change));
-      for (const double quantile : grid.change_quantiles)
-        Try("steering", gentle, {.quantile = quantile}, {1}, {kShort});
-    }
-    TryEachWay(folds, "");
-    TryEachWay(BothWays(DrivingProblem(kGentle)), ", steering within " + Text("%g", kGentle));
-    for (const Drive& from : drives)
-      Try("drives",
-          {{from.name + ", even blocks", "the blocks between", FitTo(driving, Blocks(from, false)),
-            Blocks(from, true)}},
-          {.quantile = kChosen}, {1}, {kShort});
-    for (const Drive& from : drives) {
-      std::vector<const Drive*> rest;
-      for (const Drive& by : drives)
-        if (&by != &from) rest.push_back(&by);
-      TryDrives(from.name, Whole(from), rest);
-    }
-    Stretches all;
-    for (const Drive& drive : drives) Append(all, Whole(drive));
-    std::vector<const Drive*> rest;
-    for (const Drive& by : others) rest.push_back(&by);
-    TryDrives(names, all, rest);
-    fit = folds.front().fitted.fit;
-  }
-  void TryEachWay(const std::vector<Fold>& folds, const std::string& domain) {
-    for (std::size_t i = 0; i < folds.size(); ++i) {
-      Fold fold = folds[i];
-      fold.learned_from += (i == 0 ? ", even blocks" : ", odd blocks") + domain;
-      Try("drives", {fold}, {.quantile = kChosen}, {1}, {kShort});
+  void LeaveOut(std::size_t i, const std::vector<double>& quantiles) {
+    const Drive& out = drives[i];
+    const std::vector<Stretch> rest = AllBut(drives, out.name), stamped = AllBut(at_stamps, out.name);
+    const Fitted fitted = FitTo(driving, rest), own = FitTo(driving, Whole(out));
+    Add("leave one out", rest, out, "as `declare --from-data` proposes", Proposed(fitted));
+    Add("leave one out", rest, out, kConstant, Learn(fitted, {.quantile = kChosen}));
+    Add("leave one out", stamped, at_stamps[i], "w that grows, commands where the log has them",
+        Learn(FitTo(driving, stamped), {.quantile = kChosen, .growing = true}));
+    Add("leave one out", rest, out, kGrowing, Learn(fitted, {.quantile = kChosen, .growing = true}));
+    Add("leave one out", rest, out, "w that grows, in a domain widened to this drive",
+        Learn(fitted, {.quantile = kChosen, .growing = true, .domain_of = AllBut(drives, "")}));
+    Add("leave one out", Whole(out), out, kConstant, Learn(own, {.quantile = kChosen}));
+    Add("leave one out", Whole(out), out, kGrowing, Learn(own, {.quantile = kChosen, .growing = true}));
+    hidden.emplace_back(out.name, HiddenStates(own, out));
+    for (const double quantile : quantiles) {
+      AddUp(i == 0, fitted, out, quantile);
+      Add("itself", Whole(out), out, kGrowing, Learn(own, {.quantile = quantile, .growing = true}), quantile);
     }
   }
-  // In the domain of what was learned from, and in that of both.
-  void TryDrives(const std::string& name, const Stretches& learn, const std::vector<const Drive*>& judges) {
-    if (judges.empty()) return;
-    const Fitted fitted = FitTo(driving, learn);
-    for (const Drive* by : judges) {
-      Stretches both = learn;
-      Append(both, Whole(*by));
-      Try("drives", {{name, by->name, fitted, Whole(*by)}}, {.quantile = kChosen}, {1}, {kShort});
-      Try("drives", {{name, by->name + ", its domain as well", fitted, Whole(*by)}},
-          {.quantile = kChosen, .domain_of = both}, {1}, {kShort});
+  // The trial of a quantile has the counts of all drives that are left out.
+  void AddUp(bool first, const Fitted& fitted, const Drive& out, double quantile) {
+    const Learned learned = Learn(fitted, {.quantile = quantile, .growing = true});
+    if (first) {
+      trials.push_back({"quantile", "the others", "each drive", kGrowing, quantile, learned, {}});
+      trials.back().judged.steps = kSteps;
+    }
+    Trial& trial = *std::ranges::find_if(
+        trials, [&](const Trial& each) { return each.table == "quantile" && each.quantile == quantile; });
+    trial.judged.Add(Judge(learned, Whole(out), kSteps));
+    trial.learned = learned;
+  }
+  void JudgeOthers() {
+    if (others.empty()) return;
+    const std::vector<Stretch> all = AllBut(drives, "");
+    const Fitted fitted = FitTo(driving, all);
+    for (const Drive& by : others) {
+      Add("others", all, by, kConstant, Learn(fitted, {.quantile = kChosen}));
+      Add("others", all, by, kGrowing, Learn(fitted, {.quantile = kChosen, .growing = true}));
+      Add("others", Whole(by), by, kGrowing, Learn(FitTo(driving, Whole(by)), {.quantile = kChosen, .growing = true}));
     }
   }
 };
 
 Study ReadAll(const RealOptions& options) {
   Study study;
-  study.grid = options.quick ? kQuick : kWhole;
-  for (const std::string& file : FindRecordings(options.data))
+  for (const std::string& file : FindRecordings(options.data)) {
     study.drives.push_back(TransitionsOf(ReadRecording(file), study.driving));
+    study.at_stamps.push_back(TransitionsOf(ReadRecording(file, 0), study.driving));
+  }
   for (const std::string& file : options.others)
     study.others.push_back(TransitionsOf(ReadRecording(file), study.driving));
-  for (const Drive& drive : study.drives) {
-    study.names += (study.names.empty() ? "" : " and ") + drive.name;
-    constexpr int kFewest = 100;
-    if (drive.transitions.size() < kFewest)
-      throw ConfigError(drive.name + ": the car drives at 1 m/s or more, under power, in " +
-                        std::to_string(drive.transitions.size()) + " steps of 0.1 s; there have to be " +
-                        std::to_string(kFewest));
-  }
+  for (const std::vector<Drive>* all : {&study.drives, &study.at_stamps, &study.others})
+    for (const Drive& drive : *all) {
+      constexpr int kFewest = 100;
+      if (drive.transitions.size() < kFewest)
+        throw ConfigError(drive.name + ": the car drives at 1 m/s or more, under power, in " +
+                          std::to_string(drive.transitions.size()) + " steps of 0.1 s; there have to be " +
+                          std::to_string(kFewest));
+    }
+  if (study.drives.size() < 2)
+    throw ConfigError(options.data.string() + ": has one drive; to leave one out there have to be two");
   return study;
 }
 
@@ -319,55 +257,60 @@ std::vector<Field> With(std::vector<Field> first, const std::vector<Field>& more
   return first;
 }
 
-std::string Report(const Study& study, const Learned& chosen, const RealOptions& options) {
-  const std::vector<Field> outcome{kInside, kHalfWidth, kLargest, kContradicting, kBeyond},
-      corridors(std::begin(kCertified), std::end(kCertified));
+std::string Hidden(const Study& study) {
+  std::string text = "\n| state | drive | yaw, % | v, % | r, % |\n|---|---|---|---|---|\n";
+  for (std::size_t i = 0; i < study.hidden.front().second.size(); ++i)
+    for (const auto& [drive, states] : study.hidden) {
+      const auto left = [&](Eigen::Index k) { return Text("%.1f", 100 * states[i].left[k]); };
+      text += "| " + states[i].name + " | " + drive + " | " + left(2) + " | " + left(3) + " | " + left(4) + " |\n";
+    }
+  return text;
+}
+
+std::string Report(const Study& study, const Learned& all, const Fit& fit, const RealOptions& options) {
+  const std::vector<Field> outcome = With({kLearnedFrom, kJudgedBy, kWay}, kOutcome);
   return "# A real car\n\nMade by `" + options.command + "`.\n\n" + AboutData(study) +
          "\nA declaration that was learned from data is an assumption. These tables say how it fared on other data of "
-         "the\nsame car, and nothing about data that nobody has.\n\n" +
-         "## One-step errors\nOf every other block of " + study.names + ", in m, rad, m/s, rad/s; w for quantile " +
-         Text("%g", kChosen) + ".\n" + AboutFit(chosen, study.fit) + "\n## Against the quantile\n" +
-         Markdown(study.trials, "quantile",
-                  With({kQuantile, kLeftOut, kSteps, kWindows, kComplete, kDistance}, With(outcome, corridors))) +
-         "\n## Against the factor on L\n" +
-         Markdown(study.trials, "slopes", With({kQuantile, kFactor, kLargestSlope, kWindows, kComplete}, outcome)) +
-         "\n## Against N\n" + Markdown(study.trials, "size", With({kCount, kWindows, kComplete}, outcome)) +
-         "\n## Against the change of steering from step to step\n" +
-         Markdown(study.trials, "steering",
-                  With({kChange, kQuantile, kOutside, kWindows, kComplete}, With(outcome, corridors))) +
-         "\n## Against what it is learned from\n" +
-         Markdown(study.trials, "drives",
-                  With({kLearnedFrom, kJudgedBy, kCount, kOutside, kWindows, kComplete, kDistance}, outcome));
+         "the\nsame car, and nothing about data that nobody has.\n\n"
+         "## Each drive left out\nThe quantile is " +
+         Text("%g", kChosen) +
+         ". Judged by the drive that it was learned from, a declaration is the best that these states "
+         "allow.\n" +
+         Markdown(study.trials, "leave one out", outcome) +
+         (study.others.empty() ? "" : "\n## Other drives\n" + Markdown(study.trials, "others", outcome)) +
+         "\n## Against the quantile\nOf all drives together, each left out in its turn; w grows.\n" +
+         Markdown(study.trials, "quantile", With({kQuantile}, kOutcome)) +
+         "\nOf each drive, learned from it and judged by it; w grows.\n" +
+         Markdown(study.trials, "itself", With({kJudgedBy, kQuantile}, kOutcome)) +
+         "\n## Hidden states\nWhat the best fit to a drive leaves of its errors, where a line in a further state is "
+         "taken off them.\n" +
+         Hidden(study) + "\n## One-step errors\nOf all drives, in m, rad, m/s, rad/s; one w.\n" + AboutFit(all, fit);
 }
 
 // ---- pictures
 
 Plot TradeOff(const Study& study) {
-  std::string blocks, lines;
-  for (const int steps : {kShort, kLong}) {
-    std::string data;
-    for (const Trial& trial : study.trials)
-      if (trial.table == "quantile" && trial.judged.steps == steps)
-        data += DataLine({trial.judged.HalfWidth().value_or(NAN),
-                          100.0 * trial.judged.inside() / std::max(1, trial.judged.slices()), trial.options.quantile});
-    blocks += DataBlock("after" + std::to_string(steps), data);
-  }
-  const auto series = [](int steps, const char* color, const char* what) {
-    const std::string data = "$after" + std::to_string(steps);
-    return data + " using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb " + color + " title '" + what + "', " + data +
-           " using 1:2:($3 == 0.98 || $3 == 0.99 ? '' : sprintf('%g', $3)) with labels right offset -0.8,0.3 font ',9' "
-           "textcolor rgb '#666666' notitle";
-  };
+  std::string data;
+  for (const Trial& trial : study.trials)
+    if (trial.table == "quantile" && std::isfinite(trial.judged.HalfWidth().value_or(NAN)))
+      data += DataLine({*trial.judged.HalfWidth(), 100.0 * trial.judged.inside() / std::max(1, trial.judged.slices()),
+                        1000.0 * trial.judged.contradicting / std::max(1, trial.judged.transitions), trial.quantile});
   return {"real-trade-off",
-          "Recorded states inside their slices against the median half-width of the last one, for each quantile.", 720,
-          440,
-          blocks +
-              "set xlabel 'half-width of the position at the end, m'\nset logscale x\nset key bottom right\n"
-              "set ylabel 'recorded states inside their slices, %'\nset xtics (0.05,0.1,0.15,0.25,0.5,1,2)\nset yrange "
-              "[*:100.4]\n"
-              "set arrow from 0.15,graph 0 to 0.15,graph 1 nohead dt 2 lc rgb grey\n"
-              "plot 99 lc rgb grey dt 2 title 'goal: 99 % at 0.15 m after 0.5 s', " +
-              series(kShort, "blue", "windows of 0.5 s") + ", " + series(kLong, "red", "windows of 1 s") + "\n"};
+          "Recorded states inside their slices, and steps that contradict, against the half-width, for each quantile.",
+          720, 440,
+          DataBlock("left", data) +
+              "set border 11\nset xlabel 'half-width of the position after 0.5 s, m'\nset xtics 0.05\nset key center "
+              "right\n"
+              "set ylabel 'recorded states inside their slices, %'\nset ytics nomirror\nset yrange [*:100.4]\n"
+              "set y2label 'contradictions, per thousand'\nset y2tics\nset y2range [0:*]\n"
+              "set offsets graph 0.05, graph 0.1, 0, graph 0.1\n"
+              "set arrow from 0.25,graph 0 to 0.25,graph 1 nohead dt 2 lc rgb grey\n"
+              "plot 99 lc rgb grey dt 2 title 'goal: 99 %, 0.25 m', "
+              "$left using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb blue title 'inside', "
+              "$left using 1:2:($4 == 0.98 || $4 == 0.9875 || $4 == 0.99 ? '' : sprintf('%g', $4)) with labels left "
+              "offset 0.6,-0.7 "
+              "font ',9' textcolor rgb '#666666' notitle, "
+              "$left using 1:3 axes x1y2 with linespoints pt 5 ps 0.6 lw 2 lc rgb red title 'contradictions'\n"};
 }
 
 Plot Tubes(const Trial& trial) {
@@ -380,8 +323,7 @@ Plot Tubes(const Trial& trial) {
     for (Eigen::Index t = 0; t < window.path.cols(); ++t) path += DataLine({window.path(0, t), window.path(1, t)});
     path += "\n";
   }
-  return {"real-tubes",
-          "The first windows of 0.5 s of the judging blocks: slices of the certified tubes, and where the car was.",
+  return {"real-tubes", "The first windows of 0.5 s of a drive left out: slices of the tubes, and where the car was.",
           720, 560,
           DataBlock("boxes", boxes) + DataBlock("path", path) +
               "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\nset key bottom left\n"
@@ -420,22 +362,24 @@ std::string Task(const Learned& learned, const Fit& fit) {
 
 void RunReal(const RealOptions& options, std::ostream& out) {
   Study study = ReadAll(options);
-  study.Run();
-  const Trial& chosen = *std::ranges::find_if(
-      study.trials, [](const Trial& trial) { return trial.table == "quantile" && trial.options.quantile == kChosen; });
+  for (std::size_t i = 0; i < study.drives.size(); ++i) study.LeaveOut(i, options.quick ? kFew : kQuantiles);
+  study.JudgeOthers();
+  const Fitted fitted = FitTo(study.driving, Study::AllBut(study.drives, ""));
+  const Learned all = Learn(fitted, {.quantile = kChosen});
+  const Trial& shown = *std::ranges::find_if(
+      study.trials, [](const Trial& trial) { return trial.table == "quantile" && trial.quantile == kChosen; });
 
   fs::create_directories(options.directory);
-  std::string report = Report(study, chosen.learned, options);
+  std::string report = Report(study, all, fitted.fit, options);
   out << report << std::flush;
-  for (const Plot& plot : {TradeOff(study), Tubes(chosen)})
+  for (const Plot& plot : {TradeOff(study), Tubes(shown)})
     if (Draw(plot, options.directory / "plots", options.directory / "figures"))
       report += "\n![" + plot.caption + "](figures/" + plot.name + ".svg)\n\n" + plot.caption + "\n";
   WriteFile(options.directory / "real.csv", Csv(study.trials));
   WriteFile(options.directory / "real.md", report);
   fs::copy_file(kModelFile, options.directory / "real-model.yaml", fs::copy_options::overwrite_existing);
-  WriteFile(options.directory / "real-task.yaml", Task(chosen.learned, study.fit));
-  SaveTransitions((options.directory / "real-transitions.csv").string(), *chosen.learned.problem->model,
-                  chosen.learned.problem->transitions);
+  WriteFile(options.directory / "real-task.yaml", Task(all, fitted.fit));
+  SaveTransitions((options.directory / "real-transitions.csv").string(), *all.problem->model, all.problem->transitions);
 }
 
 }  // namespace forereach::research

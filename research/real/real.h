@@ -9,8 +9,8 @@
 namespace forereach::research {
 
 struct RealOptions {
-  std::filesystem::path data;       ///< The folder of the drives that are learned from and judged by
-  std::vector<std::string> others;  ///< Files of drives to judge by only
+  std::filesystem::path data;       ///< The folder of the drives that are learned from, each left out in its turn
+  std::vector<std::string> others;  ///< Files of drives by which what was learned from all is judged
   std::filesystem::path directory;  ///< Of results
   bool quick = false;               ///< Fewer rows in the tables
   std::string command;              ///< That the report names as its origin
@@ -21,7 +21,7 @@ struct RealOptions {
     DIR/figures/real-*.svg, plots/real-*.gp   the pictures
     DIR/real-task.yaml, real-model.yaml, real-transitions.csv  what was learned, for every other command
 The same files from the same data. @throws ConfigError if data cannot be read or hold too little; the message says where
-to get them. Cost: about a minute for two drives of one and a half. */
+to get them. Cost: about two minutes for three drives of one and a half. */
 void RunReal(const RealOptions& options, std::ostream& out);
 
 }  // namespace forereach::research

@@ -92,10 +92,10 @@ Eigen::Matrix<double, 5, 1> StateOf(const LocalFit& fit) {
 
 }  // namespace
 
-Recording ReadRecording(const std::string& path) {
+Recording ReadRecording(const std::string& path, double age) {
   const LogTable log = ReadLog(path, kNames, {});
   const Samples samples = SamplesOf(log);
-  Recording recording{std::filesystem::path(path).stem().string(), {}, Eigen::VectorXd::Zero(6)};
+  Recording recording{std::filesystem::path(path).stem().string(), {}, Eigen::VectorXd::Zero(6), age};
   const Eigen::Index rows = static_cast<Eigen::Index>(samples.time[samples.time.size() - 1] / kSpacing) + 1;
   const Eigen::Index rows_of_step = std::lround(kStep / kSpacing);
   LogTable& table = recording.table;
@@ -108,7 +108,7 @@ Recording ReadRecording(const std::string& path) {
   double moving = 0;
   for (Eigen::Index i = 0; i < rows; ++i) {
     const double time = static_cast<double>(i) * kSpacing;
-    while (held + 1 < samples.time.size() && samples.time[held + 1] <= time) ++held;
+    while (held + 1 < samples.time.size() && samples.time[held + 1] <= time + age) ++held;
     const LocalFit fit = FitAbout(samples, time);
     const Eigen::Matrix<double, 5, 1> state = StateOf(fit);
     auto row = table.values.row(i);
@@ -167,7 +167,7 @@ std::vector<double> SteeringDelays(const Recording& recording) {
     if (!(std::abs(after - before) > kLeast)) continue;
     Eigen::Index at = i - kEarliest;
     while (at < i + kQuiet && (curvature[at] - before) / (after - before) < 0.5) ++at;
-    delays.push_back(static_cast<double>(at - i) * kSpacing);
+    delays.push_back(static_cast<double>(at - i) * kSpacing - recording.age);
   }
   std::ranges::sort(delays);
   return delays;

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
+
+#include <Eigen/QR>
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/text_model.h"
@@ -9,6 +13,7 @@
 #include "forereach/numerics/size.h"
 #include "identify/hold_out.h"
 #include "identify/noise_floor.h"
+#include "identify/proposal.h"
 #include "identify/smallest_row.h"
 #include "task/model_file.h"
 
@@ -17,9 +22,6 @@ namespace forereach::research {
 const char* const kModelFile = FOREREACH_SOURCE_DIR "/research/real/car.yaml";
 
 namespace {
-
-constexpr double kBlock = 10, kStep = 0.1;  // s
-constexpr double kWall = 0.05;              // m, thickness of a corridor's walls
 
 // Coordinates of z in car.yaml.
 enum Coordinate { kX, kY, kYaw, kV, kR, kBefore, kSteer, kThrottle };
@@ -53,13 +55,14 @@ Transitions RowsAt(const Transitions& transitions, const std::vector<int>& rows)
   return {transitions.z(rows, Eigen::all), transitions.x_next(rows, Eigen::all)};
 }
 
-Transitions Thinned(const Transitions& transitions, int most) {
-  if (most <= 0 || most >= transitions.size()) return transitions;
-  std::vector<int> rows;
-  rows.reserve(ToSize(most));
-  for (int i = 0; i < most; ++i)
-    rows.push_back(static_cast<int>(static_cast<std::int64_t>(i) * transitions.size() / most));
-  return RowsAt(transitions, rows);
+std::vector<int> EndsOf(const std::vector<Stretch>& stretches, const Domain* domain) {
+  std::vector<int> ends;
+  int count = 0;
+  for (std::size_t i = 0; i < stretches.size(); ++i) {
+    count += Gather({stretches[i]}, domain).size();
+    if (i + 1 == stretches.size() || stretches[i + 1].drive != stretches[i].drive) ends.push_back(count);
+  }
+  return ends;
 }
 
 Domain CoveredBy(const Domain& driving, const Transitions& transitions, const std::vector<int>& felt) {
@@ -149,7 +152,78 @@ Eigen::VectorXd EpsilonOf(const Declaration& declaration) {
   return epsilon;
 }
 
+void DeclareStateError(Declaration& declaration, const Fitted& fitted) {
+  declaration.state_error = fitted.state_error;
+  declaration.noise_bound.setConstant(fitted.state_error.size(), kRounding);
+}
+
+// What a growing disturbance grows with, of z in car.yaml.
+double HastyIn(const Eigen::RowVectorXd& z) { return z[kV] * std::abs(z[kSteer] - z[kBefore]); }
+
+// How far an observed residual may lie from the residual at z, where w grows.
+Eigen::VectorXd ErrorAt(const Learned& learned, const Eigen::RowVectorXd& z) {
+  return EpsilonOf(learned.problem->declaration) + HastyIn(z) * learned.growth;
+}
+
+// The line a + b t, a and b not negative, that fits best.
+Eigen::Vector2d LineThrough(const Eigen::VectorXd& t, const Eigen::VectorXd& values) {
+  const double mean_t = t.mean(), mean = values.mean(), spread = (t.array() - mean_t).square().sum();
+  const double b = spread > 0 ? ((t.array() - mean_t) * (values.array() - mean)).sum() / spread : 0;
+  if (!(b > 0)) return {mean, 0};
+  if (mean - b * mean_t >= 0) return {mean - b * mean_t, b};
+  return {0, t.dot(values) / t.squaredNorm()};
+}
+
+// s_k a_k and s_k b_k.
+std::pair<Eigen::VectorXd, Eigen::VectorXd> GrowingWith(const Fitted& fitted, double quantile) {
+  const Eigen::MatrixXd errors = fitted.fit.after.cwiseAbs();
+  const Eigen::Index states = errors.cols();
+  Eigen::VectorXd hasty(errors.rows());
+  for (Eigen::Index i = 0; i < hasty.size(); ++i) hasty[i] = HastyIn(fitted.transitions.z.row(i));
+  Eigen::VectorXd base(states), growth(states);
+  for (Eigen::Index k = 0; k < states; ++k) {
+    const Eigen::Vector2d line = LineThrough(hasty, errors.col(k));
+    double factor = 0;
+    int begin = 0;
+    for (const int end : fitted.ends) {
+      std::vector<double> needed;
+      for (int i = begin; i < end; ++i) {
+        const double more = errors(i, k) - fitted.state_error[k], at = line[0] + line[1] * hasty[i];
+        needed.push_back(more > 0 && at > 0 ? more / at : 0);
+      }
+      if (!needed.empty()) factor = std::max(factor, Quantile(std::move(needed), quantile));
+      begin = end;
+    }
+    base[k] = factor * line[0];
+    growth[k] = factor * line[1];
+  }
+  for (Eigen::VectorXd* const part : {&base, &growth}) part->head(2).setConstant(part->head(2).maxCoeff());
+  return {base, growth};
+}
+
+// The transitions that do not contradict a residual of zero.
+std::vector<int> RowsWithoutResidual(const Learned& learned) {
+  const Problem& problem = *learned.problem;
+  const Observations seen = Observe(*problem.model, problem.declaration, problem.transitions);
+  std::vector<int> rows;
+  for (int i = 0; i < seen.size(); ++i) {
+    const Eigen::ArrayXd error = ErrorAt(learned, seen.z.row(i));
+    if ((seen.lower.row(i).transpose().array() <= error && seen.upper.row(i).transpose().array() >= -error).all())
+      rows.push_back(i);
+  }
+  return rows;
+}
+
+void KeepOnly(const std::vector<int>& rows, Problem& problem) {
+  problem.transitions = RowsAt(problem.transitions, rows);
+}
+
 // ---- judging
+
+// Whether transition i begins where the one before it ends.
+bool Follows(const Transitions& steps, int i) {
+  return steps.z.row(i).head(steps.x_next.cols()) == steps.x_next.row(i - 1);
+}
 
 int CountContradicting(const Problem& problem, const Transitions& judged) {
   Problem both = problem;
@@ -159,22 +233,6 @@ int CountContradicting(const Problem& problem, const Transitions& judged) {
   both.transitions.z.bottomRows(judged.size()) = judged.z;
   both.transitions.x_next.bottomRows(judged.size()) = judged.x_next;
   return CountContradictions(both, both.declaration, {{{0, learned}}, {{learned, count}}}).contradicting;
-}
-
-// Walls to both sides of a path, each a piece a step, straight between the samples.
-std::vector<Obstacle> CorridorAbout(const Eigen::Matrix2Xd& path, double half_width) {
-  std::vector<Obstacle> walls;
-  for (const double side : {1.0, -1.0})
-    for (Eigen::Index t = 0; t + 1 < path.cols(); ++t) {
-      const auto place = [&](Eigen::Index at, double away) -> Eigen::VectorXd {
-        const Eigen::Vector2d ahead =
-            (path.col(std::min(at + 1, path.cols() - 1)) - path.col(std::max<Eigen::Index>(at - 1, 0))).normalized();
-        return path.col(at) + side * away * Eigen::Vector2d(-ahead[1], ahead[0]);
-      };
-      walls.push_back(Obstacle::Polygon({place(t, half_width), place(t + 1, half_width),
-                                         place(t + 1, half_width + kWall), place(t, half_width + kWall)}));
-    }
-  return walls;
 }
 
 WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, const Transitions& judged,
@@ -207,11 +265,6 @@ WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, con
       result.half_width(k, t) = tube.half_width(t)[ToSize(k)];
     }
   }
-  for (const double half_width : kCorridors) {
-    const std::vector<Obstacle> walls = CorridorAbout(result.path, half_width);
-    certifier.Require(plan, start, walls);
-    result.certified.push_back(certifier.Certify(plan, start, walls, tube).outcome == Outcome::kCertified);
-  }
   return result;
 }
 
@@ -229,7 +282,7 @@ Eigen::MatrixXd ErrorsOf(const NominalModel& model, const Transitions& transitio
   return errors;
 }
 
-Problem DrivingProblem(double most_change) {
+Problem DrivingProblem() {
   Problem problem;
   problem.model = MakeTextModel(LoadModelFile(kModelFile));
   const Eigen::VectorXd state{{kFar, kFar, kFar, kFastest, kSharpest, 1}}, steer{{-1, kPower}};
@@ -237,47 +290,28 @@ Problem DrivingProblem(double most_change) {
   lowest[kV] = kSlowest;
   problem.domain.state = Box(lowest, state);
   problem.domain.input = Box(steer, Eigen::VectorXd::Ones(2));
-  for (const double sign : {1.0, -1.0}) {
-    Eigen::VectorXd change = Eigen::VectorXd::Zero(8);
-    change[kSteer] = sign;
-    change[kBefore] = -sign;
-    problem.domain.inequalities.push_back({change, most_change + kRounding});
-  }
   problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6)};
   problem.projection = Eigen::MatrixXd::Identity(2, 6);
   return problem;
 }
 
-std::vector<Stretch> Blocks(const Drive& drive, bool odd) {
-  std::vector<Stretch> blocks;
-  const auto block_of = [](double time) { return std::floor((time + 1e-6) / kBlock); };
-  for (int i = 0; i < std::ssize(drive.times); ++i) {
-    const double time = drive.times[ToSize(i)], block = block_of(time);
-    const bool across = block_of(time + kStep - 2e-6) != block;
-    if ((std::fmod(block, 2) == 1) != odd || across) continue;
-    if (!blocks.empty() && blocks.back().end == i)
-      ++blocks.back().end;
-    else
-      blocks.push_back({&drive, i, i + 1});
-  }
-  return blocks;
-}
-
 std::vector<Stretch> Whole(const Drive& drive) { return {{&drive, 0, drive.transitions.size()}}; }
 
 Fitted Unfitted(const Problem& driving, const std::vector<Stretch>& stretches, std::vector<int> felt) {
-  Fitted fitted{driving, Gather(stretches, &driving.domain), {}, StateErrorOf(stretches), std::move(felt)};
+  Fitted fitted{driving,         Gather(stretches, &driving.domain), {}, StateErrorOf(stretches),
+                std::move(felt), EndsOf(stretches, &driving.domain)};
   if (fitted.transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
   fitted.fit.before = fitted.fit.after = ErrorsOf(*driving.model, fitted.transitions);
   return fitted;
 }
 
-Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most) {
+Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches) {
   Fitted fitted{driving,
-                Thinned(Gather(stretches, &driving.domain), most),
+                Gather(stretches, &driving.domain),
                 {},
                 StateErrorOf(stretches),
-                {kV, kR, kBefore, kSteer, kThrottle}};
+                {kV, kR, kBefore, kSteer, kThrottle},
+                EndsOf(stretches, &driving.domain)};
   if (fitted.transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
   fitted.fit = FitTwice(*driving.model->text(), fitted.transitions);
   fitted.driving.model = MakeTextModel(WithParameters(*driving.model->text(), fitted.fit));
@@ -289,18 +323,71 @@ Learned Learn(const Fitted& fitted, const LearnOptions& options) {
   auto problem = std::make_shared<Problem>(fitted.driving);
   problem->domain = CoveredBy(
       problem->domain, options.domain_of.empty() ? all : Gather(options.domain_of, &problem->domain), fitted.felt);
-  Declaration& declaration = problem->declaration;
-  declaration.noise_bound = fitted.state_error.array() + kRounding;
-  declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
-  problem->transitions = all;
   Learned learned{problem, all.size(), 0, fitted.state_error, true};
-  if (options.slopes) {
-    learned.explained = SetSlopes(declaration, *problem->model, all, fitted.felt);
+  Declaration& declaration = problem->declaration;
+  problem->transitions = all;
+  if (options.growing) {
+    DeclareStateError(declaration, fitted);
+    std::tie(declaration.disturbance, learned.growth) = GrowingWith(fitted, options.quantile);
+    KeepOnly(RowsWithoutResidual(learned), *problem);
   } else {
-    problem->transitions = RowsAt(all, RowsWithin(fitted.fit.after, EpsilonOf(declaration)));
-    learned.left_out = all.size() - problem->transitions.size();
+    declaration.noise_bound = fitted.state_error.array() + kRounding;
+    declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
+    if (options.slopes)
+      learned.explained = SetSlopes(declaration, *problem->model, all, fitted.felt);
+    else
+      KeepOnly(RowsWithin(fitted.fit.after, EpsilonOf(declaration)), *problem);
   }
+  learned.left_out = all.size() - problem->transitions.size();
   return learned;
+}
+
+Learned Proposed(const Fitted& fitted) {
+  auto problem = std::make_shared<Problem>(fitted.driving);
+  problem->domain = CoveredBy(problem->domain, fitted.transitions, fitted.felt);
+  problem->transitions = fitted.transitions;
+  DeclareStateError(problem->declaration, fitted);
+  ProposalOptions options;
+  options.estimate_disturbance = true;
+  options.columns.assign(ToSize(fitted.transitions.x_next.cols()), fitted.felt);
+  problem->declaration =
+      Propose(problem->declaration, ObserveForProposal(*problem, problem->transitions), options).declaration;
+  return {problem, problem->transitions.size(), 0, fitted.state_error, true};
+}
+
+GrowingScatter::GrowingScatter(const Learned& learned) : learned_(learned) {
+  const Problem& problem = *learned.problem;
+  const Observations seen = Observe(*problem.model, problem.declaration, problem.transitions);
+  lower_.setConstant(learned.growth.size(), -kInfinity);
+  upper_.setConstant(learned.growth.size(), kInfinity);
+  for (int i = 0; i < seen.size(); ++i) {
+    const Eigen::VectorXd error = ErrorAt(learned, seen.z.row(i));
+    lower_ = lower_.cwiseMax(seen.lower.row(i).transpose() - error);
+    upper_ = upper_.cwiseMin(seen.upper.row(i).transpose() + error);
+  }
+}
+
+void GrowingScatter::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
+  const double fastest = query.slice.center(kV) + query.half_width[kV],
+               change = std::abs(query.input[0] - query.slice.center(kBefore)) + query.half_width[kBefore];
+  for (Eigen::Index k = 0; k < lower_.size(); ++k) {
+    const double more = learned_.growth[k] * std::max(0.0, fastest) * change + kRounding;
+    bounds.lower[ToSize(k)] = lower_[k] - more;
+    bounds.upper[ToSize(k)] = upper_[k] + more;
+  }
+  bounds.capped = false;
+}
+
+int GrowingScatter::CountContradicting(const Transitions& judged) const {
+  const Observations seen = Observe(*learned_.problem->model, learned_.problem->declaration, judged);
+  int count = 0;
+  for (int i = 0; i < seen.size(); ++i) {
+    const Eigen::ArrayXd error = ErrorAt(learned_, seen.z.row(i));
+    count += (seen.lower.row(i).transpose().array() - error > upper_.array() ||
+              seen.upper.row(i).transpose().array() + error < lower_.array())
+                 .any();
+  }
+  return count;
 }
 
 Learned WithSlopesTimes(const Learned& learned, double factor) {
@@ -315,7 +402,6 @@ void Judgement::Add(const Judgement& other) {
   transitions += other.transitions;
   outside_domain += other.outside_domain;
   contradicting += other.contradicting;
-  beyond += other.beyond;
   windows.insert(windows.end(), other.windows.begin(), other.windows.end());
 }
 
@@ -332,12 +418,6 @@ int Judgement::inside() const {
 }
 
 int Judgement::complete() const { return static_cast<int>(std::ranges::count(windows, true, &WindowResult::complete)); }
-
-int Judgement::certified(std::size_t corridor) const {
-  int count = 0;
-  for (const WindowResult& window : windows) count += window.certified[corridor];
-  return count;
-}
 
 std::optional<double> Judgement::HalfWidth() const {
   std::vector<double> widths;
@@ -373,15 +453,46 @@ Judgement Judge(const Learned& learned, const std::vector<Stretch>& stretches, i
   judgement.transitions = judged.size();
   judgement.outside_domain = Gather(stretches, nullptr).size() - judged.size();
   if (judged.size() == 0) return judgement;
-  judgement.beyond =
-      judged.size() -
-      static_cast<int>(std::ssize(RowsWithin(ErrorsOf(*problem.model, judged), EpsilonOf(problem.declaration))));
-  judgement.contradicting = CountContradicting(problem, judged);
-  const Certifier certifier(learned.problem);
+  std::optional<GrowingScatter> scatter;
+  if (learned.growth.size() > 0) scatter.emplace(learned);
+  judgement.contradicting = scatter ? scatter->CountContradicting(judged) : CountContradicting(problem, judged);
+  const Certifier certifier = scatter ? Certifier(learned.problem, *scatter) : Certifier(learned.problem);
   Tube tube;
   for (const Window& window : WindowsOf(judged, {{}, {{0, judged.size()}}}, steps))
     judgement.windows.push_back(JudgeWindow(certifier, learned, judged, window, tube));
   return judgement;
+}
+
+std::vector<HiddenState> HiddenStates(const Fitted& fitted, const Drive& drive) {
+  const Transitions& steps = drive.transitions;
+  const Eigen::MatrixXd errors = ErrorsOf(*fitted.driving.model, steps);
+  std::vector<int> rows;
+  for (int i = 1; i + 1 < steps.size(); ++i)
+    if (Follows(steps, i) && Follows(steps, i + 1)) rows.push_back(i);
+  const auto count = std::ssize(rows);
+  Eigen::MatrixXd hidden(count, 5);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const int i = rows[ToSize(j)];
+    const auto z = steps.z.row(i), last = steps.z.row(i - 1);
+    const double aside = (z[kY] - last[kY]) * std::cos(z[kYaw]) - (z[kX] - last[kX]) * std::sin(z[kYaw]);
+    hidden.row(j) << aside, last[kR], last[kBefore], last[kThrottle], steps.z(i + 1, kSteer);
+  }
+  const Eigen::MatrixXd known = steps.z(rows, fitted.felt), left = errors(rows, Eigen::all);
+  // The rms of each state's errors, but for lines in the states of the model and in hidden ones.
+  const auto rest = [&](const std::vector<int>& columns) -> Eigen::RowVectorXd {
+    Eigen::MatrixXd states(count, known.cols() + std::ssize(columns));
+    states << known, hidden(Eigen::all, columns);
+    Eigen::MatrixXd lines(count, 1 + 2 * states.cols());
+    lines << Eigen::VectorXd::Ones(count), states, states.array().colwise() * known.col(0).array();
+    return (left - lines * lines.colPivHouseholderQr().solve(left)).colwise().norm();
+  };
+  const Eigen::RowVectorXd before = rest({}).cwiseMax(1e-300);
+  const auto without = [&](const std::string& name, const std::vector<int>& columns) -> HiddenState {
+    return {name, rest(columns).cwiseQuotient(before)};
+  };
+  return {without("motion aside in the step before", {0}),   without("yaw rate a step before", {1}),
+          without("steering command two steps before", {2}), without("throttle a step before", {3}),
+          without("the next steering command", {4}),         without("all of them", {0, 1, 2, 3, 4})};
 }
 
 }  // namespace forereach::research

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "forereach/certify/problem.h"
+#include "forereach/residual/enclosure.h"
 #include "identify/fit.h"
 #include "research/real/recording.h"
 
@@ -16,10 +17,8 @@ namespace forereach::research {
 extern const char* const kModelFile;
 
 /** The model of car.yaml with the domain in which a car drives: at 1 m/s or more, under power. Place and heading are
-free.
-@param most_change of the steering command from one step to the next; 2 is from end to end.
-@throws ConfigError if the file cannot be read. */
-[[nodiscard]] Problem DrivingProblem(double most_change = 2);
+free. @throws ConfigError if the file cannot be read. */
+[[nodiscard]] Problem DrivingProblem();
 
 /** A part of a drive: transitions begin <= i < end. */
 struct Stretch {
@@ -27,9 +26,6 @@ struct Stretch {
   int begin = 0, end = 0;
 };
 
-/** The transitions of a drive in blocks of 10 s, the first, third, ... or the others; those that go across the end of a
-block are in none. */
-[[nodiscard]] std::vector<Stretch> Blocks(const Drive& drive, bool odd);
 [[nodiscard]] std::vector<Stretch> Whole(const Drive& drive);
 
 /** The model with the parameters that fit the transitions of the stretches best. */
@@ -39,12 +35,12 @@ struct Fitted {
   Fit fit;
   Eigen::VectorXd state_error;  ///< Of a measured state: three standard errors, the largest of the drives.
   std::vector<int> felt;        ///< Columns of z on which the residual depends; the domain has ranges of these.
+  std::vector<int> ends;        ///< Behind the last transition of each drive.
 };
 
-/** @param driving DrivingProblem, to whose domain the transitions are cut. @param most from so many transitions only,
-evenly chosen; 0: from all.
+/** @param driving DrivingProblem, to whose domain the transitions are cut.
 @throws std::invalid_argument if there are too few transitions. Cost: about a second for 700 transitions. */
-[[nodiscard]] Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most = 0);
+[[nodiscard]] Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches);
 
 /** The same with the model as it is. */
 [[nodiscard]] Fitted Unfitted(const Problem& driving, const std::vector<Stretch>& stretches, std::vector<int> felt);
@@ -57,6 +53,12 @@ struct LearnOptions {
   /** Whether transitions with larger errors stay, and slopes explain them: L is then the smallest that no two
   transitions contradict. Otherwise they are left out, and L is zero. */
   bool slopes = false;
+  /** Instead, w_k grows with what a command does whose time is not known: w_k = s_k (a_k + b_k g), g = v |steer -
+  before|, for the columns of car.yaml. The line is the one of a, b >= 0 that fits |one-step error| best; s_k is the
+  least factor with which the quantile of every single drive is within its state error and w. x and y have one w, since
+  the car may head anywhere. State errors are declared as such, and the transitions stay that do not contradict a
+  residual of zero. */
+  bool growing = false;
   /** The domain's ranges are those of these; empty: of those that the model was fitted to. */
   std::vector<Stretch> domain_of = {};
 };
@@ -66,6 +68,7 @@ struct Learned {
   int transitions = 0, left_out = 0;
   Eigen::VectorXd state_error;  ///< Fitted::state_error
   bool explained = true;        ///< Whether slopes were found, or none were asked for.
+  Eigen::VectorXd growth = {};  ///< s_k b_k; the declaration's disturbance is s_k a_k. Empty unless w grows.
 };
 
 /** Disturbance and slopes from what the fitted model leaves of its transitions. The domain's ranges of the states are
@@ -74,8 +77,24 @@ widened by a tenth, since a tube needs room. Cost: some seconds for slopes. */
 /** The same with `factor` times the slopes. */
 [[nodiscard]] Learned WithSlopesTimes(const Learned& learned, double factor);
 
-/** Half-widths of corridors about a recorded path, m. */
-inline constexpr double kCorridors[] = {0.1, 0.15, 0.2, 0.3};
+/** What `forereach declare --from-data` proposes, which knows of no drives: slopes, and a disturbance from the scatter
+of near places. State errors are declared as such. Cost: some seconds. */
+[[nodiscard]] Learned Proposed(const Fitted& fitted);
+
+/** The bounds of a residual that is constant, and of what a growing disturbance has beyond the declaration's. Without
+directed rounding: for experiments. */
+class GrowingScatter final : public ResidualEnclosure {
+ public:
+  /** @pre learned.growth is not empty. */
+  explicit GrowingScatter(const Learned& learned);
+  void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
+  /** How many of these contradict one that was learned from. */
+  [[nodiscard]] int CountContradicting(const Transitions& judged) const;
+
+ private:
+  Learned learned_;
+  Eigen::VectorXd lower_, upper_;  // of the residual
+};
 
 /** The recorded commands of one window as a plan, and what became of it. */
 struct WindowResult {
@@ -83,7 +102,6 @@ struct WindowResult {
   Eigen::Matrix2Xd center, half_width;  ///< Of the tube's slices that there are.
   int inside = 0;                       ///< Recorded states that lie in their slices, give or take state_error.
   bool complete = false;                ///< Otherwise the tube leaves the domain.
-  std::vector<bool> certified;          ///< In each of kCorridors.
 };
 
 struct Judgement {
@@ -91,7 +109,6 @@ struct Judgement {
   int transitions = 0;  ///< In the learned domain; the windows are made of these.
   int outside_domain = 0;
   int contradicting = 0;  ///< Transitions that contradict one that was learned from.
-  int beyond = 0;         ///< Transitions with a one-step error above sigma + w in some state.
   std::vector<WindowResult> windows;
 
   /** Adds what another learner was judged by. */
@@ -101,7 +118,6 @@ struct Judgement {
   [[nodiscard]] int slices() const;
   [[nodiscard]] int inside() const;
   [[nodiscard]] int complete() const;
-  [[nodiscard]] int certified(std::size_t corridor) const;
   /** The median over the windows of the position's half-width in the last slice, the larger of x and y; infinite where
   there is no last slice. None without windows. */
   [[nodiscard]] std::optional<double> HalfWidth() const;
@@ -114,5 +130,16 @@ struct Judgement {
 /** Judges by stretches that were not learned from. Windows do not overlap and start from the measured state, give or
 take state_error. Cost: about a millisecond a window. */
 [[nodiscard]] Judgement Judge(const Learned& learned, const std::vector<Stretch>& stretches, int steps);
+
+/** What a state that the model of car.yaml lacks would explain of the errors of the best fit to a drive. */
+struct HiddenState {
+  std::string name;
+  Eigen::VectorXd left;  ///< rms of each state's error but for the lines, over that without the hidden state.
+};
+
+/** Each alone, then all. The lines are the best ones in the states and inputs that the model has, in the hidden state
+and in the products of all these with the speed. Only steps count of which the one before and the one after were
+recorded, too. */
+[[nodiscard]] std::vector<HiddenState> HiddenStates(const Fitted& fitted, const Drive& drive);
 
 }  // namespace forereach::research
