@@ -16,6 +16,8 @@ TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
   EXPECT_GT(total.withdrawn, 20) << total.Text();
   EXPECT_GT(total.motions, 4000) << total.Text();
   EXPECT_GT(total.decided_exactly, 10) << total.Text();
+  EXPECT_GT(total.shifted, 30) << total.Text();
+  EXPECT_GT(total.recorded, 30) << total.Text();
 }
 
 class WithoutOnePart : public testing::TestWithParam<Untold> {};
@@ -33,13 +35,14 @@ TEST_P(WithoutOnePart, ObstaclesAreMetWhenOnePartOfTheDeclarationIsLeftOut) {
 
 std::string NameOf(const testing::TestParamInfo<Untold>& tested) {
   static constexpr std::array kNames{"Nothing",  "Acceleration", "Turn",       "Body",
-                                     "Velocity", "Growth",       "ClockError", "Lateness"};
+                                     "Velocity", "Growth",       "ClockError", "Lateness",
+                                     "Offsets"};
   return kNames[static_cast<std::size_t>(tested.param)];
 }
 
 INSTANTIATE_TEST_SUITE_P(OfTheDeclaration, WithoutOnePart,
                          testing::Values(Untold::kAcceleration, Untold::kTurn, Untold::kBody, Untold::kVelocity,
-                                         Untold::kGrowth, Untold::kClockError, Untold::kLateness),
+                                         Untold::kGrowth, Untold::kClockError, Untold::kLateness, Untold::kOffsets),
                          NameOf);
 
 TEST(Bulge, IsZeroAtBothEndsAndReachesItsBound) {

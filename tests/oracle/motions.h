@@ -1,7 +1,9 @@
 /** What a certificate claims at all times, tried: continuous motions under certified plans, in 256 bits.
 
 A trial makes one random problem (problems.h, any_surroundings.h) and plans of it, and places obstacles that the
-certifier just accepts. Under each certificate it follows admissible residuals from sample to sample. Between two
+certifier just accepts. In some, steps are disturbed, and off their times; in some, the states of the transitions are
+recorded with errors; often by all that is declared. Under each certificate it follows admissible residuals from sample
+to sample: none leaves its slice. Between two
 samples it follows motions whose second derivatives are piecewise constant, within the declared bounds and often equal
 to them, and that keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A
 contact is a broken promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what
@@ -31,11 +33,11 @@ namespace forereach {
 
 /** A part of the declaration that the certifier of a trial is not told, which shows that the trial would find its
 absence. */
-enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, kClockError, kLateness };
+enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, kClockError, kLateness, kOffsets };
 
 struct Tally {
   long problems = 0, plans = 0, certified = 0, withdrawn = 0, motions = 0, moments = 0, decided_exactly = 0,
-       inadmissible = 0;
+       inadmissible = 0, shifted = 0, recorded = 0;  // of the certified: with steps off their times, with errors of records
 
   void Add(const Tally& other) {
     problems += other.problems;
@@ -46,10 +48,13 @@ struct Tally {
     moments += other.moments;
     decided_exactly += other.decided_exactly;
     inadmissible += other.inadmissible;
+    shifted += other.shifted;
+    recorded += other.recorded;
   }
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
-    text << problems << " problems, " << plans << " plans, " << certified << " certified, " << withdrawn
+    text << problems << " problems, " << plans << " plans, " << certified << " certified (" << shifted << " with steps off their times, " << recorded
+         << " from records with errors), " << withdrawn
          << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly
          << " of them decided in 256 bits";
     return text.str();
@@ -112,6 +117,8 @@ struct Path {
 struct Chord {
   std::vector<Real> from, to;  // p entries
   Real heading_from, heading_to;
+  double duration;                      // s, not below the true one
+  double offset_from_us, offset_to_us;  // of the boundaries from their times
 };
 
 template <class Scalar>
@@ -127,11 +134,21 @@ class MotionJudge {
  public:
   MotionJudge(const Problem& problem, const Schedule& schedule) : problem_(problem), schedule_(schedule) {}
 
-  [[nodiscard]] Chord ChordOf(const std::vector<Real>& from, const std::vector<Real>& to) const {
+  /** @param before, after how far the boundaries are off their times, s. */
+  [[nodiscard]] Chord ChordOf(const std::vector<Real>& from, const std::vector<Real>& to, const Real& before,
+                              const Real& after) const {
     const auto heading = [&](const std::vector<Real>& x) {
       return problem_.body.heading < 0 ? Real() : x[ToSize(problem_.body.heading)];
     };
-    return {Position(from), Position(to), heading(from), heading(to)};
+    const double period = problem_.between ? problem_.between->period : 0;
+    const double shorter = (after - before - Real(problem_.timing.error)).ToDouble();
+    return {Position(from),
+            Position(to),
+            heading(from),
+            heading(to),
+            period + std::min(shorter, 0.0),
+            before.ToDouble() * 1e6,
+            after.ToDouble() * 1e6};
   }
 
   /** A motion that the bounds admit; nothing if the heading turns too fast from one sample to the other already. */
@@ -147,7 +164,7 @@ class MotionJudge {
     };
     Path path{{}, any(), 0};
     for (std::size_t k = 0; k < chord.from.size(); ++k) path.of_position.push_back(any());
-    const Real period(between.period), change = abs(chord.heading_to - chord.heading_from);
+    const Real period(chord.duration), change = abs(chord.heading_to - chord.heading_from);
     const Real left = Real(between.turn_rate) - change / period;
     if (problem_.body.heading >= 0 && left < Real(0.0)) return std::nullopt;
     const double most = (left / (period * path.of_heading.Steepest())).ToDouble() * (1 - 1e-12);
@@ -159,7 +176,7 @@ class MotionJudge {
   template <class Scalar>
   [[nodiscard]] std::vector<std::vector<Point3<Scalar>>> Place(const Chord& chord, const Path* path, double s) const {
     const Scalar rest(1 - s), share(s);
-    const double period = path ? problem_.between->period : 0;
+    const double period = path ? chord.duration : 0;
     const Scalar square = Scalar(period) * Scalar(period);
     Point3<Scalar> y{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
     for (std::size_t k = 0; k < chord.from.size(); ++k) {
@@ -245,10 +262,14 @@ class MotionTrial {
     const bool bicycle = random_.Coin();
     const auto problem = AnyWorld(random_, bicycle);
     if (winds_.Coin(0.4)) Disturb(winds_, *problem);
+    if (untold_ == Untold::kOffsets || winds_.Coin()) Shift(winds_, *problem);
     const double period = problem->between ? problem->between->period : 0;
+    if (problem->between) problem->between->period = AddUp(period, problem->timing.error);
     if (problem->between && (untold_ == Untold::kLateness || winds_.Coin()))
       problem->between->period += winds_.Uniform(0, 0.05);  // what a step may last longer
-    const auto told = std::make_shared<Problem>(*problem);
+    const auto told = winds_.Coin() ? Recorded(winds_, *problem) : std::make_shared<Problem>(*problem);
+    if (untold_ == Untold::kOffsets) told->timing = {};
+    step_error_us_ = static_cast<std::int64_t>(std::ceil(told->timing.error * 1e6));
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
     if (untold_ == Untold::kTurn && told->between) told->between->turn_acceleration = 0;
     if (untold_ == Untold::kBody) told->body = Body();
@@ -269,6 +290,7 @@ class MotionTrial {
     ++tally_.plans;
     Schedule told = query.schedule;
     if (untold_ == Untold::kClockError) told.clock_error_us = 0;
+    told.clock_error_us += step_error_us_;
     if (!bicycle || random_.Coin()) query.controls *= random_.Uniform(0, 1);
     Plan plan = query.plan();
     plan.schedule = told;
@@ -284,14 +306,15 @@ class MotionTrial {
     if (certifier.Certify(plan, query.initial_set, told_obstacles, tube_).outcome != Outcome::kCertified)
       throw std::logic_error("a tube that is judged alone is certified among the same obstacles");
     ++tally_.certified;
+    if (problem.timing.error > 0) ++tally_.shifted;
+    if (certifier.problem().declaration.HasErrorInZ()) ++tally_.recorded;
     const MotionJudge judge(problem, query.schedule);
-    for (int r = 0; r < 3; ++r) Rollout(judge, query, obstacles, bicycle, 0, plan.num_steps);
-    Withdraw(certifier, judge, query, plan, bicycle);
+    for (int r = 0; r < 3; ++r) Rollout(judge, query, obstacles, 0, plan.num_steps);
+    Withdraw(certifier, judge, query, plan);
   }
 
   // An obstacle that appears while the robot is at some step, and leaves a part of the plan.
-  void Withdraw(const Certifier& certifier, const MotionJudge& judge, const Query& query, const Plan& plan,
-                bool bicycle) {
+  void Withdraw(const Certifier& certifier, const MotionJudge& judge, const Query& query, const Plan& plan) {
     const int first = random_.Below(plan.num_steps), kept = random_.Integer(first, plan.num_steps - 1);
     const auto neighbour = PlaceNeighbour(certifier, judge.problem(), query.schedule, plan.schedule, first, kept);
     if (!neighbour) return;
@@ -300,7 +323,7 @@ class MotionTrial {
     if (standing.steps < kept) throw std::logic_error("what is judged alone stands among the same obstacles");
     if (standing.steps <= first || standing.steps == plan.num_steps) return;
     ++tally_.withdrawn;
-    for (int r = 0; r < 3; ++r) Rollout(judge, query, {neighbour->obstacle}, bicycle, first, standing.steps);
+    for (int r = 0; r < 3; ++r) Rollout(judge, query, {neighbour->obstacle}, first, standing.steps);
   }
 
   // An obstacle near the path that the certifier just accepts, from a unit of time on up to control `kept`.
@@ -323,24 +346,46 @@ class MotionTrial {
   }
 
   // Under the controls 0 .. standing - 1, looked at from sample `first` on.
-  void Rollout(const MotionJudge& judge, const Query& query, const std::vector<Obstacle>& obstacles, bool bicycle,
-               int first, int standing) {
+  void Rollout(const MotionJudge& judge, const Query& query, const std::vector<Obstacle>& obstacles, int first,
+               int standing) {
     const Problem& problem = judge.problem();
     const AdmissibleResidual residual(random_, problem);
     std::vector<Real> x = PointOf(random_, query.initial_set);
+    Real offset;
     for (int t = 0; t < standing; ++t) {
-      std::vector<Real> z = x;
+      std::vector<Real> z = x, unexpected = AnyDisturbance(winds_, problem), most;
       for (const double u : query.plan().input(t)) z.emplace_back(u);
-      std::vector<Real> next = NominalSuccessor(bicycle, z);
-      const std::vector<Real> wind = AnyDisturbance(winds_, problem);
-      for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
-      const Chord chord = judge.ChordOf(x, next);
+      for (std::size_t k = 0; k < unexpected.size(); ++k) {
+        const Real r = residual(z, static_cast<int>(k));
+        unexpected[k] += r;
+        most.push_back(abs(r) + Real(problem.declaration.DisturbanceBound(static_cast<Eigen::Index>(k))));
+      }
+      const Real before = std::exchange(offset, NextOffset(problem, offset));
+      const std::vector<Real> next = LongerSuccessor(winds_, problem, z, unexpected, most, offset - before);
+      RequireInSlice(next, t + 1);
+      const Chord chord = judge.ChordOf(x, next, before, offset);
       if (t >= first && problem.between)
         Follow(judge, chord, obstacles, t);
       else if (t >= first)
         Visit(judge, chord, nullptr, obstacles, t, 0);
       if (t + 1 == standing) Visit(judge, chord, nullptr, obstacles, t, 1);
       x = next;
+    }
+  }
+
+  // Of the boundary after one: a robot ends a step that lasts longer by more than the error.
+  Real NextOffset(const Problem& problem, const Real& before) {
+    const Real any = AnyOffset(winds_, problem), latest = before + Real(problem.timing.error);
+    return any < latest ? any : latest;
+  }
+
+  void RequireInSlice(const std::vector<Real>& x, int t) const {
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      const Interval hull = tube_.hull(t, static_cast<int>(k));
+      if (Real(hull.lower) <= x[k] && x[k] <= Real(hull.upper)) continue;
+      std::ostringstream text;
+      text << random_.trace() << ": state " << k << " leaves slice " << t << " of plan " << tally_.plans;
+      throw Contradiction(text.str());
     }
   }
 
@@ -366,13 +411,14 @@ class MotionTrial {
       const std::int64_t error = random_.Coin(0.3) || most == 0 ? 0
                                  : random_.Coin()               ? (random_.Coin() ? most : -most)
                                                                 : random_.Below(static_cast<int>(2 * most + 1)) - most;
-      if (!judge.Meet(parts, obstacles[o], t, s, error, kScreen, kDouble)) continue;
+      const auto off = error + static_cast<std::int64_t>((1 - s) * chord.offset_from_us + s * chord.offset_to_us);
+      if (!judge.Meet(parts, obstacles[o], t, s, off, kScreen, kDouble)) continue;
       ++tally_.decided_exactly;
-      if (!judge.Meet(judge.Place<Real>(chord, path, s), obstacles[o], t, s, error, 0, kReal)) continue;
+      if (!judge.Meet(judge.Place<Real>(chord, path, s), obstacles[o], t, s, off, 0, kReal)) continue;
       std::ostringstream text;
       text << random_.trace() << ": obstacle " << o << " (kind " << static_cast<int>(obstacles[o].kind())
            << (obstacles[o].motion() ? ", moving" : "") << ") is met at step " << t << " + " << s << ", clock off by "
-           << error << " us, p = " << chord.from.size() << ", " << judge.problem().body.parts.size() << " parts"
+           << off << " us, p = " << chord.from.size() << ", " << judge.problem().body.parts.size() << " parts"
            << (path ? "" : ", at a sample") << "; plan " << tally_.plans << " of its problem";
       throw Contradiction(text.str());
     }
@@ -380,6 +426,7 @@ class MotionTrial {
 
   Random random_, winds_;
   Untold untold_;
+  std::int64_t step_error_us_ = 0;  // what the certifier is told
   Tally tally_;
   Tube tube_;
 };

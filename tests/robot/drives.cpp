@@ -14,12 +14,14 @@
 #include "command_line/progress.h"
 #include "simulator/drive_counts.h"
 #include "simulator/lockstep.h"
+#include "task/step_time.h"
 
 namespace forereach {
 namespace {
 
 struct Options {
   std::vector<std::string> tasks;
+  std::string obstacles;
   int seeds = 20, first_seed = 1;
   bool advice = false;
 };
@@ -32,29 +34,31 @@ std::string TextOf(const DriveCounts& all) {
                      all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
 }
 
-// Even seeds have an adversary, odd ones disturbances and errors of measurement at random, both within what the task
-// declares.
-DriveCounts Drive(Config config, int seed) {
+// Even seeds have an adversary, odd ones disturbances, errors of measurement and steps off their times at random, all
+// within what the task declares.
+DriveCounts Drive(Config config, const Config& world, int seed) {
   constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
   config.planner.seed = seed;
   config.robot.disturbance_seed = seed;
   const char* const kind = seed % 2 == 0 ? "adversarial" : "random";
   if (config.problem->declaration.IsDisturbed()) config.robot.disturbance = kind;
   if (!config.problem->declaration.state_error.isZero(0)) config.robot.sensor_error = kind;
-  Lockstep lockstep(config, config, kStartUs);
+  if (StepErrorUs(config.gate).value_or(0) > 0) config.robot.step_jitter = kind;
+  Lockstep lockstep(config, world, kStartUs);
   lockstep.Run();
   return CountsOf(lockstep);
 }
 
 // One row: the task with each seed. False if one of them was not good.
 bool DriveAll(const std::string& name, const Config& config, const Options& options) {
+  const Config world = options.obstacles.empty() ? config : LoadConfig(options.obstacles, TransitionsFile::kIgnore);
   const auto begin = std::chrono::steady_clock::now();
   DriveCounts all;
   std::string bad;
   {
     Progress progress(name + " drives", static_cast<std::size_t>(options.seeds));
     for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
-      const DriveCounts drive = Drive(config, seed);
+      const DriveCounts drive = Drive(config, world, seed);
       if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), TextOf(drive));
       all += drive;
       progress.Advance();
@@ -94,6 +98,8 @@ int main(int argc, char** argv) {
           "goal is missed, something is touched, a limit is exceeded or a step leaves its slice.",
       .footer = "Example:\n  forereach_drives config/drive/unicycle.yaml config/drive/reaching_arm.yaml --seeds 20",
       .options = {Required({"tasks", &options.tasks, "TASK", "Task files (YAML)"}),
+                  {"--obstacles", &options.obstacles, "FILE",
+                   "Task file whose obstacles are sent on OBSTACLES; by default each task's own"},
                   {"--seeds", &options.seeds, "N", "The number of drives of each task", NumberRange{1, 1'000'000}},
                   {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}},
                   {"--advice", &options.advice, "Drives each task once more with gate.advice: send"}}};
