@@ -99,7 +99,7 @@ class AbstentionReader final : public TimelineUser {
     judged.progress_steps = candidate->progress_steps;
   }
 
-  void Finish(const Timeline& timeline, Abstentions& read) {
+  void Finish(Timeline& timeline, Abstentions& read) {
     std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
     for (std::size_t i = 0; i < all_.size(); ++i) {
       const Basis& basis = bases_[i];
@@ -168,13 +168,14 @@ Abstentions AbstentionOf(const std::string& path, const std::string& config_path
 Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files,
                             const std::function<bool(const std::string& event)>& wanted) {
   Abstentions read;
-  std::vector<const Config*> pointers;
-  for (Config& task : tasks.Of(run.logs))
-    pointers.push_back(read.tasks.emplace_back(std::make_shared<const Config>(std::move(task))).get());
-  AbstentionReader reader(pointers.front()->bus, wanted);
-  Timeline timeline(pointers, reader);
+  LogTasks of_run = tasks.Of(run.logs);
+  if (!of_run.has_decisions() && tasks.is_many()) return read;
+  of_run.RequirePlans();
+  AbstentionReader reader(of_run.first().bus, wanted);
+  Timeline timeline(of_run, {&reader});
   timeline.Read(run.logs, names_files);
   reader.Finish(timeline, read);
+  read.tasks = of_run.found();
   return read;
 }
 

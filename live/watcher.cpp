@@ -214,8 +214,7 @@ bool Watcher::TakeState(const LogEvent& event) {
 bool Watcher::TakeStatus(const LogEvent& event) {
   const auto status = Decoded<certifier_status_t>(event.message());
   if (!status) return false;
-  const bool keeps =
-      status_ && IsInCharge(status_->second) && TimeApart(event.utime, status_->first) < kForgetsAfterUs;
+  const bool keeps = status_ && IsInCharge(status_->second) && TimeApart(event.utime, status_->first) < kForgetsAfterUs;
   if (!IsInCharge(*status) && keeps) return true;  // another one stands by
   status_.emplace(event.utime, *status);
   if (IsInCharge(*status)) ReadAgainFor(GetDigest(status->config_digest), event.utime);

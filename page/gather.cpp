@@ -221,20 +221,20 @@ class DetailMaker final : public CertifierFollower {
 
 // ---- Inputs.
 
-void AddTasks(const std::vector<Config>& tasks, PageRun& run) {
-  for (const Config& task : tasks) {
-    const std::string digest = ToHex(task.grounds.config);
+void AddTasks(const LogTasks& tasks, PageRun& run) {
+  for (const auto& task : tasks.found()) {
+    const std::string digest = ToHex(task->grounds.config);
     if (std::ranges::find(run.tasks, digest, &PageTask::config_digest) != run.tasks.end()) continue;
-    const NominalModel& model = *task.problem->model;
-    run.tasks.push_back({digest, model.name(), model.state_names(), model.input_names(), HoldsName(*task.problem),
-                         task.problem->body.parts.size()});
+    const NominalModel& model = *task->problem->model;
+    run.tasks.push_back({digest, model.name(), model.state_names(), model.input_names(), HoldsName(*task->problem),
+                         task->problem->body.parts.size()});
   }
 }
 
 // @param makes_rows false: they are known already.
-void ReadRows(const Logs& logs, const std::vector<Config>& tasks, bool makes_rows, PageRun& run) {
-  RowReader reader(tasks.front().bus, makes_rows, run);
-  Timeline timeline(PointersTo(tasks), reader);
+void ReadRows(const Logs& logs, LogTasks& tasks, bool makes_rows, PageRun& run) {
+  RowReader reader(tasks.first().bus, makes_rows, run);
+  Timeline timeline(tasks, {&reader});
   for (const std::string& log : logs) {
     reader.Continue(FileName(log));
     timeline.Read({log}, true);
@@ -242,6 +242,12 @@ void ReadRows(const Logs& logs, const std::vector<Config>& tasks, bool makes_row
   run.damage += timeline.damage();
   if (const std::string passed_over = DescribePassedOver(timeline.passed_over()); !passed_over.empty())
     run.notes.push_back("Messages were passed over" + passed_over + ".");
+}
+
+void ReadLogs(const Logs& logs, LogTasks tasks, bool has_database, PageRun& page) {
+  if (!tasks.has_decisions() && has_database) return;
+  ReadRows(logs, tasks, !has_database, page);
+  AddTasks(tasks, page);
 }
 
 void ReadDatabase(const RunLogs& run, PageRun& page) {
@@ -277,11 +283,7 @@ PageRun GatherRows(const RunLogs& run, const PageTasks& tasks) {
   const bool has_database = !run.database.empty();
   if (has_database) ReadDatabase(run, page);
   try {
-    if (!run.logs.empty() && !(has_database && Survey(run.logs, LogOrder::kAny).order.empty())) {
-      const std::vector<Config> of_run = tasks.of_run.Of(run.logs);
-      AddTasks(of_run, page);
-      ReadRows(run.logs, of_run, !has_database, page);
-    }
+    if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), has_database, page);
   } catch (const BadInput& error) {
     if (!has_database) throw;
     page.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
@@ -327,16 +329,14 @@ PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun&
   Wanted wanted;
   for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i].event), i);
   if (wanted.empty() || run.logs.empty()) return made;
-  std::vector<Config> of_run;
   try {
-    of_run = tasks.of_run.Of(run.logs);
+    LogTasks of_run = tasks.of_run.Of(run.logs);
+    DetailMaker maker(wanted, of_run.first().bus, numbers, threads, made);
+    Timeline timeline(of_run, {&maker});
+    timeline.Read(run.logs, true);
+    maker.Finish();
   } catch (const BadInput&) {  // noted when the rows were read
-    return made;
   }
-  DetailMaker maker(wanted, of_run.front().bus, numbers, threads, made);
-  Timeline timeline(PointersTo(of_run), maker);
-  for (const std::string& log : run.logs) timeline.Read({log}, true);
-  maker.Finish();
   return made;
 }
 

@@ -1,7 +1,6 @@
 #include "records/export.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -234,9 +233,8 @@ void TakeRows(const Rows& rows, Sink& sink) {
 
 void ReadLogs(const std::vector<std::string>& logs, const ExportOptions& options,
               const std::function<void(std::int64_t)>& on_bytes, Sink& sink) {
-  const LogSurvey survey = Survey(logs, LogOrder::kAny);
-  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
-  RecordReader reader(ChannelsOf(survey, directory, options.config, options.key), sink, on_bytes);
+  RequireLogs(logs);
+  RecordReader reader(ChannelsOf(logs, options.config, options.key), sink, on_bytes);
   reader.Read(logs);
   sink.result.damage = reader.damage();
   sink.result.passed_over = reader.passed_over();

@@ -158,10 +158,18 @@ bool IsCircumstance(const decision_t& decision) {
   }
 }
 
-ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
-                    const std::string& plan_digest, bool names_files) {
+ReplayResult Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
+                    bool names_files) {
   Replayer replayer(plan_digest);
-  Timeline timeline(PointersTo(tasks), replayer);
+  Timeline timeline(tasks, {&replayer});
+  timeline.Read(logs, names_files);
+  return replayer.Finish(timeline);
+}
+
+ReplayResult Replay(const std::vector<std::string>& logs, const Config& task, const std::string& plan_digest,
+                    bool names_files) {
+  Replayer replayer(plan_digest);
+  Timeline timeline(task, {&replayer});
   timeline.Read(logs, names_files);
   return replayer.Finish(timeline);
 }
