@@ -14,7 +14,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
-#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
@@ -23,7 +22,7 @@
 #include "records/database.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
-#include "records/timeline.h"
+#include "records/recorded_case.h"
 #include "task/files.h"
 #include "task/json_text.h"
 
@@ -94,14 +93,9 @@ class CertificateReader final : public TimelineUser {
     const Config& task = *recorded.basis.task;
     CertificateFile& file = FileOf(task);
     RecordedCertificate& certificate = file.certificates.emplace_back();
-    certificate.name = recorded.event;
-    if (!HasSizes(certified.plan, *task.problem->model)) {
-      certificate.missing = "not of this task's sizes";
-      return;
-    }
-    certificate.name += fmt::format(", plan {} of {}", certified.plan.plan_id, GetText(certified.plan.source));
-    if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
-    certificate.missing = WhyNoStep(certified.plan, task.gate);
+    certificate.name =
+        fmt::format("{}, plan {} of {}", recorded.event, certified.plan.plan_id, GetText(certified.plan.source));
+    certificate.missing = WhyNotJudged(certified.plan, task);
     if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);

@@ -226,6 +226,7 @@ std::unique_ptr<Sink> SinkOf(const std::string& robot, const ExportOptions& opti
 
 // All that is left of a log that is gone.
 void TakeRows(const Rows& rows, Sink& sink) {
+  sink.result.has_messages = true;
   for (const DecisionRow& row : rows.decisions) sink.OnDecision(row, nullptr);
   for (const EventRow& row : rows.events) sink.OnExecution(row);
   for (const GapRow& row : rows.gaps) sink.OnGap(row);
@@ -236,6 +237,7 @@ void ReadLogs(const std::vector<std::string>& logs, const ExportOptions& options
   RequireLogs(logs);
   RecordReader reader(ChannelsOf(logs, options.config, options.key), sink, on_bytes);
   reader.Read(logs);
+  sink.result.has_messages |= reader.has_messages();
   sink.result.damage = reader.damage();
   sink.result.passed_over = reader.passed_over();
 }
@@ -263,6 +265,7 @@ ExportResult& ExportResult::operator+=(const ExportResult& other) {
   tubes += other.tubes;
   messages += other.messages;
   left_out += other.left_out;
+  has_messages |= other.has_messages;
   damage += other.damage;
   passed_over += other.passed_over;
   return *this;

@@ -59,7 +59,9 @@ class Replayer final : public GateFollower {
       return;
     }
     const decision_t again = gate().Decide(bytes, decision.utime).decision;
-    const std::string difference = Difference(decision, again);
+    std::string difference = Difference(decision, again);
+    if (!difference.empty() && recorded.basis.grounds.observations != GroundsOf(decision).observations)
+      difference += "; transitions that had been learned are not in the log, which begins later or lacks messages";
     Show(recorded.event, "recorded", decision);
     Show(recorded.event, "replayed", again);
     if (difference.empty())

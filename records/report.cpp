@@ -18,9 +18,9 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/printable.h"
-#include "records/certifier_follower.h"
 #include "records/log_tasks.h"
 #include "records/outlines.h"
+#include "records/recorded_case.h"
 #include "records/run_logs.h"
 #include "task/json_text.h"
 
@@ -29,30 +29,30 @@ namespace {
 
 constexpr double kBetweenBodies = 4;  // metres of the path from one drawn body to the next
 
-class PictureMaker final : public CertifierFollower {
+class PictureMaker final : public TimelineUser, CaseJudge {
  public:
   explicit PictureMaker(const BusOptions& channels)
-      : CertifierFollower(std::max(1u, std::thread::hardware_concurrency())), channels_(channels) {}
+      : CaseJudge(std::max(1u, std::thread::hardware_concurrency())), channels_(channels) {}
 
   void OnStart(const Config& task) override {
-    CertifierFollower::OnStart(task);
     now_ = &task;
     if (const auto dim = task.problem->projection.rows(); dim != 2)
       throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}", dim));
   }
+  void OnReload(const Config& task) override { OnStart(task); }
 
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& decision = recorded.decision;
     const bool is_drawn = decision.outcome == decision_t::CERTIFIED || decision.outcome == decision_t::ABSTAIN_SAFETY;
     if (!recorded.candidate || !is_drawn) return;
-    const auto candidate = Decoded<candidate_plan_t>(recorded.candidate->bytes);
-    if (!candidate) return;
-    if (!recorded.is_of_known_task) {
+    const RecordedCase judged = CaseOf(recorded);
+    if (!judged.candidate) return;
+    if (!judged.missing.empty()) {
       ++result_.disagreements;
       return;
     }
     outlines_.emplace_back();
-    Put(*candidate, recorded, outlines_.size() - 1);
+    Put(judged, outlines_.size() - 1);
   }
 
   void OnEvent(const LogEvent& event) override {

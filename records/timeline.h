@@ -51,8 +51,13 @@ struct Basis {
   const Config* task = nullptr;
   Grounds grounds;  ///< The digests of these inputs. The decision's message has the digests that it names.
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
-  /** The range [learned_begin, learned_end) of Timeline::learned(task) that was learned at that time. */
+  /** All transitions that are learned under the task, in the order of the log; at that time [learned_begin,
+  learned_end) of them were. */
+  std::shared_ptr<const std::vector<ExecutedTransition>> learned;
   std::size_t learned_begin = 0, learned_end = 0;
+
+  /** What was known at that time: the task's problem with these transitions behind its own. */
+  [[nodiscard]] std::shared_ptr<const Problem> problem() const;
 };
 
 struct RecordedCandidate {
@@ -136,7 +141,7 @@ class Timeline final {
   [[nodiscard]] std::int64_t candidates() const { return candidates_; }
   [[nodiscard]] const Undecided<RecordedCandidate>& undecided() const { return undecided_; }
   /** All transitions that were learned under a task, in the order of the log. */
-  [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) { return learned_[&task]; }
+  [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) { return *LearnedUnder(task); }
   /** The obstacles in force after everything that was logged. */
   [[nodiscard]] const std::vector<Obstacle>& logged_obstacles() const { return logged_obstacles_.all(); }
 
@@ -183,6 +188,7 @@ class Timeline final {
   /** @param candidate_place -1 if the log has no candidate: without a state of these digests nothing advances. */
   [[nodiscard]] Basis Advance(const Grounds& named, std::int64_t candidate_place);
   [[nodiscard]] Basis Current();
+  [[nodiscard]] std::shared_ptr<std::vector<ExecutedTransition>>& LearnedUnder(const Config& task);
   void TakeNextObstacles();
   void LearnNext();
 
@@ -218,7 +224,7 @@ class Timeline final {
   Digest logged_observations_{};
   std::deque<ObstaclesChange> obstacles_ahead_;
   std::deque<Transition> transitions_ahead_;
-  std::map<const Config*, std::vector<ExecutedTransition>> learned_;
+  std::map<const Config*, std::shared_ptr<std::vector<ExecutedTransition>>> learned_;
 };
 
 }  // namespace forereach

@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "cli/gate_advice.h"
+#include "advise/gate_advice.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/size.h"
 #include "lcmtypes/names.h"

@@ -68,6 +68,8 @@ INSTANTIATE_TEST_SUITE_P(Commands, PassesTest,
                                          "replay LOG --compare --config TASK", "verify LOG --config TASK",
                                          "advise LOG --config TASK", "report LOG --config TASK",
                                          "report DIRECTORY --config TASK", "report LOG --picture OUT.svg --config TASK",
-                                         "log list LOG"));
+                                         "log list LOG", "report LOG --out OUT.html --config TASK",
+                                         "report DIRECTORY --out OUT.html --config TASK",
+                                         "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT"));
 
 }  // namespace forereach::passes_test
