@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <stdexcept>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "command_line/progress.h"
 #include "forereach/certify/explain.h"
@@ -97,6 +101,12 @@ AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTa
   }
 }
 
+// By how much it missed what it was compared with; 0 if it was not judged.
+double Shortfall(const RecordedAbstention& abstention) {
+  const double shortfall = std::abs(abstention.decision.threshold - abstention.decision.margin);
+  return std::isfinite(shortfall) ? shortfall : 0;
+}
+
 // Whether what was kept is of these abstentions. Places are used as they are.
 bool Fits(const std::vector<AbstentionAdvice>& kept, const std::vector<RecordedAbstention>& all) {
   return std::ranges::equal(kept, all, [](const AbstentionAdvice& advice, const RecordedAbstention& abstention) {
@@ -130,8 +140,8 @@ std::vector<AdviceGroup> GroupsOf(const AbstentionAdvice& advice) {
 }
 
 std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
-                                                     const FinishedRuns* finished,
-                                                     const std::vector<std::string>& keys) {
+                                                     const FinishedRuns* finished, const std::vector<std::string>& keys,
+                                                     double seconds) {
   std::vector<std::vector<AbstentionAdvice>> advised(runs.size());
   std::vector<std::atomic<std::size_t>> left(runs.size());
   std::vector<std::pair<std::size_t, std::size_t>> work;  // run, abstention
@@ -148,11 +158,18 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
     for (std::size_t i = 0; i < count; ++i) work.emplace_back(run, i);
     for (const auto& task : runs[run].tasks) tails[task.get()] = TailsOf(*task);
   }
+  std::ranges::stable_sort(work, {}, [&](const auto& each) { return Shortfall(runs[each.first].all[each.second]); });
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
   Progress progress("abstentions examined", work.size());
   ForEachInParallel(work.size(), jobs, [&](std::size_t k, std::size_t) {
     const auto [run, i] = work[k];
     const RecordedAbstention& abstention = runs[run].all[i];
-    advised[run][i] = AdviceFor(abstention, tails.at(abstention.task));
+    if (k > 0 && std::chrono::duration<double>(Clock::now() - begin).count() > seconds)
+      advised[run][i].missing = fmt::format(
+          "not searched within {:g} s: `forereach advise` searches all, or write a longer --advice-seconds", seconds);
+    else
+      advised[run][i] = AdviceFor(abstention, tails.at(abstention.task));
     if (--left[run] == 0 && finished) finished->Keep(keys[run], advised[run], {});
     progress.Advance();
   });

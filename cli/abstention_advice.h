@@ -7,9 +7,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "advise/abstentions.h"
 #include "advise/advice.h"
-#include "cli/abstentions.h"
-#include "cli/gate_advice.h"
+#include "advise/gate_advice.h"
 #include "records/finished_runs.h"
 
 namespace forereach {
@@ -36,9 +36,11 @@ void from_json(const nlohmann::json& json, AbstentionAdvice& advice);
 
 /** What would have turned the abstentions of several runs, on `jobs` threads in all and with a progress bar.
 @param keys of each run, as FinishedRuns names it. @param finished where the advice of finished runs is kept; null for
-none, without keys. @throws OutputError if it cannot be. */
+none, without keys. @param seconds after this time no further one is begun, but for the first; the others have
+`missing`. Those that missed by least come first. @throws OutputError if a result cannot be kept. */
 [[nodiscard]] std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
                                                                    const FinishedRuns* finished = nullptr,
-                                                                   const std::vector<std::string>& keys = {});
+                                                                   const std::vector<std::string>& keys = {},
+                                                                   double seconds = kInfinity);
 
 }  // namespace forereach

@@ -145,7 +145,7 @@ Advised AdviseRuns(const AdviseArguments& options) {
   const auto finished = ResultsOf(options.each_run, "advise", options.config, options.key);
   std::vector<std::string> keys(named.runs.size());
   auto read = ForEachRun<Abstentions>(named, options.each_run, "read", [&](const RunLogs& run, RunWork&) {
-    if (named.is_many && (run.logs.empty() || Survey(run.logs, LogOrder::kAny).decisions == 0)) return Abstentions{};
+    if (run.logs.empty()) return Abstentions{};
     if (finished) keys[static_cast<std::size_t>(&run - named.runs.data())] = finished->KeyOf(run);
     Abstentions of_run = ReadAbstentions(run, tasks, named.is_many || run.logs.size() > 1);
     for (RecordedAbstention& each : of_run.all)

@@ -132,7 +132,7 @@ int RunExport(ExportArguments options) {
   NamedRuns named = RunsNamedBy(options.inputs, options.each_run.jobs);
   options.what.names_robot = named.is_many;
   RequireNoOutput(options, named);  // before the logs are read
-  const bool is_own = options.each_run.resume.empty();
+  const bool is_own = options.each_run.is_own = options.each_run.resume.empty();
   if (is_own) options.each_run.resume = options.output + ".part";
   const std::string command = "export " + options.format + (named.is_many ? " many " : " ");
   const auto finished =
@@ -149,7 +149,8 @@ int RunExport(ExportArguments options) {
   for (const auto& result : results)
     if (result) sum += *result;
   Describe(options, sum, named);
-  return sum.damage.places == 0 && named.missing.empty() ? 0 : 1;
+  if (!sum.has_messages) std::cerr << "forereach: nothing in it is a message of ForeReach's" << std::endl;
+  return sum.has_messages && sum.damage.places == 0 && named.missing.empty() ? 0 : 1;
 }
 
 }  // namespace

@@ -12,7 +12,6 @@
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/compare.h"
-#include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/replay.h"
 #include "records/result_json.h"
@@ -29,18 +28,15 @@ struct ReplayArguments {
   EachRunOptions each_run;
 };
 
-// Of several runs, those with nothing to replay are passed over.
-bool HasPlans(const RunLogs& run) {
-  if (run.logs.empty()) return false;
-  const LogSurvey survey = Survey(run.logs, LogOrder::kAny);
-  return survey.candidates > 0 || survey.decisions > 0 || !survey.configs.empty();
+// Of a run in which nothing was found. Of several runs, those with nothing to replay are passed over.
+void RequirePlans(const NamedRuns& named, const RunLogs& run, const LogKey& key) {
+  if (!named.is_many) RunTasks("", key, false).Of(run.logs).RequirePlans();
 }
 
 Config OtherTask(const ReplayArguments& options) {
-  std::vector<Config> task;
-  task.push_back(LoadConfig(options.config));
+  Config task = LoadConfig(options.config);
   options.key.Override(task, options.config);
-  return std::move(task.front());
+  return task;
 }
 
 // Lines about a run, with its robot's name if there are several runs.
@@ -93,10 +89,17 @@ int RunReplay(const ReplayArguments& options) {
       ResultsOf(options.each_run, std::string("replay ") + (other ? "other " : "") + options.plan_digest,
                 options.config, options.key);
   const auto replay = [&](const RunLogs& run, RunWork&) -> ReplayResult {
-    if (named.is_many && !HasPlans(run)) return {};
-    if (other) static_cast<void>(SurveyRun(run.logs));
-    const std::vector<Config> tasks = other ? std::vector{*other} : own.Of(run.logs);
-    return Replay(run.logs, tasks, options.plan_digest, named.is_many || run.logs.size() > 1);
+    if (run.logs.empty()) return {};
+    const bool names_files = named.is_many || run.logs.size() > 1;
+    if (other) {
+      ReplayResult result = Replay(run.logs, *other, options.plan_digest, names_files);
+      if (result.candidates == 0 && result.differences.empty()) RequirePlans(named, run, options.key);
+      return result;
+    }
+    LogTasks tasks = own.Of(run.logs);
+    if (!tasks.has_plans() && named.is_many) return {};  // nothing to replay
+    tasks.RequirePlans();
+    return Replay(run.logs, tasks, options.plan_digest, names_files);
   };
   ReplayResult sum;
   auto results = ForEachRun<ReplayResult>(named, options.each_run, "replayed", finished.get(), replay);
@@ -218,9 +221,11 @@ int RunCompare(const ReplayArguments& options) {
   const Config task = OtherTask(options);
   const auto finished = ResultsOf(options.each_run, "compare", options.config, options.key);
   const auto compare = [&](const RunLogs& run, RunWork&) -> Comparison {
-    if (named.is_many && !HasPlans(run)) return {};
-    static_cast<void>(SurveyRun(run.logs));
-    return Compare(run.logs, task, named.is_many || run.logs.size() > 1);
+    if (run.logs.empty()) return {};
+    Comparison result = Compare(run.logs, task, named.is_many || run.logs.size() > 1);
+    if (result.candidates + result.circumstances + result.without_candidate + result.undecided == 0)
+      RequirePlans(named, run, options.key);
+    return result;
   };
   Comparison sum;
   ByRobot robots;

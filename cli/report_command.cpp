@@ -1,6 +1,7 @@
-#include <filesystem>
+#include <atomic>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <optional>
 
 #include "cli/abstention_advice.h"
@@ -22,36 +23,39 @@ struct ReportArguments {
   ReportOptions report;
   EachRunOptions each_run;
   std::string out, before;
+  double advice_seconds = 2;
   bool force = false;
 };
 
 constexpr std::size_t kMostAdvised = 300;
+constexpr std::size_t kMostCases = 20'000;  // of all runs, while they are read
+
+// A run that was read once, for its tubes and its advice.
+struct PageRead {
+  explicit PageRead(const DetailBounds& bounds) : pass(bounds) { pass.others = {&abstentions}; }
+
+  AbstentionReader abstentions{kMostAdvised};
+  PagePass pass;
+};
 
 // The advice on the last decisions that are no certificates. Without a log or its task, there is none.
-void AddAdvice(NamedRuns& read, const ReportArguments& options, const PageTasks& tasks, PageRun& page) {
+void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr<PageRead>>& read, PageRun& page) {
   const auto chosen = ChooseAdvised(page, kMostAdvised);
-  std::vector<std::map<std::string, std::size_t>> row_of(chosen.size());  // of each run, by the event's name
-  for (std::size_t run = 0; run < chosen.size(); ++run)
-    for (const std::size_t row : chosen[run]) row_of[run].emplace(EventName(page.decisions[row].event), row);
-  const RunLogs* const first = read.runs.data();
-  auto found = ForEachRun<Abstentions>(read, options.each_run, "searched", [&](const RunLogs& logs, RunWork&) {
-    const auto run = static_cast<std::size_t>(&logs - first);
-    if (chosen[run].empty() || logs.logs.empty()) return Abstentions{};
-    try {
-      return ReadAbstentions(logs, tasks.of_run, true,
-                             [&](const std::string& event) { return row_of[run].contains(event); });
-    } catch (const BadInput&) {  // noted when the rows were read
-      return Abstentions{};
-    }
-  });
-  std::vector<Abstentions> runs(found.size());
-  for (std::size_t run = 0; run < found.size(); ++run)
-    if (found[run]) runs[run] = std::move(*found[run]);
-  const auto advised = AdviseAll(runs, options.each_run.jobs);
+  std::vector<Abstentions> runs(read.size());
+  std::vector<std::vector<std::size_t>> rows(read.size());  // of the abstentions
+  for (std::size_t run = 0; run < read.size(); ++run) {
+    if (chosen[run].empty() || !read[run]) continue;
+    std::map<std::string, std::size_t> row_of;  // by the event's name
+    for (const std::size_t row : chosen[run]) row_of.emplace(EventName(page.decisions[row].event), row);
+    runs[run] = read[run]->abstentions.Finish(read[run]->pass.tasks);
+    std::erase_if(runs[run].all, [&](const RecordedAbstention& each) { return !row_of.contains(each.event); });
+    for (const RecordedAbstention& each : runs[run].all) rows[run].push_back(row_of.at(each.event));
+  }
+  const auto advised = AdviseAll(runs, options.each_run.jobs, nullptr, {}, options.advice_seconds);
   for (std::size_t run = 0; run < runs.size(); ++run)
     for (std::size_t i = 0; i < advised[run].size(); ++i) {
       PageAdvice& advice = page.advice.emplace_back();
-      advice.decision = row_of[run].at(runs[run].all[i].event);
+      advice.decision = rows[run][i];
       advice.missing = advised[run][i].missing;
       for (AdviceGroup& group : GroupsOf(advised[run][i]))
         advice.groups.push_back({std::move(group.heading), std::move(group.clauses)});
@@ -61,30 +65,43 @@ void AddAdvice(NamedRuns& read, const ReportArguments& options, const PageTasks&
 // Rows of finished runs are kept; the drawings and the advice, of which there is a bounded number, are made anew.
 PageRun GatherRuns(const ReportArguments& options) {
   const ReportOptions& report = options.report;
+  const DetailBounds bounds;
   NamedRuns named = RunsNamedBy(report.logs, options.each_run.jobs);
   const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
   const auto finished = ResultsOf(options.each_run, "report", report.config, report.key);
-  auto rows = ForEachRun<PageRun>(named, options.each_run, "read", finished.get(),
-                                  [&](const RunLogs& run, RunWork&) { return GatherRows(run, tasks); });
+  std::vector<std::unique_ptr<PageRead>> of_named(named.runs.size()), passes;
+  std::atomic<std::size_t> cases = 0;
+  auto rows = ForEachRun<PageRun>(named, options.each_run, "read", finished.get(), [&](const RunLogs& run, RunWork&) {
+    auto& read = of_named[static_cast<std::size_t>(&run - named.runs.data())];
+    read = std::make_unique<PageRead>(bounds);
+    PageRun of_run = GatherRows(run, tasks, read->pass);
+    if ((cases += read->pass.cases.entries().size()) > kMostCases) read.reset();  // read again if it is drawn
+    return of_run;
+  });
   PageRun page = EmptyPage(report.logs);
   NamedRuns read{{}, {}, named.is_many};
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (!rows[k]) continue;
     AddRows(page, std::move(*rows[k]));
     read.runs.push_back(named.runs[k]);
+    passes.push_back(std::move(of_named[k]));
   }
   AddMissing(page, named);
-  const DetailBounds bounds;
   std::size_t numbers = bounds.numbers;
-  const auto chosen = ChooseDetails(page, bounds);
+  const auto chosen = ChooseDetails(page, bounds), advised = ChooseAdvised(page, kMostAdvised);
   const RunLogs* const first = read.runs.data();
   auto drawn = ForEachRun<PageRun>(read, options.each_run, "drawn", nullptr, [&](const RunLogs& run, RunWork& work) {
-    const std::vector<std::size_t>& decisions = chosen[static_cast<std::size_t>(&run - first)];
-    return GatherDetails(run, tasks, page, decisions, numbers, work.threads);
+    const auto k = static_cast<std::size_t>(&run - first);
+    if (chosen[k].empty() && advised[k].empty()) return PageRun();
+    if (!passes[k]) {
+      passes[k] = std::make_unique<PageRead>(bounds);
+      ReadAgain(run, tasks, passes[k]->pass);
+    }
+    return GatherDetails(passes[k]->pass, page, chosen[k], numbers, work.threads);
   });
   for (auto& drawings : drawn)
     if (drawings) AddDetails(page, std::move(*drawings), numbers);
-  AddAdvice(read, options, tasks, page);
+  AddAdvice(options, passes, page);
   AddMissing(page, {{}, read.missing, true});
   return page;
 }
@@ -133,6 +150,13 @@ Command ReportCommand() {
                    .variable = &options->before,
                    .type = "LOG|DATABASE|DIRECTORY",
                    .help = "Show its figures beside those of the others on the page",
+                   .needs = "--out"},
+                  {.name = "--advice-seconds",
+                   .variable = &options->advice_seconds,
+                   .type = "S",
+                   .help = "How long to search what would have turned abstentions, those that missed by least first; "
+                           "the page says which were not searched",
+                   .range = NumberRange{0, 86400},
                    .needs = "--out"},
                   {.name = "--force",
                    .variable = &options->force,

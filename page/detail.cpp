@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "certifier/gate/candidate_message.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/size.h"
 #include "records/outlines.h"
@@ -74,11 +73,6 @@ std::string AddTube(const Certifier& certifier, const JudgedCandidate& judged, c
 }
 
 }  // namespace
-
-std::string WhyNotJudged(const candidate_plan_t& candidate, const Config& task) {
-  if (!HasSizes(candidate, *task.problem->model)) return "its candidate is not of its task's sizes";
-  return WhyNoSchedule(candidate, task.gate);
-}
 
 void Describe(const Certifier& certifier, const JudgedCandidate& judged, const Decision& again, const Tube& tube,
               PageDetail& detail) {

@@ -18,12 +18,9 @@
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
 #include "page/detail.h"
-#include "records/certifier_follower.h"
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/log_survey.h"
-#include "records/log_tasks.h"
-#include "records/timeline.h"
 
 namespace forereach {
 namespace {
@@ -103,8 +100,6 @@ void LeaveOut(PageDetail& detail) {
   detail.missing = "the drawings of this page have reached their bound";
 }
 
-using Wanted = std::map<std::string, std::size_t>;  // by the name of a decision's event: its place
-
 bool IsCertified(const DecisionRow& row) { return row.outcome == OutcomeName(decision_t::CERTIFIED); }
 
 bool IsJudgedAbstention(const DecisionRow& row) {
@@ -132,51 +127,26 @@ std::vector<std::vector<std::size_t>> LastDecisions(const PageRun& page, std::si
   return chosen;
 }
 
-// Certifies the wanted candidates of logs again.
-class DetailMaker final : public CertifierFollower {
+// Certifies candidates again, and describes what was found.
+class DetailMaker final : CaseJudge {
  public:
-  DetailMaker(const Wanted& wanted, const BusOptions& channels, std::size_t numbers, unsigned threads, PageRun& run)
-      : CertifierFollower(threads), wanted_(wanted), channels_(channels), numbers_(numbers), run_(run) {}
+  /** @param run receives details and obstacle sets, and has the tasks. */
+  DetailMaker(std::size_t numbers, unsigned threads, PageRun& run) : CaseJudge(threads), numbers_(numbers), run_(run) {}
 
-  void OnDecision(const RecordedDecision& recorded) override {
-    const auto found = wanted_.find(recorded.event);
-    if (found == wanted_.end()) return;
-    const std::size_t place = run_.details.size();
+  void Add(const LastCases::Entry& entry, std::size_t decision) {
+    const RecordedCase& recorded = entry.recorded;
     PageDetail& detail = run_.details.emplace_back();
-    detail.decision = found->second;
-    if (!recorded.candidate) return Miss(detail, "its candidate is not in the log");
-    const auto candidate = Decoded<candidate_plan_t>(recorded.candidate->bytes);
-    if (!candidate) return Miss(detail, "its candidate cannot be read");
-    if (!recorded.is_of_known_task) return Miss(detail, "its task is not kept next to the log");
-    const Config& task = *recorded.basis.task;
-    if (const std::string why = WhyNotJudged(*candidate, task); !why.empty()) return Miss(detail, why);
-    detail.task = TaskIndex(task);
+    detail.decision = decision;
+    detail.missing = recorded.missing;
+    if (!detail.missing.empty()) return;
+    detail.executed = entry.executed;
+    detail.task = TaskIndex(*recorded.basis.task);
     detail.obstacles = ObstaclesIndex(recorded.basis);
-    if (recorded.decision.outcome == decision_t::CERTIFIED) executing_[candidate->plan_id] = {place, &task};
-    Put(*candidate, recorded, place);
+    Put(recorded, run_.details.size() - 1);
   }
-
-  void OnEvent(const LogEvent& event) override {
-    if (event.channel != channels_.robot_state || executing_.empty()) return;
-    const auto state = Decoded<robot_state_t>(event.message());
-    if (!state) return;
-    const auto found = executing_.find(state->executing_plan_id);
-    if (found == executing_.end()) return;
-    const auto& [place, task] = found->second;
-    const Eigen::MatrixXd& projection = task->problem->projection;
-    if (state->num_states != projection.cols() || projection.rows() != 2 ||
-        !steps_.insert({place, state->executing_step}).second)
-      return;
-    const Eigen::Vector2d at = projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
-    if (at.allFinite() && 0 <= state->executing_step && state->executing_step <= kMaxSteps)
-      run_.details[place].executed.push_back({state->executing_step, at.x(), at.y()});
-  }
-
   void Finish() { CertifyAgain(); }
 
  private:
-  static void Miss(PageDetail& detail, std::string why) { detail.missing = std::move(why); }
-
   int TaskIndex(const Config& task) {
     const std::string digest = ToHex(task.grounds.config);
     const auto found = std::ranges::find(run_.tasks, digest, &PageTask::config_digest);
@@ -199,7 +169,7 @@ class DetailMaker final : public CertifierFollower {
   }
 
   void Refuse(const JudgedCandidate& judged, const std::string& why) override {
-    Miss(run_.details[judged.place], "it cannot be judged again: " + why);
+    run_.details[judged.place].missing = "it cannot be judged again: " + why;
   }
   void Look(const JudgedCandidate& judged, const Certifier& certifier, const Decision& again,
             const Tube& tube) override {
@@ -210,31 +180,29 @@ class DetailMaker final : public CertifierFollower {
     if (!TakeRoom(NumbersOf(detail))) LeaveOut(detail);
   }
 
-  const Wanted& wanted_;
-  const BusOptions channels_;
   std::size_t numbers_;  // for which there is room
   PageRun& run_;
   std::map<Digest, int> sets_;
-  std::map<std::int64_t, std::pair<std::size_t, const Config*>> executing_;  // by plan
-  std::set<std::pair<std::size_t, int>> steps_;                              // that have an executed state
 };
 
 // ---- Inputs.
 
-void AddTasks(const std::vector<Config>& tasks, PageRun& run) {
-  for (const Config& task : tasks) {
-    const std::string digest = ToHex(task.grounds.config);
+void AddTasks(const LogTasks& tasks, PageRun& run) {
+  for (const auto& task : tasks.found()) {
+    const std::string digest = ToHex(task->grounds.config);
     if (std::ranges::find(run.tasks, digest, &PageTask::config_digest) != run.tasks.end()) continue;
-    const NominalModel& model = *task.problem->model;
-    run.tasks.push_back({digest, model.name(), model.state_names(), model.input_names(), HoldsName(*task.problem),
-                         task.problem->body.parts.size()});
+    const NominalModel& model = *task->problem->model;
+    run.tasks.push_back({digest, model.name(), model.state_names(), model.input_names(), HoldsName(*task->problem),
+                         task->problem->body.parts.size()});
   }
 }
 
 // @param makes_rows false: they are known already.
-void ReadRows(const Logs& logs, const std::vector<Config>& tasks, bool makes_rows, PageRun& run) {
-  RowReader reader(tasks.front().bus, makes_rows, run);
-  Timeline timeline(PointersTo(tasks), reader);
+void ReadRows(const Logs& logs, LogTasks& tasks, bool makes_rows, PageRun& run, PagePass& pass) {
+  RowReader reader(tasks.first().bus, makes_rows, run);
+  std::vector<TimelineUser*> users{&reader, &pass.cases};
+  users.insert(users.end(), pass.others.begin(), pass.others.end());
+  Timeline timeline(tasks, users);
   for (const std::string& log : logs) {
     reader.Continue(FileName(log));
     timeline.Read({log}, true);
@@ -242,6 +210,14 @@ void ReadRows(const Logs& logs, const std::vector<Config>& tasks, bool makes_row
   run.damage += timeline.damage();
   if (const std::string passed_over = DescribePassedOver(timeline.passed_over()); !passed_over.empty())
     run.notes.push_back("Messages were passed over" + passed_over + ".");
+}
+
+void ReadLogs(const Logs& logs, LogTasks tasks, bool makes_rows, PageRun& page, PagePass& pass) {
+  pass.was_read = true;
+  if (!tasks.has_decisions() && !makes_rows) return;
+  ReadRows(logs, tasks, makes_rows, page, pass);
+  AddTasks(tasks, page);
+  pass.tasks = tasks.found();
 }
 
 void ReadDatabase(const RunLogs& run, PageRun& page) {
@@ -272,16 +248,48 @@ void AddPart(const RunLogs& run, const PageTasks& tasks, PageRun& page) {
 
 }  // namespace
 
-PageRun GatherRows(const RunLogs& run, const PageTasks& tasks) {
+void LastCases::OnStart(const Config& task) { channels_ = task.bus; }
+
+void LastCases::OnDecision(const RecordedDecision& recorded) {
+  const auto outcome = recorded.decision.outcome;
+  const bool is_certified = outcome == decision_t::CERTIFIED;
+  if (!is_certified && outcome != decision_t::ABSTAIN_FALSIFIED && outcome != decision_t::ABSTAIN_DOMAIN &&
+      outcome != decision_t::ABSTAIN_SAFETY)
+    return;
+  std::deque<std::int64_t>& kind = is_certified ? certified_ : abstained_;
+  kind.push_back(next_);
+  Entry& entry = entries_[next_++];
+  entry.recorded = CaseOf(recorded);
+  if (is_certified && entry.recorded.missing.empty()) executing_[entry.recorded.candidate->plan_id] = next_ - 1;
+  if (kind.size() <= (is_certified ? bounds_.certified : bounds_.abstained)) return;
+  entries_.erase(kind.front());
+  kind.pop_front();
+}
+
+void LastCases::OnEvent(const LogEvent& event) {
+  if (event.channel != channels_.robot_state || executing_.empty()) return;
+  const auto state = Decoded<robot_state_t>(event.message());
+  if (!state) return;
+  const auto place = executing_.find(state->executing_plan_id);
+  if (place == executing_.end()) return;
+  const auto found = entries_.find(place->second);
+  if (found == entries_.end()) return static_cast<void>(executing_.erase(place));
+  Entry& entry = found->second;
+  const Eigen::MatrixXd& projection = entry.recorded.basis.task->problem->projection;
+  if (state->num_states != projection.cols() || projection.rows() != 2 ||
+      !entry.steps.insert(state->executing_step).second)
+    return;
+  const Eigen::Vector2d at = projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
+  if (at.allFinite() && 0 <= state->executing_step && state->executing_step <= kMaxSteps)
+    entry.executed.push_back({state->executing_step, at.x(), at.y()});
+}
+
+PageRun GatherRows(const RunLogs& run, const PageTasks& tasks, PagePass& pass) {
   PageRun page;
   const bool has_database = !run.database.empty();
   if (has_database) ReadDatabase(run, page);
   try {
-    if (!run.logs.empty() && !(has_database && Survey(run.logs, LogOrder::kAny).order.empty())) {
-      const std::vector<Config> of_run = tasks.of_run.Of(run.logs);
-      AddTasks(of_run, page);
-      ReadRows(run.logs, of_run, !has_database, page);
-    }
+    if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), !has_database, page, pass);
   } catch (const BadInput& error) {
     if (!has_database) throw;
     page.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
@@ -320,22 +328,21 @@ std::string EventName(const LogReference& event) {
   return fmt::format("{} event {}", event.log_file, event.event_number);
 }
 
-PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,
-                      const std::vector<std::size_t>& decisions, std::size_t numbers, unsigned threads) {
+void ReadAgain(const RunLogs& run, const PageTasks& tasks, PagePass& pass) try {
+  PageRun known;
+  if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), false, known, pass);
+} catch (const BadInput&) {  // noted when the rows were read
+}
+
+PageRun GatherDetails(const PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions,
+                      std::size_t numbers, unsigned threads) {
   PageRun made;
   made.tasks = page.tasks;  // so that their places are the page's
-  Wanted wanted;
+  std::map<std::string, std::size_t> wanted;
   for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i].event), i);
-  if (wanted.empty() || run.logs.empty()) return made;
-  std::vector<Config> of_run;
-  try {
-    of_run = tasks.of_run.Of(run.logs);
-  } catch (const BadInput&) {  // noted when the rows were read
-    return made;
-  }
-  DetailMaker maker(wanted, of_run.front().bus, numbers, threads, made);
-  Timeline timeline(PointersTo(of_run), maker);
-  for (const std::string& log : run.logs) timeline.Read({log}, true);
+  DetailMaker maker(numbers, threads, made);
+  for (const auto& [place, entry] : pass.cases.entries())
+    if (const auto found = wanted.find(entry.recorded.event); found != wanted.end()) maker.Add(entry, found->second);
   maker.Finish();
   return made;
 }
@@ -382,11 +389,11 @@ PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& co
   NamedRuns named = RunsNamedBy(inputs, threads);
   const PageTasks tasks{config, key, RunTasks(config, key, named.is_many)};
   PageRun page = EmptyPage(inputs);
-  std::vector<RunLogs> read;
+  std::deque<PagePass> passes;
   for (const RunLogs& run : named.runs) try {
-      AddRows(page, GatherRows(run, tasks));
-      read.push_back(run);
+      AddRows(page, GatherRows(run, tasks, passes.emplace_back(bounds)));
     } catch (const BadInput& error) {
+      passes.pop_back();
       if (!named.is_many) throw;
       named.missing.emplace_back(error.what());
     }
@@ -394,7 +401,7 @@ PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& co
   std::size_t numbers = bounds.numbers;
   const auto chosen = ChooseDetails(page, bounds);
   for (std::size_t k = 0; k < chosen.size(); ++k)
-    AddDetails(page, GatherDetails(read[k], tasks, page, chosen[k], numbers, threads), numbers);
+    AddDetails(page, GatherDetails(passes[k], page, chosen[k], numbers, threads), numbers);
   return page;
 }
 

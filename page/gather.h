@@ -1,12 +1,18 @@
 /** Gathers what a page shows, from event logs and decision databases. */
 #pragma once
 
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "page/page_data.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
+#include "records/recorded_case.h"
 #include "records/run_logs.h"
 
 namespace forereach {
@@ -26,18 +32,58 @@ struct PageTasks {
   RunTasks of_run;
 };
 
+/** The last decisions of a timeline whose tubes a page may have, and the states in which the robot executed them. */
+class LastCases final : public TimelineUser {
+ public:
+  struct Entry {
+    RecordedCase recorded;
+    std::vector<PageState> executed;
+    std::set<int> steps;  ///< That have a state.
+  };
+
+  explicit LastCases(const DetailBounds& bounds) : bounds_(bounds) {}
+
+  void OnStart(const Config& task) override;
+  void OnEvent(const LogEvent& event) override;
+  void OnDecision(const RecordedDecision& recorded) override;
+
+  /** In the order of the log. */
+  [[nodiscard]] const std::map<std::int64_t, Entry>& entries() const { return entries_; }
+
+ private:
+  const DetailBounds bounds_;
+  BusOptions channels_;
+  std::int64_t next_ = 0;
+  std::map<std::int64_t, Entry> entries_;
+  std::deque<std::int64_t> certified_, abstained_;  // their places
+  std::map<std::int64_t, std::int64_t> executing_;  // by plan
+};
+
+/** What one pass over the logs of a run leaves beside its rows. */
+struct PagePass {
+  explicit PagePass(const DetailBounds& bounds) : cases(bounds) {}
+
+  LastCases cases;
+  std::vector<TimelineUser*> others{};                 ///< Who else is told of the run; set before the pass.
+  std::vector<std::shared_ptr<const Config>> tasks{};  ///< Of the cases.
+  bool was_read = false;
+};
+
 /** The rows of one run, without drawings. Rows of a database need no log; faults and withdrawals come from the logs
-beside it, and what keeps these from being read is a note. @throws BadInput if a run without a database cannot be read.
-*/
-[[nodiscard]] PageRun GatherRows(const RunLogs& run, const PageTasks& tasks);
+beside it, and what keeps these from being read is a note. Cost: the logs are read once.
+@throws BadInput if a run without a database cannot be read. */
+[[nodiscard]] PageRun GatherRows(const RunLogs& run, const PageTasks& tasks, PagePass& pass);
+
+/** Reads the logs of a run whose rows are known. */
+void ReadAgain(const RunLogs& run, const PageTasks& tasks, PagePass& pass);
 
 /** Puts the rows of one run behind those of others. */
 void AddRows(PageRun& page, PageRun&& run);
 
 /** The tubes of some decisions of a run.
-@param decisions their places in `page`. @param part the place of the run. @param threads that it may use.
-@return only details, tasks and obstacle sets. @throws BadInput if a log cannot be read. */
-[[nodiscard]] PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,
+@param decisions their places in `page`. @param threads that it may use. @return only details, tasks and obstacle sets.
+*/
+[[nodiscard]] PageRun GatherDetails(const PagePass& pass, const PageRun& page,
                                     const std::vector<std::size_t>& decisions, std::size_t numbers, unsigned threads);
 
 /** Puts the tubes of one run into a page, as far as there is room. @param numbers for which there is room. */

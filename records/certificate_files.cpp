@@ -14,7 +14,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
-#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
@@ -23,7 +22,7 @@
 #include "records/database.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
-#include "records/timeline.h"
+#include "records/recorded_case.h"
 #include "task/files.h"
 #include "task/json_text.h"
 
@@ -77,11 +76,12 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
 // Collects the certificates of a timeline, a file for each task.
 class CertificateReader final : public TimelineUser {
  public:
-  void AddTask(const Config& task) { static_cast<void>(FileOf(task)); }
+  explicit CertificateReader(const Config& first) { static_cast<void>(FileOf(first)); }
 
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& decision = recorded.decision;
     const Digest plan = GetDigest(decision.plan_digest);
+    static_cast<void>(FileOf(*recorded.basis.task));
     // A candidate that comes twice is rejected the second time: the certificate is the first's.
     if (decision.outcome == decision_t::CERTIFIED) decisions_.push_back(decision);
     Outcome& outcome = outcomes_.try_emplace(plan, Outcome{decision_t::REJECTED, recorded.basis.task}).first->second;
@@ -93,13 +93,9 @@ class CertificateReader final : public TimelineUser {
     const Config& task = *recorded.basis.task;
     CertificateFile& file = FileOf(task);
     RecordedCertificate& certificate = file.certificates.emplace_back();
-    certificate.name = recorded.event;
-    if (!HasSizes(certified.plan, *task.problem->model)) {
-      certificate.missing = "not of this task's sizes";
-      return;
-    }
-    certificate.name += fmt::format(", plan {} of {}", certified.plan.plan_id, GetText(certified.plan.source));
-    certificate.missing = WhyNoSchedule(certified.plan, task.gate);
+    certificate.name =
+        fmt::format("{}, plan {} of {}", recorded.event, certified.plan.plan_id, GetText(certified.plan.source));
+    certificate.missing = WhyNotJudged(certified.plan, task);
     if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);
@@ -167,8 +163,7 @@ class CertificateReader final : public TimelineUser {
     of_plan_.clear();
   }
 
-  // @param task in the order in which they were added.
-  std::vector<CertificateFile> Finish(const Timeline& timeline) {
+  std::vector<CertificateFile> Finish(Timeline& timeline) {
     for (const auto& [task, i] : file_of_) {
       files_[i].config = *task;
       files_[i].config.problem = WithLearned(task->problem, timeline.learned(*task));
@@ -311,13 +306,12 @@ class CertificateReader final : public TimelineUser {
 
 // ---- Runs.
 
-std::vector<CertificateFile> ReadLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
-                                      bool names_files, const std::vector<DecisionRow>* rows) {
-  CertificateReader reader;
-  for (const Config& task : tasks) reader.AddTask(task);
-  Timeline timeline(PointersTo(tasks), reader);
+std::vector<CertificateFile> ReadLogs(const std::vector<std::string>& logs, LogTasks tasks, bool names_files,
+                                      const std::vector<DecisionRow>* rows) {
+  CertificateReader reader(tasks.first());
+  Timeline timeline(tasks, {&reader});
   timeline.Read(logs, names_files);
-  reader.EndRun(tasks.front(), rows);
+  reader.EndRun(tasks.first(), rows);
   std::vector<CertificateFile> files = reader.Finish(timeline);
   if (timeline.damage().places > 0)
     files.front().certificates.push_back(DamagedLog(logs.front(), timeline.damage().places));
@@ -351,8 +345,11 @@ std::vector<CertificateFile> ReadRun(const RunLogs& run, const RunTasks& tasks, 
       std::ranges::move(database.Read(std::filesystem::path(log).filename().string()).decisions,
                         std::back_inserter(rows));
   }
-  if (is_many && (run.logs.empty() || (Survey(run.logs, LogOrder::kAny).order.empty() && rows.empty()))) return {};
-  return ReadLogs(run.logs, tasks.Of(run.logs), is_many || run.logs.size() > 1, run.database.empty() ? nullptr : &rows);
+  if (is_many && run.logs.empty()) return {};
+  LogTasks of_run = tasks.Of(run.logs);
+  if (is_many && !of_run.has_decisions() && rows.empty()) return {};
+  if (!is_many) of_run.RequirePlans();
+  return ReadLogs(run.logs, std::move(of_run), is_many || run.logs.size() > 1, run.database.empty() ? nullptr : &rows);
 }
 
 std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const std::string& config_path,
@@ -362,9 +359,6 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const 
       case FileKind::kDirectory:
       case FileKind::kDatabase: return ReadRuns(path, config_path, key);
       case FileKind::kJson: return {FromDecision(path, ParseJson(ReadWhole(path, kLargestJsonFile)), config_path)};
-      case FileKind::kOther:
-        if (Survey({path}).events == 0) break;
-        [[fallthrough]];
       default: return ReadAllLogs({path}, config_path, key);
     }
   } catch (const nlohmann::json::exception& error) {
@@ -372,12 +366,13 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const 
   } catch (const std::invalid_argument& error) {
     throw ConfigError(path + ": " + error.what());
   }
-  throw ConfigError(path + ": neither a decision (JSON), nor an event log, nor a decision database");
 }
 
 std::vector<CertificateFile> ReadAllLogs(const std::vector<std::string>& logs, const std::string& config_path,
                                          const LogKey& key) {
-  return ReadLogs(logs, TasksOf(logs, config_path, key), logs.size() > 1, nullptr);
+  LogTasks tasks = RunTasks(config_path, key, false).Of(logs);
+  tasks.RequirePlans();
+  return ReadLogs(logs, std::move(tasks), logs.size() > 1, nullptr);
 }
 
 }  // namespace forereach

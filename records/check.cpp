@@ -125,10 +125,11 @@ class DirectoryCheck {
           fmt::format("{}: its logger had the keys of {}: name them with --key FILE (verify.pub is "
                       "enough), or believe every message with --no-key",
                       directory_.PathOf(run.log_file), run.robot));
-    const std::vector<std::string> log{directory_.PathOf(run.log_file)};
-    const LogSurvey survey = check.damaged_tasks.empty() ? Survey(log, LogOrder::kAny) : LogSurvey();
-    return forereach::ChannelsOf(survey, directory_.path(), config_,
-                                 run.robot.empty() ? LogKey{.file = "", .none = true} : key_);
+    const LogKey key = run.robot.empty() ? LogKey{.file = "", .none = true} : key_;
+    if (check.damaged_tasks.empty()) return forereach::ChannelsOf({directory_.PathOf(run.log_file)}, config_, key);
+    Config task = config_.empty() ? Config() : LoadConfig(config_, TransitionsFile::kIgnore);
+    key.Override(task, config_);
+    return task.bus;
   }
 
   [[nodiscard]] Interpreter InterpreterOf(const RunRow& run, const BusOptions& channels, RowGrounds& grounds) {

@@ -79,7 +79,7 @@ std::int64_t Comparison::num_lost() const { return Sum(lost); }
 
 Comparison Compare(const std::vector<std::string>& logs, const Config& task, bool names_files) {
   Comparer comparer;
-  Timeline timeline({&task}, comparer);
+  Timeline timeline(task, {&comparer});
   timeline.Read(logs, names_files);
   return comparer.Finish(timeline);
 }

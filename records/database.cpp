@@ -80,13 +80,17 @@ std::string WhySqlRefuses(sqlite3* handle) {
 auto ColumnsOf(auto& row) {
   using Row = std::remove_const_t<std::remove_reference_t<decltype(row)>>;
   if constexpr (std::is_same_v<Row, DecisionRow>)
-    return std::tie(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence,
-                    row.source, row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle,
-                    row.first_observation, row.second_observation, row.margin, row.threshold, row.elapsed_us,
-                    row.latency_us, row.message, row.plan_digest, row.grounds, row.event.digest);
+    return std::tuple_cat(std::tie(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime,
+                                   row.sequence, row.source, row.plan_id, row.outcome, row.cause),
+                          std::tuple(OrNull{row.step}, OrNull{row.coordinate}, OrNull{row.obstacle},
+                                     OrNull{row.first_observation}, OrNull{row.second_observation}),
+                          std::tie(row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
+                                   row.plan_digest, row.grounds, row.event.digest));
   else if constexpr (std::is_same_v<Row, EventRow>)
-    return std::tie(row.event.log_file, row.event.event_number, row.utime, row.sequence, row.plan_id, row.kind,
-                    row.step, row.coordinate, row.state, row.value, row.message, row.event.digest);
+    return std::tuple_cat(std::tie(row.event.log_file, row.event.event_number, row.utime, row.sequence),
+                          std::tuple(OrNull{row.plan_id}), std::tie(row.kind),
+                          std::tuple(OrNull{row.step}, OrNull{row.coordinate}),
+                          std::tie(row.state, row.value, row.message, row.event.digest));
   else if constexpr (std::is_same_v<Row, GapRow>)
     return std::tuple_cat(std::tie(row.event.log_file), std::tuple(OrNull{row.event.event_number}),
                           std::tie(row.channel, row.source), std::tuple(OrNull{row.expected}, OrNull{row.got}),
@@ -180,7 +184,7 @@ class Database::Statement final {
 
   template <class Number>
   void BindNext(OrNull<Number> value) {
-    BindNext(value.number < 0 ? std::nullopt : std::optional<std::int64_t>(value.number));
+    BindNext(value.number == -1 ? std::nullopt : std::optional<std::int64_t>(value.number));
   }
 
   bool IsNull() const { return sqlite3_column_type(statement_, column_) == SQLITE_NULL; }
@@ -211,10 +215,11 @@ class Database::Statement final {
     value = IsNull() ? std::nullopt : std::optional(sqlite3_column_int64(statement_, column_));
     ++column_;
   }
-  void ReadNext(OrNull<std::int64_t>& value) {
+  template <class Number>
+  void ReadNext(OrNull<Number>& value) {
     std::optional<std::int64_t> number;
     ReadNext(number);
-    value.number = number.value_or(-1);
+    value.number = static_cast<Number>(number.value_or(-1));
   }
 
   sqlite3* handle_;

@@ -56,18 +56,45 @@ std::int64_t RecordBytes(const LogEvent& event) {
 
 EventLogReader::EventLogReader(const std::string& path)
     // Opening a pipe without a writer may not wait.
-    : file_(::fdopen(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK), "rb"), &std::fclose) {
+    : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)), window_(kWindowBytes) {
   struct stat status {};
-  if (!file_ || ::fstat(::fileno(file_.get()), &status) != 0) throw LogError(Reason("log: cannot read ", path));
+  if (file_.get() < 0 || ::fstat(file_.get(), &status) != 0) throw LogError(Reason("log: cannot read ", path));
   if (!S_ISREG(status.st_mode)) throw LogError("log: cannot read " + path + ": not a regular file");
   size_ = status.st_size;
 }
 
+bool EventLogReader::Fetch(std::int64_t offset, std::uint8_t* out, std::int64_t bytes) {
+  while (bytes > 0) {
+    const ssize_t read = ::pread(file_.get(), out, static_cast<std::size_t>(bytes), offset);
+    if (read < 0 && errno == EINTR) continue;
+    if (read <= 0) return false;
+    offset += read;
+    out += read;
+    bytes -= read;
+  }
+  return true;
+}
+
+// Moves the window on to `offset`. What it has from there on is not read again.
+bool EventLogReader::MoveWindow(std::int64_t offset) {
+  const std::int64_t end = window_begin_ + window_size_;
+  const std::int64_t kept = window_begin_ <= offset && offset < end ? end - offset : 0;
+  std::copy_n(window_.begin() + (window_size_ - kept), kept, window_.begin());
+  const std::int64_t wanted = std::min<std::int64_t>(kWindowBytes, size_ - offset) - kept;
+  window_begin_ = offset;
+  window_size_ = Fetch(offset + kept, window_.data() + kept, wanted) ? kept + wanted : kept;
+  return wanted >= 0 && window_size_ == kept + wanted;
+}
+
 bool EventLogReader::ReadAt(std::int64_t offset, void* out, std::int64_t bytes) {
-  if (position_ != offset && ::fseeko(file_.get(), offset, SEEK_SET) != 0) return false;
-  const std::size_t read = std::fread(out, 1, static_cast<std::size_t>(bytes), file_.get());
-  position_ = offset + static_cast<std::int64_t>(read);
-  return read == static_cast<std::size_t>(bytes);
+  if (bytes > size_ - offset) return false;
+  auto* to = static_cast<std::uint8_t*>(out);
+  if (bytes < kWindowBytes / 2 && !IsInWindow(offset, bytes) && !MoveWindow(offset)) return false;
+  const std::int64_t end = window_begin_ + window_size_;
+  const std::int64_t from_window =
+      window_begin_ <= offset && offset < end ? std::min<std::int64_t>(end - offset, bytes) : 0;
+  std::copy_n(window_.begin() + (from_window > 0 ? offset - window_begin_ : 0), from_window, to);
+  return from_window == bytes || Fetch(offset + from_window, to + from_window, bytes - from_window);
 }
 
 // A record begins at `offset` if its sync word and the plausible header behind it do; kCut if the file ends first.
@@ -93,7 +120,10 @@ EventLogReader::Found EventLogReader::Examine(std::int64_t offset, Header& heade
 bool EventLogReader::SyncAt(std::int64_t offset) {
   std::array<std::uint8_t, 4> bytes{};
   const std::int64_t left = std::min<std::int64_t>(size_ - offset, 4);
-  return ReadAt(offset, bytes.data(), left) && std::equal(bytes.begin(), bytes.begin() + left, kSync.begin());
+  // The window stays where it is, since what lies before is read next.
+  const bool is_read =
+      IsInWindow(offset, left) ? ReadAt(offset, bytes.data(), left) : Fetch(offset, bytes.data(), left);
+  return is_read && std::equal(bytes.begin(), bytes.begin() + left, kSync.begin());
 }
 
 // The offset of the first whole record that begins in [from, end), or end.

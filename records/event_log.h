@@ -10,7 +10,6 @@ damage. */
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -83,8 +82,12 @@ class EventLogReader final {
   A length field may be damaged. If it points behind the end of the file, the rest is a cut tail only if no whole record
   follows. If no sync word follows its record, the record is damaged if it contains another whole record. Memory is
   allocated for accepted records only.
-  Cost: linear in the bytes read; `event` never holds more than kMaxLogDataBytes beside its channel. */
+  Cost: linear in the bytes read, and each byte of an undamaged log is read once; `event` never holds more than
+  kMaxLogDataBytes beside its channel. */
   [[nodiscard]] LogStatus Next(LogEvent& event);
+
+  /** The next record is the first whole one that begins at this offset or behind it. */
+  void SkipTo(std::int64_t offset) { offset_ = FindRecord(offset, size_); }
 
   /** The offset behind the last record or damage. */
   [[nodiscard]] std::int64_t offset() const { return offset_; }
@@ -99,13 +102,21 @@ class EventLogReader final {
     std::int32_t channel_bytes, data_bytes;
   };
 
+  static constexpr std::int64_t kWindowBytes = 1 << 15;
+
+  bool Fetch(std::int64_t offset, std::uint8_t* out, std::int64_t bytes);
+  bool MoveWindow(std::int64_t offset);
+  [[nodiscard]] bool IsInWindow(std::int64_t offset, std::int64_t bytes) const {
+    return window_begin_ <= offset && offset + bytes <= window_begin_ + window_size_;
+  }
   bool ReadAt(std::int64_t offset, void* out, std::int64_t bytes);
   Found Examine(std::int64_t offset, Header& header);
   bool SyncAt(std::int64_t offset);
   std::int64_t FindRecord(std::int64_t from, std::int64_t end);
 
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  std::int64_t position_ = 0;  // of file_, so that reading on needs no seek
+  const Descriptor file_;
+  std::vector<std::uint8_t> window_;  // bytes of the file around the offset
+  std::int64_t window_begin_ = 0, window_size_ = 0;
   std::int64_t offset_ = 0, size_ = 0;
   LogDamage damage_;
 };

@@ -1,7 +1,6 @@
 #include "records/export.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -227,6 +226,7 @@ std::unique_ptr<Sink> SinkOf(const std::string& robot, const ExportOptions& opti
 
 // All that is left of a log that is gone.
 void TakeRows(const Rows& rows, Sink& sink) {
+  sink.result.has_messages = true;
   for (const DecisionRow& row : rows.decisions) sink.OnDecision(row, nullptr);
   for (const EventRow& row : rows.events) sink.OnExecution(row);
   for (const GapRow& row : rows.gaps) sink.OnGap(row);
@@ -234,10 +234,10 @@ void TakeRows(const Rows& rows, Sink& sink) {
 
 void ReadLogs(const std::vector<std::string>& logs, const ExportOptions& options,
               const std::function<void(std::int64_t)>& on_bytes, Sink& sink) {
-  const LogSurvey survey = Survey(logs, LogOrder::kAny);
-  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
-  RecordReader reader(ChannelsOf(survey, directory, options.config, options.key), sink, on_bytes);
+  RequireLogs(logs);
+  RecordReader reader(ChannelsOf(logs, options.config, options.key), sink, on_bytes);
   reader.Read(logs);
+  sink.result.has_messages |= reader.has_messages();
   sink.result.damage = reader.damage();
   sink.result.passed_over = reader.passed_over();
 }
@@ -265,6 +265,7 @@ ExportResult& ExportResult::operator+=(const ExportResult& other) {
   tubes += other.tubes;
   messages += other.messages;
   left_out += other.left_out;
+  has_messages |= other.has_messages;
   damage += other.damage;
   passed_over += other.passed_over;
   return *this;

@@ -38,6 +38,7 @@ struct ExportResult {
   std::int64_t left_out = 0;
   LogDamage damage;
   PassedOver passed_over;
+  bool has_messages = false;       ///< Whether a message or a row of ForeReach's was there.
   std::vector<std::string> files;  ///< That were written, in the order of ExportFiles.
 
   /** Adds the counts of another run. */

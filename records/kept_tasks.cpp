@@ -121,15 +121,21 @@ void KeptTasks::Keep(const TaskCopy& copy) const {
   Confirm(path_);
 }
 
-std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Digest>& observations) const {
+bool KeptTasks::HasAny() const {
+  std::error_code no_path;
+  return fs::is_directory(path_, no_path);
+}
+
+std::optional<Config> KeptTasks::Find(const Digest& digest,
+                                      const std::function<std::set<Digest>()>& observations) const {
   const std::string directory = PathOf(digest), task = directory + "/" + kTask;
   std::error_code no_path;
   if (!fs::exists(task, no_path)) return std::nullopt;
   std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
   if (versions.empty()) throw ConfigError(task + ": its transitions are not kept next to it");
   if (versions.size() > 1)
-    std::erase_if(versions, [&](const std::string& version) {
-      return std::ranges::none_of(observations, [&](const Digest& seen) { return ToHex(seen) == version; });
+    std::erase_if(versions, [seen = observations()](const std::string& version) {
+      return std::ranges::none_of(seen, [&](const Digest& named) { return ToHex(named) == version; });
     });
   if (versions.size() != 1)
     throw ConfigError(task + ": of the versions of its transitions beside it the log names " +

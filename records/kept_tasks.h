@@ -10,6 +10,7 @@ digests only, so no log can name a file outside the directory. What is read is c
 kept. */
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -43,8 +44,13 @@ class KeptTasks final {
   [[nodiscard]] std::string PathOf(const Digest& digest) const;
 
   /** The task with this config digest, if it is kept. Of several versions of its transitions it takes the one whose
-  digest is in `observations`. @throws ConfigError if a file is damaged, or the version is ambiguous. */
-  [[nodiscard]] std::optional<Config> Find(const Digest& digest, const std::set<Digest>& observations) const;
+  digest is among `observations()`, which is called only then.
+  @throws ConfigError if a file is damaged, or the version is ambiguous. */
+  [[nodiscard]] std::optional<Config> Find(const Digest& digest,
+                                           const std::function<std::set<Digest>()>& observations) const;
+
+  /** Whether a directory of tasks is there. */
+  [[nodiscard]] bool HasAny() const;
 
   /** The damage of the kept task with this config digest (in hexadecimal), a sentence for each version of its
   transitions. Empty if the task is intact or not kept. */

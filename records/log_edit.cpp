@@ -166,7 +166,7 @@ std::int64_t ParseLogTime(const std::string& text, std::int64_t first_utime) {
 
 LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection& selection, LogSequence sequence,
                        const LogUser& user) {
-  static_cast<void>(Survey(logs, LogOrder::kAny));  // refuses files of other kinds
+  RequireLogs(logs);
   const Selector selector(selection, logs);
   LogEditResult result;
   const auto visit = [&](const Source& source) {

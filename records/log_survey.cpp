@@ -1,20 +1,13 @@
 #include "records/log_survey.h"
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
-#include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
 #include "task/files.h"
@@ -41,64 +34,39 @@ namespace fs = std::filesystem;
   }
 }
 
-class Surveyor final {
- public:
-  void Read(const std::string& log, LogOrder order) {
-    const FileKind kind = KindOf(log);
-    if (kind != FileKind::kEventLog && kind != FileKind::kEmpty && kind != FileKind::kOther) RefuseAsLog(log, kind);
-    const std::int64_t events = survey_.events;
-    before_.Extend(std::exchange(log_, {}));
-    EventLogReader reader(log);
-    ForEachEvent(reader, [this](const LogEvent& event) {
-      log_.utime.Take(event.utime);
-      Take(event.message());
-    });
-    if (kind == FileKind::kOther && survey_.events == events) RefuseAsLog(log, kind);  // else its beginning is damaged
-    if (order == LogOrder::kOneRun) RequireSameRun(log);
-    last_log_ = log;
+void RequireLog(const std::string& path) {
+  const FileKind kind = KindOf(path);
+  if (kind == FileKind::kEventLog || kind == FileKind::kEmpty) return;
+  if (kind != FileKind::kOther) RefuseAsLog(path, kind);
+  EventLogReader reader(path);  // its beginning may be damaged
+  LogEvent event;
+  LogStatus status;
+  while ((status = reader.Next(event)) == LogStatus::kCorrupt) continue;
+  if (status != LogStatus::kEvent) RefuseAsLog(path, kind);
+}
+
+void Take(const LogEvent& event, LogEnds& ends) {
+  ends.utime.Take(event.utime);
+  if (const auto heartbeat = Decoded<certifier_status_t>(event.message())) {
+    if (IsInCharge(*heartbeat)) ends.certifier.Take(heartbeat->sequence);
+  } else if (const auto logger = Decoded<logger_status_t>(event.message())) {
+    ends.logger.Take(logger->sequence);
   }
+}
 
-  LogSurvey Finish() { return std::move(survey_); }
-  [[nodiscard]] const LogEnds& ends() const { return log_; }
-
- private:
-  void Take(Bytes message) {
-    ++survey_.events;
-    if (const auto decision = Decoded<decision_t>(message)) {
-      ++survey_.decisions;
-      Record(GetDigest(decision->config_digest), GetDigest(decision->observations_digest));
-    } else if (const auto certified = Decoded<certified_plan_t>(message)) {
-      Record(GetDigest(certified->config_digest), GetDigest(certified->observations_digest));
-    } else if (Decoded<candidate_plan_t>(message)) {
-      ++survey_.candidates;
-    } else if (const auto heartbeat = Decoded<certifier_status_t>(message)) {
-      if (IsInCharge(*heartbeat)) log_.certifier.Take(heartbeat->sequence);
-    } else if (const auto logger = Decoded<logger_status_t>(message)) {
-      log_.logger.Take(logger->sequence);
-    }
+// Events from `begin` until the reader has passed `end`, or, at the beginning, until both senders were heard.
+LogEnds Read(const std::string& log, std::int64_t begin, std::int64_t end) {
+  LogEnds ends;
+  EventLogReader reader(log);
+  if (begin > 0) reader.SkipTo(begin);
+  LogEvent event;
+  for (LogStatus status; reader.offset() < end &&
+                         ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt);) {
+    if (status == LogStatus::kEvent) Take(event, ends);
+    if (begin == 0 && ends.certifier.first && ends.logger.first) break;
   }
-
-  void Record(const Digest& config, const Digest& observations) {
-    const auto found = survey_.configs.find(config);
-    if (found == survey_.configs.end() && survey_.configs.size() >= LogSurvey::kMaxConfigs) return;
-    if (found == survey_.configs.end()) survey_.order.push_back(config);
-    LogSurvey::Recorded& recorded = found == survey_.configs.end() ? survey_.configs[config] : found->second;
-    ++recorded.decisions;
-    if (recorded.observations.size() < LogSurvey::kMaxObservations) recorded.observations.insert(observations);
-  }
-
-  void RequireSameRun(const std::string& log) const {
-    if (Continues(before_, log_).value_or(true)) return;
-    throw LogError(
-        log + ": does not follow " + last_log_ +
-        ": neither the certifier's nor the logger's heartbeats go on from one to the other; name the files of "
-        "one run, in the order of their names, and other runs by themselves");
-  }
-
-  LogSurvey survey_;
-  LogEnds before_, log_;  // of the logs before, and of the last one
-  std::string last_log_;
-};
+  return ends;
+}
 
 }  // namespace
 
@@ -116,9 +84,19 @@ void LogEnds::Extend(const LogEnds& behind) {
 }
 
 LogEnds EndsOf(const std::string& log) {
-  Surveyor surveyor;
-  surveyor.Read(log, LogOrder::kAny);
-  return surveyor.ends();
+  RequireLog(log);
+  LogEnds ends = Read(log, 0, kEndBytes);
+  const std::int64_t size = EventLogReader(log).size();
+  for (std::int64_t bytes = 1 << 18;; bytes *= 2) {
+    LogEnds last = Read(log, std::max<std::int64_t>(size - bytes, 1), size);
+    const bool is_whole =
+        last.utime.last && (last.certifier.last || !ends.certifier.first) && (last.logger.last || !ends.logger.first);
+    if (!is_whole && bytes < size) continue;
+    for (LogEnds::Range LogEnds::*range : {&LogEnds::certifier, &LogEnds::logger})
+      if (!(ends.*range).first) last.*range = {};  // its count may have begun anew in between
+    ends.Extend(last);
+    return ends;
+  }
 }
 
 std::optional<bool> Continues(const LogEnds& before, const LogEnds& log) {
@@ -143,25 +121,13 @@ FileKind KindOf(const std::string& path) {
                                                                                     : FileKind::kOther;
 }
 
-LogSurvey Survey(const std::vector<std::string>& logs, LogOrder order) {
+void RequireLogs(const std::vector<std::string>& logs) {
   std::set<std::string> named;
-  for (const std::string& log : logs)
+  for (const std::string& log : logs) {
     if (std::error_code error; !named.insert(fs::weakly_canonical(log, error).string()).second)
       throw LogError(log + ": is named twice");
-  Surveyor surveyor;
-  for (const std::string& log : logs) surveyor.Read(log, order);
-  return surveyor.Finish();
-}
-
-LogSurvey SurveyRun(const std::vector<std::string>& logs) {
-  LogSurvey survey = Survey(logs);
-  if (survey.candidates == 0 && survey.decisions == 0 && survey.configs.empty())
-    throw LogError(
-        logs.front() + (logs.size() > 1 ? " and those behind it: " : ": ") +
-        (survey.events == 0 ? "is empty" : fmt::format("holds {} events", survey.events)) +
-        ", and neither a candidate nor a decision; nothing was proposed while it was recorded, or it is not of "
-        "ForeReach");
-  return survey;
+    RequireLog(log);
+  }
 }
 
 }  // namespace forereach

@@ -7,89 +7,142 @@
 
 #include <fmt/format.h>
 
-#include "records/kept_tasks.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "records/log_survey.h"
 
 namespace forereach {
 namespace {
 
 constexpr std::size_t kMaxNamed = 4;
+constexpr std::size_t kMaxObservations = 1 << 16;
 
-// The digests of the survey, with how many decisions carry each and where its task is kept.
-std::string DescribeTask(const LogSurvey& survey, const KeptTasks& kept) {
-  std::string text;
-  for (std::size_t i = 0; i < std::min(survey.order.size(), kMaxNamed); ++i) {
-    const Digest& digest = survey.order[i];
-    const bool is_kept = std::filesystem::exists(kept.PathOf(digest));
-    text += fmt::format("{}{} ({} decisions and certified plans{})", i > 0 ? "; " : "", ToHex(digest),
-                        survey.configs.at(digest).decisions,
-                        (is_kept ? ", kept in " + kept.PathOf(digest) : ", not kept next to the log"));
-  }
-  return text + (survey.order.size() > kMaxNamed ? "; and others" : "");
+// The task and the observations that a decision or a certified plan names, on whatever channel.
+std::optional<std::pair<Digest, Digest>> NamedBy(Bytes message) {
+  const auto named = [](const auto& of) {
+    return std::pair(GetDigest(of.config_digest), GetDigest(of.observations_digest));
+  };
+  if (const auto decision = Decoded<decision_t>(message)) return named(*decision);
+  if (const auto certified = Decoded<certified_plan_t>(message)) return named(*certified);
+  return std::nullopt;
 }
+
+std::string DirectoryOf(const std::string& log) { return std::filesystem::path(log).parent_path().string(); }
 
 }  // namespace
 
-std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, const std::string& directory,
-                            const std::string& given) {
-  const KeptTasks kept(directory);
-  std::optional<Config> task;
-  if (!given.empty()) task = LoadConfig(given);
-  if (survey.order.empty()) {  // candidates, and no decision
-    if (!task)
-      throw ConfigError(logs + ": nothing in it was decided, so nothing names its task: name it with --config FILE");
-    return {*task};
+LogTasks::LogTasks(std::vector<std::string> logs, std::shared_ptr<const Config> given, LogKey key, bool must_be_given)
+    : logs_(std::move(logs)), given_(std::move(given)), key_(std::move(key)), kept_(DirectoryOf(logs_.front())) {
+  RequireLogs(logs_);
+  Look(must_be_given && given_);
+  if (order_.empty() && given_) found_.push_back(given_);  // candidates, and no decision
+}
+
+// Reads the logs up to the message that names the first task.
+void LogTasks::Look(bool must_be_given) {
+  const auto is_found = [&] {
+    return !found_.empty() && (!must_be_given || decisions_.contains(given_->grounds.config));
+  };
+  LogEvent event;
+  for (const std::string& log : logs_) {
+    EventLogReader reader(log);
+    for (LogStatus status; (status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt;) {
+      if (status == LogStatus::kCorrupt) continue;
+      ++events_;
+      const auto named = NamedBy(event.message());
+      if (!named) {
+        candidates_ += Decoded<candidate_plan_t>(event.message()).has_value();
+        continue;
+      }
+      const auto known = decisions_.find(named->first);
+      if (known != decisions_.end()) ++known->second;
+      if (known != decisions_.end() || decisions_.size() >= kMaxConfigs) continue;
+      decisions_.emplace(named->first, 1);
+      order_.push_back(named->first);
+      static_cast<void>(Find(named->first));
+      if (is_found()) return;
+    }
   }
-  if (task && !survey.configs.contains(task->grounds.config))
-    throw ConfigError(given + ": is not the task that " + logs + " was recorded with: its config digest is " +
-                      ToHex(task->grounds.config) + ", the log has " + DescribeTask(survey, kept) +
-                      "; a task that is kept is found without --config");
-  std::vector<Config> tasks;
-  for (const Digest& digest : survey.order)
-    if (task && task->grounds.config == digest)
-      tasks.push_back(*task);
-    else if (auto found = kept.Find(digest, survey.configs.at(digest).observations))
-      tasks.push_back(std::move(*found));
-  if (tasks.empty())
-    throw ConfigError(logs + ": its task is not kept next to it; name it with --config FILE: its config digest is " +
-                      DescribeTask(survey, kept));
-  return tasks;
+  if (must_be_given && !order_.empty())
+    throw ConfigError(given_->path + ": is not the task that " + logs_.front() +
+                      " was recorded with: its config digest is " + ToHex(given_->grounds.config) + ", the log has " +
+                      Describe() + "; a task that is kept is found without --config");
 }
 
-std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given, const LogKey& key) {
-  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
-  std::vector<Config> tasks = TasksOf(SurveyRun(logs), logs.front(), directory, given);
-  key.Override(tasks, given);
-  return tasks;
+const Config& LogTasks::first() const {
+  if (!found_.empty()) return *found_.front();
+  if (order_.empty())
+    throw ConfigError(logs_.front() +
+                      ": nothing in it was decided, so nothing names its task: name it with --config FILE");
+  throw ConfigError(logs_.front() +
+                    ": its task is not kept next to it; name it with --config FILE: its config digest is " +
+                    Describe());
 }
 
-BusOptions ChannelsOf(const LogSurvey& survey, const std::string& directory, const std::string& given,
-                      const LogKey& key) {
-  std::vector<Config> task;
+const Config* LogTasks::Find(const Digest& config) {
+  const auto known =
+      std::ranges::find(found_, config, [](const auto& task) -> const Digest& { return task->grounds.config; });
+  if (known != found_.end()) return known->get();
+  if (given_ && given_->grounds.config == config) return found_.emplace_back(given_).get();
+  if (unknown_.contains(config)) return nullptr;
+  auto kept = kept_.Find(config, [&] { return ObservationsOf(config); });
+  if (!kept) {
+    if (unknown_.size() < kMaxConfigs) unknown_.insert(config);
+    return nullptr;
+  }
+  key_.Override(*kept, "");
+  return found_.emplace_back(std::make_shared<const Config>(std::move(*kept))).get();
+}
+
+// All that decisions under this task name.
+std::set<Digest> LogTasks::ObservationsOf(const Digest& config) const {
+  std::set<Digest> observations;
+  static_cast<void>(ForEachEvent(logs_, [&](const LogEvent& event, const std::string&) {
+    const auto named = NamedBy(event.message());
+    if (named && named->first == config && observations.size() < kMaxObservations) observations.insert(named->second);
+  }));
+  return observations;
+}
+
+// The digests of the logs, with how many decisions carry each and where its task is kept.
+std::string LogTasks::Describe() const {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(order_.size(), kMaxNamed); ++i) {
+    const std::string place = kept_.PathOf(order_[i]);
+    text += fmt::format("{}{} ({} decisions and certified plans{})", i > 0 ? "; " : "", ToHex(order_[i]),
+                        decisions_.at(order_[i]),
+                        std::filesystem::exists(place) ? ", kept in " + place : ", not kept next to the log");
+  }
+  return text + (order_.size() > kMaxNamed ? "; and others" : "");
+}
+
+void LogTasks::RequirePlans() const {
+  if (has_plans()) return;
+  throw LogError(
+      logs_.front() + (logs_.size() > 1 ? " and those behind it: " : ": ") +
+      (events_ == 0 ? "is empty" : fmt::format("holds {} events", events_)) +
+      ", and neither a candidate nor a decision; nothing was proposed while it was recorded, or it is not of "
+      "ForeReach");
+}
+
+RunTasks::RunTasks(const std::string& given, LogKey key, bool is_many) : key_(std::move(key)), is_many_(is_many) {
+  if (given.empty()) return;
+  Config task = LoadConfig(given);
+  key_.Override(task, given);
+  given_ = std::make_shared<const Config>(std::move(task));
+}
+
+BusOptions ChannelsOf(const std::vector<std::string>& logs, const std::string& given, const LogKey& key) {
+  Config task;
   if (!given.empty()) {
-    task.push_back(LoadConfig(given, TransitionsFile::kIgnore));
-  } else {
-    const KeptTasks kept(directory);
-    for (auto digest = survey.order.begin(); digest != survey.order.end() && task.empty(); ++digest)
-      if (auto found = kept.Find(*digest, survey.configs.at(*digest).observations)) task.push_back(std::move(*found));
+    task = LoadConfig(given, TransitionsFile::kIgnore);
+  } else if (KeptTasks(DirectoryOf(logs.front())).HasAny()) {
+    const LogTasks tasks(logs, nullptr, key, false);
+    if (!tasks.found().empty()) return tasks.first().bus;
   }
-  if (task.empty()) task.emplace_back();
   key.Override(task, given);
-  return task.front().bus;
-}
-
-RunTasks::RunTasks(std::string given, LogKey key, bool is_many)
-    : given_(std::move(given)), key_(std::move(key)), is_many_(is_many) {
-  if (is_many && !given_.empty()) digest_ = LoadConfig(given_).grounds.config;
-}
-
-std::vector<Config> RunTasks::Of(const std::vector<std::string>& logs) const {
-  if (!is_many_) return TasksOf(logs, given_, key_);
-  const LogSurvey survey = Survey(logs, LogOrder::kAny);
-  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
-  const bool is_given = digest_ && (survey.order.empty() || survey.configs.contains(*digest_));
-  std::vector<Config> tasks = TasksOf(survey, logs.front(), directory, is_given ? given_ : "");
-  key_.Override(tasks, given_);
-  return tasks;
+  return task.bus;
 }
 
 }  // namespace forereach

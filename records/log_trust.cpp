@@ -12,14 +12,12 @@ void LogKey::Override(BusOptions& options) const {
   if (none || !file.empty()) options.key = file;
 }
 
-void LogKey::Override(std::vector<Config>& tasks, const std::string& given) const {
-  for (Config& task : tasks) {
-    if (!task.bus.key.empty() && task.path != given && file.empty() && !none)
-      throw ConfigError(task.path +
-                        ": the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe "
-                        "every message with --no-key");
-    Override(task.bus);
-  }
+void LogKey::Override(Config& task, const std::string& given) const {
+  if (!task.bus.key.empty() && task.path != given && file.empty() && !none)
+    throw ConfigError(task.path +
+                      ": the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe "
+                      "every message with --no-key");
+  Override(task.bus);
 }
 
 std::string DescribePassedOver(const PassedOver& passed_over) {

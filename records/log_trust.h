@@ -18,9 +18,9 @@ struct LogKey {
   bool none = false;  ///< Accept every message without a check.
 
   void Override(BusOptions& options) const;
-  /** For tasks that the logger kept without their keys. @throws ConfigError if a task has a bus.key and the command
-  line has neither a key nor `none`. */
-  void Override(std::vector<Config>& tasks, const std::string& given) const;
+  /** For a task that the logger may have kept without its keys. @param given the path of the given task.
+  @throws ConfigError if another one has a bus.key and the command line has neither a key nor `none`. */
+  void Override(Config& task, const std::string& given) const;
 };
 
 /** The numbers of skipped messages. The robot's processes refused them too. */

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "forereach/decision_t.hpp"
+#include "records/message_json.h"
 
 namespace forereach {
 
@@ -32,6 +33,7 @@ void RecordReader::Read(const std::vector<std::string>& logs) {
 
 void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
   if (!authenticator_.IsAuthentic(event)) return;
+  has_messages_ = has_messages_ || Summarize(event.message());
   user_.OnMessage(event);
   const auto reference = [&] { return LogReference{log_file, event.number, ToHex(DigestOf(event))}; };
   if (event.channel == channels_.candidate) {

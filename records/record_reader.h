@@ -51,6 +51,8 @@ class RecordReader final {
   void Read(const std::vector<std::string>& logs);
 
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
+  /** Whether a message was one of ForeReach's. */
+  [[nodiscard]] bool has_messages() const { return has_messages_; }
   [[nodiscard]] PassedOver passed_over() const { return {authenticator_.refusals(), undecodable_}; }
 
  private:
@@ -68,6 +70,7 @@ class RecordReader final {
   RepeatedWithdrawals withdrawals_;
   LogDamage damage_;
   std::int64_t undecodable_ = 0;
+  bool has_messages_ = false;
 };
 
 }  // namespace forereach

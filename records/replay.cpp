@@ -59,7 +59,9 @@ class Replayer final : public GateFollower {
       return;
     }
     const decision_t again = gate().Decide(bytes, decision.utime).decision;
-    const std::string difference = Difference(decision, again);
+    std::string difference = Difference(decision, again);
+    if (!difference.empty() && recorded.basis.grounds.observations != GroundsOf(decision).observations)
+      difference += "; transitions that had been learned are not in the log, which begins later or lacks messages";
     Show(recorded.event, "recorded", decision);
     Show(recorded.event, "replayed", again);
     if (difference.empty())
@@ -158,10 +160,18 @@ bool IsCircumstance(const decision_t& decision) {
   }
 }
 
-ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
-                    const std::string& plan_digest, bool names_files) {
+ReplayResult Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
+                    bool names_files) {
   Replayer replayer(plan_digest);
-  Timeline timeline(PointersTo(tasks), replayer);
+  Timeline timeline(tasks, {&replayer});
+  timeline.Read(logs, names_files);
+  return replayer.Finish(timeline);
+}
+
+ReplayResult Replay(const std::vector<std::string>& logs, const Config& task, const std::string& plan_digest,
+                    bool names_files) {
+  Replayer replayer(plan_digest);
+  Timeline timeline(task, {&replayer});
   timeline.Read(logs, names_files);
   return replayer.Finish(timeline);
 }

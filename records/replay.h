@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "forereach/decision_t.hpp"
+#include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "task/config.h"
 
@@ -35,17 +36,17 @@ obstacles and executed transitions that the decision names by digest, and compar
 withdrawn are judged again under the grounds that the withdrawal names. It also checks the seals of certified plans
 (lcmtypes/seal.h). Where the certifier restarted or reloaded, replay starts with a new gate. With bus.key only authentic
 messages count. Each decision is compared under the task of its config digest; a decision of an unknown digest differs.
-With a single task, every decision is compared under that task.
-@param tasks at least one; channels and key are those of the first.
 @param plan_digest the beginning of a candidate's digest, in hexadecimal: ReplayResult::shown has the decisions on such
 candidates. Empty: on none.
 @param names_files whether events are named with their log.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
-[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
+[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
+                                  bool names_files);
+/** The same, with every decision under one task. */
+[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& task,
                                   const std::string& plan_digest, bool names_files);
-[[nodiscard]] inline ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
-                                         const std::string& plan_digest = "") {
-  return Replay(logs, tasks, plan_digest, logs.size() > 1);
+[[nodiscard]] inline ReplayResult Replay(const std::vector<std::string>& logs, const Config& task) {
+  return Replay(logs, task, "", logs.size() > 1);
 }
 
 /** Whether a decision depends on the moment and not on the plan, so that no replay can give it again. */

@@ -17,9 +17,11 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
-#include "records/certifier_follower.h"
+#include "lcmtypes/printable.h"
 #include "records/log_tasks.h"
 #include "records/outlines.h"
+#include "records/recorded_case.h"
+#include "records/run_logs.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -27,31 +29,30 @@ namespace {
 
 constexpr double kBetweenBodies = 4;  // metres of the path from one drawn body to the next
 
-class PictureMaker final : public CertifierFollower {
+class PictureMaker final : public TimelineUser, CaseJudge {
  public:
-  explicit PictureMaker(const std::vector<Config>& tasks)
-      : CertifierFollower(std::max(1u, std::thread::hardware_concurrency())),
-        last_(tasks.back()),
-        channels_(tasks.front().bus) {
-    for (const Config& task : tasks)
-      if (const auto dim = task.problem->projection.rows(); dim != 2)
-        throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}", dim));
-    const std::vector<double>& goal = last_.planner.goal;
-    if (goal.size() == 2) result_.picture.goal = Picture::Circle{{goal[0], goal[1]}, last_.planner.goal_radius};
+  explicit PictureMaker(const BusOptions& channels)
+      : CaseJudge(std::max(1u, std::thread::hardware_concurrency())), channels_(channels) {}
+
+  void OnStart(const Config& task) override {
+    now_ = &task;
+    if (const auto dim = task.problem->projection.rows(); dim != 2)
+      throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}", dim));
   }
+  void OnReload(const Config& task) override { OnStart(task); }
 
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& decision = recorded.decision;
     const bool is_drawn = decision.outcome == decision_t::CERTIFIED || decision.outcome == decision_t::ABSTAIN_SAFETY;
     if (!recorded.candidate || !is_drawn) return;
-    const auto candidate = Decoded<candidate_plan_t>(recorded.candidate->bytes);
-    if (!candidate) return;
-    if (!recorded.is_of_known_task) {
+    const RecordedCase judged = CaseOf(recorded);
+    if (!judged.candidate) return;
+    if (!judged.missing.empty()) {
       ++result_.disagreements;
       return;
     }
     outlines_.emplace_back();
-    Put(*candidate, recorded, outlines_.size() - 1);
+    Put(judged, outlines_.size() - 1);
   }
 
   void OnEvent(const LogEvent& event) override {
@@ -62,9 +63,12 @@ class PictureMaker final : public CertifierFollower {
     }
   }
 
-  LogPicture Finish(const Timeline& timeline) {
+  // @param last whose goal is drawn.
+  LogPicture Finish(const Timeline& timeline, const Config& last) {
     CertifyAgain();
     Picture& picture = result_.picture;
+    const std::vector<double>& goal = last.planner.goal;
+    if (goal.size() == 2) picture.goal = Picture::Circle{{goal[0], goal[1]}, last.planner.goal_radius};
     for (auto& [plan_id, tube] : tubes_)
       for (std::size_t t = 0; t < tube.size(); ++t)
         std::ranges::move(tube[t],
@@ -101,8 +105,8 @@ class PictureMaker final : public CertifierFollower {
   }
 
   std::optional<Eigen::Vector2d> PositionOf(const double* state, int num_states) const {
-    if (num_states != last_.problem->model->num_states()) return std::nullopt;
-    return last_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state, num_states);
+    if (num_states != now_->problem->model->num_states()) return std::nullopt;
+    return now_->problem->projection * Eigen::Map<const Eigen::VectorXd>(state, num_states);
   }
 
   void AddState(const robot_state_t& message) {
@@ -112,7 +116,7 @@ class PictureMaker final : public CertifierFollower {
     picture.path.push_back(*position);
     if (last_body_ && (*position - *last_body_).norm() < kBetweenBodies) return;
     last_body_ = position;
-    std::ranges::move(BodyAt(*last_.problem, Eigen::Map<const Eigen::VectorXd>(message.state, message.num_states)),
+    std::ranges::move(BodyAt(*now_->problem, Eigen::Map<const Eigen::VectorXd>(message.state, message.num_states)),
                       std::back_inserter(picture.bodies));
   }
 
@@ -129,7 +133,7 @@ class PictureMaker final : public CertifierFollower {
     if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
   }
 
-  const Config& last_;  // task
+  const Config* now_ = nullptr;  // the task in force
   const BusOptions channels_;
   std::vector<std::vector<std::vector<Picture::Polygon>>> outlines_;  // of each decision, while it is judged again
   // Of certified plans, by plan_id: the polygons of each step.
@@ -180,43 +184,69 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   return numbers;
 }
 
+const RunLogs& OnlyRun(const NamedRuns& named) {
+  std::vector<const RunLogs*> runs;
+  for (const RunLogs& run : named.runs)
+    if (!run.logs.empty()) runs.push_back(&run);
+  if (runs.empty()) throw LogError(forereach::NameOf(named.runs.front()) + ": no log of a run is there");
+  if (runs.size() == 1) return *runs.front();
+  throw LogError(
+      fmt::format("{}: does not follow {}, and is of another run: name the files of one run, in the order of their "
+                  "names; with --out "
+                  "several runs are shown",
+                  runs[1]->logs.front(), runs[0]->logs.back()));
+}
+
 }  // namespace
 
-LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
-  PictureMaker maker(tasks);
-  Timeline timeline(PointersTo(tasks), maker);
+LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& task) {
+  PictureMaker maker(task.bus);
+  Timeline timeline(task, {&maker});
   timeline.Read(logs, false);
-  return maker.Finish(timeline);
+  return maker.Finish(timeline, task);
 }
 
 bool Report(const ReportOptions& options, std::ostream& out) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
-  const std::vector<Config> tasks = TasksOf(options.logs, options.config, options.key);
-  const Config& config = tasks.back();
-  const Summary summary = SummarizeLogs(options.logs, config);
+  const RunTasks of_runs(options.config, options.key, false);
+  const NamedRuns named = RunsNamedBy(options.logs, std::max(1u, std::thread::hardware_concurrency()));
+  const std::vector<std::string>& logs = OnlyRun(named).logs;
+  LogTasks tasks = of_runs.Of(logs);
+  tasks.RequirePlans();
+  Summarizer summarizer(tasks.first());
+  PictureMaker maker(tasks.first().bus);
+  std::vector<TimelineUser*> users{&summarizer};
+  if (!files.empty()) users.push_back(&maker);
+  Timeline timeline(tasks, users);
+  timeline.Read(logs, false);
+  const Config& last = *tasks.found().back();
+  const Summary summary = summarizer.Finish(timeline, last);
   LogPicture drawn;
   if (!files.empty()) {
-    drawn = PictureFromLogs(options.logs, tasks);
-    drawn.picture.title = TitleOf(config);
+    drawn = maker.Finish(timeline, last);
+    drawn.picture.title = TitleOf(last);
     drawn.picture.key_numbers = KeyNumbers(summary);
   }
   for (const std::string& file : files) DrawPicture(drawn.picture, file, options.width, options.height);
 
+  const bool is_whole = summary.damage.places == 0 && named.missing.empty();
   if (options.json) {
     nlohmann::json json = ToJson(summary);
-    json["logs"] = options.logs;
+    json["logs"] = logs;
     json["pictures"] = files;
     json["tubes_left_out"] = drawn.disagreements;
+    if (named.is_many) json["missing"] = named.missing;
     out << JsonText(json, 2) << "\n";
-    return summary.damage.places == 0;
+    return is_whole;
   }
   out << ToText(summary);
+  for (const std::string& missing : named.missing) out << fmt::format("{:<26}{}\n", "not read", Printable(missing));
   for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
   if (drawn.disagreements > 0)
     out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out",
                        drawn.disagreements);
-  return summary.damage.places == 0;
+  return is_whole;
 }
 
 }  // namespace forereach

@@ -18,16 +18,15 @@ struct LogPicture {
   int disagreements = 0;
 };
 
-/** Certifies the candidates of consecutive logs again, under the task and the obstacles of their decisions. The picture
-has the tubes of certified plans and of abstentions S, the measured path, stops, goal, and the obstacles at the end; it
-has no title and no key numbers. Plans of other tasks are not drawn, but counted. Cost: one certify call for each plan.
-@param tasks at least one. Path, goal and obstacles are those of the last. With a single task, decisions of any config
-digest count as its decisions.
-@throws LogError if a log cannot be read, PictureError if a task's safety coordinates are not planar. */
-[[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
+/** Certifies the candidates of consecutive logs again, under the obstacles of their decisions. The picture has the
+tubes of certified plans and of abstentions S, the measured path, stops, goal, and the obstacles at the end; it has no
+title and no key numbers. Cost: one certify call for each plan.
+@param task decisions of any config digest count as its.
+@throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
+[[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& task);
 
 struct ReportOptions {
-  std::vector<std::string> logs;  ///< Files of one run, in their order.
+  std::vector<std::string> logs;  ///< Logs, a database or a directory of one run (RunsNamedBy).
   std::string config;             ///< Task file. If empty, the tasks that were kept beside the logs.
   std::string picture;            ///< A name for PictureFiles; no picture if empty.
   bool json = false;
@@ -35,7 +34,8 @@ struct ReportOptions {
   LogKey key = {};                 ///< With a key only authentic messages count.
 };
 
-/** Prints the summary of logs to `out`, as text or as one JSON document, and writes the picture.
+/** Prints the summary of logs to `out`, as text or as one JSON document, and writes the picture: under the tasks and
+the obstacles of their decisions. Plans of other tasks are not drawn, but counted. Cost: the logs are read once.
 @return whether all of the logs could be read. @throws BadInput, before anything is printed. */
 [[nodiscard]] bool Report(const ReportOptions& options, std::ostream& out);
 

@@ -24,6 +24,11 @@ std::string DirectoryOf(const std::string& path) {
   return directory.empty() ? "." : directory;
 }
 
+// By our logger, or by lcm-logger: lcmlog-2026-01-01.00.
+bool IsNamedAsLog(const fs::path& path) {
+  return path.extension() == ".lcmlog" || path.filename().string().starts_with("lcmlog-");
+}
+
 // One log of a directory without a database, or one that was named.
 struct Log {
   std::string path;
@@ -43,7 +48,8 @@ class Finder final {
         named_.is_many = true;
         Claim(input, input);
         if (AddDirectory(fs::path(input), 0) == 0)
-          throw ConfigError(input + ": neither a decision database nor event logs, *.lcmlog, in this directory");
+          throw ConfigError(input +
+                            ": neither a decision database nor event logs, *.lcmlog or lcmlog-*, in this directory");
         break;
       case FileKind::kDatabase:
         named_.is_many = true;
@@ -85,7 +91,7 @@ class Finder final {
         continue;
       else if (file->path().filename() == LogDirectory::kDatabase)
         database = path;
-      else if (file->path().extension() == ".lcmlog")
+      else if (IsNamedAsLog(file->path()))
         (file->is_symlink(ignored) ? links : logs).push_back(path);
     }
     if (error) named_.missing.push_back(directory.string() + ": " + error.message());

@@ -29,11 +29,12 @@ struct NamedRuns {
 
 /** Finds the runs of files and directories, each with its subdirectories.
 - A database has its runs in the order in which they began.
-- The logs of a directory are its files *.lcmlog; those that its database lists are runs of the database. Of the others,
-  in the order of their names, a log continues the one before if its heartbeats do (LogOrder::kOneRun).
+- The logs of a directory are its files *.lcmlog and, as lcm-logger names them, lcmlog-*; those that its database lists
+are runs of the database. Of the others, in the order of their names, a log continues the one before if its heartbeats
+do (LogOrder::kOneRun).
 - Logs that are named one by one are one run in the order given, as long as the heartbeats go on.
 Links to directories are not followed, and of several names of one file in a directory one is read.
-Cost: one pass over logs that no database lists, on `jobs` threads, unless it is a single log.
+Cost: the ends of logs that no database lists (EndsOf), on `jobs` threads, unless it is a single log.
 @throws BadInput if an input is neither, or is named twice, or if there is no run. */
 [[nodiscard]] NamedRuns RunsNamedBy(const std::vector<std::string>& inputs, unsigned jobs);
 

@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "forereach/certify/explain.h"
+#include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
-#include "records/log_authenticator.h"
-#include "records/timeline.h"
 
 namespace forereach {
 namespace {
@@ -87,6 +88,7 @@ std::string ToText(const Summary& summary) {
     line("withdrawals",
          fmt::format("{} ({} emergency stops, not certified)", summary.withdrawals, summary.emergency_stops));
   line("refused by the guard", std::to_string(summary.refused));
+  if (!summary.faults.empty()) line("faults latched", std::to_string(Total(summary.faults)) + Listed(summary.faults));
   line("messages", std::to_string(Total(summary.messages)) + Listed(summary.messages));
   line("messages lost", std::to_string(Total(summary.lost)) + Listed(summary.lost));
   if (summary.backlog > 0) line("discarded by the bus", std::to_string(summary.backlog));
@@ -121,6 +123,7 @@ nlohmann::json ToJson(const Summary& summary) {
   json["withdrawals"] = summary.withdrawals;
   json["emergency_stops"] = summary.emergency_stops;
   json["refused"] = summary.refused;
+  json["faults"] = summary.faults;
   json["messages"] = summary.messages;
   json["lost"] = summary.lost;
   json["backlog"] = summary.backlog;
@@ -131,10 +134,15 @@ nlohmann::json ToJson(const Summary& summary) {
   return json;
 }
 
-SummaryBuilder::SummaryBuilder(const Config& config)
-    : channels_(config.bus), goal_(config.planner.goal), goal_radius_m_(config.planner.goal_radius) {
+SummaryBuilder::SummaryBuilder(const Config& config) : channels_(config.bus) {
   latency_.values.reserve(kMaxSamples);
   certify_.values.reserve(kMaxSamples);
+  SetTask(config);
+}
+
+void SummaryBuilder::SetTask(const Config& config) {
+  goal_ = config.planner.goal;
+  goal_radius_m_ = config.planner.goal_radius;
   if (!config.problem) return;
   projection_ = config.problem->projection;
   summary_.has_limits = !config.problem->limits.empty();
@@ -156,11 +164,18 @@ Quantiles SummaryBuilder::Samples::Get() const {
 }
 
 void SummaryBuilder::Add(const LogEvent& event) {
-  if (!first_utime_) first_utime_ = event.utime;
+  // Where the clock was set back, or a log of before follows, no time passes.
+  if (last_utime_ && event.utime > *last_utime_) elapsed_us_ += event.utime - *last_utime_;
   last_utime_ = event.utime;
   auto& messages = summary_.messages;
   ++messages[messages.size() < Summary::kMaxChannels || messages.contains(event.channel) ? event.channel : "*"];
   if (event.channel == channels_.candidate) ++summary_.proposed;
+  if (event.channel == channels_.fault) {
+    const auto fault = Decoded<fault_t>(event.message());
+    const std::pair latched(fault ? fault->utime : 0, fault ? fault->cause : std::int16_t{0});
+    if (fault && std::exchange(fault_, latched) != latched)  // it is repeated until a reset
+      ++summary_.faults[std::string(FaultName(fault->cause))];
+  }
   if (event.channel != channels_.robot_state) return;
   if (const auto state = Decoded<robot_state_t>(event.message()))
     state_.assign(state->state, state->state + std::clamp<int>(state->num_states, 0, 16));
@@ -223,7 +238,7 @@ Summary SummaryBuilder::Finish() const {
   summary.goal_radius_m = goal_radius_m_;
   summary.latency_us = latency_.Get();
   summary.certify_us = certify_.Get();
-  summary.duration_s = static_cast<double>(last_utime_ - first_utime_.value_or(last_utime_)) * 1e-6;
+  summary.duration_s = static_cast<double>(elapsed_us_) * 1e-6;
   const auto states = static_cast<Eigen::Index>(state_.size()), goals = static_cast<Eigen::Index>(goal_.size());
   if (goals > 0 && projection_.rows() == goals && projection_.cols() == states)
     summary.distance_to_goal_m = (projection_ * Eigen::Map<const Eigen::VectorXd>(state_.data(), states) -
@@ -232,38 +247,19 @@ Summary SummaryBuilder::Finish() const {
   return summary;
 }
 
-namespace {
+void Summarizer::OnEvent(const LogEvent& event) {
+  Rows rows;
+  interpreter_.Observe(event, rows);
+  builder_.Add(event);
+  builder_.Add(rows);
+}
 
-class Summarizer final : public TimelineUser {
- public:
-  explicit Summarizer(const Config& config) : interpreter_(config.bus, ""), builder_(config) {}
-
-  void OnEvent(const LogEvent& event) override {
-    Rows rows;
-    interpreter_.Observe(event, rows);
-    builder_.Add(event);
-    builder_.Add(rows);
-  }
-
-  Summary Finish(const Timeline& timeline) {
-    Summary summary = builder_.Finish();
-    summary.damage = timeline.damage();
-    summary.passed_over = timeline.passed_over();
-    return summary;
-  }
-
- private:
-  Interpreter interpreter_;  // the timeline has looked at the key
-  SummaryBuilder builder_;
-};
-
-}  // namespace
-
-Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config) {
-  Summarizer summarizer(config);
-  Timeline timeline({&config}, summarizer);
-  timeline.Read(logs, false);
-  return summarizer.Finish(timeline);
+Summary Summarizer::Finish(const Timeline& timeline, const Config& last) {
+  builder_.SetTask(last);
+  Summary summary = builder_.Finish();
+  summary.damage = timeline.damage();
+  summary.passed_over = timeline.passed_over();
+  return summary;
 }
 
 }  // namespace forereach

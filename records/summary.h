@@ -16,6 +16,7 @@
 #include "records/event_log.h"
 #include "records/interpreter.h"
 #include "records/log_trust.h"
+#include "records/timeline.h"
 #include "task/config.h"
 
 namespace forereach {
@@ -52,14 +53,15 @@ struct Summary {
   /** Before the goal: braking tails that began, and stops at a plan's end, after a step outside its slice or for a
   withdrawal. */
   std::int64_t tails = 0, stops = 0;
-  std::int64_t refused = 0;                  ///< Certified plans that the guard refused.
-  std::int64_t withdrawals = 0;              ///< Withdrawals that the robot has answered, without repetitions.
-  std::int64_t emergency_stops = 0;          ///< Stops for a withdrawal that no certificate covers.
-  std::map<std::string, std::int64_t> lost;  ///< Messages missing, by reason.
-  std::int64_t backlog = 0;                  ///< Messages that the bus discarded before the logger took them (rows.h).
-  std::int64_t restarts = 0;                 ///< Restarts of senders.
-  LogDamage damage;                          ///< Damage of the logs.
-  PassedOver passed_over;                    ///< Messages of the logs that were skipped.
+  std::int64_t refused = 0;                    ///< Certified plans that the guard refused.
+  std::int64_t withdrawals = 0;                ///< Withdrawals that the robot has answered, without repetitions.
+  std::map<std::string, std::int64_t> faults;  ///< That the certifier has latched, by cause, without repetitions.
+  std::int64_t emergency_stops = 0;            ///< Stops for a withdrawal that no certificate covers.
+  std::map<std::string, std::int64_t> lost;    ///< Messages missing, by reason.
+  std::int64_t backlog = 0;   ///< Messages that the bus discarded before the logger took them (rows.h).
+  std::int64_t restarts = 0;  ///< Restarts of senders.
+  LogDamage damage;           ///< Damage of the logs.
+  PassedOver passed_over;     ///< Messages of the logs that were skipped.
 };
 
 /** Text for people, in aligned lines that end with a newline. */
@@ -73,6 +75,9 @@ class SummaryBuilder final {
   static constexpr std::size_t kMaxSamples = 1 << 16;
 
   explicit SummaryBuilder(const Config& config);
+
+  /** The goal and the limits are this task's. */
+  void SetTask(const Config& config);
 
   /** Adds the next message of the log. Add the rows that the interpreter makes of it separately. */
   void Add(const LogEvent& event);
@@ -94,17 +99,28 @@ class SummaryBuilder final {
   BusOptions channels_;
   Eigen::MatrixXd projection_;
   std::vector<double> goal_;
-  double goal_radius_m_;
+  double goal_radius_m_ = 0;
   Summary summary_;
   Samples latency_, certify_;
-  std::optional<std::int64_t> first_utime_;
-  std::int64_t last_utime_ = 0;
+  std::optional<std::int64_t> last_utime_;
+  std::int64_t elapsed_us_ = 0;
+  std::optional<std::pair<std::int64_t, std::int16_t>> fault_;  // the last one
   std::vector<double> state_;
   // Plans, and how many steps stand: the last ones, of which answers may be repeated at one time.
   std::deque<std::pair<std::int64_t, int>> withdrawn_;
 };
 
-/** The summary of consecutive logs, the files of one run. With bus.key only authentic messages count. Damage is skipped
-and counted. Cost: linear in the logs. @throws LogError if a log cannot be read, KeyError if the key cannot be read. */
-[[nodiscard]] Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config);
+/** Summarises a timeline. With bus.key only authentic messages count. Damage is skipped and counted. */
+class Summarizer final : public TimelineUser {
+ public:
+  explicit Summarizer(const Config& first) : interpreter_(first.bus, ""), builder_(first) {}
+
+  void OnEvent(const LogEvent& event) override;
+  /** @param last whose goal and limits they are. */
+  [[nodiscard]] Summary Finish(const Timeline& timeline, const Config& last);
+
+ private:
+  Interpreter interpreter_;  // the timeline has looked at the key
+  SummaryBuilder builder_;
+};
 }  // namespace forereach

@@ -46,29 +46,18 @@ std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>&
   return known;
 }
 
-std::vector<const Config*> PointersTo(const std::vector<Config>& tasks) {
-  std::vector<const Config*> pointers;
-  for (const Config& task : tasks) pointers.push_back(&task);
-  return pointers;
+std::shared_ptr<const Problem> Basis::problem() const {
+  return WithLearned(task->problem, std::span(*learned).subspan(learned_begin, learned_end - learned_begin));
 }
 
-Timeline::Timeline(std::vector<const Config*> tasks, TimelineUser& user)
-    : user_(user),
-      channels_(tasks.front()->bus),
+Timeline::Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users)
+    : find_(std::move(find)),
+      users_(std::move(users)),
+      channels_(first.bus),
       authenticator_(channels_, PublicKeysOf(channels_)),
-      now_(tasks.front()),
-      logged_obstacles_(*now_),
-      transition_sender_(Microseconds(now_->gate.robot_timeout_ms)) {
-  SetTasks(std::move(tasks));
-}
-
-void Timeline::SetTasks(std::vector<const Config*> tasks) {
-  tasks_ = std::move(tasks);
-  for (const Config* task : tasks_) learned_.try_emplace(task);
-  if (std::ranges::find(tasks_, now_) != tasks_.end()) return;
-  now_ = tasks_.front();
-  has_begun_ = false;
-}
+      now_(&first),
+      logged_obstacles_(first),
+      transition_sender_(Microseconds(first.gate.robot_timeout_ms)) {}
 
 void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
   if (!has_begun_) Start();
@@ -81,7 +70,7 @@ void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
 void Timeline::Take(const LogEvent& event, const std::string& name) {
   if (!authenticator_.IsAuthentic(event)) return;
   ++place_;
-  user_.OnEvent(event);
+  Tell(&TimelineUser::OnEvent, event);
   if (event.channel == channels_.candidate) {
     ++candidates_;
     undecided_.Add(DigestOf(event.message()), {{event.message().begin(), event.message().end()}, name, place_});
@@ -131,17 +120,11 @@ void Timeline::TakeStatus(const LogEvent& event) {
   if (told != Told::kStarts && !is_reload) return;
   const bool is_known =
       std::exchange(reloaded_ahead_, false) && now_->grounds.config == GetDigest(status->config_digest);
-  if (const Config* task = TaskOf(GetDigest(status->config_digest))) now_ = task;
+  if (const Config* task = find_(GetDigest(status->config_digest))) now_ = task;
   if (told == Told::kStarts)
     Start();
   else if (!is_known)
     Reload();
-}
-
-const Config* Timeline::TaskOf(const Digest& config) const {
-  if (tasks_.size() == 1) return tasks_.front();
-  const auto found = std::ranges::find(tasks_, config, [](const Config* task) { return task->grounds.config; });
-  return found == tasks_.end() ? nullptr : *found;
 }
 
 void Timeline::Start() {
@@ -149,7 +132,7 @@ void Timeline::Start() {
   obstacles_ahead_.clear();
   transition_sender_ = SoleSender(0);
   Follow(ObstaclesInForce(*now_));
-  user_.OnStart(*now_);
+  Tell(&TimelineUser::OnStart, *now_);
 }
 
 void Timeline::Reload() {
@@ -157,7 +140,7 @@ void Timeline::Reload() {
   ObstaclesInForce after(*now_);
   after.Inherit(logged_obstacles_);
   Follow(std::move(after));
-  user_.OnReload(*now_);
+  Tell(&TimelineUser::OnReload, *now_);
 }
 
 // The task in force begins with these obstacles, and with nothing learned.
@@ -168,7 +151,7 @@ void Timeline::Follow(ObstaclesInForce obstacles) {
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
-  learned_begin_ = learned_.at(now_).size();
+  learned_begin_ = LearnedUnder(*now_)->size();
 }
 
 // A decision may tell of a reload before a heartbeat does.
@@ -201,29 +184,35 @@ void Timeline::TakeTransition(const LogEvent& event) {
       {place_, std::move(transition), {event.message().begin(), event.message().end()}, logged_observations_});
 }
 
+std::shared_ptr<std::vector<ExecutedTransition>>& Timeline::LearnedUnder(const Config& task) {
+  auto& learned = learned_[&task];
+  if (!learned) learned = std::make_shared<std::vector<ExecutedTransition>>();
+  return learned;
+}
+
 void Timeline::TakeNextObstacles() {
   const ObstaclesChange change = std::move(obstacles_ahead_.front());
   obstacles_ahead_.pop_front();
   obstacles_digest_ = change.after.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(change.after.all());
-  user_.OnObstacles(change.bytes, change.utime, change.sender);
+  Tell(&TimelineUser::OnObstacles, change.bytes, change.utime, change.sender);
 }
 
 void Timeline::LearnNext() {
   Transition next = std::move(transitions_ahead_.front());
   transitions_ahead_.pop_front();
   observations_digest_ = next.after;
-  user_.OnTransition(next.transition, next.bytes);
-  learned_.at(now_).push_back(std::move(next.transition));
+  Tell(&TimelineUser::OnTransition, next.transition, next.bytes);
+  LearnedUnder(*now_)->push_back(std::move(next.transition));
 }
 
 // ---- Decisions.
 
-Basis Timeline::Current() const {
+Basis Timeline::Current() {
   Grounds grounds = now_->grounds;
   grounds.observations = observations_digest_;
   grounds.obstacles = obstacles_digest_;
-  return {now_, grounds, obstacles_, learned_begin_, learned_.at(now_).size()};
+  return {now_, grounds, obstacles_, LearnedUnder(*now_), learned_begin_, LearnedUnder(*now_)->size()};
 }
 
 Basis Timeline::Advance(const Grounds& named, std::int64_t candidate_place) {
@@ -244,7 +233,7 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
   if (Heed(decisions_, {decision->sequence, decision->utime}, event) == Told::kStarts) Start();
   const Digest plan = GetDigest(decision->plan_digest);
   RecordedDecision recorded{*decision, name, undecided_.Take(plan), true, {}};
-  const Config* task = TaskOf(GetDigest(decision->config_digest));
+  const Config* task = find_(GetDigest(decision->config_digest));
   recorded.is_of_known_task = task != nullptr;
   if (task) FollowReload(*task);
   recorded.basis =
@@ -253,7 +242,7 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
     decided_.insert_or_assign(plan, Decided{recorded.basis, true});
   else
     decided_.try_emplace(plan, Decided{recorded.basis, recorded.candidate.has_value()});
-  user_.OnDecision(recorded);
+  Tell(&TimelineUser::OnDecision, recorded);
 }
 
 void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
@@ -265,7 +254,7 @@ void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
   if (Heed(certified_, {certified->sequence, certified->utime}, event) == Told::kStarts) Start();
   const Digest plan = DigestOf(Encode(certified->plan));
   const Grounds named = GroundsOf(*certified);
-  const Config* task = TaskOf(named.config);
+  const Config* task = find_(named.config);
   RecordedPlan recorded{*certified, name, false, task != nullptr, {}};
   const RecordedCandidate* const waiting = undecided_.Find(plan);
   const auto decided = decided_.find(plan);
@@ -278,7 +267,7 @@ void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
   } else {
     recorded.basis = Current();
   }
-  user_.OnCertified(recorded);
+  Tell(&TimelineUser::OnCertified, recorded);
 }
 
 void Timeline::TakeWithdrawal(const LogEvent& event, const std::string& name) {
@@ -286,11 +275,11 @@ void Timeline::TakeWithdrawal(const LogEvent& event, const std::string& name) {
   if (!withdrawal || !withdrawals_.IsFirst(*withdrawal)) return;
   RecordedWithdrawal recorded{*withdrawal, name, true, {}};
   const Grounds named = GroundsOf(*withdrawal);
-  const Config* task = TaskOf(named.config);
+  const Config* task = find_(named.config);
   recorded.is_of_known_task = task != nullptr;
   if (task) FollowReload(*task);
   recorded.basis = task ? Advance(named, -1) : Current();
-  user_.OnWithdrawn(recorded);
+  Tell(&TimelineUser::OnWithdrawn, recorded);
 }
 
 }  // namespace forereach

@@ -20,11 +20,13 @@ before the candidate; then the digests of the basis differ from those that the d
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "certifier/gate/obstacles_in_force.h"
@@ -36,6 +38,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
 #include "records/log_authenticator.h"
+#include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/repeated_withdrawals.h"
 #include "records/undecided.h"
@@ -48,8 +51,13 @@ struct Basis {
   const Config* task = nullptr;
   Grounds grounds;  ///< The digests of these inputs. The decision's message has the digests that it names.
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
-  /** The range [learned_begin, learned_end) of Timeline::learned(task) that was learned at that time. */
+  /** All transitions that are learned under the task, in the order of the log; at that time [learned_begin,
+  learned_end) of them were. */
+  std::shared_ptr<const std::vector<ExecutedTransition>> learned;
   std::size_t learned_begin = 0, learned_end = 0;
+
+  /** What was known at that time: the task's problem with these transitions behind its own. */
+  [[nodiscard]] std::shared_ptr<const Problem> problem() const;
 };
 
 struct RecordedCandidate {
@@ -62,8 +70,8 @@ struct RecordedDecision {
   decision_t decision;
   std::string event;
   std::optional<RecordedCandidate> candidate;  ///< No value if the log lacks it.
-  /** True if the decision's config digest is that of a known task, or if only one task is known. Otherwise `basis` is
-  the state under the task in force. */
+  /** True if the decision's config digest is that of a known task. Otherwise `basis` is the state under the task in
+  force. */
   bool is_of_known_task = true;
   Basis basis;
 };
@@ -107,30 +115,33 @@ class TimelineUser {
 [[nodiscard]] std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
                                                          std::span<const ExecutedTransition> learned);
 
-/** Pointers for Timeline, which does not own its tasks. */
-[[nodiscard]] std::vector<const Config*> PointersTo(const std::vector<Config>& tasks);
-
 class Timeline final {
  public:
-  /** @param tasks at least one. They must outlive the timeline. Channels and key are those of the first. With a single
-  task, decisions of any config digest count as its decisions.
-  @param user must outlive the timeline. @throws KeyError if the key cannot be read. */
-  Timeline(std::vector<const Config*> tasks, TimelineUser& user);
+  /** The task of a config digest; null if it is not known. */
+  using TaskFinder = std::function<const Config*(const Digest& config)>;
+
+  /** @param first the task in force at the beginning. Channels and key are its.
+  @param users each is told of every event. They must outlive the timeline, as the tasks must.
+  @throws KeyError if the key cannot be read. */
+  Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users);
+  Timeline(LogTasks& tasks, std::vector<TimelineUser*> users)
+      : Timeline(
+            tasks.first(), [&tasks](const Digest& config) { return tasks.Find(config); }, std::move(users)) {}
+  /** Decisions of any config digest count as this task's. */
+  Timeline(const Config& only, std::vector<TimelineUser*> users)
+      : Timeline(
+            only, [&only](const Digest&) { return &only; }, std::move(users)) {}
 
   /** Reads consecutive event logs of one run, which follow those that were read before.
   @param names_files whether names of events include the log's name. @throws LogError if a log cannot be read. */
   void Read(const std::vector<std::string>& logs, bool names_files);
-
-  /** Sets the tasks of the next logs, at least one. If the task in force is not among them, the process has started
-  under the first. */
-  void SetTasks(std::vector<const Config*> tasks);
 
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
   [[nodiscard]] PassedOver passed_over() const { return {authenticator_.refusals(), undecodable_}; }
   [[nodiscard]] std::int64_t candidates() const { return candidates_; }
   [[nodiscard]] const Undecided<RecordedCandidate>& undecided() const { return undecided_; }
   /** All transitions that were learned under a task, in the order of the log. */
-  [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) const { return learned_.at(&task); }
+  [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) { return *LearnedUnder(task); }
   /** The obstacles in force after everything that was logged. */
   [[nodiscard]] const std::vector<Obstacle>& logged_obstacles() const { return logged_obstacles_.all(); }
 
@@ -173,16 +184,21 @@ class Timeline final {
   void Reload();
   void Follow(ObstaclesInForce obstacles);
   void FollowReload(const Config& task);
-  [[nodiscard]] const Config* TaskOf(const Digest& config) const;
 
   /** @param candidate_place -1 if the log has no candidate: without a state of these digests nothing advances. */
   [[nodiscard]] Basis Advance(const Grounds& named, std::int64_t candidate_place);
-  [[nodiscard]] Basis Current() const;
+  [[nodiscard]] Basis Current();
+  [[nodiscard]] std::shared_ptr<std::vector<ExecutedTransition>>& LearnedUnder(const Config& task);
   void TakeNextObstacles();
   void LearnNext();
 
-  std::vector<const Config*> tasks_;
-  TimelineUser& user_;
+  template <class... Parameters, class... Arguments>
+  void Tell(void (TimelineUser::*told)(Parameters...), const Arguments&... what) {
+    for (TimelineUser* user : users_) (user->*told)(what...);
+  }
+
+  const TaskFinder find_;
+  const std::vector<TimelineUser*> users_;
   const BusOptions channels_;
   LogAuthenticator authenticator_;
 
@@ -208,7 +224,7 @@ class Timeline final {
   Digest logged_observations_{};
   std::deque<ObstaclesChange> obstacles_ahead_;
   std::deque<Transition> transitions_ahead_;
-  std::map<const Config*, std::vector<ExecutedTransition>> learned_;
+  std::map<const Config*, std::shared_ptr<std::vector<ExecutedTransition>>> learned_;
 };
 
 }  // namespace forereach

@@ -1,7 +1,7 @@
 #include "verifier/real.h"
 
+#include <array>
 #include <limits>
-#include <vector>
 
 namespace forereach::verifier {
 
@@ -9,50 +9,52 @@ thread_local int Precision::bits_ = 256;
 
 namespace {
 
-// Numbers come and go by the million: a few are kept for the next, all of one precision.
+// Numbers come and go by the million: a few are kept for the next, all of one precision. It has no constructor and no
+// destructor of its own, since each use of a thread's object that has one asks first whether it was made.
 struct Pool {
   static constexpr std::size_t kMost = 512;
-  std::vector<__mpfi_struct> numbers;
-  int bits = 0;
+  std::array<__mpfi_struct, kMost> numbers;
+  std::size_t count;
+  int bits;
+  bool closed;  // a number may outlive its thread's pool
 
-  Pool() { numbers.reserve(kMost); }
-  ~Pool() {
-    Clear();
-    closed = true;
+  void Clear() {
+    while (count > 0) mpfi_clear(&numbers[--count]);
+  }
+};
+constinit thread_local Pool pool{};
+
+struct PoolCloser {
+  ~PoolCloser() {
+    pool.Clear();
+    pool.closed = true;
     mpfr_free_cache2(MPFR_FREE_LOCAL_CACHE);  // the library's cache of this thread
   }
-  void Clear() {
-    for (__mpfi_struct& number : numbers) mpfi_clear(&number);
-    numbers.clear();
-  }
-
-  static thread_local bool closed;  // a number may outlive its thread's pool
+  void Use() {}  // so that there is one in this thread
 };
-thread_local bool Pool::closed = false;
-thread_local Pool pool;
+thread_local PoolCloser pool_closer;
 
 }  // namespace
 
 Real::Real(Uninitialized) {
   const int bits = Precision::bits();
-  if (Pool::closed || pool.bits != bits || pool.numbers.empty()) {
+  if (pool.closed || pool.bits != bits || pool.count == 0)
     mpfi_init2(value_, bits);
-  } else {
-    *value_ = pool.numbers.back();
-    pool.numbers.pop_back();
-  }
+  else
+    *value_ = pool.numbers[--pool.count];
 }
 
 void Real::Release() {
-  if (Pool::closed) return mpfi_clear(value_);
+  if (pool.closed) return mpfi_clear(value_);
   if (pool.bits != Precision::bits()) {
+    pool_closer.Use();
     pool.Clear();
     pool.bits = Precision::bits();
   }
-  if (pool.numbers.size() == Pool::kMost || mpfi_get_prec(value_) != static_cast<mpfr_prec_t>(pool.bits))
+  if (pool.count == Pool::kMost || mpfi_get_prec(value_) != static_cast<mpfr_prec_t>(pool.bits))
     mpfi_clear(value_);
   else
-    pool.numbers.push_back(*value_);
+    pool.numbers[pool.count++] = *value_;
 }
 
 Real::Real(double x) : Real(Uninitialized{}) { mpfi_set_d(value_, x); }

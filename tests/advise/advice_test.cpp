@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
+#include "advise/gate_advice.h"
 #include "advise/hypotheses.h"
-#include "cli/gate_advice.h"
 #include "forereach/certify/explain.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "advise/abstentions.h"
 #include "certifier/gate/gate.h"
-#include "cli/abstentions.h"
 #include "forereach/obstacles_t.hpp"
 #include "tests/gate/small_task.h"
 #include "tests/oracle/random.h"

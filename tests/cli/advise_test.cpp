@@ -1,9 +1,9 @@
 // `forereach advise`: the shipped abstentions, a recorded course, and answers that are about time.
 #include "tests/test.h"
 
+#include "advise/gate_advice.h"
 #include "certifier/gate/gate.h"
 #include "cli/abstention_advice.h"
-#include "cli/gate_advice.h"
 #include "forereach/obstacles_t.hpp"
 #include "lcmtypes/names.h"
 #include "tests/cli/program.h"
@@ -179,13 +179,36 @@ TEST_F(AdviseTest, GoesOnAfterAnInterruption) {
   EXPECT_EQ(Forereach(resume + "--json 2>&1").text, whole);
 }
 
+TEST_F(AdviseTest, AfterItsTimeOnlyWhatMissedByLeastIsSearched) {
+  const std::string log = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+  const RunTasks tasks(FOREREACH_SOURCE_DIR "/tests/data/course.yaml", {}, false);
+  std::vector<Abstentions> runs(1);
+  runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false);
+  std::vector<RecordedAbstention>& all = runs[0].all;
+  std::erase_if(all, [](const RecordedAbstention& each) { return each.outcome != decision_t::ABSTAIN_SAFETY; });
+  ASSERT_GE(all.size(), 3u);
+  all.resize(3);
+  const auto shortfall = [](const RecordedAbstention& each) {
+    return std::abs(each.decision.threshold - each.decision.margin);
+  };
+  const std::ptrdiff_t nearest = std::ranges::min_element(all, {}, shortfall) - all.begin();
+  const auto advised = AdviseAll(runs, 1, nullptr, {}, 0);
+  for (std::ptrdiff_t i = 0; i < 3; ++i) {
+    const AbstentionAdvice& advice = advised[0][static_cast<std::size_t>(i)];
+    EXPECT_EQ(advice.advices.empty(), i != nearest);
+    EXPECT_EQ(advice.missing, i == nearest ? ""
+                                           : "not searched within 0 s: `forereach advise` searches all, or write a "
+                                             "longer --advice-seconds");
+  }
+}
+
 TEST_F(AdviseTest, SearchesAgainWhenKeptAdviceDoesNotMatchTheRun) {
   const std::string log = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
   const RunTasks tasks(FOREREACH_SOURCE_DIR "/tests/data/course.yaml", {}, false);
-  int left = 2;
   std::vector<Abstentions> runs(1);
-  runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false, [&](const std::string&) { return left-- > 0; });
-  ASSERT_EQ(runs[0].all.size(), 2u);
+  runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false);
+  ASSERT_GE(runs[0].all.size(), 2u);
+  runs[0].all.resize(2);
   const auto whole = AdviseAll(runs, 1);
   const FinishedRuns finished(scratch_ / "kept", "a test");
   const std::string key(64, '7');

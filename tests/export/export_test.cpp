@@ -394,6 +394,17 @@ TEST_F(ExportTest, AnyLogIsExportedOrRefused) {
   }
 }
 
+TEST_F(ExportTest, ALogWithoutOurMessagesIsNoExport) {
+  {
+    EventLogWriter writer(scratch_ / "foreign.lcmlog");
+    writer.Append(1, "CAMERA", std::vector<std::uint8_t>(100));
+    ASSERT_TRUE(writer.Flush());
+  }
+  const Output output = ExportTo("jsonl", "foreign.jsonl", scratch_ / "foreign.lcmlog");
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("nothing in it is a message of ForeReach's"));
+}
+
 TEST_F(ExportTest, AFileThatExistsIsNotChanged) {
   scratch_.Write("precious", "mine");
   for (const char* format : {"jsonl", "npz", "mcap"}) {

@@ -51,7 +51,7 @@ TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
    private:
     std::int64_t& count_;
   } counter(safety);
-  Timeline timeline({&task}, counter);
+  Timeline timeline(task, {&counter});
   timeline.Read({kLog}, false);
   EXPECT_GT(safety, 0);
   std::int64_t gained_of_safety = 0;

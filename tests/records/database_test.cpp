@@ -95,6 +95,32 @@ TEST(Database, RowsSurviveARoundTrip) {
   EXPECT_TRUE(database.Read("b.lcmlog").empty());
 }
 
+TEST(Database, WhatDoesNotApplyIsNullInAQueryAndAsBeforeInARow) {
+  const ScratchDirectory scratch;
+  const std::string path = scratch / "d.sqlite";
+  Rows rows = SampleRows();
+  DecisionRow& decision = rows.decisions[0];
+  decision.step = decision.coordinate = decision.obstacle = decision.first_observation = decision.second_observation =
+      -1;
+  rows.events[0].step = rows.events[0].coordinate = -1;
+  rows.events[0].plan_id = -1;
+  decision.obstacle = -7;  // no row of ours has it, and it stays what it is
+  Database database(path);
+  database.BeginRun("a.lcmlog", 10);
+  ASSERT_EQ(database.Write(rows, "a.lcmlog", 10), 3);
+  const Rows read = database.Read("a.lcmlog");
+  EXPECT_EQ(read.decisions[0].step, -1);
+  EXPECT_EQ(read.decisions[0].second_observation, -1);
+  EXPECT_EQ(read.decisions[0].obstacle, -7);
+  EXPECT_EQ(read.events[0].plan_id, -1);
+  EXPECT_EQ(read.events[0].coordinate, -1);
+  Sql(path, R"sql(CREATE TABLE one (n INTEGER CHECK (n = 1)); INSERT INTO one
+    SELECT count(*) FROM decisions JOIN execution_events
+    WHERE decisions.step IS NULL AND decisions.coordinate IS NULL AND first_observation IS NULL
+    AND second_observation IS NULL AND obstacle = -7 AND execution_events.step IS NULL
+    AND execution_events.plan_id IS NULL AND execution_events.coordinate IS NULL)sql");
+}
+
 TEST(Database, WritesARowOnce) {
   const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");

@@ -5,6 +5,7 @@
 
 #include "forereach/logger_status_t.hpp"
 #include "records/finished_runs.h"
+#include "records/log_survey.h"
 #include "records/output_file.h"
 #include "tests/cli/program.h"
 #include "tests/records/logs.h"
@@ -43,6 +44,34 @@ TEST_F(RunLogsTest, LogsThatGoOnAreOneRun) {
   EXPECT_THAT(LogsOf(two), ElementsAre(ElementsAre(a, b), ElementsAre(c)));
   EXPECT_TRUE(two.is_many);
   EXPECT_THAT([&] { static_cast<void>(RunsNamedBy({b, a}, 1)); }, ThrowsMessage<BadInput>(HasSubstr("go on from it")));
+}
+
+TEST_F(RunLogsTest, ALongLogGoesOnByItsEnds) {
+  const auto log = [&](const std::string& name, std::int64_t first, std::int64_t last) {
+    EventLogWriter writer(scratch_ / name);
+    const auto beat = [&](std::int64_t sequence) {
+      logger_status_t status{.sequence = sequence};
+      writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(status));
+    };
+    beat(first);
+    for (int i = 0; i < 100; ++i) writer.Append(1'000'000 * first, "CAMERA", std::vector<std::uint8_t>(100'000));
+    beat(last);
+    for (int i = 0; i < 10; ++i) writer.Append(1'000'000 * last, "CAMERA", std::vector<std::uint8_t>(100'000));
+    EXPECT_TRUE(writer.Flush());
+    return scratch_ / name;
+  };
+  const std::string a = log("a", 0, 5), b = log("b", 6, 9);
+  const LogEnds ends = EndsOf(a);
+  EXPECT_EQ(ends.logger.first, 0);
+  EXPECT_EQ(ends.logger.last, 5);
+  EXPECT_EQ(ends.utime.first, 0);
+  EXPECT_EQ(ends.utime.last, 5'000'000);
+  EXPECT_THAT(LogsOf(RunsNamedBy({a, b}, 1)), ElementsAre(ElementsAre(a, b)));
+}
+
+TEST_F(RunLogsTest, LogsNamedByLcmLoggerAreLogs) {
+  const std::string a = Log("night/1.lcmlog", 0, 3), b = Log("night/lcmlog-2026-01-01.00", 0, 2);
+  EXPECT_THAT(LogsOf(RunsNamedBy({scratch_ / "night"}, 1)), ElementsAre(ElementsAre(a), ElementsAre(b)));
 }
 
 TEST_F(RunLogsTest, ADirectoryIsReadWithItsSubdirectories) {

@@ -2,6 +2,7 @@
 
 #include "tests/test.h"
 
+#include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/records/logs.h"
 
@@ -43,6 +44,13 @@ void WriteRun(const std::string& path) {
   state.state[1] = 3.5;
   writer.Append(3'000'000, "ROBOT_STATE", Encode(state));
   ASSERT_TRUE(writer.Flush());
+}
+
+Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config) {
+  Summarizer summarizer(config);
+  Timeline timeline(config, {&summarizer});
+  timeline.Read(logs, false);
+  return summarizer.Finish(timeline, config);
 }
 
 TEST(Summary, CountsAHandMadeLog) {
@@ -95,6 +103,25 @@ TEST(Summary, CountsAWithdrawalOnceHoweverOftenItIsAnswered) {
   EXPECT_EQ(summary.emergency_stops, 1);
   EXPECT_EQ(summary.stops, 1);
   EXPECT_THAT(ToText(summary), testing::HasSubstr("withdrawals               3 (1 emergency stops, not certified)"));
+}
+
+TEST(Summary, NoTimePassesWhereTheClockWasSetBack) {
+  SummaryBuilder builder(GoalConfig());
+  for (const std::int64_t utime : {5'000'000, 7'000'000, 1'000'000, 2'500'000})
+    builder.Add(LogEvent{.utime = utime, .channel = "A", .data = {}});
+  EXPECT_DOUBLE_EQ(builder.Finish().duration_s, 3.5);
+}
+
+TEST(Summary, NamesTheFaultThatHaltedTheDrive) {
+  SummaryBuilder builder(GoalConfig());
+  EXPECT_THAT(ToText(builder.Finish()), Not(HasSubstr("faults")));
+  fault_t fault{.utime = 3, .cause = fault_t::SLICE_LEFT};
+  for (int i = 0; i < 3; ++i) {  // it is repeated until a reset
+    fault.sequence = i;
+    builder.Add(LogEvent{.utime = i, .channel = "FAULT", .data = Encode(fault)});
+  }
+  EXPECT_THAT(ToText(builder.Finish()), HasSubstr("faults latched            1 (slice_left 1)\n"));
+  EXPECT_EQ(ToJson(builder.Finish())["faults"], (nlohmann::json{{"slice_left", 1}}));
 }
 
 TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {

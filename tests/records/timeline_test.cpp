@@ -145,7 +145,7 @@ class TimelineTest : public testing::Test {
       }
       int decisions = 0, plans = 0;
     } comparer;
-    Timeline timeline({&config_}, comparer);
+    Timeline timeline(config_, {&comparer});
     timeline.Read(logs_, true);
     EXPECT_EQ(comparer.decisions, certified_);
     EXPECT_EQ(comparer.plans, certified_);

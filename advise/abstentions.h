@@ -1,8 +1,9 @@
-/** Recorded abstentions with everything that they were judged by, for `forereach advise`. */
+/** Recorded abstentions with everything that they were judged by, for `forereach advise` and the page. */
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <deque>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/run_logs.h"
+#include "records/timeline.h"
 #include "task/config.h"
 
 namespace forereach {
@@ -48,10 +50,31 @@ struct Abstentions {
 @throws ConfigError with file and field for what is no decision. */
 [[nodiscard]] Abstentions AbstentionOf(const std::string& document, const std::string& config);
 
+/** Collects the last `most` of a timeline. */
+class AbstentionReader final : public TimelineUser {
+ public:
+  explicit AbstentionReader(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_(most) {}
+
+  void OnEvent(const LogEvent& event) override;
+  void OnStart(const Config& task) override;
+  void OnDecision(const RecordedDecision& recorded) override;
+
+  /** @param tasks those of the timeline. The result has nothing of what was passed over. */
+  [[nodiscard]] Abstentions Finish(std::vector<std::shared_ptr<const Config>> tasks);
+
+ private:
+  const std::size_t most_;
+  BusOptions channels_;
+  std::size_t waiting_ = 0;
+  std::shared_ptr<const std::pair<std::vector<std::uint8_t>, std::int64_t>> last_obstacles_;
+  std::deque<RecordedAbstention> all_;
+  std::deque<Basis> bases_;  // of each
+  std::int64_t certified_ = 0;
+};
+
 /** Those of a run's logs.
-@param names_files whether events are named with their log. @param wanted says of an event's name whether it is to be
-read; null for all of them. @throws BadInput for logs that cannot be read, or without their task. */
-[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files,
-                                          const std::function<bool(const std::string& event)>& wanted = nullptr);
+@param names_files whether events are named with their log.
+@throws BadInput for logs that cannot be read, or without their task. */
+[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files);
 
 }  // namespace forereach

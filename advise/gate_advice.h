@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "cli/abstentions.h"
+#include "advise/abstentions.h"
 
 namespace forereach {
 

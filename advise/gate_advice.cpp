@@ -1,4 +1,4 @@
-#include "cli/gate_advice.h"
+#include "advise/gate_advice.h"
 
 #include <cmath>
 
