@@ -282,7 +282,7 @@ std::optional<Meeting> Met(Random& random, const Problem& problem, const Query& 
     const std::vector<Real> wind = AnyDisturbance(random, problem);
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
   }
-  const Chord chord = judge.ChordOf(x, next);
+  const Chord chord = judge.ChordOf(x, next, {}, {});
   std::optional<Path> path;
   double s = random.Below(2);
   if (problem.between) {
