@@ -59,7 +59,7 @@ const Field kLearnedFrom{"learned from", [](const Trial&t) { return t.learned_fr
     kCount{"N", [](const Trial&t) { return std::to_string(t.learned.transitions); }},
     kQuantile{"quantile", [](const Trial&t) { return Text("%.4g", t.quantile); }},
     kLeftOut{"left out", [](const Trial&t) { return std::to_string(t.learned.left_out); }},
-    kSteps_{"steps", [](const Trial&t) { return std::to_string(t.judged.steps); }},
+    kLength{"steps", [](const Trial&t) { return std::to_string(t.judged.steps); }},
     kCovered{
         "covered, %",
         [](const Trial&t) { return Percent(t.judged.transitions, t.judged.outside_domain + t.judged.transitions); }},
@@ -86,7 +86,7 @@ std::vector<Field> AllFields() {
                          kCount,
                          kQuantile,
                          kLeftOut,
-                         kSteps_};
+                         kLength};
   all.insert(all.end(), kOutcome.begin(), kOutcome.end());
   all.insert(all.end(), {{"w of x", Disturbance<0>},
                          {"w of yaw", Disturbance<2>},
