@@ -10,6 +10,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "task/files.h"
 #include "tests/cli/program.h"
 #include "tests/keys.h"
 #include "tests/paths.h"
