@@ -15,12 +15,12 @@ class StepJitter final {
   explicit StepJitter(const Config& config);
 
   /** The offset of the next boundary, microseconds; whole milliseconds where there is room for some, so that a
-  simulated clock of milliseconds shows it. random: uniform. adversarial: the most early, or so late that the two are
-  apart by robot.step_error_ms. The draws depend on the seed and the number of calls only. */
+  simulated clock of milliseconds shows it. random: uniform. adversarial: the most, early or late. The draws depend on
+  the seed and the number of calls only. */
   [[nodiscard]] std::int64_t Next();
 
  private:
-  std::int64_t error_us_, unit_us_;
+  std::int64_t most_us_, unit_us_;
   bool is_adversarial_;
   std::mt19937_64 random_;
 };

@@ -24,6 +24,7 @@ struct Options {
   std::string obstacles;
   int seeds = 20, first_seed = 1;
   bool advice = false;
+  double errors = 0;
 };
 
 std::string TextOf(const DriveCounts& all) {
@@ -47,6 +48,23 @@ DriveCounts Drive(Config config, const Config& world, int seed) {
   Lockstep lockstep(config, world, kStartUs);
   lockstep.Run();
   return CountsOf(lockstep);
+}
+
+// The task of a robot that measures with errors, a share of what its planner allows a start, and takes its steps off their
+// times by the same share of a tenth of a step. A task that declares errors keeps its own.
+Config WithErrors(Config config, double share) {
+  if (share == 0 || config.problem->declaration.HasErrorInZ()) return config;
+  Problem problem = *config.problem;
+  std::vector<double>& half_width = config.planner.initial_half_width;
+  problem.declaration.state_error = share * Eigen::Map<const Eigen::VectorXd>(half_width.data(), std::ssize(half_width));
+  problem.declaration.given_are_exact = true;
+  for (double& width : half_width) width *= 1 + share;  // what is measured at the start is off, too
+  config.gate.step_error_ms = share / 10 * config.period * 1e3;
+  config.gate.step_us = StepUs(config);
+  problem.timing.error = StepErrorSeconds(config);
+  if (problem.between) problem.between->period = LongestPeriod(config);
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  return config;
 }
 
 // One row: the task with each seed. False if one of them was not good.
@@ -75,7 +93,7 @@ int Run(const Options& options) {
                            "contacts", "limits", "steps outside", "emergency", "plans certified", "searches",
                            "rounds lost", "time");
   for (const std::string& task : options.tasks) {
-    Config config = LoadConfig(task);
+    Config config = WithErrors(LoadConfig(task), options.errors);
     const std::string name = std::filesystem::path(task).stem().string();
     all_good = DriveAll(name, config, options) && all_good;
     if (!options.advice) continue;
@@ -102,6 +120,11 @@ int main(int argc, char** argv) {
                    "Task file whose obstacles are sent on OBSTACLES; by default each task's own"},
                   {"--seeds", &options.seeds, "N", "The number of drives of each task", NumberRange{1, 1'000'000}},
                   {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}},
+                  {.name = "--errors",
+                   .variable = &options.errors,
+                   .help = "Tasks without errors of measurement get this share of planner.initial_half_width, and steps "
+                           "off their times by as much of a tenth of model.dt",
+                   .range = NumberRange{0, 1}},
                   {"--advice", &options.advice, "Drives each task once more with gate.advice: send"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   logging::Silence();
