@@ -183,6 +183,7 @@ nlohmann::json Measure(int rounds) {
   config.gate.needs_robot_state = true;
   config.gate.obstacles = ObstaclesSource::kBus;
   config.gate.obstacles_lost_ms = kNeverLost;
+  config.gate.step_error_ms = kAnyTime;
   config.gate.learns = false;  // on a treadmill nothing can be learned
   const std::string url = "udpm://239.255.76.67:" + std::to_string(10'000 + getpid() % 20'000) + "?ttl=0";
   const Child certifier(url, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });

@@ -270,7 +270,7 @@ TEST_F(ForeignLogTest, ARowOfDecimalCommasBetweenCommasIsNamed) {
 
 // ---- How late commands act: v' = u in steps of 0.15 s, and each command acts one row later.
 
-class LateCommandTest : public ImportCommandTest {
+class LateRowsTest : public ImportCommandTest {
  protected:
   void Record(bool varies) {
     std::mt19937 random(7);
@@ -288,7 +288,7 @@ class LateCommandTest : public ImportCommandTest {
   }
 };
 
-TEST_F(LateCommandTest, IsSaidWithTheErrorByDelayAndMayBeShifted) {
+TEST_F(LateRowsTest, IsSaidWithTheErrorByDelayAndMayBeShifted) {
   Record(true);
   const Output said = Import(log_);
   EXPECT_EQ(said.code, 0) << said.text;
@@ -310,7 +310,7 @@ TEST_F(LateCommandTest, IsSaidWithTheErrorByDelayAndMayBeShifted) {
   EXPECT_TRUE(json["command_delay"].is_null()) << "it was said";
 }
 
-TEST_F(LateCommandTest, CannotBeToldWhereTheInputDoesNotVary) {
+TEST_F(LateRowsTest, CannotBeToldWhereTheInputDoesNotVary) {
   Record(false);
   EXPECT_THAT(Import(log_).text, HasSubstr("how late commands act cannot be told: the inputs vary too little"));
   const Output output = Import("--command-delay auto " + log_);

@@ -64,7 +64,7 @@ TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
               testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
                                    "num_inputs", "num_steps", "progress_steps", "initial_center", "initial_half_width",
                                    "control"));
-  EXPECT_EQ(types.at("decision_t").constants.size(), 35u);
+  EXPECT_EQ(types.at("decision_t").constants.size(), 36u);
 }
 
 TEST(BusDocumentTest, ItsTablesAreThoseOfTheTypes) {

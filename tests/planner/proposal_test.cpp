@@ -240,7 +240,7 @@ Config Car() {
   Config config = Bicycle();
   Problem problem = *config.problem;
   problem.body = {.heading = 2, .parts = {{{{-1, -0.9, 0}, {3.3, -0.9, 0}, {3.3, 0.9, 0}, {-1, 0.9, 0}}, 0}}};
-  problem.between = Between{Vec({25, 25}), 1.8, 6, 0.1};
+  problem.between = Between{Vec({25, 25}), 2.3, 6, 0.1};  // its data turn at up to 2.26 rad/s
   config.problem = std::make_shared<const Problem>(problem);
   return config;
 }

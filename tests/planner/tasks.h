@@ -27,6 +27,7 @@ inline Config Bicycle() {
   config.path = "bicycle";
   config.laws = laws;
   config.says_between = true;
+  config.gate.step_error_ms = kAnyTime;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({25, 1}), 3), Obstacle::Circle(Vec({45, -4}), 3)};
   config.planner.goal = {65, 0};
@@ -47,6 +48,7 @@ inline Config PointMass() {
   config.path = "point_mass";
   config.laws = laws;
   config.says_between = true;
+  config.gate.step_error_ms = kAnyTime;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({5, 0.3}), 1.5)};
   config.planner.goal = {12, 0};
