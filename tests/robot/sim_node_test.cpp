@@ -1,5 +1,7 @@
 #include "simulator/sim_node.h"
 
+#include <regex>
+
 #include "tests/test.h"
 
 #include "bus/authentic_bus.h"
@@ -16,6 +18,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
 #include "tests/worlds.h"
