@@ -19,6 +19,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
 #include "tests/worlds.h"
