@@ -1,8 +1,6 @@
 #include "verifier/real.h"
 
 #include <array>
-#include <bit>
-#include <cstdint>
 #include <limits>
 
 namespace forereach::verifier {
@@ -109,11 +107,6 @@ Real Real::middle() const {
 Real Real::magnitude() const { return abs(*this).upper(); }
 
 double Real::ToDouble(long shift) const {
-  if (shift == 0) {
-    const double left = mpfr_get_d(&value_->left, MPFR_RNDN), right = mpfr_get_d(&value_->right, MPFR_RNDN);
-    // Where both ends are nearest to one double, the middle is, too.
-    return std::bit_cast<std::uint64_t>(left) == std::bit_cast<std::uint64_t>(right) ? left : mpfi_get_d(value_);
-  }
   Real scaled{Uninitialized{}};
   if (shift >= 0)
     mpfi_mul_2exp(scaled.value_, value_, static_cast<unsigned long>(shift));
