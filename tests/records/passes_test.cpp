@@ -51,9 +51,9 @@ class PassesTest : public testing::TestWithParam<const char*> {
     const std::string output = testing::internal::GetCapturedStdout();
     EXPECT_LE(code, 1) << line << "\n" << output;
     // An export reads the program, too, since what was kept of another program is not used.
-    const std::int64_t program =
+    const std::int64_t own_bytes =
         line.starts_with("export") ? static_cast<std::int64_t>(fs::file_size(fs::read_symlink("/proc/self/exe"))) : 0;
-    return static_cast<double>(BytesRead() - before - program) / static_cast<double>(fs::file_size(log_));
+    return static_cast<double>(BytesRead() - before - own_bytes) / static_cast<double>(fs::file_size(log_));
   }
 
   ScratchDirectory scratch_;
