@@ -219,14 +219,13 @@ TEST_F(KeptTaskTest, EachCommandRefusesInputThatIsNotItsOwn) {
       for (const auto& [input, sentence] : no_logs) ExpectRefused(command + input + config, {sentence, input});
       ExpectRefused(command + logs_->front() + " " + text + config, {"no LCM event log"});
     }
-    ExpectRefused("report " + own.path() + config, {"director"});
+    ExpectRefused("report " + own.path() + config, {"of another run"});
     for (const char* command : {"replay ", "verify "})
       ExpectNamed(command + own.path() + config, {json + ": is a JSON document", noise + ": is no LCM event log",
                                                   text + ": is no LCM event log", "3 logs or runs could not be re"});
-    ExpectRefused("report " + database + config, {"is an SQLite database"});
-    ExpectRefused("report " + foreign + config, {"is an SQLite database"});
-    ExpectRefused("report " + directory + config, {"is a directory"});
-    ExpectRefused("report " + logs_->front() + " " + database + config, {"is an SQLite database"});
+    for (const std::string& runs : {database, directory}) ExpectRefused("report " + runs + config, {"of another run"});
+    ExpectRefused("report " + foreign + config, {"not a decision database"});
+    ExpectRefused("report " + logs_->front() + " " + database + config, {"is named twice"});
     ExpectRefused("replay " + foreign + config, {"not a decision database"});
     ExpectRefused("replay " + logs_->front() + " " + database + config, {"is named twice"});
     ExpectRefused("replay " + logs_->front() + " " + directory + config, {"is named twice"});
