@@ -2,9 +2,10 @@
 
 A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
 the state that the executing plan will have reached by then, as predicted from an estimate: what the controls made of
-the estimate before, moved into measured +- state error. So errors of measurement do not add up with those before. A round begins while the robot holds still, or when that
-start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
-start. A round sends one candidate at a time and waits for its decision:
+the estimate before, moved into measured +- state error. So errors of measurement do not add up with those before. A
+round begins while the robot holds still, or when that start is at or after the end of the executing plan's progress
+part. No round begins while a certified plan waits for its start. A round sends one candidate at a time and waits for
+its decision:
  - certified: the round ends, the plan waits for its start;
  - abstention S: the next candidate keeps more distance than the searches before it, by clearance_step from obstacles or
    from the limit of the task by what the tube may reach beyond it (lessons.h);

@@ -46,7 +46,7 @@ constexpr int kLookAhead = 4;      // steps
 constexpr double kReverse = 1e-3;  // m/s, what counts as standing still
 constexpr double kRoomAhead = 1;   // s at cruise speed, kept free beyond a braking tail: enough to turn away in
 constexpr int kRoomSamples = 9;
-constexpr int kPartsOn = 4;                          // progress parts that have to lead on from a place ...
+constexpr int kPartsOn = 4;                            // progress parts that have to lead on from a place ...
 constexpr double kSlowerOn = 0.75 / kLargestSlowdown;  // ... at a quarter of the speed
 constexpr std::array kTurnsAway{0.0, 1.0, -1.0};
 constexpr double kLeastCell = 1.0 / 9;  // of a cruising step
@@ -350,8 +350,8 @@ class Planner::Search {
     return best.found;
   }
 
-  /** The best of what the hints do, and of what they do if they err for longer: by the first ambition that it meets, then
-  by its heading. @pre the robot has hints. */
+  /** The best of what the hints do, and of what they do if they err for longer: by the first ambition that it meets,
+  then by its heading. @pre the robot has hints. */
   [[nodiscard]] std::optional<Proposal> FollowHintsAstray(std::int64_t allowance) const {
     ompl::RNG random;
     Best best;
@@ -548,8 +548,8 @@ class Planner::Search {
            FindTail(StateOf(s), ambition, tail);
   }
 
-  // The cosine between the motion and the way to the goal, a short time ahead, so that the steering angle counts. 1 for a
-  // robot at rest, which has no heading.
+  // The cosine between the motion and the way to the goal, a short time ahead, so that the steering angle counts. 1 for
+  // a robot at rest, which has no heading.
   [[nodiscard]] double Heading(std::span<const double> x) const {
     std::array<double, kMaxStates> ahead;
     std::copy(x.begin(), x.end(), ahead.begin());
@@ -746,8 +746,7 @@ std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   }
   for (const Ambition& ambition : kAmbitions) {
     if (!search.MayHave(ambition)) continue;
-    if (std::optional<Proposal> proposal = search.Run(ambition, work / std::ssize(kAmbitions)))
-      return proposal;
+    if (std::optional<Proposal> proposal = search.Run(ambition, work / std::ssize(kAmbitions))) return proposal;
   }
   return std::nullopt;
 }

@@ -34,9 +34,8 @@ TEST_P(WithoutOnePart, ObstaclesAreMetWhenOnePartOfTheDeclarationIsLeftOut) {
 }
 
 std::string NameOf(const testing::TestParamInfo<Untold>& tested) {
-  static constexpr std::array kNames{"Nothing",  "Acceleration", "Turn",       "Body",
-                                     "Velocity", "Growth",       "ClockError", "Lateness",
-                                     "Offsets"};
+  static constexpr std::array kNames{"Nothing", "Acceleration", "Turn",     "Body",   "Velocity",
+                                     "Growth",  "ClockError",   "Lateness", "Offsets"};
   return kNames[static_cast<std::size_t>(tested.param)];
 }
 

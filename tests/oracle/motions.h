@@ -37,7 +37,8 @@ enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, k
 
 struct Tally {
   long problems = 0, plans = 0, certified = 0, withdrawn = 0, motions = 0, moments = 0, decided_exactly = 0,
-       inadmissible = 0, shifted = 0, recorded = 0;  // of the certified: with steps off their times, with errors of records
+       inadmissible = 0, shifted = 0,
+       recorded = 0;  // of the certified: with steps off their times, with errors of records
 
   void Add(const Tally& other) {
     problems += other.problems;
@@ -53,8 +54,8 @@ struct Tally {
   }
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
-    text << problems << " problems, " << plans << " plans, " << certified << " certified (" << shifted << " with steps off their times, " << recorded
-         << " from records with errors), " << withdrawn
+    text << problems << " problems, " << plans << " plans, " << certified << " certified (" << shifted
+         << " with steps off their times, " << recorded << " from records with errors), " << withdrawn
          << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly
          << " of them decided in 256 bits";
     return text.str();
@@ -142,13 +143,8 @@ class MotionJudge {
     };
     const double period = problem_.between ? problem_.between->period : 0;
     const double shorter = (after - before - Real(problem_.timing.error)).ToDouble();
-    return {Position(from),
-            Position(to),
-            heading(from),
-            heading(to),
-            period + std::min(shorter, 0.0),
-            before.ToDouble() * 1e6,
-            after.ToDouble() * 1e6};
+    return {Position(from),          Position(to),          heading(from), heading(to), period + std::min(shorter, 0.0),
+            before.ToDouble() * 1e6, after.ToDouble() * 1e6};
   }
 
   /** A motion that the bounds admit; nothing if the heading turns too fast from one sample to the other already. */

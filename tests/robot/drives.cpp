@@ -50,13 +50,14 @@ DriveCounts Drive(Config config, const Config& world, int seed) {
   return CountsOf(lockstep);
 }
 
-// The task of a robot that measures with errors, a share of what its planner allows a start, and takes its steps off their
-// times by the same share of a tenth of a step. A task that declares errors keeps its own.
+// The task of a robot that measures with errors, a share of what its planner allows a start, and takes its steps off
+// their times by the same share of a tenth of a step. A task that declares errors keeps its own.
 Config WithErrors(Config config, double share) {
   if (share == 0 || config.problem->declaration.HasErrorInZ()) return config;
   Problem problem = *config.problem;
   std::vector<double>& half_width = config.planner.initial_half_width;
-  problem.declaration.state_error = share * Eigen::Map<const Eigen::VectorXd>(half_width.data(), std::ssize(half_width));
+  problem.declaration.state_error =
+      share * Eigen::Map<const Eigen::VectorXd>(half_width.data(), std::ssize(half_width));
   problem.declaration.given_are_exact = true;
   for (double& width : half_width) width *= 1 + share;  // what is measured at the start is off, too
   config.gate.step_error_ms = share / 10 * config.period * 1e3;
@@ -115,17 +116,18 @@ int main(int argc, char** argv) {
           "Drives each task with many seeds of planner and disturbance on a simulated clock. Exits with 1 if a "
           "goal is missed, something is touched, a limit is exceeded or a step leaves its slice.",
       .footer = "Example:\n  forereach_drives config/drive/unicycle.yaml config/drive/reaching_arm.yaml --seeds 20",
-      .options = {Required({"tasks", &options.tasks, "TASK", "Task files (YAML)"}),
-                  {"--obstacles", &options.obstacles, "FILE",
-                   "Task file whose obstacles are sent on OBSTACLES; by default each task's own"},
-                  {"--seeds", &options.seeds, "N", "The number of drives of each task", NumberRange{1, 1'000'000}},
-                  {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}},
-                  {.name = "--errors",
-                   .variable = &options.errors,
-                   .help = "Tasks without errors of measurement get this share of planner.initial_half_width, and steps "
-                           "off their times by as much of a tenth of model.dt",
-                   .range = NumberRange{0, 1}},
-                  {"--advice", &options.advice, "Drives each task once more with gate.advice: send"}}};
+      .options = {
+          Required({"tasks", &options.tasks, "TASK", "Task files (YAML)"}),
+          {"--obstacles", &options.obstacles, "FILE",
+           "Task file whose obstacles are sent on OBSTACLES; by default each task's own"},
+          {"--seeds", &options.seeds, "N", "The number of drives of each task", NumberRange{1, 1'000'000}},
+          {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}},
+          {.name = "--errors",
+           .variable = &options.errors,
+           .help = "Tasks without errors of measurement get this share of planner.initial_half_width, and steps "
+                   "off their times by as much of a tenth of model.dt",
+           .range = NumberRange{0, 1}},
+          {"--advice", &options.advice, "Drives each task once more with gate.advice: send"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   logging::Silence();
   return Guarded("forereach_drives", [&] { return Run(options); });
