@@ -29,8 +29,8 @@ inline std::string DemoTaskWithGate(const std::string& gate) {
 /** The same with its obstacles taken out: they are on the bus only. @param clocks if not 0, obstacles may move: the
 clocks differ by up to this, ms, and steps take the time of the model. */
 inline std::string DemoTaskOnTheBus(int clocks = 0) {
-  const std::string error = clocks > 0 ? ", max_clock_error_ms: " + std::to_string(clocks) : "";
-  std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1500" + error + "}");
+  const std::string apart = clocks > 0 ? ", max_clock_error_ms: " + std::to_string(clocks) : "";
+  std::string task = DemoTaskWithGate("{obstacles: bus, obstacles_lost_ms: 1500" + apart + "}");
   if (const std::string period = "step_period_ms: 50", error = "step_error_ms: any"; clocks > 0) {
     task.replace(task.find(period), period.size(), "step_period_ms: 100");
     task.replace(task.find(error), error.size(), "step_error_ms: 10");
