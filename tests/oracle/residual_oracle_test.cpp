@@ -405,9 +405,9 @@ TEST(Observe, RefusesAnAngleIfTheDurationMayHideItsTurns) {
   }
   EXPECT_NO_THROW(observe(0, third - kHair));
   EXPECT_THROW(observe(0, third + kHair), AmbiguousAngle);
-  EXPECT_THROW(observe(0, 0.45), AmbiguousAngle);
+  EXPECT_THROW(observe(0, 0.1), AmbiguousAngle);
   // A residual of 3.31 in a step that lasted 1.9 times as long ends where one of 0.0057 would.
-  EXPECT_THROW(observe(1.9 * 3.31, 0.45), AmbiguousAngle);
+  EXPECT_THROW(observe(1.9 * 3.31, 0.45), NoNominalValue);
 }
 
 // Nothing bounds a residual that may have doubled.
