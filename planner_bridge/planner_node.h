@@ -1,11 +1,9 @@
 /** The planner's node: it receives robot states, decisions and withdrawals, and sends candidates.
 
 A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
-the state that the executing plan will have reached by then, as predicted from an estimate: what the controls made of
-the estimate before, moved into measured +- state error. So errors of measurement do not add up with those before. A
-round begins while the robot holds still, or when that start is at or after the end of the executing plan's progress
-part. No round begins while a certified plan waits for its start. A round sends one candidate at a time and waits for
-its decision:
+the state that the executing plan will have reached by then. A round begins while the robot holds still, or when that
+start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
+start. A round sends one candidate at a time and waits for its decision:
  - certified: the round ends, the plan waits for its start;
  - abstention S: the next candidate keeps more distance than the searches before it, by clearance_step from obstacles or
    from the limit of the task by what the tube may reach beyond it (lessons.h);
@@ -107,9 +105,6 @@ class PlannerNode final : public Node {
   void BeginStop(int valid_steps, std::int64_t now_us);
   [[nodiscard]] std::optional<Proposal> Propose();
   void Follow(const robot_state_t& state);
-  void Estimate(const robot_state_t& state);
-  void Advance(const candidate_plan_t& plan, std::int64_t step, Eigen::VectorXd& x) const;
-  [[nodiscard]] Eigen::VectorXd ErrorOf(const robot_state_t& state) const;
   [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;
   void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
@@ -135,7 +130,6 @@ class PlannerNode final : public Node {
   std::optional<std::int64_t> waiting_start_;       // start of a certified plan that has not begun yet
   std::int64_t waiting_plan_ = -1;                  // its plan_id
   robot_state_t last_state_{};                      // of the robot, the newest; num_states 0: none yet
-  Eigen::VectorXd estimate_;                        // of its true state then
   std::map<std::int64_t, int> withdrawn_;           // valid_steps, of plans in plans_
   SoleSender robot_;                                // of two, it follows one
   StreamOrder states_;                              // of that one

@@ -46,9 +46,6 @@ constexpr int kLookAhead = 4;      // steps
 constexpr double kReverse = 1e-3;  // m/s, what counts as standing still
 constexpr double kRoomAhead = 1;   // s at cruise speed, kept free beyond a braking tail: enough to turn away in
 constexpr int kRoomSamples = 9;
-constexpr int kPartsOn = 4;                            // progress parts that have to lead on from a place ...
-constexpr double kSlowerOn = 0.75 / kLargestSlowdown;  // ... at a quarter of the speed
-constexpr std::array kTurnsAway{0.0, 1.0, -1.0};
 constexpr double kLeastCell = 1.0 / 9;  // of a cruising step
 constexpr double kCellsOfJoints = 60;   // along the longer side of a field around a body at expressions
 constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
@@ -67,8 +64,6 @@ constexpr std::array<Ambition, 6> kAmbitions{{{0.9, 0.98, true, false},
                                               {0.2, 0.4, true, false},
                                               {-0.5, -1, true, true},
                                               {0, -1, false, true}}};
-
-constexpr std::size_t kFirstAtRest = 4;
 
 const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
@@ -245,12 +240,7 @@ class Planner final : public Proposer {
   // Around obstacles. Where no part of the body is in its frame, P x is no place among them: what counts is where the
   // body is in a state with this P x, at rest.
   [[nodiscard]] NavigationField MakeField(double clearance) const {
-    if (HasFrame(problem_->body)) {
-      const RoomAt room = [this, of_point = RoomOfPoint(obstacles_)](const Eigen::VectorXd& y) {
-        return of_point(y) - half_breadth_;
-      };
-      return {region_, room, clearance, goal_};
-    }
+    if (HasFrame(problem_->body)) return {region_, RoomOfPoint(obstacles_), clearance + half_breadth_, goal_};
     const RoomAt room = [this](const Eigen::VectorXd& y) {
       const Eigen::VectorXd x = shift_ * y;
       double least = kInfinity;
@@ -319,16 +309,12 @@ class Planner::Search {
     top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_.Speed(x));
     least_speed_ = std::min(-kReverse, planner.motion_.Speed(x));
     at_rest_ = planner.motion_.IsAtRest(x);
-    may_get_stuck_ = at_rest_ && !(planner.motion_.has_hints() && CanDriveOn(x));
     start_valid_ = Allowed(x, 0);
   }
 
   /** False if the start itself is not allowed. */
   [[nodiscard]] bool StartIsValid() const { return start_valid_; }
-  /** Whether a robot that starts like this one may have the ambition. */
-  [[nodiscard]] bool MayHave(const Ambition& ambition) const {
-    return !ambition.at_rest || (ambition.room ? at_rest_ : may_get_stuck_);
-  }
+  [[nodiscard]] bool StartsAtRest() const { return at_rest_; }
   [[nodiscard]] std::optional<Proposal> Run(const Ambition& ambition, std::int64_t allowance) {
     const auto setup = SetUp(ambition);
     const std::int64_t most = work_ + allowance;
@@ -345,23 +331,17 @@ class Planner::Search {
 
   /** What the hints themselves do, without a search. @pre the robot has hints. */
   [[nodiscard]] std::optional<Proposal> FollowHints() const {
-    Best best{kFirstAtRest, 1, {}};
-    Improve({}, best);
-    return best.found;
-  }
-
-  /** The best of what the hints do, and of what they do if they err for longer: by the first ambition that it meets,
-  then by its heading. @pre the robot has hints. */
-  [[nodiscard]] std::optional<Proposal> FollowHintsAstray(std::int64_t allowance) const {
-    ompl::RNG random;
-    Best best;
-    Astray astray;
-    for (const std::int64_t most = work_ + allowance; work_ < most && best.ambition > 0; ++work_) {
-      Improve(astray, best);
-      for (double& turn : astray.turn) turn = random.uniformReal(-1, 1);
-      astray.slower = random.uniform01() * random.uniform01() / kLargestSlowdown;
+    Eigen::MatrixXd progress(static_cast<Eigen::Index>(m_), planner_.options_.progress_steps);
+    std::vector<double> s(start_.begin(), start_.end());
+    s.insert(s.end(), {0, start_distance_});
+    for (int t = 0; t < progress.cols(); ++t) {
+      double* u = progress.col(t).data();
+      planner_.motion_.Pursue(StateOf(s.data()), DesiredIn(s.data(), 0, 0), {u, m_});
+      if (!Propagate(s.data(), u, s.data()) || !Allowed(StateOf(s.data()), t + 1)) return std::nullopt;
     }
-    return best.found;
+    for (const Ambition& ambition : kAmbitions)
+      if (!ambition.at_rest && Meets(s.data(), ambition)) return Assemble(progress, StateOf(s.data()), ambition);
+    return std::nullopt;
   }
 
  private:
@@ -386,39 +366,6 @@ class Planner::Search {
     const Search& search_;
     const Ambition ambition_;
   };
-
-  /** How to err from the hints: a turn in each half of the progress part, and a lower speed. */
-  struct Astray {
-    std::array<double, 2> turn{};
-    double slower = 0;
-  };
-
-  /** The best so far. */
-  struct Best {
-    std::size_t ambition = kAmbitions.size();
-    double heading = -1;
-    std::optional<Proposal> found;
-  };
-
-  // Follows the hints astray, which may be better.
-  void Improve(const Astray& astray, Best& best) const {
-    Eigen::MatrixXd progress(static_cast<Eigen::Index>(m_), planner_.options_.progress_steps);
-    std::vector<double> s(start_.begin(), start_.end());
-    s.insert(s.end(), {0, start_distance_});
-    for (int t = 0; t < progress.cols(); ++t) {
-      double* u = progress.col(t).data();
-      const double turn = astray.turn[2 * t < progress.cols() ? 0 : 1];
-      planner_.motion_.Pursue(StateOf(s.data()), DesiredIn(s.data(), turn, astray.slower), {u, m_});
-      if (!Propagate(s.data(), u, s.data()) || !Allowed(StateOf(s.data()), t + 1)) return;
-    }
-    const double heading = Heading(StateOf(s.data()));
-    for (std::size_t i = 0; i <= std::min(best.ambition, kAmbitions.size() - 1); ++i) {
-      if (i == best.ambition && heading <= best.heading) return;
-      if (!MayHave(kAmbitions[i]) || !Meets(s.data(), kAmbitions[i])) continue;
-      best = {i, heading, Assemble(progress, StateOf(s.data()), kAmbitions[i])};
-      return;
-    }
-  }
 
   // A search state is x, the steps taken, and the shortest distance to go on the way.
   [[nodiscard]] double StepsOf(const double* s) const { return s[n_]; }
@@ -544,19 +491,17 @@ class Planner::Search {
   [[nodiscard]] bool Meets(const double* s, const Ambition& ambition) const {
     const bool arrives = BestOf(s) <= kShareOfRadius * planner_.options_.goal_radius;
     Eigen::MatrixXd tail;
-    return Shortfall(s, ambition) <= 0 && (arrives || Heading(StateOf(s)) >= ambition.heading) &&
+    return Shortfall(s, ambition) <= 0 && (arrives || HeadsWell(StateOf(s), ambition.heading)) &&
            FindTail(StateOf(s), ambition, tail);
   }
 
-  // The cosine between the motion and the way to the goal, a short time ahead, so that the steering angle counts. 1 for
-  // a robot at rest, which has no heading.
-  [[nodiscard]] double Heading(std::span<const double> x) const {
+  // Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
+  [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const {
     std::array<double, kMaxStates> ahead;
     std::copy(x.begin(), x.end(), ahead.begin());
     for (int t = 0; t < kLookAhead; ++t) Coast({ahead.data(), n_}, {ahead.data(), n_});
     const Eigen::VectorXd drift = Drift({ahead.data(), n_});
-    const double moved = drift.norm();
-    return moved > 0 ? drift.dot(field_.Descent(Position({ahead.data(), n_}))) / moved : 1;
+    return drift.dot(field_.Descent(Position({ahead.data(), n_}))) >= cosine * drift.norm();
   }
 
   [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
@@ -588,64 +533,20 @@ class Planner::Search {
     return !ambition.room || HasRoom({z.data(), n_}, position, direction);
   }
 
-  // Whether a robot at rest in x, at `position`, can drive on: straight ahead, or as the hints say. A robot that cannot
-  // reverse could otherwise not leave the place. What moves may have gone by then.
+  // Whether a robot at rest in x, at `position`, can drive on. A robot that cannot reverse could otherwise not leave
+  // the place. What moves may have gone by then.
   [[nodiscard]] bool HasRoom(std::span<const double> x, const Eigen::VectorXd& position,
                              const Eigen::VectorXd& direction) const {
-    return HasRoomAhead(x, position, direction) || (planner_.motion_.has_hints() && CanDriveOn(x));
-  }
-
-  [[nodiscard]] bool HasRoomAhead(std::span<const double> x, const Eigen::VectorXd& position,
-                                  const Eigen::VectorXd& direction) const {
     const Eigen::Map<const Eigen::VectorXd> state(x.data(), std::ssize(x));
     const double room = kRoomAhead * planner_.options_.cruise_speed;
     for (int i = 1; i <= kRoomSamples; ++i) {
       const Eigen::VectorXd ahead = state + planner_.shift_ * (room * i / kRoomSamples * direction);
-      if (!ClearOfWhatStands({ahead.data(), n_})) return false;
+      const Sweep sweep(BodyAt({ahead.data(), n_}), 0);
+      for (std::size_t o = 0; o < clearances_.size(); ++o)
+        if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
+          return false;
     }
     return planner_.region_.Contains(position + room * direction);
-  }
-
-  [[nodiscard]] bool ClearOfWhatStands(std::span<const double> x) const {
-    const Sweep sweep(BodyAt(x), 0);
-    for (std::size_t o = 0; o < clearances_.size(); ++o)
-      if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
-        return false;
-    return true;
-  }
-
-  // Whether that is so with some turn.
-  [[nodiscard]] bool CanDriveOn(std::span<const double> x) const {
-    return std::ranges::any_of(kTurnsAway, [&](double turn) { return CanDriveOn(x, turn); });
-  }
-
-  // Whether the hints, with a turn, lead from x nearer to the goal, and to a place where the robot stops.
-  [[nodiscard]] bool CanDriveOn(std::span<const double> x, double turn) const {
-    std::array<double, kMaxVariables> z;
-    std::copy_n(x.data(), n_, z.begin());
-    const std::span<double> state(z.data(), n_), input(z.data() + n_, m_);
-    const auto moves = [&] {
-      if (!planner_.problem_->domain.Contains({z.data(), n_ + m_})) return false;
-      std::array<double, kMaxStates> next;
-      Step(state, input.data(), {next.data(), n_});
-      std::copy_n(next.begin(), n_, z.begin());
-      return ClearOfWhatStands(state);
-    };
-    for (int t = 0; t < kPartsOn * planner_.options_.progress_steps; ++t) {
-      planner_.motion_.Pursue(state, DesiredIn(z.data(), turn, kSlowerOn), input);
-      if (!moves()) return false;
-    }
-    const Eigen::VectorXd before = Position(x), after = Position(state);
-    if (!(field_.DistanceToGo(after) < field_.DistanceToGo(before)) &&
-        !((planner_.goal_ - after).norm() < (planner_.goal_ - before).norm()))
-      return false;
-    Eigen::MatrixXd tail;
-    if (!planner_.motion_.Brake(state, 0, planner_.options_.tail_steps, tail)) return false;
-    for (int t = 0; t < tail.cols(); ++t) {
-      std::copy_n(tail.col(t).data(), m_, input.begin());
-      if (!moves()) return false;
-    }
-    return true;
   }
 
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {
@@ -724,7 +625,7 @@ class Planner::Search {
   std::vector<double> limit_margin_;
   std::vector<double> deviation_;  // of each part between two samples; empty: only the samples count
   double start_distance_, gain_, top_speed_, least_speed_;
-  bool at_rest_, may_get_stuck_, start_valid_;
+  bool at_rest_, start_valid_;
   mutable std::int64_t work_ = 0;  // model steps
 };
 
@@ -739,14 +640,10 @@ std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   }
   // OMPL calls a second seed an error because generators that exist keep theirs. None does: each search makes its own.
   ompl::RNG::setSeed(std::max<std::uint32_t>(request.seed, 1));
-  auto work = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs);
-  if (motion_.has_hints()) {
-    work /= 2;
-    if (std::optional<Proposal> proposal = search.FollowHintsAstray(work)) return proposal;
-  }
+  const auto allowance = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs / kAmbitions.size());
   for (const Ambition& ambition : kAmbitions) {
-    if (!search.MayHave(ambition)) continue;
-    if (std::optional<Proposal> proposal = search.Run(ambition, work / std::ssize(kAmbitions))) return proposal;
+    if (ambition.at_rest && !search.StartsAtRest()) continue;
+    if (std::optional<Proposal> proposal = search.Run(ambition, allowance)) return proposal;
   }
   return std::nullopt;
 }

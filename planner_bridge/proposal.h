@@ -1,12 +1,7 @@
 /** Candidate plans from OMPL: a progress part and a braking tail that ends at rest.
 
 If the request allows it, the candidate is what the task's hints do, provided that this makes progress and keeps
-kRoomOfHints times `clearance_step` more from the obstacles. Otherwise half of the work goes to what the hints do if
-they err for longer: a turn in each half of the progress part, and a lower speed. Only if none of that serves, it is
-searched for.
-
-A plan ends where the robot can drive on: straight ahead, or as the hints say, slowly and with a turn. Only a robot that
-stands where it cannot may end elsewhere.
+kRoomOfHints times `clearance_step` more from the obstacles. Otherwise it is searched for.
 
 The progress part is not a path to the goal. It has exactly `progress_steps` controls that reduce the travel distance to
 the goal around the obstacles, and a braking tail fits after it. The whole nominal rollout is checked in the certifier's
