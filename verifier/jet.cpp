@@ -269,10 +269,12 @@ class Rules {
     if (second_) result.second = UnknownPairs(result.first);
     return result;
   }
+  // Over a box that the kink only borders on, the derivatives are those of the operand inside. At a point of the kink
+  // either operand may be the one inside.
   [[nodiscard]] Jet Larger(Real value, const Jet& a, const Jet& b) const {
-    if (CertainlyAtMost(b.value, a.value)) return Chosen(a, b);
-    if (CertainlyAtMost(a.value, b.value)) return Chosen(b, a);
-    return Kinked(std::move(value), a.first, b.first);
+    const bool first = CertainlyAtMost(b.value, a.value), second = CertainlyAtMost(a.value, b.value);
+    if (first == second) return Kinked(std::move(value), a.first, b.first);
+    return first ? Chosen(a, b) : Chosen(b, a);
   }
   // `a`, with zeros for the derivatives that it would have at the kink: which entries there are does not depend on the
   // box.

@@ -99,7 +99,11 @@ TEST(DeclaredSlopes, OfEachFunctionBoundItAndAreConfirmed) {
                                        "softplus(abs(x) - c, 0.1) + x^3/(1 + y^2)",
                                        "(x + 1.5)^-2 + 2^y + x^0 + (y + 2)^c",
                                        "abs(abs(x) - c)*max(min(y, c), -c)",
-                                       "c*(0.3 - x)*(0.3 - x)"};
+                                       "c*(0.3 - x)*(0.3 - x)",
+                                       // Largest at a kink, where a box ends.
+                                       "max(0.5, x)/(3 + x) + x",
+                                       "x - min(x, -0.5)/(3 - x)",
+                                       "abs(x - 0.5)/(3 + x) + x"};
   Count count;
   for (const std::string& text : texts)
     for (int i = 0; i < 3; ++i) Examine(random, text, 1, count);

@@ -267,7 +267,11 @@ class MotionTrial {
     if (untold_ == Untold::kOffsets) told->timing = {};
     step_error_us_ = static_cast<std::int64_t>(std::ceil(told->timing.error * 1e6));
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
-    if (untold_ == Untold::kTurn && told->between) told->between->turn_acceleration = 0;
+    if (untold_ == Untold::kTurn && told->between) {  // a told rate of 0 would be contradicted by the slices
+      problem->between->turn_rate *= 8;
+      problem->between->turn_acceleration *= 64;
+      told->between->turn_acceleration = 0;
+    }
     if (untold_ == Untold::kBody) told->body = Body();
     if (untold_ == Untold::kLateness && told->between) told->between->period = period;
     const Certifier certifier(told);

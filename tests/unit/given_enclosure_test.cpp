@@ -65,11 +65,11 @@ TEST_F(GivenEnclosure, ASlopeContractsWhatAnIntervalCannot) {
   EXPECT_EQ(Certify(Velocities(2, 0)).outcome, Outcome::kDomain);  // threefold in each step
 }
 
-// A step that lasts a quarter longer has a quarter more of the residual, and that is up to half of the width.
+// In a step that lasts a quarter longer the residual, which is up to half of the width, grows by 1.25^2 - 1 of itself.
 TEST_F(GivenEnclosure, AStepOffItsTimeHasMoreOfWhatASlopeBounds) {
   EXPECT_EQ(Certify(Velocities(-0.5, 0), 0.03125).outcome, Outcome::kCertified);
-  EXPECT_NEAR(tube_.half_width(1)[2], 0.0625 * 0.5 * 1.25, 1e-12);
-  EXPECT_GE(tube_.half_width(1)[2], 0.0625 * 0.5 * 1.25);
+  EXPECT_NEAR(tube_.half_width(1)[2], 0.0625 * 0.5 * 1.5625, 1e-12);
+  EXPECT_GE(tube_.half_width(1)[2], 0.0625 * 0.5 * 1.5625);
 }
 
 TEST_F(GivenEnclosure, InvertedBoundsProveThatNoResidualIsAdmissible) {

@@ -121,20 +121,20 @@ TEST_F(Rates, DeclaredOfAStateAreRefutedByDataAndByThePlan) {
 // A step that may have lasted longer may have turned more.
 TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
   const auto problem = std::make_shared<Problem>(Bar(0.5, {0}));
-  const std::vector<double> z{0, 0, 0, 0.75}, next{0, 0, 0.375};
+  const std::vector<double> z{0, 0, 0, 0.625}, next{0, 0, 0.3125};
   Certifier certifier(problem);
-  EXPECT_EQ(certifier.Learn(z, next, 0.25), Learned::kAdded);
+  EXPECT_EQ(certifier.Learn(z, next, 0.125), Learned::kAdded);
   EXPECT_FALSE(certifier.violation());
-  EXPECT_EQ(certifier.Learn(z, next, 0.2), Learned::kAdded);
+  EXPECT_EQ(certifier.Learn(z, next, 0.1), Learned::kAdded);
   ASSERT_TRUE(certifier.violation());
   EXPECT_EQ(certifier.violation()->first, 2);
   EXPECT_EQ(certifier.violation()->second, -1);
   const Transitions shown = certifier.Contradiction();
   ASSERT_EQ(shown.size(), 1);
   EXPECT_EQ(shown.num_learned, 1);
-  EXPECT_EQ(shown.x_next(0, 2), 0.375);
-  EXPECT_EQ(shown.longer[0], 0.2);
-  certifier.Learn(z, next, 0.25);
+  EXPECT_EQ(shown.x_next(0, 2), 0.3125);
+  EXPECT_EQ(shown.longer[0], 0.1);
+  certifier.Learn(z, next, 0.125);
   EXPECT_TRUE(certifier.violation()) << "it does not become true again";
 }
 

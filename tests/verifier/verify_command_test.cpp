@@ -250,7 +250,7 @@ class VerifyWorld : public VerifyDecision {
     parts:
       - hull: {points: [[-1, -0.9], [3.5, -0.9], [3.5, 0.9], [-1, 0.9]]}
       - disc: {at: [2, 0], radius: 1}
-  between: {acceleration: [12, 12], turn_rate: 2, turn_acceleration: 4}
+  between: {acceleration: [12, 12], turn_rate: 2.5, turn_acceleration: 4}
   obstacles:
     - circle: {center: [11.4, 19], radius: 1}
       motion: {velocity: [0.5, -1], uncertainty: 0.1, growth: 0.2, growth_rate: 0.1}
