@@ -47,8 +47,8 @@ class StepRate final {
 
   /** q: one more than the order of the integrator, 2 for Euler, 3 for midpoint, 5 for rk4; and 2 for `next`. */
   [[nodiscard]] int power() const { return power_; }
-  /** (1 + share)^q - 1, rounded up: by so much of |r| + w^ may the residual and the disturbance of a step whose
-  duration differs from dt by `share` of it differ from those of dt. */
+  /** (1 + share)^q - 1, rounded up: in a step whose duration differs from dt by `share` of it, residual and
+  disturbance differ from those of dt by at most so much of |r| + w^. */
   [[nodiscard]] double Growth(double share) const noexcept;
 
   /** The same for some states: Enclose leaves the others' entries alone. @param states n marks. */
