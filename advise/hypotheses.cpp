@@ -1,7 +1,6 @@
 #include "advise/hypotheses.h"
 
 #include <algorithm>
-#include <ranges>
 
 #include <fmt/format.h>
 
@@ -53,12 +52,11 @@ void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
 // What is assumed of a residual in a step that is off its time, where some state's rate is that of the equations.
 void AddGrowth(const Problem& problem, std::vector<Hypothesis>& all) {
   const StepTiming& timing = problem.timing;
-  const auto follows_equations = [&](int k) {
-    return std::ranges::count(timing.set_at_steps, k) == 0 &&
-           !(timing.rate_bound.size() > 0 && timing.rate_bound[k] < kInfinity);
-  };
-  const auto states = std::views::iota(0, problem.model->num_states());
-  if (timing.error == 0 || std::ranges::none_of(states, follows_equations)) return;
+  bool follows_equations = false;
+  for (int k = 0; k < problem.model->num_states(); ++k)
+    follows_equations = follows_equations || (std::ranges::count(timing.set_at_steps, k) == 0 &&
+                                              !(timing.rate_bound.size() > 0 && timing.rate_bound[k] < kInfinity));
+  if (timing.error == 0 || !follows_equations) return;
   all.push_back(
       {fmt::format("in a step of duration h what the model does not know differs from that of dt by at most "
                    "((1 + |h - dt|/dt)^{} - 1) of its bounds",

@@ -20,7 +20,9 @@ may be off, and StepErrorUs. */
 /** step_us of a plan of this task: model.dt in microseconds, to the nearest. */
 [[nodiscard]] std::int64_t StepUs(const Config& config);
 
-/** StepTiming::error, seconds, from above: StepErrorUs, and what 128 steps of step_us differ from 128 of model.dt. */
+/** StepTiming::error, seconds, from above: StepErrorUs, and what 128 steps of step_us differ from 128 of model.dt. 0 if
+StepErrorUs is and model.dt is the double of whole microseconds, which then are the step; and if no clock is looked at.
+*/
 [[nodiscard]] double StepErrorSeconds(const Config& config);
 
 /** The longest time from one sample of a plan to the next, seconds, from above: model.dt, and what a step may last

@@ -205,12 +205,24 @@ TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
   for (const char* said : {"0", "2.5", "any"})
     EXPECT_EQ(RefusalOnBus(with(std::string("robot: {step_error_ms: ") + said + "}\n")), "");
   EXPECT_EQ(with("robot: {step_error_ms: any}\n").problem->timing.error, 0);
+  EXPECT_EQ(with("robot: {step_error_ms: 0}\n").problem->timing.error, 0);
   EXPECT_THAT(RefusalOnBus(with("", "obstacles: task, max_clock_error_ms: 20")),
               testing::HasSubstr("robot.step_error_ms: missing"))
       << "it is not taken from that of the clocks";
   EXPECT_THAT(
       [&] { static_cast<void>(with("robot: {step_error_ms: any}\n", "obstacles: task, max_clock_error_ms: 20")); },
       ThrowsMessage<ConfigError>(testing::HasSubstr("robot.step_error_ms: any, and with gate.max_clock_error_ms")));
+}
+
+// A guard counts whole microseconds, here half of one more in each step than the model.
+TEST(LoadConfig, StepsOfNoWholeMicrosecondsAreOffTheirTimes) {
+  const TaskFiles files;
+  const Config config = files.Load(Replaced(Replaced(kTask, "0.15", "0.1500005"), "samples", "{acceleration: [9, 9]}") +
+                                   "robot: {step_error_ms: 0}\ngate: {obstacles: task}\n");
+  EXPECT_GE(config.problem->timing.error, 128 * 0.4999e-6);
+  EXPECT_LE(config.problem->timing.error, 128 * 0.5001e-6);
+  EXPECT_GE(config.problem->between->period, 0.15);
+  EXPECT_EQ(config.problem->between->period, std::max(0.1500005, config.gate.step_us / 1e6));
 }
 
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {

@@ -87,23 +87,13 @@ void Examine(Random& random, const std::string& text, double half_width, Count& 
 
 TEST(DeclaredSlopes, OfEachFunctionBoundItAndAreConfirmed) {
   TracedRandom random(1741);
-  const std::vector<std::string> texts{"-c*x*abs(x)",
-                                       "max(x, c*y) - min(x*y, u)",
-                                       "c*sin(2*x)*cos(y) + tan(x/2)",
-                                       "asin(x/2)*acos(y/3) + atan(3*u)",
-                                       "atan2(x, y + 3)",
-                                       "sqrt(x + 2)*log(y + 2) + exp(c*u)",
-                                       "tanh(x/c) + hypot(x, 0.1)*u",
-                                       "sqrt(x^2 + y^2 + 0.01)",
-                                       "softplus(x - y, c)*smooth_gate(2*u - c)",
-                                       "softplus(abs(x) - c, 0.1) + x^3/(1 + y^2)",
-                                       "(x + 1.5)^-2 + 2^y + x^0 + (y + 2)^c",
-                                       "abs(abs(x) - c)*max(min(y, c), -c)",
-                                       "c*(0.3 - x)*(0.3 - x)",
-                                       // Largest at a kink, where a box ends.
-                                       "max(0.5, x)/(3 + x) + x",
-                                       "x - min(x, -0.5)/(3 - x)",
-                                       "abs(x - 0.5)/(3 + x) + x"};
+  const std::vector<std::string> texts{
+      "-c*x*abs(x)", "max(x, c*y) - min(x*y, u)", "c*sin(2*x)*cos(y) + tan(x/2)", "asin(x/2)*acos(y/3) + atan(3*u)",
+      "atan2(x, y + 3)", "sqrt(x + 2)*log(y + 2) + exp(c*u)", "tanh(x/c) + hypot(x, 0.1)*u", "sqrt(x^2 + y^2 + 0.01)",
+      "softplus(x - y, c)*smooth_gate(2*u - c)", "softplus(abs(x) - c, 0.1) + x^3/(1 + y^2)",
+      "(x + 1.5)^-2 + 2^y + x^0 + (y + 2)^c", "abs(abs(x) - c)*max(min(y, c), -c)", "c*(0.3 - x)*(0.3 - x)",
+      // Largest at a kink, where a box ends.
+      "max(0.5, x)/(3 + x) + x", "x - min(x, -0.5)/(3 - x)", "abs(x - 0.5)/(3 + x) + x"};
   Count count;
   for (const std::string& text : texts)
     for (int i = 0; i < 3; ++i) Examine(random, text, 1, count);
