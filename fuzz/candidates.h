@@ -1,8 +1,8 @@
-/** Candidates of the small task (tests/gate/small_task.h) as planners of all kinds would send them. */
+/** Candidates of the small task (tests/certifier/small_task.h) as planners of all kinds would send them. */
 #pragma once
 
 #include "fuzz/fuzz.h"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/small_task.h"
 
 namespace forereach {
 

@@ -1,4 +1,4 @@
-/** Messages on the bus of the small task (tests/gate/small_task.h), as a robot and its sensors would send them. */
+/** Messages on the bus of the small task (tests/certifier/small_task.h), as a robot and its sensors would send them. */
 #pragma once
 
 #include "certifier/gate/obstacle_message.h"

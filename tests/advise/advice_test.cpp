@@ -13,7 +13,7 @@
 #include "forereach/numerics/size.h"
 #include "lcmtypes/names.h"
 #include "tests/advise/answered.h"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/small_task.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/tries.h"

@@ -10,7 +10,7 @@
 #include "advise/abstentions.h"
 #include "certifier/gate/gate.h"
 #include "forereach/obstacles_t.hpp"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/small_task.h"
 #include "tests/oracle/random.h"
 
 namespace forereach {

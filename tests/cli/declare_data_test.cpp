@@ -4,7 +4,7 @@
 #include "forereach/certify/certifier.h"
 #include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/config/task_files.h"
+#include "tests/task/task_files.h"
 
 namespace forereach::declare_data_test {
 

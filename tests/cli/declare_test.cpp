@@ -6,9 +6,9 @@
 #include "identify/cover_file.h"
 #include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/config/task_files.h"
 #include "tests/paths.h"
 #include "tests/records/logs.h"
+#include "tests/task/task_files.h"
 
 namespace forereach::declare_test {
 

@@ -2,8 +2,8 @@
 #include "tests/test.h"
 
 #include "tests/cli/program.h"
-#include "tests/config/task_files.h"
 #include "tests/paths.h"
+#include "tests/task/task_files.h"
 
 namespace forereach::drive_test {
 

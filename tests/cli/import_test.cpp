@@ -5,8 +5,8 @@
 
 #include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/config/task_files.h"
 #include "tests/paths.h"
+#include "tests/task/task_files.h"
 
 namespace forereach::import_test {
 

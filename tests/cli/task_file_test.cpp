@@ -6,8 +6,8 @@
 #include "task/config.h"
 #include "task/task_template.h"
 #include "tests/cli/program.h"
-#include "tests/config/task_files.h"
 #include "tests/paths.h"
+#include "tests/task/task_files.h"
 
 namespace forereach::task_file_test {
 

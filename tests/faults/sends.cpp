@@ -12,8 +12,8 @@
 #include "certifier/gate/gate.h"
 #include "forereach/command_t.hpp"
 #include "robot/supervisor.h"
+#include "tests/certifier/small_task.h"
 #include "tests/faults/kind.h"
-#include "tests/gate/small_task.h"
 #include "tests/keys.h"
 
 namespace {

@@ -10,7 +10,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/dynamics/models/named_residuals.h"
 #include "simulator/sim_node.h"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/small_task.h"
 #include "tests/keys.h"
 #include "tests/paths.h"
 #include "tests/reset.h"

@@ -10,7 +10,7 @@
 
 #include "certifier/process/certifier_node.h"
 #include "forereach/withdrawal_t.hpp"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/small_task.h"
 #include "tests/reset.h"
 #include "tests/small_disk.h"
 

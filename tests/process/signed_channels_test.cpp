@@ -18,7 +18,7 @@
 #include "planner_bridge/planner_node.h"
 #include "simulator/sim_node.h"
 #include "tests/keys.h"
-#include "tests/planner/tasks.h"
+#include "tests/planner_bridge/tasks.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::signed_channels_test {

@@ -5,8 +5,8 @@
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
 #include "forereach/execution_event_t.hpp"
-#include "tests/gate/signed_air.h"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/signed_air.h"
+#include "tests/certifier/small_task.h"
 
 namespace forereach::two_senders_test {
 

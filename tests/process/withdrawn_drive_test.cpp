@@ -6,7 +6,7 @@
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "simulator/sim_node.h"
-#include "tests/gate/small_task.h"
+#include "tests/certifier/small_task.h"
 
 namespace forereach::withdrawn_drive_test {
 

@@ -4,9 +4,9 @@
 #include "tests/test.h"
 
 #include "forereach/certifier_status_t.hpp"
-#include "tests/config/task_files.h"
 #include "tests/logger/disk_fixture.h"
 #include "tests/paths.h"
+#include "tests/task/task_files.h"
 
 namespace forereach::kept_tasks_test {
 

@@ -1,0 +1,882 @@
+#include "planner_bridge/planner_node.h"
+
+#include "tests/test.h"
+
+#include "bus/log.h"
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/numerics/directed.h"
+#include "forereach/withdrawal_t.hpp"
+#include "task/canonical.h"
+#include "tests/planner_bridge/tasks.h"
+
+namespace forereach::planner_node_test {
+
+constexpr std::int64_t kNow = 1'700'000'000'000'000, kPeriod = 40'000;
+
+/** A planner node with the test as its robot and certifier. */
+class PlannerNodeTest : public testing::Test {
+ protected:
+  void SetUp() override { Start(Bicycle()); }
+
+  void Start(const Config& config) {
+    config_ = config;
+    bus_ = OpenBus("memq://", [this] { return now_; });
+    node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+    bus_->Subscribe(config_.bus.candidate, [this](const Received& received) {
+      candidate_plan_t candidate;
+      ASSERT_EQ(Decode(received.bytes, candidate), DecodeStatus::kOk);
+      candidates_.push_back(candidate);
+    });
+    Run(1);
+  }
+
+  void Deliver() {
+    while (bus_->Dispatch(0) > 0) {
+    }
+  }
+
+  // Ticks once a millisecond.
+  void Run(int milliseconds) {
+    for (int i = 0; i < milliseconds; ++i) {
+      now_ += 1000;
+      node_->Tick(now_);
+      Deliver();
+    }
+  }
+
+  robot_state_t Standing() {
+    robot_state_t state{.utime = now_};
+    state.executing_plan_id = state.executing_step = -1;
+    state.mode = robot_state_t::STANDING;
+    state.num_states = 6;
+    return state;
+  }
+
+  robot_state_t Executing(const candidate_plan_t& plan, int step) {
+    robot_state_t state = Standing();
+    state.mode = robot_state_t::EXECUTING;
+    state.executing_plan_id = plan.plan_id;
+    state.executing_step = static_cast<std::int16_t>(step);
+    std::copy_n(plan.initial_center, 6, state.state);
+    std::array<double, 8> z;
+    for (int t = 0; t < step; ++t) {
+      std::copy_n(plan.control[t], 2, std::copy_n(state.state, 6, z.begin()));
+      config_.problem->model->Evaluate(z, {state.state, 6});
+    }
+    return state;
+  }
+
+  decision_t Decision(const candidate_plan_t& candidate, std::int16_t outcome, std::int16_t cause) {
+    decision_t decision{.utime = now_, .candidate_utime = candidate.utime, .plan_id = candidate.plan_id};
+    std::copy(std::begin(candidate.source), std::end(candidate.source), decision.source);
+    decision.outcome = outcome;
+    decision.cause = cause;
+    return decision;
+  }
+
+  void Say(const robot_state_t& state) {
+    ASSERT_TRUE(bus_->Publish(config_.bus.robot_state, state));
+    Deliver();
+  }
+  void Say(const decision_t& decision) {
+    ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
+    Deliver();
+  }
+  // And lets it plan.
+  template <class Message>
+  void Tell(const Message& message) {
+    Say(message);
+    Run(3);
+  }
+  void Certify() { Say(Decision(candidates_.back(), decision_t::CERTIFIED, decision_t::CAUSE_NONE)); }
+  void AbstainS() { Say(Decision(candidates_.back(), decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE)); }
+
+  nlohmann::json Summary() const { return nlohmann::json::parse(node_->Summary()); }
+
+  // The nominal rollout's smallest distance to the obstacles.
+  double Clearance(const candidate_plan_t& plan) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int t = 0; t <= plan.num_steps; ++t) {
+      const robot_state_t state = Executing(plan, t);
+      for (const Obstacle& obstacle : config_.obstacles)
+        least = std::min(least, ApproximateDistance(obstacle, Vec({state.state[0], state.state[1]})));
+    }
+    return least;
+  }
+
+  Config config_;
+  std::int64_t now_ = kNow;
+  std::ostringstream out_;
+  std::unique_ptr<Bus> bus_;
+  std::unique_ptr<PlannerNode> node_;
+  std::vector<candidate_plan_t> candidates_;
+};
+
+TEST_F(PlannerNodeTest, SaysNothingBeforeItHearsOfTheRobot) {
+  Run(100);
+  EXPECT_TRUE(candidates_.empty());
+}
+
+TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
+  robot_state_t state = Standing();
+  state.state[3] = std::nextafter(config_.planner.initial_half_width[3], 1);
+  Tell(state);
+  EXPECT_TRUE(candidates_.empty()) << "it will be somewhere else";
+  ++state.sequence;
+  state.state[3] = -config_.planner.initial_half_width[3];
+  Tell(state);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+// So that a guard, which asks for all of the measured state +- its error inside X0, lets it start.
+TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
+  Problem problem = *config_.problem;
+  problem.declaration.state_error = Vec({0.03, 0.1, 0, 0, 0, 0});
+  problem.declaration.given_are_exact = true;
+  config_.problem = std::make_shared<const Problem>(std::move(problem));
+  Start(config_);
+  robot_state_t state = Standing();
+  Tell(state);
+  ASSERT_EQ(candidates_.size(), 1u);
+  const std::vector<double>& given = config_.planner.initial_half_width;
+  EXPECT_EQ(candidates_[0].initial_half_width[0], AddUp(given[0], 0.03));
+  EXPECT_EQ(candidates_[0].initial_half_width[1], AddUp(given[1], 0.1));
+  EXPECT_EQ(candidates_[0].initial_half_width[2], given[2]);
+
+  Start(config_);
+  state.num_state_errors = 6;
+  state.state_error[2] = 0.5;
+  Tell(state);
+  ASSERT_GE(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_.back().initial_half_width[0], given[0]) << "the state's own errors count instead";
+  EXPECT_EQ(candidates_.back().initial_half_width[2], AddUp(given[2], 0.5));
+  state.state_error[2] = -0.5;
+  const std::size_t before = candidates_.size();
+  Start(config_);
+  Tell(state);
+  EXPECT_EQ(candidates_.size(), before) << "a state with such an error is none";
+}
+
+TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
+  const robot_state_t state = Standing();
+  Tell(state);
+  ASSERT_EQ(candidates_.size(), 1u);
+  const candidate_plan_t& plan = candidates_[0];
+  EXPECT_EQ(plan.utime, now_ - 2000);
+  EXPECT_EQ(plan.sequence, 0);
+  EXPECT_EQ(plan.plan_id, kNow + 1000);  // of the first tick: it grows over restarts
+  EXPECT_EQ(GetText(plan.source), PlannerNode::kSource);
+  EXPECT_EQ(plan.start_utime, state.utime + config_.planner.lead_steps * kPeriod);
+  EXPECT_EQ(plan.step_us, kPeriod);
+  EXPECT_EQ(plan.num_states, 6);
+  EXPECT_EQ(plan.num_inputs, 2);
+  EXPECT_EQ(plan.progress_steps, config_.planner.progress_steps);
+  EXPECT_LE(plan.num_steps, plan.progress_steps + config_.planner.tail_steps);
+  for (int k = 0; k < 6; ++k) {
+    EXPECT_EQ(plan.initial_center[k], state.state[k]);
+    EXPECT_EQ(plan.initial_half_width[k], config_.planner.initial_half_width[static_cast<std::size_t>(k)]);
+  }
+  for (int t = plan.num_steps; t < 128; ++t) EXPECT_EQ(plan.control[t][0], 0);
+  EXPECT_NEAR(Executing(plan, plan.num_steps).state[3], 0, 1e-9);
+}
+
+TEST_F(PlannerNodeTest, SendsOneCandidateAndWaitsForItsDecision) {
+  Say(Standing());
+  Run(60);
+  EXPECT_EQ(candidates_.size(), 1u);
+  AbstainS();
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_[1].sequence, 1);
+  EXPECT_GT(candidates_[1].plan_id, candidates_[0].plan_id);
+  EXPECT_EQ(candidates_[1].start_utime, candidates_[0].start_utime);
+}
+
+// What the hints do is the same each time: a start that it was refused for gets a search.
+TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
+  Config config = Bicycle();
+  config.planner.candidates = 1;
+  const auto controls = [](const candidate_plan_t& plan) {
+    return std::vector<double>(&plan.control[0][0], &plan.control[0][0] + kMaxSteps * kMaxInputs);
+  };
+  std::vector<std::vector<double>> first, later;
+  for (const int seed : {1, 2}) {
+    config.planner.seed = seed;
+    candidates_.clear();
+    Start(config);
+    robot_state_t state = Standing();
+    Tell(state);
+    ASSERT_EQ(candidates_.size(), 1u);
+    first.push_back(controls(candidates_.back()));
+    for (std::size_t round = 2; round <= 3; ++round) {
+      AbstainS();
+      Run(3);
+      state.utime = now_;
+      ++state.sequence;
+      Tell(state);
+      ASSERT_EQ(candidates_.size(), round);
+      later.push_back(controls(candidates_.back()));
+    }
+    Certify();
+    now_ += 10 * kPeriod;
+    state = Standing();
+    state.sequence = 9;
+    state.state[0] = 0.5;
+    Tell(state);
+    ASSERT_EQ(candidates_.size(), 4u);
+    first.push_back(controls(candidates_.back()));
+  }
+  EXPECT_EQ(first[0], first[2]) << "the hints, whatever the seed is";
+  EXPECT_EQ(first[1], first[3]) << "and again from another start";
+  EXPECT_NE(first[0], later[0]);
+  EXPECT_NE(later[0], later[1]);
+  EXPECT_NE(later[0], later[2]);
+}
+
+TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
+  config_.planner.lead_steps = 20;  // time for all of them
+  config_.planner.clearance_step = 0.5;
+  Start(config_);
+  robot_state_t state = Standing();
+  state.state[0] = 8;
+  state.state[3] = 5;  // it comes to rest still
+  Tell(state);
+  ASSERT_EQ(candidates_.size(), 0u);
+  state.state[3] = 0;
+  ++state.sequence;
+  state.state[1] = 3.5;
+  Say(state);
+  for (int i = 1; i <= 6; ++i) {
+    Run(3);
+    ASSERT_EQ(candidates_.size(), static_cast<std::size_t>(i));
+    EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance + (i - 1) * config_.planner.clearance_step);
+    EXPECT_EQ(candidates_.back().initial_center[3], 0);
+    AbstainS();
+  }
+}
+
+class AdvisedPlannerTest : public PlannerNodeTest {
+ protected:
+  void SetUp() override {
+    config_ = Bicycle();
+    config_.gate.advises = true;
+    config_.planner.lead_steps = 20;
+    config_.planner.clearance_step = 0;
+    Start(config_);
+    robot_state_t state = Standing();
+    state.state[0] = 8;
+    state.state[1] = 3.5;
+    Tell(state);
+    ASSERT_EQ(candidates_.size(), 1u);
+  }
+
+  // As an answer to the last candidate.
+  void AbstainOn(const candidate_plan_t& candidate) {
+    decision_t decision = Decision(candidate, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
+    SetDigest(decision.plan_digest, DigestOf(Encode(candidate)));
+    Say(decision);
+  }
+  // Half a metre more to every obstacle.
+  advice_t Advice() {
+    advice_t advice{};
+    SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
+    SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
+    for (std::size_t o = 0; o < std::min<std::size_t>(config_.obstacles.size(), 8); ++o) {
+      advice_change_t& change = advice.change[advice.num_changes++];
+      change.kind = advice_change_t::OBSTACLE;
+      change.index = static_cast<std::int16_t>(o);
+      change.value = 0.5;
+    }
+    return advice;
+  }
+  void Say(const advice_t& advice) {
+    ASSERT_TRUE(bus_->Publish(config_.bus.advice, advice));
+    Deliver();
+  }
+  using PlannerNodeTest::Say;
+};
+
+TEST_F(AdvisedPlannerTest, GivesWayAsItIsTold) {
+  ASSERT_LE(config_.obstacles.size(), 8u);
+  const double before = Clearance(candidates_[0]);
+  AbstainOn(candidates_[0]);
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 1u) << "it waits for the advice";
+  Say(Advice());
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_GT(Clearance(candidates_[1]), config_.planner.clearance + 0.5) << "before: " << before;
+  EXPECT_EQ(Summary()["advised"], 1);
+}
+
+TEST_F(AdvisedPlannerTest, WaitsNoLongerThanTwiceTheBudgetOfADecision) {
+  AbstainOn(candidates_[0]);
+  const auto wait = static_cast<int>(2 * config_.gate.decision_budget_ms);
+  Run(wait - 1);
+  EXPECT_EQ(candidates_.size(), 1u);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["advised"], 0);
+}
+
+TEST_F(AdvisedPlannerTest, IgnoresAdviceThatIsNotOnItsCandidate) {
+  const std::int64_t ignored = Summary()["messages_ignored"];
+  Say(Advice());  // nothing was abstained on
+  AbstainOn(candidates_[0]);
+  advice_t other = Advice();
+  other.plan_digest[31] ^= 1;
+  Say(other);
+  advice_t elsewhere = Advice();
+  elsewhere.obstacles_digest[0] ^= 1;
+  Say(elsewhere);
+  advice_t empty = Advice();
+  empty.num_changes = 0;
+  Say(empty);
+  EXPECT_EQ(Summary()["messages_ignored"], ignored + 4);
+  EXPECT_EQ(Summary()["advised"], 0);
+  Say(Advice());
+  Say(Advice());  // repeated
+  EXPECT_EQ(Summary()["advised"], 1);
+  EXPECT_EQ(Summary()["messages_ignored"], ignored + 5);
+}
+
+// With no keys anybody can say this; with them, a certifier that is wrong.
+TEST_F(AdvisedPlannerTest, FalseAdviceCostsARoundAtMost) {
+  for (int i = 0; i < 40 && Summary()["rounds_without_certificate"] == 0; ++i) {
+    AbstainOn(candidates_.back());
+    advice_t advice = Advice();
+    for (int c = 0; c < advice.num_changes; ++c) advice.change[c].value = 1e300;
+    Say(advice);
+    Run(30);
+  }
+  EXPECT_GE(Summary()["rounds_without_certificate"], 1);
+  const std::size_t before = candidates_.size();
+  robot_state_t state = Standing();
+  state.sequence = 7;
+  state.state[0] = 8;
+  state.state[1] = 3.5;
+  Tell(state);
+  ASSERT_EQ(candidates_.size(), before + 1) << "the next round begins anew";
+  Certify();
+  EXPECT_EQ(Summary()["certified"], 1);
+}
+
+TEST_F(PlannerNodeTest, WaitsForNoAdviceUnlessItIsSent) {
+  Tell(Standing());
+  AbstainS();
+  Run(2);
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(PlannerNodeTest, ProposesAgainAfterARejectionAndAfterAnAbstentionForTheDomain) {
+  Tell(Standing());
+  Tell(Decision(candidates_.back(), decision_t::REJECTED, decision_t::CAUSE_QUEUE_FULL));
+  ASSERT_EQ(candidates_.size(), 2u);
+  Tell(Decision(candidates_.back(), decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
+  EXPECT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(Summary()["rejected"]["queue_full"], 1);
+  EXPECT_EQ(Summary()["abstained"]["domain_exit"], 1);
+}
+
+TEST_F(PlannerNodeTest, GivesUpARoundWhoseDataAreFalsified) {
+  Tell(Standing());
+  Say(Decision(candidates_.back(), decision_t::ABSTAIN_FALSIFIED, decision_t::CAUSE_PAIRWISE));
+  Run(20);
+  EXPECT_EQ(candidates_.size(), 1u);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+TEST_F(PlannerNodeTest, StopsAfterSoManyCandidatesAndBeginsAnewWithTheNextState) {
+  config_.planner.candidates = 3;
+  Start(config_);
+  Say(Standing());
+  for (int i = 0; i < 5; ++i) {
+    Run(3);
+    if (i < 3) AbstainS();
+  }
+  EXPECT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+  now_ = kNow + kPeriod;
+  Tell(Standing());
+  EXPECT_EQ(candidates_.size(), 4u);
+}
+
+// A robot that its laws do not bring to rest, or a declaration that allows too much.
+TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
+  config_.planner.candidates = 1;
+  Start(config_);
+  const auto lose = [&](int rounds) {
+    testing::internal::CaptureStdout();  // the log's, where it is not set up
+    for (int i = 0; i < rounds; ++i) {
+      now_ += kPeriod;
+      Tell(Standing());
+      Say(Decision(candidates_.back(), decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
+      Run(3);
+    }
+    logging::Flush();
+    return testing::internal::GetCapturedStdout();
+  };
+  EXPECT_THAT(lose(PlannerNode::kLostRounds - 1), Not(HasSubstr("without a certificate")));
+  EXPECT_THAT(lose(1),
+              AllOf(HasSubstr("20 rounds in a row without a certificate; since the start 20 searches, 0 without "
+                              "a plan, domain_exit 20"),
+                    HasSubstr("forereach advise")));
+  EXPECT_THAT(lose(30), Not(HasSubstr("without a certificate"))) << "it has been said";
+}
+
+TEST_F(PlannerNodeTest, SendsNothingThatWouldComeTooLate) {
+  robot_state_t state = Standing();
+  Say(state);
+  const auto search_us = static_cast<std::int64_t>(config_.planner.time_limit_ms * 1e3);
+  now_ = state.utime + config_.planner.lead_steps * kPeriod - search_us;
+  Run(3);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+TEST_F(PlannerNodeTest, WaitsForTheStartOfACertifiedPlan) {
+  const robot_state_t state = Standing();
+  Tell(state);
+  Certify();
+  Run(37);
+  Say(Standing());  // the boundary before the start
+  Run(20);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, PlansTheHandoverInTimeForTheTail) {
+  Tell(Standing());
+  Certify();
+  const candidate_plan_t first = candidates_[0];
+  for (int step = 0; step < first.progress_steps - config_.planner.lead_steps; ++step) {
+    now_ = first.start_utime + step * kPeriod;
+    Tell(Executing(first, step));
+    ASSERT_EQ(candidates_.size(), 1u) << "step " << step;
+  }
+  const int due = first.progress_steps - config_.planner.lead_steps;
+  now_ = first.start_utime + due * kPeriod;
+  Tell(Executing(first, due));
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_[1].start_utime, first.start_utime + first.progress_steps * kPeriod);
+  const robot_state_t expected = Executing(first, first.progress_steps);  // the residual of this task is zero
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(candidates_[1].initial_center[k], expected.state[k], 1e-12);
+}
+
+TEST_F(PlannerNodeTest, PredictsThatARobotStandsAfterItsTail) {
+  Tell(Standing());
+  Certify();
+  const candidate_plan_t first = candidates_[0];
+  const int last = first.num_steps - 1;
+  now_ = first.start_utime + last * kPeriod;
+  Tell(Executing(first, last));
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_[1].initial_center[3], 0);
+  EXPECT_EQ(candidates_[1].initial_center[4], 0);
+  EXPECT_NEAR(candidates_[1].initial_center[0], Executing(first, first.num_steps).state[0], 1e-9);
+}
+
+TEST_F(PlannerNodeTest, PlansAgainIfTheRobotDidNotStartACertifiedPlan) {
+  Tell(Standing());
+  Certify();
+  now_ = candidates_[0].start_utime;
+  Tell(Standing());
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(PlannerNodeTest, GivesUpWaitingForADecisionAtTheStart) {
+  const robot_state_t state = Standing();
+  Tell(state);
+  now_ = candidates_[0].start_utime;
+  Tell(Standing());
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["unanswered"], 1);
+}
+
+TEST_F(PlannerNodeTest, LeavesAPlanThatItDidNotSendAlone) {
+  candidate_plan_t foreign{.plan_id = 5, .num_steps = 20};
+  Say(Executing(foreign, 10));
+  Run(10);
+  EXPECT_TRUE(candidates_.empty());
+}
+
+TEST_F(PlannerNodeTest, IgnoresDecisionsThatConcernSomebodyElse) {
+  Tell(Standing());
+  decision_t decision = Decision(candidates_[0], decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+  SetText(decision.source, "another planner");
+  Say(decision);
+  decision = Decision(candidates_[0], decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+  ++decision.plan_id;
+  Say(decision);
+  EXPECT_EQ(Summary()["certified"], 0);
+  EXPECT_EQ(Summary()["messages_ignored"], 2);
+  AbstainS();
+  AbstainS();  // twice: the second concerns nothing that is awaited
+  EXPECT_EQ(Summary()["abstained"]["obstacle"], 1);
+  EXPECT_EQ(Summary()["messages_ignored"], 3);
+}
+
+TEST_F(PlannerNodeTest, SurvivesBadMessagesAndThenWorks) {
+  const std::vector<std::uint8_t> good = Encode(Standing());
+  std::vector<std::uint8_t> shorter(good.begin(), good.end() - 1), longer = good, other = good;
+  longer.push_back(0);
+  other[0] ^= 1;
+  for (const auto& bytes : {std::vector<std::uint8_t>{}, shorter, longer, other})
+    for (const std::string& channel : {config_.bus.robot_state, config_.bus.decision, config_.bus.obstacles})
+      ASSERT_TRUE(bus_->Publish(channel, Bytes(bytes)));
+  Deliver();
+  Run(10);
+  for (const double value : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    robot_state_t state = Standing();
+    state.state[3] = value;
+    Say(state);
+  }
+  robot_state_t state = Standing();
+  state.num_states = 4;
+  Say(state);
+  state = Standing();
+  state.mode = 7;
+  Say(state);
+  Run(10);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_EQ(Summary()["messages_ignored"], 16);
+  Tell(Standing());
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, AStateIsUsedOnce) {
+  const robot_state_t state = Standing();
+  Tell(state);
+  Certify();
+  Say(state);
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+}
+
+TEST_F(PlannerNodeTest, AStateThatComesLateIsIgnored) {
+  const auto say = [&](std::int64_t sequence, std::int64_t stamp) {
+    robot_state_t state = Standing();
+    state.sequence = sequence;
+    state.utime = now_ + stamp;
+    Say(state);
+    return Summary()["messages_ignored"].get<int>();
+  };
+  EXPECT_EQ(say(5, -100), 0);
+  EXPECT_EQ(say(4, -200), 1) << "overtaken";
+  EXPECT_EQ(say(0, -200), 2) << "an older stamp never replaces a newer one";
+  EXPECT_EQ(say(6, -300), 2) << "the robot's clock was set back, its count goes on";
+  EXPECT_EQ(say(0, -50), 2) << "the robot restarted";
+}
+
+TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
+  robot_state_t state = Standing();
+  state.utime = now_ + 50'001;  // gate.max_ahead_ms is 50
+  Tell(state);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+  Tell(Standing());
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
+  Config config = Bicycle();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  Start(config);
+  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)}, now_);
+  const auto see = [&] {
+    message.utime = now_;
+    ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+    ++message.sequence;
+    Deliver();
+  };
+  const auto round = [&] { Tell(Standing()); };
+  round();
+  EXPECT_TRUE(candidates_.empty()) << "none has been heard";
+  see();
+  round();
+  ASSERT_EQ(candidates_.size(), 1u);
+  EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
+  Run(1001);
+  round();
+  EXPECT_EQ(candidates_.size(), 1u) << "they have fallen silent";
+  see();
+  round();
+  EXPECT_EQ(candidates_.size(), 2u);
+  ++message.sequence;  // one is lost
+  see();
+  Run(200);
+  round();
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
+  Tell(Standing());
+  ASSERT_EQ(candidates_.size(), 1u);
+  decision_t decision{.plan_id = candidates_.back().plan_id};
+  SetText(decision.source, PlannerNode::kSource);
+  decision.outcome = decision_t::ABSTAIN_OBSTACLES;
+  decision.cause = decision_t::CAUSE_NO_OBSTACLES;
+  ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
+  Deliver();
+  Run(20);
+  EXPECT_EQ(candidates_.size(), 1u) << "no other candidate before the next state";
+  EXPECT_EQ(Summary()["abstained"], nlohmann::json({{"no_obstacles", 1}}));
+}
+
+// As the gate does: else the planner would go on around the obstacles of before, and the gate refuse what it finds.
+TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
+  Config config = Bicycle();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  Start(config);
+  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)}, now_);
+  message.sequence = 7;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // a repetition: ignored
+  message.sequence = 0;
+  message.utime = now_ + 50'001;  // gate.max_ahead_ms is 50: ignored
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  message.utime = now_ + 1;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  Deliver();
+  EXPECT_EQ(Summary()["messages_ignored"], 2);
+}
+
+TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
+  Config config = Bicycle();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  config.gate.obstacles_timeout_ms = 10'000;
+  Start(config);
+  config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
+  obstacles_t message = ToMessage(config_.obstacles, now_);
+  message.sequence = 1;
+  message.num_obstacles = 65;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // cannot be: ignored
+  message.num_obstacles = 1;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  Deliver();
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+  robot_state_t state = Standing();
+  for (int plan = 0; plan < 8; ++plan) {
+    Tell(state);
+    ASSERT_EQ(candidates_.size(), static_cast<std::size_t>(plan + 1));
+    EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
+    Certify();
+    now_ = candidates_.back().start_utime + (candidates_.back().progress_steps - config_.planner.lead_steps) * kPeriod;
+    state = Executing(candidates_.back(), candidates_.back().progress_steps - config_.planner.lead_steps);
+  }
+}
+
+TEST_F(PlannerNodeTest, SendsNothingOnceTheRobotHasFinished) {
+  Tell(Standing());
+  now_ += 1000;
+  robot_state_t finished = Standing();
+  finished.mode = robot_state_t::FINISHED;
+  Say(finished);
+  EXPECT_TRUE(node_->done());
+  AbstainS();
+  now_ += kPeriod;
+  Say(Standing());
+  Run(100);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, SendsNothingAtTheGoal) {
+  robot_state_t state = Standing();
+  state.state[0] = 64;
+  Say(state);
+  Run(20);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_FALSE(node_->done());
+}
+
+TEST_F(PlannerNodeTest, TheSameMessagesGetTheSameCandidates) {
+  const auto run = [this] {
+    now_ = kNow;
+    candidates_.clear();
+    Start(Bicycle());
+    Say(Standing());
+    for (int i = 0; i < 4; ++i) {
+      Run(3);
+      AbstainS();
+    }
+    std::vector<std::vector<std::uint8_t>> bytes;
+    for (const candidate_plan_t& candidate : candidates_) bytes.push_back(Encode(candidate));
+    return bytes;
+  };
+  const auto first = run();
+  EXPECT_EQ(first.size(), 4u);
+  EXPECT_EQ(first, run());
+}
+
+class WithdrawnPlanTest : public PlannerNodeTest {
+ protected:
+  // The robot executes the first candidate, at this step.
+  void Execute(int step) {
+    Tell(Standing());
+    Certify();
+    now_ = candidates_[0].start_utime + step * kPeriod;
+    Tell(Executing(candidates_[0], step));
+    ASSERT_EQ(candidates_.size(), 1u) << "no other is due";
+  }
+  void Withdraw(int valid_steps, std::size_t which = 0) {
+    withdrawal_t withdrawal{};
+    withdrawal.utime = now_;
+    withdrawal.sequence = sequence_++;
+    withdrawal.plan_id = candidates_[which].plan_id;
+    withdrawal.valid_steps = static_cast<std::int16_t>(valid_steps);
+    std::copy(std::begin(candidates_[which].source), std::end(candidates_[which].source), withdrawal.source);
+    ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
+    Deliver();
+  }
+
+  std::int64_t sequence_ = 0;
+};
+
+TEST_F(WithdrawnPlanTest, AStopIsProposedAtOnceFromTheNextHandover) {
+  Execute(3);
+  Withdraw(6);
+  Run(1);
+  ASSERT_EQ(candidates_.size(), 2u);
+  const candidate_plan_t& stop = candidates_[1];
+  EXPECT_EQ(stop.start_utime, candidates_[0].start_utime + 4 * kPeriod);
+  EXPECT_EQ(stop.progress_steps, 0);
+  const robot_state_t begin = Executing(candidates_[0], 4), end = Executing(stop, stop.num_steps);
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(stop.initial_center[k], begin.state[k], 1e-12);
+  EXPECT_NEAR(end.state[3], 0, 1e-9);
+  EXPECT_NEAR(end.state[4], 0, 1e-9);
+  for (int t = 0; t < stop.num_steps; ++t) EXPECT_EQ(stop.control[t][1], 0) << "the steering is held";
+  EXPECT_EQ(Summary()["withdrawn"], 1);
+  EXPECT_EQ(Summary()["stopping_rounds"], 1);
+}
+
+TEST_F(WithdrawnPlanTest, OtherStopsAreProposedAfterAnAbstention) {
+  Execute(3);
+  Withdraw(6);
+  Run(1);
+  for (std::size_t count = 2; count <= 5; ++count) {
+    ASSERT_EQ(candidates_.size(), count);
+    AbstainS();
+    Run(1);
+  }
+  EXPECT_EQ(candidates_.size(), 5u) << "there are four ways";
+  std::set<std::vector<double>> steering;
+  for (std::size_t i = 1; i < candidates_.size(); ++i) {
+    auto& rates = candidates_[i].control;
+    std::vector<double> its;
+    for (int t = 0; t < candidates_[i].num_steps; ++t) its.push_back(rates[t][1]);
+    steering.insert(its);
+  }
+  EXPECT_GE(steering.size(), 3u) << "held, to the left, to the right";
+}
+
+TEST_F(WithdrawnPlanTest, NoStopIsProposedAfterTheLastStepThatStands) {
+  Execute(3);
+  Withdraw(3);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+  Withdraw(4);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u) << "what was withdrawn does not stand again";
+}
+
+TEST_F(WithdrawnPlanTest, AStopIsProposedAtTheLastBoundaryThatStands) {
+  Execute(3);
+  Withdraw(4);
+  Run(1);
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(WithdrawnPlanTest, ARepeatedWithdrawalStartsNoNewRound) {
+  Execute(3);
+  Withdraw(6);
+  Run(1);
+  Certify();
+  Withdraw(6);
+  Withdraw(6);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["withdrawn"], 1);
+}
+
+TEST_F(WithdrawnPlanTest, ARoundUnderWayGivesWayToTheStop) {
+  Execute(3);
+  const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
+  now_ = candidates_[0].start_utime + due * kPeriod;
+  Tell(Executing(candidates_[0], due));
+  ASSERT_EQ(candidates_.size(), 2u);
+  Withdraw(due + 2);
+  Run(1);
+  ASSERT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(candidates_[2].progress_steps, 0);
+}
+
+TEST_F(WithdrawnPlanTest, NoStopIsProposedWhereACertifiedPlanTakesOverInTime) {
+  Execute(3);
+  const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
+  now_ = candidates_[0].start_utime + due * kPeriod;
+  Tell(Executing(candidates_[0], due));
+  Certify();
+  Withdraw(due + config_.planner.lead_steps);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  Withdraw(due + config_.planner.lead_steps - 1);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 3u) << "now it comes too late";
+}
+
+TEST_F(WithdrawnPlanTest, AWithdrawnPlanThatHasNotBegunIsReplaced) {
+  Tell(Standing());
+  Certify();
+  Withdraw(0);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u) << "it needs a state to begin from";
+  now_ += kPeriod;
+  Tell(Standing());
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(WithdrawnPlanTest, WithdrawalsOfOthersAreIgnored) {
+  Execute(3);
+  withdrawal_t withdrawal{.plan_id = candidates_[0].plan_id};
+  SetText(withdrawal.source, "another");
+  ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
+  ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, Bytes(std::vector<std::uint8_t>{1, 2, 3})));
+  Deliver();
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+  EXPECT_EQ(Summary()["messages_ignored"], 2);
+}
+
+TEST_F(PlannerNodeTest, WorksForThePointMassToo) {
+  Start(PointMass());
+  robot_state_t state = Standing();
+  state.num_states = 4;
+  Tell(state);
+  ASSERT_EQ(candidates_.size(), 1u);
+  EXPECT_EQ(candidates_[0].num_states, 4);
+}
+
+TEST_F(PlannerNodeTest, StopPrintsTheCounts) {
+  Tell(Standing());
+  AbstainS();
+  Run(3);
+  Certify();
+  node_->Stop();
+  const auto summary = nlohmann::json::parse(out_.str());
+  EXPECT_EQ(summary["proposed"], 2);
+  EXPECT_EQ(summary["certified"], 1);
+  EXPECT_EQ(summary["abstained"], nlohmann::json({{"obstacle", 1}}));
+  EXPECT_EQ(summary["rejected"], nlohmann::json::object());
+  EXPECT_EQ(summary["rounds"], 1);
+  EXPECT_EQ(summary["rounds_without_certificate"], 0);
+}
+
+TEST(PlannerNode, RefusesATaskThatDoesNotFit) {
+  const auto bus = OpenBus("memq://");
+  Config config = Bicycle();
+  config.planner.initial_half_width = {1, 2};
+  EXPECT_THROW(PlannerNode(config, *bus), ConfigError);
+  config = Bicycle();
+  config.planner.goal = {};
+  EXPECT_THROW(PlannerNode(config, *bus), ConfigError);
+}
+
+}  // namespace forereach::planner_node_test

@@ -1,0 +1,181 @@
+// A learned policy on the bus: it proposes, the gate certifies or abstains, and the robot executes what is certified.
+#include "tests/test.h"
+
+#include "certifier/process/certifier_node.h"
+#include "forereach/certified_plan_t.hpp"
+#include "planner_bridge/planner_node.h"
+#include "planner_bridge/policy_proposer.h"
+#include "planner_bridge/reference.h"
+#include "simulator/sim_node.h"
+#include "tests/paths.h"
+#include "tests/planner_bridge/tasks.h"
+
+namespace forereach::policy_run_test {
+
+const std::string kTask = FOREREACH_SOURCE_DIR "/config/policy.yaml";
+
+/** What the bus carried in one run on a simulated clock. */
+struct Traffic {
+  std::vector<candidate_plan_t> candidates;
+  std::vector<decision_t> decisions;
+  std::set<std::int64_t> certified, executed;
+  nlohmann::json planner, robot;
+};
+
+Traffic RunTask(const Config& config) {
+  Traffic traffic;
+  std::int64_t now = 1'700'000'000'000'000;
+  const Clock clock = [&now] { return now; };
+  const auto bus = OpenBus("memq://", clock);
+  std::ostringstream planner_out, robot_out;
+  CertifierNode certifier(config, *bus, {clock, clock});
+  PlannerNode planner(config, *bus, planner_out);
+  RobotSimNode robot(config, *bus, robot_out);
+  const auto keep = [&bus](const std::string& channel, auto message, auto use) {
+    bus->Subscribe(channel, [message, use](const Received& received) mutable {
+      ASSERT_EQ(Decode(received.bytes, message), DecodeStatus::kOk);
+      use(message);
+    });
+  };
+  keep(config.bus.candidate, candidate_plan_t{}, [&](const auto& plan) { traffic.candidates.push_back(plan); });
+  keep(config.bus.decision, decision_t{}, [&](const auto& decision) { traffic.decisions.push_back(decision); });
+  keep(config.bus.certified, certified_plan_t{},
+       [&](const auto& plan) { traffic.certified.insert(plan.plan.plan_id); });
+  keep(config.bus.robot_state, robot_state_t{}, [&](const auto& state) {
+    if (state.mode == robot_state_t::EXECUTING) traffic.executed.insert(state.executing_plan_id);
+  });
+  for (const auto last = now + 60'000'000; !robot.done() && now < last; now += 1000)
+    for (Node* node : std::initializer_list<Node*>{&robot, &planner, &certifier}) {
+      node->Tick(now);
+      while (bus->Dispatch(0) > 0) {
+      }
+    }
+  traffic.planner = nlohmann::json::parse(planner.Summary());
+  traffic.robot = nlohmann::json::parse(robot.Summary());
+  return traffic;
+}
+
+TEST(PolicyRun, ThePolicyProposesTheGateDecidesAndOnlyCertifiedPlansAreDriven) {
+  const Config config = LoadConfig(kTask);
+  const Traffic traffic = RunTask(config);
+  ASSERT_FALSE(traffic.candidates.empty());
+  EXPECT_EQ(traffic.decisions.size(), traffic.candidates.size());
+  std::set<std::int64_t> decided_certified;
+  int abstentions = 0;
+  for (const decision_t& decision : traffic.decisions)
+    if (decision.outcome == decision_t::CERTIFIED)
+      decided_certified.insert(decision.plan_id);
+    else
+      ++abstentions;
+  EXPECT_GT(abstentions, 0) << "a course on which the policy runs into nothing shows nothing";
+  EXPECT_EQ(decided_certified, traffic.certified);
+  EXPECT_FALSE(traffic.executed.empty());
+  EXPECT_TRUE(std::ranges::includes(traffic.certified, traffic.executed));
+  EXPECT_EQ(traffic.robot["contacts"], 0);
+  EXPECT_EQ(traffic.robot["steps_inside_slice"], traffic.robot["steps_executed"]);
+  EXPECT_EQ(traffic.robot["goal_reached"], true);
+  EXPECT_EQ(traffic.planner["proposed"], traffic.candidates.size());
+}
+
+TEST(PolicyRun, TwoRunsAreIdentical) {
+  const Config config = LoadConfig(kTask);
+  const Traffic one = RunTask(config), two = RunTask(config);
+  EXPECT_EQ(one.robot, two.robot);
+  ASSERT_EQ(one.candidates.size(), two.candidates.size());
+  for (std::size_t i = 0; i < one.candidates.size(); ++i)
+    EXPECT_EQ(Encode(one.candidates[i]), Encode(two.candidates[i])) << i;
+}
+
+// With an obstacle right ahead the policy goes on proposing, and nothing is driven.
+TEST(PolicyRun, WhereNothingCanBeCertifiedNothingIsDriven) {
+  Config config = LoadConfig(kTask);
+  config.obstacles = {Obstacle::Circle(Vec({6, 0}), 5.8)};
+  config.robot.time_limit_s = 3;
+  const Traffic traffic = RunTask(config);
+  EXPECT_GT(traffic.candidates.size(), 10u);
+  EXPECT_TRUE(traffic.certified.empty());
+  EXPECT_TRUE(traffic.executed.empty());
+  EXPECT_EQ(traffic.robot["contacts"], 0);
+}
+
+TEST(PolicyProposer, ItsPlansAreThePolicysBlocksAndEndInAStop) {
+  const Config config = LoadConfig(kTask);
+  const Policy policy = LoadPolicy(config.planner.policy);
+  PolicyProposer proposer(config, policy);
+  PlanRequest request;
+  request.state = Vec({0, 0, 0, 5, 0, 0});
+  const auto proposal = proposer.Propose(request);
+  ASSERT_TRUE(proposal);
+  EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
+  EXPECT_NEAR(proposal->states(3, proposal->states.cols() - 1), 0, 1e-9);
+  // The goal is straight ahead: (7 - 5) m/s more over a block, wheels straight.
+  const NominalModel& model = *config.problem->model;
+  const Reference reference = MakeReference(model, Vec({0, 0, 0, 5, 1, 0}), policy.num_steps());
+  const Eigen::MatrixXd block = policy.Act(Features(request.state, reference));
+  EXPECT_EQ(proposal->controls.leftCols(8), block.leftCols(8));
+
+  std::set<double> directions;  // each attempt goes another way
+  for (request.attempt = 1; request.attempt <= PolicyProposer::kFan; ++request.attempt)
+    directions.insert(proposer.Propose(request)->states(2, 8));
+  EXPECT_EQ(directions.size(), static_cast<std::size_t>(PolicyProposer::kFan));
+  EXPECT_FALSE(proposer.Propose(request));
+}
+
+TEST(PolicyProposer, LeavesOutBlocksThatExceedALimit) {
+  Config config = LoadConfig(kTask);
+  const Policy policy = LoadPolicy(config.planner.policy);
+  PlanRequest request;
+  request.state = Vec({0, 0, 0, 5, 0, 0});
+  const auto proposed = [&](const char* that, double at_most) {
+    Problem problem = *config.problem;
+    problem.limits = {{.name = "it", .that = {that, 1, 1}, .at_most = at_most}};
+    config.problem = std::make_shared<const Problem>(problem);
+    return PolicyProposer(config, policy).Propose(request).has_value();
+  };
+  EXPECT_TRUE(proposed("v", 9));
+  EXPECT_FALSE(proposed("v", 5.5)) << "it accelerates to 7 m/s";
+  EXPECT_TRUE(proposed("abs(jerk)", 10));
+  EXPECT_FALSE(proposed("abs(jerk)", 0.1));
+}
+
+// A file has finite weights; their sums may be infinite, or no number.
+TEST(PolicyProposer, ProposesNothingThatIsNotFinite) {
+  const Config config = LoadConfig(kTask);
+  Policy policy = LoadPolicy(config.planner.policy);
+  PlanRequest request;
+  request.state = Vec({0, 0, 0, 5, 0, 0});
+  ASSERT_TRUE(PolicyProposer(config, policy).Propose(request));
+  policy.layers.back().weight.setConstant(1.7e308);
+  EXPECT_FALSE(PolicyProposer(config, policy).Propose(request));
+  for (Eigen::Index j = 0; j < policy.layers.back().weight.cols(); j += 2) policy.layers.back().weight.col(j) *= -1;
+  EXPECT_FALSE(PolicyProposer(config, policy).Propose(request));
+}
+
+TEST(PolicyProposer, RefusesWhatDoesNotFit) {
+  const Config config = LoadConfig(kTask);
+  const Policy policy = LoadPolicy(config.planner.policy);
+  const auto refusal = [&](Config task, const Policy& other) -> std::string {
+    try {
+      const PolicyProposer proposer(task, other);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(refusal(config, policy), "accepted");
+  EXPECT_EQ(
+      refusal(PointMass(), policy),
+      "planner.policy: is for the model kinematic_bicycle dt=0.1 wheelbase=2.5, the task's is point_mass dt=0.15");
+  Config long_blocks = config;
+  long_blocks.planner.progress_steps = 21;
+  EXPECT_EQ(refusal(long_blocks, policy), "planner.policy: its blocks have 20 steps, planner.progress_steps is 21");
+  Config no_goal = config;
+  no_goal.planner.goal = {};
+  EXPECT_EQ(refusal(no_goal, policy),
+            "planner.goal: missing: where to go, an entry for each of the 2 safety coordinates");
+  Policy fewer = policy;
+  fewer.input = {Eigen::VectorXd::Zero(4), Eigen::VectorXd::Ones(4)};
+  EXPECT_EQ(refusal(config, fewer), "planner.policy: has 4 features, has to have 12");
+}
+
+}  // namespace forereach::policy_run_test
