@@ -222,7 +222,7 @@ TEST(LoadConfig, StepsOfNoWholeMicrosecondsAreOffTheirTimes) {
   EXPECT_GE(config.problem->timing.error, 128 * 0.4999e-6);
   EXPECT_LE(config.problem->timing.error, 128 * 0.5001e-6);
   EXPECT_GE(config.problem->between->period, 0.15);
-  EXPECT_EQ(config.problem->between->period, std::max(0.1500005, config.gate.step_us / 1e6));
+  EXPECT_EQ(config.problem->between->period, std::max(0.1500005, static_cast<double>(config.gate.step_us) / 1e6));
 }
 
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
