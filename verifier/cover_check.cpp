@@ -105,7 +105,7 @@ class ClaimCheck {
       if (CertainlyAtMost(Real(sign) * slope.value, bound)) return true;
       bool moved = false;
       for (std::size_t i = 0; i < rest.size(); ++i) {
-        if (IsPoint(rest[i]) || i >= slope.gradient.size()) continue;
+        if (IsPoint(rest[i]) || i >= slope.gradient.size() || slope.gradient[i].IsZero()) continue;
         const Real rise = Real(sign) * slope.gradient[i];
         const bool up = CertainlyAtMost(0.0, rise), down = CertainlyAtMost(rise, 0.0);
         if (!up && !down) continue;
