@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "forereach/certify/rates.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/size.h"
@@ -41,8 +40,10 @@ void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
     if (bound[k] < kInfinity)
       rates += (rates.empty() ? "" : ", ") + model.state_names()[ToSize(static_cast<int>(k))] + " " + ToText(bound[k]);
   if (!rates.empty())
-    all.push_back({"no state changes faster, a second, than " + rates,
-                   "declared (model.rate_bound); a transition that shows more falsifies it (F)"});
+    all.push_back(
+        {"no state changes faster, a second, than " + rates,
+         "declared (model.rate_bound); a transition that shows more falsifies it (F), a plan that needs more is "
+         "not certified (D)"});
   for (const int k : model.angles()) angles += (angles.empty() ? "" : ", ") + model.state_names()[ToSize(k)];
   if (!angles.empty())
     all.push_back({"no step turns " + angles + " by three quarters of a turn or more beyond the model",
@@ -140,9 +141,6 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
         {"between two samples the motion keeps the bounds of task.between",
          "declared; `forereach declare --between` proves it of the equations. Transitions that turn faster than "
          "turn_rate falsify it (F), a plan that does is not certified (D)"});
-  if (RateBounds(problem).bounds().size() > (problem.between && problem.body.heading >= 0 ? 1U : 0U))
-    all.push_back(
-        {"states change no faster than model.rate_bound", "declared; transitions and plans refute it likewise"});
   AddObstacles(config, all);
   all.push_back({"a state that leaves its slice shows that one of these is false",
                  "the guard, which halts, and the certifier, which latches it"});

@@ -23,8 +23,7 @@ std::string_view FaultAdvice(std::int16_t cause) {
              "`forereach reload`, then `forereach reset`; after a reset alone it happens again";
     case fault_t::DECLARATION_FALSIFIED:
       return "a reset alone does not help, every candidate stays F: declare a larger bound, or larger errors of what "
-             "is "
-             "recorded, in the task file, `forereach reload`, then `forereach reset`";
+             "is recorded, in the task file, `forereach reload`, then `forereach reset`";
     case fault_t::UNCERTIFIED_PLAN:
       return "find the program that commands the robot without the guard, or the other certifier on this bus; then "
              "`forereach reset`";

@@ -52,7 +52,7 @@ Json ToJson(const LatchFile::Content& content) {
   return json;
 }
 
-Eigen::MatrixXd PairFrom(const Json& lists, std::size_t most) {
+Eigen::MatrixXd RowsFrom(const Json& lists, std::size_t most) {
   const auto rows = lists.get<std::vector<std::vector<double>>>();
   if (rows.empty() || rows.size() > 2 || rows[0].empty() || rows[0].size() > most ||
       rows[0].size() != rows.back().size())
@@ -73,9 +73,9 @@ LatchFile::Content ContentFrom(const Json& json) {
   }
   for (const Json& entry : json.at("contradictions")) {
     LatchFile::Contradiction found{entry.at("model").get<Digest>(), {}};
-    found.rows.z = PairFrom(entry.at("z"), kMaxVariables);
-    found.rows.x_next = PairFrom(entry.at("next"), kMaxStates);
-    found.rows.longer = PairFrom(entry.at("longer"), 1);
+    found.rows.z = RowsFrom(entry.at("z"), kMaxVariables);
+    found.rows.x_next = RowsFrom(entry.at("next"), kMaxStates);
+    found.rows.longer = RowsFrom(entry.at("longer"), 1);
     found.rows.num_learned = entry.at("learned").get<int>();
     if (found.rows.x_next.rows() != found.rows.size() || found.rows.longer.size() != found.rows.size() ||
         found.rows.num_learned < 0 || found.rows.num_learned > found.rows.size())

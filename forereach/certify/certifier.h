@@ -54,9 +54,9 @@ class Certifier final {
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
   noise bound, and its disturbance within the declared one. @param longer by how much the step lasted longer or shorter
   than dt, at most, s. @param by_clock the same by its clock, where steps are declared to be on time and the clock does
-  not count: for Contradiction alone. Do not call it while Certify runs. Cost: about a microsecond; some more where
-  `longer` is not 0, because the model's text is read anew. If Compact has not been called for 256 transitions, it also
-  builds an index. @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
+  not count: for Contradiction alone. Do not call it while Certify runs. Cost: about a microsecond. If Compact has not
+  been called for 256 transitions, it also builds an index. @pre no ResidualEnclosure was supplied. The same holds for
+  num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next, double longer = 0,
                 std::optional<double> by_clock = {});
   /** Number of learned transitions that are not in the index yet. */
