@@ -125,19 +125,23 @@ Vector Boat(const Vector& x, const Vector& tau) {
   const Real m = Decimal(23.8), iz = Decimal(1.76), xg = Decimal(0.046), smooth = Decimal(0.01);
   const Vector3 nu = x.tail(3);
   const Real u = nu[0], v = nu[1], r = nu[2];
-  const Vector3 size(std::sqrt(u * u + smooth * smooth), std::sqrt(v * v + smooth * smooth),
-                     std::sqrt(r * r + smooth * smooth));
+  const Vector3 size = nu.cwiseAbs();
+  const auto smoothed = [&](Real speed) { return std::sqrt(speed * speed + smooth * smooth); };
   Matrix3 rigid, added, coriolis, damping, turn;
   rigid << m, 0, 0, 0, m, m * xg, 0, m * xg, iz;
   added << 2, 0, 0, 0, 10, 0, 0, 0, 1;
   const Real c13 = -m * (xg * r + v) - 10 * v, c23 = m * u + 2 * u;
   coriolis << 0, 0, c13, 0, 0, c23, -c13, -c23, 0;
-  const auto d = [&](double linear, double by_v, double by_r) {
-    return -(Decimal(linear) + Decimal(by_v) * size[1] + Decimal(by_r) * size[2]);
+  // Of a coefficient of v or r; the absolute value of the other is smoothed.
+  const auto of_v = [&](double linear, double by_v, double by_r) {
+    return -(Decimal(linear) + Decimal(by_v) * size[1] + Decimal(by_r) * smoothed(r));
+  };
+  const auto of_r = [&](double linear, double by_v, double by_r) {
+    return -(Decimal(linear) + Decimal(by_v) * smoothed(v) + Decimal(by_r) * size[2]);
   };
   damping << -(Decimal(-0.72253) + Decimal(-1.32742) * size[0] + Decimal(-5.86643) * u * u), 0, 0,  //
-      0, d(-0.88965, -36.47287, -0.805), d(-7.25, -0.845, -3.45),                                   //
-      0, d(0.0313, 3.95645, 0.13), d(-1.9, 0.08, -0.75);
+      0, of_v(-0.88965, -36.47287, -0.805), of_r(-7.25, -0.845, -3.45),                             //
+      0, of_v(0.0313, 3.95645, 0.13), of_r(-1.9, 0.08, -0.75);
   turn = Eigen::AngleAxis<Real>(x[2], Vector3::UnitZ()).toRotationMatrix();
   const Vector3 forces = tau - coriolis * nu - damping * nu;
   Vector rate(6);
