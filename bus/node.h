@@ -61,7 +61,8 @@ inline constexpr int kTickMs = 2;
 it; a process that calls it earlier also ends cleanly if a signal arrives during its start. */
 void CatchStopSignals();
 
-/** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. */
+/** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. Tells systemd, where it
+started the process, when the node is ready and stops, and that its loop turns (sd_notify(3), WatchdogSec=). */
 void RunNode(Node& node, Bus& bus);
 
 }  // namespace forereach

@@ -36,8 +36,11 @@ int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands{CertifyCommand()};
   for (const OfflineCommand& each : kOfflineCommands) {
-    const char* const program = each.name == std::string_view(kLive.name) ? FOREREACH_LIVE : FOREREACH_OFFLINE;
-    if (argc > 1 && each.name == std::string_view(argv[1])) return Become(program, argv);
+    const std::string_view name = each.name;
+    const char* const program = name == kLive.name   ? FOREREACH_LIVE
+                                : name == kDemo.name ? FOREREACH_DEMO
+                                                     : FOREREACH_OFFLINE;
+    if (argc > 1 && name == argv[1]) return Become(program, argv);
     commands.push_back({.name = each.name, .purpose = each.purpose, .run = [=] { return Become(program, argv); }});
   }
   for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),

@@ -1,6 +1,6 @@
 /** The commands that `forereach` leaves to other programs. Those of forereach-offline need no robot, and OMPL, SQLite,
 cairo and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web server:
-the commands that stop and start a robot do without. */
+the commands that stop and start a robot do without. `demo` is a script. */
 #pragma once
 
 namespace forereach {
@@ -65,8 +65,12 @@ inline constexpr OfflineCommand kLive{"live",
                                       "Show the running robot on a page for this machine's browsers, until Ctrl-C: it "
                                       "listens to the bus and sends nothing"};
 
+/** scripts/drive-demo. */
+inline constexpr OfflineCommand kDemo{"demo",
+                                      "Drive a car through circles and traffic, with a report and a picture in ./run"};
+
 inline constexpr OfflineCommand kOfflineCommands[] = {kInit,    kImport, kCheck,   kFit,    kExportModel, kPlan,
                                                       kDeclare, kVerify, kReplay,  kAdvise, kReport,      kCheckLog,
-                                                      kRun,     kExport, kLogEdit, kLive};
+                                                      kRun,     kExport, kLogEdit, kLive, kDemo};
 
 }  // namespace forereach

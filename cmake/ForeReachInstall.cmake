@@ -4,6 +4,8 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim)
 install(TARGETS forereach-live forereach-offline DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
+install(PROGRAMS scripts/drive-demo DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach RENAME demo)
+install(PROGRAMS scripts/ready-bus DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
 
 set_target_properties(forereach_library PROPERTIES EXPORT_NAME forereach OUTPUT_NAME forereach)
 set_target_properties(forereach_guard PROPERTIES EXPORT_NAME guard)
@@ -39,3 +41,14 @@ configure_package_config_file(cmake/ForeReachConfig.cmake.in ForeReachConfig.cma
 write_basic_package_version_file(ForeReachConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/ForeReachConfig.cmake ${CMAKE_BINARY_DIR}/ForeReachConfigVersion.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
+
+# For a system: units of systemd, completion for bash, and what pkg-config knows of the library.
+file(READ systemd/hardening.conf hardening)
+string(STRIP "${hardening}" hardening)
+foreach(unit forereach-bus forereach-certifier@ forereach-logger@)
+  configure_file(systemd/${unit}.service.in ${CMAKE_BINARY_DIR}/systemd/${unit}.service @ONLY)
+  install(FILES ${CMAKE_BINARY_DIR}/systemd/${unit}.service DESTINATION lib/systemd/system)
+endforeach()
+install(FILES scripts/completion.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME forereach)
+configure_file(cmake/forereach.pc.in ${CMAKE_BINARY_DIR}/forereach.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/forereach.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
