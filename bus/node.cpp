@@ -13,8 +13,8 @@ volatile std::sig_atomic_t stop_requested = 0, reload_requested = 0;
 void RequestStop(int) { stop_requested = 1; }
 void RequestReload(int) { reload_requested = 1; }
 
-// What systemd hears of a service of Type=notify: that it is ready, that its loop still turns, that it ends. Nothing where
-// systemd did not start the process.
+// What systemd hears of a service of Type=notify: that it is ready, that its loop still turns, that it ends. Nothing
+// where systemd did not start the process.
 class Service final {
  public:
   Service() {

@@ -71,6 +71,6 @@ inline constexpr OfflineCommand kDemo{"demo",
 
 inline constexpr OfflineCommand kOfflineCommands[] = {kInit,    kImport, kCheck,   kFit,    kExportModel, kPlan,
                                                       kDeclare, kVerify, kReplay,  kAdvise, kReport,      kCheckLog,
-                                                      kRun,     kExport, kLogEdit, kLive, kDemo};
+                                                      kRun,     kExport, kLogEdit, kLive,   kDemo};
 
 }  // namespace forereach
