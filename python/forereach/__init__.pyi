@@ -1,0 +1,3 @@
+from ._forereach import Bus, Decision, Error, Log, Supervisor, Task, Tube
+
+__all__ = ["Bus", "Decision", "Error", "Log", "Supervisor", "Task", "Tube"]
