@@ -47,6 +47,13 @@ Eigen::VectorXd VectorOf(const py::handle& given, const std::string& name) {
   return Eigen::Map<const Eigen::VectorXd>(numbers.data(), numbers.size());
 }
 
+std::pair<py::object, py::object> PairOf(const py::handle& x0) {
+  if (!py::isinstance<py::sequence>(x0) || py::len(x0) != 2)
+    throw std::invalid_argument("x0: must be a pair (center, half_width)");
+  const auto pair = py::reinterpret_borrow<py::sequence>(x0);
+  return {pair[0], pair[1]};
+}
+
 Eigen::MatrixXd ControlsOf(const py::handle& given) {
   const py::array_t<double> numbers = NumbersOf(given, "U", 2);
   return Steps(numbers.data(), numbers.shape(0), numbers.shape(1));

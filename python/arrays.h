@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <pybind11/numpy.h>
@@ -24,6 +25,9 @@ no real numbers of at most 64 bits. Numbers that are not finite pass: they are j
 [[nodiscard]] py::array_t<double> NumbersOf(const py::handle& given, const std::string& name, int dimensions);
 
 [[nodiscard]] Eigen::VectorXd VectorOf(const py::handle& given, const std::string& name);
+
+/** The two arrays of an x0. @throws std::invalid_argument if it is no pair. */
+[[nodiscard]] std::pair<py::object, py::object> PairOf(const py::handle& x0);
 
 /** (T, m) as m-by-T, a column a step: the layout of a Plan. */
 [[nodiscard]] Eigen::MatrixXd ControlsOf(const py::handle& given);

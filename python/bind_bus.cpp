@@ -40,10 +40,12 @@ class PlannerBus final {
     opened_.bus().Subscribe(channels.robot_state, [this](const Received& received) { TakeState(received); });
   }
 
-  std::int64_t Propose(const py::object& controls, const std::pair<py::object, py::object>& x0, std::int64_t start,
+  std::int64_t Propose(const py::object& controls, const py::object& x0, std::int64_t start,
                        std::optional<int> progress) {
     const Eigen::MatrixXd plan = ControlsOf(controls);
-    const Eigen::VectorXd center = VectorOf(x0.first, "x0: center"), width = VectorOf(x0.second, "x0: half_width");
+    const auto [given_center, given_width] = PairOf(x0);
+    const Eigen::VectorXd center = VectorOf(given_center, "x0: center"),
+                          width = VectorOf(given_width, "x0: half_width");
     task_->Require(plan, Zonotope::FromBox(center, width));
     candidate_plan_t candidate{};
     candidate.utime = WallClockUs();

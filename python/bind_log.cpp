@@ -1,7 +1,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <limits>
+#include <span>
 
 #include "python/arrays.h"
 #include "python/bindings.h"
@@ -82,9 +82,9 @@ std::vector<Cells> Read(const Log& log, Table::Of of, LogDamage& damage, PassedO
 }
 
 // Integers stay integers as long as each row has one; texts and lists are objects.
-py::array ColumnOf(const std::vector<Cells>& rows, std::size_t column) {
-  bool has_objects = false, has_reals = rows.empty();
-  for (const Cells& row : rows) {
+py::array ColumnOf(const std::vector<Cells>& rows, std::size_t column, const Cells& of_none) {
+  bool has_objects = false, has_reals = false;
+  for (const Cells& row : rows.empty() ? std::span(&of_none, 1) : std::span(rows)) {
     const Cell& cell = row[column].second;
     has_objects |= std::holds_alternative<std::string>(cell) || std::holds_alternative<std::vector<double>>(cell);
     has_reals |= std::holds_alternative<double>(cell) || std::holds_alternative<std::monostate>(cell);
@@ -115,7 +115,7 @@ py::dict Columns(const Log& log, Table::Of of) {
   if (const std::string text = DescribePassedOver(passed_over); !text.empty()) warn("the log was read" + text);
   py::dict columns;
   const Cells names = NamesOf(of);
-  for (std::size_t i = 0; i < names.size(); ++i) columns[names[i].first] = ColumnOf(rows, i);
+  for (std::size_t i = 0; i < names.size(); ++i) columns[names[i].first] = ColumnOf(rows, i, names);
   return columns;
 }
 

@@ -26,7 +26,10 @@ using WithoutGil = py::call_guard<py::gil_scoped_release>;
 std::string TextOf(const py::object& task) {
   if (py::isinstance<py::str>(task)) return task.cast<std::string>();
   if (!py::isinstance<py::dict>(task)) throw std::invalid_argument("task: must be a dict or the text of a task file");
-  const py::cpp_function plain([](const py::object& value) { return value.attr("tolist")(); });  // NumPy's
+  const py::cpp_function plain([](const py::object& value) -> py::object {
+    if (py::hasattr(value, "tolist")) return value.attr("tolist")();  // NumPy's
+    throw std::invalid_argument("task: " + py::repr(value).cast<std::string>() + " is no value of a task file");
+  });
   return py::module_::import("json")
       .attr("dumps")(task, py::arg("indent") = 1, py::arg("ensure_ascii") = false, py::arg("default") = plain)
       .cast<std::string>();
@@ -43,10 +46,8 @@ TaskPointer LoadTaskFile(const std::string& path) { return std::make_shared<Judg
 // ---- Certifying.
 
 Box BoxOf(const py::handle& x0) {
-  const auto pair = py::reinterpret_borrow<py::object>(x0).cast<std::pair<py::object, py::object>>();
-  const Eigen::VectorXd center = VectorOf(pair.first, "x0: center"),
-                        half_width = VectorOf(pair.second, "x0: half_width");
-  return Box::FromCenter(center, half_width);
+  const auto [center, half_width] = PairOf(x0);
+  return Box::FromCenter(VectorOf(center, "x0: center"), VectorOf(half_width, "x0: half_width"));
 }
 
 JudgementPointer CertifyPlan(const JudgingTask& task, const py::object& controls, const py::object& x0) {
@@ -60,8 +61,8 @@ JudgementPointer CertifyPlan(const JudgingTask& task, const py::object& controls
 // One X_0, or with center and half_width of (B, n) one for each plan.
 std::vector<Box> BoxesOf(const py::object& x0) {
   if (x0.is_none()) return {};
-  const auto [center, half_width] = x0.cast<std::pair<py::object, py::object>>();
-  if (py::array::ensure(center).ndim() == 1) return {BoxOf(x0)};
+  const auto [center, half_width] = PairOf(x0);
+  if (const py::array array = py::array::ensure(center); !array || array.ndim() != 2) return {BoxOf(x0)};
   const py::array_t<double> centers = NumbersOf(center, "x0: center", 2),
                             widths = NumbersOf(half_width, "x0: half_width", 2);
   if (centers.shape(0) == 0 || centers.shape(0) != widths.shape(0))

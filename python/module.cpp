@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <typeinfo>
 
+#include "bus/log.h"
 #include "lcmtypes/bad_input.h"
 #include "python/bindings.h"
 
@@ -31,6 +32,7 @@ void TranslateErrors(py::module_& module) {
 
 PYBIND11_MODULE(_forereach, module) {
   module.doc() = "ForeReach: certifies planned control sequences before a robot executes them.";
+  SetUpLog("forereach");
   TranslateErrors(module);
   BindTask(module);
   BindLog(module);
