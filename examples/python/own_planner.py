@@ -47,7 +47,7 @@ while True:
             if answer["plan_id"] == plan and answer["certified"]:
                 certified += 1
                 ax = decision.plot(ax)
-                while (state := bus.robot_state(timeout=30)) and state["utime"] <= start:
+                while (later := bus.robot_state(timeout=30)) and later["utime"] <= start:
                     pass
 if ax:
     ax.figure.savefig(picture)

@@ -66,7 +66,8 @@ class Columns(unittest.TestCase):
     def test_warn_of_what_is_damaged_and_have_the_rest(self):
         whole = len(fr.Log(LOG, config=TASK).decisions()["utime"])
         damaged = bytearray(Path(LOG).read_bytes())
-        damaged[len(damaged) // 2 : len(damaged) // 2 + 400] = bytes(400)
+        record = damaged.index(b"\xed\xa1\xda\x01", len(damaged) // 2)
+        damaged[record : record + 28] = bytes(28)
         file = self.scratch / "damaged.lcmlog"
         file.write_bytes(damaged)
         with self.assertWarnsRegex(UserWarning, "damaged in 1 place"):
