@@ -12,6 +12,7 @@
 #include "python/bindings.h"
 #include "python/judgement.h"
 #include "task/config_text.h"
+#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -152,6 +153,17 @@ py::list AdviceList(const Judgement& judgement) {
   return all;
 }
 
+// The task's problem with all that it observed. What is estimated from angles that jump by a turn is wrong.
+std::shared_ptr<const Problem> WithoutWrappedAngle(const JudgingTask& task) {
+  const std::shared_ptr<const Problem> problem = task.problem();
+  RequireNoWrappedAngle(task.config().path, "observations", task.model(), problem->transitions);
+  return problem;
+}
+
+py::array_t<double> PerCoordinate(const Eigen::VectorXd& vector) {
+  return ArrayOf({vector.begin(), vector.end()}, {vector.size()});
+}
+
 py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, double factor, bool noise,
                  bool disturbance) {
   ProposalOptions options{factor, noise, disturbance, ColumnsBy(by, task.model())};
@@ -159,7 +171,7 @@ py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, do
   HeldOutSteps held_out;
   const Declaration found = [&] {
     const py::gil_scoped_release release;
-    const std::shared_ptr<const Problem> problem = task.problem();
+    const std::shared_ptr<const Problem> problem = WithoutWrappedAngle(task);
     try {
       const Observations observations = ObserveForProposal(*problem, problem->transitions);
       Declaration declaration = Propose(problem->declaration, observations, options).declaration;
@@ -169,11 +181,14 @@ py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, do
       throw ConfigError(task.config().path + ": " + Explain(unexplained, task.config(), options));
     }
   }();
+  Eigen::VectorXd disturbance_bound(found.noise_bound.size());
+  for (Eigen::Index k = 0; k < disturbance_bound.size(); ++k) disturbance_bound[k] = found.DisturbanceBound(k);
   using namespace py::literals;
-  return py::dict(
-      "lipschitz"_a = ArrayOf(found.lipschitz), "noise_bound"_a = ArrayOf(found.noise_bound).attr("ravel")(),
-      "yaml"_a = "declaration:\n" + DeclarationYaml(found, task.model()), "held_out_slices"_a = held_out.slices,
-      "held_out_outside"_a = held_out.outside, "warning"_a = WarningOf(held_out));
+  return py::dict("lipschitz"_a = ArrayOf(found.lipschitz), "noise_bound"_a = PerCoordinate(found.noise_bound),
+                  "disturbance"_a = PerCoordinate(disturbance_bound),
+                  "yaml"_a = "declaration:\n" + DeclarationYaml(found, task.model()),
+                  "held_out_slices"_a = held_out.slices, "held_out_outside"_a = held_out.outside,
+                  "warning"_a = WarningOf(held_out));
 }
 
 py::dict FitOf(const JudgingTask& task, const std::vector<std::string>& names) {
@@ -183,7 +198,7 @@ py::dict FitOf(const JudgingTask& task, const std::vector<std::string>& names) {
                       " is compiled; only the parameters of a model as text can be fitted");
   const Fit fit = [&] {
     const py::gil_scoped_release release;
-    return FitParameters(*text, task.problem()->transitions, names);
+    return FitParameters(*text, WithoutWrappedAngle(task)->transitions, names);
   }();
   using namespace py::literals;
   py::dict parameters, deviations;
@@ -293,8 +308,8 @@ It is judged with what the task knew when it decided.)")
            py::arg("estimate_noise") = false, py::arg("estimate_disturbance") = true,
            R"(A declaration proposed from the observations, as `forereach declare --from-data`; it proves nothing.
 
-by: "v,omega" for every state, or "theta=v,omega" for one. The result has `lipschitz` (n, n + m), `noise_bound` (n,),
-`yaml`, and of the task's own steps how many slices were held against steps left out, how many miss them, and a warning.)")
+by: "v,omega" for every state, or "theta=v,omega" for one. The result has `lipschitz` (n, n + m),
+`noise_bound` and `disturbance` (n,), `yaml`, and of the task's own steps how many slices were held against steps left out, how many miss them, and a warning.)")
       .def("fit", &FitOf, py::arg("parameters"),
            R"(Fits the named parameters of a model as text to the observations, as `forereach fit`.
 
