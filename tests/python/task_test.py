@@ -8,6 +8,7 @@ import sys
 import tempfile
 import threading
 import unittest
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,11 @@ class Decisions(unittest.TestCase):
                 for key in ["outcome", "cause", "step", "obstacle", "message"]:
                     self.assertEqual(getattr(decision, key), said[key], key)
                 self.assertEqual(decision.certified, said["outcome"] == "certified")
+                if said["obstacle"] is None:
+                    self.assertIsNone(decision.clearance)
+                else:
+                    self.assertAlmostEqual(decision.clearance, said["margin"] - said["threshold"], 12)
+                    self.assertLessEqual(Fraction(decision.clearance), Fraction(said["margin"]) - Fraction(said["threshold"]))
                 self.assertEqual(len(decision.tube), len(said["tube"]))
                 self.assertEqual(decision.tube.center.tolist(), [each["center"] for each in said["tube"]])
                 self.assertEqual(decision.tube.half_width.tolist(), [each["half_width"] for each in said["tube"]])
@@ -98,6 +104,28 @@ class Decisions(unittest.TestCase):
         advice = task.advise(task.certify(plan("bicycle_safety")[0]))
         self.assertIn("obstacles", [each["change"] for each in advice if each["turns"]])
         self.assertEqual(task.advise(task.certify(plan("bicycle_certified")[0])), [])
+
+    def test_are_drawn_as_they_were_made_whatever_was_learned_since(self):
+        task = fr.Task.load("examples/python/rover.yaml")
+        controls = np.repeat([[2.0, 1.2], [-2.0, -1.2]], 10, axis=0)
+        before = task.certify(controls)
+        drawn = before._picture()["tube"]
+        self.assertEqual(len(drawn), len(before.tube))
+        for corners, center in zip(drawn, before.tube.center):
+            self.assertTrue((corners.min(axis=0) < center[:2]).all() and (center[:2] < corners.max(axis=0)).all())
+        for v in np.linspace(-1.9, 1.9, 200):
+            self.assertEqual(task.observe([0, 0, v, v, 0, 0], [0.05 * v, 0.05 * v, v, v]), "")
+        self.assertEqual([each.tolist() for each in before._picture()["tube"]], [each.tolist() for each in drawn])
+        after = task.certify(controls)
+        self.assertNotEqual(after._picture()["tube"][-1].tolist(), drawn[-1].tolist())
+        axes = after.plot()
+        self.assertIs(before.plot(axes), axes)
+        self.assertGreaterEqual(len(axes.patches), len(drawn) + len(after.tube) + 6)
+
+    def test_of_a_task_that_is_not_planar_are_not_drawn(self):
+        task = fr.Task.load("config/drive/quadrotor.yaml")
+        decision = task.certify(np.zeros((1, len(task.inputs))))
+        self.assertRaisesRegex(fr.Error, "plot: the task has 3 safety coordinates", decision.plot)
 
     def test_load_matplotlib_only_to_draw(self):
         program = f"import sys, forereach as fr\nfr.Task.load({BICYCLE!r})\nprint('matplotlib' in sys.modules)"
