@@ -1,5 +1,6 @@
 #include <exception>
 #include <stdexcept>
+#include <utility>
 
 #include <pybind11/stl.h>
 
@@ -13,7 +14,8 @@
 namespace forereach {
 namespace {
 
-// A robot that is an object of Python. What its functions raise goes to sys.unraisablehook, and stops the robot.
+// A robot that is an object of Python. What its functions raise stops the robot and goes to sys.unraisablehook, or,
+// what is to end the program (KeyboardInterrupt, SystemExit), to the caller of the supervisor.
 class PythonRobot final : public Supervisor::Robot {
  public:
   PythonRobot(py::object robot, const OpenedBus& opened) : robot_(std::move(robot)), opened_(opened) {}
@@ -38,6 +40,11 @@ class PythonRobot final : public Supervisor::Robot {
   }
   void Send(const std::string& channel, Bytes message) override { opened_.Send(channel, message); }
 
+  [[nodiscard]] bool is_interrupted() const { return interrupt_ != nullptr; }
+  void RaiseInterrupt() {
+    if (interrupt_) std::rethrow_exception(std::exchange(interrupt_, nullptr));
+  }
+
  private:
   bool Has(const char* name) const { return py::hasattr(robot_, name); }
 
@@ -46,7 +53,10 @@ class PythonRobot final : public Supervisor::Robot {
     try {
       use(robot_.attr(name));
     } catch (py::error_already_set& error) {
-      error.discard_as_unraisable(name);
+      if (error.matches(PyExc_Exception))
+        error.discard_as_unraisable(name);
+      else
+        interrupt_ = std::current_exception();
       throw std::runtime_error(std::string(name) + " of the robot raised an exception");
     } catch (const std::exception& error) {
       PyErr_SetString(PyExc_ValueError, error.what());
@@ -66,6 +76,7 @@ class PythonRobot final : public Supervisor::Robot {
   const py::object robot_;
   const OpenedBus& opened_;
   mutable std::vector<double> state_, error_;
+  mutable std::exception_ptr interrupt_;
 };
 
 class BusSupervisor final {
@@ -94,10 +105,15 @@ class BusSupervisor final {
   BusSupervisor(const BusSupervisor&) = delete;
   BusSupervisor& operator=(const BusSupervisor&) = delete;
 
-  void Listen(std::int64_t until_utime) const {
-    opened_.Listen(until_utime, [] { return false; });
+  void Listen(std::int64_t until_utime) {
+    opened_.Listen(until_utime, [this] { return robot_.is_interrupted(); });
+    robot_.RaiseInterrupt();
   }
-  py::object Boundary(std::int64_t utime, bool ends) { return Control(Own().Boundary(utime, WallClockUs(), ends)); }
+  py::object Boundary(std::int64_t utime, bool ends) {
+    const py::object control = Control(Own().Boundary(utime, WallClockUs(), ends));
+    robot_.RaiseInterrupt();
+    return control;
+  }
   py::object Control() { return Control(Own().control()); }
   void Expect(const JudgingTask& task) { ExpectTask(task.config(), Own()); }
   bool halted() { return Own().halted(); }

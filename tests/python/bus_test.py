@@ -103,6 +103,8 @@ class Ends(BusTest):
         rover.failing = ZeroDivisionError("no sensor")
         self.assertIsNone(supervisor.boundary(now()))
         self.assertIn("no sensor", [str(each) for each in raised])
+        rover.failing = KeyboardInterrupt()
+        self.assertRaises(KeyboardInterrupt, supervisor.boundary, now())
         rover.failing, rover.x = None, "no numbers"
         self.assertIsNone(supervisor.boundary(now()))
         self.assertIn("state: is of dtype", str(raised[-1]))
