@@ -16,6 +16,8 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
+#include "planner_bridge/motion.h"
+#include "task/config_error.h"
 
 namespace forereach {
 namespace {
@@ -655,6 +657,22 @@ std::vector<Place> RankPlaces(const std::vector<Case>& cases, const std::vector<
   }
   std::ranges::stable_sort(ranked, std::ranges::greater{}, &Place::turned);
   return ranked;
+}
+
+BrakingTails TailsOf(const Config& task) {
+  std::shared_ptr<const RobotMotion> motion;
+  try {
+    motion = std::make_shared<const RobotMotion>(task, Braking::kPlanned);
+  } catch (const ConfigError&) {
+    return {};
+  }
+  return [motion, steps = task.planner.tail_steps](const Eigen::VectorXd& state) {
+    std::vector<Eigen::MatrixXd> tails;
+    Eigen::MatrixXd controls;
+    for (int tail = 0; tail < motion->num_tails(); ++tail)
+      if (motion->Brake({state.data(), ToSize(state.size())}, tail, steps, controls)) tails.push_back(controls);
+    return tails;
+  };
 }
 
 }  // namespace forereach

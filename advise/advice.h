@@ -15,6 +15,8 @@ declaration, an obstacle has to be elsewhere. */
 
 namespace forereach {
 
+struct Config;
+
 enum class Change {
   kObstacles,     ///< S: each obstacle that may be touched stands farther away; or the plan passes it so.
   kInitialSet,    ///< S, D: a smaller X_0 around the same center.
@@ -55,8 +57,11 @@ struct Advice {
 };
 
 /** The ways to brake from a state (n entries) to rest: m-by-K controls each, a column a step; none if there is no way.
-The adviser knows no laws of braking; who asks has the planner's. */
+ */
 using BrakingTails = std::function<std::vector<Eigen::MatrixXd>(const Eigen::VectorXd& state)>;
+
+/** Those of the task's planner; none if the task does not say how its robot brakes. */
+[[nodiscard]] BrakingTails TailsOf(const Config& task);
 
 struct AdviceOptions {
   int most_observations = 8;  ///< How many places kObservation tries; 0: none.

@@ -14,8 +14,6 @@
 #include "command_line/progress.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/parallel.h"
-#include "planner_bridge/motion.h"
-#include "task/config_error.h"
 
 namespace forereach {
 
@@ -66,23 +64,6 @@ void from_json(const nlohmann::json& json, AbstentionAdvice& advice) {
 }
 
 namespace {
-
-// Those of the task's planner; none if the task does not say how its robot brakes.
-BrakingTails TailsOf(const Config& task) {
-  std::shared_ptr<const RobotMotion> motion;
-  try {
-    motion = std::make_shared<const RobotMotion>(task, Braking::kPlanned);
-  } catch (const ConfigError&) {
-    return {};
-  }
-  return [motion, steps = task.planner.tail_steps](const Eigen::VectorXd& state) {
-    std::vector<Eigen::MatrixXd> tails;
-    Eigen::MatrixXd controls;
-    for (int tail = 0; tail < motion->num_tails(); ++tail)
-      if (motion->Brake({state.data(), ToSize(state.size())}, tail, steps, controls)) tails.push_back(controls);
-    return tails;
-  };
-}
 
 AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
   if (!abstention.missing.empty()) return {{}, {}, abstention.missing};

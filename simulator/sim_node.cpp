@@ -18,6 +18,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "lcmtypes/why_failed.h"
+#include "simulator/supervised.h"
 #include "task/json_text.h"
 #include "task/step_time.h"
 
@@ -36,43 +37,6 @@ std::optional<Config> Load(const std::string& path, const BusOptions& in_force) 
 } catch (const std::exception& error) {
   logging::Error("not reloaded: {}", WhyFailed(error));
   return std::nullopt;
-}
-
-GuardDomain DomainOf(const Config& config) {
-  const auto entries = [](const Eigen::VectorXd& bounds) { return std::vector<double>(bounds.begin(), bounds.end()); };
-  const Domain& domain = config.problem->domain;
-  return {entries(domain.state.lower()), entries(domain.state.upper()), entries(domain.input.lower()),
-          entries(domain.input.upper())};
-}
-
-std::vector<double> StateErrorOf(const Config& config) {
-  const Eigen::VectorXd& error = config.problem->declaration.state_error;
-  return {error.begin(), error.end()};
-}
-
-SupervisorOptions OptionsOf(const Config& config) {
-  SupervisorOptions options;
-  options.guard.num_states = config.problem->model->num_states();
-  options.guard.num_inputs = config.problem->model->num_inputs();
-  options.guard.step_us = Microseconds(config.robot.step_period_ms);
-  options.guard.config_digest = config.grounds.config;
-  options.guard.model_digest = config.grounds.model;
-  options.guard.keys = KeysOf(config.bus, Role::kRobot);
-  options.guard.bus_name = config.bus.bus_name();
-  options.guard.channel = config.bus.certified;
-  options.guard.withdrawn = config.bus.withdrawn;
-  options.guard.domain = DomainOf(config);
-  options.guard.angles = config.problem->model->angles();
-  options.guard.state_error = StateErrorOf(config);
-  options.guard.step_error_us = StepErrorUs(config.gate);
-  options.max_age_us = Microseconds(config.gate.max_age_ms);
-  options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
-  options.fault = config.bus.fault;
-  options.command = config.bus.command;
-  options.robot_state = config.bus.robot_state;
-  options.transition = config.bus.transition;
-  options.event = config.bus.event;
-  return options;
 }
 
 // Acts on the states that are zero while the robot stands. @throws ConfigError if nobody says which.
@@ -121,7 +85,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Pl
       obstacles_(config),
       state_(config.robot.start),
       measured_(state_),
-      supervisor_(OptionsOf(config_), *this) {
+      supervisor_(SupervisorOptionsOf(config_), *this) {
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
@@ -162,8 +126,7 @@ void RobotSimNode::TakeReload() {
   if (!config) return;
   if (StepErrorUs(config->gate) != StepErrorUs(config_.gate))  // the guard keeps its own
     return logging::Error("not reloaded: robot.step_error_ms cannot change while the robot runs");
-  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config), config->problem->model->angles(),
-                     StateErrorOf(*config));
+  ExpectTask(*config, supervisor_);
   logging::Info("plans certified under {} as it is now are accepted", config_.path);
 }
 

@@ -15,6 +15,7 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
+#include "task/config_text.h"
 #include "task/csv.h"
 #include "task/document.h"
 #include "task/draft.h"
@@ -124,8 +125,7 @@ void RequireSteps(const Document& file, const Problem& problem) try {
   file.Fail("robot.step_error_ms", error.what());
 }
 
-Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
-  Document file(path);
+Config Load(Document file, TransitionsFile transitions, const NamedFiles& instead) {
   TaskDraft draft;
   draft.model_file.path = instead.model;
   file.Read(draft);
@@ -138,7 +138,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
     problem.transitions = ReadTransitions(transitions_path, model, file.Place("transitions"));
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
   }
-  config.path = path;
+  config.path = file.path();
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   if (transitions == TransitionsFile::kRead) {
     const int all = problem.transitions.size();
@@ -165,10 +165,16 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
 
 }  // namespace
 
-Config LoadConfig(const std::string& path, TransitionsFile transitions) { return Load(path, transitions, {}); }
+Config LoadConfig(const std::string& path, TransitionsFile transitions) {
+  return Load(Document(path), transitions, {});
+}
 
 Config LoadConfig(const std::string& path, const NamedFiles& instead) {
-  return Load(path, TransitionsFile::kRead, instead);
+  return Load(Document(path), TransitionsFile::kRead, instead);
+}
+
+Config ConfigOfText(const std::string& path, const std::string& text) {
+  return Load(Document::OfText(path, text), TransitionsFile::kRead, {});
 }
 
 NamedFiles FilesNamedBy(const std::string& path) {

@@ -604,9 +604,12 @@ void Field::Fail(std::string_view name, const std::string& what) const {
 }
 
 Document::Document(const std::string& path, const std::string& named_by)
-    : path_(path),
-      text_(ReadWhole(path, kLargestTaskFile, named_by)),
-      root_(new Field::Node{*this, "", "", ParseYaml(path, text_)}) {}
+    : Document(path, Text{ReadWhole(path, kLargestTaskFile, named_by)}) {}
+
+Document::Document(std::string path, Text text)
+    : path_(std::move(path)),
+      text_(std::move(text.bytes)),
+      root_(new Field::Node{*this, "", "", ParseYaml(path_, text_)}) {}
 
 Document::~Document() = default;
 

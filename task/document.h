@@ -6,6 +6,7 @@ messages. */
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "task/field.h"
 #include "task/schema.h"
@@ -17,6 +18,10 @@ class Document final {
   /** Reads and parses a file. @param named_by prefix of the message that it cannot be read: the place that names it.
   @throws ConfigError if it cannot be read, or is not exactly one YAML document. */
   explicit Document(const std::string& path, const std::string& named_by = "");
+  /** Parses this text as if it stood in the file. @throws ConfigError if it is not exactly one YAML document. */
+  [[nodiscard]] static Document OfText(std::string path, std::string text) {
+    return {std::move(path), Text{std::move(text)}};
+  }
   ~Document();
 
   /** Checks the whole document in one pass: the keys of a map before its values, its values in the schema's order. Each
@@ -39,6 +44,11 @@ class Document final {
   [[noreturn]] void Fail(std::string_view key, const std::string& what) const;
 
  private:
+  struct Text {
+    std::string bytes;
+  };
+  Document(std::string path, Text text);
+
   std::string path_, text_;
   std::unique_ptr<Field::Node> root_;
 };

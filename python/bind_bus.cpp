@@ -1,0 +1,146 @@
+#include <cmath>
+#include <deque>
+#include <stdexcept>
+
+#include <pybind11/stl.h>
+
+#include "certifier/gate/robot_messages.h"
+#include "certifier/gate/stamp.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "lcmtypes/names.h"
+#include "lcmtypes/stream_order.h"
+#include "python/arrays.h"
+#include "python/bindings.h"
+#include "python/judgement.h"
+#include "python/open_bus.h"
+
+namespace forereach {
+namespace {
+
+std::int64_t In(double seconds) {
+  if (!(seconds >= 0)) throw std::invalid_argument("timeout: must be a number of seconds that is not negative");
+  return WallClockUs() + static_cast<std::int64_t>(std::min(seconds, 1e9) * 1e6);
+}
+
+// A planner's end of the bus.
+class PlannerBus final {
+ public:
+  PlannerBus(std::shared_ptr<const JudgingTask> task, const std::string& key, const std::string& url,
+             std::string source)
+      : task_(std::move(task)), opened_(task_->config(), Role::kPlanner, key, url), source_(std::move(source)) {
+    const BusOptions& channels = opened_.config().bus;
+    if (source_.empty() || source_.size() >= sizeof(candidate_plan_t::source))
+      throw std::invalid_argument("source: must be a name of 1 to 31 characters");
+    opened_.bus().Subscribe(channels.decision, [this](const Received& received) {
+      const auto decision = Decoded<decision_t>(received.bytes);
+      if (decision && GetText(decision->source) == source_) decisions_.push_back(*decision);
+    });
+    opened_.bus().Subscribe(channels.robot_state, [this](const Received& received) { TakeState(received); });
+  }
+
+  std::int64_t Propose(const py::object& controls, const py::object& x0, std::int64_t start,
+                       std::optional<int> progress) {
+    const Eigen::MatrixXd plan = ControlsOf(controls);
+    const auto [given_center, given_width] = PairOf(x0);
+    const Eigen::VectorXd center = VectorOf(given_center, "x0: center"),
+                          width = VectorOf(given_width, "x0: half_width");
+    task_->Require(plan, Zonotope::FromBox(center, width));
+    candidate_plan_t candidate{};
+    candidate.utime = WallClockUs();
+    candidate.sequence = proposed_;
+    candidate.plan_id = last_plan_id_ = std::max(last_plan_id_ + 1, candidate.utime);
+    SetText(candidate.source, source_);
+    candidate.start_utime = start;
+    candidate.step_us = Microseconds(task_->config().robot.step_period_ms);
+    candidate.num_states = static_cast<std::int16_t>(center.size());
+    candidate.num_inputs = static_cast<std::int16_t>(plan.rows());
+    candidate.num_steps = static_cast<std::int16_t>(plan.cols());
+    if (progress && (*progress < 0 || *progress > plan.cols()))
+      throw std::invalid_argument("progress_steps: " + std::to_string(*progress) + ", must be 0 to the steps of U");
+    candidate.progress_steps = static_cast<std::int16_t>(progress.value_or(candidate.num_steps));
+    std::ranges::copy(center, candidate.initial_center);
+    std::ranges::copy(width, candidate.initial_half_width);
+    for (Eigen::Index t = 0; t < plan.cols(); ++t) std::ranges::copy(plan.col(t), candidate.control[t]);
+    opened_.Send(opened_.config().bus.candidate, Encode(candidate));
+    ++proposed_;
+    return candidate.plan_id;
+  }
+
+  py::list Decisions(double timeout) {
+    opened_.Listen(In(timeout), [this] { return !decisions_.empty(); });
+    using namespace py::literals;
+    py::list all;
+    for (const decision_t& decision : std::exchange(decisions_, {}))
+      all.append(py::dict("plan_id"_a = decision.plan_id, "certified"_a = decision.outcome == decision_t::CERTIFIED,
+                          "outcome"_a = std::string(OutcomeName(decision.outcome)),
+                          "cause"_a = std::string(CauseName(decision.cause)), "step"_a = IndexOrNone(decision.step),
+                          "obstacle"_a = IndexOrNone(decision.obstacle), "utime"_a = decision.utime,
+                          "elapsed_us"_a = decision.elapsed_us, "message"_a = GetText(decision.message)));
+    return all;
+  }
+
+  py::object RobotState(double timeout) {
+    opened_.Listen(In(timeout), [this] { return state_.has_value(); });
+    const std::optional<robot_state_t> state = std::exchange(state_, std::nullopt);
+    if (!state) return py::none();
+    using namespace py::literals;
+    const char* const mode = state->mode == robot_state_t::EXECUTING  ? "executing"
+                             : state->mode == robot_state_t::STANDING ? "standing"
+                                                                      : "finished";
+    return py::dict("utime"_a = state->utime, "mode"_a = mode,
+                    "state"_a = ArrayOf({state->state, state->state + state->num_states}, {state->num_states}),
+                    "executing_plan_id"_a = IndexOrNone(state->executing_plan_id),
+                    "executing_step"_a = IndexOrNone(state->executing_step));
+  }
+
+ private:
+  void TakeState(const Received& received) {
+    const auto state = Decoded<robot_state_t>(received.bytes);
+    const GateOptions& gate = task_->config().gate;
+    if (!state || !FaultOf(*state, task_->model().num_states()).empty() ||
+        CheckStamp(state->utime, received.utime, gate).freshness == Freshness::kFuture)
+      return;
+    const StreamPosition position{state->sequence, state->utime};
+    const std::int64_t horizon = StreamOrder::Horizon(received.utime, Microseconds(gate.max_ahead_ms));
+    if (!IsNews(order_.Compare(position, horizon))) return;
+    order_.Take(position, horizon);
+    state_ = state;
+  }
+
+  const std::shared_ptr<const JudgingTask> task_;
+  const OpenedBus opened_;
+  const std::string source_;
+  std::deque<decision_t> decisions_;
+  std::optional<robot_state_t> state_;
+  StreamOrder order_;
+  std::int64_t proposed_ = 0, last_plan_id_ = 0;
+};
+
+}  // namespace
+
+void BindBus(py::module_& module) {
+  py::class_<PlannerBus>(module, "Bus",
+                         R"(A planner's end of the bus: candidates out, decisions and the robot's states in.
+
+Messages are signed and checked as those of the other processes. Only the thread that opened it may use it.)")
+      .def(py::init([](std::shared_ptr<JudgingTask> task, const std::string& key, const std::string& url,
+                       const std::string& source) { return std::make_unique<PlannerBus>(task, key, url, source); }),
+           py::arg("task"), py::arg("key") = "", py::arg("url") = "", py::arg("source") = "python",
+           "key: the planner's key file, or a directory with it; url: of the bus. By default those of the task.")
+      .def("propose", &PlannerBus::Propose, py::arg("U"), py::arg("x0"), py::arg("start"),
+           py::arg("progress_steps") = py::none(),
+           R"(Sends a candidate, and returns its plan_id.
+
+U: (T, m). x0: (center, half_width), (n,) each: where the robot is expected at `start`, microseconds since the Unix
+epoch, at a boundary of its steps. progress_steps: the controls before the braking tail.)")
+      .def("decisions", &PlannerBus::Decisions, py::arg("timeout") = 0.0,
+           "The decisions on candidates of this source that came since the last call. Waits up to `timeout` s for one.")
+      .def("robot_state", &PlannerBus::RobotState, py::arg("timeout") = 0.0,
+           R"(The newest state of the robot, if it came since the last call; otherwise None, after `timeout` s.
+
+utime: the boundary of its step, microseconds. state: (n,).)");
+}
+
+}  // namespace forereach

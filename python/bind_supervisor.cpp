@@ -1,0 +1,175 @@
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include <pybind11/stl.h>
+
+#include "bus/log.h"
+#include "python/arrays.h"
+#include "python/bindings.h"
+#include "python/judgement.h"
+#include "python/open_bus.h"
+#include "simulator/supervised.h"
+
+namespace forereach {
+namespace {
+
+// A robot that is an object of Python. What its functions raise stops the robot and goes to sys.unraisablehook, or,
+// what is to end the program (KeyboardInterrupt, SystemExit), to the caller of the supervisor.
+class PythonRobot final : public Supervisor::Robot {
+ public:
+  PythonRobot(py::object robot, const OpenedBus& opened) : robot_(std::move(robot)), opened_(opened) {}
+
+  std::span<const double> state() const override { return Numbers("state", state_); }
+  std::span<const double> state_error() const override {
+    return Has("state_error") ? Numbers("state_error", error_) : std::span<const double>();
+  }
+  void Hold() override {
+    Call("hold", [&](const py::object& hold) { hold(); });
+  }
+  int StepsToRest(std::span<const double> lower, std::span<const double> upper) const override {
+    if (!Has("steps_to_rest")) return Robot::StepsToRest(lower, upper);
+    int steps = 0;
+    const auto array = [](std::span<const double> x) { return ArrayOf({x.begin(), x.end()}, {std::ssize(x)}); };
+    Call("steps_to_rest", [&](const py::object& rest) { steps = rest(array(lower), array(upper)).cast<int>(); });
+    if (steps < 0) throw std::runtime_error("steps_to_rest: negative");
+    return steps;
+  }
+  void Reload() override {
+    if (Has("reload")) Call("reload", [&](const py::object& reload) { reload(); });
+  }
+  void Send(const std::string& channel, Bytes message) override { opened_.Send(channel, message); }
+
+  [[nodiscard]] bool is_interrupted() const { return interrupt_ != nullptr; }
+  void RaiseInterrupt() {
+    if (interrupt_) std::rethrow_exception(std::exchange(interrupt_, nullptr));
+  }
+
+ private:
+  bool Has(const char* name) const { return py::hasattr(robot_, name); }
+
+  template <class Use>
+  void Call(const char* name, const Use& use) const {
+    try {
+      use(robot_.attr(name));
+    } catch (py::error_already_set& error) {
+      if (error.matches(PyExc_Exception))
+        error.discard_as_unraisable(name);
+      else
+        interrupt_ = std::current_exception();
+      throw std::runtime_error(std::string(name) + " of the robot raised an exception");
+    } catch (const std::exception& error) {
+      PyErr_SetString(PyExc_ValueError, error.what());
+      PyErr_WriteUnraisable(robot_.ptr());
+      throw std::runtime_error(std::string(name) + " of the robot returned what cannot be used");
+    }
+  }
+
+  std::span<const double> Numbers(const char* name, std::vector<double>& kept) const {
+    Call(name, [&](const py::object& numbers) {
+      const Eigen::VectorXd vector = VectorOf(numbers(), name);
+      kept.assign(vector.begin(), vector.end());
+    });
+    return kept;
+  }
+
+  const py::object robot_;
+  const OpenedBus& opened_;
+  mutable std::vector<double> state_, error_;
+  mutable std::exception_ptr interrupt_;
+};
+
+class BusSupervisor final {
+ public:
+  BusSupervisor(const std::shared_ptr<const JudgingTask>& task, py::object robot, const std::string& key,
+                const std::string& url)
+      : opened_(task->config(), Role::kRobot, key, url),
+        robot_(std::move(robot), opened_),
+        supervisor_(SupervisorOptionsOf(opened_.config()), robot_) {
+    const BusOptions& channels = opened_.config().bus;
+    // Handlers come without Python's lock, and the robot needs it.
+    const auto hear = [this](const std::string& channel, auto take) {
+      opened_.bus().Subscribe(channel, [this, take](const Received& received) {
+        const py::gil_scoped_acquire acquire;
+        take(received);
+      });
+    };
+    hear(channels.certified, [this](const Received& r) { supervisor_.OnCertified(r.raw, r.utime); });
+    hear(channels.withdrawn, [this](const Received& r) { supervisor_.OnWithdrawn(r.raw, r.utime); });
+    hear(channels.fault, [this](const Received& r) { supervisor_.OnFault(r.raw, r.utime); });
+    hear(channels.command, [this](const Received& r) {
+      if (const std::string why = supervisor_.OnCommand(r.raw, r.utime); !why.empty())
+        logging::Warn("{}: refused: {}", opened_.config().bus.command, why);
+    });
+  }
+  BusSupervisor(const BusSupervisor&) = delete;
+  BusSupervisor& operator=(const BusSupervisor&) = delete;
+
+  void Listen(std::int64_t until_utime) {
+    opened_.Listen(until_utime, [this] { return robot_.is_interrupted(); });
+    robot_.RaiseInterrupt();
+  }
+  py::object Boundary(std::int64_t utime, bool ends) {
+    const py::object control = Control(Own().Boundary(utime, WallClockUs(), ends));
+    robot_.RaiseInterrupt();
+    return control;
+  }
+  py::object Control() { return Control(Own().control()); }
+  void Expect(const JudgingTask& task) { ExpectTask(task.config(), Own()); }
+  bool halted() { return Own().halted(); }
+
+  py::dict Counts() {
+    const Supervisor::Counts& counts = Own().counts();
+    using namespace py::literals;
+    return py::dict(
+        "boundaries"_a = counts.boundaries, "steps"_a = counts.steps, "steps_inside"_a = counts.steps_inside,
+        "steps_consistent"_a = counts.steps_consistent, "accepted"_a = counts.accepted, "started"_a = counts.started,
+        "emergency_stops"_a = counts.emergency_stops, "errors"_a = counts.errors,
+        "failed_sends"_a = counts.failed_sends, "reports_lost"_a = counts.reports_lost, "refused"_a = counts.refused);
+  }
+
+ private:
+  Supervisor& Own() {
+    static_cast<void>(opened_.bus());  // of this thread
+    return supervisor_;
+  }
+  static py::object Control(std::span<const double> control) {
+    if (control.empty()) return py::none();
+    return ArrayOf({control.begin(), control.end()}, {std::ssize(control)});
+  }
+
+  const OpenedBus opened_;
+  PythonRobot robot_;
+  Supervisor supervisor_;
+};
+
+}  // namespace
+
+void BindSupervisor(py::module_& module) {
+  py::class_<BusSupervisor>(module, "Supervisor",
+                            R"(The robot's end of the bus: it executes certified plans and nothing else.
+
+It is the C++ Supervisor (robot/supervisor.h), which calls `robot`: state() -> (n,), as measured last; hold(), which
+comes to rest by its own means; and, where it has them, steps_to_rest(lower, upper) -> int, state_error() -> (n,),
+reload(). An exception in one of them stops the robot and goes to sys.unraisablehook. Only the thread that made it may
+use it.)")
+      .def(py::init(
+               [](std::shared_ptr<JudgingTask> task, py::object robot, const std::string& key, const std::string& url) {
+                 return std::make_unique<BusSupervisor>(task, std::move(robot), key, url);
+               }),
+           py::arg("task"), py::arg("robot"), py::arg("key") = "", py::arg("url") = "",
+           "key: the robot's key file, or a directory with it; url: of the bus. By default those of the task.")
+      .def("listen", &BusSupervisor::Listen, py::arg("until_utime"),
+           "Takes plans, withdrawals, faults and commands until this time, microseconds since the Unix epoch.")
+      .def("boundary", &BusSupervisor::Boundary, py::arg("utime"), py::arg("ends") = false,
+           R"(Handles the step boundary that was due at `utime`. ends: no further plan starts.
+
+Returns the control to apply until the next one, (m,); None: hold.)")
+      .def_property_readonly("control", py::overload_cast<>(&BusSupervisor::Control),
+                             "The control under way, until a stop or a withdrawal ends it; None: hold.")
+      .def("expect", &BusSupervisor::Expect, py::arg("task"), "After reload(): also accepts plans under this task.")
+      .def_property_readonly("halted", &BusSupervisor::halted, "Until an operator's reset.")
+      .def_property_readonly("counts", &BusSupervisor::Counts, "How often what has happened.");
+}
+
+}  // namespace forereach

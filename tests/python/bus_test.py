@@ -1,0 +1,193 @@
+"""A robot and a planner in Python against the certifier process, on a signed loopback bus; and what either end does wrong."""
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import forereach as fr
+
+BUILD = os.environ["FOREREACH_BUILD"]
+TASK = "examples/python/rover.yaml"
+# Below the ports that the kernel hands out by itself, and of this process alone.
+URL = f"udpm://239.255.76.67:{10_000 + os.getpid() % 10_000}?ttl=0"
+
+
+def now():
+    return time.time_ns() // 1000
+
+
+class Rover:
+    def __init__(self):
+        self.x, self.held, self.failing = np.zeros(4), 0, None
+
+    def state(self):
+        if self.failing:
+            raise self.failing
+        return self.x
+
+    def hold(self):
+        self.held += 1
+        self.x[2:] = 0
+
+
+class BusTest(unittest.TestCase):
+    def setUp(self):
+        self.scratch = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.keys = str(self.scratch / "keys")
+        command = [f"{BUILD}/cli/forereach", "keygen", "--robot", "rover", self.keys]
+        subprocess.run(command, check=True, capture_output=True)
+
+    def start(self, *command):
+        """A process, which ends with the test."""
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+        def end():
+            process.kill()
+            process.communicate()
+
+        self.addCleanup(end)
+        return process
+
+    def start_certifier(self):
+        program = f"{BUILD}/certifier/process/forereach-certifier"
+        certifier = self.start(program, "--config", TASK, "--lcm-url", URL, "--key", self.keys, "--state",
+                               str(self.scratch / "state"))
+        self.assertIn("ready", certifier.stdout.readline())
+
+
+class Drive(BusTest):
+    def test_own_planner_takes_own_robot_to_the_goal_in_certified_plans(self):
+        self.start_certifier()
+        robot = self.start(sys.executable, "-B", "examples/python/own_robot.py", URL, self.keys)
+        picture = self.scratch / "picture.png"
+        planner = subprocess.run([sys.executable, "-B", "examples/python/own_planner.py", picture, URL, self.keys],
+                                 capture_output=True, text=True, timeout=200)
+        self.assertEqual(planner.returncode, 0, planner.stderr)
+        plans = int(re.search(r"at the goal after (\d+) certified plans", planner.stdout)[1])
+        self.assertGreater(plans, 1)
+        self.assertEqual(picture.read_bytes()[:4], b"\x89PNG")
+        robot.send_signal(signal.SIGINT)
+        said = robot.communicate(timeout=60)[0]
+        driven, steps, inside = map(int, re.search(r"(\d+) plans, (\d+) steps, (\d+) inside", said).groups())
+        self.assertGreater(driven, 1)
+        self.assertEqual(inside, steps)
+
+
+class Ends(BusTest):
+    def supervisor(self, robot):
+        return fr.Supervisor(fr.Task.load(TASK), robot, key=self.keys, url=URL)
+
+    def test_of_a_robot_hold_without_a_certified_plan_and_count(self):
+        rover = Rover()
+        supervisor = self.supervisor(rover)
+        self.assertIsNone(supervisor.boundary(now()))
+        self.assertIsNone(supervisor.control)
+        self.assertEqual((supervisor.counts["boundaries"], supervisor.counts["started"]), (1, 0))
+        self.assertFalse(supervisor.halted)
+        supervisor.expect(fr.Task.load(TASK))
+
+    def test_of_a_robot_say_what_its_functions_raise_and_go_on(self):
+        rover, raised = Rover(), []
+        supervisor = self.supervisor(rover)
+        hook, sys.unraisablehook = sys.unraisablehook, lambda each: raised.append(each.exc_value)
+        self.addCleanup(setattr, sys, "unraisablehook", hook)
+        rover.failing = ZeroDivisionError("no sensor")
+        self.assertIsNone(supervisor.boundary(now()))
+        self.assertIn("no sensor", [str(each) for each in raised])
+        rover.failing = KeyboardInterrupt()
+        self.assertRaises(KeyboardInterrupt, supervisor.boundary, now())
+        rover.failing, rover.x = None, "no numbers"
+        self.assertIsNone(supervisor.boundary(now()))
+        self.assertIn("state: is of dtype", str(raised[-1]))
+        rover.x, before = np.zeros(4), supervisor.counts["errors"]
+        self.assertGreater(before, 0)
+        self.assertIsNone(supervisor.boundary(now()))
+        self.assertEqual(supervisor.counts["errors"], before)
+
+    def test_of_a_planner_hear_the_robots_states_and_send_only_what_fits(self):
+        task = fr.Task.load(TASK)
+        bus = fr.Bus(task, key=self.keys, url=URL)
+        rover = Rover()
+        supervisor = self.supervisor(rover)
+        rover.x[:2] = 0.25, -0.5
+        self.assertIsNone(bus.robot_state())
+        begin = now()
+        supervisor.boundary(begin + 60_000_000)  # a clock that is far ahead does not count
+        supervisor.boundary(begin)
+        state = bus.robot_state(timeout=30)
+        self.assertEqual((state["utime"], state["mode"], state["state"].tolist()), (begin, "standing", [0.25, -0.5, 0, 0]))
+        self.assertIsNone(state["executing_plan_id"])
+        self.assertIsNone(bus.robot_state())  # that one was taken
+        x0, U = (np.zeros(4), np.full(4, 0.01)), np.zeros((4, 2))
+        first, second = bus.propose(U, x0, begin), bus.propose(U, x0, begin)
+        self.assertGreater(second, first)
+        for words, call in [
+            ("3 inputs, the model has 2", lambda: bus.propose(np.zeros((4, 3)), x0, begin)),
+            ("129 steps", lambda: bus.propose(np.zeros((129, 2)), x0, begin)),
+            ("must be finite", lambda: bus.propose(np.full((4, 2), np.nan), x0, begin)),
+            ("dimension 3", lambda: bus.propose(U, (np.zeros(3), np.zeros(3)), begin)),
+            ("half", lambda: bus.propose(U, (np.zeros(4), np.full(4, -1.0)), begin)),
+            ("progress_steps: 5", lambda: bus.propose(U, x0, begin, progress_steps=5)),
+            ("timeout", lambda: bus.decisions(timeout=-1)),
+            ("timeout", lambda: bus.robot_state(timeout=float("nan"))),
+        ]:
+            self.assertRaisesRegex(fr.Error, words, call)
+
+    def test_are_answered_by_the_certifier_each_source_by_itself(self):
+        self.start_certifier()
+        task = fr.Task.load(TASK)
+        buses = [fr.Bus(task, key=self.keys, url=URL, source=name) for name in ["one", "other"]]
+        plan = buses[0].propose(np.zeros((4, 2)), (np.zeros(4), np.full(4, 0.01)), now())
+        answer = buses[0].decisions(timeout=60)
+        self.assertEqual([(each["plan_id"], each["outcome"]) for each in answer], [(plan, "rejected")])
+        self.assertEqual(buses[1].decisions(), [])
+
+    def test_take_the_keys_of_their_role_alone(self):
+        task = fr.Task.load(TASK)
+        self.assertRaisesRegex(fr.Error, "robot.key", fr.Bus, task, key=self.keys + "/robot.key", url=URL)
+        self.assertRaisesRegex(fr.Error, "nosuch", fr.Bus, task, key="nosuch", url=URL)
+        self.assertRaisesRegex(fr.Error, "planner.key", fr.Supervisor, task, Rover(), key=self.keys + "/planner.key", url=URL)
+        self.assertRaisesRegex(fr.Error, "http", fr.Bus, task, key=self.keys, url="http://here")
+        self.assertRaisesRegex(fr.Error, "source", fr.Bus, task, key=self.keys, url=URL, source="x" * 32)
+        with self.assertWarnsRegex(UserWarning, "UNSIGNED"):
+            fr.Bus(task, url=URL)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.assertRaises(UserWarning, fr.Bus, task, url=URL)
+
+    def test_belong_to_the_thread_that_opened_them(self):
+        bus = fr.Bus(fr.Task.load(TASK), key=self.keys, url=URL)
+        supervisor, refused = self.supervisor(Rover()), []
+
+        def use(call):
+            try:
+                call()
+            except fr.Error as error:
+                refused.append(str(error))
+
+        for call in [bus.decisions, bus.robot_state, lambda: supervisor.boundary(now()), lambda: supervisor.listen(0)]:
+            thread = threading.Thread(target=use, args=[call])
+            thread.start()
+            thread.join()
+        self.assertEqual(len(refused), 4, refused)
+
+    def test_end_waiting_when_they_are_interrupted(self):
+        program = ("import forereach as fr, sys; bus = fr.Bus(fr.Task.load(sys.argv[1]), key=sys.argv[2], url=sys.argv[3]);"
+                   "print('waits', flush=True); bus.decisions(timeout=1e6)")
+        waiting = self.start(sys.executable, "-B", "-c", program, TASK, self.keys, URL)
+        self.assertEqual(waiting.stdout.readline(), "waits\n")
+        waiting.send_signal(signal.SIGINT)
+        self.assertIn("KeyboardInterrupt", waiting.communicate(timeout=60)[0])
+
+
+if __name__ == "__main__":
+    unittest.main()
