@@ -524,44 +524,6 @@ TEST_F(ManyRunsTest, RowsHaveTheRobotAndRunsAFileEach) {
   EXPECT_EQ(FilesIn(scratch_.path()), (std::set<std::string>{"night", "night.jsonl", "tables", "mcaps", "tubes"}));
 }
 
-// What a killed command has finished is not made again: here a log that is gone since.
-TEST_F(ManyRunsTest, GoesOnAfterAnInterruption) {
-  std::filesystem::remove(scratch_ / "night/b/log/two.lcmlog");
-  const std::string resume = "--resume '" + (scratch_ / "kept") + "'";
-  ASSERT_EQ(ExportTo("jsonl", "first.jsonl", scratch_ / "night", resume).code, 0);
-  EXPECT_EQ(FilesIn(scratch_ / "kept").size(), 4u);
-  // The bytes of one of the kept files are changed, and with them the new output: it was taken.
-  for (const std::string& file : FilesIn(scratch_ / "kept"))
-    if (file.ends_with(".jsonl")) {
-      std::string text = Read(scratch_ / ("kept/" + file));
-      text[text.find("certified")] = 'C';
-      scratch_.Write("kept/" + file, text);
-    }
-  ASSERT_EQ(ExportTo("jsonl", "second.jsonl", scratch_ / "night", resume).code, 0);
-  const std::string first = Read(scratch_ / "first.jsonl"), second = Read(scratch_ / "second.jsonl");
-  EXPECT_NE(first, second);
-  EXPECT_EQ(first.size(), second.size());
-  // A changed log, a shorter file and a damaged result are made again.
-  for (const std::string& file : FilesIn(scratch_ / "kept"))
-    scratch_.Write("kept/" + file, file.ends_with(".jsonl") ? "" : "0123");
-  ASSERT_EQ(ExportTo("jsonl", "third.jsonl", scratch_ / "night", resume).code, 0);
-  EXPECT_EQ(Read(scratch_ / "third.jsonl"), first);
-  auto bytes = ReadBytes(scratch_ / "night/a/one.lcmlog");
-  bytes.resize(bytes.size() / 2);
-  WriteBytes(scratch_ / "night/a/one.lcmlog", bytes);
-  static_cast<void>(ExportTo("jsonl", "fourth.jsonl", scratch_ / "night", resume));
-  EXPECT_LT(Read(scratch_ / "fourth.jsonl").size(), first.size());
-}
-
-TEST_F(ManyRunsTest, WhatAKilledCommandLeftIsNoPartOfTheNextOutput) {
-  std::filesystem::create_directory(scratch_ / "tables.part-out");
-  for (const char* left : {"decisions.csv", "decisions.csv.part-a1B2c3"})
-    scratch_.Write(std::string("tables.part-out/") + left, "half a row");
-  ASSERT_EQ(ExportTo("csv", "tables", scratch_ / "night").code, 1) << "two.lcmlog cannot be read";
-  EXPECT_EQ(FilesIn(scratch_ / "tables").size(), 5u);
-  EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 2u * kCourseDecisions + 1);
-}
-
 TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {
   const std::string command = "'" FOREREACH_PROGRAM "' export '" + (scratch_ / "night") + "' --config '" + kConfig +
                               "' --format csv -o '" + (scratch_ / "tables") + "'";

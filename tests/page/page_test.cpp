@@ -3,12 +3,10 @@
 #include "page/columns.h"
 #include "page/detail.h"
 #include "page/gather.h"
-#include "page/rows_json.h"
 #include "page/sketch.h"
 #include "page/write.h"
 #include "records/database.h"
 #include "records/interpreter.h"
-#include "task/json_text.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/course.h"
@@ -277,49 +275,14 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
   EXPECT_EQ(few.details.size(), 5u) << "of the page, not of each run";
 }
 
-TEST_F(ManyRunsTest, APageMadeAfterAnInterruptionIsTheSame) {
-  const std::string all = "--advice-seconds 1000", resume = all + " --resume '" + (directory_ / "kept") + "'";
-  const Output first = Report("first.html", resume);
+TEST_F(ManyRunsTest, APageMadeOnOneCoreIsTheSame) {
+  const Output first = Report("first.html", "--advice-seconds 1000");
   EXPECT_EQ(first.code, 0) << first.text;
   EXPECT_THAT(first.text, HasSubstr(std::to_string(2 * kCourseDecisions) + " decisions"));
   EXPECT_THAT(first.text, HasSubstr(", 2 runs"));
   EXPECT_THAT(first.text, HasSubstr("two.lcmlog: is no LCM event log"));
-  const auto files =
-      std::distance(std::filesystem::directory_iterator(directory_ / "kept"), std::filesystem::directory_iterator());
-  EXPECT_EQ(files, 2);
-  EXPECT_EQ(Report("second.html", resume).code, 0);
-  EXPECT_EQ(Report("fresh.html", all + " --jobs 1").code, 0);
-  EXPECT_EQ(Read(directory_ / "first.html"), Read(directory_ / "second.html"));
+  EXPECT_EQ(Report("fresh.html", "--advice-seconds 1000 --jobs 1").code, 0);
   EXPECT_EQ(Read(directory_ / "first.html"), Read(directory_ / "fresh.html"));
-}
-
-// What is kept of a run comes back with every bit.
-TEST(RowsJsonTest, NumbersAndTextsSurviveARoundTrip) {
-  PageRun run;
-  DecisionRow row;
-  row.event = {"a", 7, "digest"};
-  row.margin = kInfinity;
-  row.threshold = std::nextafter(0.1, 1);
-  row.message = "a \x80 \x1b[2J \"<";
-  row.utime = std::numeric_limits<std::int64_t>::min();
-  row.grounds[4] = "os";
-  run.decisions = {row};
-  EventRow event;
-  event.state = {std::nan(""), -0.0, 1e-320};
-  run.events = {event};
-  run.gaps = {{{"a", -1, ""}, "C\xff", "s", 1, 3, 1, 9, "bus"}};
-  run.faults = {{1, 2, "c", "m"}};
-  run.withdrawals = {{1, 2, "s", "c", "m", 3}};
-  run.parts = {{"r", {{"a", "forereach replay a"}}, 1, 1, 1, 1, 1}};
-  run.tasks = {{"d", "n", {"x"}, {"u"}, "all_times", 2}};
-  run.damage = {1, 2};
-  const PageRun back = ParseJson(JsonText(nlohmann::json(run))).get<PageRun>();
-  EXPECT_EQ(PageHtml(back), PageHtml(run)) << "it shows the same";
-  EXPECT_EQ(back.decisions[0].threshold, row.threshold);
-  EXPECT_TRUE(std::isnan(back.decisions[0].elapsed_us));
-  EXPECT_TRUE(std::signbit(back.events[0].state[1]));
-  EXPECT_EQ(back.parts[0].replays, run.parts[0].replays);
-  EXPECT_EQ(back.damage.bytes, 2);
 }
 
 TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
