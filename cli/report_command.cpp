@@ -84,7 +84,7 @@ PageRun GatherRuns(const ReportArguments& options) {
     passes.push_back(std::move(of_named[k]));
   }
   AddMissing(page, named);
-  std::size_t numbers = bounds.numbers;
+  std::size_t bytes = bounds.bytes;
   const auto chosen = ChooseDetails(page, bounds), advised = ChooseAdvised(page, kMostAdvised);
   const RunLogs* const first = read.runs.data();
   auto drawn = ForEachRun<PageRun>(read, options.each_run, "drawn", [&](const RunLogs& run, RunWork& work) {
@@ -94,10 +94,10 @@ PageRun GatherRuns(const ReportArguments& options) {
       passes[k] = std::make_unique<PageRead>(bounds);
       ReadAgain(run, tasks, passes[k]->pass);
     }
-    return GatherDetails(passes[k]->pass, page, chosen[k], numbers, work.threads);
+    return GatherDetails(passes[k]->pass, page, chosen[k], bytes, work.threads);
   });
   for (auto& drawings : drawn)
-    if (drawings) AddDetails(page, std::move(*drawings), numbers);
+    if (drawings) AddDetails(page, std::move(*drawings), bytes);
   AddAdvice(options, passes, page);
   AddMissing(page, {{}, read.missing, true});
   return page;
@@ -138,8 +138,8 @@ Command ReportCommand() {
                   {.name = "--picture",
                    .variable = &report.picture,
                    .type = "FILE",
-                   .help = "Draw obstacles, tubes and driven path into a .svg, .png or .pdf file; without an ending a "
-                           ".svg and a .png",
+                   .help =
+                       "Draw obstacles, tubes and driven path into a .svg or .png file, without an ending into both",
                    .excludes = "--out"},
                   {"-o,--out", &options->out, "FILE.html",
                    "Write a page with figures, every decision and its tube, instead of the text"},

@@ -74,7 +74,7 @@ class PictureMaker final : public TimelineUser, CaseJudge {
         std::ranges::move(tube[t],
                           std::back_inserter(executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed
                                                                                                 : picture.certified));
-    for (const Obstacle& obstacle : timeline.logged_obstacles()) AddObstacle(obstacle, result_.picture);
+    picture.obstacles = timeline.logged_obstacles();
     return std::move(result_);
   }
 

@@ -361,7 +361,7 @@ TEST(BadInput, ExitsWithTwoAndNamesTheInputThatCannotBeUsed) {
       {"replay config --config tests/data/course.yaml", "config: neither a decision database nor event logs"},
       {"report config --config tests/data/course.yaml", "config: neither a decision database nor event logs"},
       {"report " + log + " --picture " + (scratch / "none/x.svg"), "there is no directory"},
-      {"report " + log + " --picture x.gif", "x.gif ends in .gif; it has to end in .svg, .png or .pdf"},
+      {"report " + log + " --picture x.gif", "x.gif ends in .gif; it has to end in .svg or .png"},
       {"report " + log + " --picture ''", "--picture: the value is empty; write a FILE"},
       {"check-log none", "none: there is no such directory"},
       {"run --config config", "config: is a directory, not a file"},
@@ -399,7 +399,6 @@ TEST(OutputFiles, AreWholeOrNotThere) {
   const std::string full = "cd '" FOREREACH_SOURCE_DIR "'; ulimit -f 8; trap '' XFSZ; '" FOREREACH_PROGRAM "' ";
   for (const std::string& arguments : {"report " + log + " --picture '" + (scratch / "a.svg") + "'",
                                        "report " + log + " --picture '" + (scratch / "a.png") + "'",
-                                       "report " + log + " --picture '" + (scratch / "a.pdf") + "'",
                                        "report " + log + " --out '" + (scratch / "a.html") + "'"}) {
     const Output output = Shell(full + arguments + " 2>&1");
     EXPECT_EQ(output.code, 2) << arguments << "\n" << output.text;
