@@ -437,8 +437,7 @@ TEST(Keygen, AgainReplacesOneKeyAndSaysWhoNeedsWhichFile) {
   const std::string keys = scratch / "keys";
   ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
   const Output output = Forereach("keygen --robot alpha " + keys + " --again planner 2>&1");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr(keys + ": the planner has a new key."));
+  EXPECT_THAT(output, Exits(0, keys + ": the planner has a new key."));
   std::size_t at = 0;
   for (const char* line :
        {"  certifier.key to the machine that speaks as certifier", "  robot.key to", "  perception.key to",
@@ -446,9 +445,8 @@ TEST(Keygen, AgainReplacesOneKeyAndSaysWhoNeedsWhichFile) {
     at = output.text.find(line, at);
     EXPECT_NE(at, std::string::npos) << line << "\n" << output.text;
   }
-  const Output other = Forereach("keygen --robot beta " + keys + " --again planner 2>&1");
-  EXPECT_EQ(other.code, 2);
-  EXPECT_THAT(other.text, HasSubstr("the keys are of robot alpha, not of beta"));
+  EXPECT_THAT(Forereach("keygen --robot beta " + keys + " --again planner 2>&1"),
+              Exits(2, "the keys are of robot alpha, not of beta"));
 }
 
 // The lines below "Example:", "Examples:" or "Try:".
@@ -470,8 +468,7 @@ std::vector<std::string> ExamplesOf(const std::string& help) {
 // What a robot's machine runs does not load what only plans, reads or draws.
 TEST(Program, CommandsForARunningSystemLoadNoLibraryOfTheOthers) {
   const Output libraries = Forereach("--version && ldd '" FOREREACH_PROGRAM "'");
-  ASSERT_EQ(libraries.code, 0) << libraries.text;
-  EXPECT_THAT(libraries.text, testing::HasSubstr("liblcm"));
+  ASSERT_THAT(libraries, Exits(0, "liblcm"));
   for (const char* library : {"libompl", "libcairo", "libmpfi", "libsqlite3"})
     EXPECT_THAT(libraries.text, testing::Not(testing::HasSubstr(library)));
 }

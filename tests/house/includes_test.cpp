@@ -54,15 +54,11 @@ class IncludesTest : public testing::Test {
 };
 
 TEST_F(IncludesTest, OurSourcesKeepTheIncludeRules) {
-  const Output result = CheckIncludes(FOREREACH_SOURCE_DIR);
-  EXPECT_EQ(result.code, 0) << result.text;
-  EXPECT_THAT(result.text, HasSubstr(" 0 against the arrows"));
+  EXPECT_THAT(CheckIncludes(FOREREACH_SOURCE_DIR), Exits(0, " 0 against the arrows"));
 }
 
 TEST_F(IncludesTest, ATreeThatKeepsTheRulesPasses) {
-  const Output result = CheckIncludes(root_.string());
-  EXPECT_EQ(result.code, 0) << result.text;
-  EXPECT_THAT(result.text, HasSubstr("14 files, 23 includes, 0 against the arrows"));
+  EXPECT_THAT(CheckIncludes(root_.string()), Exits(0, "14 files, 23 includes, 0 against the arrows"));
 }
 
 TEST_F(IncludesTest, TheDocumentHasEachFolderWithItsContentAndWhatItIncludes) {
@@ -70,9 +66,8 @@ TEST_F(IncludesTest, TheDocumentHasEachFolderWithItsContentAndWhatItIncludes) {
   EXPECT_THAT(table, HasSubstr("| `forereach` | the proof as a library"));
   EXPECT_THAT(table, testing::Not(HasSubstr("| ? |")));
   Write("docs/architecture.md", table);  // of another tree, which includes more
-  const Output result = CheckIncludes(root_.string());
-  EXPECT_EQ(result.code, 1);
-  EXPECT_THAT(result.text, HasSubstr("docs/architecture.md:1: the table of folders differs from the sources"));
+  EXPECT_THAT(CheckIncludes(root_.string()),
+              Exits(1, "docs/architecture.md:1: the table of folders differs from the sources"));
 }
 
 TEST_F(IncludesTest, ATreeWithoutSourcesIsAnError) {

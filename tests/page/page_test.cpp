@@ -306,10 +306,8 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
 
 TEST_F(ManyRunsTest, APageMadeOnOneCoreIsTheSame) {
   const Output first = Report("first.html", "--advice-seconds 1000");
-  EXPECT_EQ(first.code, 0) << first.text;
-  EXPECT_THAT(first.text, HasSubstr(std::to_string(2 * kCourseDecisions) + " decisions"));
-  EXPECT_THAT(first.text, HasSubstr(", 2 runs"));
-  EXPECT_THAT(first.text, HasSubstr("two.lcmlog: is no LCM event log"));
+  EXPECT_THAT(first, Exits(0, std::to_string(2 * kCourseDecisions) + " decisions", ", 2 runs",
+                           "two.lcmlog: is no LCM event log"));
   EXPECT_EQ(Report("fresh.html", "--advice-seconds 1000 --jobs 1").code, 0);
   EXPECT_EQ(Read(directory_ / "first.html"), Read(directory_ / "fresh.html"));
 }
@@ -317,14 +315,10 @@ TEST_F(ManyRunsTest, APageMadeOnOneCoreIsTheSame) {
 TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
   const ScratchDirectory directory;
   const std::string page = directory / "a page.html", report = "report '" + kLog + "' --config '" + kTask + "' --out '";
-  const Output first = Forereach(report + page + "' 2>&1");
-  EXPECT_EQ(first.code, 0) << first.text;
-  EXPECT_THAT(first.text, HasSubstr(std::to_string(kCourseDecisions) + " decisions"));
+  EXPECT_THAT(Forereach(report + page + "' 2>&1"), Exits(0, std::to_string(kCourseDecisions) + " decisions"));
   EXPECT_THAT(Read(page), testing::StartsWith("<!DOCTYPE html>"));
   directory.Write("a page.html", "mine");
-  const Output second = Forereach(report + page + "' 2>&1");
-  EXPECT_EQ(second.code, 2);
-  EXPECT_THAT(second.text, HasSubstr("the file exists"));
+  EXPECT_THAT(Forereach(report + page + "' 2>&1"), Exits(2, "the file exists"));
   EXPECT_EQ(Read(page), "mine");
   EXPECT_EQ(Forereach(report + page + "' --force 2>&1").code, 0);
   EXPECT_THAT(Read(page), testing::EndsWith("</html>\n"));
