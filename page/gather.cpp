@@ -347,7 +347,6 @@ PageRun EmptyPage(const std::vector<std::string>& inputs) {
   const bool is_log = kind != FileKind::kDirectory && kind != FileKind::kDatabase;
   const std::string name = is_log ? FileName(inputs[0]) : inputs[0];
   page.name = inputs.size() == 1 ? name : fmt::format("{} and {} more", name, inputs.size() - 1);
-  page.files = inputs;
   return page;
 }
 

@@ -2,7 +2,7 @@
 'use strict';
 (() => {
 const {OUTCOMES, EXECUTED, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, clockText,
-  listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, view, wholeOf, showView, startView, drawTube, fillLegend, showLegend} = ForeReach;
+  listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, wholeOf, showView, startView, drawTube, fillLegend, showLegend} = ForeReach;
 
 const MOST = {decisions: 120, faults: 60, withdrawals: 60, events: 60, gaps: 60, places: 600};
 const REFUSED_US = 3e6;  // as long is an abstention drawn
@@ -44,7 +44,7 @@ const showFigures = () => {
   const {counts, certifier, logger} = state.now, outcomes = counts.by_outcome ?? {};
   const of = (wanted) => Object.entries(outcomes).filter(([name]) => wanted(name)).reduce((sum, [, n]) => sum + n, 0);
   const abstained = of((name) => name.startsWith('abstain')), certified = outcomes.certified ?? 0;
-  const cards = [
+  fillCards([
     ['Decisions', counted(counts.decisions), counts.not_shown > 0 ? `${counted(counts.not_shown)} too fast to be listed` : ''],
     ['Certified', percent(certified, counts.decisions), `${counted(certified)}, if the declaration is true`],
     ['Abstained', counted(abstained), listed(new Map(Object.entries(counts.by_cause ?? {}).map(([name, n]) => [name.replaceAll('_', ' '), n])))],
@@ -53,12 +53,7 @@ const showFigures = () => {
     ['Messages lost', counted(counts.lost), `${counted(counts.gaps)} gaps; here ${counted(counts.dropped)} dropped`],
     ['Unreadable', counted(counts.undecodable), `messages; ${counted(counts.datagrams_refused)} datagrams`],
     ['Logger', !logger ? '\u2013' : age(logger.heard) > SILENT_US ? 'silent' : logger.level, logger ? `${counted(logger.lost)} events lost` : 'not heard'],
-  ];
-  byId('figures').replaceChildren(...cards.map(([name, value, note]) => {
-    const card = make('div');
-    card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'));
-    return card;
-  }));
+  ]);
   const {robot} = state.now;
   fillList('facts', robot ? [
     ['Mode', robot.mode],

@@ -2,7 +2,7 @@
 'use strict';
 (() => {
 const {OUTCOMES, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf, timeText, clockText,
-  listed, drawPart, drawChart, axis, legend, fillTable, fillList, view, startView, drawTube, showLegend} = ForeReach;
+  listed, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, startView, drawTube, showLegend} = ForeReach;
 
 // ---- Columns: base64 of zlib's format, each in an element of its own.
 const ARRAYS = {i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
@@ -224,16 +224,12 @@ const figuresOf = (run) => {
 
 const showFigures = (run, before) => {
   const old = before ? figuresOf(before) : null;
-  byId('figures').replaceChildren(...figuresOf(run).map(([name, value, note], k) => {
-    const card = make('div');
-    card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'));
-    if (old) {
-      const dd = make('dd', 'before: ', 'before');
-      dd.append(make('b', old[k][1]), old[k][2] ? ` (${old[k][2]})` : '');
-      card.append(dd);
-    }
-    return card;
-  }));
+  fillCards(figuresOf(run), (k) => {
+    if (!old) return [];
+    const dd = make('dd', 'before: ', 'before');
+    dd.append(make('b', old[k][1]), old[k][2] ? ` (${old[k][2]})` : '');
+    return [dd];
+  });
 };
 
 const BINS = 48;

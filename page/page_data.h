@@ -86,7 +86,6 @@ struct PagePart {
 /** One side of a page: a run, or several. */
 struct PageRun {
   std::string name;
-  std::vector<std::string> files;  ///< What it was read from.
   std::vector<DecisionRow> decisions;
   std::vector<EventRow> events;
   std::vector<GapRow> gaps;

@@ -102,6 +102,12 @@ const fillTable = (table, caption, heads, rows, numeric = []) => {
 const fillList = (id, entries) => byId(id).replaceChildren(...entries.filter(([, value]) => value !== '' && value !== null)
   .flatMap(([name, value]) => [make('dt', name), make('dd', value)]));
 
+// Figures: name, value and note each, and what `more` adds to the k-th.
+const fillCards = (cards, more = () => []) => byId('figures').replaceChildren(...cards.map(([name, value, note], k) => {
+  const card = make('div');
+  card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'), ...more(k));
+  return card;
+}));
 
 // ---- Drawings: SVG of records/svg.h, which holds numbers and names of classes alone, in metres.
 const view = {x: 0, y: 0, width: 1, height: 1, whole: null, detail: null};
@@ -206,6 +212,6 @@ const showLegend = (color, detail) => fillLegend([[color, 'tube'],
   ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']]);
 
 return {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf,
-  timeText, clockText, listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, view, wholeOf, showView, startView, drawTube,
+  timeText, clockText, listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, wholeOf, showView, startView, drawTube,
   fillLegend, showLegend};
 })();

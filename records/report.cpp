@@ -228,7 +228,7 @@ bool Report(const ReportOptions& options, std::ostream& out) {
     drawn.picture.title = TitleOf(last);
     drawn.picture.key_numbers = KeyNumbers(summary);
   }
-  for (const std::string& file : files) DrawPicture(drawn.picture, file, options.width, options.height);
+  for (const std::string& file : files) DrawPicture(drawn.picture, file);
 
   const bool is_whole = summary.damage.places == 0 && named.missing.empty();
   if (options.json) {

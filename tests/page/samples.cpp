@@ -69,7 +69,7 @@ PageRun Hostile() {
   const double infinity = std::numeric_limits<double>::infinity();
   PageRun run = Many(20);
   run.name = evil;
-  run.files = run.notes = {evil};
+  run.notes = {evil};
   for (DecisionRow& row : run.decisions) {
     row.source = evil, row.message = evil, row.outcome = evil, row.cause = "__proto__";
     row.event.log_file = evil, row.plan_digest = evil;
