@@ -5,8 +5,7 @@ const {OUTCOMES, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, num
   listed, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, startView, drawTube, showLegend} = ForeReach;
 
 // ---- Columns: base64 of zlib's format, each in an element of its own.
-const ARRAYS = {i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
-  i64: BigInt64Array, f32: Float32Array, f64: Float64Array};
+const ARRAYS = {u8: Uint8Array, i32: Int32Array, u32: Uint32Array, i64: BigInt64Array, f32: Float32Array, f64: Float64Array};
 const packed = document.getElementsByClassName('column');
 
 const bytesOf = (base64) => {
@@ -35,7 +34,6 @@ const unpackTable = async (columns) => {
 };
 // Of 64-bit integers, by their halves, since big integers are slow.
 const toNumbers = (bigs) => {
-  if (!(bigs instanceof BigInt64Array)) return Float64Array.from(bigs);
   const numbers = new Float64Array(bigs.length), low = new Uint32Array(bigs.buffer), high = new Int32Array(bigs.buffer);
   for (let i = 0; i < numbers.length; ++i) numbers[i] = 2 ** 32 * high[2 * i + 1] + low[2 * i];
   return numbers;

@@ -30,18 +30,6 @@ TEST(ColumnsTest, ColumnNamesItsType) {
   EXPECT_EQ(Column(std::vector<float>{})["type"], "f32");
 }
 
-TEST(ColumnsTest, IntegersAreInTheNarrowestTypeThatHasThem) {
-  using std::int64_t, std::uint32_t;
-  EXPECT_EQ(Column(std::vector<int64_t>{})["type"], "i8");
-  EXPECT_EQ(Column(std::vector<int64_t>{-128, 127})["type"], "i8");
-  EXPECT_EQ(Column(std::vector<int64_t>{0, 128})["type"], "i16");
-  EXPECT_EQ(Column(std::vector<int64_t>{0, -32769})["type"], "i32");
-  EXPECT_EQ(Column(std::vector<int64_t>{0, int64_t{1} << 31})["type"], "i64");
-  EXPECT_EQ(Column(std::vector<uint32_t>{255})["type"], "u8");
-  EXPECT_EQ(Column(std::vector<uint32_t>{256})["type"], "u16");
-  EXPECT_EQ(Column(std::vector<uint32_t>{65536})["type"], "u32");
-}
-
 // How far a point lies outside of a convex polygon whose corners are in counter-clockwise order.
 double Outside(const Svg::Points& polygon, const Eigen::Vector2d& point) {
   double most = 0;
