@@ -62,7 +62,7 @@ double RoundLength(double length) {
 // About as wide as it is in DejaVu Sans.
 double TextWidth(const std::string& text, double size) {
   const auto is_begin = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; };
-  return 0.58 * size * static_cast<double>(std::ranges::count_if(text, is_begin));
+  return 0.51 * size * static_cast<double>(std::ranges::count_if(text, is_begin));
 }
 
 // Lengths of header and legend are in units, of which 1200 x 800 fit.
