@@ -63,7 +63,6 @@ void DrawChart(const Chart& chart, const std::string& path) {
   }
   paper.Write(chart.x_name, kLeft, y_of(0) + 42, 13);
   paper.Write(chart.y_name, kLeft, y_of(100) - 8, 13);
-  double key = kLeft;
   for (std::size_t s = 0; s < chart.series.size(); ++s) {
     const auto& [name, y] = chart.series[s];
     Require(y.size() == chart.x.size(),
@@ -74,9 +73,9 @@ void DrawChart(const Chart& chart, const std::string& path) {
         paper.Line(x_of(chart.x[i - 1]), y_of(y[i - 1]), x_of(chart.x[i]), y_of(y[i]), kColors[s], 2);
       paper.Dot(x_of(chart.x[i]), y_of(y[i]), 4, kColors[s]);
     }
-    paper.Dot(key, kHeight - 26, 4, kColors[s]);
-    paper.Write(name, key + 10, kHeight - 21, 11);
-    key += 6.4 * static_cast<double>(name.size()) + 32;
+    const double x = kLeft + (s % 2 == 0 ? 0 : kWidth / 2), height = kHeight - 40 + 18 * static_cast<double>(s / 2);
+    paper.Dot(x, height, 4, kColors[s]);
+    paper.Write(name, x + 10, height + 5, 13);
   }
   WriteSvg(path, static_cast<int>(kWidth), static_cast<int>(kHeight), paper.Done());
 }
