@@ -762,7 +762,7 @@ class Examination final {
     result_.is_planar = true;
     Picture& picture = result_.picture;
     picture.title = "forereach check: " + std::filesystem::path(options_.config).filename().string();
-    for (const Obstacle& obstacle : config_.obstacles) AddObstacle(obstacle, picture);
+    picture.obstacles = config_.obstacles;
     for (Eigen::Index i = 0; i < all_.z.rows(); i += 1 + all_.z.rows() / kMostCompared)
       picture.observations.emplace_back(problem_.projection * all_.z.row(i).head(model_.num_states()).transpose());
     const Eigen::VectorXd center = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;

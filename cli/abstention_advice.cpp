@@ -151,7 +151,7 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
           "not searched within {:g} s: `forereach advise` searches all, or write a longer --advice-seconds", seconds);
     else
       advised[run][i] = AdviceFor(abstention, tails.at(abstention.task));
-    if (--left[run] == 0 && finished) finished->Keep(keys[run], advised[run], {});
+    if (--left[run] == 0 && finished) finished->Keep(keys[run], advised[run]);
     progress.Advance();
   });
   return advised;

@@ -170,7 +170,7 @@ Command CheckCommand() {
                        "Steps of the plan without a file; by default planner.progress_steps + planner.tail_steps",
                        NumberRange{1, kMaxSteps}},
                       {"--picture", &options->picture, "NAME",
-                       "Draws data, tube, obstacles and goal into NAME.svg and NAME.png, or a NAME.svg, .png or .pdf"},
+                       "Draws data, tube, obstacles and goal into NAME.svg and NAME.png, or into one of them"},
                       JsonFlag(options->json)},
           .run = [options] { return Check(*options); }};
 }

@@ -398,7 +398,7 @@ Command DeclareCommand() {
                   {.name = "--picture",
                    .variable = &options->data.picture,
                    .type = "NAME",
-                   .help = "With --hold-out: the trade-off as NAME.svg and NAME.png, or as one of .svg, .png, .pdf",
+                   .help = "With --hold-out: the trade-off as NAME.svg and NAME.png, or as one of them",
                    .needs = "--hold-out"},
                   JobsOption(options->jobs),
                   JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},

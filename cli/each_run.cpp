@@ -8,11 +8,11 @@
 namespace forereach {
 
 std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command, const std::string& config,
-                                        const LogKey& key, TransitionsFile transitions) {
+                                        const LogKey& key) {
   if (options.resume.empty()) return nullptr;
   BusOptions bus;
   if (!config.empty()) {
-    const Config task = LoadConfig(config, transitions);
+    const Config task = LoadConfig(config);
     for (const auto& [name, digest] : kGrounds) command += " " + ToHex(task.grounds.*digest);
     bus = task.bus;
   }

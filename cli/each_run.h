@@ -27,8 +27,7 @@ namespace forereach {
 /** The options of such a command. */
 struct EachRunOptions {
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
-  std::string resume;   ///< The directory of FinishedRuns; empty for none.
-  bool is_own = false;  ///< Whether the command deletes that directory at its end.
+  std::string resume;  ///< The directory of FinishedRuns; empty for none.
 
   void AddTo(std::vector<Option>& options) {
     options.push_back(JobsOption(jobs));
@@ -62,17 +61,6 @@ class RunWork final {
   void Finish(std::size_t units) {
     if (units > told_) progress_.Advance(units - told_);
   }
-  /** Its result is kept. */
-  void KeepIn(const FinishedRuns& finished, std::string key) {
-    finished_ = &finished;
-    key_ = std::move(key);
-  }
-  /** The path of a file of its result. @pre It is kept. */
-  [[nodiscard]] std::string NewFile(const std::string& name) {
-    files_.push_back(finished_->PathOf(key_, name));
-    return files_.back();
-  }
-  [[nodiscard]] const std::vector<std::string>& files() const { return files_; }
 
   static constexpr std::int64_t kUnit = 1 << 20;
   static std::size_t UnitsOf(const RunLogs& run) { return static_cast<std::size_t>(BytesOf(run) / kUnit + 1); }
@@ -81,11 +69,8 @@ class RunWork final {
 
  private:
   Progress& progress_;
-  const FinishedRuns* finished_ = nullptr;
-  std::string key_;
   std::int64_t pending_ = 0;
   std::size_t told_ = 0;
-  std::vector<std::string> files_;
 };
 
 /** Calls one(run, work) for each run, on `options.jobs` threads in all, and returns the results in the order of the
@@ -134,22 +119,18 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
                                               const FinishedRuns* finished, const One& one) {
   return ForEachRun<Result>(named, options, done, [&](const RunLogs& run, RunWork& work) -> Result {
     if (!finished) return one(run, work);
-    // A single run whose result is not kept need not be told from others, which costs a pass over its logs.
-    const bool is_only = options.is_own && named.runs.size() == 1;
-    const std::string key = is_only ? std::string(64, '0') : finished->KeyOf(run);
-    if (auto kept = is_only ? std::nullopt : finished->FindAs<Result>(key)) return std::move(*kept);
-    work.KeepIn(*finished, key);
+    const std::string key = finished->KeyOf(run);
+    if (auto kept = finished->FindAs<Result>(key)) return std::move(*kept);
     Result result = one(run, work);
-    finished->Keep(key, result, work.files());
+    finished->Keep(key, result);
     return result;
   });
 }
 
 /** The results of finished runs of one command, or null without --resume.
 @param command its name and every option that changes a result; task file and key are added to it.
-@param transitions whether results depend on those that the task file names. @throws BadInput if one cannot be read. */
+@throws BadInput if one cannot be read. */
 [[nodiscard]] std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command,
-                                                      const std::string& config, const LogKey& key,
-                                                      TransitionsFile transitions = TransitionsFile::kRead);
+                                                      const std::string& config, const LogKey& key);
 
 }  // namespace forereach

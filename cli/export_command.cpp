@@ -1,7 +1,12 @@
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <iostream>
+
+#include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
@@ -9,7 +14,6 @@
 #include "lcmtypes/printable.h"
 #include "records/export.h"
 #include "records/output_file.h"
-#include "records/result_json.h"
 
 namespace forereach {
 namespace {
@@ -68,30 +72,33 @@ void WriteTable(const ExportArguments& options, const std::vector<std::optional<
   JoinTables(options.what.format, parts, path);
 }
 
-// Removes what a killed command left in its directory, also files that it had not named yet (NAME.part-XXXXXX).
-void RemoveFilesOf(const fs::path& directory, const std::vector<std::string>& names) {
-  std::error_code error;
-  std::vector<fs::path> left;
-  for (const auto& entry : fs::directory_iterator(directory, error))
-    if (std::ranges::any_of(names, [file = entry.path().filename().string()](const std::string& name) {
-          return file == name || file.starts_with(name + ".part-");
-        }))
-      left.push_back(entry.path());
-  for (const fs::path& file : left) fs::remove(file, error);
-}
+// What is written before it has its name. After a kill it stays.
+struct PartsDirectory {
+  explicit PartsDirectory(const std::string& output) {
+    std::string name = output + ".part-XXXXXX";
+    if (!mkdtemp(name.data())) throw OutputError(name + ": cannot be made: " + std::strerror(errno));
+    path = name;
+  }
+  ~PartsDirectory() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+  PartsDirectory(const PartsDirectory&) = delete;
+  PartsDirectory& operator=(const PartsDirectory&) = delete;
+
+  fs::path path;
+};
 
 void Write(const ExportArguments& options, const NamedRuns& named,
-           const std::vector<std::optional<ExportResult>>& results) {
+           const std::vector<std::optional<ExportResult>>& results, const fs::path& parts) {
   if (!IsDirectory(options, named)) {
     if (options.is_table()) return WriteTable(options, results, 0, options.output);
     return GiveName(results.front()->files.front(), options.output);
   }
-  const fs::path made = options.output + ".part-out";  // it gets its name when it is whole
+  const fs::path made = parts / "out";
   std::error_code error;
-  fs::create_directory(made, error);
-  if (error) throw OutputError(made.string() + ": cannot be made: " + error.message());
+  fs::create_directory(made, error);  // if it fails, so does the first file in it
   const std::vector<std::string> names = NamesOf(options, named);
-  RemoveFilesOf(made, names);
   for (std::size_t k = 0; k < names.size(); ++k) {
     if (options.is_table())
       WriteTable(options, results, k, (made / names[k]).string());
@@ -132,19 +139,15 @@ int RunExport(ExportArguments options) {
   NamedRuns named = RunsNamedBy(options.inputs, options.each_run.jobs);
   options.what.names_robot = named.is_many;
   RequireNoOutput(options, named);  // before the logs are read
-  const bool is_own = options.each_run.is_own = options.each_run.resume.empty();
-  if (is_own) options.each_run.resume = options.output + ".part";
-  const std::string command = "export " + options.format + (named.is_many ? " many " : " ");
-  const auto finished =
-      ResultsOf(options.each_run, command, options.what.config, options.what.key, TransitionsFile::kIgnore);
-  const auto results = ForEachRun<ExportResult>(
-      named, options.each_run, "exported", finished.get(), [&](const RunLogs& run, RunWork& work) {
+  const PartsDirectory parts(options.output);
+  const auto results =
+      ForEachRun<ExportResult>(named, options.each_run, "exported", [&](const RunLogs& run, RunWork& work) {
         std::vector<std::string> files;
-        for (const std::string& name : ExportFiles(options.what.format)) files.push_back(work.NewFile(name));
+        for (const std::string& name : ExportFiles(options.what.format))
+          files.push_back(parts.path / fmt::format("{}.{}", &run - named.runs.data(), name));
         return ExportRun(run, options.what, files, [&](std::int64_t bytes) { work.Read(bytes); });
       });
-  Write(options, named, results);
-  if (is_own) finished->Clear();
+  Write(options, named, results, parts.path);
   ExportResult sum;
   for (const auto& result : results)
     if (result) sum += *result;
@@ -166,7 +169,7 @@ Command ExportCommand() {
           "npz     the tubes and controls of certified plans as NumPy arrays\n"
           "mcap    every message as JSON with its schema, for PlotJuggler and Foxglove\n"
           "For a directory, a database or logs of several runs, npz and mcap write a directory with a file for each "
-          "run.\nFinished runs wait in OUT.part until all are written: the same command goes on there.\n\n"
+          "run.\n\n"
           "Examples:\n  forereach export run/log --format csv -o tables\n"
           "  forereach export run/log/events-20260101-120000-000000.lcmlog --format mcap -o run.mcap",
       .options = {Required({"inputs", &options->inputs, "LOG|DATABASE|DIRECTORY", kRuns}),
@@ -180,7 +183,7 @@ Command ExportCommand() {
                    "The task file of the recording, for its channels and its key; by default the one that the logger "
                    "kept next to the log, in tasks/, otherwise the usual channels"}},
       .run = [options] { return RunExport(*options); }};
-  options->each_run.AddTo(command.options);
+  command.options.push_back(JobsOption(options->each_run.jobs));
   AddKeyOptions(command.options, options->what.key);
   return command;
 }

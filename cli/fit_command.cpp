@@ -13,7 +13,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/fit.h"
-#include "records/scatter.h"
+#include "records/chart.h"
 #include "task/config.h"
 #include "task/json_text.h"
 #include "task/wrapped_angle.h"
@@ -162,7 +162,7 @@ Command FitCommand() {
                        "Those to fit, with commas between; by default all but dt"},
                       {"--picture", &options->picture, "NAME",
                        "The errors before and after against each coordinate, as NAME.svg and NAME.png, or as one of "
-                       ".svg, .png, .pdf"},
+                       "them"},
                       JsonFlag(options->json)},
           .run = [options] { return RunFit(*options); }};
 }

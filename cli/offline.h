@@ -1,6 +1,6 @@
 /** The commands that `forereach` leaves to other programs. Those of forereach-offline need no robot, and OMPL, SQLite,
-cairo and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web server:
-the commands that stop and start a robot do without. `demo` is a script. */
+librsvg and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web
+server: the commands that stop and start a robot do without. `demo` is a script. */
 #pragma once
 
 namespace forereach {

@@ -11,7 +11,6 @@
 #include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "page/gather.h"
-#include "page/rows_json.h"
 #include "page/write.h"
 #include "records/report.h"
 #include "task/config_error.h"
@@ -62,16 +61,14 @@ void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr
     }
 }
 
-// Rows of finished runs are kept; the drawings and the advice, of which there is a bounded number, are made anew.
 PageRun GatherRuns(const ReportArguments& options) {
   const ReportOptions& report = options.report;
   const DetailBounds bounds;
   NamedRuns named = RunsNamedBy(report.logs, options.each_run.jobs);
   const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
-  const auto finished = ResultsOf(options.each_run, "report", report.config, report.key);
   std::vector<std::unique_ptr<PageRead>> of_named(named.runs.size()), passes;
   std::atomic<std::size_t> cases = 0;
-  auto rows = ForEachRun<PageRun>(named, options.each_run, "read", finished.get(), [&](const RunLogs& run, RunWork&) {
+  auto rows = ForEachRun<PageRun>(named, options.each_run, "read", [&](const RunLogs& run, RunWork&) {
     auto& read = of_named[static_cast<std::size_t>(&run - named.runs.data())];
     read = std::make_unique<PageRead>(bounds);
     PageRun of_run = GatherRows(run, tasks, read->pass);
@@ -87,20 +84,20 @@ PageRun GatherRuns(const ReportArguments& options) {
     passes.push_back(std::move(of_named[k]));
   }
   AddMissing(page, named);
-  std::size_t numbers = bounds.numbers;
+  std::size_t bytes = bounds.bytes;
   const auto chosen = ChooseDetails(page, bounds), advised = ChooseAdvised(page, kMostAdvised);
   const RunLogs* const first = read.runs.data();
-  auto drawn = ForEachRun<PageRun>(read, options.each_run, "drawn", nullptr, [&](const RunLogs& run, RunWork& work) {
+  auto drawn = ForEachRun<PageRun>(read, options.each_run, "drawn", [&](const RunLogs& run, RunWork& work) {
     const auto k = static_cast<std::size_t>(&run - first);
     if (chosen[k].empty() && advised[k].empty()) return PageRun();
     if (!passes[k]) {
       passes[k] = std::make_unique<PageRead>(bounds);
       ReadAgain(run, tasks, passes[k]->pass);
     }
-    return GatherDetails(passes[k]->pass, page, chosen[k], numbers, work.threads);
+    return GatherDetails(passes[k]->pass, page, chosen[k], bytes, work.threads);
   });
   for (auto& drawings : drawn)
-    if (drawings) AddDetails(page, std::move(*drawings), numbers);
+    if (drawings) AddDetails(page, std::move(*drawings), bytes);
   AddAdvice(options, passes, page);
   AddMissing(page, {{}, read.missing, true});
   return page;
@@ -133,7 +130,7 @@ Command ReportCommand() {
           "With --out it writes a page for a browser: one HTML file that needs no network. See docs/analysis.md.\n\n"
           "Examples:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo\n"
           "  forereach report run/log --out report.html\n"
-          "  forereach report run --out season.html --resume season.read\n"
+          "  forereach report run --out season.html\n"
           "  forereach report run/log --before old/log/decisions.sqlite --out both.html",
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
                             std::string(kLogs) + "; with --out also databases, directories and logs of several runs"}),
@@ -141,8 +138,8 @@ Command ReportCommand() {
                   {.name = "--picture",
                    .variable = &report.picture,
                    .type = "FILE",
-                   .help = "Draw obstacles, tubes and driven path into a .svg, .png or .pdf file; without an ending a "
-                           ".svg and a .png",
+                   .help =
+                       "Draw obstacles, tubes and driven path into a .svg or .png file, without an ending into both",
                    .excludes = "--out"},
                   {"-o,--out", &options->out, "FILE.html",
                    "Write a page with figures, every decision and its tube, instead of the text"},
@@ -167,7 +164,7 @@ Command ReportCommand() {
         if (!options->out.empty()) return WritePage(*options);
         return Report(options->report, std::cout) ? 0 : 1;
       }};
-  options->each_run.AddTo(command.options);
+  command.options.push_back(JobsOption(options->each_run.jobs));
   AddKeyOptions(command.options, report.key);
   return command;
 }

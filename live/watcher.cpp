@@ -20,7 +20,6 @@
 #include "lcmtypes/printable.h"
 #include "lcmtypes/why_failed.h"
 #include "page/detail.h"
-#include "page/drawing_json.h"
 #include "records/log_trust.h"
 #include "records/outlines.h"
 #include "records/status_json.h"
@@ -31,7 +30,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t kNumbersOfATube = 20'000;
+constexpr std::size_t kBytesOfATube = 400'000;
 constexpr std::size_t kMostLearned = 200'000;
 constexpr std::uint64_t kReadsAgainAfterUs = 2'000'000;
 constexpr std::uint64_t kForgetsAfterUs = 3'000'000;  // that a certifier was in charge
@@ -52,20 +51,6 @@ BusOptions Named(BusOptions options) {
 
 // Integers as text: a browser has no exact ones beyond 2^53.
 std::string Text(std::int64_t number) { return std::to_string(number); }
-
-Json SketchJson(const Sketch& sketch) {
-  return {{"parts", sketch.parts}, {"corners", sketch.corners}, {"points", sketch.points}};
-}
-
-Json PolygonsJson(const std::vector<Picture::Polygon>& polygons) {
-  Json all = Json::array();
-  for (const Picture::Polygon& polygon : polygons) {
-    if (!std::ranges::all_of(polygon, [](const Eigen::Vector2d& point) { return point.allFinite(); })) continue;
-    Json& points = all.emplace_back(Json::array());
-    for (const Eigen::Vector2d& point : polygon) points.push_back({point.x(), point.y()});
-  }
-  return all;
-}
 
 bool IsJudged(const decision_t& decision) {
   return decision.outcome == decision_t::CERTIFIED || decision.outcome == decision_t::ABSTAIN_SAFETY ||
@@ -207,7 +192,7 @@ bool Watcher::TakeState(const LogEvent& event) {
   if (task_.problem->projection.rows() != 2) return true;
   const Eigen::Vector2d at =
       task_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
-  if (at.allFinite()) Add(kPlaceFeed, {at.x(), at.y(), Text(state->executing_plan_id), state->executing_step});
+  if (Svg::CanBeDrawn(at)) Add(kPlaceFeed, {at.x(), at.y(), Text(state->executing_plan_id), state->executing_step});
   return true;
 }
 
@@ -242,10 +227,23 @@ void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
 void Watcher::ShowObstacles() {
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(in_force_->all());
   obstacles_digest_ = in_force_->digest();
-  std::string text = JsonText(ToJson(*obstacles_));
-  const std::lock_guard lock(mutex_);
-  set_ = std::move(text);
-  ++obstacles_number_;
+}
+
+// As they are now, and where they will be.
+std::string Watcher::ObstaclesSvg(std::int64_t now_us) const {
+  const auto now = static_cast<double>(now_us);
+  Eigen::AlignedBox2d frame = frame_;
+  if (!Svg::CanBeDrawn(frame))
+    for (const Obstacle& obstacle : *obstacles_)
+      if (const auto place = PlaceOf(obstacle, now); place && obstacle.dim() == 2)
+        for (const Eigen::Vector2d& point : place->points)
+          if (Svg::CanBeDrawn(point)) frame.extend(point);
+  Svg svg(frame.isEmpty() ? Eigen::AlignedBox2d(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1)) : frame);
+  DrawObstacles(*obstacles_, {now}, frame, -1, false, svg);
+  for (const Obstacle& obstacle : *obstacles_)
+    if (obstacle.dim() == 2)
+      for (const Svg::Points& outline : PredictionOf(obstacle, now_us)) svg.Polygon(outline, "class=\"prediction\"");
+  return svg.Done();
 }
 
 bool Watcher::TakeObstacles(const LogEvent& event) {
@@ -330,7 +328,7 @@ void Watcher::Draw(const Decided& decided, PageDetail& detail) {
     const Zonotope initial_set = InitialSetOf(*candidate);
     certifier_->Require(plan, initial_set, *decided.obstacles);
     const Decision again = certifier_->Certify(plan, initial_set, *decided.obstacles, *tube_);
-    Describe(*certifier_, judged, again, *tube_, detail);
+    Describe(*certifier_, judged, again, *tube_, *decided.obstacles, detail);
   } catch (const std::invalid_argument& error) {
     detail.missing = std::string("it cannot be judged again: ") + error.what();
   }
@@ -341,7 +339,7 @@ void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
   const auto certified = decided.certificate ? Decoded<certified_plan_t>(*decided.certificate) : std::nullopt;
   const Eigen::MatrixXd& projection = task_.problem->projection;
   if (!certified || projection.rows() != 2 || !HasSizes(certified->plan, *task_.problem->model)) return;
-  std::vector<std::vector<Picture::Polygon>> units;
+  std::vector<std::vector<Svg::Points>> units;
   const Eigen::Index n = projection.cols();
   for (int t = 0; t <= certified->plan.num_steps; ++t) {
     const Eigen::Map<const Eigen::VectorXd> lower(certified->slice_lower[t], n), upper(certified->slice_upper[t], n);
@@ -349,13 +347,11 @@ void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
     if (!lower.allFinite() || !upper.allFinite() || half.minCoeff() < 0) return;
     units.push_back({Outline(Zonotope(projection * (lower + half), projection * half.asDiagonal()))});
   }
-  auto sketch = MakeSketch(units);
-  if (!sketch) return;
-  detail.sketch = std::move(*sketch);
   detail.start_utime = certified->plan.start_utime;
   detail.step_us = certified->plan.step_us;
   detail.steps = certified->plan.num_steps;
-  detail.missing = "the boxes of its certificate, without the body; " + detail.missing;
+  if (DrawTube(units, {}, *decided.obstacles, -1, detail))
+    detail.missing = "the boxes of its certificate, without the body; " + detail.missing;
 }
 
 Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {
@@ -372,14 +368,13 @@ Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {
     detail.missing = IsJudged(decided.decision) ? "more was decided at this time than this page draws"
                                                 : "it was answered without a tube";
   if (decided.decision.outcome == decision_t::CERTIFIED && !detail.missing.empty()) DrawBoxes(decided, detail);
-  if (detail.sketch.points.size() + detail.bodies.points.size() > kNumbersOfATube) {
-    detail.sketch = detail.bodies = {};
-    detail.missing = "its tube has too many corners for this page";
+  if (detail.svg.size() > kBytesOfATube) {
+    detail.svg.clear();
+    detail.missing = "its drawing is too large for this page";
   }
+  if (!detail.svg.empty()) frame_ = detail.frame;
   json["detail"] = ToJson(detail);
-  json["detail"].update(SketchJson(detail.sketch));
-  json["detail"]["body"] = SketchJson(detail.bodies);
-  json["detail"]["set"] = is_drawn && !detail.sketch.parts.empty() ? ToJson(*decided.obstacles) : Json::array();
+  json["detail"]["svg"] = std::move(detail.svg);
   return json;
 }
 
@@ -389,9 +384,11 @@ void Watcher::Tick(std::int64_t now_us, const LiveLosses& losses) {
   const std::vector<bool> drawn = ChooseDrawn();
   for (std::size_t i = 0; i < decided_.size(); ++i) Add(kDecisionFeed, DecisionJson(decided_[i], drawn[i]));
   decided_.clear();
-  std::string now = JsonText(NowJson(now_us, losses));
+  std::string now = JsonText(NowJson(now_us, losses)), obstacles = JsonText(Json(ObstaclesSvg(now_us)));
   const std::lock_guard lock(mutex_);
   now_ = std::move(now);
+  if (set_ != obstacles) ++obstacles_number_;
+  set_ = std::move(obstacles);
   std::ranges::transform(feeds_, ends_.begin(), &LiveFeed::end);
   ++tick_;
 }
@@ -422,9 +419,16 @@ Json Watcher::RobotJson() const {
             {"state", std::vector<double>(x.begin(), x.end())}};
   if (task_.problem->projection.rows() != 2 || x.size() != task_.problem->projection.cols()) return json;
   const Eigen::Vector2d at = task_.problem->projection * x;
-  if (!at.allFinite()) return json;
+  const std::vector<Svg::Points> body = BodyAt(*task_.problem, x);
+  Eigen::AlignedBox2d frame(at);
+  for (const Svg::Points& part : body)
+    for (const Eigen::Vector2d& corner : part) frame.extend(corner);
+  if (!Svg::CanBeDrawn(frame)) return json;
+  Svg svg(frame);
+  for (const Svg::Points& part : body) svg.Polygon(part, "class=\"robot\"");
+  svg.Dot(at, "class=\"dot now\"");
   json["at"] = {at.x(), at.y()};
-  json["body"] = PolygonsJson(BodyAt(*task_.problem, x));
+  json["svg"] = svg.Done();
   return json;
 }
 

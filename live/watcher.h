@@ -102,6 +102,7 @@ class Watcher final {
 
   void UseTask(Config task);
   void ShowObstacles();
+  [[nodiscard]] std::string ObstaclesSvg(std::int64_t now_us) const;
   void TakeRows(const LogEvent& event);
   [[nodiscard]] bool TakeMessage(const LogEvent& event);
   [[nodiscard]] bool TakeDecision(const LogEvent& event);
@@ -142,6 +143,7 @@ class Watcher final {
   std::optional<std::pair<std::int64_t, logger_status_t>> logger_;
   std::optional<std::pair<std::int64_t, robot_state_t>> state_;
   std::unique_ptr<Tube> tube_;
+  Eigen::AlignedBox2d frame_;  // of the decision that was drawn last
 
   struct Counts {
     std::int64_t messages = 0, undecodable = 0, decisions = 0, lost = 0, gaps = 0;

@@ -91,12 +91,13 @@ class RowReader final : public TimelineUser {
 
 // ---- Tubes.
 
-constexpr std::size_t kNumbersOfObstacle = 10;
-
-std::size_t NumbersOf(const PageDetail& detail) { return detail.sketch.points.size() + detail.bodies.points.size(); }
-
-void LeaveOut(PageDetail& detail) {
-  detail.sketch = detail.bodies = {};
+// As far as there is room.
+void TakeRoom(PageDetail& detail, std::size_t& bytes) {
+  if (detail.svg.size() <= bytes) {
+    bytes -= detail.svg.size();
+    return;
+  }
+  detail.svg.clear();
   detail.missing = "the drawings of this page have reached their bound";
 }
 
@@ -130,18 +131,18 @@ std::vector<std::vector<std::size_t>> LastDecisions(const PageRun& page, std::si
 // Certifies candidates again, and describes what was found.
 class DetailMaker final : CaseJudge {
  public:
-  /** @param run receives details and obstacle sets, and has the tasks. */
-  DetailMaker(std::size_t numbers, unsigned threads, PageRun& run) : CaseJudge(threads), numbers_(numbers), run_(run) {}
+  /** @param run receives details, and has the tasks. */
+  DetailMaker(std::size_t bytes, unsigned threads, PageRun& run) : CaseJudge(threads), bytes_(bytes), run_(run) {}
 
   void Add(const LastCases::Entry& entry, std::size_t decision) {
     const RecordedCase& recorded = entry.recorded;
     PageDetail& detail = run_.details.emplace_back();
     detail.decision = decision;
+    obstacles_.push_back(recorded.basis.obstacles);
     detail.missing = recorded.missing;
     if (!detail.missing.empty()) return;
     detail.executed = entry.executed;
     detail.task = TaskIndex(*recorded.basis.task);
-    detail.obstacles = ObstaclesIndex(recorded.basis);
     Put(recorded, run_.details.size() - 1);
   }
   void Finish() { CertifyAgain(); }
@@ -153,36 +154,18 @@ class DetailMaker final : CaseJudge {
     return found == run_.tasks.end() ? -1 : static_cast<int>(found - run_.tasks.begin());
   }
 
-  // -1: there is no room for them.
-  int ObstaclesIndex(const Basis& basis) {
-    const auto [found, is_new] = sets_.try_emplace(basis.grounds.obstacles, -1);
-    if (!is_new || !TakeRoom(kNumbersOfObstacle * basis.obstacles->size())) return found->second;
-    found->second = static_cast<int>(run_.obstacle_sets.size());
-    run_.obstacle_sets.push_back(*basis.obstacles);
-    return found->second;
-  }
-
-  bool TakeRoom(std::size_t numbers) {
-    if (numbers > numbers_) return false;
-    numbers_ -= numbers;
-    return true;
-  }
-
   void Refuse(const JudgedCandidate& judged, const std::string& why) override {
     run_.details[judged.place].missing = "it cannot be judged again: " + why;
   }
   void Look(const JudgedCandidate& judged, const Certifier& certifier, const Decision& again,
             const Tube& tube) override {
-    Describe(certifier, judged, again, tube, run_.details[judged.place]);
+    Describe(certifier, judged, again, tube, *obstacles_[judged.place], run_.details[judged.place]);
   }
-  void Take(const JudgedCandidate& judged) override {
-    PageDetail& detail = run_.details[judged.place];
-    if (!TakeRoom(NumbersOf(detail))) LeaveOut(detail);
-  }
+  void Take(const JudgedCandidate& judged) override { TakeRoom(run_.details[judged.place], bytes_); }
 
-  std::size_t numbers_;  // for which there is room
+  std::size_t bytes_;  // for which there is room
   PageRun& run_;
-  std::map<Digest, int> sets_;
+  std::vector<decltype(Basis::obstacles)> obstacles_;  // of each detail
 };
 
 // ---- Inputs.
@@ -335,36 +318,21 @@ void ReadAgain(const RunLogs& run, const PageTasks& tasks, PagePass& pass) try {
 }
 
 PageRun GatherDetails(const PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions,
-                      std::size_t numbers, unsigned threads) {
+                      std::size_t bytes, unsigned threads) {
   PageRun made;
   made.tasks = page.tasks;  // so that their places are the page's
   std::map<std::string, std::size_t> wanted;
   for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i].event), i);
-  DetailMaker maker(numbers, threads, made);
+  DetailMaker maker(bytes, threads, made);
   for (const auto& [place, entry] : pass.cases.entries())
     if (const auto found = wanted.find(entry.recorded.event); found != wanted.end()) maker.Add(entry, found->second);
   maker.Finish();
   return made;
 }
 
-void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers) {
-  std::map<std::size_t, int> place_of;  // of a set of obstacles, in the page
+void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes) {
   for (PageDetail& detail : details.details) {
-    if (detail.obstacles >= 0) {
-      const auto old = static_cast<std::size_t>(detail.obstacles);
-      const auto [place, is_new] = place_of.try_emplace(old, -1);
-      const std::size_t size = kNumbersOfObstacle * details.obstacle_sets[old].size();
-      if (is_new && size <= numbers) {
-        numbers -= size;
-        place->second = static_cast<int>(page.obstacle_sets.size());
-        page.obstacle_sets.push_back(details.obstacle_sets[old]);
-      }
-      detail.obstacles = place->second;
-    }
-    if (const std::size_t size = NumbersOf(detail); size <= numbers)
-      numbers -= size;
-    else
-      LeaveOut(detail);
+    TakeRoom(detail, bytes);
     page.details.push_back(std::move(detail));
   }
 }
@@ -379,7 +347,6 @@ PageRun EmptyPage(const std::vector<std::string>& inputs) {
   const bool is_log = kind != FileKind::kDirectory && kind != FileKind::kDatabase;
   const std::string name = is_log ? FileName(inputs[0]) : inputs[0];
   page.name = inputs.size() == 1 ? name : fmt::format("{} and {} more", name, inputs.size() - 1);
-  page.files = inputs;
   return page;
 }
 
@@ -398,10 +365,10 @@ PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& co
       named.missing.emplace_back(error.what());
     }
   AddMissing(page, named);
-  std::size_t numbers = bounds.numbers;
+  std::size_t bytes = bounds.bytes;
   const auto chosen = ChooseDetails(page, bounds);
   for (std::size_t k = 0; k < chosen.size(); ++k)
-    AddDetails(page, GatherDetails(passes[k], page, chosen[k], numbers, threads), numbers);
+    AddDetails(page, GatherDetails(passes[k], page, chosen[k], bytes, threads), bytes);
   return page;
 }
 

@@ -21,8 +21,8 @@ namespace forereach {
 struct DetailBounds {
   /** The last certified plans, and the last abstentions. */
   std::size_t certified = 2000, abstained = 2000;
-  /** Numbers in all drawings: corners of tubes, and ten for each obstacle. */
-  std::size_t numbers = 12'000'000;
+  /** Of all drawings, before they are packed. */
+  std::size_t bytes = 60'000'000;
 };
 
 /** What the command line says of the tasks of all runs. */
@@ -81,13 +81,12 @@ void ReadAgain(const RunLogs& run, const PageTasks& tasks, PagePass& pass);
 void AddRows(PageRun& page, PageRun&& run);
 
 /** The tubes of some decisions of a run.
-@param decisions their places in `page`. @param threads that it may use. @return only details, tasks and obstacle sets.
-*/
+@param decisions their places in `page`. @param threads that it may use. @return only details and tasks. */
 [[nodiscard]] PageRun GatherDetails(const PagePass& pass, const PageRun& page,
-                                    const std::vector<std::size_t>& decisions, std::size_t numbers, unsigned threads);
+                                    const std::vector<std::size_t>& decisions, std::size_t bytes, unsigned threads);
 
-/** Puts the tubes of one run into a page, as far as there is room. @param numbers for which there is room. */
-void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers);
+/** Puts the tubes of one run into a page, as far as there is room. @param bytes for which there is room. */
+void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes);
 
 /** The decisions whose tubes a page has: of each part their places, the last ones by time. */
 [[nodiscard]] std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds);

@@ -1,14 +1,13 @@
 // The live page: what `forereach live` sends on /events, as it is now.
 'use strict';
 (() => {
-const {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, clockText,
-  listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn, placeOf,
-  centerOf, drawObstacle, showView, startView, drawTube, showLegend} = ForeReach;
+const {OUTCOMES, EXECUTED, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, clockText,
+  listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, wholeOf, showView, startView, drawTube, fillLegend, showLegend} = ForeReach;
 
 const MOST = {decisions: 120, faults: 60, withdrawals: 60, events: 60, gaps: 60, places: 600};
 const REFUSED_US = 3e6;  // as long is an abstention drawn
 const SILENT_US = 2e6;  // the certifier's heartbeat comes twice a second
-const state = {beginning: null, now: null, obstacles: [], chosen: null, heard: 0};
+const state = {beginning: null, now: null, obstacles: '', chosen: null, heard: 0};
 for (const name of Object.keys(MOST)) state[name] = [];
 
 const followed = () => state.chosen === null;
@@ -45,7 +44,7 @@ const showFigures = () => {
   const {counts, certifier, logger} = state.now, outcomes = counts.by_outcome ?? {};
   const of = (wanted) => Object.entries(outcomes).filter(([name]) => wanted(name)).reduce((sum, [, n]) => sum + n, 0);
   const abstained = of((name) => name.startsWith('abstain')), certified = outcomes.certified ?? 0;
-  const cards = [
+  fillCards([
     ['Decisions', counted(counts.decisions), counts.not_shown > 0 ? `${counted(counts.not_shown)} too fast to be listed` : ''],
     ['Certified', percent(certified, counts.decisions), `${counted(certified)}, if the declaration is true`],
     ['Abstained', counted(abstained), listed(new Map(Object.entries(counts.by_cause ?? {}).map(([name, n]) => [name.replaceAll('_', ' '), n])))],
@@ -54,12 +53,7 @@ const showFigures = () => {
     ['Messages lost', counted(counts.lost), `${counted(counts.gaps)} gaps; here ${counted(counts.dropped)} dropped`],
     ['Unreadable', counted(counts.undecodable), `messages; ${counted(counts.datagrams_refused)} datagrams`],
     ['Logger', !logger ? '\u2013' : age(logger.heard) > SILENT_US ? 'silent' : logger.level, logger ? `${counted(logger.lost)} events lost` : 'not heard'],
-  ];
-  byId('figures').replaceChildren(...cards.map(([name, value, note]) => {
-    const card = make('div');
-    card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'));
-    return card;
-  }));
+  ]);
   const {robot} = state.now;
   fillList('facts', robot ? [
     ['Mode', robot.mode],
@@ -117,10 +111,7 @@ const showOthers = () => {
 };
 
 // ---- The drawing: around the robot now, or a decision that was chosen.
-const unitsOfDecision = ({detail}) => unitsOf(detail, {...detail, at: {part: 0, polygon: 0, point: 0}});
-const bodiesOfDecision = ({detail}) =>
-  unitsOf(detail.body, {units: detail.body_units, grid: detail.body_grid, at: {part: 0, polygon: 0, point: 0}});
-const hasTube = (decision) => decision?.detail.units > 0;
+const hasTube = (decision) => Boolean(decision?.detail.frame);
 const newest = (passes) => state.decisions.findLast((decision) => hasTube(decision) && passes(decision));
 
 const choose = (decision) => {
@@ -128,7 +119,7 @@ const choose = (decision) => {
   byId('follow').setAttribute('aria-pressed', String(followed()));
   byId('step').closest('.slider').hidden = followed();
   byId('missing').textContent = '';
-  view.scene = view.whole = null;
+  view.detail = view.whole = null;
   byId('svg').replaceChildren();
   markChosen();
   draw('the drawing');
@@ -142,42 +133,10 @@ const showDrawing = () => {
   byId('shows').textContent = `Decision of ${clockText(decision.utime)}: ${decision.message}`;
   if (decision.detail.missing) byId('missing').textContent = `${hasTube(decision) ? 'Drawn are' : 'No drawing'}: ${decision.detail.missing}.`;
   if (!hasTube(decision)) return;
-  drawTube({units: unitsOfDecision(decision), bodies: bodiesOfDecision(decision), detail: decision.detail, outcome: decision.outcome, set: decision.detail.set,
-    binding: decision.outcome === 'rejected' ? -1 : decision.obstacle});
+  drawTube(decision.detail, decision.detail.svg, outcomeColor(decision.outcome));
   showLegend(outcomeColor(decision.outcome), decision.detail);
 };
 
-const tubeGroup = (decision, attributes) => {
-  const group = shape('g', {});
-  for (const polygon of unitsOfDecision(decision).flat()) group.append(outline(polygon, {'stroke-width': .8, 'stroke-opacity': .5, ...attributes}));
-  return group;
-};
-
-const obstacleGroup = (time, binding) => {
-  const group = shape('g', {});
-  state.obstacles.forEach((obstacle, k) => {
-    const place = placeOf(obstacle, time);
-    if (!obstacle || !(obstacle.normal ? canBeDrawn(...obstacle.normal, obstacle.offset) : place && canBeDrawn(place.radius, ...place.points.flat()))) return;
-    group.append(drawObstacle(obstacle, place, k === binding));
-    if (!obstacle.motion || !place) return;
-    for (const later of [.5e6, 1e6, 1.5e6, 2e6]) {  // where it will be, grown
-      const then = placeOf(obstacle, time + later);
-      if (!then || !canBeDrawn(then.radius, ...then.points.flat())) continue;
-      group.append(then.points.length === 1
-        ? shape('circle', {class: 'prediction', cx: then.points[0][0], cy: -then.points[0][1], r: Math.max(then.radius, 0), fill: 'none', stroke: '#6b7280', 'stroke-dasharray': '4 4', 'vector-effect': 'non-scaling-stroke'})
-        : outline(then.points, {class: 'prediction', fill: 'none', stroke: '#6b7280', 'stroke-dasharray': '4 4', 'stroke-width': 1}));
-    }
-  });
-  return group;
-};
-
-const extentOfTubes = (tubes) => {
-  let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
-  for (const [x, y] of tubes.flatMap((decision) => unitsOfDecision(decision).flat(2))) {
-    left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y);
-  }
-  return right > left ? Math.max(right - left, top - bottom) : 0;
-};
 const follow = {size: 0};
 const moveView = ([x, y], size) => {
   if (!(size <= follow.size && follow.size <= 3 * size)) follow.size = 2 * Math.max(size, .5);
@@ -198,35 +157,22 @@ const showNow = () => {
   // The planner answers an abstention at once: the newest plan is mostly another one.
   const refused = newest((decision) => decision.outcome.startsWith('abstain') && utime - decision.utime < REFUSED_US);
   const tubes = [...new Set([refused, last, running].filter(Boolean))];  // the last is on top
-  const center = robot?.at ?? (last ? unitsOfDecision(last)[0][0]?.[0] : null);
-  if (!center || !canBeDrawn(...center)) {
+  const frame = last && wholeOf(last.detail);
+  const center = robot?.at ?? (frame && [frame.x + frame.width / 2, -frame.y - frame.height / 2]);
+  if (!center) {
     byId('shows').textContent = state.beginning.planar ? 'Neither a robot nor a tube has been heard of yet.' : 'The safety coordinates of this task are not planar: no drawing.';
     return;
   }
-  moveView(center, Math.max(extentOfTubes(tubes), 1));
-  const colorOf = (tube) => (tube === running ? EXECUTED : outcomeColor(tube.outcome));
-  const layers = [obstacleGroup(utime, refused?.obstacle ?? -1)];
-  for (const tube of tubes) layers.push(tubeGroup(tube, {fill: colorOf(tube), 'fill-opacity': .13, stroke: colorOf(tube)}));
-  const places = state.places.filter(([x, y]) => canBeDrawn(x, y));
-  layers.push(shape('polyline', {points: pointsText(places), fill: 'none', stroke: INK, 'stroke-width': 1.2, 'vector-effect': 'non-scaling-stroke'}));
-  for (const polygon of robot?.body ?? []) layers.push(outline(polygon, {id: 'body', fill: INK, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.5}));
-  if (robot?.at) {
-    const dot = shape('circle', {class: 'dot', cx: robot.at[0], cy: -robot.at[1], fill: INK});
-    dot.isNow = true;
-    layers.push(dot);
-  }
-  byId('svg').replaceChildren(...layers);
+  const svg = byId('svg'), colorOf = (tube) => (tube === running ? EXECUTED : outcomeColor(tube.outcome));
+  moveView(center, Math.max(...tubes.map(({detail: {frame: [, , width, height]}}) => Math.max(width, height) / 1.3), 1));
+  svg.innerHTML = state.obstacles + tubes.map(({detail}) => `<g class="glance">${detail.svg}</g>`).join('') +
+    `<polyline class="driven" points="${state.places.map(([x, y]) => `${Number(x)},${-y}`).join(' ')}"/>` + (robot?.svg ?? '');
+  [...svg.querySelectorAll('.glance')].forEach((group, k) => group.style.setProperty('--tube', colorOf(tubes[k])));
+  svg.querySelectorAll(':scope > .scene > .obstacle')[refused?.obstacle ?? -1]?.classList.add('binding');
   byId('shows').textContent = last ? `The newest decision: ${last.message}` : '';
   showView();
-  const entries = [['#6b7280', 'obstacles now, and where they will be'], [INK, 'the robot and its path']];
-  for (const tube of tubes.reverse())
-    entries.push([colorOf(tube), tube === running ? 'the certified plan that it executes' : tube === last ? `the newest plan: ${outcomeLabel(tube.outcome)}` : `the newest plan that is not certified: ${outcomeLabel(tube.outcome)}`]);
-  byId('legend').replaceChildren(...entries.map(([color, text]) => {
-    const item = make('li'), chip = make('i', undefined, 'chip');
-    chip.style.background = color;
-    item.append(chip, text);
-    return item;
-  }));
+  fillLegend([['#6b7280', 'obstacles now, and where they will be'], [INK, 'the robot and its path'], ...tubes.reverse().map((tube) =>
+    [colorOf(tube), tube === running ? 'the certified plan that it executes' : tube === last ? `the newest plan: ${outcomeLabel(tube.outcome)}` : `the newest plan that is not certified: ${outcomeLabel(tube.outcome)}`])]);
 };
 
 // ---- News.

@@ -2,11 +2,10 @@
 'use strict';
 (() => {
 const {OUTCOMES, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf, timeText, clockText,
-  listed, drawPart, drawChart, axis, legend, fillTable, fillList, unitsOf, view, canBeDrawn, startView, drawTube, showLegend} = ForeReach;
+  listed, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, startView, drawTube, showLegend} = ForeReach;
 
 // ---- Columns: base64 of zlib's format, each in an element of its own.
-const ARRAYS = {i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
-  i64: BigInt64Array, f32: Float32Array, f64: Float64Array};
+const ARRAYS = {u8: Uint8Array, i32: Int32Array, u32: Uint32Array, i64: BigInt64Array, f32: Float32Array, f64: Float64Array};
 const packed = document.getElementsByClassName('column');
 
 const bytesOf = (base64) => {
@@ -35,7 +34,6 @@ const unpackTable = async (columns) => {
 };
 // Of 64-bit integers, by their halves, since big integers are slow.
 const toNumbers = (bigs) => {
-  if (!(bigs instanceof BigInt64Array)) return Float64Array.from(bigs);
   const numbers = new Float64Array(bigs.length), low = new Uint32Array(bigs.buffer), high = new Int32Array(bigs.buffer);
   for (let i = 0; i < numbers.length; ++i) numbers[i] = 2 ** 32 * high[2 * i + 1] + low[2 * i];
   return numbers;
@@ -224,16 +222,12 @@ const figuresOf = (run) => {
 
 const showFigures = (run, before) => {
   const old = before ? figuresOf(before) : null;
-  byId('figures').replaceChildren(...figuresOf(run).map(([name, value, note], k) => {
-    const card = make('div');
-    card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'));
-    if (old) {
-      const dd = make('dd', 'before: ', 'before');
-      dd.append(make('b', old[k][1]), old[k][2] ? ` (${old[k][2]})` : '');
-      card.append(dd);
-    }
-    return card;
-  }));
+  fillCards(figuresOf(run), (k) => {
+    if (!old) return [];
+    const dd = make('dd', 'before: ', 'before');
+    dd.append(make('b', old[k][1]), old[k][2] ? ` (${old[k][2]})` : '');
+    return [dd];
+  });
 };
 
 const BINS = 48;
@@ -572,27 +566,11 @@ const startGrid = (run) => {
 
 // ---- Drawings.
 const loadDrawings = async (raw) => {
-  const texts = JSON.parse(decoder.decode(await unpack(raw.texts)));
-  const [tubes, bodies] = await Promise.all([unpackTable(raw.tubes), unpackTable(raw.bodies)]);
-  const ofRow = new Map(), atTube = {part: 0, polygon: 0, point: 0}, atBody = {part: 0, polygon: 0, point: 0};
-  const skip = ({parts, corners}, at, units) => {
-    for (let u = 0; u < units; ++u)
-      for (let k = parts.values[at.part++]; k > 0; --k) at.point += 2 * corners.values[at.polygon++];
-  };
-  for (const detail of texts.details) {  // where its numbers begin
-    detail.at = {...atTube};
-    detail.body_at = {...atBody};
-    detail.executed = detail.executed.filter(([, x, y]) => canBeDrawn(x, y));
-    skip(tubes, atTube, detail.units);
-    skip(bodies, atBody, detail.body_units);
-    ofRow.set(detail.row, detail);
-  }
-  const valuesOf = ({parts, corners, points}) => ({parts: parts.values, corners: corners.values, points: points.values});
-  const adviceOf = new Map(texts.advice.map((advice) => [advice.row, advice]));
-  return {ofRow, adviceOf, sets: texts.obstacle_sets, tubes: valuesOf(tubes), bodies: valuesOf(bodies)};
+  const texts = JSON.parse(decoder.decode(await unpack(raw.texts))), {svg} = await unpackTable({svg: raw.svg});
+  texts.details.forEach((detail, i) => { detail.place = i; });
+  const byRow = (all) => new Map(all.map((each) => [each.row, each]));
+  return {ofRow: byRow(texts.details), adviceOf: byRow(texts.advice), svgOf: (detail) => textAt(svg, detail.place)};
 };
-const bodiesOf = (drawings, detail) =>
-  unitsOf(drawings.bodies, {units: detail.body_units, grid: detail.body_grid, at: detail.body_at});
 
 // ---- The detail of a decision.
 // The name of the coordinate that an abstention is about.
@@ -632,7 +610,7 @@ const showDetail = (run, i) => drawPart('the chosen decision', ['detail'], () =>
   const d = run.decisions, detail = run.drawings.ofRow.get(i);
   const config = nameAt(d.config, i), task = run.raw.tasks.find((each) => each.digest === config);
   const outcome = nameAt(d.outcome, i), cause = nameAt(d.cause, i), digest = hexAt(d.digest.values, i);
-  const hasDrawing = Boolean(detail && detail.units > 0 && !detail.missing);
+  const hasDrawing = Boolean(detail?.frame && !detail.missing);
   const index = (column) => (column.values[i] >= 0 ? String(column.values[i]) : '');
   const margin = d.margin.values[i], threshold = d.threshold.values[i];
   byId('sentence').textContent = textAt(d.message, i) || '(no sentence)';
@@ -660,11 +638,10 @@ const showDetail = (run, i) => drawPart('the chosen decision', ['detail'], () =>
   byId('stage').hidden = byId('step').closest('.steer').hidden = byId('legend').hidden = !hasDrawing;
   byId('missing').textContent = hasDrawing ? '' : `No drawing: ${detail ? detail.missing || 'it has no tube' :
     outcome === 'certified' || /safety|domain|falsified/.test(outcome) ? 'the page has the tubes of the last decisions only' : 'it was answered without a tube'}.`;
-  view.scene = view.whole = null;
+  view.detail = view.whole = null;
   if (!hasDrawing) return;
   showLegend(outcomeColor(outcome), detail);
-  drawTube({units: unitsOf(run.drawings.tubes, detail), bodies: bodiesOf(run.drawings, detail), detail, outcome, binding: outcome === 'rejected' ? -1 : d.obstacle.values[i],
-    set: run.drawings.sets[detail.obstacles] ?? []});
+  drawTube(detail, run.drawings.svgOf(detail), outcomeColor(outcome));
 });
 
 // ---- Filters.

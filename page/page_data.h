@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "forereach/safety/obstacle.h"
-#include "page/sketch.h"
+#include <Eigen/Geometry>
+
 #include "records/event_log.h"
 #include "records/rows.h"
 
@@ -42,9 +42,7 @@ struct PageState {
 struct PageDetail {
   std::size_t decision = 0;  ///< Index in PageRun::decisions.
   std::string missing;       ///< Why there is no tube; empty if there is one.
-  Sketch sketch;             ///< What the body sweeps in each unit of the tube.
   int task = -1;             ///< Index in PageRun::tasks.
-  int obstacles = -1;        ///< Index in PageRun::obstacle_sets.
   std::int64_t start_utime = 0, step_us = 0;
   int steps = 0;     ///< Of the plan.
   int binding = -1;  ///< The step that decided: the first that fails, or the closest.
@@ -57,8 +55,13 @@ struct PageDetail {
   row is zero, or they were not looked for. */
   std::vector<int> nearest;
   std::vector<double> nearest_distance;
-  Sketch bodies;  ///< The body at the center of each slice; empty for a point.
   std::vector<PageState> executed;
+  /** The drawing (records/svg.h), empty if there is none: groups "obstacle", "tube", "path" and "bodies". What belongs
+  to a unit of the tube has the class "sN". Obstacles that move do so by the drawing's clock, one unit a second. */
+  std::string svg;
+  Eigen::AlignedBox2d frame;  ///< What of the plane is shown, metres.
+  std::size_t units = 0;      ///< Of the tube.
+  bool has_body = false;      ///< More than a point.
 };
 
 /** What would have turned a decision that is no certificate (docs/advise.md). */
@@ -83,14 +86,12 @@ struct PagePart {
 /** One side of a page: a run, or several. */
 struct PageRun {
   std::string name;
-  std::vector<std::string> files;  ///< What it was read from.
   std::vector<DecisionRow> decisions;
   std::vector<EventRow> events;
   std::vector<GapRow> gaps;
   std::vector<PageFault> faults;            ///< Without repetitions. Only logs have them.
   std::vector<PageWithdrawal> withdrawals;  ///< Likewise.
   std::vector<PageTask> tasks;
-  std::vector<std::vector<Obstacle>> obstacle_sets;
   std::vector<PageDetail> details;
   std::vector<PageAdvice> advice;
   std::vector<PagePart> parts;  ///< The rows of each run, one behind the other.

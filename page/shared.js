@@ -102,75 +102,22 @@ const fillTable = (table, caption, heads, rows, numeric = []) => {
 const fillList = (id, entries) => byId(id).replaceChildren(...entries.filter(([, value]) => value !== '' && value !== null)
   .flatMap(([name, value]) => [make('dt', name), make('dd', value)]));
 
+// Figures: name, value and note each, and what `more` adds to the k-th.
+const fillCards = (cards, more = () => []) => byId('figures').replaceChildren(...cards.map(([name, value, note], k) => {
+  const card = make('div');
+  card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'), ...more(k));
+  return card;
+}));
 
-// ---- Drawings.
-// The polygons of each unit, as arrays of x and y in metres.
-const unitsOf = (drawings, detail) => {
-  const [x0, y0, quantum] = detail.grid;
-  let {part, polygon, point} = detail.at;
-  return Array.from({length: detail.units}, () => Array.from({length: drawings.parts[part++]}, () => {
-    let x = 0, y = 0;
-    return Array.from({length: drawings.corners[polygon++]}, () => {
-      x += drawings.points[point++];
-      y += drawings.points[point++];
-      return [x0 + quantum * x, y0 + quantum * y];
-    });
-  }));
-};
-
-const SVG = 'http://www.w3.org/2000/svg';
-const shape = (tag, attributes) => {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  return element;
-};
-// y points up.
-const pointsText = (points) => points.map(([x, y]) => `${x},${-y}`).join(' ');
-const outline = (points, attributes) =>
-  shape('polygon', {points: pointsText(points), 'vector-effect': 'non-scaling-stroke', 'stroke-linejoin': 'round', ...attributes});
-
-const view = {x: 0, y: 0, width: 1, height: 1, whole: null, scene: null};
-
-// Beyond this, numbers of a log are no places in a drawing.
-const canBeDrawn = (...numbers) => numbers.every((x) => Math.abs(x) < 1e9);
-
-// Where an obstacle is at a time: its points and its radius, or null.
-const placeOf = (obstacle, time) => {
-  if (!obstacle?.points) return null;
-  const {points, radius, motion} = obstacle;
-  if (!motion) return {points, radius};
-  if (time < motion.from || motion.until < time) return null;
-  const tau = (time - motion.stamp) / 1e6;
-  return {points: points.map(([x, y]) => [x + motion.velocity[0] * tau, y + motion.velocity[1] * tau]),
-    radius: radius + motion.uncertainty + motion.growth * Math.abs(tau) + motion.growth_rate * tau * tau / 2};
-};
-const centerOf = (points) => [0, 1].map((k) => points.reduce((sum, point) => sum + point[k], 0) / points.length);
-
-// A hull of points, each with a disc of this radius, is their polygon with a round border as wide.
-const drawObstacle = (obstacle, place, isBinding) => {
-  const color = isBinding ? WRONG : '#6b7280';
-  if (obstacle.normal) {
-    const [nx, ny] = obstacle.normal, norm = Math.hypot(nx, ny), far = 50 * Math.max(view.whole.width, view.whole.height);
-    const [ux, uy] = [nx / norm, ny / norm], [cx, cy] = [ux * obstacle.offset / norm, uy * obstacle.offset / norm];
-    if (!canBeDrawn(cx, cy)) return shape('g', {});
-    return outline([[cx - far * uy, cy + far * ux], [cx + far * uy, cy - far * ux], [cx + far * (uy + ux), cy + far * (uy - ux)],
-      [cx + far * (ux - uy), cy + far * (uy + ux)]], {fill: color, 'fill-opacity': .28, stroke: color, 'stroke-width': isBinding ? 2 : 1});
-  }
-  const group = shape('g', {opacity: isBinding ? .5 : .38});
-  if (place.points.length === 1)
-    group.append(shape('circle', {cx: place.points[0][0], cy: -place.points[0][1], r: Math.max(place.radius, 0), fill: color}));
-  else
-    group.append(shape('polygon', {points: pointsText(place.points), fill: color, stroke: color, 'stroke-width': 2 * place.radius, 'stroke-linejoin': 'round'}));
-  return group;
-};
+// ---- Drawings: SVG of records/svg.h, which holds numbers and names of classes alone, in metres.
+const view = {x: 0, y: 0, width: 1, height: 1, whole: null, detail: null};
 
 const showView = () => {
   const svg = byId('svg');
   svg.setAttribute('viewBox', `${view.x} ${view.y} ${view.width} ${view.height}`);
   const box = svg.getBoundingClientRect();
   const perPixel = Math.max(view.width / Math.max(box.width, 1), view.height / Math.max(box.height, 1));
-  for (const label of svg.querySelectorAll('text')) label.setAttribute('font-size', 12 * perPixel);
-  for (const dot of svg.querySelectorAll('.dot')) dot.setAttribute('r', (dot.isNow ? 5 : 2.2) * perPixel);
+  for (const label of svg.querySelectorAll('text')) label.setAttribute('font-size', 12 * perPixel / label.closest('.scene').dataset.scale);
   const target = 110 * perPixel, base = Math.pow(10, Math.floor(Math.log10(target)));
   const length = [5, 2, 1].map((k) => k * base).find((l) => l <= target) ?? base;
   byId('scale').style.width = `${length / perPixel}px`;
@@ -228,85 +175,43 @@ const startView = () => {
   new ResizeObserver(() => { if (view.whole) showView(); }).observe(svg);
 };
 
-// The tube, and the obstacle that decides if it is not much larger.
-const extentOf = (units, executed, place) => {
-  let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
-  const add = ([x, y]) => { left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y); };
-  units.flat(2).forEach(add);
-  executed.forEach(([, x, y]) => add([x, y]));
-  const size = Math.max(right - left, top - bottom, 1e-3);
-  for (const [x, y] of place && place.radius < size && canBeDrawn(...place.points.flat()) ? place.points : [])
-    if (Math.abs(x - (left + right) / 2) < 1.5 * size && Math.abs(y - (top + bottom) / 2) < 1.5 * size)
-      for (const way of [-1, 1]) add([x + way * place.radius, y + way * place.radius]);
-  const border = Math.max(.12 * Math.max(right - left, top - bottom), 1e-3);
-  const width = right - left + 2 * border, height = Math.max(top - bottom + 2 * border, .45 * width);
-  return {x: left - border, y: -(top + bottom) / 2 - height / 2, width, height};
-};
-
-// What the step slider changes is in groups of its own.
-// @param binding the index of the obstacle that decides in `set`, or -1.
-const drawTube = ({units, bodies = [], detail, outcome, binding, set}) => {
-  const color = outcomeColor(outcome);
-  const executed = new Set(detail.executed.map(([step]) => step));
-  view.whole = extentOf(units, detail.executed, placeOf(set[binding], detail.start + Math.max(detail.binding, 0) * detail.step_us));
-  const tube = shape('g', {}), path = shape('g', {}), now = shape('g', {}), obstacles = shape('g', {}), labels = shape('g', {});
-  units.forEach((polygons, u) => polygons.forEach((polygon) => tube.append(outline(polygon, {
-    fill: executed.has(u) ? EXECUTED : color, 'fill-opacity': executed.has(u) ? .2 : .13,
-    stroke: executed.has(u) ? EXECUTED : color, 'stroke-opacity': .45, 'stroke-width': .8}))));
-  for (const polygon of units[detail.binding] ?? []) path.append(outline(polygon, {fill: 'none', stroke: WRONG, 'stroke-width': 2}));
-  if (detail.executed.length > 1)
-    path.append(shape('polyline', {points: pointsText(detail.executed.map(([, x, y]) => [x, y])), fill: 'none', stroke: INK, 'stroke-width': 1, 'vector-effect': 'non-scaling-stroke'}));
-  for (const [step, x, y] of detail.executed) {
-    const dot = shape('circle', {class: 'dot', cx: x, cy: -y, fill: INK});
-    dot.step = step;
-    path.append(dot);
-  }
-  byId('svg').replaceChildren(obstacles, tube, path, now, labels);
-  view.scene = {units, bodies, detail, color, binding, obstacles, now, path, labels, set};
-  const slider = byId('step');
-  slider.max = String(Math.max(0, units.length - 1));
-  slider.value = String(Math.max(0, Math.min(detail.binding, units.length - 1)));
+const wholeOf = ({frame: [x, y, width, height]}) => ({x, y, width, height});
+const drawTube = (detail, svgText, color) => {
+  const svg = byId('svg'), slider = byId('step');
+  svg.innerHTML = svgText;
+  svg.pauseAnimations();
+  svg.style.setProperty('--tube', color);
+  view.whole = wholeOf(detail);
+  view.detail = detail;
+  slider.max = String(Math.max(0, detail.units - 1));
+  slider.value = String(Math.max(0, Math.min(detail.binding, detail.units - 1)));
   Object.assign(view, view.whole);
   showStep();
 };
 
 const showStep = () => {
-  const {scene} = view, step = Number(byId('step').value);
-  if (!scene) return;
-  const {detail, units} = scene, time = detail.start + step * detail.step_us;
+  const svg = byId('svg'), step = Number(byId('step').value), {detail} = view;
+  if (!detail) return;
   byId('step-name').textContent = `Step ${step} of ${detail.steps}${step === detail.binding ? ', binding' : ''}`;
   byId('step').setAttribute('aria-valuetext', byId('step-name').textContent);
-  scene.now.replaceChildren(...(units[step] ?? []).map((polygon) => outline(polygon, {fill: scene.color, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.6})));
-  for (const polygon of scene.bodies[step] ?? []) scene.now.append(outline(polygon, {class: 'body', fill: INK, 'fill-opacity': .3, stroke: INK, 'stroke-width': 1.4}));
-  for (const dot of scene.path.querySelectorAll('.dot')) dot.isNow = dot.step === step;
-  scene.obstacles.replaceChildren();
-  scene.labels.replaceChildren();
-  scene.set.forEach((obstacle, k) => {
-    const place = placeOf(obstacle, time), isBinding = k === scene.binding;
-    if (!obstacle || !(obstacle.normal ? canBeDrawn(...obstacle.normal, obstacle.offset) : place && canBeDrawn(place.radius, ...place.points.flat()))) return;
-    scene.obstacles.append(drawObstacle(obstacle, place, isBinding));
-    if (!place) return;
-    const [x, y] = centerOf(place.points);
-    const label = shape('text', {x, y: -y, 'text-anchor': 'middle', 'dominant-baseline': 'middle', fill: INK, 'pointer-events': 'none'});
-    label.textContent = String(k);
-    scene.labels.append(label);
-  });
+  svg.setCurrentTime(step + .5);  // obstacles that move
+  for (const old of svg.querySelectorAll('.now')) old.classList.remove('now');
+  for (const part of svg.querySelectorAll(`.s${step}`)) part.classList.add('now');
   showView();
 };
 
-const showLegend = (color, detail) => {
-  const entries = [[color, 'tube'], ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']];
-  if (detail.body_units > 0) entries.splice(1, 0, [INK, 'the body, at the center of its slice']);
-  if (detail.executed.length) entries.splice(1, 0, [EXECUTED, 'executed slices'], [INK, 'measured states']);
-  byId('legend').replaceChildren(...entries.map(([background, text]) => {
-    const item = make('li'), chip = make('i', undefined, 'chip');
-    chip.style.background = background;
-    item.append(chip, text);
-    return item;
-  }));
-};
+const fillLegend = (entries) => byId('legend').replaceChildren(...entries.map(([color, text]) => {
+  const item = make('li'), chip = make('i', undefined, 'chip');
+  chip.style.background = color;
+  item.append(chip, text);
+  return item;
+}));
+const showLegend = (color, detail) => fillLegend([[color, 'tube'],
+  ...(detail.executed ? [[EXECUTED, 'executed slices'], [INK, 'measured states']] : []),
+  ...(detail.has_body ? [[INK, 'the body, at the center of its slice']] : []),
+  ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']]);
 
 return {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf,
-  timeText, clockText, listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn,
-  placeOf, centerOf, drawObstacle, showView, showWhole, startView, drawTube, showLegend};
+  timeText, clockText, listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, wholeOf, showView, startView, drawTube,
+  fillLegend, showLegend};
 })();

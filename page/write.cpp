@@ -1,13 +1,14 @@
 #include "page/write.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <utility>
 
 #include "lcmtypes/printable.h"
 #include "page/columns.h"
+#include "page/detail.h"
 #include "page/document.h"
-#include "page/drawing_json.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -43,7 +44,7 @@ template <class Row, class Of>
 Json TextColumn(const std::vector<Row>& rows, const Of& of) {
   std::string bytes;
   Json ends = ColumnOf<std::uint32_t>(rows, [&](const Row& row) {
-    bytes += Printable(of(row)) + "\n";
+    bytes += Printable(std::invoke(of, row)) + "\n";
     return bytes.size();
   });
   return {{"type", "text"}, {"data", Packed(bytes)}, {"ends", std::move(ends)}};
@@ -168,20 +169,6 @@ Json TasksJson(const std::vector<PageTask>& tasks) {
 
 // ---- Drawings.
 
-template <class Number>
-Json Joined(const std::vector<PageDetail>& details, Sketch PageDetail::*sketch, std::vector<Number> Sketch::*member) {
-  std::vector<Number> all;
-  for (const PageDetail& detail : details)
-    all.insert(all.end(), (detail.*sketch.*member).begin(), (detail.*sketch.*member).end());
-  return Column(all);
-}
-
-Json SketchesJson(const std::vector<PageDetail>& details, Sketch PageDetail::*sketch) {
-  return {{"parts", Joined(details, sketch, &Sketch::parts)},
-          {"corners", Joined(details, sketch, &Sketch::corners)},
-          {"points", Joined(details, sketch, &Sketch::points)}};
-}
-
 Json ToJson(const PageAdvice& advice) {
   Json groups = Json::array();
   for (const PageAdvice::Group& group : advice.groups)
@@ -192,14 +179,11 @@ Json ToJson(const PageAdvice& advice) {
 Json DrawingsJson(const PageRun& run) {
   Json details = Json::array();
   for (const PageDetail& detail : run.details) details.push_back(ToJson(detail));
-  Json sets = Json::array();
-  for (const std::vector<Obstacle>& set : run.obstacle_sets) sets.push_back(ToJson(set));
   Json advice = Json::array();
   for (const PageAdvice& each : run.advice) advice.push_back(ToJson(each));
-  const Json texts{{"details", std::move(details)}, {"obstacle_sets", std::move(sets)}, {"advice", std::move(advice)}};
+  const Json texts{{"details", std::move(details)}, {"advice", std::move(advice)}};
   return {{"texts", {{"type", "json"}, {"data", Packed(JsonText(texts))}}},
-          {"tubes", SketchesJson(run.details, &PageDetail::sketch)},
-          {"bodies", SketchesJson(run.details, &PageDetail::bodies)}};
+          {"svg", TextColumn(run.details, &PageDetail::svg)}};
 }
 
 Json RunsJson(const PageRun& run, bool only_figures) {
@@ -214,17 +198,11 @@ Json RunsJson(const PageRun& run, bool only_figures) {
 }
 
 Json RunJson(const PageRun& run, bool only_figures) {
-  Json json{{"name", Printable(run.name)},
-            {"files", TextsJson(run.files)},
-            {"notes", TextsJson(run.notes)},
-            {"tasks", TasksJson(run.tasks)},
-            {"damaged_places", run.damage.places},
-            {"count", run.decisions.size()},
-            {"decisions", only_figures ? FiguresJson(run) : DecisionsJson(run)},
-            {"events", EventsJson(run.events)},
-            {"gaps", GapsJson(run.gaps)},
-            {"faults", FaultsJson(run.faults)},
-            {"withdrawals", WithdrawalsJson(run.withdrawals)}};
+  Json json{{"name", Printable(run.name)},      {"notes", TextsJson(run.notes)},
+            {"tasks", TasksJson(run.tasks)},    {"damaged_places", run.damage.places},
+            {"count", run.decisions.size()},    {"decisions", only_figures ? FiguresJson(run) : DecisionsJson(run)},
+            {"events", EventsJson(run.events)}, {"gaps", GapsJson(run.gaps)},
+            {"faults", FaultsJson(run.faults)}, {"withdrawals", WithdrawalsJson(run.withdrawals)}};
   json["events"]["run"] = RunColumn(run, &PagePart::events, run.events.size());
   json["gaps"]["run"] = RunColumn(run, &PagePart::gaps, run.gaps.size());
   json["faults"]["run"] = RunColumn(run, &PagePart::faults, run.faults.size());

@@ -1,124 +1,129 @@
 #include "records/chart.h"
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include <cairo.h>
-#include <fmt/core.h>
-
-#include "records/canvas.h"
+#include <fmt/format.h>
 
 namespace forereach {
 namespace {
 
-constexpr std::size_t kMostSeries = 6;
 // Told apart with every common colour blindness (the set of Okabe and Ito).
-constexpr std::array<std::array<double, 3>, kMostSeries> kColors{{{0.84, 0.37, 0.00},
-                                                                  {0.90, 0.62, 0.00},
-                                                                  {0.00, 0.45, 0.70},
-                                                                  {0.00, 0.62, 0.45},
-                                                                  {0.80, 0.47, 0.65},
-                                                                  {0.13, 0.13, 0.15}}};
-constexpr double kLeft = 70, kRight = 30, kTop = 60, kBottom = 105;  // pixels
+constexpr const char* kColors[] = {"#d55e00", "#e69f00", "#0072b2", "#009e73", "#cc79a7", "#212126"};
+constexpr double kWidth = 900, kHeight = 560, kLeft = 70, kRight = 30, kTop = 60, kBottom = 105;  // pixels of a chart
+constexpr double kPanelWidth = 210, kPanelHeight = 130, kGap = 16, kScatterLeft = 100, kScatterTop = 70,
+                 kScatterBottom = 40;  // pixels of a scatter
+constexpr Eigen::Index kMostDots = 2000;
 
-class ChartPainter {
+/** Places are pixels from the upper left. */
+class Paper final {
  public:
-  ChartPainter(cairo_t* cairo, const Chart& chart, double width, double height)
-      : cairo_(cairo), chart_(chart), width_(width), height_(height) {}
-
-  void Paint() {
-    BeginDrawing(cairo_);
-    Write(chart_.title, kLeft, 34, 18);
-    PaintAxes();
-    for (std::size_t s = 0; s < chart_.series.size(); ++s) PaintSeries(s);
-    PaintLegend();
+  void Write(const std::string& text, double x, double y, double size) {
+    svg_.Text({x, -y}, text, fmt::format("font-size=\"{}\" fill=\"#212126\"", size));
   }
+  void Line(double x0, double y0, double x1, double y1, const char* color = "#ccccd1", double width = 1) {
+    svg_.Line({{x0, -y0}, {x1, -y1}}, fmt::format("stroke=\"{}\" stroke-width=\"{}\"", color, width));
+  }
+  void Dot(double x, double y, double radius, const char* color, double alpha = 1) {
+    svg_.Dot({x, -y}, fmt::format("stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{}\" stroke-linecap=\"round\"",
+                                  color, 2 * radius, alpha));
+  }
+  std::string Done() { return svg_.Done(); }
 
  private:
-  double X(double x) const {
-    const double least = std::log(chart_.x.front()), range = std::log(chart_.x.back()) - least;
-    return kLeft + (width_ - kLeft - kRight) * (range > 0 ? (std::log(x) - least) / range : 0.5);
-  }
-  double Y(double percent) const { return height_ - kBottom - (height_ - kTop - kBottom) * percent / 100; }
-
-  void Write(const std::string& text, double x, double y, double size) { WriteText(cairo_, text, x, y, size); }
-  void Line(double x0, double y0, double x1, double y1) {
-    cairo_set_source_rgb(cairo_, 0.80, 0.80, 0.82);
-    cairo_set_line_width(cairo_, 1);
-    cairo_move_to(cairo_, x0, y0);
-    cairo_line_to(cairo_, x1, y1);
-    cairo_stroke(cairo_);
-  }
-
-  void PaintAxes() {
-    for (int percent = 0; percent <= 100; percent += 20) {
-      Line(kLeft, Y(percent), width_ - kRight, Y(percent));
-      Write(fmt::format("{:>3}", percent), kLeft - 36, Y(percent) + 5, 13);
-    }
-    for (const double x : chart_.x) {
-      Line(X(x), Y(0), X(x), Y(100));
-      Write(fmt::format("{:g}", x), X(x) - 8, Y(0) + 20, 13);
-    }
-    Write(chart_.x_name, kLeft, Y(0) + 42, 13);
-    Write(chart_.y_name, kLeft, Y(100) - 8, 13);
-  }
-
-  void UseColor(std::size_t s) { cairo_set_source_rgb(cairo_, kColors[s][0], kColors[s][1], kColors[s][2]); }
-  void Mark(double x, double y) {
-    cairo_arc(cairo_, x, y, 4, 0, 2 * M_PI);
-    cairo_fill(cairo_);
-  }
-
-  void PaintSeries(std::size_t s) {
-    UseColor(s);
-    cairo_set_line_width(cairo_, 2);
-    const std::vector<double>& y = chart_.series[s].y;
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      if (!std::isfinite(y[i])) continue;
-      if (i > 0 && std::isfinite(y[i - 1])) {
-        cairo_move_to(cairo_, X(chart_.x[i - 1]), Y(y[i - 1]));
-        cairo_line_to(cairo_, X(chart_.x[i]), Y(y[i]));
-        cairo_stroke(cairo_);
-      }
-      Mark(X(chart_.x[i]), Y(y[i]));
-    }
-  }
-
-  void PaintLegend() {
-    double x = kLeft;
-    for (std::size_t s = 0; s < chart_.series.size(); ++s) {
-      UseColor(s);
-      Mark(x, height_ - 26);
-      Write(chart_.series[s].name, x + 10, height_ - 21, 13);
-      cairo_text_extents_t extents;
-      cairo_text_extents(cairo_, chart_.series[s].name.c_str(), &extents);
-      x += extents.x_advance + 32;
-    }
-  }
-
-  cairo_t* cairo_;
-  const Chart& chart_;
-  const double width_, height_;
+  Svg svg_{Eigen::Vector2d::Zero(), 1, 0.1};
 };
 
-void Require(const Chart& chart) {
-  if (chart.x.empty() || !(chart.x.front() > 0)) throw std::invalid_argument("chart: x is positive");
-  for (std::size_t i = 1; i < chart.x.size(); ++i)
-    if (!(chart.x[i - 1] < chart.x[i])) throw std::invalid_argument("chart: x has to rise");
-  if (chart.series.size() > kMostSeries)
-    throw std::invalid_argument(fmt::format("chart: {} series, at most {}", chart.series.size(), kMostSeries));
-  for (const Chart::Series& series : chart.series)
-    if (series.y.size() != chart.x.size())
-      throw std::invalid_argument(
-          fmt::format("chart: {} has {} values for {} x", series.name, series.y.size(), chart.x.size()));
+void Require(bool is_right, const std::string& what) {
+  if (!is_right) throw std::invalid_argument(what);
 }
 
 }  // namespace
 
-void DrawChart(const Chart& chart, const std::string& path, int width, int height) {
-  Require(chart);
-  DrawFile(path, width, height, [&](cairo_t* cairo) { ChartPainter(cairo, chart, width, height).Paint(); });
+void DrawChart(const Chart& chart, const std::string& path) {
+  Require(!chart.x.empty() && chart.x.front() > 0, "chart: x is positive");
+  Require(std::ranges::adjacent_find(chart.x, [](double a, double b) { return !(a < b); }) == chart.x.end(),
+          "chart: x has to rise");
+  Require(chart.series.size() <= std::size(kColors), fmt::format("chart: {} series", chart.series.size()));
+  const double least = std::log(chart.x.front()), range = std::log(chart.x.back()) - least;
+  const auto x_of = [&](double x) {
+    return kLeft + (kWidth - kLeft - kRight) * (range > 0 ? (std::log(x) - least) / range : 0.5);
+  };
+  const auto y_of = [](double percent) { return kHeight - kBottom - (kHeight - kTop - kBottom) * percent / 100; };
+  Paper paper;
+  paper.Write(chart.title, kLeft, 34, 18);
+  for (int percent = 0; percent <= 100; percent += 20) {
+    paper.Line(kLeft, y_of(percent), kWidth - kRight, y_of(percent));
+    paper.Write(std::to_string(percent), kLeft - 36, y_of(percent) + 5, 13);
+  }
+  for (const double x : chart.x) {
+    paper.Line(x_of(x), y_of(0), x_of(x), y_of(100));
+    paper.Write(fmt::format("{:g}", x), x_of(x) - 8, y_of(0) + 20, 13);
+  }
+  paper.Write(chart.x_name, kLeft, y_of(0) + 42, 13);
+  paper.Write(chart.y_name, kLeft, y_of(100) - 8, 13);
+  for (std::size_t s = 0; s < chart.series.size(); ++s) {
+    const auto& [name, y] = chart.series[s];
+    Require(y.size() == chart.x.size(),
+            fmt::format("chart: {} has {} values for {} x", name, y.size(), chart.x.size()));
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      if (!std::isfinite(y[i])) continue;
+      if (i > 0 && std::isfinite(y[i - 1]))
+        paper.Line(x_of(chart.x[i - 1]), y_of(y[i - 1]), x_of(chart.x[i]), y_of(y[i]), kColors[s], 2);
+      paper.Dot(x_of(chart.x[i]), y_of(y[i]), 4, kColors[s]);
+    }
+    const double x = kLeft + (s % 2 == 0 ? 0 : kWidth / 2), height = kHeight - 40 + 18 * static_cast<double>(s / 2);
+    paper.Dot(x, height, 4, kColors[s]);
+    paper.Write(name, x + 10, height + 5, 13);
+  }
+  WriteSvg(path, static_cast<int>(kWidth), static_cast<int>(kHeight), paper.Done());
+}
+
+void DrawScatter(const Scatter& scatter, const std::string& path) {
+  const auto& [title, first, second, x_names, y_names, x, y_first, y_second] = scatter;
+  Require(x.rows() > 0 && y_first.rows() == x.rows() && y_second.rows() == x.rows() &&
+              y_first.cols() == y_second.cols() && std::ssize(x_names) == x.cols() &&
+              std::ssize(y_names) == y_first.cols(),
+          "scatter: sizes differ");
+  Require(x.allFinite() && y_first.allFinite() && y_second.allFinite(), "scatter: a number is not finite");
+  struct Set {
+    const std::string& name;
+    const Eigen::MatrixXd& y;
+    const char* color;
+    double alpha, key;
+  };
+  const Set sets[] = {{first, y_first, kColors[0], 0.35, kGap}, {second, y_second, kColors[2], 0.6, kGap + 160}};
+  Paper paper;
+  paper.Write(title, kGap, 28, 17);
+  for (const Set& set : sets) {
+    paper.Dot(set.key + 5, 50, 4, set.color, set.alpha);
+    paper.Write(set.name, set.key + 16, 55, 13);
+  }
+  for (Eigen::Index k = 0; k < y_first.cols(); ++k) {
+    const double top = kScatterTop + static_cast<double>(k) * (kPanelHeight + kGap), bottom = top + kPanelHeight;
+    const double most = std::max(y_first.col(k).cwiseAbs().maxCoeff(), y_second.col(k).cwiseAbs().maxCoeff());
+    paper.Write(y_names[static_cast<std::size_t>(k)], kGap, top + 16, 13);
+    paper.Write(fmt::format("+-{:.3g}", most), kGap, top + 34, 11);
+    for (Eigen::Index l = 0; l < x.cols(); ++l) {
+      const double left = kScatterLeft + static_cast<double>(l) * (kPanelWidth + kGap), right = left + kPanelWidth;
+      const double least = x.col(l).minCoeff(), range = x.col(l).maxCoeff() - least;
+      for (const double y : {top, (top + bottom) / 2, bottom}) paper.Line(left, y, right, y);
+      for (const double side : {left, right}) paper.Line(side, top, side, bottom);
+      for (const Set& set : sets)
+        for (Eigen::Index d = 0, dots = std::min(x.rows(), kMostDots); d < dots; ++d) {
+          const Eigen::Index i = d * x.rows() / dots;
+          paper.Dot(left + kPanelWidth * (range > 0 ? (x(i, l) - least) / range : 0.5),
+                    top + kPanelHeight / 2 * (1 - (most > 0 ? set.y(i, k) / most : 0)), 1.3, set.color, set.alpha);
+        }
+      if (k + 1 == y_first.cols())
+        paper.Write(fmt::format("{}  {:.3g} .. {:.3g}", x_names[static_cast<std::size_t>(l)], least, least + range),
+                    left, bottom + 18, 12);
+    }
+  }
+  WriteSvg(path, static_cast<int>(kScatterLeft + static_cast<double>(x.cols()) * (kPanelWidth + kGap)),
+           static_cast<int>(kScatterTop + static_cast<double>(y_first.cols()) * (kPanelHeight + kGap) + kScatterBottom),
+           paper.Done());
 }
 
 }  // namespace forereach

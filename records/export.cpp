@@ -37,75 +37,70 @@ OutputFile FileOf(const std::string& path) { return OutputFile(path, OutputFile:
 
 // ---- Tables.
 
-class JsonLinesSink final : public Sink {
+class TableSink : public Sink {
  public:
-  JsonLinesSink(const std::string& name, const std::string& path) : Sink(name), file_(FileOf(path)) {}
+  using Sink::Sink;
 
-  void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
+  void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) final {
     ++result.decisions;
     result.without_candidate += candidate == nullptr;
-    file_.Write(JsonLine("decision", CellsOf(robot, row, candidate), candidate));
+    Write("decision", CellsOf(robot, row, candidate), candidate);
+    if (candidate && HasCounts(*candidate)) OnControls(row, *candidate);
   }
-  void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
+  void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) final {
     ++result.withdrawals;
-    file_.Write(JsonLine("withdrawal", CellsOf(robot, withdrawal, event)));
+    Write("withdrawal", CellsOf(robot, withdrawal, event), nullptr);
   }
-  void OnExecution(const EventRow& row) override {
+  void OnExecution(const EventRow& row) final {
     ++result.executions;
-    file_.Write(JsonLine("execution_event", CellsOf(robot, row)));
+    Write("execution_event", CellsOf(robot, row), nullptr);
   }
-  void OnGap(const GapRow& row) override {
+  void OnGap(const GapRow& row) final {
     ++result.gaps;
-    file_.Write(JsonLine("gap", CellsOf(robot, row)));
+    Write("gap", CellsOf(robot, row), nullptr);
   }
+
+ private:
+  virtual void OnControls(const DecisionRow&, const candidate_plan_t&) {}
+  virtual void Write(const char* record, const Cells& cells, const candidate_plan_t* candidate) = 0;
+};
+
+class JsonLinesSink final : public TableSink {
+ public:
+  JsonLinesSink(const std::string& name, const std::string& path) : TableSink(name), file_(FileOf(path)) {}
   void Finish() override { file_.Close(); }
 
  private:
+  void Write(const char* record, const Cells& cells, const candidate_plan_t* candidate) override {
+    file_.Write(JsonLine(record, cells, candidate));
+  }
+
   OutputFile file_;
 };
 
-class CsvSink final : public Sink {
+class CsvSink final : public TableSink {
  public:
-  CsvSink(const std::string& name, const std::vector<std::string>& files)
-      : Sink(name),
-        decisions_(FileOf(files[0])),
-        controls_(FileOf(files[1])),
-        executions_(FileOf(files[2])),
-        withdrawals_(FileOf(files[3])),
-        gaps_(FileOf(files[4])) {
+  CsvSink(const std::string& name, const std::vector<std::string>& files) : TableSink(name) {
     static const candidate_plan_t none{};
-    decisions_.Write(CsvHeader(CellsOf("", DecisionRow{}, nullptr)));
-    controls_.Write(CsvHeader(CellsOfControl("", DecisionRow{}, none, 0)));
-    executions_.Write(CsvHeader(CellsOf("", EventRow{})));
-    withdrawals_.Write(CsvHeader(CellsOf("", withdrawal_t{}, LogReference{})));
-    gaps_.Write(CsvHeader(CellsOf("", GapRow{})));
-  }
-
-  void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
-    ++result.decisions;
-    result.without_candidate += candidate == nullptr;
-    decisions_.Write(CsvLine(CellsOf(robot, row, candidate)));
-    if (!candidate || !HasCounts(*candidate)) return;
-    for (int t = 0; t < candidate->num_steps; ++t) controls_.Write(CsvLine(CellsOfControl(robot, row, *candidate, t)));
-  }
-  void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
-    ++result.withdrawals;
-    withdrawals_.Write(CsvLine(CellsOf(robot, withdrawal, event)));
-  }
-  void OnExecution(const EventRow& row) override {
-    ++result.executions;
-    executions_.Write(CsvLine(CellsOf(robot, row)));
-  }
-  void OnGap(const GapRow& row) override {
-    ++result.gaps;
-    gaps_.Write(CsvLine(CellsOf(robot, row)));
+    const Cells first[] = {CellsOf("", DecisionRow{}, nullptr), CellsOfControl("", DecisionRow{}, none, 0),
+                           CellsOf("", EventRow{}), CellsOf("", withdrawal_t{}, LogReference{}), CellsOf("", GapRow{})};
+    const char* const records[] = {"decision", "control", "execution_event", "withdrawal", "gap"};
+    for (std::size_t i = 0; i < std::size(records); ++i)
+      files_.emplace(records[i], FileOf(files[i])).first->second.Write(CsvHeader(first[i]));
   }
   void Finish() override {
-    for (OutputFile* file : {&decisions_, &controls_, &executions_, &withdrawals_, &gaps_}) file->Close();
+    for (auto& [record, file] : files_) file.Close();
   }
 
  private:
-  OutputFile decisions_, controls_, executions_, withdrawals_, gaps_;
+  void OnControls(const DecisionRow& row, const candidate_plan_t& candidate) override {
+    for (int t = 0; t < candidate.num_steps; ++t) Write("control", CellsOfControl(robot, row, candidate, t), nullptr);
+  }
+  void Write(const char* record, const Cells& cells, const candidate_plan_t*) override {
+    files_.find(record)->second.Write(CsvLine(cells));
+  }
+
+  std::map<std::string_view, OutputFile> files_;
 };
 
 // ---- Tubes.
@@ -245,15 +240,9 @@ void ReadLogs(const std::vector<std::string>& logs, const ExportOptions& options
 }  // namespace
 
 const std::vector<std::string>& ExportFiles(ExportFormat format) {
-  static const std::vector<std::string> csv{"decisions.csv", "controls.csv", "executions.csv", "withdrawals.csv",
-                                            "gaps.csv"},
-      jsonl{"jsonl"}, npz{"npz"}, mcap{"mcap"};
-  switch (format) {
-    case ExportFormat::kCsv: return csv;
-    case ExportFormat::kJsonLines: return jsonl;
-    case ExportFormat::kNpz: return npz;
-    default: return mcap;
-  }
+  static const std::vector<std::string> of[] = {
+      {"decisions.csv", "controls.csv", "executions.csv", "withdrawals.csv", "gaps.csv"}, {"jsonl"}, {"npz"}, {"mcap"}};
+  return of[static_cast<std::size_t>(format)];
 }
 
 ExportResult& ExportResult::operator+=(const ExportResult& other) {

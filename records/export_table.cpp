@@ -1,6 +1,8 @@
 #include "records/export_table.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -24,10 +26,10 @@ constexpr const char* kGroundNames[] = {"config_digest", "model_digest", "declar
 Cell Index(std::int64_t value) { return value < 0 ? Cell() : Cell(value); }
 Cell TextOrNone(const std::string& text) { return text.empty() ? Cell() : Cell(text); }
 
-void AddReference(Cells& cells, const std::string& robot, const LogReference& event) {
-  cells.emplace_back("robot", robot);
-  cells.emplace_back("log_file", event.log_file);
-  cells.emplace_back("event_number", Index(event.event_number));
+void Add(Cells& cells, Cells more) { std::ranges::move(more, std::back_inserter(cells)); }
+
+Cells ReferenceOf(const std::string& robot, const LogReference& event) {
+  return {{"robot", robot}, {"log_file", event.log_file}, {"event_number", Index(event.event_number)}};
 }
 
 void AddCandidate(Cells& cells, const candidate_plan_t* candidate) {
@@ -37,14 +39,14 @@ void AddCandidate(Cells& cells, const candidate_plan_t* candidate) {
   };
   static const candidate_plan_t none{};
   const candidate_plan_t& given = candidate ? *candidate : none;
-  cells.emplace_back("start_utime", number(given.start_utime));
-  cells.emplace_back("step_us", number(given.step_us));
-  cells.emplace_back("num_states", number(given.num_states));
-  cells.emplace_back("num_inputs", number(given.num_inputs));
-  cells.emplace_back("num_steps", number(given.num_steps));
-  cells.emplace_back("progress_steps", number(given.progress_steps));
-  cells.emplace_back("initial_center", numbers(given.initial_center));
-  cells.emplace_back("initial_half_width", numbers(given.initial_half_width));
+  Add(cells, {{"start_utime", number(given.start_utime)},
+              {"step_us", number(given.step_us)},
+              {"num_states", number(given.num_states)},
+              {"num_inputs", number(given.num_inputs)},
+              {"num_steps", number(given.num_steps)},
+              {"progress_steps", number(given.progress_steps)},
+              {"initial_center", numbers(given.initial_center)},
+              {"initial_half_width", numbers(given.initial_half_width)}});
 }
 
 // What a text of a recording may not begin with in a spreadsheet: it would be computed.
@@ -91,38 +93,33 @@ bool HasCounts(const candidate_plan_t& candidate) {
 }
 
 Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_plan_t* candidate) {
-  Cells cells;
-  AddReference(cells, robot, row.event);
-  cells.emplace_back("utime", row.utime);
-  cells.emplace_back("candidate_utime", row.candidate_utime);
-  cells.emplace_back("sequence", row.sequence);
-  cells.emplace_back("source", row.source);
-  cells.emplace_back("plan_id", row.plan_id);
-  cells.emplace_back("outcome", row.outcome);
-  cells.emplace_back("cause", row.cause);
-  cells.emplace_back("step", Index(row.step));
-  cells.emplace_back("coordinate", Index(row.coordinate));
-  cells.emplace_back("obstacle", Index(row.obstacle));
-  cells.emplace_back("first_observation", Index(row.first_observation));
-  cells.emplace_back("second_observation", Index(row.second_observation));
-  cells.emplace_back("margin", row.margin);
-  cells.emplace_back("threshold", row.threshold);
-  cells.emplace_back("elapsed_us", row.elapsed_us);
-  cells.emplace_back("latency_us", row.latency_us);
+  Cells cells = ReferenceOf(robot, row.event);
+  Add(cells, {{"utime", row.utime},
+              {"candidate_utime", row.candidate_utime},
+              {"sequence", row.sequence},
+              {"source", row.source},
+              {"plan_id", row.plan_id},
+              {"outcome", row.outcome},
+              {"cause", row.cause},
+              {"step", Index(row.step)},
+              {"coordinate", Index(row.coordinate)},
+              {"obstacle", Index(row.obstacle)},
+              {"first_observation", Index(row.first_observation)},
+              {"second_observation", Index(row.second_observation)},
+              {"margin", row.margin},
+              {"threshold", row.threshold},
+              {"elapsed_us", row.elapsed_us},
+              {"latency_us", row.latency_us}});
   AddCandidate(cells, candidate);
-  cells.emplace_back("message", row.message);
-  cells.emplace_back("plan_digest", row.plan_digest);
+  Add(cells, {{"message", row.message}, {"plan_digest", row.plan_digest}});
   for (std::size_t i = 0; i < row.grounds.size(); ++i) cells.emplace_back(kGroundNames[i], row.grounds[i]);
   cells.emplace_back("event_digest", TextOrNone(row.event.digest));
   return cells;
 }
 
 Cells CellsOfControl(const std::string& robot, const DecisionRow& row, const candidate_plan_t& candidate, int step) {
-  Cells cells;
-  AddReference(cells, robot, row.event);
-  cells.emplace_back("source", row.source);
-  cells.emplace_back("plan_id", row.plan_id);
-  cells.emplace_back("step", step);
+  Cells cells = ReferenceOf(robot, row.event);
+  Add(cells, {{"source", row.source}, {"plan_id", row.plan_id}, {"step", step}});
   for (int i = 0; i < kInputs; ++i) {
     Cell& cell = cells.emplace_back(kInputNames[i], std::monostate()).second;
     if (i < candidate.num_inputs) cell = candidate.control[step][i];
@@ -131,22 +128,21 @@ Cells CellsOfControl(const std::string& robot, const DecisionRow& row, const can
 }
 
 Cells CellsOf(const std::string& robot, const withdrawal_t& withdrawal, const LogReference& event) {
-  Cells cells;
-  AddReference(cells, robot, event);
-  cells.emplace_back("utime", withdrawal.utime);
-  cells.emplace_back("sequence", withdrawal.sequence);
-  cells.emplace_back("source", GetText(withdrawal.source));
-  cells.emplace_back("plan_id", withdrawal.plan_id);
-  cells.emplace_back("cause", std::string(WithdrawalName(withdrawal.cause)));
-  cells.emplace_back("first_step", Index(withdrawal.first_step));
-  cells.emplace_back("valid_steps", withdrawal.valid_steps);
-  cells.emplace_back("step", Index(withdrawal.step));
-  cells.emplace_back("obstacle", Index(withdrawal.obstacle));
-  cells.emplace_back("margin", withdrawal.margin);
-  cells.emplace_back("threshold", withdrawal.threshold);
-  cells.emplace_back("message", GetText(withdrawal.message));
-  cells.emplace_back("plan_digest", ToHex(GetDigest(withdrawal.plan_digest)));
-  cells.emplace_back("certificate_digest", ToHex(GetDigest(withdrawal.certificate_digest)));
+  Cells cells = ReferenceOf(robot, event);
+  Add(cells, {{"utime", withdrawal.utime},
+              {"sequence", withdrawal.sequence},
+              {"source", GetText(withdrawal.source)},
+              {"plan_id", withdrawal.plan_id},
+              {"cause", std::string(WithdrawalName(withdrawal.cause))},
+              {"first_step", Index(withdrawal.first_step)},
+              {"valid_steps", withdrawal.valid_steps},
+              {"step", Index(withdrawal.step)},
+              {"obstacle", Index(withdrawal.obstacle)},
+              {"margin", withdrawal.margin},
+              {"threshold", withdrawal.threshold},
+              {"message", GetText(withdrawal.message)},
+              {"plan_digest", ToHex(GetDigest(withdrawal.plan_digest))},
+              {"certificate_digest", ToHex(GetDigest(withdrawal.certificate_digest))}});
   const Grounds grounds = GroundsOf(withdrawal);
   for (std::size_t i = 0; i < kGrounds.size(); ++i)
     cells.emplace_back(kGroundNames[i], ToHex(grounds.*kGrounds[i].member));
@@ -155,32 +151,30 @@ Cells CellsOf(const std::string& robot, const withdrawal_t& withdrawal, const Lo
 }
 
 Cells CellsOf(const std::string& robot, const EventRow& row) {
-  Cells cells;
-  AddReference(cells, robot, row.event);
-  cells.emplace_back("utime", row.utime);
-  cells.emplace_back("sequence", row.sequence);
-  cells.emplace_back("plan_id", Index(row.plan_id));
-  cells.emplace_back("kind", row.kind);
-  cells.emplace_back("step", Index(row.step));
-  cells.emplace_back("coordinate", Index(row.coordinate));
-  cells.emplace_back("state", row.state);
-  cells.emplace_back("value", row.value);
-  cells.emplace_back("message", row.message);
-  cells.emplace_back("event_digest", TextOrNone(row.event.digest));
+  Cells cells = ReferenceOf(robot, row.event);
+  Add(cells, {{"utime", row.utime},
+              {"sequence", row.sequence},
+              {"plan_id", Index(row.plan_id)},
+              {"kind", row.kind},
+              {"step", Index(row.step)},
+              {"coordinate", Index(row.coordinate)},
+              {"state", row.state},
+              {"value", row.value},
+              {"message", row.message},
+              {"event_digest", TextOrNone(row.event.digest)}});
   return cells;
 }
 
 Cells CellsOf(const std::string& robot, const GapRow& row) {
-  Cells cells;
-  AddReference(cells, robot, row.event);
-  cells.emplace_back("channel", row.channel);
-  cells.emplace_back("source", TextOrNone(row.source));
-  cells.emplace_back("expected", Index(row.expected));
-  cells.emplace_back("got", Index(row.got));
-  cells.emplace_back("lost", row.lost);
-  cells.emplace_back("utime", row.utime);
-  cells.emplace_back("reason", row.reason);
-  cells.emplace_back("event_digest", TextOrNone(row.event.digest));
+  Cells cells = ReferenceOf(robot, row.event);
+  Add(cells, {{"channel", row.channel},
+              {"source", TextOrNone(row.source)},
+              {"expected", Index(row.expected)},
+              {"got", Index(row.got)},
+              {"lost", row.lost},
+              {"utime", row.utime},
+              {"reason", row.reason},
+              {"event_digest", TextOrNone(row.event.digest)}});
   return cells;
 }
 

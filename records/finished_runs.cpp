@@ -81,49 +81,30 @@ std::string FinishedRuns::KeyOf(const RunLogs& run) const {
   return ToHex(DigestOf(inputs + DescribeTasks(fs::path(path).parent_path())));
 }
 
-std::string FinishedRuns::PathOf(const std::string& key, const std::string& name) const {
-  return (fs::path(directory_) / (key.substr(0, kNameDigits) + "." + name)).string();
+std::string FinishedRuns::PathOf(const std::string& key) const {
+  return (fs::path(directory_) / (key.substr(0, kNameDigits) + ".json")).string();
 }
 
 std::optional<nlohmann::json> FinishedRuns::Find(const std::string& key) const {
-  const std::string path = PathOf(key, "json");
+  const std::string path = PathOf(key);
   if (!fs::exists(path)) return std::nullopt;
   const std::string bytes = ReadWhole(path, kLargestJsonFile);
   const std::string_view text = std::string_view(bytes).substr(std::min(bytes.size(), kHexDigits));
   if (bytes.size() < kHexDigits || ToHex(DigestOf(key + std::string(text))) != bytes.substr(0, kHexDigits))
     return std::nullopt;
   try {
-    const nlohmann::json kept = ParseJson(text);
-    for (const auto& [file, size] : kept.at("files").items()) {
-      std::error_code error;
-      if (fs::file_size(file, error) != size.get<std::uintmax_t>() || error) return std::nullopt;
-    }
-    return kept.at("result");
+    return ParseJson(text);
   } catch (const nlohmann::json::exception&) {  // not what Keep writes
     return std::nullopt;
   }
 }
 
-void FinishedRuns::Keep(const std::string& key, const nlohmann::json& result,
-                        const std::vector<std::string>& files) const {
-  nlohmann::json kept{{"result", result}, {"files", nlohmann::json::object()}};
-  for (const std::string& path : files) kept["files"][path] = fs::file_size(path);
-  const std::string text = JsonText(kept);
-  OutputFile file(PathOf(key, "json"), OutputFile::Existing::kReplaced);
+void FinishedRuns::Keep(const std::string& key, const nlohmann::json& result) const {
+  const std::string text = JsonText(result);
+  OutputFile file(PathOf(key), OutputFile::Existing::kReplaced);
   file.Write(ToHex(DigestOf(key + text)));
   file.Write(text);
   file.Close();
-}
-
-void FinishedRuns::Clear() const {
-  std::error_code error;
-  for (fs::directory_iterator file(directory_, error), end; !error && file != end; file.increment(error)) {
-    const std::string name = file->path().filename().string();
-    std::error_code ignored;
-    if (name.find_first_not_of("0123456789abcdef") == kNameDigits && name[kNameDigits] == '.')
-      fs::remove(file->path(), ignored);
-  }
-  fs::remove(directory_, error);
 }
 
 }  // namespace forereach

@@ -30,7 +30,7 @@ class FinishedRuns final {
   read. */
   [[nodiscard]] std::string KeyOf(const RunLogs& run) const;
 
-  /** The result that was kept last under this key, if there is one and its files are still there. */
+  /** The result that was kept last under this key, if there is one. */
   [[nodiscard]] std::optional<nlohmann::json> Find(const std::string& key) const;
   /** The same as a Result (nlohmann's from_json); nothing if it is not what this program writes. */
   template <class Result>
@@ -43,17 +43,12 @@ class FinishedRuns final {
       return std::nullopt;
     }
   }
-  /** Keeps a result. Any number of threads may keep, each another key.
-  @param files paths that belong to it, of PathOf; they are written before. @throws OutputError. */
-  void Keep(const std::string& key, const nlohmann::json& result, const std::vector<std::string>& files) const;
-
-  /** The path of a file that belongs to a run's result. */
-  [[nodiscard]] std::string PathOf(const std::string& key, const std::string& name) const;
-
-  /** Deletes all results, and the directory if nothing else is in it. */
-  void Clear() const;
+  /** Keeps a result. Any number of threads may keep, each another key. @throws OutputError. */
+  void Keep(const std::string& key, const nlohmann::json& result) const;
 
  private:
+  [[nodiscard]] std::string PathOf(const std::string& key) const;
+
   const std::string directory_;
   std::string job_;
 };

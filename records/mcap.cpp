@@ -28,40 +28,36 @@ enum class Opcode : std::uint8_t {
 };
 
 // All numbers are little-endian, and texts have their length before them.
-template <std::unsigned_integral Integer>
-void PutInteger(std::string& out, Integer value) {
+void Put(std::string& out, std::unsigned_integral auto value) {
   for (std::size_t i = 0; i < sizeof value; ++i) out.push_back(static_cast<char>(value >> (8 * i) & 0xff));
 }
-
-void PutText(std::string& out, std::string_view text) {
-  PutInteger(out, static_cast<std::uint32_t>(text.size()));
+void Put(std::string& out, std::string_view text) {
+  Put(out, static_cast<std::uint32_t>(text.size()));
   out += text;
 }
-
 // A map or an array: the bytes of its entries, and the entries.
-template <class Entries, class PutEntry>
-void PutEntries(std::string& out, const Entries& entries, PutEntry put) {
+template <class Entries>
+requires requires(const Entries& entries) { entries.begin()->first; }
+void Put(std::string& out, const Entries& entries) {
   std::string bytes;
-  for (const auto& [key, value] : entries) put(bytes, key, value);
-  PutText(out, bytes);
+  for (const auto& [key, value] : entries) Put(bytes, key), Put(bytes, value);
+  Put(out, std::string_view(bytes));
 }
 
-void PutCounts(std::string& out, const std::map<std::uint16_t, std::uint64_t>& counts) {
-  PutEntries(out, counts, [](std::string& bytes, std::uint16_t key, std::uint64_t value) {
-    PutInteger(bytes, key);
-    PutInteger(bytes, value);
-  });
+template <class... Field>
+std::string BytesOf(const Field&... fields) {
+  std::string bytes;
+  (Put(bytes, fields), ...);
+  return bytes;
 }
 
 std::string Record(Opcode op, std::string_view content) {
-  std::string record(1, static_cast<char>(op));
-  PutInteger(record, static_cast<std::uint64_t>(content.size()));
-  record += content;
-  return record;
+  return static_cast<char>(op) + BytesOf(std::uint64_t{content.size()}).append(content);
 }
 
 std::uint32_t Crc(std::uint32_t before, std::string_view bytes) {
-  return static_cast<std::uint32_t>(crc32_z(before, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+  return static_cast<std::uint32_t>(
+      crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 std::uint64_t Nanoseconds(std::int64_t us) {
@@ -78,57 +74,36 @@ void McapWriter::Range::Take(std::uint64_t time) {
 }
 
 McapWriter::McapWriter(OutputFile file) : file_(std::move(file)) {
-  Put(kMagic);
-  std::string header;
-  PutText(header, "");  // no profile
-  PutText(header, "forereach");
-  Put(Record(Opcode::kHeader, header));
+  Append(kMagic);
+  const std::string_view no_profile;
+  Append(Record(Opcode::kHeader, BytesOf(no_profile, std::string_view("forereach"))));
 }
 
-// Of the data section, which has a checksum of its own.
-void McapWriter::Put(std::string_view record) {
+// To the data section, which has a checksum of its own.
+void McapWriter::Append(std::string_view record) {
   data_crc_ = Crc(data_crc_, record);
   file_.Write(record);
 }
 
 std::uint16_t McapWriter::AddSchema(const std::string& name, const std::string& schema) {
   const auto id = static_cast<std::uint16_t>(schemas_.size() + 1);
-  std::string content;
-  PutInteger(content, id);
-  PutText(content, name);
-  PutText(content, "jsonschema");
-  PutText(content, schema);
-  records_ += schemas_.emplace_back(Record(Opcode::kSchema, content));
+  records_ += schemas_.emplace_back(Record(Opcode::kSchema, BytesOf(id, name, std::string_view("jsonschema"), schema)));
   return id;
 }
 
 std::uint16_t McapWriter::AddChannel(std::uint16_t schema, const std::string& topic,
                                      const std::map<std::string, std::string>& metadata) {
   const auto id = static_cast<std::uint16_t>(channels_.size());
-  std::string content;
-  PutInteger(content, id);
-  PutInteger(content, schema);
-  PutText(content, topic);
-  PutText(content, "json");
-  PutEntries(content, metadata, [](std::string& bytes, const std::string& key, const std::string& value) {
-    PutText(bytes, key);
-    PutText(bytes, value);
-  });
-  records_ += channels_.emplace_back(Record(Opcode::kChannel, content));
+  records_ +=
+      channels_.emplace_back(Record(Opcode::kChannel, BytesOf(id, schema, topic, std::string_view("json"), metadata)));
   return id;
 }
 
 void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::int64_t log_us, std::int64_t publish_us,
                        std::string_view json) {
   const std::uint64_t time = Nanoseconds(log_us);
-  std::string content;
-  PutInteger(content, channel);
-  PutInteger(content, sequence);
-  PutInteger(content, time);
-  PutInteger(content, Nanoseconds(publish_us));
-  content += json;
   index_[channel].emplace_back(time, records_.size());
-  records_ += Record(Opcode::kMessage, content);
+  records_ += Record(Opcode::kMessage, BytesOf(channel, sequence, time, Nanoseconds(publish_us)).append(json));
   ++counts_[channel];
   chunk_times_.Take(time);
   times_.Take(time);
@@ -137,27 +112,17 @@ void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::int64
 
 void McapWriter::EndChunk() {
   if (records_.empty()) return;
-  std::string content;
-  PutInteger(content, chunk_times_.first);
-  PutInteger(content, chunk_times_.last);
-  PutInteger(content, static_cast<std::uint64_t>(records_.size()));
-  PutInteger(content, Crc(0, records_));
-  PutText(content, "");  // no compression
-  PutInteger(content, static_cast<std::uint64_t>(records_.size()));
-  content += records_;
-  Chunk chunk{chunk_times_, static_cast<std::uint64_t>(file_.size()), 0, {}, 0, records_.size()};
-  Put(Record(Opcode::kChunk, content));
+  const std::string_view no_compression;
+  const std::uint64_t size = records_.size();
+  Chunk chunk{chunk_times_, static_cast<std::uint64_t>(file_.size()), 0, {}, 0, size};
+  Append(Record(
+      Opcode::kChunk,
+      BytesOf(chunk_times_.first, chunk_times_.last, size, Crc(0, records_), no_compression, size).append(records_)));
   const auto begin = static_cast<std::uint64_t>(file_.size());
   chunk.length = begin - chunk.at;
   for (const auto& [channel, entries] : index_) {
-    std::string index;
-    PutInteger(index, channel);
-    PutEntries(index, entries, [](std::string& bytes, std::uint64_t time, std::uint64_t place) {
-      PutInteger(bytes, time);
-      PutInteger(bytes, place);
-    });
     chunk.indexes[channel] = static_cast<std::uint64_t>(file_.size());
-    Put(Record(Opcode::kMessageIndex, index));
+    Append(Record(Opcode::kMessageIndex, BytesOf(channel, entries)));
   }
   chunk.indexes_length = static_cast<std::uint64_t>(file_.size()) - begin;
   chunks_.push_back(std::move(chunk));
@@ -168,9 +133,7 @@ void McapWriter::EndChunk() {
 
 void McapWriter::Finish() {
   EndChunk();
-  std::string content;
-  PutInteger(content, data_crc_);
-  file_.Write(Record(Opcode::kDataEnd, content));
+  file_.Write(Record(Opcode::kDataEnd, BytesOf(data_crc_)));
 
   const auto begin = static_cast<std::uint64_t>(file_.size());
   std::string summary, offsets;
@@ -178,53 +141,30 @@ void McapWriter::Finish() {
   const auto end_group = [&](Opcode op) {
     const std::uint64_t end = begin + summary.size();
     if (end == group) return;
-    std::string offset(1, static_cast<char>(op));
-    PutInteger(offset, group);
-    PutInteger(offset, end - group);
-    offsets += Record(Opcode::kSummaryOffset, offset);
+    offsets += Record(Opcode::kSummaryOffset, static_cast<char>(op) + BytesOf(group, end - group));
     group = end;
   };
   for (const std::string& schema : schemas_) summary += schema;
   end_group(Opcode::kSchema);
   for (const std::string& channel : channels_) summary += channel;
   end_group(Opcode::kChannel);
-  for (const Chunk& chunk : chunks_) {
-    std::string index;
-    PutInteger(index, chunk.times.first);
-    PutInteger(index, chunk.times.last);
-    PutInteger(index, chunk.at);
-    PutInteger(index, chunk.length);
-    PutCounts(index, chunk.indexes);
-    PutInteger(index, chunk.indexes_length);
-    PutText(index, "");
-    PutInteger(index, chunk.size);
-    PutInteger(index, chunk.size);
-    summary += Record(Opcode::kChunkIndex, index);
-  }
+  const std::string_view no_compression;
+  for (const Chunk& chunk : chunks_)
+    summary +=
+        Record(Opcode::kChunkIndex, BytesOf(chunk.times.first, chunk.times.last, chunk.at, chunk.length, chunk.indexes,
+                                            chunk.indexes_length, no_compression, chunk.size, chunk.size));
   end_group(Opcode::kChunkIndex);
-  std::string statistics;
-  PutInteger(statistics, times_.messages);
-  PutInteger(statistics, static_cast<std::uint16_t>(schemas_.size()));
-  PutInteger(statistics, static_cast<std::uint32_t>(channels_.size()));
-  PutInteger(statistics, std::uint32_t{0});  // attachments
-  PutInteger(statistics, std::uint32_t{0});  // metadata
-  PutInteger(statistics, static_cast<std::uint32_t>(chunks_.size()));
-  PutInteger(statistics, times_.first);
-  PutInteger(statistics, times_.last);
-  PutCounts(statistics, counts_);
-  summary += Record(Opcode::kStatistics, statistics);
+  const std::uint32_t no_attachments = 0, no_metadata = 0;
+  summary += Record(Opcode::kStatistics,
+                    BytesOf(times_.messages, static_cast<std::uint16_t>(schemas_.size()),
+                            static_cast<std::uint32_t>(channels_.size()), no_attachments, no_metadata,
+                            static_cast<std::uint32_t>(chunks_.size()), times_.first, times_.last, counts_));
   end_group(Opcode::kStatistics);
 
-  std::string footer;
-  PutInteger(footer, begin);
-  PutInteger(footer, begin + summary.size());
-  summary += offsets;
+  const std::string footer = BytesOf(begin, begin + summary.size());
   // The checksum includes the beginning of the footer's record: its length is that of two places and the checksum.
-  std::string head(1, static_cast<char>(Opcode::kFooter));
-  PutInteger(head, std::uint64_t{20});
-  summary += head + footer;
-  const std::uint32_t crc = Crc(0, summary);
-  PutInteger(summary, crc);
+  summary += offsets + static_cast<char>(Opcode::kFooter) + BytesOf(std::uint64_t{20}) + footer;
+  summary += BytesOf(Crc(0, summary));
   file_.Write(summary);
   file_.Write(kMagic);
   file_.Close();

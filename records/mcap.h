@@ -44,7 +44,7 @@ class McapWriter final {
   using Index = std::vector<std::pair<std::uint64_t, std::uint64_t>>;  // time, place in the chunk
 
   void EndChunk();
-  void Put(std::string_view record);
+  void Append(std::string_view record);
 
   OutputFile file_;
   std::uint32_t data_crc_ = 0;

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <iterator>
+#include <memory>
+#include <numeric>
 #include <utility>
 
-#include <Eigen/Geometry>
+#include <fmt/format.h>
 
 #include "forereach/numerics/size.h"
 #include "forereach/sets/zonogon.h"
@@ -22,8 +23,8 @@ constexpr int kCornersOfDisc = 16;
 }  // namespace
 
 // The corners of the convex hull, by Andrew's monotone chain.
-Picture::Polygon HullOf(const std::vector<Vector2d>& points, double radius) {
-  Picture::Polygon all;
+Svg::Points HullOf(const std::vector<Vector2d>& points, double radius) {
+  Svg::Points all;
   for (const Vector2d& point : points) {
     if (radius == 0) all.push_back(point);
     for (int i = 0; radius > 0 && i < kCornersOfDisc; ++i) {
@@ -33,7 +34,7 @@ Picture::Polygon HullOf(const std::vector<Vector2d>& points, double radius) {
   }
   if (all.size() < 2) return all;
   std::ranges::sort(all, {}, [](const Vector2d& a) { return std::pair(a.x(), a.y()); });
-  Picture::Polygon hull;
+  Svg::Points hull;
   for (int pass = 0; pass < 2; ++pass) {
     const std::size_t base = hull.size();
     for (const Vector2d& point : all) {
@@ -50,7 +51,7 @@ Picture::Polygon HullOf(const std::vector<Vector2d>& points, double radius) {
   return hull;
 }
 
-std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, const Tube& tube, int last) {
+std::vector<std::vector<Svg::Points>> Sweeps(const Certifier& certifier, const Tube& tube, int last) {
   const Placement& placement = certifier.safety().placement();
   std::vector<Zonotope> places(ToSize(placement.num_points()));
   const auto sample = std::make_unique<Placement::Sample>();
@@ -66,12 +67,12 @@ std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, co
     }
     return corners;
   };
-  std::vector<std::vector<Picture::Polygon>> sweeps;
+  std::vector<std::vector<Svg::Points>> sweeps;
   const int units = std::min(last + 1, certifier.safety().NumUnits(tube));
   auto corners = corners_at(0);
   for (int t = 0; t < units; ++t) {
     auto next = t < tube.length() ? corners_at(t + 1) : corners;
-    std::vector<Picture::Polygon>& unit = sweeps.emplace_back();
+    std::vector<Svg::Points>& unit = sweeps.emplace_back();
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const Placement::Part& part = placement.parts()[i];
       double turn = 0;
@@ -91,11 +92,11 @@ BodyOutlines::BodyOutlines(const Problem& problem) : problem_(problem) {
   }
 }
 
-std::vector<Picture::Polygon> BodyOutlines::At(const Eigen::VectorXd& x) const {
+std::vector<Svg::Points> BodyOutlines::At(const Eigen::VectorXd& x) const {
   if (problem_.body == Body{}) return {};
   const Vector2d position = problem_.projection * x;
   const Eigen::Rotation2Dd turn(problem_.body.heading < 0 ? 0 : x[problem_.body.heading]);
-  std::vector<Picture::Polygon> parts;
+  std::vector<Svg::Points> parts;
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const BodyPart& part = problem_.body.parts[i];
     std::vector<Vector2d> points;
@@ -113,38 +114,86 @@ std::vector<Picture::Polygon> BodyOutlines::At(const Eigen::VectorXd& x) const {
   return parts;
 }
 
-std::vector<Picture::Polygon> PredictionOf(const Obstacle& obstacle) {
-  constexpr std::int64_t kStepUs = 500'000, kLastUs = 2'000'000;
-  if (!obstacle.motion() || obstacle.kind() == Obstacle::Kind::kHalfSpace) return {};
-  const ObstacleMotion& motion = *obstacle.motion();
-  std::vector<Picture::Polygon> outlines;
-  for (std::int64_t after = 0; after <= kLastUs; after += kStepUs) {
-    const std::int64_t time = motion.stamp_us + after;
-    if (time < motion.from_us || motion.until_us < time) continue;
-    const double tau = static_cast<double>(after) * 1e-6;
-    std::vector<Vector2d> points;
-    for (const Eigen::Vector3d& point : obstacle.hull()) points.push_back((point + motion.velocity * tau).head<2>());
-    outlines.push_back(HullOf(
-        points, obstacle.radius() + motion.uncertainty + motion.growth * tau + motion.growth_rate * tau * tau / 2));
+std::optional<ObstaclePlace> PlaceOf(const Obstacle& obstacle, double time_us) {
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return std::nullopt;
+  ObstaclePlace place{{}, Vector2d::Zero(), obstacle.radius()};
+  if (const auto& motion = obstacle.motion()) {
+    if (time_us < static_cast<double>(motion->from_us) || static_cast<double>(motion->until_us) < time_us)
+      return std::nullopt;
+    const double tau = (time_us - static_cast<double>(motion->stamp_us)) * 1e-6;
+    place.shift = (motion->velocity * tau).head<2>();
+    place.radius += motion->uncertainty + motion->growth * std::abs(tau) + motion->growth_rate * tau * tau / 2;
   }
+  std::vector<Vector2d> points;
+  for (const Eigen::Vector3d& point : obstacle.hull()) points.push_back(point.head<2>() + place.shift);
+  place.points = HullOf(points);
+  return place;
+}
+
+std::vector<Svg::Points> PredictionOf(const Obstacle& obstacle, std::int64_t from_us) {
+  std::vector<Svg::Points> outlines;
+  if (obstacle.motion())
+    for (double after_us = 0; after_us <= 2e6; after_us += 5e5)
+      if (const auto place = PlaceOf(obstacle, static_cast<double>(from_us) + after_us))
+        outlines.push_back(HullOf(place->points, place->radius));
   return outlines;
 }
 
-Picture::Polygon CornersOf(const Obstacle& obstacle) {
-  std::vector<Vector2d> corners;
-  for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
-  return HullOf(corners);
+namespace {
+
+// What a discrete animation goes through, one value a second.
+template <class Of>
+std::string Animated(const char* attribute, const std::vector<std::optional<ObstaclePlace>>& places, const Of& of) {
+  std::string values;
+  for (const auto& place : places) values += (values.empty() ? "" : ";") + of(place);
+  const bool moves = attribute == std::string_view("transform");
+  return fmt::format(
+      "<animate{0} attributeName=\"{1}\"{2} calcMode=\"discrete\" dur=\"{3}s\" fill=\"freeze\" values=\"{4}\"/>",
+      moves ? "Transform" : "", attribute, moves ? " type=\"translate\"" : "", places.size(), values);
 }
 
-void AddObstacle(const Obstacle& obstacle, Picture& picture) {
-  const auto& points = obstacle.points();
-  switch (obstacle.kind()) {
-    case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
-    case Obstacle::Kind::kBox:
-    case Obstacle::Kind::kPolygon: picture.polygons.push_back(CornersOf(obstacle)); break;
-    case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
+void DrawHalfPlane(const Obstacle& obstacle, const Eigen::AlignedBox2d& frame, Svg& svg) {
+  const Vector2d all = obstacle.points()[0], normal = all.normalized(), along(-normal.y(), normal.x());
+  const double far = 50 * frame.sizes().maxCoeff();
+  const Vector2d foot = frame.center() + (obstacle.offset() / all.norm() - normal.dot(frame.center())) * normal;
+  svg.Polygon({foot - far * along, foot + far * along, foot + far * (along + normal), foot + far * (normal - along)});
+}
+
+}  // namespace
+
+void DrawObstacle(const Obstacle& obstacle, const std::vector<double>& times_us, const Eigen::AlignedBox2d& frame,
+                  std::string_view name, Svg& svg) {
+  if (obstacle.dim() != 2) return;
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return DrawHalfPlane(obstacle, frame, svg);
+  std::vector<std::optional<ObstaclePlace>> places;
+  for (const double time : times_us) places.push_back(PlaceOf(obstacle, time));
+  const auto found = std::ranges::find_if(places, [](const auto& place) { return place.has_value(); });
+  if (found == places.end()) return;
+  const ObstaclePlace first = **found;
+  std::string size;  // how the shape grows
+  const bool is_circle = first.points.size() == 1, moves = places.size() > 1 && obstacle.motion();
+  const auto width = [&](double radius) { return svg.Length(is_circle ? radius : 2 * radius); };
+  if (moves) {
+    const auto value = [](const auto& of) {
+      return [of](const auto& place) { return place ? of(*place) : std::string("0"); };
+    };
+    svg.Add(
+        Animated("visibility", places, [](const auto& place) { return std::string(place ? "inherit" : "hidden"); }));
+    svg.Add(Animated("transform", places,
+                     value([&](const ObstaclePlace& place) { return svg.Shift(place.shift - first.shift); })));
+    size = Animated(is_circle ? "r" : "stroke-width", places,
+                    value([&](const ObstaclePlace& place) { return width(place.radius); }));
   }
-  std::ranges::move(PredictionOf(obstacle), std::back_inserter(picture.predictions));
+  if (is_circle)
+    svg.Circle(first.points[0], first.radius, "", size);
+  else  // with a disc around each point it is as large as with a round border
+    svg.Polygon(
+        first.points,
+        first.radius > 0 || moves ? fmt::format("class=\"round\" stroke-width=\"{}\"", width(first.radius)) : "", size);
+  if (name.empty()) return;
+  const Vector2d center = std::accumulate(first.points.begin(), first.points.end(), Vector2d(0, 0)) /
+                          static_cast<double>(first.points.size());
+  svg.Text(center, name);
 }
 
 }  // namespace forereach

@@ -5,67 +5,50 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <system_error>
 #include <utility>
 
-#include <cairo.h>
-#include <fmt/core.h>
+#include <fmt/format.h>
 
-#include "records/canvas.h"
+#include <librsvg/rsvg.h>
+
+#include "records/outlines.h"
+#include "records/output_file.h"
 
 namespace forereach {
 namespace {
 
 using Eigen::Vector2d;
-
-struct Color {
-  double red, green, blue;
-};
+using Polygons = std::vector<Svg::Points>;
 
 // Told apart with every common colour blindness (the set of Okabe and Ito), and by lightness in grey.
-constexpr Color kWhite{1, 1, 1};
-constexpr Color kInk{0.13, 0.13, 0.15};
-constexpr Color kFaintInk{0.45, 0.45, 0.48};
-constexpr Color kFrame{0.80, 0.80, 0.82};
-constexpr Color kObstacle{0.42, 0.43, 0.47};
-constexpr Color kExecuted{0.00, 0.62, 0.45};
-constexpr Color kCertified{0.34, 0.71, 0.91};
-constexpr Color kAbstained{0.84, 0.37, 0.00};
-constexpr Color kGoal{0.90, 0.62, 0.00};
+constexpr const char *kInk = "#212126", *kFaintInk = "#73737a", *kFrame = "#ccccd1", *kObstacle = "#6b6e78",
+                     *kExecuted = "#009e73", *kCertified = "#56b4e9", *kAbstained = "#d55e00", *kGoal = "#e69f00";
 
 constexpr double kMargin = 24, kHeader = 74, kFooter = 62;  // pixels at 1200 x 800
 
-struct Extent {
-  Vector2d lower{INFINITY, INFINITY}, upper{-INFINITY, -INFINITY};
-
-  void Add(const Vector2d& point, double radius = 0) {
-    if (!point.allFinite() || !std::isfinite(radius)) return;
-    lower = lower.cwiseMin(point - Vector2d::Constant(radius));
-    upper = upper.cwiseMax(point + Vector2d::Constant(radius));
-  }
-  void Add(const std::vector<Vector2d>& points) {
-    for (const Vector2d& point : points) Add(point);
-  }
-};
-
 // Half-planes have no extent, and a tube that was refused may be as wide as it likes: the rest sets the frame.
-Extent ExtentOf(const Picture& picture) {
-  Extent extent;
-  extent.Add(picture.path);
-  for (const auto& circle : picture.circles) extent.Add(circle.center, circle.radius);
-  for (const auto& polygon : picture.polygons) extent.Add(polygon);
-  for (const auto& body : picture.bodies) extent.Add(body);
-  for (const auto& slice : picture.executed) extent.Add(slice);
-  for (const auto& slice : picture.certified) extent.Add(slice);
-  for (const auto& slice : picture.expected) extent.Add(slice);
-  extent.Add(picture.observations);
-  if (picture.goal) extent.Add(picture.goal->center, picture.goal->radius);
-  if (!(extent.lower.x() <= extent.upper.x())) extent.Add(Vector2d::Zero(), 1);
-  const Vector2d least = (Vector2d::Constant(1.0) - (extent.upper - extent.lower)).cwiseMax(0) / 2;
-  const double space = 0.03 * (extent.upper - extent.lower).maxCoeff();
-  extent.lower -= least + Vector2d::Constant(space);
-  extent.upper += least + Vector2d::Constant(space);
-  return extent;
+Eigen::AlignedBox2d ExtentOf(const Picture& picture) {
+  Eigen::AlignedBox2d extent;
+  const auto add = [&extent](const Svg::Points& points, double radius = 0) {
+    for (const Vector2d& point : points)
+      for (const double way : {-radius, radius})
+        if (Svg::CanBeDrawn(point + Vector2d::Constant(way))) extent.extend(point + Vector2d::Constant(way));
+  };
+  for (const Obstacle& obstacle : picture.obstacles) {
+    const auto place = PlaceOf(obstacle, obstacle.motion() ? static_cast<double>(obstacle.motion()->stamp_us) : 0);
+    if (place) add(place->points, place->radius);
+  }
+  for (const Polygons* all : {&picture.bodies, &picture.executed, &picture.certified, &picture.expected})
+    for (const Svg::Points& polygon : *all) add(polygon);
+  add(picture.path);
+  add(picture.observations);
+  if (picture.goal) add({picture.goal->center}, picture.goal->radius);
+  if (extent.isEmpty()) add({Vector2d::Zero()}, 1);
+  const Vector2d border =
+      (Vector2d::Constant(1.0) - extent.sizes()).cwiseMax(0) / 2 + Vector2d::Constant(0.03 * extent.sizes().maxCoeff());
+  return {extent.min() - border, extent.max() + border};
 }
 
 // 1, 2 or 5 times a power of ten, at most `length`.
@@ -76,278 +59,197 @@ double RoundLength(double length) {
   return power;
 }
 
+// About as wide as it is in DejaVu Sans.
+double TextWidth(const std::string& text, double size) {
+  const auto is_begin = [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; };
+  return 0.51 * size * static_cast<double>(std::ranges::count_if(text, is_begin));
+}
+
+// Lengths of header and legend are in units, of which 1200 x 800 fit.
 class Painter final {
  public:
-  Painter(cairo_t* cairo, const Picture& picture, int width, int height)
-      : cairo_(cairo),
-        picture_(picture),
+  Painter(const Picture& picture, int width, int height)
+      : picture_(picture),
         unit_(std::min(width / 1200.0, height / 800.0)),
-        width_(width),
-        height_(height) {
-    const Extent extent = ExtentOf(picture);
-    const Vector2d size = extent.upper - extent.lower;
-    left_ = kMargin * unit_;
-    top_ = kHeader * unit_;
-    frame_width_ = width_ - 2 * left_;
-    frame_height_ = height_ - top_ - kFooter * unit_;
-    scale_ = std::min(frame_width_ / size.x(), frame_height_ / size.y());
-    lower_ = (extent.lower + extent.upper - Vector2d(frame_width_, frame_height_) / scale_) / 2;
+        width_(width / unit_),
+        height_(height / unit_) {
+    const Eigen::AlignedBox2d extent = ExtentOf(picture);
+    const Vector2d size(width_ - 2 * kMargin, height_ - kHeader - kFooter);
+    scale_ = (size.array() / extent.sizes().array()).minCoeff();
+    frame_ = {extent.center() - size / (2 * scale_), extent.center() + size / (2 * scale_)};
+    svg_ = Svg({frame_.min().x() - kMargin / scale_, frame_.max().y() + kHeader / scale_}, scale_, 0.01);
   }
 
-  void Paint() {
-    SelectFont(CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_line_join(cairo_, CAIRO_LINE_JOIN_ROUND);
-    cairo_set_line_cap(cairo_, CAIRO_LINE_CAP_ROUND);
-    SetColor(kWhite);
-    cairo_paint(cairo_);
+  std::string Paint() {
+    svg_.Open(fmt::format(
+        "transform=\"scale({:.6g})\" fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"", unit_));
     PaintHeader();
-    cairo_save(cairo_);
-    cairo_rectangle(cairo_, left_, top_, frame_width_, frame_height_);
-    cairo_clip(cairo_);
+    svg_.Add(fmt::format("<clipPath id=\"frame\"><rect x=\"{0}\" y=\"{1}\" width=\"{2}\" height=\"{3}\"/></clipPath>",
+                         kMargin, kHeader, width_ - 2 * kMargin, height_ - kHeader - kFooter));
+    svg_.Open("clip-path=\"url(#frame)\"");
     PaintGrid();
-    PaintGoal();
+    if (picture_.goal) {
+      svg_.Circle(picture_.goal->center, std::max(picture_.goal->radius, 3 / scale_), Fill(kGoal, 0.22, 2));
+    }
     PaintTube(picture_.certified, kCertified, 0.30);
     PaintTube(picture_.expected, kCertified, 0.30);
     PaintTube(picture_.executed, kExecuted, 0.55);
-    PaintObservations();
+    svg_.Open(Line(kFaintInk, 3.2, 0.7));
+    for (const Vector2d& place : picture_.observations) svg_.Dot(place, "");
+    svg_.Close();
     PaintObstacles();
-    PaintOutlines(picture_.predictions, kObstacle);
-    PaintAbstained();
-    PaintOutlines(picture_.bodies, kInk);
+    for (const Polygons& tube : picture_.abstained) {
+      PaintOutlines(tube, Line(kAbstained, 0.8, 0.4));
+      if (!tube.empty()) svg_.Polygon(tube.back(), Line(kAbstained, 1.6, 0.9));  // where it was found unsafe
+    }
+    PaintOutlines(picture_.bodies, Line(kInk, 1, 0.7));
     PaintPath();
-    cairo_restore(cairo_);
-    PaintFrame();
+    svg_.Close();
+    svg_.Polygon(Corners(frame_), Line(kFrame, 1));
     PaintLegend();
+    svg_.Close();
+    return svg_.Done();
   }
 
  private:
-  Vector2d ToPixels(const Vector2d& point) const {
-    return {left_ + scale_ * (point.x() - lower_.x()), top_ + frame_height_ - scale_ * (point.y() - lower_.y())};
+  static std::string Line(const char* color, double width, double alpha = 1) {
+    return fmt::format("stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{}\"", color, width, alpha);
   }
-
-  void SetColor(const Color& color, double alpha = 1) {
-    cairo_set_source_rgba(cairo_, color.red, color.green, color.blue, alpha);
+  static std::string Fill(const char* color, double alpha, double width, const char* line = nullptr) {
+    return fmt::format("fill=\"{}\" fill-opacity=\"{}\" ", color, alpha) + Line(line ? line : color, width);
   }
-
-  void Stroke(const Color& color, double line_width, double alpha = 1) {
-    SetColor(color, alpha);
-    cairo_set_line_width(cairo_, line_width * unit_);
-    cairo_stroke(cairo_);
+  static Svg::Points Corners(const Eigen::AlignedBox2d& box) {
+    return {box.min(), {box.max().x(), box.min().y()}, box.max(), {box.min().x(), box.max().y()}};
   }
-
-  void FillAndStroke(const Color& fill, double fill_alpha, const Color& line, double line_width,
-                     double line_alpha = 1) {
-    SetColor(fill, fill_alpha);
-    cairo_fill_preserve(cairo_);
-    Stroke(line, line_width, line_alpha);
+  // The place in the plane of one in the picture, in units from its upper left.
+  Vector2d At(double x, double y) const {
+    return {frame_.min().x() + (x - kMargin) / scale_, frame_.max().y() + (kHeader - y) / scale_};
   }
-
-  // Corners that lie closer together than the eye can tell are left out: a slice has up to two hundred.
-  void Trace(const std::vector<Vector2d>& points) {
-    Vector2d last{INFINITY, INFINITY};
-    for (const Vector2d& point : points) {
-      const Vector2d pixel = ToPixels(point);
-      if (!pixel.allFinite() || (pixel - last).norm() < 0.3 * unit_) continue;
-      cairo_line_to(cairo_, pixel.x(), pixel.y());
-      last = pixel;
-    }
-  }
-
-  void TraceClosed(const std::vector<Vector2d>& points) {
-    cairo_new_sub_path(cairo_);
-    Trace(points);
-    cairo_close_path(cairo_);
-  }
-
-  void TraceDisc(const Vector2d& pixel, double radius_px) {
-    cairo_new_sub_path(cairo_);
-    cairo_arc(cairo_, pixel.x(), pixel.y(), radius_px, 0, 2 * M_PI);
-  }
-
-  void SelectFont(cairo_font_weight_t weight) {
-    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, weight);
-  }
-
-  double TextWidth(const std::string& text, double size) {
-    cairo_set_font_size(cairo_, size * unit_);
-    cairo_text_extents_t extents;
-    cairo_text_extents(cairo_, text.c_str(), &extents);
-    return extents.x_advance;
-  }
-
-  void Write(const std::string& text, double x, double y, double size, const Color& color, bool bold = false) {
-    SelectFont(bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cairo_, size * unit_);
-    SetColor(color);
-    cairo_move_to(cairo_, x, y);
-    cairo_show_text(cairo_, text.c_str());
-    SelectFont(CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_new_path(cairo_);
+  void Write(const std::string& text, double x, double y, double size, const char* color, const char* more = "") {
+    svg_.Text(At(x, y), text, fmt::format("font-size=\"{}\" fill=\"{}\" {}", size, color, more));
   }
 
   void PaintHeader() {
-    Write(picture_.title, kMargin * unit_, 33 * unit_, 19, kInk, true);
-    std::string line;
-    for (const std::string& number : picture_.key_numbers) line += (line.empty() ? "" : "   \u00b7   ") + number;
-    double size = 13.5;
-    while (size > 9 && TextWidth(line, size) > width_ - 2 * kMargin * unit_) size -= 0.5;
-    Write(line, kMargin * unit_, 57 * unit_, size, kFaintInk);
+    Write(picture_.title, kMargin, 33, 19, kInk, "font-weight=\"bold\"");
+    const std::string line = fmt::format("{}", fmt::join(picture_.key_numbers, "   \u00b7   "));
+    const double size = std::clamp((width_ - 2 * kMargin) / TextWidth(line + " ", 1), 9.0, 13.5);
+    Write(line, kMargin, 57, size, kFaintInk, "xml:space=\"preserve\"");
   }
 
   void PaintGrid() {
-    const double step = RoundLength(std::max(frame_width_, frame_height_) / scale_ / 6);
-    for (double x = std::ceil(lower_.x() / step) * step; ToPixels({x, 0}).x() < left_ + frame_width_; x += step)
-      Trace({{x, lower_.y()}, {x, lower_.y() + frame_height_ / scale_}}), cairo_new_sub_path(cairo_);
-    for (double y = std::ceil(lower_.y() / step) * step; ToPixels({0, y}).y() > top_; y += step)
-      Trace({{lower_.x(), y}, {lower_.x() + frame_width_ / scale_, y}}), cairo_new_sub_path(cairo_);
-    Stroke(kFrame, 0.8, 0.55);
+    const double step = RoundLength(frame_.sizes().maxCoeff() / 6);
+    svg_.Open(Line(kFrame, 0.8, 0.55));
+    for (double x = std::ceil(frame_.min().x() / step) * step; x < frame_.max().x(); x += step)
+      svg_.Line({{x, frame_.min().y()}, {x, frame_.max().y()}});
+    for (double y = std::ceil(frame_.min().y() / step) * step; y < frame_.max().y(); y += step)
+      svg_.Line({{frame_.min().x(), y}, {frame_.max().x(), y}});
+    svg_.Close();
   }
 
-  void PaintFrame() {
-    cairo_rectangle(cairo_, left_, top_, frame_width_, frame_height_);
-    Stroke(kFrame, 1);
+  void PaintOutlines(const Polygons& polygons, const std::string& attributes) {
+    svg_.Open(attributes);
+    for (const Svg::Points& polygon : polygons) svg_.Polygon(polygon);
+    svg_.Close();
   }
 
-  // One layer for all slices, so that where many overlap it is no darker than where one lies alone.
-  void PaintTube(const std::vector<Picture::Polygon>& slices, const Color& color, double alpha) {
+  // One layer for all slices, so that where many overlap it is no darker than where one lies alone; a slice thinner
+  // than a pixel still shows. Outlines tell how wide one slice is, where they are few enough to be told apart.
+  void PaintTube(const Polygons& slices, const char* color, double alpha) {
     if (slices.empty()) return;
-    cairo_push_group(cairo_);
-    for (const auto& slice : slices) {
-      TraceClosed(slice);
-      SetColor(color);
-      cairo_fill_preserve(cairo_);
-      cairo_set_line_width(cairo_, 0.6 * unit_);  // a slice thinner than a pixel still shows
-      cairo_stroke(cairo_);
-    }
-    cairo_pop_group_to_source(cairo_);
-    cairo_paint_with_alpha(cairo_, alpha);
-    // Outlines tell how wide one slice is, where they are few enough to be told apart.
-    for (const auto& slice : slices) TraceClosed(slice);
-    Stroke(color, 0.7, 0.35);
-  }
-
-  void PaintAbstained() {
-    for (const auto& tube : picture_.abstained) {
-      for (const auto& slice : tube) TraceClosed(slice);
-      Stroke(kAbstained, 0.8, 0.4);
-      if (tube.empty()) continue;
-      TraceClosed(tube.back());  // where it was found unsafe
-      Stroke(kAbstained, 1.6, 0.9);
-    }
+    PaintOutlines(slices, fmt::format("opacity=\"{}\" ", alpha) + Fill(color, 1, 0.6));
+    PaintOutlines(slices, Line(color, 0.7, 0.35));
   }
 
   void PaintObstacles() {
-    for (const auto& circle : picture_.circles) TraceDisc(ToPixels(circle.center), scale_ * circle.radius);
-    for (const auto& polygon : picture_.polygons) TraceClosed(polygon);
-    for (const auto& half_plane : picture_.half_planes) {
-      // A rectangle with one edge on the line, larger than the frame.
-      const double far = 2 * (frame_width_ + frame_height_) / scale_;
-      const Vector2d normal = half_plane.normal.normalized(), along{-normal.y(), normal.x()};
-      const Vector2d middle = lower_ + Vector2d(frame_width_, frame_height_) / (2 * scale_);
-      const Vector2d foot = middle + (half_plane.offset / half_plane.normal.norm() - normal.dot(middle)) * normal;
-      TraceClosed({foot - far * along, foot + far * along, foot + far * along + far * normal,
-                   foot - far * along + far * normal});
-    }
-    FillAndStroke(kObstacle, 0.88, kInk, 0.8, 0.8);
+    svg_.Open("opacity=\"0.88\" " + Fill(kObstacle, 1, 0.8));
+    for (const Obstacle& obstacle : picture_.obstacles)
+      DrawObstacle(obstacle, {obstacle.motion() ? static_cast<double>(obstacle.motion()->stamp_us) : 0}, frame_, "",
+                   svg_);
+    svg_.Close();
+    for (const Obstacle& obstacle : picture_.obstacles)
+      if (obstacle.motion())
+        PaintOutlines(PredictionOf(obstacle, obstacle.motion()->stamp_us), Line(kObstacle, 1, 0.7));
   }
 
-  void PaintOutlines(const std::vector<Picture::Polygon>& polygons, const Color& color) {
-    for (const auto& polygon : polygons) TraceClosed(polygon);
-    Stroke(color, 1, 0.7);
+  void PaintStop(const Vector2d& at) {
+    const Vector2d half = Vector2d::Constant(4 / scale_);
+    svg_.Polygon(Corners({at - half, at + half}), Fill("#fff", 1, 1.6, kInk));
   }
-
-  void PaintGoal() {
-    if (!picture_.goal) return;
-    TraceDisc(ToPixels(picture_.goal->center), std::max(scale_ * picture_.goal->radius, 3 * unit_));
-    FillAndStroke(kGoal, 0.22, kGoal, 2);
-  }
-
-  void PaintObservations() {
-    for (const Vector2d& place : picture_.observations) TraceDisc(ToPixels(place), 1.6 * unit_);
-    SetColor(kFaintInk, 0.7);
-    cairo_fill(cairo_);
-  }
-
-  void PaintStop(const Vector2d& pixel) {
-    const double half = 4 * unit_;
-    cairo_rectangle(cairo_, pixel.x() - half, pixel.y() - half, 2 * half, 2 * half);
-    FillAndStroke(kWhite, 1, kInk, 1.6);
-  }
+  void PaintRing(const Vector2d& at, double radius) { svg_.Circle(at, radius / scale_, Fill("#fff", 1, 2, kInk)); }
 
   void PaintPath() {
     if (picture_.path.empty()) return;
-    Trace(picture_.path);
-    Stroke(kInk, 2);
-    for (const Vector2d& stop : picture_.stops) PaintStop(ToPixels(stop));
-    PaintRing(ToPixels(picture_.path.front()), 6);
-    TraceDisc(ToPixels(picture_.path.back()), 4.5 * unit_);
-    SetColor(kInk);
-    cairo_fill(cairo_);
-  }
-
-  void PaintSwatch(double x, double y, const Color& color, double fill, double line) {
-    cairo_rectangle(cairo_, x, y - 10 * unit_, 22 * unit_, 13 * unit_);
-    FillAndStroke(color, fill, color, 1.2, line);
-  }
-
-  void PaintLine(double x, double y) {
-    cairo_move_to(cairo_, x, y - 3.5 * unit_);
-    cairo_line_to(cairo_, x + 22 * unit_, y - 3.5 * unit_);
-    Stroke(kInk, 2);
+    svg_.Line(picture_.path, Line(kInk, 2));
+    for (const Vector2d& stop : picture_.stops) PaintStop(stop);
+    PaintRing(picture_.path.front(), 6);
+    svg_.Dot(picture_.path.back(), Line(kInk, 9));
   }
 
   // Only what the picture shows has an entry.
   void PaintLegend() {
-    const double y = height_ - 24 * unit_;
-    double x = kMargin * unit_;
+    const double y = height_ - 24;
+    double x = kMargin;
     const auto entry = [&](bool shown, const std::string& name, const std::function<void()>& symbol) {
       if (!shown) return;
       symbol();
-      Write(name, x + 29 * unit_, y, 12.5, kInk);
-      x += 29 * unit_ + TextWidth(name, 12.5) + 20 * unit_;
+      Write(name, x + 29, y, 12.5, kInk);
+      x += 29 + TextWidth(name, 12.5) + 20;
     };
-    const bool obstacles = !(picture_.circles.empty() && picture_.polygons.empty() && picture_.half_planes.empty());
-    entry(!picture_.executed.empty(), "certified, executed", [&] { PaintSwatch(x, y, kExecuted, 0.55, 1); });
-    entry(!picture_.certified.empty(), "certified, replaced", [&] { PaintSwatch(x, y, kCertified, 0.30, 0.6); });
-    entry(!picture_.expected.empty(), "tube without obstacles", [&] { PaintSwatch(x, y, kCertified, 0.30, 0.6); });
-    entry(!picture_.observations.empty(), "data", [&] {
-      TraceDisc({x + 11 * unit_, y - 4 * unit_}, 2.5 * unit_);
-      SetColor(kFaintInk);
-      cairo_fill(cairo_);
-    });
-    entry(!picture_.abstained.empty(), "abstained (S)", [&] { PaintSwatch(x, y, kAbstained, 0, 1); });
-    entry(obstacles, "obstacle", [&] { PaintSwatch(x, y, kObstacle, 0.88, 1); });
-    entry(!picture_.predictions.empty(), "predicted", [&] { PaintSwatch(x, y, kObstacle, 0, 0.7); });
-    entry(picture_.path.size() > 1, "driven", [&] { PaintLine(x, y); });
-    entry(!picture_.path.empty(), "start", [&] { PaintRing({x + 11 * unit_, y - 4 * unit_}, 5.5); });
-    entry(!picture_.stops.empty(), "stop", [&] { PaintStop({x + 11 * unit_, y - 4 * unit_}); });
-    entry(picture_.goal.has_value(), "goal", [&] { PaintSwatch(x, y, kGoal, 0.22, 1); });
+    const auto swatch = [&](const char* color, double fill) {
+      return [=, this, &x] {
+        svg_.Polygon({At(x, y + 3), At(x + 22, y + 3), At(x + 22, y - 10), At(x, y - 10)}, Fill(color, fill, 1.2));
+      };
+    };
+    const auto middle = [&] { return At(x + 11, y - 4); };
+    const bool predicted =
+        std::ranges::any_of(picture_.obstacles, [](const Obstacle& each) { return !!each.motion(); });
+    entry(!picture_.executed.empty(), "certified, executed", swatch(kExecuted, 0.55));
+    entry(!picture_.certified.empty(), "certified, replaced", swatch(kCertified, 0.30));
+    entry(!picture_.expected.empty(), "tube without obstacles", swatch(kCertified, 0.30));
+    entry(!picture_.observations.empty(), "data", [&] { svg_.Dot(middle(), Line(kFaintInk, 5)); });
+    entry(!picture_.abstained.empty(), "abstained (S)", swatch(kAbstained, 0));
+    entry(!picture_.obstacles.empty(), "obstacle", swatch(kObstacle, 0.88));
+    entry(predicted, "predicted", swatch(kObstacle, 0));
+    entry(picture_.path.size() > 1, "driven", [&] { svg_.Line({At(x, y - 3.5), At(x + 22, y - 3.5)}, Line(kInk, 2)); });
+    entry(!picture_.path.empty(), "start", [&] { PaintRing(middle(), 5.5); });
+    entry(!picture_.stops.empty(), "stop", [&] { PaintStop(middle()); });
+    entry(picture_.goal.has_value(), "goal", swatch(kGoal, 0.22));
     PaintScaleBar(y);
   }
 
-  void PaintRing(const Vector2d& pixel, double radius) {
-    TraceDisc(pixel, radius * unit_);
-    FillAndStroke(kWhite, 1, kInk, 2);
-  }
-
   void PaintScaleBar(double y) {
-    const double length = RoundLength(150 * unit_ / scale_), pixels = length * scale_;
-    const double right = width_ - kMargin * unit_, left = right - pixels, tick = 4 * unit_, line = y + 1 * unit_;
-    cairo_move_to(cairo_, left, line - tick);
-    cairo_line_to(cairo_, left, line);
-    cairo_line_to(cairo_, right, line);
-    cairo_line_to(cairo_, right, line - tick);
-    Stroke(kInk, 1.4);
-    const std::string text = fmt::format("{:g} m", length);
-    Write(text, left + (pixels - TextWidth(text, 12.5)) / 2, line - 6 * unit_, 12.5, kInk);
+    const double length = RoundLength(150 / scale_), right = width_ - kMargin, left = right - length * scale_;
+    svg_.Line({At(left, y - 3), At(left, y + 1), At(right, y + 1), At(right, y - 3)}, Line(kInk, 1.4));
+    Write(fmt::format("{:g} m", length), (left + right) / 2, y - 5, 12.5, kInk, "text-anchor=\"middle\"");
   }
 
-  cairo_t* cairo_;
   const Picture& picture_;
-  double unit_, width_, height_;
-  double scale_ = 1, left_ = 0, top_ = 0, frame_width_ = 0, frame_height_ = 0;  // pixels, scale_ in pixels per metre
-  Vector2d lower_;                                                              // metres, the frame's lower left
+  double unit_, width_, height_;  // pixels; units
+  double scale_ = 1;              // units per metre
+  Eigen::AlignedBox2d frame_;     // metres
+  Svg svg_{Vector2d::Zero(), 1, 1};
 };
+
+std::string PngOf(const std::string& svg) {
+  GError* error = nullptr;
+  const auto require = [&](bool done) {
+    if (done) return;
+    const std::string why = error ? error->message : "there is not enough memory";
+    g_clear_error(&error);
+    throw PictureError("picture: a .png cannot be drawn: " + why);
+  };
+  const std::unique_ptr<RsvgHandle, decltype(&g_object_unref)> handle(
+      rsvg_handle_new_from_data(reinterpret_cast<const guint8*>(svg.data()), svg.size(), &error), &g_object_unref);
+  require(handle != nullptr);
+  const std::unique_ptr<GdkPixbuf, decltype(&g_object_unref)> pixels(rsvg_handle_get_pixbuf(handle.get()),
+                                                                     &g_object_unref);
+  require(pixels != nullptr);
+  gchar* bytes = nullptr;
+  gsize size = 0;
+  require(gdk_pixbuf_save_to_buffer(pixels.get(), &bytes, &size, "png", &error, nullptr));
+  const std::unique_ptr<gchar, decltype(&g_free)> owner(bytes, &g_free);
+  return {bytes, size};
+}
 
 }  // namespace
 
@@ -355,9 +257,9 @@ std::vector<std::string> PictureFiles(const std::string& name) {
   const std::filesystem::path path(name);
   if (!path.has_filename()) throw PictureError("picture: '" + name + "' names no file");
   const std::string ending = path.extension();
-  if (!ending.empty() && ending != ".svg" && ending != ".png" && ending != ".pdf")
+  if (!ending.empty() && ending != ".svg" && ending != ".png")
     throw PictureError("picture: " + name + " ends in " + ending +
-                       "; it has to end in .svg, .png or .pdf, or have no ending: then a .svg and a .png are written");
+                       "; it has to end in .svg or .png, or have no ending: then both are written");
   const std::filesystem::path directory = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   std::error_code ignored;
   if (!std::filesystem::is_directory(directory, ignored))
@@ -369,8 +271,23 @@ std::vector<std::string> PictureFiles(const std::string& name) {
   return files;
 }
 
+void WriteSvg(const std::string& path, int width, int height, const std::string& drawing) {
+  const bool png = path.ends_with(".png");
+  if (!png && !path.ends_with(".svg")) throw PictureError("picture: " + path + " has to end in .svg or .png");
+  if (width < 200 || width > 10000 || height < 200 || height > 10000)
+    throw PictureError(fmt::format("picture: {} x {} pixels is not within 200 to 10000", width, height));
+  const std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
+      "font-family=\"DejaVu Sans, sans-serif\"><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>{2}</svg>\n",
+      width, height, drawing);
+  const std::string bytes = png ? PngOf(svg) : svg;
+  OutputFile file(path, OutputFile::Existing::kReplaced);
+  file.Write(bytes);
+  file.Close();
+}
+
 void DrawPicture(const Picture& picture, const std::string& path, int width, int height) {
-  DrawFile(path, width, height, [&](cairo_t* cairo) { Painter(cairo, picture, width, height).Paint(); });
+  WriteSvg(path, width, height, Painter(picture, width, height).Paint());
 }
 
 }  // namespace forereach

@@ -6,9 +6,9 @@ logs. */
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
+#include "forereach/safety/obstacle.h"
 #include "lcmtypes/bad_input.h"
+#include "records/svg.h"
 
 namespace forereach {
 
@@ -20,26 +20,18 @@ class PictureError : public BadInput {
 
 /** Everything in metres, x to the right and y up, to one scale. A polygon is convex, its corners in order. */
 struct Picture {
-  using Polygon = std::vector<Eigen::Vector2d>;
+  using Polygon = Svg::Points;
 
   struct Circle {
     Eigen::Vector2d center = Eigen::Vector2d::Zero();
     double radius = 0;
   };
-  /** {y : normal . y >= offset} */
-  struct HalfPlane {
-    Eigen::Vector2d normal = Eigen::Vector2d::Zero();
-    double offset = 0;
-  };
 
   std::string title;
   std::vector<std::string> key_numbers;  ///< Shown in one line below the title.
 
-  std::vector<Circle> circles;         ///< Obstacles.
-  std::vector<Polygon> polygons;       ///< Obstacles.
-  std::vector<HalfPlane> half_planes;  ///< Obstacles.
-
-  std::vector<Polygon> predictions;  ///< Where obstacles that move will be, a polygon for each time.
+  std::vector<Obstacle>
+      obstacles;  ///< In the plane; those that move as they are at their stamp, and where they will be.
 
   std::vector<Polygon> executed;   ///< Certified slices of executed steps, or what the body sweeps in them.
   std::vector<Polygon> certified;  ///< The same of steps that newer plans replaced.
@@ -55,14 +47,18 @@ struct Picture {
   std::optional<Circle> goal;
 };
 
-/** The files for a picture with this name: the name itself if it ends in .svg, .png or .pdf; NAME.svg and NAME.png if
-it has no ending. Creates no file.
+/** The files for a picture with this name: the name itself if it ends in .svg or .png; NAME.svg and NAME.png if it has
+no ending. Creates no file.
 @throws PictureError for another ending, for a directory, or if the directory of the file does not exist. */
 [[nodiscard]] std::vector<std::string> PictureFiles(const std::string& name);
 
-/** Writes `picture` to a .svg, .png or .pdf file, by the same drawing code.
-@param width, height pixels (of a .pdf points), 200 to 10000 each.
-@throws PictureError for another ending or size, or if the file cannot be written. */
+/** Writes a drawing, on white, to a .svg file, or to a .png file by librsvg.
+@param width, height pixels, 200 to 10000 each.
+@throws PictureError for another ending or size, OutputError (output_file.h) if the file cannot be written: it is whole,
+or not there. */
+void WriteSvg(const std::string& path, int width, int height, const std::string& drawing);
+
+/** Writes `picture` to a .svg or .png file. @throws as WriteSvg. */
 void DrawPicture(const Picture& picture, const std::string& path, int width = 1200, int height = 800);
 
 }  // namespace forereach

@@ -74,7 +74,7 @@ class PictureMaker final : public TimelineUser, CaseJudge {
         std::ranges::move(tube[t],
                           std::back_inserter(executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed
                                                                                                 : picture.certified));
-    for (const Obstacle& obstacle : timeline.logged_obstacles()) AddObstacle(obstacle, result_.picture);
+    picture.obstacles = timeline.logged_obstacles();
     return std::move(result_);
   }
 
@@ -228,7 +228,7 @@ bool Report(const ReportOptions& options, std::ostream& out) {
     drawn.picture.title = TitleOf(last);
     drawn.picture.key_numbers = KeyNumbers(summary);
   }
-  for (const std::string& file : files) DrawPicture(drawn.picture, file, options.width, options.height);
+  for (const std::string& file : files) DrawPicture(drawn.picture, file);
 
   const bool is_whole = summary.damage.places == 0 && named.missing.empty();
   if (options.json) {

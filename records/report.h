@@ -30,8 +30,7 @@ struct ReportOptions {
   std::string config;             ///< Task file. If empty, the tasks that were kept beside the logs.
   std::string picture;            ///< A name for PictureFiles; no picture if empty.
   bool json = false;
-  int width = 1200, height = 800;  ///< Pixels.
-  LogKey key = {};                 ///< With a key only authentic messages count.
+  LogKey key = {};  ///< With a key only authentic messages count.
 };
 
 /** Prints the summary of logs to `out`, as text or as one JSON document, and writes the picture: under the tasks and

@@ -6,7 +6,6 @@
 #include "bus/authentic.h"
 #include "records/compare.h"
 #include "records/event_log.h"
-#include "records/export.h"
 #include "records/log_trust.h"
 #include "records/replay.h"
 
@@ -20,7 +19,5 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReplayResult, candidates, agreed, withdrawals
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WhyNot, outcome, cause, obstacle, step)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Comparison, candidates, certificates, circumstances, without_candidate, undecided,
                                    gained, lost, otherwise, refused_alike, lost_plans, corruptions, passed_over)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ExportResult, decisions, without_candidate, executions, withdrawals, gaps, tubes,
-                                   messages, left_out, has_messages, damage, passed_over, files)
 
 }  // namespace forereach

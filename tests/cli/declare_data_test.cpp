@@ -91,19 +91,14 @@ TEST_F(DeclareDataTest, ItsLinesGoIntoATaskFileThatNoTransitionContradicts) {
 }
 
 TEST_F(DeclareDataTest, SaysWhatIsNotProven) {
-  const Output output = Declare("--by vx");
-  EXPECT_EQ(output.code, 0);
-  EXPECT_THAT(output.text, HasSubstr("an estimate and no proof"));
-  EXPECT_THAT(output.text, HasSubstr("Nothing of this is proven."));
-  EXPECT_THAT(output.text,
-              HasSubstr("Never varied in these transitions, so that nothing is known of their slopes: py, vy, ay."));
+  EXPECT_THAT(Declare("--by vx"),
+              Exits(0, "an estimate and no proof", "Nothing of this is proven.",
+                    "Never varied in these transitions, so that nothing is known of their slopes: py, vy, ay."));
 }
 
 TEST_F(DeclareDataTest, SaysSoIfNoSlopesAreConsistent) {
   const Output output = Declare("--by px= --by vx=vy --disturbance declared");
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("no L is consistent"));
-  EXPECT_THAT(output.text, HasSubstr("their residuals of vx differ by"));
+  EXPECT_THAT(output, Exits(1, "no L is consistent", "their residuals of vx differ by"));
   EXPECT_LT(output.text.find("--disturbance estimated"), output.text.find("--noise estimated"));
 }
 
@@ -221,12 +216,8 @@ class LateCommandTest : public testing::Test {
 };
 
 TEST_F(LateCommandTest, ScatterIsADisturbanceAndKeepsTheRobotInItsSlices) {
-  const Output output = Declare("");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("noise_bound: [0.001]\n  disturbance: [0."));
-  EXPECT_THAT(output.text, HasSubstr("<- the knee"));
-  EXPECT_THAT(output.text, HasSubstr("differ by more\n  than noise_bound explains: x."));
-  EXPECT_THAT(output.text, Not(HasSubstr("warning")));
+  EXPECT_THAT(Declare(""), Exits(0, "noise_bound: [0.001]\n  disturbance: [0.", "<- the knee",
+                                 "differ by more\n  than noise_bound explains: x.", Not(HasSubstr("warning"))));
   const Json row = Json::parse(Declare("--json").text)["rows"][0];
   EXPECT_NEAR(row["disturbance"], 1.5 * row["scatter"].get<double>(), 1e-5);
   EXPECT_GT(row["scatter"], 0.05);

@@ -39,12 +39,7 @@ class DeclareTest : public testing::Test {
         ToHex(CoverDigest(LoadCover(cover_, LoadConfig(task_, TransitionsFile::kIgnore)).claims));
     Tamper([&](Json& document) { document["digests"]["cover"] = digest; });
   }
-  void ExpectRefuted(const char* text) const {
-    const Output output = Check();
-    EXPECT_EQ(output.code, 1);
-    EXPECT_THAT(output.text, HasSubstr(text));
-    EXPECT_THAT(output.text, HasSubstr("check: refuted"));
-  }
+  void ExpectRefuted(const char* text) const { EXPECT_THAT(Check(), Exits(1, text, "check: refuted")); }
 
   ScratchDirectory scratch_;
   const std::string task_ = scratch_ / "task.yaml", cover_ = scratch_ / "cover.json";
@@ -103,9 +98,7 @@ TEST_F(DeclareTest, ItsLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
 
 TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {
   const Output output = Forereach("declare --config tests/data/field.yaml --between");
-  EXPECT_EQ(output.code, 0);
-  EXPECT_THAT(output.text, HasSubstr("from the equations of kinematic_bicycle\n"));
-  EXPECT_THAT(output.text, HasSubstr("The residual is not included"));
+  EXPECT_THAT(output, Exits(0, "from the equations of kinematic_bicycle\n", "The residual is not included"));
   const Json document = Json::parse(Forereach("declare --config tests/data/field.yaml --between --json").text);
   EXPECT_EQ(document["source"], "equations");
   EXPECT_TRUE(document["proven"]);
@@ -144,19 +137,16 @@ TEST_F(DeclareTest, BetweenTakesLoggedPositionsIfAsked) {
                                     second + ",0,1,0,0,0,0.345,0,1,0\n");
   };
   steps("0.15");
-  const Output output = Declare("--between --from positions");
-  EXPECT_EQ(output.code, 0);
-  EXPECT_THAT(output.text, HasSubstr("from the logged positions\n"));
-  EXPECT_THAT(output.text, HasSubstr("in 1 triples of logged samples. This proves nothing"));
+  EXPECT_THAT(Declare("--between --from positions"),
+              Exits(0, "from the logged positions\n", "in 1 triples of logged samples. This proves nothing"));
   const Json document = Json::parse(Declare("--between --from positions --json").text);
   EXPECT_EQ(document["source"], "positions");
   EXPECT_FALSE(document["proven"]);
   EXPECT_NEAR(document["entries"][0]["upper"], 2, 1e-9) << "(0.345 - 2 * 0.15) / 0.15^2";
   EXPECT_EQ(document["entries"][1]["upper"], 0);
   steps("0.16");
-  const Output isolated = Declare("--between --from positions");
-  EXPECT_EQ(isolated.code, 2);
-  EXPECT_THAT(isolated.text, HasSubstr("transitions: none begins with the state in which the one before it ends"));
+  EXPECT_THAT(Declare("--between --from positions"),
+              Exits(2, "transitions: none begins with the state in which the one before it ends"));
 }
 
 TEST_F(DeclareTest, BetweenProposesInSpaceFromEquationsAndFromPositions) {
@@ -224,26 +214,20 @@ TEST_F(DeclareTest, BetweenBoundsAsManyStatesAndInputsAsATaskMayHave) {
   std::ofstream(task_) << TaskFor("model:\n  states: {" + states + "}\n  inputs: {" + inputs +
                                       "}\n  parameters: {dt: 0.05}\n  integrator: rk4\n  rate:\n" + rates,
                                   16, 8, "x0, x1");
-  const Output output = Declare("--between");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("x0''       at most 1.05277 "));
+  EXPECT_THAT(Declare("--between"), Exits(0, "x0''       at most 1.05277 "));
 }
 
 TEST_F(DeclareTest, BetweenExcludesWhatBelongsToTheResidual) {
   for (const char* options : {"--between --cover cover.json", "--between --check cover.json", "--from positions"})
     EXPECT_EQ(Forereach("declare --config config/demo.yaml " + std::string(options) + " 2>&1").code, 2) << options;
   std::ofstream(task_) << Replaced(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"), "-0.36]", "-1.5]");
-  const Output output = Declare("--between");
-  EXPECT_EQ(output.code, 1) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("no finite bound on the motion between two samples"));
+  EXPECT_THAT(Declare("--between"), Exits(1, "no finite bound on the motion between two samples"));
 }
 
 TEST_F(DeclareTest, StopsAtTheWorkLimitWithABoundAndSaysSo) {
   WriteTask("residual: {name: heading_saturation}\n");
-  const Output output = Declare("--max-boxes 20 --cover " + cover_);
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("stopped at a gap of"));
-  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_THAT(Declare("--max-boxes 20 --cover " + cover_), Exits(1, "stopped at a gap of"));
+  EXPECT_THAT(Check(), Exits(0));
 }
 
 // Every residual there is, over a domain or parameters without a finite slope: a sentence, not a search without end.
@@ -270,15 +254,13 @@ TEST_F(DeclareTest, ADomainWithoutAPointIsBadInput) {
   const std::string bicycle = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
   std::ofstream(task_) << std::regex_replace(bicycle, std::regex("domain:\n"),
                                              "domain:\n  inequalities:\n    - {coefficients: {v: 1}, bound: -1}\n");
-  const Output output = Declare();
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("no point of its box satisfies"));
+  EXPECT_THAT(Declare(), Exits(2, "no point of its box satisfies"));
 }
 
 TEST_F(DeclareTest, CoverIsConfirmed) {
   WriteTask("residual: {name: heading_saturation, gravity: [9.78, 9.84]}\n");
   EXPECT_EQ(Declare("--cover " + cover_).code, 0);
-  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_THAT(Check(), Exits(0));
   EXPECT_EQ(Json::parse(Declare("--json --check " + cover_).text)["verdict"], "confirmed");
 }
 
@@ -290,8 +272,7 @@ TEST_F(DeclareTest, ATextIsBoundedAndItsCoverIsConfirmed) {
   EXPECT_EQ(document["lipschitz"][4][6], 0.5);
   EXPECT_EQ(document["residual"]["add"]["v"], "-dt*drag");
   EXPECT_EQ(document["residual"]["parameters"]["c"], Json::parse("[0.1, 0.2]"));
-  EXPECT_EQ(Check().code, 0) << Check().text;
-  EXPECT_THAT(Check().text, HasSubstr("check: confirmed: 2 bounds of the residual"));
+  EXPECT_THAT(Check(), Exits(0, "check: confirmed: 2 bounds of the residual"));
   Tamper([](Json& file) { file["entries"][1]["bound"] = file["entries"][1]["cover"] = 0.499; });
   Reseal();
   ExpectRefuted("a by jerk: a box's bound is");
@@ -301,9 +282,7 @@ TEST_F(DeclareTest, ATextIsBoundedAndItsCoverIsConfirmed) {
     ExpectRefuted("another domain, residual or parameters");
   }
   WriteTask("residual: {add: {v: log(v - 3)}}\n");
-  const Output output = Declare();
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("no finite bound for the slope of v by v: the residual has none over v in ["));
+  EXPECT_THAT(Declare(), Exits(1, "no finite bound for the slope of v by v: the residual has none over v in ["));
 }
 
 TEST_F(DeclareTest, TamperedCoversAreRefused) {
@@ -335,8 +314,7 @@ TEST_F(DeclareTest, BadInputExitsWithTwoAndOneLine) {
   const auto expect = [&](const std::string& residual, const char* text) {
     WriteTask(residual);
     const Output output = Declare();
-    EXPECT_EQ(output.code, 2) << residual;
-    EXPECT_THAT(output.text, HasSubstr(text));
+    EXPECT_THAT(output, Exits(2, text)) << residual;
     EXPECT_EQ(std::count(output.text.begin(), output.text.end(), '\n'), 1) << output.text;
   };
   expect("", "residual: missing");

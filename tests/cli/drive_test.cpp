@@ -56,9 +56,8 @@ TEST(Run, RefusesAStartAtASpeedAndCheckNamesIt) {
   };
   for (const char* speed : {"1", "-0.5", "0.021"}) {
     with(speed);
-    const Output run = Forereach("run " + path + " --directory '" + (scratch / "log") + "' 2>&1");
-    EXPECT_EQ(run.code, 2) << run.text;
-    EXPECT_THAT(run.text, HasSubstr("unicycle.yaml: robot.start: v is " + std::string(speed)));
+    EXPECT_THAT(Forereach("run " + path + " --directory '" + (scratch / "log") + "' 2>&1"),
+                Exits(2, "unicycle.yaml: robot.start: v is " + std::string(speed)));
     const Output check = Forereach("check " + path);
     EXPECT_THAT(check.text, HasSubstr("robot.start: remark: v begins at " + std::string(speed)));
   }
@@ -71,11 +70,9 @@ TEST(Run, SaysWhatBecameOfThePlansIfTheRobotDoesNotArrive) {
   CopyDrives(scratch);
   scratch.Write("drive/unicycle.yaml",
                 Replaced(Read(scratch / "drive/unicycle.yaml"), "time_limit_s: 60", "time_limit_s: 3"));
-  const Output run =
-      Forereach("run '" + (scratch / "drive/unicycle.yaml") + "' --directory '" + (scratch / "log") + "' 2>&1");
-  EXPECT_EQ(run.code, 1);
-  EXPECT_THAT(run.text, testing::ContainsRegex("did not reach planner.goal: the planner searched [1-9][0-9]* times and "
-                                               "proposed [1-9][0-9]* plans, [1-9][0-9]* were certified"));
+  EXPECT_THAT(Forereach("run '" + (scratch / "drive/unicycle.yaml") + "' --directory '" + (scratch / "log") + "' 2>&1"),
+              Exits(1, testing::ContainsRegex("did not reach planner.goal: the planner searched [1-9][0-9]* times and "
+                                              "proposed [1-9][0-9]* plans, [1-9][0-9]* were certified")));
 }
 
 // What keeps the start is said, and not what cannot help.
@@ -89,9 +86,8 @@ TEST(Plan, FromWhereNoneIsPossibleSaysWhy) {
                {"[-3, 0.3, 0, 0, 0]", "below its bound -1"}};
   for (const auto& [center, why] : cases) {
     scratch.Write("drive/unicycle.yaml", Replaced(task, "center: [0, 0, 0, 0, 0]", std::string("center: ") + center));
-    const Output plan = Forereach("plan " + path + " --out '" + (scratch / "plan.csv") + "' 2>&1");
-    EXPECT_EQ(plan.code, 1);
-    EXPECT_THAT(plan.text, AllOf(HasSubstr(why), Not(HasSubstr("planner.time_limit_ms may help"))));
+    EXPECT_THAT(Forereach("plan " + path + " --out '" + (scratch / "plan.csv") + "' 2>&1"),
+                Exits(1, why, Not(HasSubstr("planner.time_limit_ms may help"))));
   }
 }
 

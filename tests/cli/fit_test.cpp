@@ -35,9 +35,7 @@ class FitCommandTest : public testing::Test {
 
 TEST_F(FitCommandTest, ItsLineGoesIntoATaskFile) {
   const std::string picture = scratch_ / "errors.svg";
-  const Output output = Fit("--picture " + picture);
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("model:\n  parameters: {decay: 0.5, gain: 0.25}"));
+  EXPECT_THAT(Fit("--picture " + picture), Exits(0, "model:\n  parameters: {decay: 0.5, gain: 0.25}"));
   EXPECT_THAT(Read(picture), HasSubstr("<svg"));
   const Json document = Json::parse(Fit("--json").text);
   EXPECT_TRUE(document["converged"]);
@@ -105,10 +103,8 @@ TEST_F(FitCommandTest, NamesParametersThatTheDataDoNotDetermine) {
   const std::string task = Read(task_);
   scratch_.Write("task.yaml",
                  Replaced(Replaced(task, "decay: 1,", "decay: 1, more: 1, idle: 3,"), "x: decay*x", "x: decay*more*x"));
-  const Output output = Forereach("fit " + task_ + " 2>&1");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("not determined, only together with more\n"));
-  EXPECT_THAT(output.text, HasSubstr("not determined: it has no effect on these transitions\n"));
+  EXPECT_THAT(Forereach("fit " + task_ + " 2>&1"), Exits(0, "not determined, only together with more\n",
+                                                         "not determined: it has no effect on these transitions\n"));
   const Json document = Json::parse(Fit("--json").text);
   EXPECT_EQ(document["parameters"][1]["undetermined_with"], Json({"decay"}));
   EXPECT_TRUE(document["parameters"][3]["deviation"].is_number()) << "of gain";
@@ -116,9 +112,7 @@ TEST_F(FitCommandTest, NamesParametersThatTheDataDoNotDetermine) {
 
 TEST_F(FitCommandTest, SaysWhyAParameterHasNoStandardError) {
   scratch_.Write("steps.csv", "x,y,u,x_next,y_next\n0.5,0,0,0.26,0\n0,0,0.5,0.12,0\n");
-  const Output two = Fit("");
-  EXPECT_EQ(two.code, 0) << two.text;
-  EXPECT_THAT(two.text, HasSubstr("none: no informative number is left over to show the noise"));
+  EXPECT_THAT(Fit(""), Exits(0, "none: no informative number is left over to show the noise"));
   EXPECT_THAT(Json::parse(Fit("--json").text)["parameters"][0]["why_no_deviation"], HasSubstr("left over"));
   scratch_.Write("steps.csv", "x,y,u,x_next,y_next\n0.5,0,0,0.26,0\n0,0,0.5,0.12,0\n0.25,0,0.25,0.2,0\n");
   EXPECT_TRUE(Json::parse(Fit("--json").text)["parameters"][0]["why_no_deviation"].is_null()) << "one is left over";
@@ -130,10 +124,7 @@ TEST_F(FitCommandTest, AParameterThatBeginsWithoutADerivativeIsExitTwo) {
            {"x: sqrt(decay)*x", "no derivative by 'decay' at 0; begin elsewhere"},
            {"x: decay^2*x", "'decay' has no effect near 0; begin elsewhere"}}) {
     scratch_.Write("task.yaml", Replaced(task, "x: decay*x", term));
-    const Output output = Fit("");
-    EXPECT_EQ(output.code, 2) << term;
-    EXPECT_THAT(output.text, HasSubstr(words));
-    EXPECT_THAT(output.text, Not(HasSubstr("local minimum")));
+    EXPECT_THAT(Fit(""), Exits(2, words, Not(HasSubstr("local minimum")))) << term;
   }
 }
 
@@ -143,13 +134,10 @@ TEST_F(FitCommandTest, BadInputIsExitTwo) {
                                                         {"--parameters dt", "dt is the step"},
                                                         {"--parameters gain,gain", "parameter 'gain' is given twice"},
                                                         {"--picture errors.gif", "ends in .gif"}}) {
-    const Output output = Fit(options);
-    EXPECT_EQ(output.code, 2) << options;
-    EXPECT_THAT(output.text, HasSubstr(words));
+    EXPECT_THAT(Fit(options), Exits(2, words)) << options;
   }
-  const Output compiled = Forereach("fit --config config/point_mass.yaml 2>&1");
-  EXPECT_EQ(compiled.code, 2);
-  EXPECT_THAT(compiled.text, HasSubstr("only the parameters of a model as text can be fitted"));
+  EXPECT_THAT(Forereach("fit --config config/point_mass.yaml 2>&1"),
+              Exits(2, "only the parameters of a model as text can be fitted"));
 }
 
 }  // namespace forereach::fit_test

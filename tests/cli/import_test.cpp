@@ -29,9 +29,7 @@ class ImportCommandTest : public testing::Test {
 };
 
 TEST_F(ImportCommandTest, ItsTransitionsAreReadWithTheTask) {
-  const Output output = Import(columns_ + log_);
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("import: 2 transitions of 0.15 s in " + out_));
+  EXPECT_THAT(Import(columns_ + log_), Exits(0, "import: 2 transitions of 0.15 s in " + out_));
   const Transitions transitions = LoadConfig(scratch_ / "task.yaml").problem->transitions;
   ASSERT_EQ(transitions.size(), 2);
   EXPECT_DOUBLE_EQ(transitions.z(0, 0), 1);
@@ -42,7 +40,7 @@ TEST_F(ImportCommandTest, ItsTransitionsAreReadWithTheTask) {
 
 TEST_F(ImportCommandTest, AColumnOfTimeNeedsNoOption) {
   scratch_.Write("log.csv", "px,py,vx,vy,ax,ay,time\n0,0,1,0,0,0,0\n0.15,0,1,0,0,0,0.15\n");
-  EXPECT_EQ(Import(log_).code, 0) << Import(log_).text;
+  EXPECT_THAT(Import(log_), Exits(0));
   EXPECT_THAT(Import("--rate 5 " + log_).text, HasSubstr("a step of the task is")) << "--rate takes no stamps";
   scratch_.Write("log.csv", "0,0,1,0,0,0,0\n0.15,0,1,0,0,0,0.15\n");
   EXPECT_EQ(Import("--header px,py,vx,vy,ax,ay,time " + log_).code, 0);
@@ -52,11 +50,10 @@ TEST_F(ImportCommandTest, SaysHowFarTheNearestStampsAre) {
   std::string rows = "time,px,py,vx,vy,ax,ay\n";
   for (const char* stamp : {"0", "0.079", "0.146", "0.225", "0.3"}) rows += std::string(stamp) + ",0,0,0,0,0,0\n";
   scratch_.Write("log.csv", rows);
-  const Output output = Import(log_);
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("3  starts without a stamp near t + dt; first in line 2\n             the nearest "
-                                     "is 4"));
-  EXPECT_THAT(output.text, HasSubstr("at most; --tolerance-ms is 0.001\n"));
+  EXPECT_THAT(Import(log_), Exits(1,
+                                  "3  starts without a stamp near t + dt; first in line 2\n             the nearest "
+                                  "is 4",
+                                  "at most; --tolerance-ms is 0.001\n"));
   const Json gap = Json::parse(Import("--json " + log_).text)["logs"][0]["dropped"]["gap"];
   EXPECT_NEAR(gap["median_distance_s"], 0.004, 1e-9);
   EXPECT_NEAR(gap["largest_distance_s"], 0.004, 1e-9);
@@ -79,10 +76,8 @@ TEST_F(ImportCommandTest, JsonHasEveryCause) {
 
 TEST_F(ImportCommandTest, NoTransitionIsExitOneAndNoFile) {
   scratch_.Write("log.csv", "stamp;x pos;py;vx;vy;cmd;ay\n0;100;0;1;0;5;0\n150;115.5;0;1.07;0;0.5;0\n");
-  const Output output = Import(columns_ + log_);
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("1  starts outside the task's domain; first in line 2 (ax 5)"));
-  EXPECT_THAT(output.text, HasSubstr(out_ + " is not written"));
+  EXPECT_THAT(Import(columns_ + log_),
+              Exits(1, "1  starts outside the task's domain; first in line 2 (ax 5)", out_ + " is not written"));
   EXPECT_FALSE(std::filesystem::exists(out_));
 }
 
@@ -147,26 +142,21 @@ class ForeignLogTest : public testing::Test {
 };
 
 TEST_F(ForeignLogTest, ZeroPaddedNumbersAreNumbers) {
-  const Output output = Import(header_ + Rows(0, 60));
-  EXPECT_EQ(output.code, 0);
-  EXPECT_THAT(output.text, HasSubstr("59 transitions from 60 rows, typically 0.1 s apart\n"));
-  EXPECT_THAT(output.text, Not(HasSubstr("no number")));
+  EXPECT_THAT(Import(header_ + Rows(0, 60)),
+              Exits(0, "59 transitions from 60 rows, typically 0.1 s apart\n", Not(HasSubstr("no number"))));
 }
 
 TEST_F(ForeignLogTest, ASecondHeaderInAnotherOrderIsRefusedWithItsLine) {
-  const Output output = Import(header_ + Rows(0, 20) + "time,v,p,a\n" + Rows(20, 40, "{0:.1f},{2:.2f},{1:.4f},1\n"));
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("log.csv:22: a second header that differs from the first: time, v, p, a"));
-  const Output more = Import(header_ + Rows(0, 20) + "time,p,v,a,mode\n" + Rows(20, 40, "{:.1f},{:.4f},{:.2f},1,b\n"));
-  EXPECT_EQ(more.code, 2) << more.text;
+  EXPECT_THAT(Import(header_ + Rows(0, 20) + "time,v,p,a\n" + Rows(20, 40, "{0:.1f},{2:.2f},{1:.4f},1\n")),
+              Exits(2, "log.csv:22: a second header that differs from the first: time, v, p, a"));
+  EXPECT_THAT(Import(header_ + Rows(0, 20) + "time,p,v,a,mode\n" + Rows(20, 40, "{:.1f},{:.4f},{:.2f},1,b\n")),
+              Exits(2));
 }
 
 TEST_F(ForeignLogTest, ARepeatedHeaderIsSkippedAndSaid) {
-  const Output output = Import(header_ + Rows(0, 20) + header_ + Rows(20, 40));
-  EXPECT_EQ(output.code, 0);
-  EXPECT_THAT(output.text, HasSubstr("38 transitions from 40 rows"));
-  EXPECT_THAT(output.text, HasSubstr("1  lines that repeat the header; first in line 22"));
-  EXPECT_THAT(output.text, Not(HasSubstr("no number")));
+  EXPECT_THAT(Import(header_ + Rows(0, 20) + header_ + Rows(20, 40)),
+              Exits(0, "38 transitions from 40 rows", "1  lines that repeat the header; first in line 22",
+                    Not(HasSubstr("no number"))));
 }
 
 TEST_F(ForeignLogTest, ALineOfUnitsIsNoSecondHeader) {
@@ -186,9 +176,8 @@ TEST_F(ForeignLogTest, AHeaderThatIsACommentIsNamed) {
 TEST_F(ForeignLogTest, DecimalCommasAreNamed) {
   std::string rows = Rows(0, 20, "{:.1f};{:.4f};{:.2f};1\n");
   std::ranges::replace(rows, '.', ',');
-  const Output output = Import("time;p;v;a\n" + rows);
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("60  numbers with a decimal comma: write a point; first in line 2 ('0,0')"));
+  EXPECT_THAT(Import("time;p;v;a\n" + rows),
+              Exits(1, "60  numbers with a decimal comma: write a point; first in line 2 ('0,0')"));
 }
 
 TEST_F(ForeignLogTest, OtherSeparatorsAreNamed) {
@@ -205,21 +194,16 @@ TEST_F(ForeignLogTest, OtherSeparatorsAreNamed) {
 TEST_F(ForeignLogTest, StampsThatGoBackAreNamed) {
   std::string rows;
   for (int i = 0; i < 40; ++i) rows += Row(i * 7 % 40);
-  const Output output = Import(header_ + rows);
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("stamps go back, 6 times, first in line 8"));
-  EXPECT_THAT(output.text, Not(HasSubstr("record faster")));
+  EXPECT_THAT(Import(header_ + rows),
+              Exits(2, "stamps go back, 6 times, first in line 8", Not(HasSubstr("record faster"))));
 }
 
 TEST_F(ForeignLogTest, FewerThanHalfOfTheRowsAreKeptOnlyIfAskedFor) {
   const auto log = [&](int lost) { return header_ + Rows(0, 20) + Rows(20, 20 + lost, "{:.1f},{:.4f},-,1\n"); };
   const Output half = Import(log(20)), fewer = Import(log(21));
-  EXPECT_EQ(half.code, 0) << half.text;
-  EXPECT_THAT(half.text, HasSubstr("20 of 40 rows (50 %) are in no transition"));
-  EXPECT_EQ(fewer.code, 1);
-  EXPECT_THAT(fewer.text, HasSubstr("21 of 41 rows (51.2 %) are in no transition"));
-  EXPECT_THAT(fewer.text, HasSubstr("--keep-few"));
-  EXPECT_THAT(fewer.text, HasSubstr("write these fields as decimal numbers"));
+  EXPECT_THAT(half, Exits(0, "20 of 40 rows (50 %) are in no transition"));
+  EXPECT_THAT(fewer, Exits(1, "21 of 41 rows (51.2 %) are in no transition", "--keep-few",
+                           "write these fields as decimal numbers"));
   std::filesystem::remove(scratch_ / "steps.csv");
   EXPECT_EQ(Import(log(21)).code, 1);
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "steps.csv"));
@@ -243,10 +227,8 @@ TEST_F(ForeignLogTest, TheShareThatIsDroppedIsSaidInJsonToo) {
 
 // 0.1 * 3 is not 0.3: stamps and dt are doubles, and their rounding is no distance.
 TEST_F(ForeignLogTest, RoundingOfStampsIsNoDistance) {
-  const Output zero = Import(header_ + Rows(0, 60), "--tolerance-ms 0");
-  EXPECT_EQ(zero.code, 0);
-  EXPECT_THAT(zero.text, HasSubstr("59 transitions"));
-  EXPECT_THAT(zero.text, Not(HasSubstr("ms off t + dt")));
+  EXPECT_THAT(Import(header_ + Rows(0, 60), "--tolerance-ms 0"),
+              Exits(0, "59 transitions", Not(HasSubstr("ms off t + dt"))));
   const Output off = Import(header_ + Row(0) + Replaced(Row(1), "0.1,", "0.1000001,") + Row(2));
   EXPECT_THAT(off.text, HasSubstr("Stamps are up to 0.0001 ms off t + dt"));
   EXPECT_EQ(Import(header_ + Row(0) + Replaced(Row(1), "0.1,", "0.1000001,") + Row(2), "--tolerance-ms 0").code, 1);
@@ -255,10 +237,8 @@ TEST_F(ForeignLogTest, RoundingOfStampsIsNoDistance) {
 TEST_F(ForeignLogTest, StampsThatJitterAreSaidWithTheToleranceThatTakesThem) {
   std::string rows;
   for (int i = 0; i < 60; ++i) rows += fmt::format("{:.4f},0,8,1\n", 0.1 * i + (i % 2 == 0 ? 0 : 0.002));
-  const Output output = Import(header_ + rows);
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("60 of 60 rows (100 %) are in no transition"));
-  EXPECT_THAT(output.text, HasSubstr("--tolerance-ms 2 takes half of these starts"));
+  EXPECT_THAT(Import(header_ + rows),
+              Exits(1, "60 of 60 rows (100 %) are in no transition", "--tolerance-ms 2 takes half of these starts"));
   EXPECT_EQ(Import(header_ + rows, "--tolerance-ms 2").code, 0);
 }
 
@@ -291,13 +271,9 @@ class LateRowsTest : public ImportCommandTest {
 TEST_F(LateRowsTest, IsSaidWithTheErrorByDelayAndMayBeShifted) {
   Record(true);
   const Output said = Import(log_);
-  EXPECT_EQ(said.code, 0) << said.text;
-  EXPECT_THAT(said.text,
-              AllOf(HasSubstr("Commands: by the model's error, commands act 1 row late.\n    0 rows late: px 0.00"),
-                    HasSubstr("Shift them with --command-delay 1"), HasSubstr("`held: u`")));
-  const Output shifted = Import("--command-delay auto " + log_);
-  EXPECT_EQ(shifted.code, 0) << shifted.text;
-  EXPECT_THAT(shifted.text, HasSubstr("Each command counts 1 row later."));
+  EXPECT_THAT(said, Exits(0, "Commands: by the model's error, commands act 1 row late.\n    0 rows late: px 0.00",
+                          "Shift them with --command-delay 1", "`held: u`"));
+  EXPECT_THAT(Import("--command-delay auto " + log_), Exits(0, "Each command counts 1 row later."));
   const Problem problem = *LoadConfig(scratch_ / "task.yaml").problem;
   EXPECT_EQ(problem.transitions.size(), 78) << "nothing is known of the first row's command";
   for (Eigen::Index i = 0; i < problem.transitions.size(); ++i)
@@ -313,9 +289,8 @@ TEST_F(LateRowsTest, IsSaidWithTheErrorByDelayAndMayBeShifted) {
 TEST_F(LateRowsTest, CannotBeToldWhereTheInputDoesNotVary) {
   Record(false);
   EXPECT_THAT(Import(log_).text, HasSubstr("how late commands act cannot be told: the inputs vary too little"));
-  const Output output = Import("--command-delay auto " + log_);
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("--command-delay: auto: how late commands act cannot be told"));
+  EXPECT_THAT(Import("--command-delay auto " + log_),
+              Exits(2, "--command-delay: auto: how late commands act cannot be told"));
   EXPECT_THAT(Import("--command-delay 1.5 " + log_).text, HasSubstr("'1.5' is no whole number of rows, nor auto"));
 }
 

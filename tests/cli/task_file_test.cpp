@@ -35,6 +35,11 @@ class TaskFileTest : public testing::Test {
     scratch_.Write("task.yaml", from.empty() ? task : Replaced(task, from, to));
     scratch_.Write("steps.csv", transitions);
   }
+  template <class... Change>
+  [[nodiscard]] Output CheckWith(const Change&... change) const {
+    WriteTask(change...);
+    return Check();
+  }
 
   ScratchDirectory scratch_;
   const std::string task_ = scratch_ / "task.yaml";
@@ -50,14 +55,12 @@ TEST_F(InitTest, EveryModelOfTheLibraryGivesATaskThatLoads) {
   for (const auto& entry : fs::directory_iterator(kSource + "/config/models")) {
     const std::string name = entry.path().stem().string();
     SCOPED_TRACE(name);
-    const Output output = Init("--force --model " + name);
-    ASSERT_EQ(output.code, 0) << output.text;
+    ASSERT_THAT(Init("--force --model " + name), Exits(0));
     const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
     EXPECT_EQ(config.problem->model->name(), name + " (text)");
     EXPECT_TRUE(config.says_between);
     EXPECT_NE(config.gate.obstacles, ObstaclesSource::kUnsaid);
-    EXPECT_EQ(Check().code, 1) << "there are no data yet";
-    EXPECT_THAT(Check().text, HasSubstr("task_steps.csv does not exist"));
+    EXPECT_THAT(Check(), Exits(1, "task_steps.csv does not exist")) << "there are no data yet";
     ++models;
   }
   EXPECT_GE(models, 13);
@@ -167,11 +170,8 @@ TEST_F(InitTest, PlaceholdersKeepPlansFromBeingCertified) {
     }
     SaveTransitions(scratch_ / "task_steps.csv", model, transitions);
     SavePlan(scratch_ / "plan.csv", model, Eigen::MatrixXd::Zero(model.num_inputs(), 5));
-    const Output output = Forereach("certify --config " + task_ + " --plan " + (scratch_ / "plan.csv") + " 2>&1");
-    EXPECT_EQ(output.code, 1) << output.text;
-    const Output check = Check();
-    EXPECT_EQ(check.code, 1);
-    EXPECT_THAT(check.text, HasSubstr("from a declaration that is too wide")) << check.text;
+    EXPECT_THAT(Forereach("certify --config " + task_ + " --plan " + (scratch_ / "plan.csv") + " 2>&1"), Exits(1));
+    EXPECT_THAT(Check(), Exits(1, "from a declaration that is too wide"));
   }
 }
 
@@ -184,9 +184,7 @@ TEST_F(InitTest, SaysWhatTheParametersAre) {
 
 TEST_F(InitTest, OverwritesNothingUnlessTold) {
   scratch_.Write("task.yaml", "mine\n");
-  const Output output = Init("--model unicycle");
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("the file exists, and is not changed"));
+  EXPECT_THAT(Init("--model unicycle"), Exits(2, "the file exists, and is not changed"));
   EXPECT_EQ(Read(task_), "mine\n");
   scratch_.Write("task.yaml", std::string(100'000, '#'));
   EXPECT_EQ(Init("--model unicycle --force").code, 0);
@@ -194,16 +192,13 @@ TEST_F(InitTest, OverwritesNothingUnlessTold) {
 }
 
 TEST_F(InitTest, UnknownModelsAreRefusedWithTheNearest) {
-  const Output output = Init("--model unicicle");
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("did you mean models/unicycle.yaml?"));
+  EXPECT_THAT(Init("--model unicicle"), Exits(2, "did you mean models/unicycle.yaml?"));
   EXPECT_FALSE(fs::exists(task_));
 }
 
 TEST_F(InitTest, TakesStatesAndInputsFromTheHeaderOfTheTransitions) {
   scratch_.Write("log.csv", "\xef\xbb\xbfx , v,x_next,u, v_next\r\n0,1,0.1,5,1.5\n2,-1,1.9,5,-0.5\n");
-  const Output output = Init("--dt 0.1 --transitions " + (scratch_ / "log.csv"));
-  ASSERT_EQ(output.code, 0) << output.text;
+  ASSERT_THAT(Init("--dt 0.1 --transitions " + (scratch_ / "log.csv")), Exits(0));
   const Config config = LoadConfig(task_);
   const Problem& problem = *config.problem;
   EXPECT_EQ(problem.model->state_names(), (std::vector<std::string>{"x", "v"}));
@@ -282,8 +277,7 @@ TEST_F(CheckTest, CountsTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
   EXPECT_THAT(Check().text, HasSubstr("remark: 1 transition left out, the first in " + (scratch_ / "steps.csv") +
                                       ":4: within state_error and input_error it may be outside the domain"));
   WriteTask(line, "  state_error: {px: 21}\n" + line);
-  EXPECT_THAT(Check().text, HasSubstr(" 2 transitions left out")) << "all, and that is no mere remark";
-  EXPECT_EQ(Check().code, 1);
+  EXPECT_THAT(Check(), Exits(1, " 2 transitions left out")) << "all, and that is no mere remark";
 }
 
 TEST(Check, ExitsWithTheExpectedCodeForEachShippedTask) {
@@ -304,9 +298,7 @@ TEST(Check, ExitsWithTheExpectedCodeForEachShippedTask) {
 
 TEST_F(CheckTest, SaysThatAPlanCouldBeCertifiedWhenNothingIsWrong) {
   WriteTask();
-  const Output output = Check();
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("a plan could be certified"));
+  EXPECT_THAT(Check(), Exits(0, "a plan could be certified"));
   const Json json = Json::parse(Check("--json --steps 3").text);
   EXPECT_EQ(json["good"], true);
   EXPECT_EQ(json["half_widths"].size(), 4u);
@@ -317,7 +309,7 @@ TEST_F(CheckTest, SaysThatAPlanCouldBeCertifiedWhenNothingIsWrong) {
 TEST_F(CheckTest, DataOutsideTheDomainAreAllNamed) {
   const std::string at = "0,0,5.4,0,3,0,0.84375,0,5.85,0\n";
   WriteTask("", "", kTransitions + at);
-  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_THAT(Check(), Exits(0));
   WriteTask("", "", kTransitions + at + "0,0,5.5,-5.41,0,0,0,0,0,0\n0,0,6.5,0,0,3.1,0,0,0,0\n");
   const Output output = Check();
   EXPECT_EQ(output.code, 1);
@@ -361,9 +353,8 @@ TEST_F(CheckTest, TransitionsThatNothingCanBeObservedOfAreNamedByTheirLine) {
     return Forereach("check " + (scratch_ / "task.yaml") + " 2>&1");
   };
   const std::string rows = "7,0,0,0,0,0,0\n0.5,0,0,0,0.5,0,0\n0,0,0,0,0,0,2\n";
-  const Output angle = check("  next: {x: x, y: y, t: t}\n  angles: [t]\n", rows);
-  EXPECT_EQ(angle.code, 1);
-  EXPECT_THAT(angle.text, AllOf(HasSubstr("steps.csv:4: "), HasSubstr("t is 2 rad away"), HasSubstr("has to be rad")));
+  EXPECT_THAT(check("  next: {x: x, y: y, t: t}\n  angles: [t]\n", rows),
+              Exits(1, "steps.csv:4: ", "t is 2 rad away", "has to be rad"));
   const Output value = check("  next: {x: log(x), y: y, t: t}\n", rows);
   EXPECT_EQ(value.code, 1);
   EXPECT_THAT(value.text, AllOf(HasSubstr("steps.csv:4: x: the nominal model has no finite value there\n"),
@@ -373,20 +364,18 @@ TEST_F(CheckTest, TransitionsThatNothingCanBeObservedOfAreNamedByTheirLine) {
 // Observation errors of 2 sigma and 0.05 m/s times 1 m/s: the residuals of vx may differ by 0.12. They differ by d.
 TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
   const auto with = [&](const std::string& next) {
-    WriteTask("", "",
-              "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,1,0,0,0,0.15,0,1,0\n0,0,1,1,0,0,0.15,0.15," +
-                  next + ",1\n");
-    return Check();
+    return CheckWith(
+        "", "",
+        "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,1,0,0,0,0.15,0,1,0\n0,0,1,1,0,0,0.15,0.15," + next +
+            ",1\n");
   };
-  EXPECT_EQ(with("1.0699").code, 0) << with("1.0699").text;
-  EXPECT_THAT(with("1.0699").text, HasSubstr(task_ + ":9: declaration.lipschitz.vx: remark: vx: the data use 99."));
-  const Output output = with("1.0701");
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr(task_ + ":9: declaration.lipschitz.vx: vx: lines 2 and 3 of " +
-                                     (scratch_ / "steps.csv") + " differ in the model's error by 0.07"));
-  EXPECT_THAT(output.text, HasSubstr("noise_bound of vx at least 0.01005")) << output.text;
+  EXPECT_THAT(with("1.0699"), Exits(0, task_ + ":9: declaration.lipschitz.vx: remark: vx: the data use 99."));
+  EXPECT_THAT(with("1.0701"), Exits(1,
+                                    task_ + ":9: declaration.lipschitz.vx: vx: lines 2 and 3 of " +
+                                        (scratch_ / "steps.csv") + " differ in the model's error by 0.07",
+                                    "noise_bound of vx at least 0.01005"));
   scratch_.Write("task.yaml", Replaced(Read(task_), "[0.01, 0.01, 0.01, 0.01]", "[0.01, 0.01, 0.01006, 0.01]"));
-  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_THAT(Check(), Exits(0));
 }
 
 // A bar that turns on the spot in steps of 1 s.
@@ -409,39 +398,33 @@ gate: {obstacles: task}
     scratch_.Write("steps.csv", "x,y,th,w,x_next,y_next,th_next\n0,0,0,1.5,0,0,1.5\n0,0,0,0,0,0,0\n0,0,3,-3,0,0,0\n");
     return Check();
   };
-  const Output output = with("0.5");
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text,
-              HasSubstr(task_ +
+  EXPECT_THAT(with("0.5"),
+              Exits(1,
+                    task_ +
                         ":9: task.between.turn_rate: th changes faster than 0.5 a second in 2 "
                         "transitions of " +
                         (scratch_ / "steps.csv") +
-                        ", so nothing can be certified: line 4: 2.999 (5.999 times), line 2: 1.499 (2.999 times)"));
-  EXPECT_THAT(output.text, HasSubstr("declare 3 at least")) << output.text;
+                        ", so nothing can be certified: line 4: 2.999 (5.999 times), line 2: 1.499 (2.999 times)",
+                    "declare 3 at least"));
   EXPECT_THAT(with("2").text, HasSubstr("in 1 transition of"));
-  EXPECT_EQ(with("3").code, 0) << with("3").text;
+  EXPECT_THAT(with("3"), Exits(0));
 }
 
 // In a step of 0.15 s 0.02 m more than the velocity says, of which 0.01 m may be noise: 0.888 m/s^2 over the step.
 TEST_F(CheckTest, RemarksOnRowsThatCurveMoreThanDeclaredByTheVelocityOfTheEquations) {
   const auto with = [&](const std::string& acceleration) {
-    WriteTask("between: samples", "between: {acceleration: [" + acceleration + ", 4]}",
-              Replaced(kTransitions, "0.155", "0.17"));
-    return Check();
+    return CheckWith("between: samples", "between: {acceleration: [" + acceleration + ", 4]}",
+                     Replaced(kTransitions, "0.155", "0.17"));
   };
-  const Output output = with("0.125");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr(":19: task.between.acceleration: remark: coordinate 0 curves by more than 0.125 "
-                                     "m/s^2, if its velocity is what the equations say, in 1 transition of " +
-                                     (scratch_ / "steps.csv") + ": line 2: 0.8888 (7.111 times)"));
+  EXPECT_THAT(with("0.125"), Exits(0,
+                                   ":19: task.between.acceleration: remark: coordinate 0 curves by more than 0.125 "
+                                   "m/s^2, if its velocity is what the equations say, in 1 transition of " +
+                                       (scratch_ / "steps.csv") + ": line 2: 0.8888 (7.111 times)"));
   EXPECT_THAT(with("0.9").text, Not(HasSubstr("curves by more")));
 }
 
 TEST_F(CheckTest, PrintsNoShareOfTheDeclarationWhereNothingIsDeclared) {
-  const auto with = [&](const std::string& noise_bound) {
-    WriteTask("[0.01, 0.01, 0.01, 0.01]", noise_bound);
-    return Check();
-  };
+  const auto with = [&](const std::string& noise_bound) { return CheckWith("[0.01, 0.01, 0.01, 0.01]", noise_bound); };
   EXPECT_THAT(with("[0.01, 0.01, 0.01, 0.01]").text, Not(HasSubstr("nothing is declared")));
   const std::string text = with("[0, 0.01, 0, 0]").text;
   EXPECT_THAT(text, AllOf(HasSubstr("declaration: nothing is declared for px\n"), HasSubstr("\n  py "),
@@ -456,24 +439,18 @@ TEST_F(CheckTest, PrintsNoShareOfTheDeclarationWhereNothingIsDeclared) {
 // X0 is a square of half-width 0.1, and the circle's edge is at 3 - radius.
 TEST_F(CheckTest, FindsAnObstacleThatTheInitialSetMayTouch) {
   const auto with = [&](const std::string& radius) {
-    WriteTask("{center: [3, 2], radius: 0.8}", "{center: [3, 0], radius: " + radius + "}");
-    return Check();
+    return CheckWith("{center: [3, 2], radius: 0.8}", "{center: [3, 0], radius: " + radius + "}");
   };
-  EXPECT_THAT(with("2.9001").text, HasSubstr(task_ + ":18: task.obstacles[0]: the robot may touch it at the start"));
-  EXPECT_EQ(with("2.9001").code, 1);
-  EXPECT_EQ(with("2.8999").code, 0) << with("2.8999").text;
+  EXPECT_THAT(with("2.9001"), Exits(1, task_ + ":18: task.obstacles[0]: the robot may touch it at the start"));
+  EXPECT_THAT(with("2.8999"), Exits(0));
 }
 
 // In 0.15 s at up to 5.4 m/s along both axes, and 3 m/s^2 along both: sqrt(2) (0.81 + 0.03375) = 1.1933 m.
 TEST_F(CheckTest, FindsAnObstacleThatIsThinnerThanAStep) {
-  const auto with = [&](const std::string& radius) {
-    WriteTask("radius: 0.8", "radius: " + radius);
-    return Check();
-  };
-  EXPECT_EQ(with("0.5967").code, 0) << with("0.5967").text;
-  EXPECT_THAT(with("0.5966").text,
-              HasSubstr(task_ + ":19: task.between: the robot moves by up to 1.194 m in one step of 0.15 s"));
-  EXPECT_EQ(with("0.5966").code, 1);
+  const auto with = [&](const std::string& radius) { return CheckWith("radius: 0.8", "radius: " + radius); };
+  EXPECT_THAT(with("0.5967"), Exits(0));
+  EXPECT_THAT(with("0.5966"),
+              Exits(1, task_ + ":19: task.between: the robot moves by up to 1.194 m in one step of 0.15 s"));
   WriteTask("  between: samples\n", "  between: {acceleration: [5, 5]}\n");
   scratch_.Write("task.yaml", Replaced(Read(task_), "radius: 0.8", "radius: 0.1"));
   EXPECT_EQ(Check().code, 0);
@@ -484,49 +461,40 @@ TEST_F(CheckTest, FindsAThinObstacleForABodyAtExpressions) {
   std::string task = Read(scratch_ / "drive/reaching_arm.yaml");
   const auto line = task.find("  between:");
   task.replace(line, task.find('\n', line) - line, "  between: samples");
-  const Output thick = Forereach("check " + scratch_.Write("drive/thick.yaml", task) + " 2>&1");
-  EXPECT_EQ(thick.code, 0) << thick.text;
+  EXPECT_THAT(Forereach("check " + scratch_.Write("drive/thick.yaml", task) + " 2>&1"), Exits(0));
   const auto obstacles = task.find("  obstacles:");
   task.replace(obstacles, task.find("\n\n", obstacles) - obstacles,
                "  obstacles: [{circle: {center: [1, 1], radius: 0.005}}]");
-  const Output thin = Forereach("check " + scratch_.Write("drive/thin.yaml", task) + " 2>&1");
-  EXPECT_EQ(thin.code, 1) << thin.text;
-  EXPECT_THAT(thin.text, HasSubstr("task.between: the robot moves by up to 0."));
+  EXPECT_THAT(Forereach("check " + scratch_.Write("drive/thin.yaml", task) + " 2>&1"),
+              Exits(1, "task.between: the robot moves by up to 0."));
 }
 
 TEST_F(CheckTest, FindsAStartOfTheRobotOutsideTheDomain) {
   const auto with = [&](const std::string& start) {
-    WriteTask("  between: samples\n", "  between: samples\nrobot: {start: " + start + "}\n");
-    return Check();
+    return CheckWith("  between: samples\n", "  between: samples\nrobot: {start: " + start + "}\n");
   };
-  EXPECT_EQ(with("[20, 0, 0, -5.4]").code, 0) << with("[20, 0, 0, -5.4]").text;
-  EXPECT_THAT(with("[20.1, 0, 0, 0]").text,
-              HasSubstr(task_ + ":20: robot.start: px begins at 20.1, and the domain is [-20, 20]"));
-  EXPECT_EQ(with("[20.1, 0, 0, 0]").code, 1);
+  EXPECT_THAT(with("[20, 0, 0, -5.4]"), Exits(0));
+  EXPECT_THAT(with("[20.1, 0, 0, 0]"),
+              Exits(1, task_ + ":20: robot.start: px begins at 20.1, and the domain is [-20, 20]"));
   EXPECT_EQ(with("[3.81, 2, 0, 0]").code, 0);
   EXPECT_THAT(with("[3.79, 2, 0, 0]").text, HasSubstr("robot.start: the robot touches task.obstacles[0] there"));
 }
 
 TEST_F(CheckTest, FindsALawThatStopsTheRobotFromNoState) {
   const auto with = [&](const std::string& ax) {
-    WriteTask("  between: samples\n", "  between: samples\nplanner: {at_rest: {vx: 0.1, vy: 0.1}, stop: {ax: " + ax +
-                                          ", ay: -vy}}\nrobot: {hold: [vx, vy]}\n");
-    return Check();
+    return CheckWith("  between: samples\n", "  between: samples\nplanner: {at_rest: {vx: 0.1, vy: 0.1}, stop: {ax: " +
+                                                 ax + ", ay: -vy}}\nrobot: {hold: [vx, vy]}\n");
   };
-  EXPECT_EQ(with("-vx").code, 0) << with("-vx").text;
-  const Output output = with("sqrt(-1 - vx^2)");
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr(task_ + ":20: planner.stop: from none of"));
+  EXPECT_THAT(with("-vx"), Exits(0));
+  EXPECT_THAT(with("sqrt(-1 - vx^2)"), Exits(1, task_ + ":20: planner.stop: from none of"));
 }
 
 TEST_F(CheckTest, FindsAGoalOutsideTheDomainOrCoveredByAnObstacle) {
   const auto with = [&](const std::string& goal) {
-    WriteTask("  between: samples\n", "  between: samples\nplanner: {goal: " + goal + ", goal_radius: 0.5}\n");
-    return Check();
+    return CheckWith("  between: samples\n", "  between: samples\nplanner: {goal: " + goal + ", goal_radius: 0.5}\n");
   };
-  EXPECT_EQ(with("[20, -20]").code, 0) << with("[20, -20]").text;
-  EXPECT_THAT(with("[20.1, 0]").text, HasSubstr(task_ + ":20: planner.goal: px: 20.1 is outside [-20, 20]"));
-  EXPECT_EQ(with("[20.1, 0]").code, 1);
+  EXPECT_THAT(with("[20, -20]"), Exits(0));
+  EXPECT_THAT(with("[20.1, 0]"), Exits(1, task_ + ":20: planner.goal: px: 20.1 is outside [-20, 20]"));
   EXPECT_EQ(with("[3.29, 2]").code, 1) << "0.8 - 0.29 > 0.5: no point of the goal is free";
   EXPECT_EQ(with("[3.31, 2]").code, 0);
 }
@@ -536,18 +504,15 @@ TEST_F(CheckTest, RemarksOnAGoalBeyondTheDataWhereTheErrorDependsOnThePlace) {
   WriteTask("  between: samples\n", "  between: samples\nplanner: {goal: [8, 0], goal_radius: 0.5}\n");
   EXPECT_THAT(Check().text, Not(HasSubstr("planner.goal: remark")));
   scratch_.Write("task.yaml", Replaced(Read(task_), "lipschitz:\n", "lipschitz:\n    px: {px: 0.001}\n"));
-  EXPECT_THAT(Check().text, HasSubstr("planner.goal: remark: px: 8 is 7 beyond the data, which lie in [0, 1]"));
-  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_THAT(Check(), Exits(0, "planner.goal: remark: px: 8 is 7 beyond the data, which lie in [0, 1]"));
 }
 
 TEST_F(CheckTest, FindsABoundOfRestThatIsSmallerThanTheTube) {
   const auto with = [&](const std::string& bound) {
-    WriteTask("  between: samples\n", "  between: samples\n  rest: {vx: " + bound + "}\n");
-    return Check();
+    return CheckWith("  between: samples\n", "  between: samples\n  rest: {vx: " + bound + "}\n");
   };
-  EXPECT_EQ(with("0.099").code, 1);
-  EXPECT_THAT(with("0.099").text, HasSubstr(task_ + ":20: task.rest: vx is known only up to"));
-  EXPECT_EQ(with("5").code, 0) << with("5").text;
+  EXPECT_THAT(with("0.099"), Exits(1, task_ + ":20: task.rest: vx is known only up to"));
+  EXPECT_THAT(with("5"), Exits(0));
 }
 
 // The table is that of `certify` where there are no obstacles.
@@ -566,11 +531,10 @@ TEST_F(CheckTest, FindsThatAGivenPlanLeavesTheDomain) {
   WriteTask();
   std::string controls = "ax,ay\n";
   for (int t = 0; t < 15; ++t) controls += "2,0\n";
-  const Output output = Check("--plan " + scratch_.Write("plan.csv", controls));
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text,
-              AllOf(HasSubstr("domain.state.upper: the tube of " + (scratch_ / "plan.csv")), HasSubstr("vx reaches")));
-  EXPECT_THAT(output.text, HasSubstr("remark: vx: at step ")) << "the data end at 2 m/s";
+  EXPECT_THAT(
+      Check("--plan " + scratch_.Write("plan.csv", controls)),
+      Exits(1, "domain.state.upper: the tube of " + (scratch_ / "plan.csv"), "vx reaches", "remark: vx: at step "))
+      << "the data end at 2 m/s";
 }
 
 TEST_F(CheckTest, BadInputIsRefused) {
@@ -592,10 +556,9 @@ TEST_F(CheckTest, DrawsAPicture) {
 }
 
 TEST_F(CheckTest, PrintsItsFindingsEvenIfItCannotDrawThem) {
-  const Output output =
-      Forereach("check config/drive/quadrotor.yaml --picture " + (scratch_ / "a.svg") + " 2>&1 >" + (scratch_ / "out"));
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("there is no picture"));
+  EXPECT_THAT(
+      Forereach("check config/drive/quadrotor.yaml --picture " + (scratch_ / "a.svg") + " 2>&1 >" + (scratch_ / "out")),
+      Exits(2, "there is no picture"));
   EXPECT_EQ(Read(scratch_ / "out"), Forereach("check config/drive/quadrotor.yaml").text);
 }
 

@@ -43,9 +43,9 @@ class KeptTaskTest : public testing::Test {
     replace("gate: {obstacles: task}", "gate: {obstacles: task, learn: none}");
     for (const char* name : {"one", "two"}) {
       scratch_->Write(std::string("tasks_of_mine/") + name + ".yaml", text + "# " + name + "\n");
-      const Output run = Forereach("run --config " + TaskOf(name) + " --directory " + (*scratch_ / "log") + " 2>&1");
-      ASSERT_EQ(run.code, 1) << run.text;
-      ASSERT_THAT(run.text, HasSubstr("the robot did not reach planner.goal")) << "in 2 s";
+      ASSERT_THAT(Forereach("run --config " + TaskOf(name) + " --directory " + (*scratch_ / "log") + " 2>&1"),
+                  Exits(1, "the robot did not reach planner.goal"))
+          << "in 2 s";
     }
     logs_ = new std::vector<std::string>;
     for (const std::string& log : LogDirectory(*scratch_ / "log").Logs()) logs_->push_back(*scratch_ / "log/" + log);
@@ -108,9 +108,7 @@ TEST_F(KeptTaskTest, ACopiedDirectoryNeedsNoTaskFile) {
 TEST_F(KeptTaskTest, ADirectoryWithSeveralTasksVerifiesWhole) {
   const std::string copy = Copied();
   for (const std::string& what : {copy, copy + "/decisions.sqlite"}) {
-    const Output output = Forereach("verify " + what + " 2>&1");
-    EXPECT_EQ(output.code, 0) << output.text;
-    EXPECT_THAT(output.text, AllOf(HasSubstr(" 0 refuted"), HasSubstr(" 0 cannot be verified")));
+    EXPECT_THAT(Forereach("verify " + what + " 2>&1"), Exits(0, " 0 refuted", " 0 cannot be verified"));
   }
   EXPECT_EQ(Forereach("verify " + copy + " --config " + TaskOf("one")).code, 0)
       << "the given one for its own, the kept for others";
@@ -126,8 +124,7 @@ TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
     ExpectRefused(command + kCourseLog, {"--config"});
   }
   const Output other = Forereach("replay " + log + " --other-task --config " + TaskOf("two"));
-  EXPECT_EQ(other.code, 1);
-  EXPECT_THAT(other.text, HasSubstr("another config"));
+  EXPECT_THAT(other, Exits(1, "another config"));
   EXPECT_EQ(Forereach("replay " + log + " --other-task 2>&1").code, 2);
 }
 
@@ -173,8 +170,7 @@ TEST_F(KeptTaskTest, ATaskWithAKeyAsksForIt) {
   ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
   const std::string field = std::regex_replace(Read(data + "field.yaml"), std::regex(R"(\.\./\.\./)"), data + "../../");
   const std::string task = own.Write("task.yaml", field + "bus: {key: keys}\n");
-  const Output run = Forereach("run --config " + task + " --directory " + (own / "log") + " 2>&1");
-  ASSERT_EQ(run.code, 0) << run.text;
+  ASSERT_THAT(Forereach("run --config " + task + " --directory " + (own / "log") + " 2>&1"), Exits(0));
   const std::string log = own / "log/" + LogDirectory(own / "log").Logs().front();
   ExpectRefused("replay " + log, {"keys are not kept", "--key FILE", "--no-key"});
   EXPECT_EQ(Forereach("replay " + log + " --key " + keys).code, 0);
@@ -255,8 +251,7 @@ TEST_F(KeptTaskTest, ADecisionOfATaskThatNobodyKnowsSpoilsItselfOnly) {
     ASSERT_TRUE(writer.Flush());
   }
   const Output replayed = Forereach("replay " + log), verified = Forereach("verify " + log);
-  EXPECT_EQ(replayed.code, 1);
-  EXPECT_THAT(replayed.text, HasSubstr(" 1 differ"));
+  EXPECT_THAT(replayed, Exits(1, " 1 differ"));
   EXPECT_EQ(verified.code, 1);
   EXPECT_THAT(verified.text, AllOf(HasSubstr(" 0 refuted"), HasSubstr(" 1 cannot be verified")));
 }

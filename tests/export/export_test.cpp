@@ -86,9 +86,8 @@ class ExportTest : public testing::Test {
 };
 
 TEST_F(ExportTest, TablesHaveEveryDecisionWithItsCandidate) {
-  const Output output = ExportTo("csv", "tables");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, StartsWith("export: " + std::to_string(kCourseDecisions) + " decisions, "));
+  EXPECT_THAT(ExportTo("csv", "tables"),
+              Exits(0, StartsWith("export: " + std::to_string(kCourseDecisions) + " decisions, ")));
   const auto decisions = ParseCsv(Read(scratch_ / "tables/decisions.csv"));
   ASSERT_EQ(decisions.size(), kCourseDecisions + 1u);
   const auto column = [&](const std::string& name) {
@@ -159,8 +158,7 @@ TEST_F(ExportTest, EveryColumnIsInTheDocument) {
 }
 
 TEST_F(ExportTest, TubesAreThoseOfTheCertifiedPlans) {
-  const Output output = ExportTo("npz", "tubes.npz");
-  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(ExportTo("npz", "tubes.npz"), Exits(0));
   const json arrays = ReadBack("read_npz", "tubes.npz");
   std::vector<certified_plan_t> plans;
   for (const LogEvent& event : ReadLog(kCourse).events)
@@ -201,8 +199,7 @@ TEST_F(ExportTest, ArraysMayBeEmptyAndRowsMayDiffer) {
 }
 
 TEST_F(ExportTest, AnMcapFileHasEveryMessage) {
-  const Output output = ExportTo("mcap", "run.mcap");
-  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(ExportTo("mcap", "run.mcap"), Exits(0));
   const json found = ReadBack("read_mcap", "run.mcap");
   std::map<std::string, std::int64_t> counts;
   const auto events = ReadLog(kCourse).events;
@@ -363,9 +360,7 @@ TEST_F(ExportTest, DamageIsSaidAndTheRestIsExported) {
   auto bytes = ReadBytes(kCourse);
   std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(RecordFrom(bytes, bytes.size() / 2)), 100, std::uint8_t{0});
   WriteBytes(scratch_ / "damaged.lcmlog", bytes);
-  const Output output = ExportTo("jsonl", "run.jsonl", scratch_ / "damaged.lcmlog");
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("damaged in 1 places"));
+  EXPECT_THAT(ExportTo("jsonl", "run.jsonl", scratch_ / "damaged.lcmlog"), Exits(1, "damaged in 1 places"));
   EXPECT_GT(ParseLines(Read(scratch_ / "run.jsonl")).size(), 60u);
 }
 
@@ -400,17 +395,14 @@ TEST_F(ExportTest, ALogWithoutOurMessagesIsNoExport) {
     writer.Append(1, "CAMERA", std::vector<std::uint8_t>(100));
     ASSERT_TRUE(writer.Flush());
   }
-  const Output output = ExportTo("jsonl", "foreign.jsonl", scratch_ / "foreign.lcmlog");
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("nothing in it is a message of ForeReach's"));
+  EXPECT_THAT(ExportTo("jsonl", "foreign.jsonl", scratch_ / "foreign.lcmlog"),
+              Exits(1, "nothing in it is a message of ForeReach's"));
 }
 
 TEST_F(ExportTest, AFileThatExistsIsNotChanged) {
   scratch_.Write("precious", "mine");
   for (const char* format : {"jsonl", "npz", "mcap"}) {
-    const Output output = ExportTo(format, "precious");
-    EXPECT_EQ(output.code, 2) << format;
-    EXPECT_THAT(output.text, HasSubstr("the file exists, and is not changed"));
+    EXPECT_THAT(ExportTo(format, "precious"), Exits(2, "the file exists, and is not changed")) << format;
   }
   EXPECT_EQ(ExportTo("csv", "precious").code, 2);
   std::filesystem::create_directory(scratch_ / "tables");
@@ -435,21 +427,17 @@ TEST_F(ExportTest, RefusesWhatItCannotExportAndSaysWhy) {
 }
 
 TEST_F(ExportTest, AFullDiskIsAnErrorAndLeavesNothing) {
-  const Output output = Forereach("export '" + kCourse + "' --format jsonl -o /dev/full 2>&1");
-  EXPECT_EQ(output.code, 2) << "it exists";
-  const Output limited = Shell("ulimit -f 8; trap '' XFSZ; '" FOREREACH_PROGRAM "' export '" + kCourse +
-                               "' --config '" + kConfig + "' --format mcap -o '" + (scratch_ / "big.mcap") + "' 2>&1");
-  EXPECT_EQ(limited.code, 2) << limited.text;
-  EXPECT_THAT(limited.text, HasSubstr("cannot be written"));
+  EXPECT_THAT(Forereach("export '" + kCourse + "' --format jsonl -o /dev/full 2>&1"), Exits(2)) << "it exists";
+  EXPECT_THAT(Shell("ulimit -f 8; trap '' XFSZ; '" FOREREACH_PROGRAM "' export '" + kCourse + "' --config '" + kConfig +
+                    "' --format mcap -o '" + (scratch_ / "big.mcap") + "' 2>&1"),
+              Exits(2, "cannot be written"));
   EXPECT_TRUE(FilesIn(scratch_.path()).empty()) << "neither the file nor what was begun";
 }
 
 TEST_F(ExportTest, OnlyAuthenticMessagesCount) {
   const auto [key, log] = SignedLog(scratch_, kCourse);
-  const Output output = ExportTo("jsonl", "run.jsonl", log, "--key '" + key + "'");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr(std::to_string(kCourseDecisions) + " decisions"));
-  EXPECT_THAT(output.text, HasSubstr("not authentic and passed over: 5"));
+  EXPECT_THAT(ExportTo("jsonl", "run.jsonl", log, "--key '" + key + "'"),
+              Exits(0, std::to_string(kCourseDecisions) + " decisions", "not authentic and passed over: 5"));
 }
 
 // Two files of one run and one file that is gone.
@@ -468,10 +456,9 @@ TEST_F(ExportTest, ADirectoryIsExportedByItsDatabase) {
     database.MarkLogDeleted("events-0.lcmlog", 2);
     database.BeginRun("events-1.lcmlog", 3);
   }
-  const Output output = ExportTo("jsonl", "run.jsonl", directory);
-  EXPECT_EQ(output.code, 1) << "a log is missing";
-  EXPECT_THAT(output.text, HasSubstr("events-0.lcmlog: the log was deleted for the quota"));
-  EXPECT_THAT(output.text, HasSubstr(std::to_string(kCourseDecisions + 1) + " decisions"));
+  EXPECT_THAT(ExportTo("jsonl", "run.jsonl", directory), Exits(1, "events-0.lcmlog: the log was deleted for the quota",
+                                                               std::to_string(kCourseDecisions + 1) + " decisions"))
+      << "a log is missing";
   const auto lines = ParseLines(Read(scratch_ / "run.jsonl"));
   EXPECT_EQ(lines[0]["log_file"], "events-0.lcmlog");
   EXPECT_EQ(lines[0]["event_digest"], "ab");
@@ -500,10 +487,9 @@ TEST_F(ManyRunsTest, ChannelsOfAnMcapFileNameTheRobot) {
 }
 
 TEST_F(ManyRunsTest, RowsHaveTheRobotAndRunsAFileEach) {
-  const Output lines = ExportTo("jsonl", "night.jsonl", scratch_ / "night");
-  EXPECT_EQ(lines.code, 1) << "two.lcmlog cannot be read";
-  EXPECT_THAT(lines.text, HasSubstr("two.lcmlog: is no LCM event log"));
-  EXPECT_THAT(lines.text, HasSubstr(std::to_string(2 * kCourseDecisions) + " decisions"));
+  EXPECT_THAT(ExportTo("jsonl", "night.jsonl", scratch_ / "night"),
+              Exits(1, "two.lcmlog: is no LCM event log", std::to_string(2 * kCourseDecisions) + " decisions"))
+      << "two.lcmlog cannot be read";
   std::map<std::string, int> decisions;
   for (const json& line : ParseLines(Read(scratch_ / "night.jsonl")))
     decisions[line["robot"]] += line["record"] == "decision";
@@ -522,44 +508,6 @@ TEST_F(ManyRunsTest, RowsHaveTheRobotAndRunsAFileEach) {
   EXPECT_EQ(ExportTo("npz", "tubes", scratch_ / "night").code, 1);
   EXPECT_EQ(ReadBack("read_npz", "tubes/0001-one.npz")["robot"]["values"][19], scratch_ / "night/a");
   EXPECT_EQ(FilesIn(scratch_.path()), (std::set<std::string>{"night", "night.jsonl", "tables", "mcaps", "tubes"}));
-}
-
-// What a killed command has finished is not made again: here a log that is gone since.
-TEST_F(ManyRunsTest, GoesOnAfterAnInterruption) {
-  std::filesystem::remove(scratch_ / "night/b/log/two.lcmlog");
-  const std::string resume = "--resume '" + (scratch_ / "kept") + "'";
-  ASSERT_EQ(ExportTo("jsonl", "first.jsonl", scratch_ / "night", resume).code, 0);
-  EXPECT_EQ(FilesIn(scratch_ / "kept").size(), 4u);
-  // The bytes of one of the kept files are changed, and with them the new output: it was taken.
-  for (const std::string& file : FilesIn(scratch_ / "kept"))
-    if (file.ends_with(".jsonl")) {
-      std::string text = Read(scratch_ / ("kept/" + file));
-      text[text.find("certified")] = 'C';
-      scratch_.Write("kept/" + file, text);
-    }
-  ASSERT_EQ(ExportTo("jsonl", "second.jsonl", scratch_ / "night", resume).code, 0);
-  const std::string first = Read(scratch_ / "first.jsonl"), second = Read(scratch_ / "second.jsonl");
-  EXPECT_NE(first, second);
-  EXPECT_EQ(first.size(), second.size());
-  // A changed log, a shorter file and a damaged result are made again.
-  for (const std::string& file : FilesIn(scratch_ / "kept"))
-    scratch_.Write("kept/" + file, file.ends_with(".jsonl") ? "" : "0123");
-  ASSERT_EQ(ExportTo("jsonl", "third.jsonl", scratch_ / "night", resume).code, 0);
-  EXPECT_EQ(Read(scratch_ / "third.jsonl"), first);
-  auto bytes = ReadBytes(scratch_ / "night/a/one.lcmlog");
-  bytes.resize(bytes.size() / 2);
-  WriteBytes(scratch_ / "night/a/one.lcmlog", bytes);
-  static_cast<void>(ExportTo("jsonl", "fourth.jsonl", scratch_ / "night", resume));
-  EXPECT_LT(Read(scratch_ / "fourth.jsonl").size(), first.size());
-}
-
-TEST_F(ManyRunsTest, WhatAKilledCommandLeftIsNoPartOfTheNextOutput) {
-  std::filesystem::create_directory(scratch_ / "tables.part-out");
-  for (const char* left : {"decisions.csv", "decisions.csv.part-a1B2c3"})
-    scratch_.Write(std::string("tables.part-out/") + left, "half a row");
-  ASSERT_EQ(ExportTo("csv", "tables", scratch_ / "night").code, 1) << "two.lcmlog cannot be read";
-  EXPECT_EQ(FilesIn(scratch_ / "tables").size(), 5u);
-  EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 2u * kCourseDecisions + 1);
 }
 
 TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {

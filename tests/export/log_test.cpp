@@ -55,9 +55,9 @@ TEST_F(LogTest, ListsAsJson) {
 TEST_F(LogTest, ACutKeepsNumbersStampsAndBytes) {
   const std::string out = scratch_ / "out.lcmlog";
   const auto events = ReadLog(kCourse).events;
-  const Output output = Log("cut '" + kCourse + "' --channel PLAN_DECISION --from " + std::to_string(events[20].utime) +
-                            " --to " + std::to_string(events[200].utime) + " -o '" + out + "'");
-  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(Log("cut '" + kCourse + "' --channel PLAN_DECISION --from " + std::to_string(events[20].utime) +
+                  " --to " + std::to_string(events[200].utime) + " -o '" + out + "'"),
+              Exits(0));
   std::vector<LogEvent> expected;
   for (const LogEvent& event : events)
     if (event.channel == "PLAN_DECISION" && event.utime >= events[20].utime && event.utime < events[200].utime)
@@ -147,10 +147,7 @@ TEST_F(LogTest, NamesOfAHostileLogDoNotReachTheTerminal) {
     writer.Append(INT64_MAX, "\x1b[2J", std::vector<std::uint8_t>{1});
     ASSERT_TRUE(writer.Flush());
   }
-  const Output output = Log("list '" + (scratch_ / "hostile") + "'");
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, Not(HasSubstr("\x1b")));
-  EXPECT_THAT(output.text, HasSubstr("\\x1b[2J"));
+  EXPECT_THAT(Log("list '" + (scratch_ / "hostile") + "'"), Exits(0, Not(HasSubstr("\x1b")), "\\x1b[2J"));
 }
 
 TEST_F(LogTest, RefusesWhatItCannotDoAndSaysWhy) {

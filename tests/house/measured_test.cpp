@@ -45,9 +45,7 @@ TEST_F(Measured, FiguresOfTheSourcesAsTheyAreSaySo) {
 TEST_F(Measured, ADocumentThatDoesNotSayThatItsCodeHasChangedIsRefused) {
   Write("bus/deep/one.cpp", "int two;\n");
   Output run = Run();
-  EXPECT_EQ(run.code, 1);
-  EXPECT_THAT(run.text, AllOf(HasSubstr("docs/performance.md"), HasSubstr("`bus/` changed after"),
-                              Not(HasSubstr("reproduction"))));
+  EXPECT_THAT(run, Exits(1, "docs/performance.md", "`bus/` changed after", Not(HasSubstr("reproduction"))));
   EXPECT_EQ(Run("--say").code, 0);
   EXPECT_THAT(Read("docs/performance.md"), HasSubstr("**Older than the code:** `bus/` changed after"));
   EXPECT_EQ(Run().code, 0) << "it says so now";

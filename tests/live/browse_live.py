@@ -89,14 +89,14 @@ def choose(browser, outcome):
     script = ("(() => { for (const row of document.querySelectorAll('#decisions tbody tr')) {"
               f"if (row.children[1].textContent !== {outcome!r}) continue;"
               "row.querySelector('button').click();"
-              "if (document.querySelectorAll('#svg polygon').length > 5) return true; } return false; })()")
+              "if (document.querySelectorAll('#svg .tube path').length > 5) return true; } return false; })()")
     wait_for(browser, script, f"a decision with the outcome {outcome!r} has its tube")
     check(browser.run("document.querySelectorAll('tr.chosen').length") == 1, "the chosen row is marked")
     check(browser.run("document.getElementById('follow').ariaPressed") == "false", "the page shows the decision")
-    before = browser.run("document.querySelector('#svg > g:nth-of-type(4)').innerHTML")
+    before = browser.run("document.querySelector('#svg .tube .now').outerHTML")
     browser.run("(() => { const s = document.getElementById('step'); s.value = Number(s.value) > 1 ? 1 : 3;"
                 "s.dispatchEvent(new Event('input')); })()")
-    check(browser.run("document.querySelector('#svg > g:nth-of-type(4)').innerHTML") != before, "the slider steps through it")
+    check(browser.run("document.querySelector('#svg .tube .now').outerHTML") != before, "the slider steps through it")
 
 
 def watch(browser, demo, picture):

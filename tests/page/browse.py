@@ -111,11 +111,11 @@ def use_course(browser, path):
     binding = browser.run("Number(document.getElementById('step').value)")
     check(text(browser, "#sentence").find(f"step {binding}") >= 0 or text(browser, "#sentence").find(f"steps {binding}") >= 0,
           "the slider begins at the binding step")
-    before = browser.run("document.querySelector('#svg > g:nth-of-type(4)').innerHTML")
+    before = browser.run("document.querySelector('#svg .tube .now').outerHTML")
     browser.key("ArrowLeft", 37)
     equal(browser.run("Number(document.getElementById('step').value)"), binding - 1, "an arrow moves the slider")
-    check(browser.run("document.querySelector('#svg > g:nth-of-type(4)').innerHTML") != before, "the slice moves along")
-    check(browser.run("document.querySelectorAll('#svg polygon').length") > 10, "the tube is drawn")
+    check(browser.run("document.querySelector('#svg .tube .now').outerHTML") != before, "the slice moves along")
+    check(browser.run("document.querySelectorAll('#svg .tube path').length") > 10, "the tube is drawn")
     check(browser.run("document.querySelectorAll('#svg circle').length") > 5, "obstacles are drawn")
     box = browser.run("document.getElementById('svg').getAttribute('viewBox')")
     browser.run("document.getElementById('svg').focus()")
@@ -195,7 +195,7 @@ def main():
             if os.path.exists(page(name)):
                 os.remove(page(name))
         log = ["tests/data/course.lcmlog", "--config", "tests/data/course.yaml"]
-        subprocess.run([forereach, "report", *log, "--out", page("course")], cwd=ROOT, check=True)
+        subprocess.run([forereach, "report", *log, "--advice-seconds", "1000", "--out", page("course")], cwd=ROOT, check=True)
         subprocess.run([forereach, "report", *log, "--before", log[0], "--out", page("before")], cwd=ROOT, check=True)
         for robot in ("a", "b"):
             os.makedirs(os.path.join(scratch, "night", robot))

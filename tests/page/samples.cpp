@@ -8,6 +8,7 @@ forereach_page_samples any FILE.lcmlog SEED: a log of the recorded course, some 
 #include <random>
 #include <string>
 
+#include "page/detail.h"
 #include "page/write.h"
 #include "tests/any_fields.h"
 #include "tests/paths.h"
@@ -68,7 +69,7 @@ PageRun Hostile() {
   const double infinity = std::numeric_limits<double>::infinity();
   PageRun run = Many(20);
   run.name = evil;
-  run.files = run.notes = {evil};
+  run.notes = {evil};
   for (DecisionRow& row : run.decisions) {
     row.source = evil, row.message = evil, row.outcome = evil, row.cause = "__proto__";
     row.event.log_file = evil, row.plan_digest = evil;
@@ -88,16 +89,17 @@ PageRun Hostile() {
   run.events = {{{evil, 2, evil}, 5, 6, 7, evil, evil, -1, -1, {}, infinity}};
   run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil, 2}};
   run.parts = {{evil, {{evil, evil}}, run.decisions.size()}};
-  run.obstacle_sets = {
-      {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1e300), Obstacle::HalfSpace(Eigen::Vector2d(1e-300, 1), 1e300)}};
   PageDetail detail;
   detail.decision = 4;
-  detail.obstacles = detail.task = 0;
+  detail.task = 0;
   detail.start_utime = detail.step_us = std::numeric_limits<std::int64_t>::max();
   detail.binding = detail.steps = std::numeric_limits<int>::max();
   detail.hull_lower = {-infinity}, detail.hull_upper = {infinity};
-  detail.sketch = *MakeSketch({{{{0, 0}, {1, 0}, {0, 1}}}, {}, {{{2, 2}}}});
   detail.executed = {{3, 1e308, -1e308}};
+  static_cast<void>(DrawTube(
+      {{{{0, 0}, {1, 0}, {0, 1}}}, {}, {{{2, 2}}}}, {},
+      {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1e300), Obstacle::HalfSpace(Eigen::Vector2d(1e-300, 1), 1e300)}, -1,
+      detail));
   run.details.push_back(detail);
   detail.decision = 5;
   detail.missing = evil;

@@ -59,8 +59,7 @@ class BusCommands : public testing::Test {
 
 TEST_F(BusCommands, AFaultIsSeenAndClearedByAPersonWithTheKey) {
   Output status = Say("status");
-  EXPECT_EQ(status.code, 1);
-  EXPECT_THAT(status.text, HasSubstr("STALE, disarmed: waits for the robot's state"));
+  EXPECT_THAT(status, Exits(1, "STALE, disarmed: waits for the robot's state"));
   SayState();
   EXPECT_THAT(Say("status").text, HasSubstr("it counts after 2000 ms alone")) << "a second one may be there";
   for (int i = 0; i < 12; ++i) {
@@ -68,14 +67,11 @@ TEST_F(BusCommands, AFaultIsSeenAndClearedByAPersonWithTheKey) {
     SayState();
   }
   status = Say("status");
-  EXPECT_EQ(status.code, 0) << status.text;
-  EXPECT_THAT(status.text, HasSubstr("OK, armed"));
+  EXPECT_THAT(status, Exits(0, "OK, armed"));
 
   std::this_thread::sleep_for(std::chrono::milliseconds(2300));
   EXPECT_THAT(Say("status").text, HasSubstr("ERROR, fault: robot_state_lost"));
-  const Output refused = Say("reset", false);
-  EXPECT_EQ(refused.code, 1);
-  EXPECT_THAT(refused.text, HasSubstr("--key"));
+  EXPECT_THAT(Say("reset", false), Exits(1, "--key"));
   EXPECT_THAT(Say("status").text, HasSubstr("fault")) << "without the key nothing is cleared";
   EXPECT_EQ(Say("reset").code, 0);
   EXPECT_THAT(Say("status").text, HasSubstr("disarmed"));
@@ -106,12 +102,11 @@ TEST_F(BusCommands, WhatAStrangerSaysMeanwhileAnswersNoCommand) {
   const Output reload = Say("reload"), reset = Say("reset"), without_key = Say("reload", false);
   stop = true;
   stranger.join();
-  EXPECT_EQ(reload.code, 0) << reload.text;
-  EXPECT_THAT(reload.text, AllOf(HasSubstr("version 2"), Not(HasSubstr("--key"))));
+  EXPECT_THAT(reload, Exits(0, "version 2", Not(HasSubstr("--key"))));
   EXPECT_EQ(reset.code, 0) << reset.text;
-  EXPECT_EQ(without_key.code, 1);
-  EXPECT_THAT(without_key.text, HasSubstr("has not done the reload within 3 s: it refuses a command without the "
-                                          "operator's key (--key)"));
+  EXPECT_THAT(without_key, Exits(1,
+                                 "has not done the reload within 3 s: it refuses a command without the "
+                                 "operator's key (--key)"));
   EXPECT_THAT(Say("status").text,
               AllOf(HasSubstr("version 2"), HasSubstr("messages refused: "), HasSubstr(" unsigned")));
 }
@@ -122,17 +117,11 @@ TEST_F(BusCommands, AReloadOfAnotherFileOrAFailedOneOfOthersIsNoAnswer) {
   const auto reload_of = [&](const std::string& path) {
     return Forereach("reload --config '" + path + "' --lcm-url '" + config_.bus.url + "' --key '" + key_ + "' 2>&1");
   };
-  const Output other = reload_of(mine);
-  EXPECT_EQ(other.code, 1) << other.text;
-  EXPECT_THAT(other.text, AllOf(HasSubstr("version 2"), HasSubstr("it is not --config as it is here")));
+  EXPECT_THAT(reload_of(mine), Exits(1, "version 2", "it is not --config as it is here"));
   scratch_.Write("task.yaml", "model: {name: hovercraft}\n");
-  const Output failed = reload_of(mine);
-  EXPECT_EQ(failed.code, 1) << failed.text;
-  EXPECT_THAT(failed.text, AllOf(HasSubstr("hovercraft"), HasSubstr("a heartbeat does not say whose")));
+  EXPECT_THAT(reload_of(mine), Exits(1, "hovercraft", "a heartbeat does not say whose"));
   std::filesystem::copy_file(mine, path_, std::filesystem::copy_options::overwrite_existing);
-  const Output done = reload_of(mine);
-  EXPECT_EQ(done.code, 0) << done.text;
-  EXPECT_THAT(done.text, HasSubstr("version 3"));
+  EXPECT_THAT(reload_of(mine), Exits(0, "version 3"));
 }
 
 TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {
@@ -178,8 +167,7 @@ TEST_F(BusCommands, AForgedHeartbeatIsNoSignOfLife) {
   stop = true;
   forging.join();
   for (const Output& output : {status, reset, reload}) {
-    EXPECT_EQ(output.code, 1) << output.text;
-    EXPECT_THAT(output.text, HasSubstr("no certifier answered"));
+    EXPECT_THAT(output, Exits(1, "no certifier answered"));
   }
   EXPECT_EQ(believed.code, 0) << "without a key everybody is believed";
   EXPECT_THAT(believed.text, HasSubstr("UNSIGNED: anyone on this network can move this robot"));
@@ -197,9 +185,8 @@ TEST_F(BusCommands, DoctorLooksAtTheKeys) {
               HasSubstr("of robot test, for bus " + config_.bus.bus_name() + "; secrets of certifier, planner"));
   std::filesystem::permissions(key_ + "/planner.key", std::filesystem::perms::others_read,
                                std::filesystem::perm_options::add);
-  const Output bad = Forereach("doctor --key '" + key_ + "' --lcm-url '" + config_.bus.url + "' 2>&1");
-  EXPECT_EQ(bad.code, 1);
-  EXPECT_THAT(bad.text, HasSubstr("others can read it"));
+  EXPECT_THAT(Forereach("doctor --key '" + key_ + "' --lcm-url '" + config_.bus.url + "' 2>&1"),
+              Exits(1, "others can read it"));
 }
 
 // Whatever is sent on each of our channels, only what its speaker signed for this robot and this bus is handed out.
@@ -247,9 +234,8 @@ TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
 TEST(BusCommandsTest, StatusSaysThatNoCertifierAnswered) {
   const ScratchDirectory scratch;
   const std::string path = scratch.Write("task.yaml", PatientTask());
-  const Output status = Forereach("status --config '" + path + "' --lcm-url '" + PrivateBusUrl() + "' 2>&1");
-  EXPECT_EQ(status.code, 1);
-  EXPECT_THAT(status.text, HasSubstr("no certifier answered"));
+  EXPECT_THAT(Forereach("status --config '" + path + "' --lcm-url '" + PrivateBusUrl() + "' 2>&1"),
+              Exits(1, "no certifier answered"));
 }
 
 }  // namespace forereach::bus_commands_test

@@ -16,6 +16,12 @@ namespace forereach::event_log_test {
 
 constexpr int kHeader = 28;
 
+class EventLog : public testing::Test {
+ protected:
+  const ScratchDirectory scratch_;
+  const std::string log_ = scratch_ / "log";
+};
+
 void WriteSample(const std::string& path, int events = 5) {
   EventLogWriter writer(path);
   for (int i = 0; i < events; ++i) {
@@ -37,10 +43,9 @@ void PutLength(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t v
     bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
 }
 
-TEST(EventLog, EventsSurviveARoundTrip) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
-  const LogContents contents = ReadLog(scratch / "log");
+TEST_F(EventLog, EventsSurviveARoundTrip) {
+  WriteSample(log_);
+  const LogContents contents = ReadLog(log_);
   ASSERT_EQ(contents.events.size(), 5u);
   EXPECT_EQ(contents.end, LogStatus::kEnd);
   EXPECT_EQ(contents.damage.places, 0);
@@ -53,22 +58,20 @@ TEST(EventLog, EventsSurviveARoundTrip) {
   }
 }
 
-TEST(EventLog, OffsetIsTheFileSizeAfterFlush) {
-  const ScratchDirectory scratch;
-  EventLogWriter writer(scratch / "log");
+TEST_F(EventLog, OffsetIsTheFileSizeAfterFlush) {
+  EventLogWriter writer(log_);
   const std::vector<std::uint8_t> data(7);
   writer.Append(1, "C", data);
   EXPECT_EQ(writer.offset(), 0);
   EXPECT_EQ(writer.pending_bytes(), kHeader + 1 + 7);
   ASSERT_TRUE(writer.Flush());
   EXPECT_EQ(writer.offset(), kHeader + 1 + 7);
-  EXPECT_EQ(std::filesystem::file_size(scratch / "log"), static_cast<std::uintmax_t>(writer.offset()));
+  EXPECT_EQ(std::filesystem::file_size(log_), static_cast<std::uintmax_t>(writer.offset()));
 }
 
-TEST(EventLog, LcmReadsOurFile) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
-  lcm::LogFile file(scratch / "log", "r");
+TEST_F(EventLog, LcmReadsOurFile) {
+  WriteSample(log_);
+  lcm::LogFile file(log_, "r");
   ASSERT_TRUE(file.good());
   for (int i = 0; i < 5; ++i) {
     const lcm::LogEvent* event = file.readNextEvent();
@@ -82,11 +85,10 @@ TEST(EventLog, LcmReadsOurFile) {
   EXPECT_EQ(file.readNextEvent(), nullptr);
 }
 
-TEST(EventLog, WeReadLcmsFile) {
-  const ScratchDirectory scratch;
+TEST_F(EventLog, WeReadLcmsFile) {
   std::string data = "payload";
   {
-    lcm::LogFile file(scratch / "log", "w");
+    lcm::LogFile file(log_, "w");
     ASSERT_TRUE(file.good());
     lcm::LogEvent event{};
     event.timestamp = 42;
@@ -95,7 +97,7 @@ TEST(EventLog, WeReadLcmsFile) {
     event.data = data.data();
     for (int i = 0; i < 3; ++i) ASSERT_EQ(file.writeEvent(&event), 0);
   }
-  const LogContents contents = ReadLog(scratch / "log");
+  const LogContents contents = ReadLog(log_);
   ASSERT_EQ(contents.events.size(), 3u);
   EXPECT_EQ(contents.end, LogStatus::kEnd);
   EXPECT_EQ(contents.events[2].number, 2);
@@ -103,52 +105,49 @@ TEST(EventLog, WeReadLcmsFile) {
   EXPECT_EQ(std::string(contents.events[2].data.begin(), contents.events[2].data.end()), data);
 }
 
-TEST(EventLog, AnEmptyFileHasNoEventsAndAMissingOneIsAnError) {
-  const ScratchDirectory scratch;
-  WriteBytes(scratch / "log", {});
-  EXPECT_EQ(ReadLog(scratch / "log").end, LogStatus::kEnd);
-  EXPECT_THROW(EventLogReader(scratch / "missing"), LogError);
-  EXPECT_THROW(EventLogReader(scratch.path()), LogError);
+TEST_F(EventLog, AnEmptyFileHasNoEventsAndAMissingOneIsAnError) {
+  WriteBytes(log_, {});
+  EXPECT_EQ(ReadLog(log_).end, LogStatus::kEnd);
+  EXPECT_THROW(EventLogReader(scratch_ / "missing"), LogError);
+  EXPECT_THROW(EventLogReader(scratch_.path()), LogError);
 }
 
-TEST(EventLog, ALogCutInsideItsLastRecordKeepsTheOthers) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
-  const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
+TEST_F(EventLog, ALogCutInsideItsLastRecordKeepsTheOthers) {
+  WriteSample(log_);
+  const std::vector<std::uint8_t> whole = ReadBytes(log_);
   const std::size_t last = RecordOffset(4);
   for (std::size_t size = last; size < whole.size(); ++size) {
     SCOPED_TRACE(size);
-    WriteBytes(scratch / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
-    const LogContents contents = ReadLog(scratch / "cut");
+    WriteBytes(scratch_ / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
+    const LogContents contents = ReadLog(scratch_ / "cut");
     EXPECT_EQ(contents.events.size(), 4u);
     EXPECT_EQ(contents.end, size == last ? LogStatus::kEnd : LogStatus::kCutTail);
     EXPECT_EQ(contents.damage.places, 0);
 
-    EventLogWriter writer(scratch / "cut");
+    EventLogWriter writer(scratch_ / "cut");
     EXPECT_EQ(writer.recovery().events, 4);
     EXPECT_EQ(writer.recovery().cut_bytes, static_cast<std::int64_t>(size - last));
     EXPECT_EQ(writer.recovery().damage.places, 0);
     EXPECT_EQ(writer.recovery().last_utime, 1'000'003);
     EXPECT_EQ(writer.Append(7, "AFTER", {}), 4);
     ASSERT_TRUE(writer.Flush());
-    const LogContents mended = ReadLog(scratch / "cut");
+    const LogContents mended = ReadLog(scratch_ / "cut");
     ASSERT_EQ(mended.events.size(), 5u);
     EXPECT_EQ(mended.end, LogStatus::kEnd);
     EXPECT_EQ(mended.events[4].channel, "AFTER");
   }
 }
 
-class CorruptLength : public testing::TestWithParam<std::uint32_t> {};
+class CorruptLength : public EventLog, public testing::WithParamInterface<std::uint32_t> {};
 
 TEST_P(CorruptLength, ARecordWithACorruptLengthIsTheOnlyOneLost) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
+  WriteSample(log_);
   for (const std::size_t field : {20u, 24u}) {
     SCOPED_TRACE(field);
-    std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+    std::vector<std::uint8_t> bytes = ReadBytes(log_);
     PutLength(bytes, RecordOffset(2) + field, GetParam());
-    WriteBytes(scratch / "bad", bytes);
-    const LogContents contents = ReadLog(scratch / "bad");
+    WriteBytes(scratch_ / "bad", bytes);
+    const LogContents contents = ReadLog(scratch_ / "bad");
     EXPECT_EQ(contents.end, LogStatus::kEnd);
     EXPECT_EQ(contents.damage.places, 1);
     EXPECT_EQ(contents.damage.bytes, kHeader + 9 + 20);
@@ -163,13 +162,12 @@ INSTANTIATE_TEST_SUITE_P(HugeNegativeAndSwallowing, CorruptLength,
                          testing::Values(0x7fffffffu, 0x80000000u, 0xffffffffu, 1u << 24, (1u << 24) + 1, 1u << 20,
                                          60u));
 
-TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
-  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+TEST_F(EventLog, ResynchronisesBehindDamagedSyncWord) {
+  WriteSample(log_);
+  std::vector<std::uint8_t> bytes = ReadBytes(log_);
   bytes[RecordOffset(3)] ^= 1;
-  WriteBytes(scratch / "log", bytes);
-  EventLogReader reader(scratch / "log");
+  WriteBytes(log_, bytes);
+  EventLogReader reader(log_);
   LogEvent event;
   for (int i = 0; i < 3; ++i) ASSERT_EQ(reader.Next(event), LogStatus::kEvent) << i;
   EXPECT_EQ(reader.Next(event), LogStatus::kCorrupt);
@@ -180,84 +178,78 @@ TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
   EXPECT_EQ(reader.damage().bytes, static_cast<std::int64_t>(RecordOffset(4) - RecordOffset(3)));
 }
 
-TEST(EventLog, FindsASyncWordWhereverItLies) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log", 1);
-  const std::vector<std::uint8_t> record = ReadBytes(scratch / "log");
+TEST_F(EventLog, FindsASyncWordWhereverItLies) {
+  WriteSample(log_, 1);
+  const std::vector<std::uint8_t> record = ReadBytes(log_);
   for (std::size_t garbage = 1; garbage < (1 << 18); garbage += garbage < 2000 ? 1 : 997) {
     std::vector<std::uint8_t> bytes(garbage, 0x55);
     bytes.insert(bytes.end(), record.begin(), record.end());
-    WriteBytes(scratch / "bad", bytes);
-    const LogContents contents = ReadLog(scratch / "bad");
+    WriteBytes(scratch_ / "bad", bytes);
+    const LogContents contents = ReadLog(scratch_ / "bad");
     ASSERT_EQ(contents.events.size(), 1u) << garbage;
     ASSERT_EQ(contents.damage.bytes, static_cast<std::int64_t>(garbage));
   }
 }
 
 // A record that lost 1, 2, 3 bytes claims as many of the next one.
-TEST(EventLog, BytesCutOutCostThatRecordOnly) {
-  const ScratchDirectory scratch;
+TEST_F(EventLog, BytesCutOutCostThatRecordOnly) {
   for (const int cut : {1, 2, 3, 4, 5}) {
-    std::filesystem::remove(scratch / "log");
-    WriteSample(scratch / "log");
-    std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+    std::filesystem::remove(log_);
+    WriteSample(log_);
+    std::vector<std::uint8_t> bytes = ReadBytes(log_);
     const auto at = bytes.begin() + static_cast<std::ptrdiff_t>(RecordOffset(2) + kHeader + 12);
     bytes.erase(at, at + cut);
-    WriteBytes(scratch / "log", bytes);
-    const LogContents contents = ReadLog(scratch / "log");
+    WriteBytes(log_, bytes);
+    const LogContents contents = ReadLog(log_);
     ASSERT_EQ(contents.events.size(), 4u) << cut;
     EXPECT_EQ(contents.events[2].number, 3);
     EXPECT_EQ(contents.damage.places, 1);
   }
 }
 
-TEST(EventLog, TheDigestCoversEveryByteOfTheRecord) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log", 3);
-  const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
-  const LogEvent event = ReadLog(scratch / "log").events[2];
+TEST_F(EventLog, TheDigestCoversEveryByteOfTheRecord) {
+  WriteSample(log_, 3);
+  const std::vector<std::uint8_t> bytes = ReadBytes(log_);
+  const LogEvent event = ReadLog(log_).events[2];
   const Bytes record = Bytes(bytes).subspan(RecordOffset(2));
   EXPECT_EQ(DigestOf(event), DigestOf(record));
   EXPECT_EQ(RecordBytes(event), std::ssize(record));
 }
 
-TEST(EventLog, RecoveryKeepsWhatFollowsDamage) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
-  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+TEST_F(EventLog, RecoveryKeepsWhatFollowsDamage) {
+  WriteSample(log_);
+  std::vector<std::uint8_t> bytes = ReadBytes(log_);
   PutLength(bytes, RecordOffset(1) + 24, 0x7fffffff);
   bytes.erase(bytes.end() - 3, bytes.end());
-  WriteBytes(scratch / "log", bytes);
-  const EventLogWriter writer(scratch / "log");
+  WriteBytes(log_, bytes);
+  const EventLogWriter writer(log_);
   EXPECT_EQ(writer.recovery().events, 3);
   EXPECT_EQ(writer.recovery().damage.places, 1);
   EXPECT_EQ(writer.recovery().cut_bytes, kHeader + 9 + 40 - 3);
-  EXPECT_EQ(std::filesystem::file_size(scratch / "log"), RecordOffset(4));
+  EXPECT_EQ(std::filesystem::file_size(log_), RecordOffset(4));
   EXPECT_EQ(writer.next_number(), 4);
 }
 
-TEST(EventLog, RecoveryRemovesNoGarbage) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log");
-  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+TEST_F(EventLog, RecoveryRemovesNoGarbage) {
+  WriteSample(log_);
+  std::vector<std::uint8_t> bytes = ReadBytes(log_);
   const std::size_t size = bytes.size();
   bytes.resize(size + 100);
-  WriteBytes(scratch / "log", bytes);
-  EventLogWriter writer(scratch / "log");
+  WriteBytes(log_, bytes);
+  EventLogWriter writer(log_);
   EXPECT_EQ(writer.recovery().cut_bytes, 0);
   EXPECT_EQ(writer.recovery().damage.bytes, 100);
   writer.Append(9, "AFTER", {});
   ASSERT_TRUE(writer.Flush());
-  const LogContents contents = ReadLog(scratch / "log");
+  const LogContents contents = ReadLog(log_);
   ASSERT_EQ(contents.events.size(), 6u);
   EXPECT_EQ(contents.events[5].number, 5);
-  EXPECT_GT(std::filesystem::file_size(scratch / "log"), size + 100);
+  EXPECT_GT(std::filesystem::file_size(log_), size + 100);
 }
 
-TEST(EventLog, RefusesASecondWriter) {
-  const ScratchDirectory scratch;
-  const EventLogWriter writer(scratch / "log");
-  EXPECT_THROW(EventLogWriter(scratch / "log"), LogError);
+TEST_F(EventLog, RefusesASecondWriter) {
+  const EventLogWriter writer(log_);
+  EXPECT_THROW(EventLogWriter{log_}, LogError);
 }
 
 /** While it lives, no file of this process grows beyond so many bytes: writes stop there and fail. */
@@ -278,7 +270,7 @@ class FileSizeLimit final {
 };
 
 // A flush fails half-way, and the file cannot be cut back: it is sealed against that here.
-TEST(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
+TEST_F(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
   const int file = ::memfd_create("log", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   ASSERT_GE(file, 0);
   ASSERT_EQ(::fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK), 0);
@@ -311,9 +303,8 @@ TEST(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
   EXPECT_EQ(contents.damage.places, 0);
 }
 
-TEST(EventLog, RefusesWhatTheFormatCannotHold) {
-  const ScratchDirectory scratch;
-  EventLogWriter writer(scratch / "log");
+TEST_F(EventLog, RefusesWhatTheFormatCannotHold) {
+  EventLogWriter writer(log_);
   EXPECT_NO_THROW(writer.Append(0, std::string(63, 'c'), {}));
   EXPECT_THROW(writer.Append(0, std::string(64, 'c'), {}), std::invalid_argument);
   EXPECT_THROW(writer.Append(0, "", {}), std::invalid_argument);
@@ -322,10 +313,9 @@ TEST(EventLog, RefusesWhatTheFormatCannotHold) {
 }
 
 // Whatever is changed, the reader ends, accounts for every byte, and returns only records that are in the file.
-TEST(EventLog, ReadsAnyMutationWithoutInventingRecords) {
-  const ScratchDirectory scratch;
-  WriteSample(scratch / "log", 12);
-  const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
+TEST_F(EventLog, ReadsAnyMutationWithoutInventingRecords) {
+  WriteSample(log_, 12);
+  const std::vector<std::uint8_t> whole = ReadBytes(log_);
   const unsigned seed = std::random_device{}();
   RecordProperty("seed", std::to_string(seed));
   std::mt19937 random(seed);
@@ -346,8 +336,8 @@ TEST(EventLog, ReadsAnyMutationWithoutInventingRecords) {
         default: bytes.resize(static_cast<std::size_t>(at));
       }
     }
-    WriteBytes(scratch / "bad", bytes);
-    EventLogReader reader(scratch / "bad");
+    WriteBytes(scratch_ / "bad", bytes);
+    EventLogReader reader(scratch_ / "bad");
     LogEvent event;
     LogStatus status;
     std::int64_t passed = 0, skipped = 0;

@@ -11,7 +11,7 @@ namespace forereach::outlines_test {
 using Eigen::Vector2d;
 
 // Counter-clockwise, with what rounding may cost.
-bool Contains(const Picture::Polygon& polygon, const Vector2d& point) {
+bool Contains(const Svg::Points& polygon, const Vector2d& point) {
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vector2d edge = polygon[(i + 1) % polygon.size()] - polygon[i], away = point - polygon[i];
     if (edge.x() * away.y() - edge.y() * away.x() < -1e-9) return false;
@@ -20,10 +20,10 @@ bool Contains(const Picture::Polygon& polygon, const Vector2d& point) {
 }
 
 TEST(Outlines, HullsAreCounterClockwiseAndConvex) {
-  const Picture::Polygon square = HullOf({{1, 1}, {0, 0}, {0.5, 0.5}, {1, 0}, {0, 1}, {0.5, 0}});
-  EXPECT_EQ(square, (Picture::Polygon{{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
-  EXPECT_EQ(HullOf({{1, 2}}), (Picture::Polygon{{1, 2}}));
-  const Picture::Polygon disc = HullOf({{1, 2}}, 0.5);
+  const Svg::Points square = HullOf({{1, 1}, {0, 0}, {0.5, 0.5}, {1, 0}, {0, 1}, {0.5, 0}});
+  EXPECT_EQ(square, (Svg::Points{{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
+  EXPECT_EQ(HullOf({{1, 2}}), (Svg::Points{{1, 2}}));
+  const Svg::Points disc = HullOf({{1, 2}}, 0.5);
   EXPECT_EQ(disc.size(), 16u);
   for (const Vector2d& corner : disc) EXPECT_NEAR((corner - Vector2d(1, 2)).norm(), 0.5, 1e-12);
 }
@@ -78,9 +78,9 @@ TEST(Outlines, ASweepContainsTheBodyAtItsSamples) {
 
 TEST(Outlines, PredictionsGrowWhereTheObstacleIs) {
   const Obstacle circle = Obstacle::Circle(Vector2d(1, 0), 0.5);
-  EXPECT_TRUE(PredictionOf(circle).empty());
+  EXPECT_TRUE(PredictionOf(circle, 0).empty());
   const ObstacleMotion motion{.stamp_us = 1'000'000, .velocity = {2, 0, 0}, .uncertainty = 0.25, .growth = 0.5};
-  const auto seen = PredictionOf(circle.Moving(motion));
+  const auto seen = PredictionOf(circle.Moving(motion), motion.stamp_us);
   ASSERT_EQ(seen.size(), 5u) << "0, 0.5, .. 2 s";
   EXPECT_TRUE(Contains(seen[0], {1.74, 0}));
   EXPECT_FALSE(Contains(seen[0], {1.76, 0}));
@@ -88,8 +88,8 @@ TEST(Outlines, PredictionsGrowWhereTheObstacleIs) {
   EXPECT_FALSE(Contains(seen[4], {5 + 1.76, 0}));
   ObstacleMotion brief = motion;
   brief.from_us = 1'200'000, brief.until_us = 2'000'000;
-  EXPECT_EQ(PredictionOf(circle.Moving(brief)).size(), 2u) << "at 0.5 and 1 s";
-  EXPECT_TRUE(PredictionOf(Obstacle::HalfSpace(Vector2d(1, 0), 3).Moving(motion)).empty());
+  EXPECT_EQ(PredictionOf(circle.Moving(brief), motion.stamp_us).size(), 2u) << "at 0.5 and 1 s";
+  EXPECT_TRUE(PredictionOf(Obstacle::HalfSpace(Vector2d(1, 0), 3).Moving(motion), motion.stamp_us).empty());
 }
 
 }  // namespace forereach::outlines_test

@@ -1,4 +1,5 @@
 #include "records/report.h"
+#include "records/outlines.h"
 
 #include "tests/test.h"
 
@@ -84,8 +85,8 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
   EXPECT_EQ(drawn.picture.path[0], Eigen::Vector2d(0, 1.8));
   ASSERT_EQ(drawn.picture.stops.size(), 1u);
   EXPECT_EQ(drawn.picture.stops[0], Eigen::Vector2d(0, 1.8));
-  ASSERT_EQ(drawn.picture.circles.size(), 1u);
-  EXPECT_EQ(drawn.picture.circles[0].radius, 0.5);
+  ASSERT_EQ(drawn.picture.obstacles.size(), 1u);
+  EXPECT_EQ(drawn.picture.obstacles[0].radius(), 0.5);
   ASSERT_TRUE(drawn.picture.goal.has_value());
   EXPECT_EQ(drawn.picture.goal->center, Eigen::Vector2d(0, 5));
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
@@ -115,12 +116,13 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
   Decide(Drive(1, true), decision_t::CERTIFIED, -1);
   const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {config});
   EXPECT_EQ(drawn.disagreements, 0);
-  EXPECT_TRUE(drawn.picture.circles.empty());
-  ASSERT_EQ(drawn.picture.polygons.size(), 2u);
-  EXPECT_EQ(drawn.picture.polygons[0].size(), 4u);
-  EXPECT_THAT(drawn.picture.polygons[1], testing::ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5),
-                                                              Eigen::Vector2d(6, 6), Eigen::Vector2d(5, 6)));
-  EXPECT_EQ(drawn.picture.half_planes.size(), 1u);
+  using Kind = Obstacle::Kind;
+  const std::vector<Kind> kinds{Kind::kBox, Kind::kPolygon, Kind::kHalfSpace};
+  ASSERT_TRUE(std::ranges::equal(drawn.picture.obstacles, kinds, {}, &Obstacle::kind));
+  const auto place = PlaceOf(drawn.picture.obstacles[1], 0);
+  ASSERT_TRUE(place);
+  EXPECT_THAT(place->points, testing::ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5), Eigen::Vector2d(6, 6),
+                                                  Eigen::Vector2d(5, 6)));
 }
 
 TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {

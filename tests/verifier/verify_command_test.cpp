@@ -55,9 +55,7 @@ class VerifyDecision : public testing::Test {
 };
 
 TEST_F(VerifyDecision, TheUnchangedDecisionIsConfirmed) {
-  const Output output = Verify();
-  EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_THAT(output.text, HasSubstr("1 certificates, 1 confirmed, 0 refuted"));
+  EXPECT_THAT(Verify(), Exits(0, "1 certificates, 1 confirmed, 0 refuted"));
 }
 
 TEST_F(VerifyDecision, EveryShippedCertificateIsConfirmed) {
@@ -123,9 +121,7 @@ TEST_F(VerifyDecision, WithOtherWordsOfWhenItHoldsIsRefuted) {
   decision_["holds"] = "all_times";
   ExpectRefuted({"the record was altered after it was made: holds"});
   decision_.erase("holds");
-  const Output lacking = Verify();
-  EXPECT_EQ(lacking.code, 2);
-  EXPECT_THAT(lacking.text, HasSubstr("holds"));
+  EXPECT_THAT(Verify(), Exits(2, "holds"));
   decision_ = before;
   decision_["message"] = std::regex_replace(decision_["message"].get<std::string>(),
                                             std::regex("certified at its sample instants only: the robot stays clear"),
@@ -147,9 +143,7 @@ TEST_F(VerifyDecision, WhoseTaskHasANameThatNoFileHasIsBadInput) {
 TEST_F(VerifyDecision, NestedWithoutEndIsBadInput) {
   const std::string text = decision_.dump(), deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
   std::ofstream(scratch_ / "decision.json") << std::string(text).insert(text.find("\"center\""), "\"a\":" + deep + ",");
-  const Output output = Forereach("verify " + scratch_ / "decision.json 2>&1");
-  EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("nested deeper than 32 levels"));
+  EXPECT_THAT(Forereach("verify " + scratch_ / "decision.json 2>&1"), Exits(2, "nested deeper than 32 levels"));
 }
 
 TEST_F(VerifyDecision, PrintsItsVerdictAsJson) {
@@ -171,9 +165,7 @@ TEST_F(VerifyDecision, TakesAnotherTaskByOption) {
 
 TEST_F(VerifyDecision, RefusesAnAbstention) {
   decision_ = Certify("bicycle_safety");
-  const Output output = Verify();
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("0 certificates"));
+  EXPECT_THAT(Verify(), Exits(1, "0 certificates"));
   decision_["outcome"] = "certified";
   ExpectRefuted({"refuted", "clear of obstacle"});
 }
@@ -192,10 +184,7 @@ TEST_F(VerifyDecision, RefutesASliceThatWasShrunkenAndResealed) {
   Json& half_width = decision_["tube"][5]["half_width"][0];
   half_width = half_width.get<double>() * (1 - 1e-12);
   Reseal();
-  const Output output = Verify();
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("step 5: not so: "));
-  EXPECT_THAT(output.text, Not(HasSubstr("altered")));
+  EXPECT_THAT(Verify(), Exits(1, "step 5: not so: ", Not(HasSubstr("altered"))));
 }
 
 TEST_F(VerifyDecision, RefutesAnInitialSliceShrunkenByOneUlpAndResealed) {
@@ -221,9 +210,7 @@ TEST_F(VerifyDecision, RefutesAChangedSigma) {
   WriteTask(std::regex_replace(task_, std::regex("noise_bound: .*"), "noise_bound: [0, 0, 1e-9, 0, 0, 0]"));
   ExpectRefuted({"digest of the config", "digest of the declaration", "step 0: not so", "residual of theta"});
   Reseal(LoadConfig(scratch_ / "task.yaml"));
-  const Output output = Verify();
-  EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, Not(HasSubstr("digest of")));
+  EXPECT_THAT(Verify(), Exits(1, Not(HasSubstr("digest of"))));
 }
 
 TEST_F(VerifyDecision, RefutesAMovedObstacle) {
@@ -268,8 +255,7 @@ TEST_F(VerifyWorld, ADecisionWithABodyAndMovingObstaclesIsConfirmed) {
   EXPECT_EQ(decision_["inputs"]["schedule"]["step_us"], 100'000);
   EXPECT_TRUE(decision_["tube"].back()["clearance"].empty());
   EXPECT_TRUE(decision_["tube"][0]["clearance"][1].is_null()) << "nowhere";
-  const Output output = Verify();
-  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(Verify(), Exits(0));
 }
 
 TEST_F(VerifyWorld, AChangedWitnessIsRefuted) {
