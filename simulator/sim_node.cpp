@@ -19,7 +19,6 @@
 #include "forereach/numerics/text.h"
 #include "lcmtypes/why_failed.h"
 #include "task/json_text.h"
-#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -45,11 +44,6 @@ GuardDomain DomainOf(const Config& config) {
           entries(domain.input.upper())};
 }
 
-std::vector<double> StateErrorOf(const Config& config) {
-  const Eigen::VectorXd& error = config.problem->declaration.state_error;
-  return {error.begin(), error.end()};
-}
-
 SupervisorOptions OptionsOf(const Config& config) {
   SupervisorOptions options;
   options.guard.num_states = config.problem->model->num_states();
@@ -63,8 +57,6 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
-  options.guard.state_error = StateErrorOf(config);
-  options.guard.step_error_us = StepErrorUs(config.gate);
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;
@@ -160,10 +152,8 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
-  if (StepErrorUs(config->gate) != StepErrorUs(config_.gate))  // the guard keeps its own
-    return logging::Error("not reloaded: robot.step_error_ms cannot change while the robot runs");
-  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config), config->problem->model->angles(),
-                     StateErrorOf(*config));
+  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config),
+                     config->problem->model->angles());
   logging::Info("plans certified under {} as it is now are accepted", config_.path);
 }
 
