@@ -978,6 +978,26 @@ TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
   }
 }
 
+// Otherwise what it reports of a step would contradict a true declaration.
+TEST(RobotSim, AStepLastsAsLongAsTheClockSays) {
+  for (const bool looks_at_time : {true, false}) {
+    Config config = PointMassTask();
+    config.gate.step_error_ms = looks_at_time ? 5.0 : kAnyTime;
+    std::vector<double> longer;
+    Rig rig(config, [&](auto x, auto, auto next, double by) {
+      std::ranges::copy(x, next.begin());
+      longer.push_back(by);
+    });
+    rig.RunTo(0);
+    rig.Send(Plan(config, 1, 1, kOrigin));
+    for (const auto& [j, late_us] : {std::pair(1, 300), {2, 1700}, {3, 500}}) rig.TickLate(j, late_us);
+    ASSERT_EQ(rig.transitions.size(), 2u);
+    EXPECT_EQ(rig.transitions[0].duration_us, kPeriod + 1400);
+    EXPECT_EQ(rig.transitions[1].duration_us, kPeriod - 1200);
+    EXPECT_THAT(longer, looks_at_time ? ElementsAre(1400 * 1e-6, -1200 * 1e-6) : ElementsAre(0, 0));
+  }
+}
+
 TEST(RobotSim, HoldsEachPlanToTheStepErrorOfItsTask) {
   const ScratchDirectory scratch;
   const std::string path = scratch / "task.yaml";
