@@ -46,29 +46,24 @@ constexpr int kLookAhead = 4;      // steps
 constexpr double kReverse = 1e-3;  // m/s, what counts as standing still
 constexpr double kRoomAhead = 1;   // s at cruise speed, kept free beyond a braking tail: enough to turn away in
 constexpr int kRoomSamples = 9;
-constexpr int kMostOnwards = 60;        // steps, to drive as far from rest by the hints
 constexpr double kLeastCell = 1.0 / 9;  // of a cruising step
 constexpr double kCellsOfJoints = 60;   // along the longer side of a field around a body at expressions
 constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
 constexpr double kArrivalSpeed = 0.35;  // ... down to this share of the cruise speed
 
-/** How a robot can drive on from where a braking tail ends: straight ahead, or as the hints steer it. A robot without
-hints needs nothing for the latter. */
-enum class Onwards { kStraight, kByHints };
-
 /** What a progress part has to achieve. Tried in turn, the later ones are easier. */
 struct Ambition {
   double share;    // of the distance that cruising straight at the goal would gain
   double heading;  // least cosine between the motion at the end and the way to the goal
-  Onwards onwards;
-  bool at_rest;  // only for a robot at rest: it may have to turn round, and takes any progress
+  bool room;       // to drive on from where the tail ends
+  bool at_rest;    // only for a robot at rest: it may have to turn round, and takes any progress
 };
-constexpr std::array<Ambition, 6> kAmbitions{{{0.9, 0.98, Onwards::kStraight, false},
-                                              {0.8, 0.92, Onwards::kStraight, false},
-                                              {0.6, 0.8, Onwards::kStraight, false},
-                                              {0.2, 0.4, Onwards::kStraight, false},
-                                              {-0.5, -1, Onwards::kStraight, true},
-                                              {0, -1, Onwards::kByHints, true}}};
+constexpr std::array<Ambition, 6> kAmbitions{{{0.9, 0.98, true, false},
+                                              {0.8, 0.92, true, false},
+                                              {0.6, 0.8, true, false},
+                                              {0.2, 0.4, true, false},
+                                              {-0.5, -1, true, true},
+                                              {0, -1, false, true}}};
 
 const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
@@ -535,8 +530,7 @@ class Planner::Search {
       position += moved;
       if (moved.norm() > kReverse) direction = moved.normalized();
     }
-    return ambition.onwards == Onwards::kStraight ? HasRoom({z.data(), n_}, position, direction)
-                                                  : LeadOn({z.data(), n_}, position);
+    return !ambition.room || HasRoom({z.data(), n_}, position, direction);
   }
 
   // Whether a robot at rest in x, at `position`, can drive on. A robot that cannot reverse could otherwise not leave
@@ -547,39 +541,12 @@ class Planner::Search {
     const double room = kRoomAhead * planner_.options_.cruise_speed;
     for (int i = 1; i <= kRoomSamples; ++i) {
       const Eigen::VectorXd ahead = state + planner_.shift_ * (room * i / kRoomSamples * direction);
-      if (!IsClearOfWhatStands({ahead.data(), n_})) return false;
+      const Sweep sweep(BodyAt({ahead.data(), n_}), 0);
+      for (std::size_t o = 0; o < clearances_.size(); ++o)
+        if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
+          return false;
     }
     return planner_.region_.Contains(position + room * direction);
-  }
-
-  // Whether the hints lead a robot at rest in x, at `position`, as much nearer to the goal, or to it. A stop from which
-  // they do not may be one that a robot that cannot reverse never leaves. What moves may have gone by then.
-  [[nodiscard]] bool LeadOn(std::span<const double> x, const Eigen::VectorXd& position) const {
-    if (!planner_.motion_.has_hints()) return true;
-    const double room = kRoomAhead * planner_.options_.cruise_speed, begin = field_.DistanceToGo(position);
-    const double enough = std::max(begin - room, kShareOfRadius * planner_.options_.goal_radius);
-    std::array<double, kMaxVariables> z;
-    std::copy(x.begin(), x.end(), z.begin());
-    for (int t = 0; t < kMostOnwards; ++t) {
-      planner_.motion_.Pursue({z.data(), n_}, DesiredIn(z.data(), 0, 0), {z.data() + n_, m_});
-      std::array<double, kMaxStates> next;
-      Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
-      std::copy_n(next.begin(), n_, z.begin());
-      const std::span<const double> state(z.data(), n_);
-      const Eigen::Map<const Eigen::ArrayXd> values(z.data(), start_.size());
-      if (!(lower_.array() <= values).all() || !(values <= upper_.array()).all() || !IsClearOfWhatStands(state))
-        return false;
-      if (field_.DistanceToGo(Position(state)) <= enough) return true;
-    }
-    return false;
-  }
-
-  [[nodiscard]] bool IsClearOfWhatStands(std::span<const double> x) const {
-    const Sweep sweep(BodyAt(x), 0);
-    for (std::size_t o = 0; o < clearances_.size(); ++o)
-      if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
-        return false;
-    return true;
   }
 
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {

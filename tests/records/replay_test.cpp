@@ -8,6 +8,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "lcmtypes/seal.h"
 #include "records/event_log.h"
 #include "records/replay.h"
 #include "tests/certifier/small_task.h"
