@@ -19,14 +19,13 @@ const KeyRing& Keys(bool ours) {
   return ours ? keys : other;
 }
 
-// With the key it has a domain too, which the small plan reaches exactly, and a jitter.
+// With the key it has a domain too, which the small plan reaches exactly.
 GuardOptions Options(bool with_key) {
   GuardOptions options{2, 1, kStepUs, DigestOf("config"), DigestOf("model")};
   if (!with_key) return options;
   options.keys = Keys(true);
   options.bus_name = "bus";
   options.domain = GuardDomain{{-12, -5}, {12, 5}, {-3}, {3}};
-  options.step_error_us = kJitterUs;
   return options;
 }
 
@@ -36,7 +35,7 @@ void Distort(FuzzedDataProvider& input, certified_plan_t& certified) {
   const auto entry = [&](auto& slices) -> double& {
     return slices[input.ConsumeIntegralInRange(0, 4)][input.ConsumeIntegralInRange(0, 2)];
   };
-  switch (input.ConsumeIntegralInRange(0, 16)) {
+  switch (input.ConsumeIntegralInRange(0, 18)) {
     case 0: entry(certified.slice_lower) = AnyNumber(input); return;
     case 1: entry(certified.slice_upper) = AnyNumber(input); return;
     case 2: certified.expires_utime = AnyInteger(input, certified.expires_utime, kStepUs); return;
@@ -56,6 +55,8 @@ void Distort(FuzzedDataProvider& input, certified_plan_t& certified) {
     case 14: certified.model_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
     case 15: certified.observations_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
     case 16: certified.transitions_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
+    case 17: certified.state_error[input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input); return;
+    case 18: certified.step_error_us = AnyInteger(input, certified.step_error_us, kJitterUs); return;
   }
 }
 
@@ -63,7 +64,7 @@ void Distort(FuzzedDataProvider& input, certified_plan_t& certified) {
 std::vector<std::uint8_t> AnyPlan(FuzzedDataProvider& input) {
   static const std::vector<std::vector<std::uint8_t>> sealed = [] {
     std::vector<std::vector<std::uint8_t>> plans;
-    for (int id = 1; id <= 8; ++id) plans.push_back(Sealed(SmallPlan(id)));
+    for (int id = 1; id <= 8; ++id) plans.push_back(Sealed(SmallPlan(id, id % 2 == 0 ? kJitterUs : -1)));
     return plans;
   }();
   if (input.ConsumeIntegralInRange(0, 31) == 31) return AnyBytes(input, 64);
@@ -214,7 +215,7 @@ class Session final {
     Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 &&
             now <= plan->expires_utime);
     RequireInSlice(*plan, 0, state);
-    if (with_key_) Require(Apart(plan->plan.start_utime, boundary) <= kJitterUs && IsOnTime(*plan, 0, now));
+    Require(IsOnTime(*plan, 0, boundary) && IsOnTime(*plan, 0, now));
     step_ = 0;
     standing_ = 128;
   }
@@ -228,21 +229,22 @@ class Session final {
     if (!ok) return;
     Require(step == ++step_ && step <= standing_);
     RequireInSlice(*guard_.executing(), step, state);
-    Require(!with_key_ || IsOnTime(*guard_.executing(), step, now));
+    Require(IsOnTime(*guard_.executing(), step, now));
     has_executed_ = true;
   }
 
   static void RequireInSlice(const certified_plan_t& plan, int step, const std::vector<double>& state) {
     Require(state.size() == 2 && step <= plan.plan.num_steps);
     for (std::size_t k = 0; k < 2; ++k)
-      Require(plan.slice_lower[step][k] <= state[k] && state[k] <= plan.slice_upper[step][k]);
+      Require(plan.slice_lower[step][k] <= state[k] + plan.state_error[k] &&
+              state[k] - plan.state_error[k] <= plan.slice_upper[step][k]);
   }
 
   // In wider arithmetic. No time is later than the last one of 64 bits.
   static bool IsOnTime(const certified_plan_t& plan, int step, std::int64_t now) {
     const __int128 due = plan.plan.start_utime + static_cast<__int128>(step) * plan.plan.step_us;
     const __int128 late = now - std::min<__int128>(due, INT64_MAX);
-    return -kJitterUs <= late && late <= kJitterUs;
+    return plan.step_error_us < 0 || (-plan.step_error_us <= late && late <= plan.step_error_us);
   }
 
   static std::uint64_t Apart(std::int64_t a, std::int64_t b) {

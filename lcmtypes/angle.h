@@ -1,7 +1,6 @@
 /** Comparison of a measured state with an interval, modulo whole turns for an angle. */
 #pragma once
 
-#include <array>
 #include <bitset>
 #include <span>
 
@@ -11,12 +10,6 @@ namespace forereach {
 
 /** The states that are angles, by their indices: values that differ by a multiple of 2 pi are the same. */
 using Angles = std::bitset<16>;
-
-/** What a task says of measured states. */
-struct Sensing {
-  Angles angles = {};
-  std::array<double, 16> state_error = {};  ///< How far the true state may be from the measured one, not negative.
-};
 
 /** @throws std::invalid_argument if an index is negative or not below `num_states`. */
 [[nodiscard]] Angles AnglesOf(std::span<const int> states, int num_states);

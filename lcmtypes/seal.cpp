@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 namespace forereach {
 namespace {
@@ -22,17 +23,31 @@ InUse InUseBy(const candidate_plan_t& plan) {
   return {plan.num_steps + 1, plan.num_states};
 }
 
-std::optional<SealFault> FindUnusedEntry(const char* name, const Slices& slices, InUse in_use) {
-  for (int t = 0; t < kSlices; ++t)
-    for (int k = t < in_use.slices ? in_use.states : 0; k < kStates; ++k) {
-      const double value = slices[t][k];
-      if (std::bit_cast<std::uint64_t>(value) == 0) continue;
-      char text[32];
-      std::snprintf(text, sizeof text, "%.17g", value);
-      const std::string field = std::string(name) + "[" + std::to_string(t) + "][" + std::to_string(k) + "]";
-      return SealFault{SealFault::Kind::kUnusedEntry, field, "0, because it is not in use", text, t, k, value};
-    }
+// The first entry from `begin` on that is not all zero bits.
+std::optional<SealFault> FindEntry(const std::string& name, int step, const double (&row)[kStates], int begin) {
+  for (int k = begin; k < kStates; ++k) {
+    if (std::bit_cast<std::uint64_t>(row[k]) == 0) continue;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", row[k]);
+    return SealFault{SealFault::Kind::kUnusedEntry,
+                     name + "[" + std::to_string(k) + "]",
+                     "0, because it is not in use",
+                     text,
+                     step,
+                     k,
+                     row[k]};
+  }
   return std::nullopt;
+}
+
+std::optional<SealFault> FindUnusedEntry(const certified_plan_t& certified, InUse in_use) {
+  for (const auto& [name, slices] :
+       {std::pair{"slice_lower[", &certified.slice_lower}, {"slice_upper[", &certified.slice_upper}})
+    for (int t = 0; t < kSlices; ++t)
+      if (auto found =
+              FindEntry(name + std::to_string(t) + "]", t, (*slices)[t], t < in_use.slices ? in_use.states : 0))
+        return found;
+  return FindEntry("state_error", -1, certified.state_error, in_use.states);
 }
 
 }  // namespace
@@ -48,6 +63,8 @@ Digest CertificateDigest(const certified_plan_t& certified) {
   for (const Slices* slices : {&certified.slice_lower, &certified.slice_upper})
     for (int t = 0; t < in_use.slices; ++t)
       for (int k = 0; k < in_use.states; ++k) append(BigEndian(std::bit_cast<std::uint64_t>((*slices)[t][k])));
+  for (int k = 0; k < in_use.states; ++k) append(BigEndian(std::bit_cast<std::uint64_t>(certified.state_error[k])));
+  append(BigEndian(certified.step_error_us));
   append(certified.plan_digest);
   append(certified.config_digest);
   append(certified.model_digest);
@@ -66,10 +83,7 @@ std::vector<SealFault> FindSealFaults(const certified_plan_t& certified) {
   hold(SealFault::Kind::kPlanDigest, "plan_digest", DigestOf(Encode(certified.plan)), GetDigest(certified.plan_digest));
   hold(SealFault::Kind::kCertificateDigest, "certificate_digest", CertificateDigest(certified),
        GetDigest(certified.certificate_digest));
-  const InUse in_use = InUseBy(certified.plan);
-  auto unused = FindUnusedEntry("slice_lower", certified.slice_lower, in_use);
-  if (!unused) unused = FindUnusedEntry("slice_upper", certified.slice_upper, in_use);
-  if (unused) faults.push_back(*std::move(unused));
+  if (auto unused = FindUnusedEntry(certified, InUseBy(certified.plan))) faults.push_back(*std::move(unused));
   return faults;
 }
 

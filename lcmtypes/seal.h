@@ -3,10 +3,11 @@
 `certificate_digest` is the BLAKE2b-256 of the message's bytes in their order on the bus, big-endian and with the
 fingerprint, without three parts:
 - `plan`; it is represented by `plan_digest`, the BLAKE2b-256 of its bytes as a candidate_plan_t;
-- the unused slice entries: those with t > plan.num_steps or k >= plan.num_states;
+- the unused entries: those of slices with t > plan.num_steps or k >= plan.num_states, of state_error with
+  k >= plan.num_states;
 - `certificate_digest` itself.
 So the seal holds only if `plan_digest` is the digest of the plan (which also determines the entries in use) and every
-bit of the unused entries is zero. If num_steps or num_states is out of range, no slice entry is in use.
+bit of the unused entries is zero. If num_steps or num_states is out of range, no entry is in use.
 
 The seal detects damage and mix-ups. It is not a signature: every writer of a message can compute its seal. */
 #pragma once
@@ -19,7 +20,8 @@ The seal detects damage and mix-ups. It is not a signature: every writer of a me
 
 namespace forereach {
 
-/** The correct value of `certificate_digest`. Cost: a digest of 256 bytes, plus 16 bytes for each slice and state. */
+/** The correct value of `certificate_digest`. Cost: a digest of 264 bytes, plus 8 bytes for each state, and 16 for each
+state of each slice. */
 [[nodiscard]] Digest CertificateDigest(const certified_plan_t& certified);
 
 /** A violation of a seal. */
@@ -29,12 +31,12 @@ struct SealFault {
   Kind kind;
   std::string field;               ///< "plan_digest", "certificate_digest", "slice_lower[40][3]", ...
   std::string expected, found;     ///< The required and the actual value.
-  int step = -1, coordinate = -1;  ///< kUnusedEntry: the first one; slice_lower comes before slice_upper.
+  int step = -1, coordinate = -1;  ///< kUnusedEntry: the first one, in the order of the message.
   double value = 0;                ///< kUnusedEntry: its value.
 };
 
 /** All violations, at most one of each kind, in the order of kinds. Empty if the seal holds. Call it before any use of
-a certified plan. Cost: two digests, and a test of every slice entry. */
+a certified plan. Cost: two digests, and a test of every entry of slices and errors. */
 [[nodiscard]] std::vector<SealFault> FindSealFaults(const certified_plan_t& certified);
 
 }  // namespace forereach

@@ -15,6 +15,7 @@
 
 #include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
+#include "certifier/gate/upheld.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
 #include "lcmtypes/names.h"
@@ -103,6 +104,9 @@ class CertificateReader final : public TimelineUser {
     for (const SealFault& fault : FindSealFaults(certified))
       certificate.mismatches.push_back({kAltered + fault.field, fault.expected, fault.found});
     CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(certified));
+    for (const auto& [field, expected, found] :
+         FindDifferences(UpheldUnder(*task.problem, task.gate), UpheldBy(certified)))
+      certificate.mismatches.push_back({kOtherInput + field, expected, found});
     certificate.Compare(DigestOfInput("transitions of the task"), ToHex(task.grounds.observations),
                         ToHex(GetDigest(certified.transitions_digest)));
     if (!recorded.has_candidate) certificate.Compare("its candidate is in the log", "a candidate", "none");
@@ -130,6 +134,10 @@ class CertificateReader final : public TimelineUser {
     const certified_plan_t& certified = plan->second.certified;
     if (withdrawal.valid_steps > certified.plan.num_steps) {
       certificate.missing = fmt::format("its plan has {} controls", certified.plan.num_steps);
+      return;
+    }
+    if (!UpheldBy(certified).Suffices(UpheldUnder(*recorded.basis.task->problem, recorded.basis.task->gate))) {
+      certificate.missing = "the robot's guard does not uphold what this task's certificates rest on";
       return;
     }
     verifier::Certificate& derived = certificate.certificate;

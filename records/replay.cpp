@@ -75,8 +75,13 @@ class Replayer final : public GateFollower {
     for (const SealFault& fault : FindSealFaults(certified))
       Differ(recorded.event, certified.plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
+    const Upheld upheld = UpheldBy(certified);
+    const Config& task = *recorded.basis.task;
+    for (const UpheldDifference& difference : FindDifferences(UpheldUnder(*task.problem, task.gate), upheld))
+      Differ(recorded.event, certified.plan.plan_id,
+             difference.field + " is " + difference.found + ", it is " + difference.expected + " in the task");
     if (plans_.size() == kPlans) plans_.pop_front();
-    plans_.emplace_back(GetDigest(certified.certificate_digest), certified.plan);
+    plans_.push_back({GetDigest(certified.certificate_digest), upheld, certified.plan});
   }
 
   void OnWithdrawn(const RecordedWithdrawal& recorded) override {
@@ -113,9 +118,9 @@ class Replayer final : public GateFollower {
     const Grounds named = GroundsOf(withdrawal);
     for (const auto& [name, digest] : kGrounds)
       if (named.*digest != recorded.basis.grounds.*digest) return "withdrawn under other " + std::string(name);
-    const auto plan = std::ranges::find(plans_, GetDigest(withdrawal.certificate_digest), &Plan::first);
+    const auto plan = std::ranges::find(plans_, GetDigest(withdrawal.certificate_digest), &Plan::certificate);
     if (plan == plans_.end()) return "withdrawn, but its certified plan is not in the log";
-    const Standing standing = gate().JudgeAgain(plan->second, withdrawal.first_step);
+    const Standing standing = gate().JudgeAgain(plan->plan, plan->upheld, withdrawal.first_step);
     const Decision& verdict = standing.verdict;
     if (standing.steps == withdrawal.valid_steps && static_cast<int>(verdict.cause) == withdrawal.cause &&
         verdict.step == withdrawal.step && verdict.obstacle == withdrawal.obstacle)
@@ -136,7 +141,11 @@ class Replayer final : public GateFollower {
                                         DescribeDecision(decision), remark, GetText(decision.message)));
   }
 
-  using Plan = std::pair<Digest, candidate_plan_t>;  // by its certificate
+  struct Plan {
+    Digest certificate;
+    Upheld upheld;
+    candidate_plan_t plan;
+  };
 
   const std::string plan_digest_;
 

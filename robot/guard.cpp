@@ -168,6 +168,21 @@ std::uint64_t Apart(std::int64_t a, std::int64_t b) {
   return a > b ? x - y : y - x;
 }
 
+bool LooksAtTime(const certified_plan_t& certified) { return certified.step_error_us >= 0; }
+
+GuardVerdict CheckDue(const certified_plan_t& certified, int step, std::int64_t due, const char* by,
+                      std::int64_t now_us) {
+  const std::int64_t most = certified.step_error_us;
+  const std::uint64_t apart = Apart(now_us, due);
+  if (apart <= static_cast<std::uint64_t>(most)) return {};
+  const bool late = now_us > due;
+  return RefuseAt(GuardCause::kOffSchedule, step, -1, static_cast<double>(apart) * (late ? 1 : -1),
+                  static_cast<double>(most),
+                  Sentence("plan %" PRId64 ": step %d was due at %" PRId64 " us%s, it is %" PRIu64
+                           " us too %s, at most %" PRId64 " us are allowed",
+                           certified.plan.plan_id, step, due, by, apart, late ? "late" : "early", most));
+}
+
 }  // namespace
 
 std::string_view GuardCauseName(GuardCause cause) {
@@ -228,17 +243,6 @@ void RequireDomain(const std::optional<GuardDomain>& domain, const GuardOptions&
   require("input", domain->input_lower, domain->input_upper, options.num_inputs);
 }
 
-std::array<double, 16> ErrorOf(const std::vector<double>& declared, int num_states) {
-  std::array<double, 16> error{};
-  if (!declared.empty() && std::ssize(declared) != num_states)
-    throw std::invalid_argument("GuardOptions: state_error has " + std::to_string(declared.size()) +
-                                " entries, it has to have none or " + std::to_string(num_states));
-  if (const GuardVerdict verdict = CheckError(declared); !verdict.ok())
-    throw std::invalid_argument("GuardOptions: state_error: " + verdict.message);
-  std::ranges::copy(declared, error.begin());
-  return error;
-}
-
 }  // namespace
 
 Guard::Guard(GuardOptions options) : options_(std::move(options)) {
@@ -250,11 +254,8 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   require("num_states", options_.num_states, kMaxPlanStates);
   require("num_inputs", options_.num_inputs, kMaxPlanInputs);
   require("step_us", options_.step_us, INT64_MAX);
-  if (options_.step_error_us && *options_.step_error_us < 0)
-    throw std::invalid_argument("GuardOptions: step_error_us is " + std::to_string(*options_.step_error_us) +
-                                ", it must not be negative");
   RequireDomain(options_.domain, options_);
-  sensing_ = {AnglesOf(options_.angles, options_.num_states), ErrorOf(options_.state_error, options_.num_states)};
+  angles_ = AnglesOf(options_.angles, options_.num_states);
   expected_.reserve(kMostExpected);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
@@ -269,15 +270,13 @@ void Guard::Halt() noexcept {
 }
 
 void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
-                   const std::optional<std::vector<int>>& angles,
-                   const std::optional<std::vector<double>>& state_error) {
+                   const std::optional<std::vector<int>>& angles) {
   RequireDomain(domain, options_);
   const auto known = angles ? std::optional(AnglesOf(*angles, options_.num_states)) : std::nullopt;
-  const auto error = state_error ? std::optional(ErrorOf(*state_error, options_.num_states)) : std::nullopt;
   std::erase_if(expected_,
                 [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
   if (expected_.size() >= kMostExpected) expected_.erase(expected_.begin());
-  expected_.push_back({config_digest, model_digest, std::move(domain), known, error});
+  expected_.push_back({config_digest, model_digest, std::move(domain), known});
 }
 
 // Checks and removes the signature.
@@ -306,8 +305,9 @@ GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, co
   return Refuse(GuardCause::kSignatureReplayed, "the signature on " + channel + " was used before");
 }
 
-std::int64_t StartTolerance(const GuardOptions& options) {
-  return std::min(options.step_us / 2, options.step_error_us.value_or(INT64_MAX));
+std::int64_t StartTolerance(const certified_plan_t& certified) {
+  const std::int64_t half = certified.plan.step_us / 2;
+  return LooksAtTime(certified) ? std::min(half, certified.step_error_us) : half;
 }
 
 GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
@@ -325,8 +325,9 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     last_accepted_ = certified->plan.plan_id;
     last_expiry_ = std::max(last_expiry_, certified->expires_utime);
     TakeTaskOf(*certified);
+    std::ranges::copy(certified->state_error, state_error_.begin());
     pending_ = std::move(certified);
-    pending_sensing_ = sensing_;
+    pending_angles_ = angles_;
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
@@ -340,7 +341,7 @@ void Guard::TakeTaskOf(const certified_plan_t& certified) {
   options_.config_digest = task->config;
   options_.model_digest = task->model;
   if (task->domain) options_.domain = std::move(task->domain);
-  sensing_ = {task->angles.value_or(sensing_.angles), task->state_error.value_or(sensing_.state_error)};
+  angles_ = task->angles.value_or(angles_);
   expected_.erase(expected_.begin(), task + 1);
 }
 
@@ -460,7 +461,12 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
     if (!std::isfinite(center) || !(std::isfinite(half_width) && half_width >= 0))
       return RefuseAt(GuardCause::kNonFinite, 0, k, std::isfinite(center) ? half_width : center, 0,
                       Sentence("X0 in coordinate %d is %.17g +- %.17g", k, center, half_width));
+    if (const double error = certified.state_error[k]; !(std::isfinite(error) && error >= 0))
+      return RefuseAt(GuardCause::kNonFinite, -1, k, error, 0,
+                      Sentence("state_error in coordinate %d is %.17g", k, error));
   }
+  if (certified.step_error_us < -1)
+    return Refuse(GuardCause::kNonFinite, Sentence("step_error_us is %" PRId64, certified.step_error_us));
   for (int t = 0; t < plan.num_steps; ++t)
     for (int i = 0; i < options_.num_inputs; ++i)
       if (const double control = plan.control[t][i]; !std::isfinite(control))
@@ -522,7 +528,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us, s
   if (verdict.cause == GuardCause::kTooEarly) return verdict;
   if (verdict.ok()) {
     executing_ = std::move(pending_);
-    executing_sensing_ = pending_sensing_;
+    executing_angles_ = pending_angles_;
     last_step_ = 0;
     first_step_utime_ = last_step_utime_ = now_us;
     standing_steps_.reset();
@@ -535,27 +541,27 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
                                  std::span<const double> error) const {
   if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
-  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(StartTolerance(options_))) {
+  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(StartTolerance(*pending_))) {
     const bool early = boundary_utime < plan.start_utime;
     return Refuse(early ? GuardCause::kTooEarly : GuardCause::kTooLate,
                   Sentence("plan %" PRId64 " starts at %" PRId64 " us, this boundary is %" PRId64 " us", plan.plan_id,
                            plan.start_utime, boundary_utime));
   }
   GuardVerdict verdict = CheckExpiry(*pending_, now_us);
-  if (verdict.ok()) verdict = ExamineTime(plan, 0, now_us);
+  if (verdict.ok()) verdict = ExamineTime(*pending_, 0, now_us);
   if (!verdict.ok()) return verdict;
-  verdict = ExamineMeasured(pending_sensing_, state, error);
-  if (verdict.ok()) verdict = CheckInitialSet(plan, pending_sensing_.angles, state, error);
-  return verdict.ok() ? CheckSlice(*pending_, pending_sensing_.angles, 0, state, error) : verdict;
+  verdict = ExamineMeasured(*pending_, state, error);
+  if (verdict.ok()) verdict = CheckInitialSet(plan, pending_angles_, state, error);
+  return verdict.ok() ? CheckSlice(*pending_, pending_angles_, 0, state, error) : verdict;
 }
 
-// An error that is not given becomes the declared one.
-GuardVerdict Guard::ExamineMeasured(const Sensing& sensing, std::span<const double> state,
+// An error that is not given becomes the plan's.
+GuardVerdict Guard::ExamineMeasured(const certified_plan_t& certified, std::span<const double> state,
                                     std::span<const double>& error) const {
   if (std::ssize(state) != options_.num_states)
     return Refuse(GuardCause::kWrongStateSize,
                   Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
-  if (error.empty()) error = std::span(sensing.state_error).first(state.size());
+  if (error.empty()) error = std::span(certified.state_error).first(state.size());
   if (error.size() != state.size())
     return Refuse(GuardCause::kWrongStateError,
                   Sentence("a state error of %zu entries, this robot has %d", error.size(), options_.num_states));
@@ -570,36 +576,24 @@ std::int64_t Guard::DueAfter(std::int64_t begin, int step) const {
   return overflows ? INT64_MAX : due;
 }
 
-GuardVerdict Guard::ExamineDue(const candidate_plan_t& plan, int step, std::int64_t due, const char* by,
-                               std::int64_t now_us) const {
-  const std::uint64_t apart = Apart(now_us, due);
-  if (apart <= static_cast<std::uint64_t>(*options_.step_error_us)) return {};
-  const bool late = now_us > due;
-  return RefuseAt(GuardCause::kOffSchedule, step, -1, static_cast<double>(apart) * (late ? 1 : -1),
-                  static_cast<double>(*options_.step_error_us),
-                  Sentence("plan %" PRId64 ": step %d was due at %" PRId64 " us%s, it is %" PRIu64
-                           " us too %s, at most %" PRId64 " us are allowed",
-                           plan.plan_id, step, due, by, apart, late ? "late" : "early", *options_.step_error_us));
-}
-
-GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const {
-  if (!options_.step_error_us) return {};
-  GuardVerdict verdict = ExamineDue(plan, step, DueAfter(plan.start_utime, step), "", now_us);
+GuardVerdict Guard::ExamineTime(const certified_plan_t& certified, int step, std::int64_t now_us) const {
+  if (!LooksAtTime(certified)) return {};
+  GuardVerdict verdict = CheckDue(certified, step, DueAfter(certified.plan.start_utime, step), "", now_us);
   if (!verdict.ok() || step == 0) return verdict;
-  return ExamineDue(plan, step, DueAfter(first_step_utime_, step), " by the first step", now_us);
+  return CheckDue(certified, step, DueAfter(first_step_utime_, step), " by the first step", now_us);
 }
 
 // Of the step that ends: its motion is bounded for so long.
 GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const {
-  if (!options_.step_error_us || now_us <= began_utime) return {};
+  if (!LooksAtTime(*executing_) || now_us <= began_utime) return {};
   const candidate_plan_t& plan = executing_->plan;
+  const std::int64_t longer = executing_->step_error_us;
   const std::uint64_t lasted = Apart(now_us, began_utime);
-  const std::uint64_t most =
-      static_cast<std::uint64_t>(options_.step_us) + static_cast<std::uint64_t>(*options_.step_error_us);
+  const std::uint64_t most = static_cast<std::uint64_t>(plan.step_us) + static_cast<std::uint64_t>(longer);
   if (lasted <= most) return {};
   return RefuseAt(
       GuardCause::kOffSchedule, step, -1, static_cast<double>(lasted) - static_cast<double>(plan.step_us),
-      static_cast<double>(*options_.step_error_us),
+      static_cast<double>(longer),
       Sentence("plan %" PRId64 ": the step before step %d lasted %" PRIu64 " us, at most %" PRIu64 " us are allowed",
                plan.plan_id, step, lasted, most));
 }
@@ -607,17 +601,15 @@ GuardVerdict Guard::ExamineDuration(int step, std::int64_t began_utime, std::int
 bool Guard::IsDeclared(std::span<const double> state_error) const noexcept {
   if (state_error.empty()) return true;
   if (std::ssize(state_error) != options_.num_states) return false;
-  const auto allows = [&](const std::array<double, 16>& declared) {
-    return std::ranges::equal(state_error, std::span(declared).first(state_error.size()), std::less_equal());
+  const auto allows = [&](std::span<const double> declared) {
+    return std::ranges::equal(state_error, declared.first(state_error.size()), std::less_equal());
   };
-  return allows(executing_sensing_.state_error) && allows(sensing_.state_error) &&
-         std::ranges::all_of(expected_,
-                             [&](const Task& task) { return !task.state_error || allows(*task.state_error); });
+  return expected_.empty() && allows(state_error_) && (!executing_ || allows(executing_->state_error));
 }
 
 bool Guard::IsOnSchedule(int step, std::int64_t now_us) const noexcept {
   return !executing_ ||
-         (ExamineTime(executing_->plan, step, now_us).ok() && ExamineDuration(step, last_step_utime_, now_us).ok());
+         (ExamineTime(*executing_, step, now_us).ok() && ExamineDuration(step, last_step_utime_, now_us).ok());
 }
 
 GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us,
@@ -630,21 +622,20 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
     return Refuse(GuardCause::kWithdrawn,
                   Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
   // No slice says where the robot is at another time.
-  GuardVerdict verdict = ExamineTime(executing_->plan, step, now_us);
+  GuardVerdict verdict = ExamineTime(*executing_, step, now_us);
   if (verdict.ok()) verdict = ExamineDuration(step, last_step_utime_, now_us);
-  if (verdict.ok()) verdict = ExamineMeasured(executing_sensing_, state, error);
-  return verdict.ok() ? CheckSlice(*executing_, executing_sensing_.angles, step, state, error) : verdict;
+  if (verdict.ok()) verdict = ExamineMeasured(*executing_, state, error);
+  return verdict.ok() ? CheckSlice(*executing_, executing_angles_, step, state, error) : verdict;
 }
 
 GuardVerdict Guard::ExamineAgain(std::span<const double> state, std::int64_t now_us,
                                  std::span<const double> error) const {
   if (!executing_) return Refuse(GuardCause::kNotExecuting, Sentence("no plan is executing"));
-  const Angles& angles = executing_sensing_.angles;
-  GuardVerdict verdict = ExamineTime(executing_->plan, last_step_, now_us);
+  GuardVerdict verdict = ExamineTime(*executing_, last_step_, now_us);
   if (verdict.ok() && last_step_ > 0) verdict = ExamineDuration(last_step_, step_before_utime_, now_us);
-  if (verdict.ok()) verdict = ExamineMeasured(executing_sensing_, state, error);
-  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, angles, state, error);
-  return verdict.ok() ? CheckSlice(*executing_, angles, last_step_, state, error) : verdict;
+  if (verdict.ok()) verdict = ExamineMeasured(*executing_, state, error);
+  if (verdict.ok() && last_step_ == 0) verdict = CheckInitialSet(executing_->plan, executing_angles_, state, error);
+  return verdict.ok() ? CheckSlice(*executing_, executing_angles_, last_step_, state, error) : verdict;
 }
 
 GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us,

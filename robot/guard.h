@@ -6,8 +6,8 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
     Accept    -> the plan is pending and waits for its start; a newer plan replaces it
     TryStart  -> at the plan's start boundary, with the state inside X_0: the plan executes from step 0 and replaces
                  the plan before it
-    Check     -> after each control: the state has not left X_t, so the next control may be applied. With
-                 GuardOptions::step_error_us also: the step is on time and has not lasted too long
+    Check     -> after each control: the state has not left X_t, so the next control may be applied; the step is on
+                 time and has not lasted too long, unless the plan's step_error_us is -1
     CheckAgain -> the same once more, if time has passed since Check
     Withdraw  -> controls of a plan stand no longer: a pending plan is dropped, and of the executing one only the
                  controls before `standing_steps` may still be applied
@@ -19,7 +19,11 @@ Check fails stops executing. If Check finds that a slice was left, the guard hal
 next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
 next one. Apply only what `control` returns.
 
-The measured state is not the true one: the true state is anywhere in measured +- state_error. A plan starts only if all
+The plan says what it was certified for, under its seal: its step_error_us is how far a step may be off its time, its
+state_error how far the true state may be from a measured one. So a guard always upholds what its plan rests on.
+
+The measured state is not the true one: the true state is anywhere in measured +- state_error, the plan's or that of
+this measurement. A plan starts only if all
 of that lies inside X_0. A slice is left if none of it lies in the slice. In between, the measurement is consistent with
 the certificate, which holds for the true state if the plan began inside X_0 and its assumptions are true.
 
@@ -68,12 +72,12 @@ enum class GuardCause {
   kPlanDigest,         ///< plan_digest is not the digest of the embedded candidate.
   kCertificateDigest,  ///< certificate_digest is not the digest of the message.
   kUnusedEntry,        ///< An unused slice entry is not zero. No digest covers it.
-  kNonFinite,          ///< NaN or infinity in a control, X_0 or a slice, or a negative half-width.
-  kEmptySlice,         ///< A slice has lower > upper.
-  kOutsideDomain,      ///< A slice before the last, X_0 or a control leaves GuardOptions::domain.
-  kExpired,            ///< Also from TryStart.
-  kConfigDigest,       ///< Certified under another configuration.
-  kModelDigest,        ///< Certified for another model.
+  kNonFinite,      ///< NaN or infinity in a control, X_0, a slice or state_error, or a negative half-width or error.
+  kEmptySlice,     ///< A slice has lower > upper.
+  kOutsideDomain,  ///< A slice before the last, X_0 or a control leaves GuardOptions::domain.
+  kExpired,        ///< Also from TryStart.
+  kConfigDigest,   ///< Certified under another configuration.
+  kModelDigest,    ///< Certified for another model.
   kReplayed,  ///< plan_id is the executing plan's, or not above the last accepted one while an accepted plan may be
               ///< valid.
   // Accept and TryStart
@@ -84,7 +88,7 @@ enum class GuardCause {
   kTooLate,
   kOutsideInitialSet,
   // TryStart and Check
-  kOffSchedule,  ///< With step_error_us: further than this from start_utime + step * step_us, from the first step's
+  kOffSchedule,  ///< Further than the plan's step_error_us from start_utime + step * step_us, from the first step's
                  ///< time + step * step_us, or from step_us after the last step.
   kWrongStateSize,
   kWrongStateError,  ///< An error of the state is negative or not finite, or there is not one for each state.
@@ -149,18 +153,11 @@ struct GuardOptions {
   /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
   if it is there after whole turns of these (lcmtypes/angle.h). */
   std::vector<int> angles = {};
-  /** The task's declaration.state_error: half-widths, one for each state, of what the true state may be from the
-  measured one; none: zeros. */
-  std::vector<double> state_error = {};
-  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us and of the first step's
-  time + t * step_us, and no later than this after step_us from the last step, microseconds, not negative. It is the
-  task's robot.step_error_ms (task/step_time.h): certificates hold for steps within it. */
-  std::optional<std::int64_t> step_error_us = {};
 };
 
-/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or step_error_us if that is
-less. Microseconds. */
-[[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
+/** How far the plan's start_utime may be from the boundary at which it starts: half a step, or its step_error_us if
+that is less and not -1. Microseconds. */
+[[nodiscard]] std::int64_t StartTolerance(const certified_plan_t& certified);
 
 /** As Authenticator::Check's: the refusal of a message on a channel, kNone if it is authentic. */
 [[nodiscard]] GuardVerdict VerdictOn(Authenticity authenticity, const std::string& channel, const Speaker& speaker);
@@ -184,21 +181,21 @@ class Guard final {
   /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= StartTolerance;
   now_us <= expires_utime, because a delayed robot reaches a boundary late; all of measured_state +- state_error lies
   in X_0 = {x : |x - initial_center| <= initial_half_width}, compared as exact real numbers, and a part of it in the
-  hull of slice 0. NaN lies in no set. With step_error_us, boundary_utime and now_us have to be within it of
+  hull of slice 0. NaN lies in no set. With a step_error_us, boundary_utime and now_us have to be within it of
   start_utime, too. kNothingPending and kTooEarly change nothing. After any other refusal no plan is pending. The
   executing plan continues unless the new one starts. It allocates nothing if it passes.
   @param measured_state num_states entries in the model's units. @param state_error of this measurement, likewise;
-  empty: GuardOptions::state_error. */
+  empty: the plan's. */
   [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::int64_t now_us,
                                       std::span<const double> measured_state,
                                       std::span<const double> state_error = {}) noexcept;
 
-  /** Checks first, with step_error_us, |now_us - start_utime - step * step_us| <= step_error_us, the same from the time
-  of TryStart, and now_us - (that of the step before, or of TryStart) <= step_us + step_error_us. Then checks that the
-  state measured after control step - 1 has not left the hull of slice `step`: that a part of measured_state +-
-  state_error lies in it, compared as exact real numbers. No slice says where the robot is at another time, so a step
-  that is off its time halts nothing. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing.
-  Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  /** Checks first, with a step_error_us of the plan, |now_us - start_utime - step * step_us| <= step_error_us, the same
+  from the time of TryStart, and now_us - (that of the step before, or of TryStart) <= step_us + step_error_us. Then
+  checks that the state measured after control step - 1 has not left the hull of slice `step`: that a part of
+  measured_state +- state_error lies in it, compared as exact real numbers. No slice says where the robot is at another
+  time, so a step that is off its time halts nothing. Call it for step = 1, 2, .. T in this order. After a refusal no
+  plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us,
                                    std::span<const double> state_error = {}) noexcept;
 
@@ -208,12 +205,13 @@ class Guard final {
   [[nodiscard]] GuardVerdict CheckAgain(std::span<const double> measured_state, std::int64_t now_us,
                                         std::span<const double> state_error = {}) noexcept;
 
-  /** Whether the task of the executing plan, and every one that is accepted now or expected, declares errors as large
-  as these, num_states entries; empty: as declared. */
+  /** Whether the certifier counts on errors as large as these, num_states entries, as far as plans say: the executing
+  plan does, so does the one accepted last, and no task is expected of which none has been accepted. Empty: true, as
+  declared. */
   [[nodiscard]] bool IsDeclared(std::span<const double> state_error) const noexcept;
 
   /** Whether Check of the same step and time would find them on schedule, whatever the state is: the step that ends has
-  lasted as long as a step may. True without step_error_us or an executing plan. */
+  lasted as long as a step may. True without an executing plan. */
   [[nodiscard]] bool IsOnSchedule(int step, std::int64_t now_us) const noexcept;
 
   /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed
@@ -237,12 +235,10 @@ class Guard final {
   void Reset() noexcept { halted_ = false; }
   /** After a reload of the task: also accepts plans certified under this configuration and model. The certifier may not
   have taken the new task yet, so plans of the old one are accepted until the first plan of the new one arrives.
-  The task's step error has to be GuardOptions::step_error_us, which stays.
-  @param domain the domain of these plans; nothing: the domain in force stays. @param angles, state_error likewise.
+  @param domain the domain of these plans; nothing: the domain in force stays. @param angles likewise.
   @throws std::invalid_argument as the constructor. What throws changes nothing. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
-              const std::optional<std::vector<int>>& angles = {},
-              const std::optional<std::vector<double>>& state_error = {});
+              const std::optional<std::vector<int>>& angles = {});
   [[nodiscard]] bool halted() const { return halted_; }
 
   /** The control that may be applied after the last step that passed: num_inputs entries. Empty if no plan is
@@ -256,11 +252,11 @@ class Guard final {
   [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
 
  private:
+  using StateError = std::array<double, 16>;
   struct Task {
     Digest config, model;
     std::optional<GuardDomain> domain;
     std::optional<Angles> angles;
-    std::optional<std::array<double, 16>> state_error;
   };
 
   [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, const Speaker& speaker, Bytes& bytes,
@@ -278,24 +274,23 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us,
                                          std::span<const double> error) const;
   [[nodiscard]] std::int64_t DueAfter(std::int64_t begin, int step) const;
-  [[nodiscard]] GuardVerdict ExamineDue(const candidate_plan_t& plan, int step, std::int64_t due, const char* by,
-                                        std::int64_t now_us) const;
-  [[nodiscard]] GuardVerdict ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineTime(const certified_plan_t& certified, int step, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineAgain(std::span<const double> state, std::int64_t now_us,
                                           std::span<const double> error) const;
   [[nodiscard]] GuardVerdict ExamineDuration(int step, std::int64_t began_utime, std::int64_t now_us) const;
-  [[nodiscard]] GuardVerdict ExamineMeasured(const Sensing& sensing, std::span<const double> state,
+  [[nodiscard]] GuardVerdict ExamineMeasured(const certified_plan_t& certified, std::span<const double> state,
                                              std::span<const double>& error) const;
 
   GuardOptions options_;
   std::vector<Task> expected_;  // by Expect
-  Sensing sensing_;             // of plans that are accepted now
+  Angles angles_;               // of plans that are accepted now
+  StateError state_error_{};    // of the plan that was accepted last
   std::optional<Authenticator> authenticator_;
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;  // plan_id
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
   std::unique_ptr<certified_plan_t> pending_, executing_;
-  Sensing pending_sensing_, executing_sensing_;
+  Angles pending_angles_, executing_angles_;
   int last_step_ = 0;                   // last checked step of the executing plan
   std::int64_t first_step_utime_ = 0;   // when the plan started
   std::int64_t last_step_utime_ = 0;    // when it was checked

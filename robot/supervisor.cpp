@@ -321,7 +321,7 @@ bool Supervisor::TakesOver(int standing) const {
   const auto step_us = static_cast<std::uint64_t>(options_.guard.step_us);
   const std::uint64_t after = ahead % step_us, off = std::min(after, step_us - after);  // from the nearest boundary
   const std::uint64_t boundary = ahead / step_us + (after > step_us - after ? 1 : 0);
-  return off <= static_cast<std::uint64_t>(StartTolerance(options_.guard)) &&
+  return off <= static_cast<std::uint64_t>(StartTolerance(*next)) &&
          boundary <= static_cast<std::uint64_t>(std::max(standing - step_, 0));
 }
 
@@ -360,9 +360,8 @@ void Supervisor::HoldIfMoving() {
 }
 
 void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
-                        const std::optional<std::vector<int>>& angles,
-                        const std::optional<std::vector<double>>& state_error) {
-  guard_.Expect(config_digest, model_digest, std::move(domain), angles, state_error);
+                        const std::optional<std::vector<int>>& angles) {
+  guard_.Expect(config_digest, model_digest, std::move(domain), angles);
 }
 
 void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) noexcept {

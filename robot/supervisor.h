@@ -13,10 +13,11 @@ call Boundary at every step boundary:
 Boundary does, in this order:
  1. FinishStep: if a plan is executing, sends the step that has ended as transition_t and checks the measured state
     against the certified slice: STEP_INSIDE, STEP_CONSISTENT, or STEP_OUTSIDE if it was left, an emergency stop. A step
-    that is further off its schedule than the guard's step_error_us is OFF_SCHEDULE, an emergency stop that needs no
+    that is further off its schedule than the plan's step_error_us is OFF_SCHEDULE, an emergency stop that needs no
     reset, wherever the robot is: no slice is about that time. No transition_t is sent for it: it did not last as long
     as the model's step, so it is no observation of that. Nor is one sent if the state at one of its ends was measured
-    with a larger error than the task declares, or one that Expect was told of;
+    with a larger error than the plan's, or with one of its own while a plan of a task that Expect was told of is
+awaited;
  2. a pending plan whose start_utime is this boundary takes over, in the middle of a plan or at rest: STARTED. If a
 check of the guard fails it is REFUSED, and the current plan goes on;
  3. otherwise the current plan goes on: TAIL_BEGUN where its braking tail begins, STANDING where it ends, with a hold;
@@ -48,8 +49,8 @@ executing is not affected by Expect.
   measured last, and ERROR_STOP follows it.
 - A boundary whose state could not be measured sends no robot_state_t, and leaves out its sequence number.
 - Boundary checks state and time again if FinishStep was called before it. So a control is returned only if the guard
-  has checked the state and the time of that call, whatever was called or threw before. The time is checked only with
-  GuardOptions::step_error_us.
+  has checked the state and the time of that call, whatever was called or threw before. The time is checked unless the
+  plan's step_error_us is -1.
 - If your program throws between the calls (a clock, a receiver), this object does not know it: hold until Boundary
   returns a control.
 
@@ -101,7 +102,7 @@ class Supervisor final {
     /** The state that was measured last: num_states entries. */
     [[nodiscard]] virtual std::span<const double> state() const = 0;
     /** How far the true state may be from state(), num_states entries, not negative: of an estimator, a stated multiple
-    of its standard deviations. Empty: as far as GuardOptions::state_error says. */
+    of its standard deviations. Empty: as far as the plan's state_error says. */
     [[nodiscard]] virtual std::span<const double> state_error() const { return {}; }
     /** Come to rest by your own means, and hold until Boundary returns a control. In an emergency nothing certified is
     left to execute, whatever the speed is. */
@@ -136,8 +137,8 @@ class Supervisor final {
   std::string OnCommand(Bytes message, std::int64_t now_us) noexcept;
 
   /** Handles a step boundary. @param utime the boundary's time. @param now_us later than that if the robot was held up;
-  a plan that has expired meanwhile is refused, and with the guard's step_error_us the plan under way ends where now_us
-  is too late. @param ends the robot ends its run: no further plan starts, and at rest it reports FINISHED.
+  a plan that has expired meanwhile is refused, and the plan under way ends where now_us is too late for its
+  step_error_us. @param ends the robot ends its run: no further plan starts, and at rest it reports FINISHED.
   @return the control to apply until the next boundary, num_inputs entries, valid until the next call of this object;
   empty: hold. */
   std::span<const double> Boundary(std::int64_t utime, std::int64_t now_us, bool ends = false) noexcept;
@@ -147,8 +148,7 @@ class Supervisor final {
 
   /** Guard::Expect. */
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
-              const std::optional<std::vector<int>>& angles = {},
-              const std::optional<std::vector<double>>& state_error = {});
+              const std::optional<std::vector<int>>& angles = {});
 
   /** Sends an event. @param text one sentence. */
   void Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) noexcept;

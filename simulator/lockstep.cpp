@@ -1,5 +1,6 @@
 #include "simulator/lockstep.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <utility>
@@ -58,12 +59,14 @@ void Lockstep::Run(Node* last) {
   if (last != nullptr) nodes.push_back(last);
   const auto end = now_us_ + static_cast<std::int64_t>((config_.robot.time_limit_s + 60) * 1e6);
   const auto is_done = [&] { return robot_.done() || (last != nullptr && last->done()); };
-  for (; !is_done() && now_us_ < end; now_us_ += kClockStepUs) {
+  while (!is_done() && now_us_ < end) {
     Perceive();
     for (Node* node : nodes) {
       node->Tick(now_us_);
       Deliver();
     }
+    const std::int64_t due_us = robot_.due_us();  // no boundary is late
+    now_us_ = now_us_ < due_us ? std::min(due_us, now_us_ + kClockStepUs) : now_us_ + kClockStepUs;
   }
 }
 

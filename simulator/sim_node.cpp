@@ -80,6 +80,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Pl
       sensor_(Disturbance::OfMeasurements(config.problem->declaration, config.robot)),
       jitter_(config),
       period_us_(Microseconds(config.robot.step_period_ms)),
+      most_late_us_(StepErrorUs(config.gate) ? period_us_ / 2 : 0),
       brake_(BrakeOf(config_)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
       obstacles_(config),
@@ -109,11 +110,14 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Pl
 void RobotSimNode::Tick(std::int64_t now_us) {
   TakeReload();
   if (!start_utime_) start_utime_ = now_us;
-  const auto next = [&] { return *start_utime_ + supervisor_.counts().boundaries * period_us_; };
-  while (!done() && next() + offset_us_ <= now_us) {
-    Boundary(next(), now_us);
-    offset_before_us_ = std::exchange(offset_us_, jitter_.Next());
+  while (!done() && due_us() <= now_us) {
+    Boundary(due_us() - offset_us_, now_us);
+    offset_us_ = jitter_.Next();
   }
+}
+
+std::int64_t RobotSimNode::due_us() const {
+  return start_utime_.value_or(0) + supervisor_.counts().boundaries * period_us_ + offset_us_;
 }
 
 void RobotSimNode::Reload() {
@@ -124,18 +128,17 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
-  if (StepErrorUs(config->gate) != StepErrorUs(config_.gate))  // the guard keeps its own
-    return logging::Error("not reloaded: robot.step_error_ms cannot change while the robot runs");
   ExpectTask(*config, supervisor_);
   logging::Info("plans certified under {} as it is now are accepted", config_.path);
 }
 
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
+  const std::int64_t late_us = std::clamp(now_us - utime, -most_late_us_, most_late_us_);
   const std::span<const double> control = supervisor_.control();
   const bool moves = !control.empty() || is_stopping_;
   if (!control.empty()) {
     is_stopping_ = false;
-    plant_(state_, control, state_, static_cast<double>(offset_us_ - offset_before_us_) * 1e-6);
+    plant_(state_, control, state_, static_cast<double>(late_us - late_before_us_) * 1e-6);
     disturbance_.Add(state_);
   } else if (is_stopping_) {
     BrakeUntil(utime);
@@ -153,6 +156,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   ReportGoal(utime);
   const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
   if (supervisor_.Boundary(utime, now_us, ends).empty() && ends && !is_stopping_) ++finished_boundaries_;
+  late_before_us_ = late_us;
   LogProgress(utime);
   LogRefusedStarts();
 }

@@ -1,7 +1,8 @@
 /** The simulated robot: a Plant that executes certified plans under the Supervisor, one step at a time.
 
 Step boundaries are due at t_j = t_0 + j * step_period, where t_0 is the first Tick, and come as early or late as
-robot.step_jitter says (step_jitter.h); messages carry the times at which they are due. At each boundary, in this order:
+robot.step_jitter says (step_jitter.h); messages carry the times at which they are due. Where the task has
+robot.step_error_ms, a step lasts as long as the clock says; otherwise step_period. At each boundary, in this order:
  1. The plant takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
     turned into [-pi, pi], its state is measured, with an error by robot.sensor_error, and the supervisor finishes the
     step. All that supervisor and bus see is the measured state.
@@ -60,6 +61,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   /** Handles every boundary up to `now_us`, microseconds since the Unix epoch. After a late call, each boundary keeps
   its own time. */
   void Tick(std::int64_t now_us) override;
+  /** The earliest time at which Tick handles the next boundary, once it has handled one. */
+  [[nodiscard]] std::int64_t due_us() const;
   [[nodiscard]] bool done() const override { return finished_boundaries_ >= kFinishedBoundaries; }
   /** Reads the task file in the background. */
   void Reload() override;
@@ -106,6 +109,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   Disturbance disturbance_, sensor_;
   StepJitter jitter_;
   const std::int64_t period_us_;
+  const std::int64_t most_late_us_;  // by which the plant knows of it; 0: the task looks at no clock
   const Brake brake_;
   Reloading<std::optional<Config>> reload_;
 
@@ -113,7 +117,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   std::vector<double> state_, measured_;  // the true one, and what the robot takes for it
   std::vector<double> state_before_;      // at the last boundary; empty before the first
   std::optional<std::int64_t> start_utime_;
-  std::int64_t offset_before_us_ = 0, offset_us_ = 0;  // of the last boundary, and of the next one
+  std::int64_t offset_us_ = 0;       // of the next boundary
+  std::int64_t late_before_us_ = 0;  // at the last one
   std::int64_t next_progress_utime_ = 0;
   std::string last_refusal_;  // of a plan at its start, since the state was outside its X0
   bool said_refusals_ = false;

@@ -14,13 +14,12 @@ class StepJitter final {
  public:
   explicit StepJitter(const Config& config);
 
-  /** The offset of the next boundary, microseconds; whole milliseconds where there is room for some, so that a
-  simulated clock of milliseconds shows it. random: uniform. adversarial: the most, early or late. The draws depend on
-  the seed and the number of calls only. */
+  /** The offset of the next boundary, microseconds. random: uniform. adversarial: the most, early or late. The draws
+  depend on the seed and the number of calls only. */
   [[nodiscard]] std::int64_t Next();
 
  private:
-  std::int64_t most_us_, unit_us_;
+  std::int64_t most_us_;
   bool is_adversarial_;
   std::mt19937_64 random_;
 };

@@ -1,7 +1,6 @@
 #include "simulator/supervised.h"
 
 #include "certifier/gate/stamp.h"
-#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -11,11 +10,6 @@ GuardDomain DomainOf(const Config& config) {
   const Domain& domain = config.problem->domain;
   return {entries(domain.state.lower()), entries(domain.state.upper()), entries(domain.input.lower()),
           entries(domain.input.upper())};
-}
-
-std::vector<double> StateErrorOf(const Config& config) {
-  const Eigen::VectorXd& error = config.problem->declaration.state_error;
-  return {error.begin(), error.end()};
 }
 
 }  // namespace
@@ -33,8 +27,6 @@ SupervisorOptions SupervisorOptionsOf(const Config& config) {
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
-  options.guard.state_error = StateErrorOf(config);
-  options.guard.step_error_us = StepErrorUs(config.gate);
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;
@@ -46,8 +38,7 @@ SupervisorOptions SupervisorOptionsOf(const Config& config) {
 }
 
 void ExpectTask(const Config& config, Supervisor& supervisor) {
-  supervisor.Expect(config.grounds.config, config.grounds.model, DomainOf(config), config.problem->model->angles(),
-                    StateErrorOf(config));
+  supervisor.Expect(config.grounds.config, config.grounds.model, DomainOf(config), config.problem->model->angles());
 }
 
 }  // namespace forereach

@@ -210,10 +210,11 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem(), plan, tube_));
 }
 
-Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noexcept {
+Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& upheld, int first_step) noexcept {
   try {
-    // The task may have been read again, with another dt.
+    // The task may have been read again, with another dt, more exact steps or less exact states.
     if (!WhyNoSchedule(candidate, options_).empty()) return {};
+    if (!upheld.Suffices(UpheldUnder(certifier_.problem(), options_))) return {};
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.all());
@@ -275,6 +276,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
     }
   }
   std::ranges::copy(decision.plan_digest, certified.plan_digest);
+  SetUpheld(certified, UpheldUnder(certifier_.problem(), options_));
   SetGrounds(certified, grounds());
   SetDigest(certified.transitions_digest, transitions_);
   SetDigest(certified.certificate_digest, CertificateDigest(certified));

@@ -15,6 +15,7 @@ not, the caller calls Refuse. */
 
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
+#include "certifier/gate/upheld.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
@@ -64,8 +65,10 @@ class Gate final {
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
   /** JudgeAgain (standing.h) under what is in force now. Outcome kNone: the plan cannot be judged under this task.
-  @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps. */
-  [[nodiscard]] Standing JudgeAgain(const candidate_plan_t& plan, int first_step) noexcept;
+  @param plan a candidate that this gate or one before a reload has certified. @param upheld what its certified plan
+  says that the guard upholds; if less than this task's certificates rest on, the plan cannot be judged.
+  @param first_step 0..num_steps. */
+  [[nodiscard]] Standing JudgeAgain(const candidate_plan_t& plan, const Upheld& upheld, int first_step) noexcept;
 
   /** What would have helped a candidate that this gate has abstained on (advice_message.h). Nothing if there is nothing
   to say, if other inputs than the decision's are in force, or if `effort` ended the search. The caller sets utime and

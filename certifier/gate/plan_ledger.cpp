@@ -77,10 +77,10 @@ void PlanLedger::Follow(const GateOptions& gate) {
   silence_us_ = gate.needs_robot_state ? std::optional(Microseconds(gate.robot_timeout_ms)) : std::nullopt;
 }
 
-void PlanLedger::Add(const certified_plan_t& certified, std::int64_t steady_us, const Sensing& sensing) {
+void PlanLedger::Add(const certified_plan_t& certified, std::int64_t steady_us, const Angles& angles) {
   ForgetEnded(steady_us);
   const auto whole = std::make_shared<const certified_plan_t>(certified);
-  KeepSlices({whole, sensing});
+  KeepSlices({whole, angles});
   const candidate_plan_t& plan = whole->plan;
   Record& record = Append(plan.plan_id, plan.num_steps);
   record.is_known = true;
@@ -205,11 +205,10 @@ std::optional<PlanLedger::Departure> PlanLedger::Compare(std::int64_t plan_id, i
   const certified_plan_t& certified = *slices->certified;
   if (step < 0 || step > certified.plan.num_steps || std::ssize(state) != certified.plan.num_states)
     return std::nullopt;
-  const Sensing& sensing = slices->sensing;
   for (std::size_t k = 0; k < state.size(); ++k) {
-    const double value = state[k], error = state_error.empty() ? sensing.state_error[k] : state_error[k];
+    const double value = state[k], error = state_error.empty() ? certified.state_error[k] : state_error[k];
     const double lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
-    if (Conform(value, error, lower, upper, sensing.angles[k]) == Conformance::kLeft)
+    if (Conform(value, error, lower, upper, slices->angles[k]) == Conformance::kLeft)
       return Departure{plan_id, step, static_cast<int>(k), value, error, lower, upper};
   }
   return std::nullopt;
@@ -390,7 +389,7 @@ void PlanLedger::Judge(Record& record, Gate& gate) {
     return Withdraw(
         record, gate.grounds(),
         Unjudged(withdrawal_t::NOT_JUDGED, "something has changed, and newer plans are judged in its place"));
-  const Standing standing = gate.JudgeAgain(force.judged->plan, force.first_step);
+  const Standing standing = gate.JudgeAgain(force.judged->plan, UpheldBy(*force.judged), force.first_step);
   if (standing.verdict.outcome == Outcome::kCertified) return;
   if (force.is_withdrawn && standing.steps >= force.standing_steps) return;
   Withdraw(record, gate.grounds(), Judged(standing, gate.certifier().problem()));

@@ -112,9 +112,9 @@ class PlanLedger final {
   /** Uses new options from now on. */
   void Follow(const GateOptions& gate);
   /** Adds a plan that was certified and sent. Its slices replace those of a plan of the same plan_id, unless that plan
-  is executing: a guard does not accept the plan_id that it executes. @param sensing what the task that it was certified
-  with says of measured states. @pre not IsFull(). Cost: a copy of the plan. */
-  void Add(const certified_plan_t& certified, std::int64_t steady_us, const Sensing& sensing = {});
+  is executing: a guard does not accept the plan_id that it executes. @param angles the states that are angles in the
+  task that it was certified with. @pre not IsFull(). Cost: a copy of the plan. */
+  void Add(const certified_plan_t& certified, std::int64_t steady_us, const Angles& angles = {});
   /** Another certifier is in charge: no plan is in force, and slices and states are forgotten. It is still known which
   plans were certified. */
   void StandBy();
@@ -123,7 +123,7 @@ class PlanLedger final {
 
   /** Tests a usable state against the slice of the step that it names. If the robot has advanced by one boundary while
   executing, it also tests the state against the slice of the plan that was executing before. Its error is the message's
-  or, if that has none, the declared one. Nothing if the slices were not left, or if the plan's are not remembered.
+  or, if that has none, the plan's. Nothing if the slices were not left, or if the plan's are not remembered.
   @param sender of the message: only the same robot's states and transitions are about one step. Cost O(n + kSlices). */
   [[nodiscard]] std::optional<Departure> FindDeparture(const robot_state_t& state, SenderId sender = {});
   /** Takes the robot's word that it has stopped the plan that it executed when it was last heard, in that step or at
@@ -207,7 +207,7 @@ class PlanLedger final {
   };
   struct Slices {
     Whole certified;
-    Sensing sensing;
+    Angles angles;
   };
   struct Place {
     std::int64_t utime = -1, plan_id = -1;  // plan -1: not executing

@@ -45,12 +45,6 @@ double LongerThanDt(std::int64_t duration_us, double dt) {
 
 }  // namespace
 
-Sensing SensingOf(const Problem& problem) {
-  Sensing sensing{AnglesOf(problem.model->angles(), problem.model->num_states()), {}};
-  std::ranges::copy(problem.declaration.state_error, sensing.state_error.begin());
-  return sensing;
-}
-
 ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
   const NominalModel& model = *problem.model;
   const int n = model.num_states(), m = model.num_inputs();

@@ -20,9 +20,6 @@ not one for each state, negative or not finite, an unknown mode. Empty if it is 
 certificates and its comparison with the slices rest on. Empty if none is. @pre FaultOf is empty. */
 [[nodiscard]] std::string WiderThanDeclared(const robot_state_t& state, const Problem& problem);
 
-/** What a task says of measured states. */
-[[nodiscard]] Sensing SensingOf(const Problem& problem);
-
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
   double longer = 0;            ///< By how much the step lasted longer or shorter than dt, at most, s.

@@ -479,7 +479,10 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
 
   if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
   sender_.Send(channels_.decision, answer.decision);
-  if (answer.certified) plans_.Add(*answer.certified, clocks_.steady(), SensingOf(*config_.problem));
+  if (answer.certified) {
+    const NominalModel& model = *config_.problem->model;
+    plans_.Add(*answer.certified, clocks_.steady(), AnglesOf(model.angles(), model.num_states()));
+  }
   reporter_.CountDecision(elapsed.count());
   advice_.Note(candidate, answer.decision, gate_->options());
 }

@@ -6,7 +6,6 @@
 #include "bus/bus_options.h"
 #include "bus/log.h"
 #include "lcmtypes/why_failed.h"
-#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -59,7 +58,6 @@ std::string TaskReload::WhyNotTaken(const Config& config, const Config& in_force
            {config.realtime != in_force.realtime, "realtime"},
            {config.gate.obstacles != in_force.gate.obstacles, "gate.obstacles"},
            {config.gate.max_clock_error_ms != in_force.gate.max_clock_error_ms, "gate.max_clock_error_ms"},
-           {StepErrorUs(config.gate) != StepErrorUs(in_force.gate), "robot.step_error_ms"},  // the guard keeps its own
            {config.gate.state != in_force.gate.state, "gate.state"},
            {after.model->num_states() != before.model->num_states(), "the number of states"},
            {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},

@@ -1,6 +1,5 @@
 // A robot that executes certified plans and nothing else: a point mass as in config/point_mass.yaml, without keys. Your
-// robot also sets guard.keys, config_digest, model_digest, domain, step_error_us and state_error (robot/guard.h),
-// and signs its messages.
+// robot also sets guard.keys, config_digest, model_digest and domain (robot/guard.h), and signs its messages.
 //   robot [URL [BOUNDARIES]]      by default on the loopback bus, without end
 #include <chrono>
 #include <iostream>

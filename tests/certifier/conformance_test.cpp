@@ -133,7 +133,7 @@ TEST_F(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
 
 TEST_F(ConformanceTest, AnAngleMayDifferByWholeTurns) {
   constexpr double kTurn = 2 * std::numbers::pi;
-  ledger_.Add(Plan(7), 0, {Angles(0b10)});
+  ledger_.Add(Plan(7), 0, Angles(0b10));
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1.5, 1.5)));
   EXPECT_FALSE(ledger_.FindDeparture(At(10, 7, 1, 1.5, 1.5 + kTurn)));
   EXPECT_FALSE(ledger_.FindDeparture(At(20, 7, 1, 1.5, 1.5 - 3 * kTurn)));
@@ -142,13 +142,13 @@ TEST_F(ConformanceTest, AnAngleMayDifferByWholeTurns) {
   EXPECT_TRUE(ledger_.FindDeparture(At(50, 7, 1, 1.5, 1 + kTurn))) << "at the end of the slice it cannot be told";
   ledger_.Add(Plan(8), 0);
   EXPECT_TRUE(ledger_.FindDeparture(At(60, 8, 1, 1.5, 1.5 + kTurn))) << "a plan of a task without angles";
-  ledger_.Add(Plan(8), 0, {Angles(0b10)});
+  ledger_.Add(Plan(8), 0, Angles(0b10));
 }
 
 TEST_F(ConformanceTest, ASliceIsLeftByMoreThanTheStateErrorOnly) {
-  Sensing sensing;
-  sensing.state_error = {0, 0.25};
-  ledger_.Add(Plan(7), 0, sensing);
+  certified_plan_t plan = Plan(7);
+  plan.state_error[1] = 0.25;
+  ledger_.Add(plan, 0);
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1, 2.25)));
   EXPECT_FALSE(ledger_.FindDeparture(At(10, 7, 1, 2, 0.75)));
   const auto above = ledger_.FindDeparture(At(20, 7, 1, 1, std::nextafter(2.25, 3)));
@@ -162,9 +162,9 @@ TEST_F(ConformanceTest, ASliceIsLeftByMoreThanTheStateErrorOnly) {
 }
 
 TEST_F(ConformanceTest, AStateMayBringItsOwnError) {
-  Sensing sensing;
-  sensing.state_error = {0, 0.25};
-  ledger_.Add(Plan(7), 0, sensing);
+  certified_plan_t plan = Plan(7);
+  plan.state_error[1] = 0.25;
+  ledger_.Add(plan, 0);
   const auto at = [](std::int64_t sequence, double y, double error) {
     robot_state_t state = At(sequence, 7, 1, 1, y);
     state.num_state_errors = 2;
@@ -178,9 +178,9 @@ TEST_F(ConformanceTest, AStateMayBringItsOwnError) {
 }
 
 TEST_F(ConformanceTest, TheEndOfAStepMayBeOffByTheDeclaredError) {
-  Sensing sensing;
-  sensing.state_error = {0.25, 0};
-  ledger_.Add(Plan(7), 0, sensing);
+  certified_plan_t plan = Plan(7);
+  plan.state_error[0] = 0.25;
+  ledger_.Add(plan, 0);
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
   EXPECT_FALSE(ledger_.FindDeparture(Step(0, 2.25, 2)));
   EXPECT_TRUE(ledger_.FindDeparture(Step(0, std::nextafter(2.25, 3), 2)));

@@ -98,6 +98,21 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
   EXPECT_EQ(GetDigest(certified.transitions_digest), config_.grounds.observations);
 }
 
+TEST_F(GateAnswerTest, ACertifiedPlanSaysWhatItsGuardHasToUphold) {
+  for (const auto& [step_error_ms, step_error_us] : {std::pair(kAnyTime, -1), {0.0, 0}, {5.0, 5000}}) {
+    Problem problem = *config_.problem;
+    problem.declaration.state_error = Eigen::Vector4d(0.01, 0, 0.02, 0);
+    config_.problem = std::make_shared<const Problem>(problem);
+    config_.gate.step_error_ms = step_error_ms;
+    const GateAnswer answer = Gate(config_).Decide(Encode(Candidate(7)), kNow);
+    ASSERT_TRUE(answer.certified);
+    EXPECT_EQ(answer.certified->step_error_us, step_error_us);
+    EXPECT_THAT(std::vector(answer.certified->state_error, answer.certified->state_error + 5),
+                ElementsAre(0.01, 0, 0.02, 0, 0));
+    EXPECT_THAT(FindSealFaults(*answer.certified), IsEmpty());
+  }
+}
+
 TEST_F(GateAnswerTest, ACertificateNamesTheTransitionsOfTheTaskWithoutWhatWasLearned) {
   Gate gate(config_);
   transition_t learned{.utime = kNow, .num_states = 4, .num_inputs = 2};

@@ -1,6 +1,8 @@
 // The ledger of certified plans: they are judged again, how many controls stand, and when withdrawals are sent.
 #include "certifier/gate/plan_ledger.h"
 
+#include <fmt/format.h>
+
 #include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
@@ -163,6 +165,48 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
     plans.Judge(reloaded, now_);
     const auto due = plans.TakeDue(now_, now_);
     ASSERT_TRUE(due);
+    EXPECT_EQ(due->message.cause, withdrawal_t::NOT_JUDGED);
+    EXPECT_EQ(due->message.valid_steps, 0);
+  }
+}
+
+// The guard goes on by the plan, under whatever task the certifier is.
+TEST_F(PlansInForceTest, APlanStandsUnderANewTaskOnlyIfItsGuardUpholdsWhatThatRestsOn) {
+  const auto with = [&](double step_error_ms, double error_of_py) {
+    Config config = config_;
+    Problem problem = *config_.problem;
+    problem.declaration.state_error[1] = error_of_py;
+    config.gate.step_error_ms = step_error_ms;
+    config.problem = std::make_shared<const Problem>(problem);
+    config.grounds.config = DigestOf(fmt::format("{} {}", step_error_ms, error_of_py));
+    return config;
+  };
+  struct {
+    double before_ms, after_ms, before_m, after_m;
+    bool stands;
+  } const cases[] = {{5, 5.001, 0, 0, true},
+                     {5, 4.999, 0, 0, false},
+                     {5, kAnyTime, 0, 0, true},
+                     {kAnyTime, 5, 0, 0, false},
+                     {kAnyTime, kAnyTime, 0.01, 0.0099, true},
+                     {5, 6, 0.01, 0.0101, false}};
+  for (const auto& [before_ms, after_ms, before_m, after_m, stands] : cases) {
+    SCOPED_TRACE(fmt::format("{} {} {} {}", before_ms, after_ms, before_m, after_m));
+    Gate gate(with(before_ms, before_m));
+    PlanLedger plans(config_.gate, now_);
+    obstacles_t message = ToMessage({}, now_);
+    message.sequence = sequence_++;
+    ASSERT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
+    plans.Judge(gate, now_);
+    const auto certified = gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified;
+    ASSERT_TRUE(certified);
+    plans.Add(*certified, now_);
+    Gate reloaded(with(after_ms, after_m));
+    reloaded.Inherit(gate);
+    plans.Judge(reloaded, now_);
+    const auto due = plans.TakeDue(now_, now_);
+    EXPECT_EQ(due.has_value(), !stands);
+    if (!due) continue;
     EXPECT_EQ(due->message.cause, withdrawal_t::NOT_JUDGED);
     EXPECT_EQ(due->message.valid_steps, 0);
   }

@@ -12,6 +12,7 @@
 #include "certifier/gate/gate.h"
 #include "forereach/command_t.hpp"
 #include "robot/supervisor.h"
+#include "task/step_time.h"
 #include "tests/certifier/small_task.h"
 #include "tests/faults/kind.h"
 #include "tests/keys.h"
@@ -63,13 +64,20 @@ class Supervising final {
   const bool before_;
 };
 
+Config StepsWithinJitter(Config config) {
+  config.gate.step_error_ms = kJitterUs * 1e-3;
+  Problem problem = *config.problem;
+  problem.timing.error = StepErrorSeconds(config);
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  return config;
+}
+
 SupervisorOptions OptionsFor(const Config& config) {
   SupervisorOptions options;
   options.guard = {config.problem->model->num_states(), config.problem->model->num_inputs(), kStepUs,
                    config.grounds.config, config.grounds.model};
   options.guard.keys = TestKeys("campaign");
   options.guard.bus_name = kBusName;
-  options.guard.step_error_us = kJitterUs;
   return options;
 }
 
@@ -203,7 +211,7 @@ class ThrowingRobot final : private Supervisor::Robot {
   }
 
   std::mt19937& random_;
-  const Config config_ = SmallTask();
+  const Config config_ = StepsWithinJitter(SmallTask());
   Gate gate_{config_};
   Signer signer_{TestKeys("campaign"), kBusName};
   State state_{};

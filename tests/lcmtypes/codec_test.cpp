@@ -33,7 +33,7 @@ const std::map<std::string, Contract> kContracts = {
     {"logger_status_t", {0x2a2438623a759ef0, 260}},   {"command_t", {0x1b315e627593a95f, 58}},
     {"fault_t", {0x85189bcc15840698, 866}},           {"certifier_status_t", {0xf224554c7bae02b5, 1220}},
     {"obstacle_t", {0xbbad85e96469971b, 488}},        {"obstacles_t", {0xc1a2a66356f23f34, 30746}},
-    {"withdrawal_t", {0x143744ac67af3ba6, 482}},      {"certified_plan_t", {0xef35232fd0f5e514, 41840}},
+    {"withdrawal_t", {0x143744ac67af3ba6, 482}},      {"certified_plan_t", {0xd6bfba8d7729f625, 41976}},
     {"advice_change_t", {0x2820254c63772fe1, 56}},    {"advice_t", {0xc708fe6c4a3d4e09, 654}},
 };
 

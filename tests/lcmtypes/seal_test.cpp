@@ -28,6 +28,8 @@ certified_plan_t Plan(int states, int steps) {
       certified.slice_lower[t][k] = -1 - t - 0.1 * k;
       certified.slice_upper[t][k] = 1 + t + 0.1 * k;
     }
+  for (int k = 0; k < states; ++k) certified.state_error[k] = 0.01 * (k + 1);
+  certified.step_error_us = 3000;
   SetDigest(certified.config_digest, DigestOf("config"));
   SetDigest(certified.model_digest, DigestOf("model"));
   SetDigest(certified.declaration_digest, DigestOf("declaration"));
@@ -66,15 +68,16 @@ TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
     for (int bound = 0; bound < 2; ++bound, slices += kAllSlices * kRow)
       for (std::size_t t = 0; t <= static_cast<std::size_t>(steps); ++t)
         cover(slices + t * kRow, static_cast<std::size_t>(states) * sizeof(double));
-    cover(slices, 7 * sizeof(Digest));
+    cover(slices, static_cast<std::size_t>(states) * sizeof(double));
+    cover(slices + kRow, sizeof(std::int64_t) + 7 * sizeof(Digest));
     EXPECT_EQ(CertificateDigest(certified), DigestOf(covered));
-    EXPECT_EQ(covered.size(), 256u + 16u * static_cast<unsigned>(states * (steps + 1)));
+    EXPECT_EQ(covered.size(), 264u + 8u * static_cast<unsigned>(states + 2 * states * (steps + 1)));
   }
 }
 
 // Fast for good: other implementations have to come to the same.
 TEST(Seal, DigestOfAnExampleIsTheRecordedOne) {
-  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "f7d10124a54a007bccd52d554097834e3a705860ebdb4ca31e9a304a4c29e4ce");
+  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "2963f9eac474ff9e4ae878a21a3d06f12f2d9282f9c48147c226fb7e26c7ad7f");
 }
 
 // Of a small plan each byte, of the largest one in eight at random.
@@ -101,6 +104,13 @@ TEST(Seal, BreaksWhenASliceInUseChangesByOneUlp) {
   EXPECT_THAT(FaultsAfter([&](auto& c) { nudge(c.slice_lower[0][0]); }), ElementsAre(Kind::kCertificateDigest));
 }
 
+TEST(Seal, BreaksWhenWhatTheGuardUpholdsChanges) {
+  EXPECT_THAT(FaultsAfter([](auto& c) { c.state_error[5] = std::nextafter(c.state_error[5], 0); }),
+              ElementsAre(Kind::kCertificateDigest));
+  for (const std::int64_t other : {-1, 2999, 3001})
+    EXPECT_THAT(FaultsAfter([&](auto& c) { c.step_error_us = other; }), ElementsAre(Kind::kCertificateDigest)) << other;
+}
+
 TEST(Seal, BreaksWhenAnUnusedEntryIsNotZero) {
   for (const double stray :
        {1.0, -0.0, std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::quiet_NaN()}) {
@@ -108,6 +118,7 @@ TEST(Seal, BreaksWhenAnUnusedEntryIsNotZero) {
     EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[13][0] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
     EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[128][15] = stray; }), ElementsAre(Kind::kUnusedEntry))
         << stray;
+    EXPECT_THAT(FaultsAfter([&](auto& c) { c.state_error[6] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
   }
 }
 

@@ -13,7 +13,6 @@ int main() {
   const ScratchDirectory scratch;
   Config config = LoadConfig(kCourseTask);
   config.logger.directory = scratch / "log";
-  config.gate.step_error_ms = kAnyTime;
   Config world = config;  // what the file does not know comes by the bus
   world.obstacles = {Obstacle::Circle(Eigen::Vector2d(100, 1), 2.5)};
   Lockstep lockstep(config, world, kBegins);

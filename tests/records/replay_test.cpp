@@ -8,6 +8,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "lcmtypes/seal.h"
 #include "records/event_log.h"
 #include "records/replay.h"
 #include "tests/certifier/small_task.h"
@@ -218,6 +219,13 @@ TEST_F(ReplayTest, ACertifiedPlanThatWasAlteredIsListed) {
               HasSubstr("slice_upper[100][0] is 0.5, it has to be 0"));
   EXPECT_THAT(difference([](auto& c) { c.plan.control[0][0] += 1; }), HasSubstr("plan_digest"));
   EXPECT_THAT(difference([](auto& c) { c.expires_utime += 1; }), HasSubstr("certificate_digest"));
+  const auto resealed = [&](auto alter) {
+    return difference([&](auto& c) { alter(c), SetDigest(c.certificate_digest, CertificateDigest(c)); });
+  };
+  EXPECT_THAT(resealed([](auto& c) { c.step_error_us = 5000; }),
+              HasSubstr("step_error_us is 5000, it is -1 in the task"));
+  EXPECT_THAT(resealed([](auto& c) { c.state_error[5] = 0.25; }),
+              HasSubstr("state_error[5] is 0.25, it is 0 in the task"));
 }
 
 // The seam lies between a candidate and its decision.

@@ -7,11 +7,14 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "bus/log.h"
 #include "bus/process.h"
 #include "command_line/command_line.h"
 #include "command_line/progress.h"
+#include "forereach/fault_t.hpp"
+#include "lcmtypes/codec.h"
 #include "simulator/drive_counts.h"
 #include "simulator/lockstep.h"
 #include "task/step_time.h"
@@ -35,9 +38,15 @@ std::string TextOf(const DriveCounts& all) {
                      all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
 }
 
+struct Drive {
+  DriveCounts counts;
+  std::string fault;            // the first that was latched; empty: none
+  std::vector<double> ends_at;  // the measured state
+};
+
 // Even seeds have an adversary, odd ones disturbances, errors of measurement and steps off their times at random, all
 // within what the task declares.
-DriveCounts Drive(Config config, const Config& world, int seed) {
+Drive DriveOnce(Config config, const Config& world, int seed) {
   constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
   config.planner.seed = seed;
   config.robot.disturbance_seed = seed;
@@ -46,8 +55,15 @@ DriveCounts Drive(Config config, const Config& world, int seed) {
   if (!config.problem->declaration.state_error.isZero(0)) config.robot.sensor_error = kind;
   if (StepErrorUs(config.gate).value_or(0) > 0) config.robot.step_jitter = kind;
   Lockstep lockstep(config, world, kStartUs);
+  Drive drive;
+  lockstep.bus().Subscribe(config.bus.fault, [&drive](const Received& received) {
+    const auto fault = Decoded<fault_t>(received.bytes);
+    if (fault && drive.fault.empty()) drive.fault = GetText(fault->message);
+  });
   lockstep.Run();
-  return CountsOf(lockstep);
+  drive.counts = CountsOf(lockstep);
+  drive.ends_at.assign(lockstep.robot().state().begin(), lockstep.robot().state().end());
+  return drive;
 }
 
 // The task of a robot that measures with errors, a share of what its planner allows a start, and takes its steps off
@@ -74,18 +90,24 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
   const auto begin = std::chrono::steady_clock::now();
   DriveCounts all;
   std::string bad;
+  bool all_good = true;
   {
     Progress progress(name + " drives", static_cast<std::size_t>(options.seeds));
     for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
-      const DriveCounts drive = Drive(config, world, seed);
-      if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), TextOf(drive));
-      all += drive;
+      const Drive drive = DriveOnce(config, world, seed);
+      const bool is_good = drive.fault.empty() && drive.counts.good();
+      if (!is_good)
+        bad += fmt::format("{:>26} {}, abstained {}, {}, ends at {:.2f}\n", fmt::format("seed {}", seed),
+                           TextOf(drive.counts), drive.counts.abstained,
+                           drive.fault.empty() ? "no fault" : "fault: " + drive.fault, fmt::join(drive.ends_at, ", "));
+      all_good = all_good && is_good;
+      all += drive.counts;
       progress.Advance();
     }
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
   std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", name, TextOf(all), seconds.count()) << bad << std::flush;
-  return all.good();
+  return all_good;
 }
 
 int Run(const Options& options) {

@@ -20,9 +20,9 @@ void Seal(Certified& certified) {
 
 inline constexpr std::int64_t kPlanStart = 1'000'000'000'000, kPlanStepUs = 40'000;
 
-/** Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5]. Not
-sealed. */
-inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
+/** Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5]; states are
+exact. Not sealed. */
+inline certified_plan_t SmallPlan(std::int64_t plan_id = 7, std::int64_t step_error_us = -1) {
   certified_plan_t certified{};
   candidate_plan_t& plan = certified.plan;
   plan.plan_id = plan_id;
@@ -37,6 +37,7 @@ inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
   plan.initial_half_width[0] = 0.5;
   plan.initial_half_width[1] = 0.25;
   certified.expires_utime = kPlanStart + kPlanStepUs;
+  certified.step_error_us = step_error_us;
   for (int t = 0; t <= 3; ++t) {
     certified.slice_lower[t][0] = -10 - t;
     certified.slice_upper[t][0] = 10 + t;

@@ -7,6 +7,7 @@
 #include "bus/authentic_bus.h"
 #include "bus/log.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/upheld.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/dynamics/models/named_models.h"
@@ -54,6 +55,7 @@ certified_plan_t Plan(const Config& config, std::int64_t id, int start, const st
   certified_plan_t certified{};
   certified.utime = certified.plan.utime = BoundaryTime(0);
   certified.expires_utime = BoundaryTime(start) + kPeriod;
+  SetUpheld(certified, UpheldUnder(*config.problem, config.gate));
   candidate_plan_t& plan = certified.plan;
   plan.plan_id = id;
   plan.start_utime = BoundaryTime(start);
@@ -101,6 +103,14 @@ class Rig {
       node_.Tick(now_);
     }
     bus_->Dispatch(0);
+  }
+  /** Handles boundary j late, at once with those before it. */
+  void TickLate(int j, std::int64_t late_us) {
+    now_ = BoundaryTime(j) + late_us;
+    bus_->Dispatch(0);
+    node_.Tick(now_);
+    bus_->Dispatch(0);
+    now_ += 2000;
   }
 
   [[nodiscard]] std::vector<double> StateAt(int j) const {
@@ -968,8 +978,27 @@ TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
   }
 }
 
-// Its guard keeps the step error that it began with.
-TEST(RobotSim, ATaskWithAnotherStepErrorIsNotTaken) {
+// Otherwise what it reports of a step would contradict a true declaration.
+TEST(RobotSim, AStepLastsAsLongAsTheClockSays) {
+  for (const bool looks_at_time : {true, false}) {
+    Config config = PointMassTask();
+    config.gate.step_error_ms = looks_at_time ? 5.0 : kAnyTime;
+    std::vector<double> longer;
+    Rig rig(config, [&](auto x, auto, auto next, double by) {
+      std::ranges::copy(x, next.begin());
+      longer.push_back(by);
+    });
+    rig.RunTo(0);
+    rig.Send(Plan(config, 1, 1, kOrigin));
+    for (const auto& [j, late_us] : {std::pair(1, 300), {2, 1700}, {3, 500}}) rig.TickLate(j, late_us);
+    ASSERT_EQ(rig.transitions.size(), 2u);
+    EXPECT_EQ(rig.transitions[0].duration_us, kPeriod + 1400);
+    EXPECT_EQ(rig.transitions[1].duration_us, kPeriod - 1200);
+    EXPECT_THAT(longer, looks_at_time ? ElementsAre(1400 * 1e-6, -1200 * 1e-6) : ElementsAre(0, 0));
+  }
+}
+
+TEST(RobotSim, HoldsEachPlanToTheStepErrorOfItsTask) {
   const ScratchDirectory scratch;
   const std::string path = scratch / "task.yaml";
   const auto write = [&](const std::string& step_error_ms) {
@@ -993,22 +1022,21 @@ TEST(RobotSim, ATaskWithAnotherStepErrorIsNotTaken) {
     rig.RunTo(++at);
   };
   std::int64_t id = 0;
-  for (const auto& [step_error_ms, kind] : {std::pair("12", kRefused), {"10.0", kAccepted}}) {
+  for (const auto& [step_error_ms, late_us, kind] :
+       {std::tuple("12", 12'000, kStarted), {"12", 12'001, kRefused}, {"10", 10'001, kRefused}}) {
     const Config config = write(step_error_ms);
     reload();
-    certified_plan_t plan = Plan(config, ++id, at + 3, config.robot.start);
+    certified_plan_t plan = Plan(config, ++id, ++at, config.robot.start, 2);
     for (int t = 0; t <= plan.plan.num_steps; ++t)
       for (int k = 0; k < plan.plan.num_states; ++k) {
         plan.slice_lower[t][k] = config.problem->domain.state.lower()[k];
         plan.slice_upper[t][k] = config.problem->domain.state.upper()[k];
       }
     rig.Send(plan);
-    rig.RunTo(++at);
+    rig.TickLate(at, late_us);
     ASSERT_FALSE(rig.events.empty());
-    EXPECT_EQ(rig.events.back().kind, kind) << GetText(rig.events.back().message);
-    if (kind == kRefused) {
-      EXPECT_THAT(GetText(rig.events.back().message), testing::StartsWith("config_digest"));
-    }
+    EXPECT_EQ(rig.events.back().kind, kind) << late_us << ": " << GetText(rig.events.back().message);
+    rig.RunTo(at += 3);
   }
 }
 

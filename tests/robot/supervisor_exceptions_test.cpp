@@ -62,13 +62,12 @@ SupervisorOptions OnTime() {
   options.guard.num_states = 2;
   options.guard.num_inputs = 1;
   options.guard.step_us = kPlanStepUs;
-  options.guard.step_error_us = kJitterUs;
   return options;
 }
 
 // The slices of all steps are (1 +- 0.1) x (-2 +- 0.1).
 certified_plan_t NarrowPlan(std::int64_t plan_id = 7, std::int64_t start_utime = kPlanStart) {
-  certified_plan_t certified = SmallPlan(plan_id);
+  certified_plan_t certified = SmallPlan(plan_id, kJitterUs);
   certified.plan.start_utime = start_utime;
   certified.expires_utime = start_utime + kPlanStepUs;
   for (int t = 0; t <= 3; ++t)

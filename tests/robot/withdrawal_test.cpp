@@ -360,7 +360,6 @@ TEST_F(SupervisorWithdrawTest, APlanThatStartsBetweenTheBoundariesDoesNotTakeOve
     brake_.emplace(std::vector<double>{kFarthest, 0});
     SupervisorOptions options;
     options.guard = TwoStates();
-    options.guard.step_error_us = kJitter;
     Supervisor::Robot& robot = *this;
     supervisor_.emplace(options, robot);
     holds_ = 0;
@@ -368,6 +367,7 @@ TEST_F(SupervisorWithdrawTest, APlanThatStartsBetweenTheBoundariesDoesNotTakeOve
     EXPECT_TRUE(Boundary(0));
     certified_plan_t next = PlanFrom(2, 8);
     next.plan.start_utime += off;
+    next.step_error_us = kJitter;
     Accept(next);
     Withdraw(PlanFrom(0, 7), 2);
     EXPECT_EQ(Boundary(1), std::abs(off) == kJitter) << off << ": else the stop begins while it fits";
