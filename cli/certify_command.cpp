@@ -44,8 +44,8 @@ void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& t
   if (const Declaration& declaration = certifier.problem().declaration; declaration.IsDisturbed()) {
     std::cout << "\n  each step disturbed by up to:";
     for (std::size_t k = 0; k < names.size(); ++k)
-      if (const double bound = declaration.DisturbanceBound(static_cast<Eigen::Index>(k)); bound != 0)
-        std::cout << " " << names[k] << " " << RoundedDown(bound);
+      if (const std::string bound = declaration.DisturbanceText(static_cast<Eigen::Index>(k)); bound != "0")
+        std::cout << " " << names[k] << " " << bound;
   }
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }
