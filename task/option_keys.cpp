@@ -332,9 +332,10 @@ std::vector<Key> RobotKeys() {
           [](const Declaration& declaration) { return declaration.IsDisturbed(); }, "disturbance",
           "In each step, within declaration.disturbance. random: of each state a uniform value. adversarial: "
           "of each state its bound, with signs that stay for 1 to 32 steps."),
-      WithinDeclared(robot, "sensor_error", &RobotOptions::sensor_error,
+      WithinDeclared(
+          robot, "sensor_error", &RobotOptions::sensor_error,
           [](const Declaration& declaration) { return !declaration.state_error.isZero(0); }, "state_error",
-                     "By how much measured states are off the true ones, within declaration.state_error: likewise."),
+          "By how much measured states are off the true ones, within declaration.state_error: likewise."),
       RobotJitter(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
                     "Of the random numbers of disturbance, sensor_error and step_jitter."),

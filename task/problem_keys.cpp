@@ -111,11 +111,12 @@ void RequireFinite(const Field& at, const GrowingDisturbance& growing, const Tas
   const auto unbounded = growing.FindUnbounded(draft.problem.domain.Ranges());
   if (!unbounded) return;
   std::string place;
-  for (std::size_t l = 0; l < draft.scope.variables.size(); ++l)
-    place += fmt::format("{}{} {}", l == 0 ? "" : ", ", draft.scope.variables[l],
-                         RoundedDown(unbounded->second[l].Middle()));
+  const std::vector<Interval> domain = draft.problem.domain.Ranges();
+  for (std::size_t l = 0; l < domain.size(); ++l)
+    if (const Interval& range = unbounded->second[l]; range.lower != domain[l].lower || range.upper != domain[l].upper)
+      place += fmt::format("{} {} {:.4g}", place.empty() ? " near" : ",", draft.scope.variables[l], range.Middle());
   at.Fail(draft.scope.states[ToSize(unbounded->first)],
-          "has to have a finite value everywhere in the domain's box; nothing bounds it near " + place);
+          "has to have a finite value everywhere in the domain's box, and nothing bounds it" + place);
 }
 
 // By names: numbers and expressions.

@@ -518,8 +518,8 @@ Real TubeMaker::Growth(const Real& share) const {
   return share * sum;
 }
 
-// The largest disturbance of each state over a box, with the ends of what is not known exactly. Not finite where nothing
-// bounds it.
+// The largest disturbance of each state over a box, with the ends of what is not known exactly. Not finite where
+// nothing bounds it.
 std::vector<Real> TubeMaker::DisturbanceOver(std::span<const Real> box) const {
   std::vector<Real> sum = disturbance_;
   if (!growing_) return sum;
@@ -572,7 +572,8 @@ void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector
     const Real most = (seen.magnitude() + hidden) / (Real(1.0) - growth);
     const Real turned = errors[k] + moved + growth * (Real(1.5) * Real::Pi() + off + disturbance[k]);
     const bool is_told = !is_angle || (difference.IsFinite() && WithoutTurns(difference, turned).IsFinite());
-    const bool is_known = rate[k].IsFinite() && disturbance[k].IsFinite() && CertainlyBelow(growth, Real(1.0)) && is_told;
+    const bool is_known =
+        rate[k].IsFinite() && disturbance[k].IsFinite() && CertainlyBelow(growth, Real(1.0)) && is_told;
     errors[k] += is_known ? moved + growth * (most + disturbance[k]) : Real::Everything();
   }
 }

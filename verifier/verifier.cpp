@@ -149,7 +149,8 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
     return {Status::kCannotVerify,
             {-1, "cannot verify: no equations for the model " + problem_->model->name() + reason_, "", ""}};
   if (!functions_)
-    return {Status::kCannotVerify, {-1, "cannot verify: a limit, place or disturbance is no expression" + reason_, "", ""}};
+    return {Status::kCannotVerify,
+            {-1, "cannot verify: a limit, place or disturbance is no expression" + reason_, "", ""}};
   if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
   std::optional<Failure> failure;
   for (const int bits : kBits) {

@@ -7,8 +7,8 @@ middle, half-width and slope of the residual's bounds. The slope is zero for the
 w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
 defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
 f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_offsets.h says what is added; where the
-inputs that act may be off the plan's, acted_inputs.h does. Where the bound on the disturbance grows with state and input,
-w^ is its sup over the hull of Z_t, with the inputs that act. */
+inputs that act may be off the plan's, acted_inputs.h does. Where the bound on the disturbance grows with state and
+input, w^ is its sup over the hull of Z_t, with the inputs that act. */
 #pragma once
 
 #include <array>
@@ -57,8 +57,8 @@ class Propagator final {
   @throws std::invalid_argument as StepOffsets. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
              const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {},
-             ActedInputs inputs = {}, std::shared_ptr<const GrowingDisturbance> growing = {});
+             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {}, ActedInputs inputs = {},
+             std::shared_ptr<const GrowingDisturbance> growing = {});
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.

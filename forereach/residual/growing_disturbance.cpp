@@ -1,5 +1,7 @@
 #include "forereach/residual/growing_disturbance.h"
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 
 #include "forereach/dynamics/angles.h"
@@ -14,9 +16,9 @@ namespace forereach {
 
 GrowingDisturbance::GrowingDisturbance(const NominalModel& model, std::vector<ExpressionText> bounds)
     : bounds_(std::move(bounds)) {
-  Require(std::ssize(bounds_) == model.num_states(),
-          "declaration: " + std::to_string(bounds_.size()) + " expressions of a disturbance, must be " +
-              std::to_string(model.num_states()));
+  Require(std::ssize(bounds_) == model.num_states(), "declaration: " + std::to_string(bounds_.size()) +
+                                                         " expressions of a disturbance, must be " +
+                                                         std::to_string(model.num_states()));
   const ExpressionNames names = NamesOf(model);
   program_ = std::make_shared<const ProgramDraft>(MakeProgram(names, bounds_));
   const Program program = program_->View();
@@ -49,16 +51,21 @@ std::optional<std::pair<int, std::vector<Interval>>> GrowingDisturbance::FindUnb
   };
   for (std::size_t k = 0; k < bounds_.size(); ++k) {
     if (!is_unbounded(k)) continue;
-    for (Interval& range : box)
+    for (Interval& range : box) {
+      const Interval all = range;
+      bool matters = false;
       for (int i = 0; i < kHalvings; ++i) {
-        const Interval whole = range;
-        range = {whole.lower, whole.Middle()};
-        if (is_unbounded(k)) continue;
-        range = {whole.Middle(), whole.upper};
-        if (is_unbounded(k)) continue;
-        range = whole;
-        break;
+        const Interval halves[] = {{range.lower, range.Middle()}, {range.Middle(), range.upper}};
+        const auto unbounded = std::ranges::find_if(halves, [&](const Interval& half) {
+          range = half;
+          const bool found = is_unbounded(k);
+          matters |= !found;
+          return found;
+        });
+        if (unbounded == std::end(halves)) break;
       }
+      if (!matters) range = all;
+    }
     return std::pair(static_cast<int>(k), box);
   }
   return std::nullopt;

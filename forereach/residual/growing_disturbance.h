@@ -35,8 +35,8 @@ class GrowingDisturbance final {
   (docs/soundness.md, 2.1). Allocates nothing. @param box d_z entries. @param sizes n entries. */
   void Enclose(std::span<const Interval> box, std::span<Interval> sizes) const noexcept;
 
-  /** The first state whose d_k has no finite bound over the box by Enclose, and a small part of the box where it has
-  none either. */
+  /** The first state whose d_k has no finite bound over the box by Enclose, and a part of the box where it has none
+  either: small in the variables by which that differs from place to place, and whole in the others. */
   [[nodiscard]] std::optional<std::pair<int, std::vector<Interval>>> FindUnbounded(std::vector<Interval> box) const;
 
  private:

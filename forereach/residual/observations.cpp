@@ -120,8 +120,7 @@ class Observer final {
     if (!(growth_ < 1)) return kInfinity;
     const auto i = static_cast<Eigen::Index>(k);
     const double moved = MulUp(longer, rate_[k].Magnitude());
-    const double hidden =
-        AddUp(AddUp(declaration_.ObservationError(i), moved), MulUp(growth_, DisturbanceAt(k)));
+    const double hidden = AddUp(AddUp(declaration_.ObservationError(i), moved), MulUp(growth_, DisturbanceAt(k)));
     return DivUp(AddUp(residual_[k].Magnitude(), hidden), SubDown(1, growth_));
   }
 

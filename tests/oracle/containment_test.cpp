@@ -315,8 +315,7 @@ TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanTheExpressionAllows) {
     for (const double input_error : {0.0, 0.5}) {
       auto problem = std::make_shared<Problem>(PointMassInHalves());
       problem->declaration.input_error = Vec({input_error, 0});
-      problem->declaration.growing = std::make_shared<const GrowingDisturbance>(
-          *problem->model, std::vector<ExpressionText>{{"0"}, {"0"}, {"0"}, {"0.125*vx*(vy - ax)"}});
+      problem->declaration.growing = Growing(*problem->model, {"0", "0", "0", "0.125*vx*(vy - ax)"});
       const Certifier certifier(problem);
       Tube tube;
       const Query query{Zonotope::FromBox(Vec({0, 0, 2, 0.5}), Vec({0, 0, half_width, 0})), Vec({1, 0}), {}};

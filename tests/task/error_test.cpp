@@ -309,7 +309,30 @@ TEST_F(ErrorTest, ADisturbanceThatDoesNotFitIsAnError) {
   EXPECT_EQ(with("[0, 0, .inf, 0]"),
             "task.yaml:12: declaration.disturbance[2]: .inf is not a finite number; write a number in [0, inf)");
   EXPECT_EQ(with("[0, 0, 1]"), "task.yaml:12: declaration.disturbance: has 3 entries, has to have 4: px, py, vx, vy");
-  EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a list of numbers");
+  EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a map or a list of numbers");
+  EXPECT_EQ(with("{vx: -1e-9}"), "task.yaml:12: declaration.disturbance.vx: -1e-9 is outside [0, inf)");
+  EXPECT_EQ(with("{ax: 1}"),
+            "task.yaml:12: declaration.disturbance.ax: unknown key; did you mean vx? known here: px, py, vx, vy");
+  EXPECT_EQ(with("{vx: 0.1, vy: 0.02 + 0.3*abs(vx*(ax - vy)), px: -vx}"), "") << "the sign does not count";
+  EXPECT_EQ(with("{vx: 0.02 + 0.3*wind}"), "");
+  EXPECT_EQ(with("{vx: .inf}"), "");
+  EXPECT_EQ(with("{vx: 1e999}"), "");
+  EXPECT_EQ(with("{vx: \"max(vx\"}"), "");
+  EXPECT_EQ(with("{vx: [1]}"), "");
+}
+
+// Where a bound on the disturbance is undefined or infinite, the key, the state and the place are named.
+TEST_F(ErrorTest, ADisturbanceWithoutABoundInTheDomainIsAnError) {
+  const auto with = [&](const std::string& vx) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files_.ErrorWith(line, line + "  disturbance: {vx: \"" + vx + "\"}\n");
+  };
+  EXPECT_EQ(with("1/(vx + 6)"), "");
+  EXPECT_EQ(with("sqrt(6 - abs(vy))*exp(ax)"), "");
+  EXPECT_EQ(with("1/(vx - 2)"), "");
+  EXPECT_EQ(with("sqrt(vy)"), "");
+  EXPECT_EQ(with("exp(1000*px)"), "");
+  EXPECT_EQ(with("0/0"), "");
 }
 
 TEST_F(ErrorTest, AnErrorOfRecordsThatDoesNotFitIsAnError) {
