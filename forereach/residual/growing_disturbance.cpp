@@ -1,7 +1,5 @@
 #include "forereach/residual/growing_disturbance.h"
 
-#include <algorithm>
-#include <iterator>
 #include <string>
 
 #include "forereach/dynamics/angles.h"
@@ -51,22 +49,23 @@ std::optional<std::pair<int, std::vector<Interval>>> GrowingDisturbance::FindUnb
   };
   for (std::size_t k = 0; k < bounds_.size(); ++k) {
     if (!is_unbounded(k)) continue;
-    for (Interval& range : box) {
-      const Interval all = range;
+    std::vector<Interval> where = box;
+    for (std::size_t l = 0; l < box.size(); ++l) {
+      Interval& range = box[l];
       bool matters = false;
       for (int i = 0; i < kHalvings; ++i) {
-        const Interval halves[] = {{range.lower, range.Middle()}, {range.Middle(), range.upper}};
-        const auto unbounded = std::ranges::find_if(halves, [&](const Interval& half) {
-          range = half;
-          const bool found = is_unbounded(k);
-          matters |= !found;
-          return found;
-        });
-        if (unbounded == std::end(halves)) break;
+        const Interval whole = range, low(whole.lower, whole.Middle()), high(whole.Middle(), whole.upper);
+        range = low;
+        const bool in_low = is_unbounded(k);
+        range = high;
+        const bool in_high = is_unbounded(k);
+        matters |= in_low != in_high;
+        range = in_low ? low : in_high ? high : whole;
+        if (!in_low && !in_high) break;
       }
-      if (!matters) range = all;
+      if (matters) where[l] = range;
     }
-    return std::pair(static_cast<int>(k), box);
+    return std::pair(static_cast<int>(k), where);
   }
   return std::nullopt;
 }

