@@ -130,8 +130,6 @@ TEST(CertifyJsonTest, SaysWhichDisturbanceItAllowsFor) {
   EXPECT_EQ(Forereach("verify " + decision_path + " 2>&1").code, 1);
   EXPECT_THAT(Forereach("certify --config " + path + plan).text,
               HasSubstr("\n  each step disturbed by up to: theta 0.0001 v 1e-3*abs(v*(delta - a))\n"));
-  EXPECT_THAT(Forereach("check " + path + " 2>&1").text,
-              HasSubstr("each step is disturbed by at most theta 0.0001, v 1e-3*abs(v*(delta - a))"));
 
   path = with("[0, 0, 0, 0, 0, 0]");
   const Json zeros = Json::parse(Forereach("certify --json --config " + path + plan).text);
