@@ -22,6 +22,15 @@ std::string Bounds(const std::vector<std::string>& names, const Eigen::VectorXd&
   return text;
 }
 
+// The same of the disturbance, with its expressions.
+std::string Disturbances(const std::vector<std::string>& names, const Declaration& declaration) {
+  std::string text;
+  for (Eigen::Index k = 0; k < std::ssize(names); ++k)
+    if (const std::string bound = declaration.DisturbanceText(k); bound != "0")
+      text += (text.empty() ? "" : ", ") + names[ToSize(k)] + " " + bound;
+  return text;
+}
+
 // Who may find what is declared of states false.
 std::string WhoRefutesStateError(const Config& config) {
   const Declaration& declaration = config.problem->declaration;
@@ -134,7 +143,7 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   if (declaration.given_are_exact)
     all.push_back({"the transitions of the file are exact", "declared (declaration.transitions_are)"});
   if (declaration.IsDisturbed())
-    all.push_back({"each step is disturbed by at most " + Bounds(model.state_names(), declaration.disturbance),
+    all.push_back({"each step is disturbed by at most " + Disturbances(model.state_names(), declaration),
                    "declared; transitions refute it likewise"});
   if (problem.between)
     all.push_back(

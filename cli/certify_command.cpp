@@ -43,9 +43,13 @@ void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& t
   if (tube.length() > 0) PrintLimits(plan, tube, certifier);
   if (const Declaration& declaration = certifier.problem().declaration; declaration.IsDisturbed()) {
     std::cout << "\n  each step disturbed by up to:";
-    for (std::size_t k = 0; k < names.size(); ++k)
-      if (const double bound = declaration.DisturbanceBound(static_cast<Eigen::Index>(k)); bound != 0)
-        std::cout << " " << names[k] << " " << RoundedDown(bound);
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      if (declaration.Grows(i) || declaration.DisturbanceBound(i) != 0)
+        std::cout << " " << names[k] << " "
+                  << (declaration.Grows(i) ? declaration.DisturbanceText(i)
+                                           : RoundedDown(declaration.DisturbanceBound(i)));
+    }
   }
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }

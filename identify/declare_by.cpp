@@ -79,7 +79,16 @@ std::string DeclarationYaml(const Declaration& declaration, const NominalModel& 
     if (!row.empty()) rows += (rows.empty() ? "" : ", ") + states[ToSize(k)] + ": {" + row + "}";
   }
   std::string text = "  lipschitz: {" + rows + "}\n  noise_bound: " + List(declaration.noise_bound) + "\n";
-  if (declaration.IsDisturbed()) text += "  disturbance: " + List(declaration.disturbance) + "\n";
+  if (declaration.growing) {
+    text += "  disturbance:\n";
+    for (Eigen::Index k = 0; k < std::ssize(states); ++k)
+      if (const std::string bound = declaration.DisturbanceText(k); declaration.Grows(k))
+        text += "    " + states[ToSize(k)] + ": \"" + bound + "\"\n";
+      else if (bound != "0")
+        text += "    " + states[ToSize(k)] + ": " + bound + "\n";
+  } else if (declaration.IsDisturbed()) {
+    text += "  disturbance: " + List(declaration.disturbance) + "\n";
+  }
   if (declaration.DeclaresStateError()) text += "  state_error: " + List(declaration.state_error) + "\n";
   if (declaration.input_error.size() > 0) text += "  input_error: " + List(declaration.input_error) + "\n";
   return text;

@@ -16,7 +16,8 @@ namespace forereach {
 /** Which two lines of the transitions disagree, and what to change. `first_line` of observation 0. */
 [[nodiscard]] std::string Explain(const Unexplained& found, const Config& config, const ProposalOptions& options);
 
-/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", a line each, indented by two. */
+/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", or by names, a line each, indented by
+ * two. */
 [[nodiscard]] std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model);
 
 }  // namespace forereach

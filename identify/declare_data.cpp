@@ -131,7 +131,8 @@ void PrintTrades(const Proposal& proposal, const NominalModel& model, std::ostre
 std::vector<std::string> TooQuiet(const Proposal& proposal, const NominalModel& model) {
   std::vector<std::string> names;
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
-    if (proposal.declaration.ObservationError(static_cast<Eigen::Index>(k)) < proposal.rows[k].noise.deviation)
+    if (const auto i = static_cast<Eigen::Index>(k);
+        !proposal.declaration.Grows(i) && proposal.declaration.ObservationError(i) < proposal.rows[k].noise.deviation)
       names.push_back(model.state_names()[k]);
   return names;
 }

@@ -15,7 +15,11 @@
 namespace forereach {
 
 nlohmann::json DisturbanceJson(const Declaration& declaration) {
-  return std::vector(declaration.disturbance.begin(), declaration.disturbance.end());
+  nlohmann::json bounds = nlohmann::json::array();
+  for (Eigen::Index k = 0; k < declaration.noise_bound.size(); ++k)
+    bounds.push_back(declaration.Grows(k) ? nlohmann::json(declaration.DisturbanceText(k))
+                                          : nlohmann::json(declaration.DisturbanceBound(k)));
+  return bounds;
 }
 
 namespace {

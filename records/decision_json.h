@@ -28,7 +28,7 @@ If model.dt is no whole number of microseconds, its rounding counts as clock err
 /** The digest of every number in the document's `tube`. An infinite number counts as null. */
 [[nodiscard]] Digest TubeDigest(const nlohmann::json& tube);
 
-/** The bound of each state. @pre some bound is not zero. */
+/** The bound of each state, a number or an expression. @pre some bound is not zero. */
 [[nodiscard]] nlohmann::json DisturbanceJson(const Declaration& declaration);
 
 /** The document; docs/decision.md lists its keys. It includes all inputs, so it can be verified by itself. Infinite

@@ -2,37 +2,46 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
+#include "forereach/residual/growing_disturbance.h"
 
 namespace forereach {
 
-Disturbance::Disturbance(const Eigen::VectorXd& bounds, const std::string& kind, std::uint64_t seed)
+Disturbance::Disturbance(const Eigen::VectorXd& bounds, std::shared_ptr<const GrowingDisturbance> growing,
+                         const std::string& kind, std::uint64_t seed)
     : bounds_(bounds),
-      acts_(kind != "none" && !bounds.isZero(0)),
+      growing_(std::move(growing)),
+      acts_(kind != "none" && (growing_ || !bounds.isZero(0))),
       adversarial_(kind == "adversarial"),
       random_(seed),
       signs_(ToSize(bounds.size())) {}
 
 Disturbance::Disturbance(const Declaration& declaration, const RobotOptions& options)
-    : Disturbance(declaration.disturbance, options.disturbance, static_cast<std::uint64_t>(options.disturbance_seed)) {}
+    : Disturbance(declaration.disturbance.size() == 0 ? Eigen::VectorXd::Zero(declaration.noise_bound.size())
+                                                      : declaration.disturbance,
+                  declaration.growing, options.disturbance, static_cast<std::uint64_t>(options.disturbance_seed)) {}
 
 Disturbance Disturbance::OfMeasurements(const Declaration& declaration, const RobotOptions& options) {
   constexpr std::uint64_t kOtherNumbers = std::uint64_t{1} << 32;
-  return {declaration.state_error, options.sensor_error,
+  return {declaration.state_error, nullptr, options.sensor_error,
           kOtherNumbers + static_cast<std::uint64_t>(options.disturbance_seed)};
 }
 
-void Disturbance::Add(std::span<double> next) {
+void Disturbance::Add(std::span<double> next, std::span<const double> z) {
   if (!acts_) return;
+  std::vector<Interval> grown(next.size(), 0);
+  if (growing_) growing_->Enclose(std::vector<Interval>(z.begin(), z.end()), grown);
   if (adversarial_ && --steps_left_ < 0) {
     steps_left_ = static_cast<int>(random_() % kLongestHold);
     for (double& sign : signs_) sign = random_() >> 63 == 0 ? 1 : -1;
   }
   for (std::size_t k = 0; k < next.size(); ++k) {
     const double share = Share(k), unit = NextUp(std::abs(next[k])) - std::abs(next[k]);
-    next[k] += share * std::max(0.0, SubDown(bounds_[static_cast<Eigen::Index>(k)], unit));
+    const double bound = AddDown(bounds_[static_cast<Eigen::Index>(k)], grown[k].lower);
+    next[k] += share * std::max(0.0, SubDown(bound, unit));
   }
 }
 

@@ -29,6 +29,13 @@ constexpr std::int64_t kProgressUs = 1'000'000;
 constexpr std::int64_t kRefusedStarts = 10;  // so many are no accident
 const std::string_view kOutsideX0 = GuardCauseName(GuardCause::kOutsideInitialSet);
 
+// z of a state and an input.
+std::vector<double> Joined(std::span<const double> x, std::span<const double> u) {
+  std::vector<double> z(x.begin(), x.end());
+  z.insert(z.end(), u.begin(), u.end());
+  return z;
+}
+
 std::optional<Config> Load(const std::string& path, const BusOptions& in_force) try {
   Config config = LoadConfig(path);
   const std::string why = WhyKeyCannotChange(in_force, config.bus, Role::kRobot);
@@ -138,8 +145,9 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const bool moves = !control.empty() || is_stopping_;
   if (!control.empty()) {
     is_stopping_ = false;
+    const std::vector<double> z = Joined(state_, control);
     plant_(state_, control, state_, static_cast<double>(late_us - late_before_us_) * 1e-6);
-    disturbance_.Add(state_);
+    disturbance_.Add(state_, z);
   } else if (is_stopping_) {
     BrakeUntil(utime);
   }
@@ -179,8 +187,9 @@ void RobotSimNode::BrakeUntil(std::int64_t utime) {
   const std::vector<double> before = state_;
   const Box& inputs = config_.problem->domain.input;
   const Eigen::VectorXd idle = inputs.lower().cwiseMax(0).cwiseMin(inputs.upper());
-  plant_(before, {idle.data(), ToSize(idle.size())}, state_, 0);
-  disturbance_.Add(state_);
+  const std::span<const double> no_drive(idle.data(), ToSize(idle.size()));
+  plant_(before, no_drive, state_, 0);
+  disturbance_.Add(state_, Joined(before, no_drive));
   const double share = static_cast<double>(utime - brakes_since_utime_) / static_cast<double>(period_us_);
   brake_.Apply(before, std::clamp(share, 0.0, 1.0), state_);
   is_stopping_ = brake_.StepsToRest(state_, state_) > 0;

@@ -127,7 +127,7 @@ Transitions MakeTransitions(const Target& target, const Problem& problem, std::u
     const std::vector<double> z = SampleInside(problem.domain, bounds, random);
     const std::span<const double> point(z);
     target.Step(point.first(next.size()), point.subspan(next.size()), next);
-    if (disturbance) disturbance->Add(next);
+    if (disturbance) disturbance->Add(next, point);
     transitions.z.row(i) = Eigen::Map<const Eigen::RowVectorXd>(z.data(), d);
     transitions.x_next.row(i) = Eigen::Map<const Eigen::RowVectorXd>(next.data(), n);
     for (Eigen::Index k = 0; k < noise_bound.size(); ++k)

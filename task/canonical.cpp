@@ -2,6 +2,8 @@
 
 #include <bit>
 
+#include "forereach/residual/growing_disturbance.h"
+
 namespace forereach {
 namespace {
 
@@ -65,6 +67,10 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
     bytes.Numbers(bounds);
   };
   add("disturbance", declaration.disturbance);
+  if (declaration.growing) {
+    bytes.Text("growing disturbance");
+    for (const ExpressionText& bound : declaration.growing->bounds()) bytes.Text(bound.text);
+  }
   add("state_error", declaration.state_error);
   add("input_error", declaration.input_error);
   if (declaration.given_are_exact && declaration.HasErrorInZ()) bytes.Text("given are exact");

@@ -231,11 +231,11 @@ std::vector<Key> PlannerKeys() {
 
 // A kind of numbers within bounds of the declaration.
 Key WithinDeclared(const OptionRows<RobotOptions>& robot, const char* name, std::string RobotOptions::*kind,
-                   Eigen::VectorXd Declaration::*bounds, const char* bounds_name, const char* meaning) {
+                   bool (*is_declared)(const Declaration&), const char* bounds_name, const char* meaning) {
   Key key = robot.OneOf(name, {"none", "random", "adversarial"}, kind, meaning);
   key.read = [=, read = key.read](const Field& at, TaskDraft& draft) {
     read(at, draft);
-    if (draft.config.robot.*kind != "none" && (draft.problem.declaration.*bounds).isZero(0))
+    if (draft.config.robot.*kind != "none" && !is_declared(draft.problem.declaration))
       at.Fail(draft.config.robot.*kind + ", and declaration." + bounds_name + " allows for none");
   };
   return key;
@@ -328,11 +328,14 @@ std::vector<Key> RobotKeys() {
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after it, even without the goal."),
       WithinDeclared(
-          robot, "disturbance", &RobotOptions::disturbance, &Declaration::disturbance, "disturbance",
+          robot, "disturbance", &RobotOptions::disturbance,
+          [](const Declaration& declaration) { return declaration.IsDisturbed(); }, "disturbance",
           "In each step, within declaration.disturbance. random: of each state a uniform value. adversarial: "
           "of each state its bound, with signs that stay for 1 to 32 steps."),
-      WithinDeclared(robot, "sensor_error", &RobotOptions::sensor_error, &Declaration::state_error, "state_error",
-                     "By how much measured states are off the true ones, within declaration.state_error: likewise."),
+      WithinDeclared(
+          robot, "sensor_error", &RobotOptions::sensor_error,
+          [](const Declaration& declaration) { return !declaration.state_error.isZero(0); }, "state_error",
+          "By how much measured states are off the true ones, within declaration.state_error: likewise."),
       RobotJitter(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
                     "Of the random numbers of disturbance, sensor_error and step_jitter."),

@@ -12,8 +12,10 @@
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
+#include "forereach/residual/growing_disturbance.h"
 #include "forereach/safety/clearance.h"
 #include "task/key_rows.h"
+#include "task/number.h"
 #include "task/option_rows.h"
 #include "task/row_readers.h"
 #include "task/schema_parts.h"
@@ -104,6 +106,47 @@ void ReadLipschitzMatrix(const Field& at, TaskDraft& draft) {
   draft.problem.declaration.lipschitz = ReadMatrix(at);
 }
 
+// Where an expression has no finite bound, with the state's key.
+void RequireFinite(const Field& at, const GrowingDisturbance& growing, const TaskDraft& draft) {
+  const auto unbounded = growing.FindUnbounded(draft.problem.domain.Ranges());
+  if (!unbounded) return;
+  std::string place;
+  const std::vector<Interval> domain = draft.problem.domain.Ranges();
+  for (std::size_t l = 0; l < domain.size(); ++l)
+    if (const Interval& range = unbounded->second[l]; range.lower != domain[l].lower || range.upper != domain[l].upper)
+      place += fmt::format("{} {} {:.4g}", place.empty() ? " near" : ",", draft.scope.variables[l], range.Middle());
+  at.Fail(draft.scope.states[ToSize(unbounded->first)],
+          "has to have a finite value everywhere in the domain's box, and nothing bounds it" + place);
+}
+
+// By names: numbers and expressions.
+void ReadDisturbance(const Field& at, TaskDraft& draft) {
+  const std::vector<std::string>& states = draft.scope.states;
+  Declaration& declaration = draft.problem.declaration;
+  declaration.disturbance.setZero(std::ssize(states));
+  std::vector<ExpressionText> growing(states.size(), {GrowingDisturbance::kNone});
+  bool grows = false;
+  for (const Field& bound : at.Entries()) {
+    const int k = IndexOf(states, bound.name());
+    const Parsed<double> number = ParseNumber(bound.Text());
+    if (!number.problem.empty()) {
+      growing[ToSize(k)] = bound.Expression();
+      grows = true;
+    } else if (kNotNegative.Contains(number.value)) {
+      declaration.disturbance[k] = number.value;
+    } else {
+      bound.Fail(bound.Text() + " is outside " + kNotNegative.text());
+    }
+  }
+  if (!grows) return;
+  try {
+    declaration.growing = std::make_shared<const GrowingDisturbance>(*draft.problem.model, std::move(growing));
+  } catch (const ExpressionError& error) {
+    FailAt(at.file(), error);
+  }
+  RequireFinite(at, *declaration.growing, draft);
+}
+
 // A bound on the error of what is recorded: by names, then one name, then the vector.
 std::array<Key, 3> ErrorKeys(const std::string& of, Key::Size size, Eigen::VectorXd Declaration::*errors,
                              std::vector<std::string> SchemaScope::*names, std::string meaning) {
@@ -142,11 +185,17 @@ std::vector<Key> DeclarationKeys() {
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
                       "sigma: the largest error of a recorded successor, beside its last bit and state_error.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),
-      Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
-                      "w: in each step the true successor differs from f0 + r by at most this. The difference may be "
-                      "another in each step. Errors of measurement belong to state_error and noise_bound.",
-                      [](const Field& at, TaskDraft& draft) { draft.problem.declaration.disturbance = at.Vector(); }),
+      Optional(Map("declaration.disturbance",
+                   "w by names: in each step the true successor differs from f0 + r by at most this. The difference "
+                   "may be another in each step. Errors of measurement belong to state_error and noise_bound.",
+                   ReadDisturbance),
                "zeros"),
+      Expression("declaration.disturbance.<state>",
+                 "Of this state, in its unit: a number that is not negative, or an expression in states, inputs, "
+                 "parameters and definitions, of which the absolute value counts. It has to be finite in the whole box "
+                 "of the domain. One that is not named is zero."),
+      Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates, "The same as a list of numbers.",
+             [](const Field& at, TaskDraft& draft) { draft.problem.declaration.disturbance = at.Vector(); }),
       state_error[0],
       state_error[1],
       state_error[2],

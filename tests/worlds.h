@@ -14,14 +14,24 @@ All else is as `Problem` has it by default. A test changes what it is about. It 
 #include <initializer_list>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "forereach/certify/problem.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/residual/growing_disturbance.h"
 
 namespace forereach {
 
 inline Eigen::VectorXd Vec(std::initializer_list<double> entries) {
   return Eigen::Map<const Eigen::VectorXd>(entries.begin(), static_cast<Eigen::Index>(entries.size()));
+}
+
+/** Bounds on a disturbance that grow with state and input: an expression for each state. */
+inline std::shared_ptr<const GrowingDisturbance> Growing(const NominalModel& model,
+                                                         std::initializer_list<const char*> bounds) {
+  std::vector<ExpressionText> texts;
+  for (const char* const bound : bounds) texts.push_back({bound, 1, 1});
+  return std::make_shared<const GrowingDisturbance>(model, std::move(texts));
 }
 
 /** {x : |x_k| <= reach_k}. */

@@ -7,6 +7,8 @@
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
+#include "forereach/residual/growing_disturbance.h"
+#include "verifier/functions.h"
 
 namespace forereach::verifier {
 namespace {
@@ -318,6 +320,20 @@ int NearestGenerator(const RecordedSet& recorded, const std::vector<Real>& colum
   return nearest;
 }
 
+// Around what was recorded as z: where the true one is.
+std::vector<Real> BoxAround(const Declaration& declaration, const std::vector<Real>& z) {
+  std::vector<Real> box;
+  for (std::size_t l = 0; l < z.size(); ++l)
+    box.push_back(Around(z[l], Real(declaration.VariableError(static_cast<Eigen::Index>(l)))));
+  return box;
+}
+
+// Null: nothing grows.
+std::shared_ptr<const Functions> GrowthOf(const Problem& problem) {
+  const auto& growing = problem.declaration.growing;
+  return growing ? std::make_shared<const Functions>(*problem.model, growing->bounds()) : nullptr;
+}
+
 // Replaces a number by a point, and adds to `slack` how far it may be away.
 void Round(Real& number, Real& slack) {
   const Real point = number.middle();
@@ -386,41 +402,45 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
     : problem_(problem),
       equations_(equations),
       method_(method),
+      disturbance_(ToSize(problem.model->num_states())),
+      growing_(GrowthOf(problem)),
       input_error_(ToSize(problem.model->num_inputs())),
+      of_inputs_(disturbance_.size()),
       power_(PowerOf(*problem.model)),
       remainder_rounding_(RemainderRounding()) {
   std::ranges::copy(problem.declaration.input_error, input_error_.begin());
   const Transitions& data = problem.transitions;
-  disturbance_.resize(ToSize(problem.model->num_states()));
   std::ranges::copy(problem.declaration.disturbance, disturbance_.begin());
-  unexpected_ = disturbance_;
-  for (std::size_t k = 0; k < unexpected_.size(); ++k)
+  for (std::size_t k = 0; k < of_inputs_.size(); ++k)
     for (std::size_t l = 0; l < input_error_.size(); ++l)
       if (!input_error_[l].IsZero())
-        unexpected_[k] += Real(problem.declaration.lipschitz(static_cast<Eigen::Index>(k),
-                                                             static_cast<Eigen::Index>(unexpected_.size() + l))) *
-                          input_error_[l];
+        of_inputs_[k] += Real(problem.declaration.lipschitz(static_cast<Eigen::Index>(k),
+                                                            static_cast<Eigen::Index>(of_inputs_.size() + l))) *
+                         input_error_[l];
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
     const std::vector<Real> nominal = equations.Value(z);
     std::vector<Real> errors(ToSize(problem.model->num_states()));
-    if (!problem.declaration.given_are_exact || data.IsLearned(i)) errors = RecordErrors(z);
-    AddDuration(i, z, nominal, errors);
+    const bool is_exact = problem.declaration.given_are_exact && !data.IsLearned(i);
+    if (!is_exact) errors = RecordErrors(z);
+    const std::vector<Real> disturbance = DisturbanceOver(is_exact ? z : BoxAround(problem.declaration, z));
+    AddDuration(i, z, nominal, disturbance, errors);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
       const bool is_angle = std::ranges::count(problem.model->angles(), k) > 0;
       const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
       const Real& error = errors[ToSize(k)];
-      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)] + error;
+      const Real& w = disturbance[ToSize(k)];
+      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + w + error;
       const Real difference = Real(x_next) - nominal[ToSize(k)];
       const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
       const Bounds bounds{observed - allowed, observed + allowed};
       // A transition for which the model has no value says nothing.
-      row.push_back(!observed.IsFinite() || !error.IsFinite() ? Bounds{-kNone, kNone}
-                    : equations.IsExact()                     ? bounds
-                                                              : Outermost(bounds));
+      row.push_back(!observed.IsFinite() || !error.IsFinite() || !w.IsFinite() ? Bounds{-kNone, kNone}
+                    : equations.IsExact()                                      ? bounds
+                                                                               : Outermost(bounds));
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k)
@@ -474,8 +494,7 @@ std::vector<Real> TubeMaker::RecordErrors(const std::vector<Real>& z) const {
   std::ranges::copy(declaration.state_error, e.begin());
   std::ranges::copy(declaration.input_error, e.begin() + std::ssize(errors));
   if (std::ranges::all_of(e, [](const Real& error) { return error.IsZero(); })) return errors;
-  std::vector<Real> box;
-  for (std::size_t l = 0; l < z.size(); ++l) box.push_back(Around(z[l], e[l]));
+  const std::vector<Real> box = BoxAround(declaration, z);
   if (LeavesDomain(0, z, e)) return std::vector<Real>(errors.size(), Real::Everything());
   const std::vector<Real> values = equations_.Value(box);
   for (std::size_t k = 0; k < errors.size(); ++k) {
@@ -499,6 +518,17 @@ Real TubeMaker::Growth(const Real& share) const {
   return share * sum;
 }
 
+// The largest disturbance of each state over a box, with the ends of what is not known exactly. Not finite where
+// nothing bounds it.
+std::vector<Real> TubeMaker::DisturbanceOver(std::span<const Real> box) const {
+  std::vector<Real> sum = disturbance_;
+  if (!growing_) return sum;
+  const std::vector<Real> grown = growing_->At(box);
+  for (std::size_t k = 0; k < sum.size(); ++k)
+    sum[k] += grown[k].IsFinite() ? grown[k].magnitude() : Real::Everything();
+  return sum;
+}
+
 // What inputs that are off by their errors add to f0: the largest slopes over all that may act, times the errors. Not
 // finite where f0 has no bound there.
 std::vector<Real> TubeMaker::InputSpread(const Query& query) const {
@@ -518,14 +548,11 @@ std::vector<Real> TubeMaker::InputSpread(const Query& query) const {
 // at most what is seen of it, what hides it, and that growth itself. Of an angle it must not hide three quarters of a
 // turn.
 void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
-                            std::vector<Real>& errors) const {
+                            const std::vector<Real>& disturbance, std::vector<Real>& errors) const {
   if (problem_.transitions.Longer(i) == 0) return;
   const Declaration& declaration = problem_.declaration;
   const Real longer(problem_.transitions.Longer(i)), dt(StepOf(*problem_.model)), growth = Growth(longer / dt);
-  std::vector<Real> box;
-  for (std::size_t l = 0; l < z.size(); ++l)
-    box.push_back(Around(z[l], Real(declaration.VariableError(static_cast<Eigen::Index>(l)))));
-  const std::vector<Real> rate = equations_.Rate(box, Around(dt, longer));
+  const std::vector<Real> rate = equations_.Rate(BoxAround(declaration, z), Around(dt, longer));
   const StepTiming& timing = problem_.timing;
   for (std::size_t k = 0; k < errors.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
@@ -540,13 +567,14 @@ void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector
     const Real seen = is_angle && difference.IsFinite() ? WithoutTurns(difference, errors[k]) : difference;
     const Real moved = longer * rate[k].magnitude(),
                unit(is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next));
-    const Real off = unit + Real(declaration.noise_bound[row]) + disturbance_[k];
-    const Real hidden = errors[k] + off + moved + growth * disturbance_[k];
+    const Real off = unit + Real(declaration.noise_bound[row]) + disturbance[k];
+    const Real hidden = errors[k] + off + moved + growth * disturbance[k];
     const Real most = (seen.magnitude() + hidden) / (Real(1.0) - growth);
-    const Real turned = errors[k] + moved + growth * (Real(1.5) * Real::Pi() + off + disturbance_[k]);
+    const Real turned = errors[k] + moved + growth * (Real(1.5) * Real::Pi() + off + disturbance[k]);
     const bool is_told = !is_angle || (difference.IsFinite() && WithoutTurns(difference, turned).IsFinite());
-    const bool is_known = rate[k].IsFinite() && CertainlyBelow(growth, Real(1.0)) && is_told;
-    errors[k] += is_known ? moved + growth * (most + disturbance_[k]) : Real::Everything();
+    const bool is_known =
+        rate[k].IsFinite() && disturbance[k].IsFinite() && CertainlyBelow(growth, Real(1.0)) && is_told;
+    errors[k] += is_known ? moved + growth * (most + disturbance[k]) : Real::Everything();
   }
 }
 
@@ -605,7 +633,9 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
 
   const RecordedSet* const recorded = options.follow ? &(*options.follow)[tube.slices.size()] : nullptr;
   const std::vector<Real> input_spread = InputSpread(query);
-  const Offset offset = OffsetOf(query, step, input_spread, recorded);
+  std::vector<Real> unexpected = DisturbanceOver(query.acted);
+  for (std::size_t k = 0; k < unexpected.size(); ++k) unexpected[k] += of_inputs_[k];
+  const Offset offset = OffsetOf(query, step, input_spread, unexpected, recorded);
   std::vector<Real> slack(ToSize(n));
   Slice next = Image(query, offset, slack);
   const Real half(0.5);
@@ -620,7 +650,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
     if (const Real h =
-            half * abs(upper - lower) + unexpected_[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
+            half * abs(upper - lower) + unexpected[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
         !h.IsZero())
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
@@ -670,7 +700,7 @@ std::vector<Real> TubeMaker::Rates(const Query& query, const std::vector<Bounds>
 
 // Any d is sound, since what it differs from E g counts as spread: the record's is the one by which its slices hold.
 TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, const std::vector<Real>& input_spread,
-                                      const RecordedSet* recorded) const {
+                                      const std::vector<Real>& unexpected, const RecordedSet* recorded) const {
   const std::vector<Bounds>& envelope = step.envelope;
   const std::size_t n = envelope.size();
   Offset offset{std::vector<Real>(n), std::vector<Real>(n)};
@@ -694,8 +724,8 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
     } else if (declared(k) < kNone) {
       offset.spread[k] = ends * (error * Real(declared(k)) + abs(offset.column[k]));
     } else {
-      const Real unexpected = max(abs(envelope[k].lower), abs(envelope[k].upper)) + unexpected_[k];
-      offset.spread[k] = ends * (moved[k] - offset.column[k]).magnitude() + growth * unexpected;
+      const Real unknown = max(abs(envelope[k].lower), abs(envelope[k].upper)) + unexpected[k];
+      offset.spread[k] = ends * (moved[k] - offset.column[k]).magnitude() + growth * unknown;
     }
   }
   return offset;

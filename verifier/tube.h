@@ -3,12 +3,14 @@ and (set-envelope), implemented directly. It shares data types with the certifie
 
 For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h + w)] >,
 with w the declared bound on the disturbance. It counts twice, for different steps: an observation's r~_i differs from
-r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So is it by inputs that are off. */
+r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So is it by inputs that are off. Where the
+bound grows with state and input, it is the largest over the box of what is known of them. */
 #pragma once
 
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,6 +21,8 @@ r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So 
 #include "verifier/real.h"
 
 namespace forereach::verifier {
+
+class Functions;
 
 /** The enclosure of the second-order part of f0, with r the half-widths of Box(Z_t) and H_k the Hessian over it.
 kPaper: q_k = 1/2 sum_ij r_i max|H_ij| r_j, both signs.
@@ -100,7 +104,8 @@ struct TubeOptions {
 /** Computes tubes for any number of plans of one problem, with the precision at its construction. Immutable. */
 class TubeMaker final {
  public:
-  /** @param problem, equations must outlive this object. @pre a Certifier accepts the problem. */
+  /** @param problem, equations must outlive this object. @pre a Certifier accepts the problem.
+  @throws ExpressionError (expressions.h) if a bound on the disturbance is none. */
   TubeMaker(const Problem& problem, const Equations& equations, Method method);
 
   /** The tube of a plan. @param controls m-by-T, one column for each step. */
@@ -119,26 +124,29 @@ class TubeMaker final {
                                                     const std::vector<Real>& half_width) const;
   [[nodiscard]] std::vector<Real> RecordErrors(const std::vector<Real>& z) const;
   [[nodiscard]] Real Growth(const Real& share) const;
+  [[nodiscard]] std::vector<Real> DisturbanceOver(std::span<const Real> box) const;
   [[nodiscard]] std::vector<Real> InputSpread(const Query& query) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
-                   std::vector<Real>& errors) const;
+                   const std::vector<Real>& disturbance, std::vector<Real>& errors) const;
   struct Offset;
   [[nodiscard]] std::vector<Real> Rates(const Query& query, const std::vector<Bounds>& remainder,
                                         const std::vector<Real>& input_spread) const;
   [[nodiscard]] Offset OffsetOf(const Query& query, const Step& step, const std::vector<Real>& input_spread,
-                                const RecordedSet* recorded) const;
+                                const std::vector<Real>& unexpected, const RecordedSet* recorded) const;
   [[nodiscard]] Slice Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;
   const Equations& equations_;
   Method method_;
-  /** The declared disturbance, one entry for each state; the errors of the inputs; and the disturbance with what these
-  add to the residual. */
-  std::vector<Real> disturbance_, input_error_, unexpected_;
+  /** The declared disturbance, one entry for each state, and what it has beyond that, or null; the errors of the
+  inputs, and what these add to the residual. */
+  std::vector<Real> disturbance_;
+  std::shared_ptr<const Functions> growing_;
+  std::vector<Real> input_error_, of_inputs_;
   /** By this power of a step's duration grows what the model does not know. */
   int power_;
   /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "forereach/numerics/size.h"
+#include "forereach/residual/growing_disturbance.h"
 #include "verifier/claims.h"
 #include "verifier/expressions.h"
 
@@ -22,7 +23,10 @@ constexpr double kGrowth = 1024;
 
 bool IsSize(double x) { return 0 <= x && x < std::numeric_limits<double>::infinity(); }
 
+// Those of the disturbance are the tube's (tube.h): here only whether they are expressions.
 TaskFunctions FunctionsOf(const Problem& problem) {
+  if (const auto& growing = problem.declaration.growing)
+    static_cast<void>(Functions(*problem.model, growing->bounds()));
   std::vector<ExpressionText> limits;
   for (const Limit& limit : problem.limits) limits.push_back(limit.that);
   TaskFunctions functions{Functions(*problem.model, limits), {}};
@@ -145,7 +149,8 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
     return {Status::kCannotVerify,
             {-1, "cannot verify: no equations for the model " + problem_->model->name() + reason_, "", ""}};
   if (!functions_)
-    return {Status::kCannotVerify, {-1, "cannot verify: a limit or place is no expression" + reason_, "", ""}};
+    return {Status::kCannotVerify,
+            {-1, "cannot verify: a limit, place or disturbance is no expression" + reason_, "", ""}};
   if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
   std::optional<Failure> failure;
   for (const int bits : kBits) {

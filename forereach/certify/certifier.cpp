@@ -186,7 +186,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       violation_(observed_->known.violation()),
       propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing,
-                  ActedInputs(problem_->declaration)) {
+                  ActedInputs(problem_->declaration), problem_->declaration.growing) {
   TestRates();
 }
 
@@ -196,7 +196,8 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       limits_(*problem_),
       rates_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
-                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing) {
+                  problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing, {},
+                  problem_->declaration.growing) {
   forereach::Require(problem_->declaration.input_error.isZero(0),
                      "declaration: input_error counts by lipschitz, which does not bound a residual of another kind");
 }

@@ -27,11 +27,13 @@ bool IsNegligible(const StepError& error) {
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-                       InstructionSet instructions, const StepTiming& timing, ActedInputs inputs)
+                       InstructionSet instructions, const StepTiming& timing, ActedInputs inputs,
+                       std::shared_ptr<const GrowingDisturbance> growing)
     : model_(model),
       domain_(domain, inputs.error),
       residual_(residual),
       inputs_(std::move(inputs)),
+      growing_(std::move(growing)),
       offsets_(model, timing),
       order_(zonotope_order),
       method_(method),
@@ -83,19 +85,25 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
   }
 }
 
-void Propagator::AddInputs(std::span<const PlainInterval> hull, Disturbed& all) const noexcept {
+void Propagator::Disturb(std::span<const PlainInterval> hull, Disturbed& all) const noexcept {
   const auto n = ToSize(model_.num_states());
   std::ranges::copy(hull, all.hull.begin());
   std::array<Interval, kMaxVariables> box;
   for (std::size_t l = 0; l < hull.size(); ++l) box[l] = Interval(NextDown(hull[l].lower), NextUp(hull[l].upper));
   for (std::size_t l = n; l < hull.size(); ++l) {
-    const double e = inputs_.error[static_cast<Eigen::Index>(l - n)];
+    const double e = inputs_.AreExact() ? 0 : inputs_.error[static_cast<Eigen::Index>(l - n)];
     box[l] = Interval(hull[l].lower) + Interval(-e, e);
     all.hull[l] = {box[l].lower, box[l].upper};
   }
-  inputs_.Spread(model_, {box.data(), hull.size()}, all.of_model);
-  all.by_all = {};
-  for (std::size_t k = 0; k < n; ++k) all.by_all[k] = AddUp(unexpected_[k], all.of_model[k]);
+  all.of_model = all.by_all = {};
+  if (!inputs_.AreExact()) inputs_.Spread(model_, {box.data(), hull.size()}, all.of_model);
+  all.unexpected = unexpected_;
+  std::array<Interval, kMaxStates> sizes;
+  if (growing_) growing_->Enclose({box.data(), hull.size()}, sizes);
+  for (std::size_t k = 0; k < n; ++k) {
+    if (growing_) all.unexpected[k] = AddUp(unexpected_[k], sizes[k].upper);
+    all.by_all[k] = AddUp(all.unexpected[k], all.of_model[k]);
+  }
 }
 
 namespace {
@@ -253,19 +261,19 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   OffsetSpread offset;
   constexpr std::array<double, kMaxStates> kNothing{};
   Disturbed disturbed;
-  const bool is_punctual = offsets_.AreZero(), is_exact = inputs_.AreExact();
-  if (!is_exact) AddInputs(hull, disturbed);
-  const double* const disturbance = is_exact ? unexpected_.data() : disturbed.by_all.data();
+  const bool is_punctual = offsets_.AreZero(), is_constant = inputs_.AreExact() && !growing_;
+  if (!is_constant) Disturb(hull, disturbed);
+  const double* const disturbance = is_constant ? unexpected_.data() : disturbed.by_all.data();
   if (!is_punctual) {
     const StepSoFar step{slice,
-                         is_exact ? hull : std::span<const PlainInterval>(disturbed.hull.data(), hull.size()),
+                         is_constant ? hull : std::span<const PlainInterval>(disturbed.hull.data(), hull.size()),
                          half_width,
                          expansion,
                          error,
                          record.remainder,
                          record.envelope,
-                         unexpected_.data(),
-                         is_exact ? kNothing.data() : disturbed.of_model.data(),
+                         is_constant ? unexpected_.data() : disturbed.unexpected.data(),
+                         is_constant ? kNothing.data() : disturbed.of_model.data(),
                          disturbance,
                          is_first};
     if (const int k = offsets_.Add(step, offset, next, sums, instructions_); k >= 0)

@@ -7,10 +7,12 @@ middle, half-width and slope of the residual's bounds. The slope is zero for the
 w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
 defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
 f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_offsets.h says what is added; where the
-inputs that act may be off the plan's, acted_inputs.h does. */
+inputs that act may be off the plan's, acted_inputs.h does. Where the bound on the disturbance grows with state and
+input, w^ is its sup over the hull of Z_t, with the inputs that act. */
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 
 #include "forereach/dynamics/expansion.h"
@@ -21,6 +23,7 @@ inputs that act may be off the plan's, acted_inputs.h does. */
 #include "forereach/reach/domain.h"
 #include "forereach/reach/step_offsets.h"
 #include "forereach/residual/enclosure.h"
+#include "forereach/residual/growing_disturbance.h"
 #include "forereach/sets/zonotope.h"
 
 namespace forereach {
@@ -50,12 +53,12 @@ class Propagator final {
   /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
   slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
   @param disturbance w^, n entries or none. @param instructions changes the computing time only. @param inputs how far
-  those that act may be off.
+  those that act may be off. @param growing what w^ has beyond that (Declaration::growing), or null.
   @throws std::invalid_argument as StepOffsets. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
              const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
-             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {},
-             ActedInputs inputs = {});
+             InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {}, ActedInputs inputs = {},
+             std::shared_ptr<const GrowingDisturbance> growing = {});
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
@@ -78,12 +81,13 @@ class Propagator final {
                                                           std::span<const PlainInterval> hull, StepRecord& record,
                                                           Zonotope& next, double* next_half_width,
                                                           bool is_first) const noexcept;
-  // What disturbs one step whose inputs have errors: what they add to f0, and that with unexpected_.
+  // What disturbs one step whose inputs have errors, or whose disturbance grows: unexpected_ with that, what the inputs
+  // add to f0, and both.
   struct Disturbed {
-    std::array<double, kMaxStates> of_model, by_all;
+    std::array<double, kMaxStates> unexpected, of_model, by_all;
     std::array<PlainInterval, kMaxVariables> hull;  // with the inputs that may act
   };
-  [[gnu::noinline]] void AddInputs(std::span<const PlainInterval> hull, Disturbed& all) const noexcept;
+  [[gnu::noinline]] void Disturb(std::span<const PlainInterval> hull, Disturbed& all) const noexcept;
   // The step without model, envelope and reduction.
   [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
                                                        StepRecord& record, Zonotope& next, double* next_half_width,
@@ -97,6 +101,7 @@ class Propagator final {
   const ResidualEnclosure& residual_;
   std::array<double, kMaxStates> unexpected_{};  // w^, and what the errors of the inputs add to the residual
   ActedInputs inputs_;
+  std::shared_ptr<const GrowingDisturbance> growing_;
   StepOffsets offsets_;
   int order_;
   Method method_;

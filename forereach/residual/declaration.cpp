@@ -4,7 +4,9 @@
 #include <string>
 
 #include "forereach/numerics/directed.h"
+#include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/residual/growing_disturbance.h"
 
 namespace forereach {
 namespace {
@@ -35,6 +37,17 @@ std::vector<Interval> Declaration::BoxAround(std::span<const double> z) const {
   for (std::size_t l = 0; l < box.size(); ++l)
     if (const double e = VariableError(static_cast<Eigen::Index>(l)); e != 0) box[l] += Interval(-e, e);
   return box;
+}
+
+bool Declaration::Grows(Eigen::Index k) const {
+  return growing && growing->bounds()[ToSize(k)].text != GrowingDisturbance::kNone;
+}
+
+std::string Declaration::DisturbanceText(Eigen::Index k) const {
+  const double constant = DisturbanceBound(k);
+  if (!Grows(k)) return ToText(constant);
+  const std::string& text = growing->bounds()[ToSize(k)].text;
+  return constant == 0 ? text : ToText(constant) + " + abs(" + text + ")";
 }
 
 double Declaration::ObservationError(Eigen::Index k) const { return AddUp(noise_bound[k], DisturbanceBound(k)); }

@@ -3,13 +3,17 @@ L_kl |z_l - z'_l| for all z, z' in Z_cert, Eq. (regularity); the bound sigma on 
 bound on the disturbance w, which the paper does not have (docs/soundness.md, 1). */
 #pragma once
 
+#include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "forereach/numerics/interval.h"
 #include "forereach/sets/eigen.h"
 
 namespace forereach {
+
+class GrowingDisturbance;
 
 struct Declaration {
   Eigen::MatrixXd
@@ -25,10 +29,17 @@ struct Declaration {
   /** e is not that of the given transitions, which are exact, as those of a simulation are; of those that are learned
   it is (Transitions::num_learned). */
   bool given_are_exact = false;
+  /** What w^ has beyond that in a step at z: |w_k| <= w^_k + |d_k(z)|. Null: nothing. */
+  std::shared_ptr<const GrowingDisturbance> growing = {};
 
-  /** Whether some w^_k is not zero. */
-  [[nodiscard]] bool IsDisturbed() const { return (disturbance.array() != 0).any(); }
-  /** w^_k. */
+  /** Whether some w^_k is not zero, or some d_k is given. */
+  [[nodiscard]] bool IsDisturbed() const { return growing || (disturbance.array() != 0).any(); }
+  /** Whether d_k is given. */
+  [[nodiscard]] bool Grows(Eigen::Index k) const;
+  /** w^_k + |d_k| as a task file has it: an expression if d_k is given, of which the absolute value counts, otherwise a
+  number. */
+  [[nodiscard]] std::string DisturbanceText(Eigen::Index k) const;
+  /** w^_k, without d_k. */
   [[nodiscard]] double DisturbanceBound(Eigen::Index k) const { return disturbance.size() == 0 ? 0 : disturbance[k]; }
   /** Whether a bound on the error of recorded states is declared, be it zero. */
   [[nodiscard]] bool DeclaresStateError() const { return state_error.size() != 0; }
@@ -39,7 +50,7 @@ struct Declaration {
   /** The box of the true z of what was recorded as z: z_l +- e_l rounded outward, z_l itself where e_l is zero. */
   [[nodiscard]] std::vector<Interval> BoxAround(std::span<const double> z) const;
   /** sigma_k + w^_k rounded up: how far an observed residual may lie from r_k, apart from the successor's last bit. It
-  is sigma_k itself if w^_k is zero. */
+  is sigma_k itself if w^_k is zero. What d_k adds is in the observation (observations.h). */
   [[nodiscard]] double ObservationError(Eigen::Index k) const;
 
   /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ or e has another number of entries

@@ -11,6 +11,7 @@
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/residual/growing_disturbance.h"
 #include "forereach/residual/no_nominal_value.h"
 
 namespace forereach {
@@ -49,7 +50,9 @@ bool IsWithinAQuarterTurn(const Interval& residual) {
 class Observer final {
  public:
   Observer(const NominalModel& model, const Declaration& declaration, const StepTiming& timing)
-      : model_(model), declaration_(declaration), timing_(timing), has_errors_(declaration.HasErrorInZ()) {}
+      : model_(model), declaration_(declaration), timing_(timing), has_errors_(declaration.HasErrorInZ()) {
+    grown_.fill(0);
+  }
 
   // An enclosure for each state, valid until the next call. The step lasted by up to `longer` longer than dt or
   // shorter.
@@ -64,10 +67,14 @@ class Observer final {
     }
     if (has_errors_ && is_exact) error_.fill(0);
     if (has_errors_ && !is_exact) BoundErrors(z);
+    if (declaration_.growing)
+      declaration_.growing->Enclose(is_exact ? std::vector<Interval>(z.begin(), z.end()) : declaration_.BoxAround(z),
+                                    grown_);
     if (longer > 0) EncloseRate(z, longer);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
       const Interval seen = residual_[k];
+      if (const double most = grown_[k].upper; most > 0) residual_[k] += Interval(-most, most);
       if (longer > 0) residual_[k] += OfDuration(longer, k, MostResidual(longer, k));
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kAround);
       if (IsAngle(k)) RequireTurns(seen, x_next[k], longer, k, row);
@@ -93,6 +100,11 @@ class Observer final {
         error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
   }
 
+  // w^_k + |d_k|, at most.
+  [[nodiscard]] double DisturbanceAt(std::size_t k) const {
+    return AddUp(declaration_.DisturbanceBound(static_cast<Eigen::Index>(k)), grown_[k].upper);
+  }
+
   // What a step did more or less in state k because of its duration, delta g and growth (|r| + w), if |r| is at most
   // this.
   [[nodiscard]] Interval OfDuration(double longer, std::size_t k, double most) const {
@@ -100,8 +112,7 @@ class Observer final {
     if (std::ranges::count(timing_.set_at_steps, static_cast<int>(k)) > 0) return 0;
     if (const auto i = static_cast<Eigen::Index>(k); timing_.rate_bound.size() > 0 && timing_.rate_bound[i] < kInfinity)
       return around(MulUp(longer, timing_.rate_bound[i]));
-    const double w = declaration_.DisturbanceBound(static_cast<Eigen::Index>(k));
-    return around(AddUp(MulUp(longer, rate_[k].Magnitude()), MulUp(growth_, AddUp(most, w))));
+    return around(AddUp(MulUp(longer, rate_[k].Magnitude()), MulUp(growth_, AddUp(most, DisturbanceAt(k)))));
   }
 
   // |r_k| is at most what is seen of it, what hides it, and its growth. Infinite where it may have doubled.
@@ -109,8 +120,7 @@ class Observer final {
     if (!(growth_ < 1)) return kInfinity;
     const auto i = static_cast<Eigen::Index>(k);
     const double moved = MulUp(longer, rate_[k].Magnitude());
-    const double hidden =
-        AddUp(AddUp(declaration_.ObservationError(i), moved), MulUp(growth_, declaration_.DisturbanceBound(i)));
+    const double hidden = AddUp(AddUp(declaration_.ObservationError(i), moved), MulUp(growth_, DisturbanceAt(k)));
     return DivUp(AddUp(residual_[k].Magnitude(), hidden), SubDown(1, growth_));
   }
 
@@ -120,7 +130,8 @@ class Observer final {
     Interval within = seen;
     if (longer > 0) {
       const double unit = std::max(UlpOf(x_next), kAngleUnit);
-      const double most = AddUp(MulUp(3, kTurn.upper / 4), declaration_.ObservationError(static_cast<Eigen::Index>(k)));
+      const double error = AddUp(declaration_.ObservationError(static_cast<Eigen::Index>(k)), grown_[k].upper);
+      const double most = AddUp(MulUp(3, kTurn.upper / 4), error);
       within += OfDuration(longer, k, AddUp(most, unit));
     }
     if (!IsWithinAQuarterTurn(within))
@@ -147,6 +158,7 @@ class Observer final {
   Linearization linear_;
   std::array<Interval, kMaxStates> residual_;
   std::array<double, kMaxStates> error_{};
+  std::array<Interval, kMaxStates> grown_;  // |d_k| over the box of the true z
 };
 
 }  // namespace

@@ -10,6 +10,9 @@ belongs to. By the mean value theorem and by L, [lower, upper] then contains in 
     e_k + sum_l (sup |D_l f0_k| + L_kl) e_l,    the sup over the box z_i +- e,
 and the inequality above holds at the recorded z_i. That box has to lie in the domain (docs/soundness.md, 3.16).
 
+Where the bound on the disturbance grows (Declaration::growing), [lower, upper] contains sup |d_k| over that box, too,
+and the inequality holds with what is left in eps_k.
+
 A step that lasted by up to delta longer or shorter than dt (Transitions::longer) may have moved the state by delta |d
 f0 / d dt| more or less, and the residual may have done delta / dt of itself more: [lower, upper] contains that, too
 (docs/ soundness.md, 3.15).
@@ -54,9 +57,9 @@ class AmbiguousAngle final : public std::invalid_argument {
   int row_;
 };
 
-/** Computes the observations from transitions. @param declaration its L, its e and w^. @param timing what is declared
-of rates, where steps did not last dt. @throws AmbiguousAngle; NoNominalValue; std::invalid_argument if there are none,
-a size does not match the model or a number is not finite; the message names the row. Cost O(N). */
+/** Computes the observations from transitions. @param declaration its L, its e, w^ and d. @param timing what is
+declared of rates, where steps did not last dt. @throws AmbiguousAngle; NoNominalValue; std::invalid_argument if there
+are none, a size does not match the model or a number is not finite; the message names the row. Cost O(N). */
 [[nodiscard]] Observations Observe(const NominalModel& model, const Declaration& declaration,
                                    const Transitions& transitions, const StepTiming& timing = {});
 /** The same of exact records: e = 0. */

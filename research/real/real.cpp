@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <ostream>
 
+#include "identify/declare_by.h"
 #include "research/plot.h"
 #include "research/real/study.h"
 #include "research/run_directory.h"
@@ -238,7 +239,8 @@ std::string AboutData(const Study& study) {
 
 std::string AboutFit(const Learned& learned, const Fit& fit) {
   std::string text =
-      "\n| state | rms before the fit | after | largest after | sigma | w |\n|---|---|---|---|---|---|\n";
+      "\n| state | rms before the fit | after | largest after | state error | w, not hasty | growth "
+      "|\n|---|---|---|---|---|---|---|\n";
   const Problem& problem = *learned.problem;
   for (Eigen::Index k = 0; k < 5; ++k) {
     const auto rms = [&](const Eigen::MatrixXd& errors) {
@@ -246,8 +248,8 @@ std::string AboutFit(const Learned& learned, const Fit& fit) {
     };
     text += "| " + problem.model->state_names()[static_cast<std::size_t>(k)] + " | " + rms(fit.before) + " | " +
             rms(fit.after) + " | " + Text("%.4f", fit.after.col(k).cwiseAbs().maxCoeff()) + " | " +
-            Text("%.4f", problem.declaration.noise_bound[k]) + " | " +
-            Text("%.4f", problem.declaration.disturbance[k]) + " |\n";
+            Text("%.4f", learned.state_error[k]) + " | " + Text("%.4f", problem.declaration.disturbance[k]) + " | " +
+            Text("%.4f", learned.growth[k]) + " |\n";
   }
   return text;
 }
@@ -284,7 +286,7 @@ std::string Report(const Study& study, const Learned& all, const Fit& fit, const
          Markdown(study.trials, "itself", With({kJudgedBy, kQuantile}, kOutcome)) +
          "\n## Hidden states\nWhat the best fit to a drive leaves of its errors, where a line in a further state is "
          "taken off them.\n" +
-         Hidden(study) + "\n## One-step errors\nOf all drives, in m, rad, m/s, rad/s; one w.\n" + AboutFit(all, fit);
+         Hidden(study) + "\n## One-step errors\nOf all drives, in m, rad, m/s, rad/s; w grows.\n" + AboutFit(all, fit);
 }
 
 // ---- pictures
@@ -350,10 +352,9 @@ std::string Task(const Learned& learned, const Fit& fit) {
          parameters + "}}\ndomain:\n  state: {lower: " + List(problem.domain.state.lower()) +
          ", upper: " + List(problem.domain.state.upper()) +
          "}\n  input: {lower: " + List(problem.domain.input.lower()) +
-         ", upper: " + List(problem.domain.input.upper()) +
-         "}\ndeclaration:\n  lipschitz: {}\n  noise_bound: " + List(problem.declaration.noise_bound) +
-         "\n  disturbance: " + List(problem.declaration.disturbance) +
-         "\ntransitions: real-transitions.csv\ntask:\n  initial_set: {center: " + List(start) +
+         ", upper: " + List(problem.domain.input.upper()) + "}\ndeclaration:\n" +
+         DeclarationYaml(problem.declaration, *problem.model) +
+         "transitions: real-transitions.csv\ntask:\n  initial_set: {center: " + List(start) +
          ", half_width: " + List(learned.state_error) +
          "}\n  projection: [x, y]\n  obstacles: []\n  between: samples\n";
 }
@@ -365,7 +366,7 @@ void RunReal(const RealOptions& options, std::ostream& out) {
   for (std::size_t i = 0; i < study.drives.size(); ++i) study.LeaveOut(i, options.quick ? kFew : kQuantiles);
   study.JudgeOthers();
   const Fitted fitted = FitTo(study.driving, Study::AllBut(study.drives, ""));
-  const Learned all = Learn(fitted, {.quantile = kChosen});
+  const Learned all = Learn(fitted, {.quantile = kChosen, .growing = true});
   const Trial& shown = *std::ranges::find_if(
       study.trials, [](const Trial& trial) { return trial.table == "quantile" && trial.quantile == kChosen; });
 

@@ -11,6 +11,8 @@
 #include "forereach/dynamics/text_model.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/growing_disturbance.h"
 #include "identify/hold_out.h"
 #include "identify/noise_floor.h"
 #include "identify/proposal.h"
@@ -158,12 +160,8 @@ void DeclareStateError(Declaration& declaration, const Fitted& fitted) {
 }
 
 // What a growing disturbance grows with, of z in car.yaml.
+constexpr const char* kHasty = "abs(v*(steer - before))";
 double HastyIn(const Eigen::RowVectorXd& z) { return z[kV] * std::abs(z[kSteer] - z[kBefore]); }
-
-// How far an observed residual may lie from the residual at z, where w grows.
-Eigen::VectorXd ErrorAt(const Learned& learned, const Eigen::RowVectorXd& z) {
-  return EpsilonOf(learned.problem->declaration) + HastyIn(z) * learned.growth;
-}
 
 // The line a + b t, a and b not negative, that fits best.
 Eigen::Vector2d LineThrough(const Eigen::VectorXd& t, const Eigen::VectorXd& values) {
@@ -202,15 +200,13 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> GrowingWith(const Fitted& fitted, do
 }
 
 // The transitions that do not contradict a residual of zero.
-std::vector<int> RowsWithoutResidual(const Learned& learned) {
-  const Problem& problem = *learned.problem;
+std::vector<int> RowsWithoutResidual(const Problem& problem) {
   const Observations seen = Observe(*problem.model, problem.declaration, problem.transitions);
+  const Eigen::ArrayXd error = EpsilonOf(problem.declaration);
   std::vector<int> rows;
-  for (int i = 0; i < seen.size(); ++i) {
-    const Eigen::ArrayXd error = ErrorAt(learned, seen.z.row(i));
+  for (int i = 0; i < seen.size(); ++i)
     if ((seen.lower.row(i).transpose().array() <= error && seen.upper.row(i).transpose().array() >= -error).all())
       rows.push_back(i);
-  }
   return rows;
 }
 
@@ -329,7 +325,10 @@ Learned Learn(const Fitted& fitted, const LearnOptions& options) {
   if (options.growing) {
     DeclareStateError(declaration, fitted);
     std::tie(declaration.disturbance, learned.growth) = GrowingWith(fitted, options.quantile);
-    KeepOnly(RowsWithoutResidual(learned), *problem);
+    std::vector<ExpressionText> bounds;
+    for (const double growth : learned.growth) bounds.push_back({ToText(growth) + "*" + kHasty});
+    declaration.growing = std::make_shared<const GrowingDisturbance>(*problem->model, std::move(bounds));
+    KeepOnly(RowsWithoutResidual(*problem), *problem);
   } else {
     declaration.noise_bound = fitted.state_error.array() + kRounding;
     declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
@@ -353,41 +352,6 @@ Learned Proposed(const Fitted& fitted) {
   problem->declaration =
       Propose(problem->declaration, ObserveForProposal(*problem, problem->transitions), options).declaration;
   return {problem, problem->transitions.size(), 0, fitted.state_error, true};
-}
-
-GrowingScatter::GrowingScatter(const Learned& learned) : learned_(learned) {
-  const Problem& problem = *learned.problem;
-  const Observations seen = Observe(*problem.model, problem.declaration, problem.transitions);
-  lower_.setConstant(learned.growth.size(), -kInfinity);
-  upper_.setConstant(learned.growth.size(), kInfinity);
-  for (int i = 0; i < seen.size(); ++i) {
-    const Eigen::VectorXd error = ErrorAt(learned, seen.z.row(i));
-    lower_ = lower_.cwiseMax(seen.lower.row(i).transpose() - error);
-    upper_ = upper_.cwiseMin(seen.upper.row(i).transpose() + error);
-  }
-}
-
-void GrowingScatter::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
-  const double fastest = query.slice.center(kV) + query.half_width[kV],
-               change = std::abs(query.input[0] - query.slice.center(kBefore)) + query.half_width[kBefore];
-  for (Eigen::Index k = 0; k < lower_.size(); ++k) {
-    const double more = learned_.growth[k] * std::max(0.0, fastest) * change + kRounding;
-    bounds.lower[ToSize(k)] = lower_[k] - more;
-    bounds.upper[ToSize(k)] = upper_[k] + more;
-  }
-  bounds.capped = false;
-}
-
-int GrowingScatter::CountContradicting(const Transitions& judged) const {
-  const Observations seen = Observe(*learned_.problem->model, learned_.problem->declaration, judged);
-  int count = 0;
-  for (int i = 0; i < seen.size(); ++i) {
-    const Eigen::ArrayXd error = ErrorAt(learned_, seen.z.row(i));
-    count += (seen.lower.row(i).transpose().array() - error > upper_.array() ||
-              seen.upper.row(i).transpose().array() + error < lower_.array())
-                 .any();
-  }
-  return count;
 }
 
 Learned WithSlopesTimes(const Learned& learned, double factor) {
@@ -453,10 +417,8 @@ Judgement Judge(const Learned& learned, const std::vector<Stretch>& stretches, i
   judgement.transitions = judged.size();
   judgement.outside_domain = Gather(stretches, nullptr).size() - judged.size();
   if (judged.size() == 0) return judgement;
-  std::optional<GrowingScatter> scatter;
-  if (learned.growth.size() > 0) scatter.emplace(learned);
-  judgement.contradicting = scatter ? scatter->CountContradicting(judged) : CountContradicting(problem, judged);
-  const Certifier certifier = scatter ? Certifier(learned.problem, *scatter) : Certifier(learned.problem);
+  judgement.contradicting = CountContradicting(problem, judged);
+  const Certifier certifier(learned.problem);
   Tube tube;
   for (const Window& window : WindowsOf(judged, {{}, {{0, judged.size()}}}, steps))
     judgement.windows.push_back(JudgeWindow(certifier, learned, judged, window, tube));

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "forereach/certify/problem.h"
-#include "forereach/residual/enclosure.h"
 #include "identify/fit.h"
 #include "research/real/recording.h"
 
@@ -68,7 +67,7 @@ struct Learned {
   int transitions = 0, left_out = 0;
   Eigen::VectorXd state_error;  ///< Fitted::state_error
   bool explained = true;        ///< Whether slopes were found, or none were asked for.
-  Eigen::VectorXd growth = {};  ///< s_k b_k; the declaration's disturbance is s_k a_k. Empty unless w grows.
+  Eigen::VectorXd growth = {};  ///< s_k b_k; the rest of its w is s_k a_k. Empty unless w grows.
 };
 
 /** Disturbance and slopes from what the fitted model leaves of its transitions. The domain's ranges of the states are
@@ -80,21 +79,6 @@ widened by a tenth, since a tube needs room. Cost: some seconds for slopes. */
 /** What `forereach declare --from-data` proposes, which knows of no drives: slopes, and a disturbance from the scatter
 of near places. State errors are declared as such. Cost: some seconds. */
 [[nodiscard]] Learned Proposed(const Fitted& fitted);
-
-/** The bounds of a residual that is constant, and of what a growing disturbance has beyond the declaration's. Without
-directed rounding: for experiments. */
-class GrowingScatter final : public ResidualEnclosure {
- public:
-  /** @pre learned.growth is not empty. */
-  explicit GrowingScatter(const Learned& learned);
-  void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
-  /** How many of these contradict one that was learned from. */
-  [[nodiscard]] int CountContradicting(const Transitions& judged) const;
-
- private:
-  Learned learned_;
-  Eigen::VectorXd lower_, upper_;  // of the residual
-};
 
 /** The recorded commands of one window as a plan, and what became of it. */
 struct WindowResult {

@@ -272,6 +272,12 @@ TEST(Hypotheses, NameThoseWhoUpholdThemAndNobodyElse) {
   config.gate.learns = false;
   EXPECT_THAT(upheld("a measured state"), HasSubstr("refuted by nobody"));
   EXPECT_THAT(upheld("declaration.lipschitz"), Not(HasSubstr("of the bus")));
+  EXPECT_EQ(upheld("is disturbed"), "");
+  problem.declaration.disturbance = Vec({0, 0.5, 0, 0});
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "0.1*abs(vx)", "0"});
+  EXPECT_THAT(upheld("disturbed by at most py 0.5, vx 0.1*abs(vx)"), HasSubstr("transitions refute it"));
+  problem.declaration.disturbance = {};
+  problem.declaration.growing.reset();
   EXPECT_EQ(upheld("changes faster"), "");
   problem.timing.rate_bound = Vec({kInfinity, 2, kInfinity, kInfinity});
   EXPECT_THAT(upheld("changes faster, a second, than py 2"), HasSubstr("model.rate_bound"));

@@ -97,10 +97,10 @@ TEST(CertifyJsonTest, SaysWhichDisturbanceItAllowsFor) {
   task = std::regex_replace(task, std::regex("transitions: "), "transitions: " FOREREACH_SOURCE_DIR "/config/");
   const std::string noise = "  noise_bound: [0, 0, 0, 0, 0, 0]\n";
   const auto with = [&](const std::string& bounds) {
-    return scratch.Write("task.yaml", Replaced(task, noise, noise + "  disturbance: [" + bounds + "]\n"));
+    return scratch.Write("task.yaml", Replaced(task, noise, noise + "  disturbance: " + bounds + "\n"));
   };
   const std::string plan = " --plan config/plans/bicycle_certified.csv", decision_path = scratch / "decision.json";
-  std::string path = with("0, 0, 1e-4, 0.01, 0, 0");
+  std::string path = with("[0, 0, 1e-4, 0.01, 0, 0]");
   const Output output = Forereach("certify --json --config " + path + plan);
   ASSERT_EQ(output.code, 0);
   const Json decision = Json::parse(output.text), calm = CertifyJson("bicycle", "bicycle_certified");
@@ -117,7 +117,21 @@ TEST(CertifyJsonTest, SaysWhichDisturbanceItAllowsFor) {
   scratch.Write("decision.json", altered.dump());
   EXPECT_EQ(Forereach("verify " + decision_path + " 2>&1").code, 1);
 
-  path = with("0, 0, 0, 0, 0, 0");
+  path = with("{theta: 1e-4, v: \"1e-3*abs(v*(delta - a))\"}");
+  const Output grows = Forereach("certify --json --config " + path + plan);
+  ASSERT_EQ(grows.code, 0);
+  Json growing = Json::parse(grows.text);
+  EXPECT_EQ(growing["disturbance"], Json({0.0, 0.0, 1e-4, "1e-3*abs(v*(delta - a))", 0.0, 0.0}));
+  EXPECT_NE(growing["digests"]["declaration"], decision["digests"]["declaration"]);
+  scratch.Write("decision.json", grows.text);
+  EXPECT_EQ(Forereach("verify " + decision_path).code, 0);
+  growing["disturbance"][3] = "1e-3*abs(v*delta)";
+  scratch.Write("decision.json", growing.dump());
+  EXPECT_EQ(Forereach("verify " + decision_path + " 2>&1").code, 1);
+  EXPECT_THAT(Forereach("certify --config " + path + plan).text,
+              HasSubstr("\n  each step disturbed by up to: theta 0.0001 v 1e-3*abs(v*(delta - a))\n"));
+
+  path = with("[0, 0, 0, 0, 0, 0]");
   const Json zeros = Json::parse(Forereach("certify --json --config " + path + plan).text);
   EXPECT_FALSE(zeros.contains("disturbance"));
   for (const char* same : {"tube", "message"}) EXPECT_EQ(zeros[same], calm[same]);

@@ -52,6 +52,23 @@ TEST_F(DeclareDataTest, WhatTheErrorsOfTheRecordExplainNeedsNoSlope) {
   EXPECT_FALSE(Certifier(config.problem).violation());
 }
 
+// Drag of 0.02 |vx| with noise needs slopes, unless it is declared as what disturbs each step; what is proposed is a
+// task again.
+TEST_F(DeclareDataTest, KeepsAnExpressionOfTheDisturbanceAndJudgesByIt) {
+  const Json without = Json::parse(Declare("--by vx --json").text);
+  const std::string line = "transitions: steps.csv\n";
+  const std::string task = Replaced(Read(task_), line, "  disturbance: {vx: 0.03*vx}\n" + line);
+  std::ofstream(task_) << task;
+  const Json document = Json::parse(Declare("--by vx --json").text);
+  EXPECT_GT(without["lipschitz"][2][2], 0);
+  EXPECT_EQ(document["lipschitz"][2][2], 0);
+  const std::size_t begin = task.find("declaration:"), end = task.find("transitions:");
+  std::ofstream(task_) << task.substr(0, begin) + document["yaml"].get<std::string>() + task.substr(end);
+  const Config config = LoadConfig(task_);
+  EXPECT_EQ(config.problem->declaration.DisturbanceText(2), "0.03*vx");
+  EXPECT_FALSE(Certifier(config.problem).violation());
+}
+
 // The first of the rows lies next to the domain's edge.
 TEST_F(DeclareDataTest, NamesTheLinesOfTheFileWhereTransitionsAreLeftOut) {
   const Json before = Json::parse(Declare("--by vx --json").text);

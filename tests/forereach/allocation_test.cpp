@@ -96,8 +96,9 @@ TEST_F(Allocation, CertifyAllocatesNothing) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
-TEST_F(Allocation, CertifyAllocatesNothingForLimitsAndPlacesAtExpressions) {
+TEST_F(Allocation, CertifyAllocatesNothingForExpressions) {
   Problem problem = BicycleProblem();
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "0", "1e-4*abs(v*(a - delta))", "0", "0"});
   problem.limits = {{.name = "lateral acceleration", .that = {"v^2*tan(delta)/wheelbase", 1, 1}, .at_most = 4}};
   problem.body.parts = {{{}, 0.5, {{{"x + cos(theta)", 1, 1}, {"y + sin(theta)", 1, 1}}}}};
   certifier_.emplace(std::make_shared<Problem>(problem));

@@ -348,6 +348,50 @@ TEST(Certifier, ADisturbanceCountsForTheObservationAndForEachStep) {
   EXPECT_NEAR(judge.tube().step(0).envelope.lower[kVx], 0.25 - 0.1875, 1e-14) << "the residual's, without the step's";
 }
 
+// The observation is from vx = 2 +- 0.5, where the bound is at most 0.3125 of the true state, and the steps are from vx
+// up to 1 and up to 1.75.
+TEST(Certifier, ADisturbanceThatGrowsCountsForTheObservationAndForEachStepWhereTheyAre) {
+  Problem problem = PointMassInHalves();
+  problem.transitions.z(0, kVx) = problem.transitions.x_next(0, kVx) = 2;
+  problem.transitions.x_next(0, 0) = 1;
+  problem.declaration.state_error = Vec({0, 0, 0.5, 0});
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "0", "-0.125*vx"});
+  Judge judge(problem);
+  EXPECT_EQ(judge(Zonotope::FromBox(Vec({0, 0, 0.5, 0}), Vec({0, 0, 0.5, 0})), Coast(2), {}).outcome,
+            Outcome::kCertified);
+  const double observed = 0.125 * 2.5;
+  double width = 0;
+  for (const int t : {0, 1}) {
+    EXPECT_NEAR(judge.tube().step(t).envelope.upper[3], observed, 1e-14) << "the residual's, without the step's";
+    width += observed + 0.125 * judge.tube().slice(t).Hull(kVx).upper;
+    const Interval hull = judge.tube().slice(t + 1).Hull(3);
+    EXPECT_NEAR(hull.upper, width, 1e-14);
+    EXPECT_GE(hull.upper, width);
+    EXPECT_LE(hull.lower, -width);
+  }
+}
+
+TEST(Certifier, WhereAGrowingDisturbanceHasNoBoundThereIsNoSuccessor) {
+  Problem problem = PointMassInHalves();
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "1e-3/(vx - 2)", "0"});
+  Judge judge(problem);
+  EXPECT_EQ(judge(PointSet(Vec({0, 0, 1, 0})), Coast(1), {}).outcome, Outcome::kCertified);
+  const Decision decision = judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {});
+  EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
+  EXPECT_EQ(decision.coordinate, kVx);
+  problem.transitions.z(0, kVx) = 2;
+  EXPECT_THROW(Judge{problem}, std::invalid_argument) << "such a transition says nothing";
+}
+
+TEST(Certifier, RefusesAGrowingDisturbanceOfOtherNamesOrSizes) {
+  const Problem problem = PointMassInHalves();
+  EXPECT_THROW(Growing(*problem.model, {"0", "0", "wind", "0"}), std::invalid_argument);
+  EXPECT_THROW(Growing(*problem.model, {"0", "0", "0"}), std::invalid_argument);
+  const auto bicycle = MakeKinematicBicycle(0.1, 2.5, {2});
+  EXPECT_NO_THROW(Growing(*bicycle, {"0", "0", "v*sin(theta)", "0", "0", "0"}));
+  EXPECT_THROW(Growing(*bicycle, {"0", "0", "v*theta", "0", "0", "0"}), std::invalid_argument) << "an angle";
+}
+
 TEST(Certifier, ZerosAreTheSameAsNoDisturbance) {
   Problem problem = PointMassInHalves();
   problem.transitions.x_next(0, kVx) += 0.25;
@@ -373,6 +417,19 @@ TEST(Certifier, ADisturbanceExplainsDataThatContradictEachOtherWithoutIt) {
   EXPECT_FALSE(Judge(problem).certifier().violation());
   problem.declaration.disturbance[kVx] = 0.25 * (1 - 0x1p-50);
   EXPECT_TRUE(Judge(problem).certifier().violation());
+}
+
+// Each observation has the bound of its own place: 0.125 |ax|.
+TEST(Certifier, AGrowingDisturbanceExplainsDataAsFarAsItsPlacesAllow) {
+  Problem problem = PointMassInHalves();
+  problem.transitions = {Eigen::MatrixXd::Zero(2, 6), Eigen::MatrixXd::Zero(2, 4)};
+  problem.transitions.z(1, 4) = -1;
+  problem.transitions.x_next(1, 0) = -0.125;
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "0.125*abs(ax)", "0"});
+  for (const double beyond : {-0x1p-40, 0x1p-40}) {
+    problem.transitions.x_next(1, kVx) = -0.5 - 0.125 - beyond;
+    EXPECT_EQ(Judge(problem).certifier().violation().has_value(), beyond > 0);
+  }
 }
 
 // s+ = s + r(v), r changes by at most 0.5 for a change of 1 in v, and v was recorded as 1.1 +- 0.1 when s went from 0

@@ -71,6 +71,19 @@ TEST_F(LearnTest, ALearnedStepMayHaveBeenDisturbedAsAnyOther) {
   }
 }
 
+// The same, where the bound is what the expression has at their place.
+TEST_F(LearnTest, ALearnedStepMayHaveBeenDisturbedByWhatItsPlaceAllows) {
+  problem_.declaration.growing = Growing(*problem_.model, {"0", "0", "0.015625*abs(v*(delta - 1))", "0", "0", "0"});
+  const Eigen::VectorXd z = Draw();
+  const double bound = 0.015625 * z[3] * (1 - z[5]);
+  Add(problem_, z, Next(z, -bound));
+  for (const double beyond : {-1e-9, 1e-9}) {
+    Certifier certifier(std::make_shared<Problem>(problem_));
+    EXPECT_EQ(Learn(certifier, z, Next(z, bound + beyond)), Certifier::Learned::kAdded);
+    EXPECT_EQ(certifier.violation().has_value(), beyond > 0);
+  }
+}
+
 TEST_F(LearnTest, AnswersAsACertifierThatHadAllDataFromTheStart) {
   Problem all = problem_;
   std::vector<Eigen::VectorXd> points;

@@ -26,7 +26,8 @@ class AdmissibleResidual {
         const auto coordinate = static_cast<Eigen::Index>(k);
         const double next = problem.transitions.x_next(i, coordinate);
         const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) +
-                           Real(declaration_.noise_bound[coordinate]) + Real(declaration_.DisturbanceBound(coordinate));
+                           Real(declaration_.noise_bound[coordinate]) +
+                           DisturbanceAt(problem, {z.begin(), z.end()}, coordinate);
         lower.push_back(Real(next) - nominal[k] - slack);
         upper.push_back(Real(next) - nominal[k] + slack);
       }

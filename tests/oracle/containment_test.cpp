@@ -108,11 +108,11 @@ bool Collides(const Obstacle& obstacle, const Eigen::MatrixXd& projection, const
 // The next state of an admissible rollout. `offset` is that of its boundary, and becomes the next one's.
 std::vector<Real> Rolled(Random& random, const Problem& problem, const AdmissibleResidual& residual,
                          const std::vector<Real>& z, Real& offset) {
-  std::vector<Real> unexpected = AnyDisturbance(random, problem), most;
+  std::vector<Real> unexpected = AnyDisturbance(random, problem, z), most;
   for (std::size_t k = 0; k < unexpected.size(); ++k) {
     const Real r = residual(z, static_cast<int>(k));
     unexpected[k] += r;
-    most.push_back(abs(r) + Real(problem.declaration.DisturbanceBound(static_cast<Eigen::Index>(k))));
+    most.push_back(abs(r) + DisturbanceAt(problem, z, static_cast<Eigen::Index>(k)));
   }
   const Real before = offset;
   offset = AnyOffset(random, problem);
@@ -305,6 +305,29 @@ TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanDeclared) {
     EXPECT_TRUE(first.Contains(at(1 - 0x1p-39)));
     EXPECT_FALSE(first.Contains(at(1)));
   }
+}
+
+// A bound that grows with state and input counts where the step is: from one state its slice ends at that bound, and
+// from a set at the largest one in it, under any input that may act.
+TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanTheExpressionAllows) {
+  TracedRandom random(806);
+  for (const double half_width : {0.0, 0.25})
+    for (const double input_error : {0.0, 0.5}) {
+      auto problem = std::make_shared<Problem>(PointMassInHalves());
+      problem->declaration.input_error = Vec({input_error, 0});
+      problem->declaration.growing = Growing(*problem->model, {"0", "0", "0", "0.125*vx*(vy - ax)"});
+      const Certifier certifier(problem);
+      Tube tube;
+      const Query query{Zonotope::FromBox(Vec({0, 0, 2, 0.5}), Vec({0, 0, half_width, 0})), Vec({1, 0}), {}};
+      ASSERT_EQ(certifier.Certify(query.plan(), query.initial_set, {}, tube).outcome, Outcome::kCertified);
+      const Membership slice(random, tube.slice(1));
+      const double vx = 2 + half_width, ax = 1 + input_error, bound = 0.125 * vx * (ax - 0.5);
+      const auto at = [&](double w) { return std::vector<Real>{0.5 * vx + 0.125 * ax, 0.25, vx + 0.5 * ax, 0.5 + w}; };
+      for (const double sign : {1.0, -1.0}) {
+        EXPECT_TRUE(slice.Contains(at(sign * bound))) << half_width << " " << input_error;
+        EXPECT_FALSE(slice.Contains(at(sign * (bound + 0x1p-40)))) << half_width << " " << input_error;
+      }
+    }
 }
 
 // The judge itself: it has to notice a state just outside.

@@ -279,7 +279,7 @@ std::optional<Meeting> Met(Random& random, const Problem& problem, const Query& 
     std::vector<Real> z = x;
     for (const double u : query.plan().input(step)) z.emplace_back(u);
     next = NominalSuccessor(bicycle, z);
-    const std::vector<Real> wind = AnyDisturbance(random, problem);
+    const std::vector<Real> wind = AnyDisturbance(random, problem, z);
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
   }
   const Chord chord = judge.ChordOf(x, next, {}, {});

@@ -353,12 +353,13 @@ class MotionTrial {
     std::vector<Real> x = PointOf(random_, query.initial_set);
     Real offset;
     for (int t = 0; t < standing; ++t) {
-      std::vector<Real> z = x, unexpected = AnyDisturbance(winds_, problem), most;
+      std::vector<Real> z = x, most;
       for (const double u : query.plan().input(t)) z.emplace_back(u);
+      std::vector<Real> unexpected = AnyDisturbance(winds_, problem, z);
       for (std::size_t k = 0; k < unexpected.size(); ++k) {
         const Real r = residual(z, static_cast<int>(k));
         unexpected[k] += r;
-        most.push_back(abs(r) + Real(problem.declaration.DisturbanceBound(static_cast<Eigen::Index>(k))));
+        most.push_back(abs(r) + DisturbanceAt(problem, z, static_cast<Eigen::Index>(k)));
       }
       const Real before = std::exchange(offset, NextOffset(problem, offset));
       const std::vector<Real> next = LongerSuccessor(winds_, problem, z, unexpected, most, offset - before);

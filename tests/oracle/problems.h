@@ -4,13 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/kinematic_bicycle.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/models/point_mass.h"
 #include "forereach/dynamics/step_rate.h"
+#include "forereach/numerics/text.h"
+#include "forereach/residual/growing_disturbance.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 #include "tests/worlds.h"
@@ -126,18 +131,61 @@ inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int cou
   return problem;
 }
 
-/** Declares a disturbance in about half of the coordinates, and disturbs every observation within it, many of them by
-the bound. The margin of 1e-6 is for the rounding of the successors. */
+/** What the bound on the disturbance of state k has at z beyond its constant part: |d_k(z)|. @pre d_k names variables
+only. */
+inline Real GrowthAt(const Problem& problem, const std::vector<Real>& z, Eigen::Index k) {
+  const Declaration& declaration = problem.declaration;
+  if (!declaration.Grows(k)) return 0;
+  const Expression text =
+      ParseExpression(declaration.growing->bounds()[static_cast<std::size_t>(k)], problem.model->variable_names());
+  return abs(Evaluate<Real>(text, z, [](double number) { return Real(number); }));
+}
+
+/** The bound on the disturbance of state k in a step at z. */
+inline Real DisturbanceAt(const Problem& problem, const std::vector<Real>& z, Eigen::Index k) {
+  return Real(problem.declaration.DisturbanceBound(k)) + GrowthAt(problem, z, k);
+}
+
+/** Declares that the disturbance of about half of the coordinates grows with state and input, by expressions with and
+without kinks, some of which are negative somewhere. */
+inline void Grow(Random& random, Problem& problem) {
+  const std::vector<std::string> names = problem.model->variable_names();
+  const std::vector<Interval> ranges = problem.domain.Ranges();
+  std::vector<ExpressionText> bounds(static_cast<std::size_t>(problem.model->num_states()),
+                                     {GrowingDisturbance::kNone});
+  for (ExpressionText& bound : bounds) {
+    if (random.Coin()) continue;
+    const auto any = [&] { return static_cast<std::size_t>(random.Below(static_cast<int>(names.size()))); };
+    const std::size_t a = any(), b = any();
+    const double reach = std::max(ranges[a].Magnitude(), ranges[b].Magnitude());
+    const std::string least = ToText(std::ldexp(random.Uniform(0.5, 1), -random.Integer(6, 16)) / (reach * reach)),
+                      scale = least + "*" + ToText(reach);
+    switch (random.Below(5)) {
+      case 0: bound.text = scale + "*" + names[a]; break;
+      case 1: bound.text = least + "*abs(" + names[a] + "*(" + names[b] + " - 0.25*" + names[a] + "))"; break;
+      case 2: bound.text = least + "*(" + names[a] + "^2 - " + names[b] + "*" + names[a] + ")"; break;
+      case 3: bound.text = scale + "*" + names[a] + "*sin(" + names[b] + ")"; break;
+      default: bound.text = scale + "*max(" + names[a] + ", abs(" + names[b] + "))"; break;
+    }
+  }
+  problem.declaration.growing = std::make_shared<const GrowingDisturbance>(*problem.model, std::move(bounds));
+}
+
+/** Declares a disturbance in about half of the coordinates, in some problems one that grows, and disturbs every
+observation within it, many of them by the bound. The margin of 1e-6 is for the rounding of the successors. */
 inline void Disturb(Random& random, Problem& problem) {
   const int n = problem.model->num_states();
   Eigen::VectorXd& bound = problem.declaration.disturbance;
   bound = Eigen::VectorXd::Zero(n);
   for (int k = 0; k < n; ++k)
     if (random.Coin()) bound[k] = std::ldexp(random.Uniform(0.5, 1), -random.Integer(6, 16));
-  for (int i = 0; i < problem.transitions.size(); ++i)
+  if (random.Coin(0.4)) Grow(random, problem);
+  for (int i = 0; i < problem.transitions.size(); ++i) {
+    const Eigen::VectorXd z = problem.transitions.z.row(i);
     for (int k = 0; k < n; ++k)
-      problem.transitions.x_next(i, k) +=
-          (1 - 1e-6) * bound[k] * (random.Coin() ? random.Sign() : random.Uniform(-1, 1));
+      problem.transitions.x_next(i, k) += (1 - 1e-6) * DisturbanceAt(problem, {z.begin(), z.end()}, k).ToDouble() *
+                                          (random.Coin() ? random.Sign() : random.Uniform(-1, 1));
+  }
 }
 
 /** The same as a robot records it whose states and inputs are known to the errors e that it declares, in about half of
@@ -171,12 +219,11 @@ inline std::shared_ptr<Problem> Recorded(Random& random, const Problem& truth) {
   return problem;
 }
 
-/** What disturbs one step: by the bound or by anything within it. */
-inline std::vector<Real> AnyDisturbance(Random& random, const Problem& problem) {
-  std::vector<Real> w(static_cast<std::size_t>(problem.model->num_states()));
-  const Eigen::VectorXd& bound = problem.declaration.disturbance;
-  for (Eigen::Index k = 0; k < bound.size(); ++k)
-    w[static_cast<std::size_t>(k)] = Real(bound[k]) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+/** What disturbs a step at z: by the bound or by anything within it. */
+inline std::vector<Real> AnyDisturbance(Random& random, const Problem& problem, const std::vector<Real>& z) {
+  std::vector<Real> w;
+  for (int k = 0; k < problem.model->num_states(); ++k)
+    w.push_back(DisturbanceAt(problem, z, k) * Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1)));
   return w;
 }
 

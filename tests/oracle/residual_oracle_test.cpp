@@ -803,11 +803,11 @@ TEST(Observe, OfAStepOffItsTimeContainsTheResidual) {
     Eigen::VectorXd z(d);
     for (int l = 0; l < d; ++l) z[l] = random.Uniform(-0.3, 0.3) * (l < n ? StateReach(bicycle)[l] : 1);
     const std::vector<Real> exact_z(z.begin(), z.end());
-    std::vector<Real> unexpected = AnyDisturbance(random, *problem), most, r;
+    std::vector<Real> unexpected = AnyDisturbance(random, *problem, exact_z), most, r;
     for (int k = 0; k < n; ++k) {
       r.push_back(residual(exact_z, k));
       unexpected[ToSize(k)] += r.back();
-      most.push_back(abs(r.back()) + Real(declaration.DisturbanceBound(k)));
+      most.push_back(abs(r.back()) + DisturbanceAt(*problem, exact_z, k));
     }
     const double longer = 2 * AnyOffset(random, *problem).ToDouble();
     // What may have doubled says nothing: SaysNothingIfTheDurationMayHaveDoubledTheResidual.

@@ -4,8 +4,12 @@
 #include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
+#include "forereach/dynamics/text_model.h"
+#include "forereach/residual/growing_disturbance.h"
+#include "tests/oracle/any_expression.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/traced_random.h"
+#include "tests/text_models.h"
 
 namespace forereach::text_enclosure_test {
 
@@ -148,6 +152,43 @@ TEST(TextEnclosure, TellsWhichExpressionsUseAnInput) {
   EXPECT_TRUE(enclosure.UsesInput(1));
   EXPECT_TRUE(enclosure.UsesInput(2));
   EXPECT_FALSE(enclosure.UsesInput(3));
+}
+
+// Of random expressions, with kinks, poles and functions that are not defined everywhere.
+TEST(GrowingDisturbance, BoundsTheSizeAtEveryPointOfTheBox) {
+  const ModelText text = TextModel({{"x", "x"}, {"y", "y"}}, {"u"}, {{"dt", 1, 1}, {"d", 0.5, 1.5}});
+  const auto model = MakeTextModel(text);
+  const std::vector<std::string> names{"x", "y", "u", "dt", "d"}, leaves{"x", "y", "u", "d", "0.3"};
+  TracedRandom random(7241);
+  int finite = 0, tight = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::vector<ExpressionText> bounds;
+    for (int k = 0; k < 2; ++k) bounds.push_back({AnyExpression(random, leaves, random.Integer(1, 5), false), 1, 1});
+    const GrowingDisturbance growing(*model, bounds);
+    std::vector<Interval> box, sizes(2);
+    const double width = random.Coin() ? 0 : std::ldexp(1, -random.Integer(0, 20));
+    for (int l = 0; l < 3; ++l) {
+      const double middle = random.Uniform(-2, 2);
+      box.emplace_back(middle - width, middle + width);
+    }
+    growing.Enclose(box, sizes);
+    for (int sample = 0; sample < 4; ++sample) {
+      std::vector<Real> at;
+      for (const Interval& range : box)
+        at.emplace_back(random.Coin() ? range.lower : random.Coin() ? range.upper : range.Middle());
+      at.emplace_back(1.0);
+      at.emplace_back(random.Coin() ? 0.5 : 1.5);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Real value = abs(Evaluate<Real>(ParseExpression(bounds[k], names), at, [](double x) { return Real(x); }));
+        ASSERT_TRUE(IsInside(value, sizes[k])) << bounds[k].text;
+        ASSERT_GE(sizes[k].lower, 0) << bounds[k].text;
+        finite += sizes[k].IsFinite();
+        tight += sizes[k].IsFinite() && value >= Real(sizes[k].upper) - Real(1e-9);
+      }
+    }
+  }
+  EXPECT_GT(finite, 4000);
+  EXPECT_GT(tight, 1000);
 }
 
 }  // namespace forereach::text_enclosure_test

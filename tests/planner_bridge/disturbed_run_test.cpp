@@ -10,10 +10,15 @@
 namespace forereach::disturbed_run_test {
 
 // X0 of a candidate leaves room for the two steps until it starts.
-Config Task(const std::string& disturbance, int seed) {
+Config Task(const std::string& disturbance, int seed, bool grows = false) {
   Config config = Bicycle();
   Problem problem = *config.problem;
   problem.declaration.disturbance = Vec({0.002, 0.002, 0.0005, 0.004, 0, 0});
+  if (grows) {
+    problem.declaration.disturbance.setZero();
+    problem.declaration.growing =
+        Growing(*problem.model, {"0.0004*v", "0.0004*v", "0.0005*abs(v*delta)", "0.002 + 0.001*abs(jerk)", "0", "0"});
+  }
   config.robot.disturbance = disturbance;
   config.robot.disturbance_seed = seed;
   config.robot.time_limit_s = 40;
@@ -55,11 +60,11 @@ Ending Drive(const Config& config) {
   return run;
 }
 
-class DisturbedRun : public testing::TestWithParam<std::pair<const char*, int>> {};
+class DisturbedRun : public testing::TestWithParam<std::tuple<const char*, int, bool>> {};
 
 TEST_P(DisturbedRun, StaysInItsSlicesAndClear) {
-  const auto [disturbance, seed] = GetParam();
-  const Ending run = Drive(Task(disturbance, seed));
+  const auto [disturbance, seed, grows] = GetParam();
+  const Ending run = Drive(Task(disturbance, seed, grows));
   SCOPED_TRACE(run.robot.dump() + run.planner.dump());
   EXPECT_EQ(run.robot["contacts"], 0);
   EXPECT_GT(run.robot["steps_executed"], 60);
@@ -69,8 +74,8 @@ TEST_P(DisturbedRun, StaysInItsSlicesAndClear) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, DisturbedRun,
-                         testing::Values(std::pair("random", 1), std::pair("adversarial", 1),
-                                         std::pair("adversarial", 2)));
+                         testing::Values(std::tuple("random", 1, false), std::tuple("adversarial", 1, false),
+                                         std::tuple("adversarial", 2, false), std::tuple("adversarial", 3, true)));
 
 // The robot of the task without disturbances, whose sensors err.
 Config MeasuredTask(const std::string& sensor_error, int seed) {

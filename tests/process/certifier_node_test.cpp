@@ -1485,6 +1485,22 @@ TEST_F(ReloadTest, TakesANewTaskWholeOrNotAtAll) {
   EXPECT_EQ(GetText(status_.message), "waits for the robot's state");
 }
 
+TEST_F(ReloadTest, ANewExpressionOfTheDisturbanceIsANewDeclaration) {
+  const auto node = Begin();
+  std::set<Digest> declarations;
+  for (const char* const bound : {"0.001*abs(vx*(ax - vy))", "0.002*abs(vx*(ax - vy))"}) {
+    Copy([&](const std::string& text) {
+      return std::regex_replace(text, std::regex("  state_error"),
+                                "  disturbance: {vx: \"" + std::string(bound) + "\"}\n  state_error");
+    });
+    Reload(*node);
+    EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).grounds.config);
+    declarations.insert(LoadConfig(path_).grounds.declaration);
+  }
+  EXPECT_EQ(status_.version, 3);
+  EXPECT_EQ(declarations.size(), 2u);
+}
+
 TEST_F(ReloadTest, TheSizesOfTheModelCannotChange) {
   const auto node = Begin();
   const auto expect_refused = [&](std::int64_t failed, const char* what) {

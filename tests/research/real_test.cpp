@@ -190,24 +190,6 @@ TEST_F(RealTest, EachDriveLiesWithinWhatGrowsAndNotOnlyMostOfAll) {
   }
 }
 
-TEST_F(RealTest, ADisturbanceThatDoesNotGrowIsJudgedAsTheCertifierWould) {
-  const Drive learn = DriveOf({}, 30, 1), judge = DriveOf({.gain = 2.6}, 20, 2);
-  Learned learned = Learn(FitTo(driving_, Whole(learn)), {.quantile = 0.9, .growing = true});
-  learned.growth.setZero();
-  auto problem = std::make_shared<Problem>(*learned.problem);
-  problem->declaration.disturbance *= 3;  // so that every transition is within it
-  learned.problem = problem;
-  Learned plain = learned;
-  plain.growth = {};
-  ASSERT_FALSE(Certifier(plain.problem).violation());
-  const Judgement by_certifier = Judge(plain, Whole(judge), 5), by_scatter = Judge(learned, Whole(judge), 5);
-  EXPECT_EQ(by_scatter.contradicting, by_certifier.contradicting);
-  EXPECT_EQ(by_scatter.inside(), by_certifier.inside());
-  EXPECT_EQ(by_scatter.complete(), by_certifier.complete());
-  ASSERT_GT(by_certifier.complete(), 10);
-  EXPECT_NEAR(*by_scatter.HalfWidth(), *by_certifier.HalfWidth(), 1e-6);
-}
-
 TEST_F(RealTest, AGrowingDisturbanceIsNarrowerWhereCommandsComeAtUnknownTimes) {
   const MadeUpCar car{.asked_late = true};
   const Drive first = DriveOf(car, 30, 1), second = DriveOf(car, 30, 2), left_out = DriveOf(car, 30, 3);
@@ -376,7 +358,7 @@ TEST_F(RealTest, TheCommandWritesTablesAndATaskThatOthersRead) {
 
   const Config config = LoadConfig((out / "real-task.yaml").string());
   EXPECT_GT(config.problem->transitions.size(), 100);
-  EXPECT_TRUE(config.problem->declaration.IsDisturbed());
+  EXPECT_TRUE(config.problem->declaration.Grows(4));
   EXPECT_FALSE(Certifier(config.problem).violation().has_value());
 }
 

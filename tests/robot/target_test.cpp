@@ -415,6 +415,31 @@ TEST_P(DisturbanceTest, StaysWithinItsBoundAndReachesIt) {
   EXPECT_FALSE(FindViolation(problem.declaration, Observe(*problem.model, made)));
 }
 
+// At each place by what the expression allows there, which is reached.
+TEST_P(DisturbanceTest, StaysWithinABoundThatGrowsAndReachesIt) {
+  Config config = PointMassTask();
+  Problem problem = *config.problem;
+  config.robot_residual.reset();
+  problem.declaration.disturbance = {};
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "0.25*(ax - vy)", "0"});
+  config.robot.disturbance = GetParam();
+  config.robot.disturbance_seed = 3;
+  const std::unique_ptr<Target> target = MakeTarget(config);
+  Disturbance disturbance(problem.declaration, config.robot);
+  const Transitions made = MakeTransitions(*target, problem, 8, 2000, {}, {}, &disturbance);
+  double largest = 0;
+  for (int i = 0; i < made.size(); ++i) {
+    const Eigen::VectorXd row = made.z.row(i);
+    const std::vector<double> next = Step(*target, {row.begin(), row.end()}, 4);
+    const mpq_class moved = mpq_class(made.x_next(i, 2)) - mpq_class(next[2]),
+                    bound = abs(mpq_class(row[4]) - mpq_class(row[3])) / 4;
+    EXPECT_LE(abs(moved), bound) << i;
+    if (bound > 0.01) largest = std::max(largest, mpq_class(abs(moved) / bound).get_d());
+    for (int k : {0, 1, 3}) EXPECT_EQ(made.x_next(i, k), next[static_cast<std::size_t>(k)]);
+  }
+  EXPECT_GT(largest, 0.99);
+}
+
 // Also where the true state is far smaller than its error, or far larger.
 TEST_P(DisturbanceTest, MeasuresWithinTheStateErrorAndReachesIt) {
   Declaration declaration;

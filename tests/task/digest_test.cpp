@@ -70,6 +70,26 @@ TEST(DeclarationDigest, NoDisturbanceAndZerosAreTheSame) {
   EXPECT_NE(with("[0, 0, 0, 4.9e-324]"), digest);
   EXPECT_NE(with("[0, 0, 0.1, 0]"), with("[0, 0, 0, 0.1]"));
   EXPECT_NE(with("[0, 0, 0.01, 0.01]"), digest);
+  EXPECT_EQ(with("{vx: 0}"), digest);
+  EXPECT_EQ(with("{vx: 0.1, px: 0.2}"), with("[0.2, 0, 0.1, 0]"));
+}
+
+TEST(DeclarationDigest, TellsExpressionsOfTheDisturbanceApart) {
+  const TaskFiles files;
+  const auto with = [&](const std::string& disturbance) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files.Load(Replaced(kTask, line, line + "  disturbance: " + disturbance + "\n")).grounds.declaration;
+  };
+  const std::set<Digest> different{files.Load().grounds.declaration,
+                                   with("{vx: 0.1}"),
+                                   with("{vx: 0.1*vx}"),
+                                   with("{vx: 0.1*ax}"),
+                                   with("{vy: 0.1*vx}"),
+                                   with("{vx: 0.1*vx, vy: 0.1}"),
+                                   with("{vx: 0.1*vx, vy: 0.1*vx}"),
+                                   with("{vx: 0.10000000000000002*vx}")};
+  EXPECT_EQ(different.size(), 8u);
+  EXPECT_EQ(with("{vx: 0.1*vx}"), with("{vx: \"0.1*vx\"}"));
 }
 
 TEST(DeclarationDigest, NoErrorOfRecordsAndZerosAreTheSame) {

@@ -309,7 +309,36 @@ TEST_F(ErrorTest, ADisturbanceThatDoesNotFitIsAnError) {
   EXPECT_EQ(with("[0, 0, .inf, 0]"),
             "task.yaml:12: declaration.disturbance[2]: .inf is not a finite number; write a number in [0, inf)");
   EXPECT_EQ(with("[0, 0, 1]"), "task.yaml:12: declaration.disturbance: has 3 entries, has to have 4: px, py, vx, vy");
-  EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a list of numbers");
+  EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a map or a list of numbers");
+  EXPECT_EQ(with("{vx: -1e-9}"), "task.yaml:12: declaration.disturbance.vx: -1e-9 is outside [0, inf)");
+  EXPECT_EQ(with("{ax: 1}"), "task.yaml:12: declaration.disturbance.ax: unknown key; did you mean px?");
+  EXPECT_EQ(with("{vx: 0.1, vy: 0.02 + 0.3*abs(vx*(ax - vy)), px: -vx}"), "") << "the sign does not count";
+  EXPECT_EQ(with("{vx: 0.02 + 0.3*wind}"),
+            "task.yaml:12:32: wind is not a name that is known here; known here: px, py, vx, vy, ax, ay, dt, pi");
+  EXPECT_EQ(with("{vx: .inf}"), "task.yaml:12:21: . is not a number; write digits behind the point");
+  EXPECT_EQ(with("{vx: 1e999}"), "task.yaml:12:21: 1e999 is too large or too small to represent");
+  EXPECT_EQ(with("{vx: \"max(vx\"}"), "task.yaml:12:22: ( has no )");
+  EXPECT_EQ(with("{vx: [1]}"), "task.yaml:12: declaration.disturbance.vx: a list is not an expression");
+  EXPECT_THAT(with("{vx: \"" + std::string(1 << 16, '(') + "\"}"), StartsWith("task.yaml:12:"));
+}
+
+// Where a bound on the disturbance is undefined or infinite, the key, the state and the place are named.
+TEST_F(ErrorTest, ADisturbanceWithoutABoundInTheDomainIsAnError) {
+  const auto with = [&](const std::string& vx) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files_.ErrorWith(line, line + "  disturbance: {vx: \"" + vx + "\"}\n");
+  };
+  EXPECT_EQ(with("1/(vx + 6)"), "");
+  EXPECT_EQ(with("sqrt(6 - abs(vy))*exp(ax)"), "");
+  const std::string nowhere =
+      "task.yaml:12: declaration.disturbance.vx: has to have a finite value everywhere in the domain's box, and "
+      "nothing "
+      "bounds it";
+  EXPECT_EQ(with("1/(vx - 2)"), nowhere + " near vx 2");
+  EXPECT_EQ(with("1/((ax - 2)*vy)"), nowhere + " near ax 2");
+  EXPECT_EQ(with("sqrt(vy)"), nowhere + " near vy -5.4");
+  EXPECT_EQ(with("exp(1000*px)"), nowhere + " near px 0.7098");
+  EXPECT_EQ(with("0/0"), nowhere);
 }
 
 TEST_F(ErrorTest, AnErrorOfRecordsThatDoesNotFitIsAnError) {

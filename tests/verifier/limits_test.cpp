@@ -83,7 +83,7 @@ TEST(LimitOf, WhatIsLeftOfAPlanCountsFromItsFirstStep) {
 TEST(LimitOf, AMalformedExpressionCannotBeVerified) {
   const Verdict verdict = Judge(AtMost("vx +", 9));
   EXPECT_EQ(verdict.status, Status::kCannotVerify);
-  EXPECT_THAT(verdict.failure.what, testing::HasSubstr("a limit or place is no expression"));
+  EXPECT_THAT(verdict.failure.what, testing::HasSubstr("a limit, place or disturbance is no expression"));
 }
 
 }  // namespace forereach::verifier::limits_test

@@ -241,6 +241,36 @@ TEST(HandMade, ADisturbanceCountsForBothSteps) {
   ExpectRefuted(Judge(problem, sure_of_the_residual), 0, "residual of px");
 }
 
+// |ax| is 0 where the step was observed, give or take its error of 1/8, and 1 in this step, by the same error.
+TEST(HandMade, ADisturbanceThatGrowsCountsWhereTheStepsAre) {
+  const auto problem = Halves();
+  problem->declaration.input_error = Eigen::Vector2d(0.125, 0);
+  problem->declaration.growing = Growing(*problem->model, {"0", "0", "0", "-ax*abs(vy + 2)/3"});
+  const auto certificate = [](double observed, double stepped) {
+    Certificate one_step = OneStep();
+    one_step.slices[0].envelope_lower = Eigen::Vector4d(-1, -1, -1, -observed);
+    one_step.slices[0].envelope_upper = Eigen::Vector4d(1, 1, 1, observed);
+    one_step.slices[1].lower -= Eigen::Vector4d(1, 0, 1, stepped);
+    one_step.slices[1].upper += Eigen::Vector4d(1, 0, 1, stepped);
+    return one_step;
+  };
+  constexpr double kHair = 1e-15, kObserved = 0.125 * 2 / 3, kStepped = kObserved + 1.125;
+  ExpectConfirmed(Judge(problem, certificate(kObserved + kHair, kStepped + kHair)));
+  ExpectRefuted(Judge(problem, certificate(kObserved - kHair, kStepped + kHair)), 0, "residual of vy");
+  ExpectRefuted(Judge(problem, certificate(kObserved + kHair, kStepped - kHair)), 1, "hull contains vy");
+}
+
+TEST(HandMade, WithoutABoundOnTheDisturbanceNothingIsKnown) {
+  const auto problem = Halves();
+  Certificate wide = OneStep();
+  wide.slices[1].lower.setConstant(-1e300);
+  wide.slices[1].upper.setConstant(1e300);
+  problem->declaration.growing = Growing(*problem->model, {"1/(vx - 2)", "0", "0", "0"});
+  ExpectConfirmed(Judge(problem, wide));
+  problem->declaration.growing = Growing(*problem->model, {"1/(vx - 0.5)", "0", "0", "0"});
+  EXPECT_NE(Judge(problem, wide).status, Status::kConfirmed);
+}
+
 // px+ = px + vx / 2 + ax / 8. With e = 1/4 in vx and 1/8 in ax, L = 1/2 of px by vx and of vx by ax:
 // px: 1/8 + 1/64 + 1/8, vx: 1/4 after the step, 1/4 before it, 1/16 by ax, and 1/16.
 TEST(HandMade, ErrorsOfTheRecordCountForSuccessorModelAndResidual) {
@@ -473,6 +503,13 @@ TEST_F(Tampered, AChangedDisturbanceIsRefuted) {
   problem_->declaration.disturbance = Eigen::VectorXd::Zero(6);
   EXPECT_EQ(Verdict_().status, Status::kConfirmed) << "zeros change nothing";
   problem_->declaration.disturbance[2] = 1e-12;
+  ExpectRefuted(Verdict_(), 0, "residual of theta");
+}
+
+TEST_F(Tampered, ADisturbanceThatGrowsElsewhereChangesNothing) {
+  problem_->declaration.growing = Growing(*problem_->model, {"0", "0", "1e-12*max(0, 1 - v)", "0", "0", "0"});
+  ExpectConfirmed(Verdict_());
+  problem_->declaration.growing = Growing(*problem_->model, {"0", "0", "1e-12*v", "0", "0", "0"});
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
