@@ -40,22 +40,22 @@ struct Variable {
     center = is_state ? set.slice.center(l) : set.input[ToSize(l - n)];
     slack = is_state ? set.slice.slack(l) : 0;
     half_width = is_state ? set.half_width[ToSize(l)] : 0;
-    generators = is_state ? set.slice.row(l).data() : kNoGenerators.data();
+    generators = is_state ? set.slice.padded_row(l).data() : kNoGenerators.data();
   }
 };
 
 /** Reads a row of generators, eight at a time. Entries behind the last generator are zero. */
 class Chunks {
  public:
-  explicit Chunks(const Zonotope& slice) : generators_(ToSize(slice.num_generators())) {}
-  [[nodiscard]] std::size_t size() const { return (generators_ + kPackSize - 1) / kPackSize; }
+  explicit Chunks(const Zonotope& slice) : padded_(slice.padded_size()) {}
+  [[nodiscard]] std::size_t size() const { return (padded_ + kLaneCount) / kPackSize; }
   [[nodiscard]] Pack Get(const double* row, std::size_t chunk) const {
     const std::size_t first = chunk * kPackSize;
-    return first + kPackSize <= generators_ ? LoadPack(row + first) : LoadFirst(row + first, generators_ - first);
+    return first + kPackSize <= padded_ ? LoadPack(row + first) : Pack{LoadLanes(row + first), AllLanes(0)};
   }
 
  private:
-  std::size_t generators_;
+  std::size_t padded_;  // a multiple of four
 };
 
 /** The distance of x to each of eight intervals; zero inside. */
