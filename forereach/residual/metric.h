@@ -12,6 +12,7 @@ an observation. Only lipschitz_envelope.cpp includes this file: every function m
 is compiled for one instruction set. */
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <span>
 
@@ -92,17 +93,26 @@ class PatternMetric {
       for (std::size_t l = 0; l < kColumns; ++l) term[l] = slope[l] * chunks.Get(generators[l], j);
       for (std::size_t s = 0; s < kPatterns; ++s) spread[s] = spread[s] + Abs(Signed(s, term));
     }
-    common_ = SumLanes(spread[0]) + slack;
-    double farthest = 0;
+    const auto lanes = [](auto get) __attribute__((always_inline)) {  // a pattern in each
+      const auto at = [&](std::size_t s) __attribute__((always_inline)) { return get(std::min(s, kPatterns - 1)); };
+      return std::array{at(0), at(1), at(2), at(3)};
+    };
+    const auto sums =
+        lanes([&](std::size_t s) __attribute__((always_inline)) { return spread[s].low + spread[s].high; });
+    const auto centers = lanes([&](std::size_t s) { return Signed(s, weighted); });
+    const Lanes spreads = SumEach(sums[0], sums[1], sums[2], sums[3]) + AllLanes(slack);
+    common_ = spreads[0];
+    const Lanes center{centers[0], centers[1], centers[2], centers[3]}, extra = spreads - AllLanes(common_);
+    const Lanes below = center - extra + AllLanes(margin), above = -center - extra + AllLanes(margin);
+    Lanes farthest = AllLanes(0);
     for (std::size_t s = 0; s < kPatterns; ++s) {
-      const double center = Signed(s, weighted), extra = SumLanes(spread[s]) + slack - common_;
-      center_[s] = Fill(center);
-      extra_[s] = Fill(extra);
-      from_below_[s] = Fill(center - extra + margin);
-      from_above_[s] = Fill(-center - extra + margin);
-      farthest = Max(farthest, extra);
+      center_[s] = {AllLanes(center[s])};
+      extra_[s] = {AllLanes(extra[s])};
+      from_below_[s] = {AllLanes(below[s])};
+      from_above_[s] = {AllLanes(above[s])};
+      farthest = Max(farthest, extra_[s].all);
     }
-    anywhere_ = Fill(margin - farthest);
+    anywhere_ = {AllLanes(margin) - farthest};
   }
 
   [[nodiscard]] double common() const { return common_; }

@@ -170,10 +170,10 @@ struct Axes {
 };
 
 // kDim: the set's, or 0.
-template <std::size_t kDim>
+template <int kDim>
 FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& scores, const double* first,
                                            const double* second, int order) {
-  const std::size_t n = kDim > 0 ? kDim : ToSize(set.dim());
+  const std::size_t n = ToSize(kDim > 0 ? kDim : set.dim());
   const int count = set.num_generators(), most = order * static_cast<int>(n), keep = most - static_cast<int>(n);
   Axes early = Axes::Nonzero(first, n), late = Axes::Nonzero(second, n);
   const int axes = early.size() + late.size();
@@ -187,15 +187,21 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& sc
     }
   }
   Lengths boxed;
-  for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
-  if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
+  if (stay == 0) {  // as most often: all of them
+    for (std::size_t k = 0; k < n; k += kLaneCount)
+      StoreLanes((AllLanes(0) + LoadLanes(first + k)) + LoadLanes(second + k), &boxed[k]);
+    early.which = late.which = 0;
+  } else {
+    for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
+    if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
+  }
   const Lanes inflation = AllLanes(1 + (2.0 * count + 8) * kUnitRoundoff);
   if (left < count)
     Drop(set, n, ToSize(count - left), scores.data(), inflation, boxed);
   else
     for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(LoadLanes(&boxed[k]) * inflation, &boxed[k]);
   const Axes box = Axes::Nonzero(boxed.data(), n);
-  set.Resize(left, left + stay + box.size());
+  set.Resize<kDim>(left, left + stay + box.size());
   box.Write(set, late.Write(set, early.Write(set, left)));
 }
 
@@ -203,7 +209,7 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& sc
 
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second, int order,
                      InstructionSet instructions) noexcept {
-  const auto reduce = [&]<std::size_t kDim>() {
+  const auto reduce = [&]<int kDim>() {
     Dispatch<&AppendAndReduceLanes<kDim>>(instructions, set, scores, first, second, order);
   };
   switch (set.dim()) {
