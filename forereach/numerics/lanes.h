@@ -58,6 +58,11 @@ FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double othe
   const auto end = static_cast<std::int64_t>(count);
   return LaneMask{0, 1, 2, 3} < LaneMask{end, end, end, end} ? x : AllLanes(other);
 }
+/** Set in this lane alone. */
+FOREREACH_INLINE LaneMask AtLane(std::size_t lane) {
+  const auto i = static_cast<std::int64_t>(lane);
+  return LaneMask{0, 1, 2, 3} == LaneMask{i, i, i, i};
+}
 /** One bit for each lane of a mask. */
 FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
 #ifdef __SSE2__

@@ -74,7 +74,7 @@ struct LipschitzEnvelope::Search {
     const ObservationIndex& index = row.index;
     Sides best{-kInfinity, -kInfinity};
     if (index.num_blocks() <= MaxFlatBlocks<Metric>())
-      best = ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), best, budget);
+      best = ScanBlocks(metric, index.block(0), index.num_blocks(), best, budget);
     else
       best = internal::TreeSearch<Metric>(metric, index, found, budget).Run();
     if (tail_count > 0) best = ScanTail(metric, best);
@@ -86,14 +86,14 @@ struct LipschitzEnvelope::Search {
   [[nodiscard]] Sides ScanTail(const Metric& metric, Sides best) const {
     const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kPackSize,
                       rest = tail_count % kPackSize;
-    if (full > 0) best = ScanBlocks(metric, tail, full, coordinates, best, budget);
+    if (full > 0) best = ScanBlocks(metric, tail, full, best, budget);
     if (rest == 0) return best;
     std::array<Pack, kMaxVariables + 2> last;
     for (std::size_t p = 0; p < coordinates + 2; ++p) {
       last[p] = Fill(p < coordinates ? 0 : -kInfinity);
       for (std::size_t lane = 0; lane < rest; ++lane) last[p].set(lane, tail[full * (coordinates + 2) + p].at(lane));
     }
-    return ScanBlocks(metric, last.data(), 1, coordinates, best, budget);
+    return ScanBlocks(metric, last.data(), 1, best, budget);
   }
 
   // The boxes of a tree say little in many coordinates, and an entry that is refined costs more than a block.

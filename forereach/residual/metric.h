@@ -2,6 +2,7 @@
 over an ObservationIndex (search.h).
 
 A metric has
+- coordinates(): those of an observation in this row;
 - common(): the part of D_i that is the same for every observation;
 - Block(block): D_i - common() for the eight observations of a block;
 - Node(node, side): for each child, an upper bound on v_i - (D_i - common()) over the observations below it;
@@ -115,6 +116,7 @@ class PatternMetric {
     anywhere_ = {AllLanes(margin) - farthest};
   }
 
+  [[nodiscard]] static constexpr std::size_t coordinates() { return kPatterns; }
   [[nodiscard]] double common() const { return common_; }
 
   [[nodiscard]] Pack Block(const Pack* block) const {
@@ -160,6 +162,7 @@ class CenterDistance {
   }
 
   [[nodiscard]] std::size_t columns() const { return columns_; }
+  [[nodiscard]] std::size_t coordinates() const { return columns_; }
   /** L_kl (c_l - z_il) of one observation. */
   [[nodiscard]] double Component(const Pack* block, std::size_t lane, std::size_t l) const {
     return center_[l].all[0] - block[l].at(lane);

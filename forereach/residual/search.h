@@ -53,8 +53,8 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
 
 /** `best`, raised to both maxima over `count` adjacent blocks. */
 template <class Metric>
-Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, const Sides& best,
-                 Budget&) {
+Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, const Sides& best, Budget&) {
+  const std::size_t coordinates = metric.coordinates();
   Pack floors = Fill(best.floor), ceilings = Fill(best.negated_ceiling);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
     const Pack distance = metric.Block(block);
@@ -68,7 +68,8 @@ Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std
 best. */
 template <class Metric>
 requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
-                                           std::size_t coordinates, const Sides& before, Budget& budget) {
+                                           const Sides& before, Budget& budget) {
+  const std::size_t coordinates = metric.coordinates();
   std::array<std::array<Pack, kMaxRefinedBlocks>, 2> optimistic;
   std::array<std::array<double, kMaxRefinedBlocks>, 2> highest;
   std::array<std::size_t, 2> first{0, 0};
@@ -106,10 +107,10 @@ class TreeSearch {
       : metric_(metric), index_(index), found_(found), budget_(budget), leaves_(budget.leaves) {}
 
   Sides Run() {
-    const std::size_t first = LeafToBegin(found_.lower, 0), second = LeafToBegin(found_.upper, 1);
-    Visit(first);
-    const bool has_second = second != first && leaves_ > 0;
-    if (has_second) Visit(second);
+    first_ = second_ = LeafToBegin(found_.lower, 0);
+    const std::size_t second = LeafToBegin(found_.upper, 1);
+    Visit(first_);
+    if (second != first_ && leaves_ > 0) Visit(second_ = second);
     // The bound of a root with two children says little.
     const int top =
         index_.height() > 1 && index_.num_nodes(index_.height() - 1) == 2 ? index_.height() - 1 : index_.height();
@@ -127,8 +128,6 @@ class TreeSearch {
         const std::size_t child = at.first_child + lane;
         if (level_ > 1) {
           Open(level_ - 1, child);
-        } else if (child == first || (has_second && child == second)) {
-          continue;
         } else if (leaves_ > 0) {
           Visit(child);
         } else {
@@ -159,8 +158,7 @@ class TreeSearch {
   }
 
   void Visit(std::size_t leaf) {
-    const Sides best =
-        ScanBlocks(metric_, index_.leaf(leaf), ObservationIndex::kLeafBlocks, index_.num_coordinates(), best_, budget_);
+    const Sides best = ScanBlocks(metric_, index_.leaf(leaf), ObservationIndex::kLeafBlocks, best_, budget_);
     if (best.floor > best_.floor) found_.lower = static_cast<std::uint32_t>(leaf);
     if (best.negated_ceiling > best_.negated_ceiling) found_.upper = static_cast<std::uint32_t>(leaf);
     best_ = best;
@@ -173,7 +171,11 @@ class TreeSearch {
     at.floors = metric_.Node(index_.node(level, node), 0);
     at.negated_ceilings = metric_.Node(index_.node(level, node), 1);
     at.first_child = node * kPackSize;
-    at.left = ~0u;
+    at.left = level > 1 ? ~0u : ~(BitIn(node, first_) | BitIn(node, second_));
+  }
+
+  [[nodiscard]] static unsigned BitIn(std::size_t node, std::size_t leaf) {
+    return static_cast<unsigned>(leaf / kPackSize == node) << leaf % kPackSize;
   }
 
   // A bit for each child whose bound exceeds the best of its side. That of a missing child does not.
@@ -188,6 +190,7 @@ class TreeSearch {
   FoundIn& found_;
   Budget& budget_;
   int leaves_, level_ = 0;
+  std::size_t first_ = 0, second_ = 0;  // the leaves in which the search began, perhaps one
   Sides best_{-kInfinity, -kInfinity};
   std::array<Level, ObservationIndex::kMaxHeight + 1> levels_;
 };
