@@ -69,9 +69,9 @@ class DomainTest final {
   explicit DomainTest(const Domain& domain, const Eigen::VectorXd& input_error = {});
 
   /** FindExit for the box {(x, u) : |x - center| <= half_width, |u - input| <= input_error}. Plain arithmetic decides
-  for a box that is inside by a margin; directed rounding decides otherwise. @tparam kStates n, if it is a constant.
-  @param center, half_width n entries;
-  kMaxStates entries must be readable.
+  for a box that is inside by a margin; directed rounding decides otherwise.
+  @tparam kStates n, if it is a constant.
+  @param center, half_width n entries; kMaxStates entries must be readable.
   @param input m entries. */
   template <std::size_t kStates = 0>
   [[nodiscard]] FOREREACH_INLINE DomainExit FindExit(const double* center, const double* half_width,
