@@ -2,8 +2,8 @@
 with v_i = floor_i and once with v_i = -ceiling_i. D_i is the distance of the query set to entry i (metric.h).
 
 ScanBlocks looks at all blocks. TreeSearch looks where the last search found its bounds, and then goes down the tree,
-past every child whose bound exceeds neither of the best values so far. Both give the same bits, in plain arithmetic.
-Only lipschitz_envelope.cpp includes this file. */
+the child of highest bound first, past every one whose bound exceeds neither of the best values so far. Both give the
+same bits, in plain arithmetic. Only lipschitz_envelope.cpp includes this file. */
 #pragma once
 
 #include <bit>
@@ -123,8 +123,8 @@ class TreeSearch {
           ++level_;
           continue;
         }
-        const auto lane = ToSize(std::countr_zero(better));
-        at.left &= ~1u << lane;
+        const std::size_t lane = BestOf(better, at);
+        at.left &= ~(1u << lane);
         const std::size_t child = at.first_child + lane;
         if (level_ > 1) {
           Open(level_ - 1, child);
@@ -176,6 +176,18 @@ class TreeSearch {
 
   [[nodiscard]] static unsigned BitIn(std::size_t node, std::size_t leaf) {
     return static_cast<unsigned>(leaf / kPackSize == node) << leaf % kPackSize;
+  }
+
+  // Of the children with these bits, the one whose bound exceeds the best of its side by most.
+  [[nodiscard]] std::size_t BestOf(unsigned better, const Level& at) const {
+    std::size_t best = 0;
+    for (double most = -kInfinity; better != 0; better &= better - 1) {
+      const auto lane = ToSize(std::countr_zero(better));
+      const double gain = Max(at.floors.at(lane) - best_.floor, at.negated_ceilings.at(lane) - best_.negated_ceiling);
+      best = gain > most ? lane : best;
+      most = Max(gain, most);
+    }
+    return best;
   }
 
   // A bit for each child whose bound exceeds the best of its side. That of a missing child does not.
