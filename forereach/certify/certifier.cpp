@@ -287,6 +287,7 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   for (int t = 0; t < plan.num_steps; ++t) {
     const auto i = ToSize(t);
     StepRecord& record = tube.steps_[i];
+    record.envelope.found = t > 0 ? tube.steps_[i - 1].envelope.found : decltype(record.envelope.found){};
     const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1],
                                                tube.steps_[i + 1].half_width.data(), t == 0);
     if (result.status != StepResult::Status::kDone) return Stopped(result, t, record);

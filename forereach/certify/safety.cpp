@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "forereach/dynamics/angles.h"
+#include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/size.h"
 
@@ -296,14 +297,14 @@ class SafetyTest::Unit {
   [[nodiscard]] Separation SeparatePart(std::size_t number, const Obstacle& obstacle, double added,
                                         const Encounter& meeting) noexcept {
     const Placement::Part& part = placement().parts()[number];
-    std::array<Piece, kMaxPieces> pieces;
+    auto* const pieces = FOREREACH_ON_STACK(Piece, 2 * part.count);
     std::size_t count = 0;
     for (int t = first_; t <= last_; ++t) {
       const Zonotope* places = PlacesAt(t);
       for (int i = part.first; i < part.first + part.count; ++i)
         pieces[count++] = {&places[i], placement().turn(i), meeting.shift[ToSize(t - first_)]};
     }
-    return forereach::Separate({pieces.data(), count}, obstacle, added, test_.instructions_);
+    return forereach::Separate({pieces, count}, obstacle, added, test_.instructions_);
   }
 
   const SafetyTest& test_;

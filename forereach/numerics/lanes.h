@@ -58,6 +58,11 @@ FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double othe
   const auto end = static_cast<std::int64_t>(count);
   return LaneMask{0, 1, 2, 3} < LaneMask{end, end, end, end} ? x : AllLanes(other);
 }
+/** Set in this lane alone. */
+FOREREACH_INLINE LaneMask AtLane(std::size_t lane) {
+  const auto i = static_cast<std::int64_t>(lane);
+  return LaneMask{0, 1, 2, 3} == LaneMask{i, i, i, i};
+}
 /** One bit for each lane of a mask. */
 FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
 #ifdef __SSE2__
@@ -148,14 +153,6 @@ FOREREACH_INLINE Same Fill(double x) { return {AllLanes(x)}; }
 FOREREACH_INLINE Pack LoadPack(const Pack& p) { return {p.low, p.high}; }
 /** From any address of eight doubles. */
 FOREREACH_INLINE Pack LoadPack(const double* p) { return {LoadLanes(p), LoadLanes(p + kLaneCount)}; }
-
-/** The first `count` of eight doubles, with zeros behind them. @pre eight doubles can be read. */
-FOREREACH_INLINE Pack LoadFirst(const double* p, std::size_t count) {
-  const auto n = static_cast<std::int64_t>(count);
-  const LaneMask all{n, n, n, n};
-  return {FromBits(Bits(LoadLanes(p)) & (LaneMask{0, 1, 2, 3} < all)),
-          FromBits(Bits(LoadLanes(p + kLaneCount)) & (LaneMask{4, 5, 6, 7} < all))};
-}
 
 FOREREACH_INLINE Pack operator+(const Pack& a, const Pack& b) { return {a.low + b.low, a.high + b.high}; }
 FOREREACH_INLINE Pack operator-(const Pack& a, const Pack& b) { return {a.low - b.low, a.high - b.high}; }

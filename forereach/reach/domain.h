@@ -69,12 +69,15 @@ class DomainTest final {
   explicit DomainTest(const Domain& domain, const Eigen::VectorXd& input_error = {});
 
   /** FindExit for the box {(x, u) : |x - center| <= half_width, |u - input| <= input_error}. Plain arithmetic decides
-  for a box that is inside by a margin; directed rounding decides otherwise. @param center, half_width n entries;
-  kMaxStates entries must be readable.
+  for a box that is inside by a margin; directed rounding decides otherwise.
+  @tparam kStates n, if it is a constant.
+  @param center, half_width n entries; kMaxStates entries must be readable.
   @param input m entries. */
+  template <std::size_t kStates = 0>
   [[nodiscard]] FOREREACH_INLINE DomainExit FindExit(const double* center, const double* half_width,
                                                      std::span<const double> input) const noexcept {
-    const bool inside = StateLiesWellInside(center, half_width) && InputLiesWellInside(input);
+    const std::size_t n = kStates > 0 ? kStates : num_states_;
+    const bool inside = StateLiesWellInside(n, center, half_width) && InputLiesWellInside(input);
     if (inside && is_box_) return {};
     return FindExitOf(center, half_width, input, inside);
   }
@@ -82,10 +85,11 @@ class DomainTest final {
  private:
   static constexpr double kMargin = 0x1p-48;  // larger than the rounding error of plain arithmetic
 
-  FOREREACH_INLINE bool StateLiesWellInside(const double* center, const double* half_width) const noexcept {
+  FOREREACH_INLINE bool StateLiesWellInside(std::size_t n, const double* center,
+                                            const double* half_width) const noexcept {
     const Lanes margin = AllLanes(RoundingError(kMargin, 1));
     return HoldsForFirst(
-        num_states_, [&](std::size_t k) __attribute__((always_inline)) {
+        n, [&](std::size_t k) __attribute__((always_inline)) {
           const Lanes c = LoadLanes(center + k), r = LoadLanes(half_width + k), reach = r + margin * (Abs(c) + r);
           return (LoadLanes(&state_lower_[k]) < c - reach) & (c + reach < LoadLanes(&state_upper_[k]));
         });

@@ -113,8 +113,8 @@ struct Surroundings {
   std::array<double, kMaxVariables> center;
   std::array<PlainInterval, kMaxVariables> hull;
 
-  FOREREACH_INLINE Surroundings(const Zonotope& slice, const double* half_width, std::span<const double> input) {
-    const auto n = ToSize(slice.dim());
+  FOREREACH_INLINE Surroundings(std::size_t n, const Zonotope& slice, const double* half_width,
+                                std::span<const double> input) {
     for (std::size_t k = 0; k < n; k += kLaneCount) {
       const Lanes c = LoadLanes(slice.centers() + k), r = LoadLanes(half_width + k), lower = c - r, upper = c + r;
       StoreLanes(c, &center[k]);
@@ -131,13 +131,13 @@ struct Surroundings {
 // Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
 // no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
 // @param box_half_width is set to half the residual's width plus the disturbance: one axis for both.
-FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, const StepRecord& record,
+FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const StepError& error, const StepRecord& record,
                            const ImageSums& sums, const double* disturbance, Zonotope& next, double* box_half_width,
                            double* next_half_width) noexcept {
   // With room for what the reduction, which comes later, adds by its own inflation: docs/soundness.md, 2.
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
   return HoldsForFirst(
-      ToSize(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
+      n, [&](std::size_t k) __attribute__((always_inline)) {
         const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
         const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
         const Lanes disturbed = LoadLanes(disturbance + k);
@@ -208,24 +208,33 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
 
 StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
                             double* next_half_width, bool is_first) const noexcept {
-  return Dispatch<&Propagator::StepInline>(instructions_, *this, slice, input, record, next, next_half_width, is_first);
+  const auto step = [&]<std::size_t kStates, std::size_t kInputs>() {
+    return Dispatch<&Propagator::StepInline<kStates, kInputs>>(instructions_, *this, slice, input, record, next,
+                                                               next_half_width, is_first);
+  };
+  if (input.size() == 2 && slice.dim() == 6) return step.operator()<6, 2>();
+  if (input.size() == 2 && slice.dim() == 4) return step.operator()<4, 2>();
+  return step.operator()<0, 0>();
 }
 
+template <std::size_t kStates, std::size_t kInputs>
 StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
                                   Zonotope& next, double* next_half_width, bool is_first) const noexcept {
   const double* half_width = record.half_width.data();
+  const std::size_t n = kStates > 0 ? kStates : ToSize(slice.dim());
+  if constexpr (kInputs > 0) input = input.first(kInputs);
   // The domain comes first: error_ and the bounds of the envelope hold inside it only.
-  if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input);
+  if (const DomainExit exit = domain_.FindExit<kStates>(slice.centers(), half_width, input);
       exit.kind != DomainExit::Kind::kNone)
     return {StepResult::Status::kDomainExit, exit, -1};
-  const Surroundings around(slice, half_width, input);
-  const std::size_t variables = ToSize(slice.dim()) + input.size();
+  const Surroundings around(n, slice, half_width, input);
+  const std::size_t variables = n + input.size();
   const std::span<const double> center(around.center.data(), variables);
   const std::span<const PlainInterval> hull(around.hull.data(), variables);
   if (!plain_) return StepByIntervals(slice, input, center, hull, record, next, next_half_width, is_first);
   Expansion expansion;
   model_.Expand(center, hull, expansion, instructions_);
-  return Advance(slice, input, hull, expansion, error_, record, next, next_half_width, is_first);
+  return Advance<kStates>(slice, input, hull, expansion, error_, record, next, next_half_width, is_first);
 }
 
 StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const double> input,
@@ -237,15 +246,16 @@ StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const do
   ExpandByIntervals(center, hull, expansion, error);
   std::array<double, kMaxVariables> half_width{};
   std::copy_n(record.half_width.begin(), slice.dim(), half_width.begin());
-  return Advance(slice, input, hull, expansion, BoundStepError(model_.program(), error, half_width), record, next,
-                 next_half_width, is_first);
+  return Advance<0>(slice, input, hull, expansion, BoundStepError(model_.program(), error, half_width), record, next,
+                    next_half_width, is_first);
 }
 
+template <std::size_t kStates>
 StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input,
                                std::span<const PlainInterval> hull, const Expansion& expansion, const StepError& error,
                                StepRecord& record, Zonotope& next, double* next_half_width,
                                bool is_first) const noexcept {
-  const auto n = ToSize(slice.dim());
+  const std::size_t n = kStates > 0 ? kStates : ToSize(slice.dim());
   const double* half_width = record.half_width.data();
   model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(),
                           record.remainder, instructions_);
@@ -259,7 +269,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums, instructions_);
   OffsetSpread offset;
-  constexpr std::array<double, kMaxStates> kNothing{};
+  static constexpr std::array<double, kMaxStates> kNothing{};
   Disturbed disturbed;
   const bool is_punctual = offsets_.AreZero(), is_constant = inputs_.AreExact() && !growing_;
   if (!is_constant) Disturb(hull, disturbed);
@@ -282,7 +292,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   std::array<double, kMaxStates> box_half_width;
   const double* added = is_punctual ? disturbance : offset.half_width.data();
-  if (!Join(expansion, error, record, sums, added, next, box_half_width.data(), next_half_width))
+  if (!Join(n, expansion, error, record, sums, added, next, box_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
   AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), box_half_width.data(), order_, instructions_);
   if (!is_punctual) StepOffsets::Append(offset, next, next_half_width);

@@ -88,10 +88,13 @@ class Propagator final {
     std::array<PlainInterval, kMaxVariables> hull;  // with the inputs that may act
   };
   [[gnu::noinline]] void Disturb(std::span<const PlainInterval> hull, Disturbed& all) const noexcept;
-  // The step without model, envelope and reduction.
+  // The step without model, envelope and reduction. It is quicker with constant numbers of states and inputs; zeros:
+  // those of the slice and the input.
+  template <std::size_t kStates, std::size_t kInputs>
   [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
                                                        StepRecord& record, Zonotope& next, double* next_half_width,
                                                        bool is_first) const noexcept;
+  template <std::size_t kStates>
   [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input,
                                                     std::span<const PlainInterval> hull, const Expansion& expansion,
                                                     const StepError& error, StepRecord& record, Zonotope& next,

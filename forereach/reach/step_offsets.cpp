@@ -27,18 +27,13 @@ constexpr double kOffsetRelative = 0x1p-43, kOffsetSmallest = 0x1p-1000;
                               MulUp(std::abs(step.residual.slope[ToSize(k)][ToSize(l)]), step.half_width[ToSize(l)]));
 }
 
-FOREREACH_INLINE LaneMask IsLane(std::size_t lane) {
-  const auto i = static_cast<std::int64_t>(lane);
-  return LaneMask{0, 1, 2, 3} == LaneMask{i, i, i, i};
-}
-
 // One pass over an image and the slice that it is of. Sets away[k] to sum_j |image_kj - slice_kj| in plain arithmetic.
 // Unless the step is the first, subtracts `column` from the last generator, and sets the image's sums anew.
 FOREREACH_INLINE void Compare(const Zonotope& slice, const double* column, bool is_first, Zonotope& image,
                               ImageSums& sums, double* away) {
   const auto count = ToSize(image.num_generators());
   const std::size_t size = image.padded_size(), block = size - std::min(size, kLaneCount), last = count - block - 1;
-  const LaneMask is_last = IsLane(last);
+  const LaneMask is_last = AtLane(last);
   Lanes column_sum = AllLanes(0), largest = AllLanes(0);
   for (int k = 0; k < image.dim(); ++k) {
     double* const row = image.mutable_row(k);
@@ -165,21 +160,6 @@ int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope
   for (std::size_t k = 0; k < states_; ++k)
     if (!(std::abs(spread.column[k]) + spread.half_width[k] < kInfinity)) return static_cast<int>(k);
   return 0;
-}
-
-void StepOffsets::Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
-  const auto last = ToSize(next.num_generators()), lane = last % kLaneCount, block = last - lane;
-  const LaneMask is_last = IsLane(lane);
-  next.Reset(next.dim(), next.num_generators() + 1);
-  for (int k = 0; k < next.dim(); ++k) {
-    double* const at = next.mutable_row(k) + block;
-    const Lanes kept = lane == 0 ? AllLanes(0) : FirstLanes(LoadLanes(at), lane, 0);
-    StoreLanes(is_last ? AllLanes(spread.column[ToSize(k)]) : kept, at);
-  }
-  for (std::size_t k = 0; k < ToSize(next.dim()); k += kLaneCount) {
-    const Lanes sum = LoadLanes(half_width + k) + Abs(LoadLanes(&spread.column[k]));
-    StoreLanes(sum * AllLanes(1 + 4 * kUnitRoundoff), half_width + k);
-  }
 }
 
 }  // namespace forereach

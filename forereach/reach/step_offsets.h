@@ -21,9 +21,12 @@ docs/soundness.md, 3.15. */
 #include "forereach/dynamics/rounding.h"
 #include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/instruction_set.h"
+#include "forereach/numerics/lanes.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/sets/eigen.h"
 #include "forereach/sets/zonotope.h"
+
+FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
@@ -65,13 +68,26 @@ class StepOffsets final {
                         InstructionSet instructions) const noexcept;
 
   /** Appends d as a generator, and adds it to the half-widths of the hull. */
-  static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept;
+  FOREREACH_INLINE static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
+    const auto last = ToSize(next.num_generators()), lane = last % kLaneCount, block = last - lane;
+    const LaneMask is_last = AtLane(lane);
+    next.Reset(next.dim(), next.num_generators() + 1);
+    for (int k = 0, n = next.dim(); k < n; ++k) {
+      double* const at = next.mutable_row(k) + block;
+      const Lanes kept = lane == 0 ? AllLanes(0) : FirstLanes(LoadLanes(at), lane, 0);
+      StoreLanes(is_last ? AllLanes(spread.column[ToSize(k)]) : kept, at);
+    }
+    for (std::size_t k = 0; k < ToSize(next.dim()); k += kLaneCount) {
+      const Lanes sum = LoadLanes(half_width + k) + Abs(LoadLanes(&spread.column[k]));
+      StoreLanes(sum * AllLanes(1 + 4 * kUnitRoundoff), half_width + k);
+    }
+  }
 
  private:
   using PerState = std::array<double, kMaxStates>;
 
-  [[nodiscard]] int AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
-                              ImageSums& sums) const noexcept;
+  [[nodiscard]] FOREREACH_INLINE int AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
+                                               ImageSums& sums) const noexcept;
   void EncloseByIntervals(std::span<const PlainInterval> hull, PerState& middle, PerState& reach) const noexcept;
 
   double error_, period_ = 0;
@@ -85,3 +101,5 @@ class StepOffsets final {
 };
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -3,6 +3,7 @@ bounds on the values of every admissible residual over a query set. */
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 
 #include "forereach/numerics/interval.h"
@@ -11,6 +12,12 @@ bounds on the values of every admissible residual over a query set. */
 
 namespace forereach {
 
+/** The groups of observations in which a search found its bounds. */
+struct FoundIn {
+  static constexpr std::uint32_t kNowhere = 0xffffffff;
+  std::uint32_t lower = kNowhere, upper = kNowhere;
+};
+
 /** For every admissible residual r and every z = (x, u) in the query set, whose center is (c, u):
     lower_k <= r_k(z) - slope_k . (x - c) <= upper_k,   k = 0 .. n-1, in units of state k.
 The slope is zero unless has_slope is set: the bounds are then plain intervals, and `slope` is not read. */
@@ -18,6 +25,9 @@ struct ResidualBounds {
   std::array<double, kMaxStates> lower, upper;
   bool capped;  ///< True if a limit on the work was met: sound, and perhaps wider than the observations allow.
   bool has_slope = false;
+  /** Set by a search, and where the next one begins, so give it those of a query nearby. It changes the time only,
+  unless the search is capped. */
+  std::array<FoundIn, kMaxStates> found;
   std::array<std::array<double, kMaxStates>, kMaxStates> slope;  ///< n rows of n entries, finite.
 };
 

@@ -65,46 +65,42 @@ struct LipschitzEnvelope::Search {
   const Row& row;
   const EnvelopeOptions& options;
   Budget& budget;
+  FoundIn& found;
   const Pack* tail = nullptr;  // blocks
   std::size_t tail_count = 0;  // entries
 
   template <class Metric>
   [[nodiscard]] Sides Run(const Metric& metric) const {
     const ObservationIndex& index = row.index;
-    Sides best;
+    Sides best{-kInfinity, -kInfinity};
     if (index.num_blocks() <= MaxFlatBlocks<Metric>())
-      best = ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), budget);
+      best = ScanBlocks(metric, index.block(0), index.num_blocks(), best, budget);
     else
-      best = SearchTree(metric, index, budget);
-    if (tail_count > 0) best = Highest(best, ScanTail(metric));
+      best = internal::TreeSearch<Metric>(metric, index, found, budget).Run();
+    if (tail_count > 0) best = ScanTail(metric, best);
     return {best.floor - metric.common(), best.negated_ceiling - metric.common()};
-  }
-
-  static Sides Highest(const Sides& a, const Sides& b) {
-    return {Max(a.floor, b.floor), Max(a.negated_ceiling, b.negated_ceiling)};
   }
 
   // The last block may be written to while it is read: only the lanes that count are.
   template <class Metric>
-  [[nodiscard]] Sides ScanTail(const Metric& metric) const {
+  [[nodiscard]] Sides ScanTail(const Metric& metric, Sides best) const {
     const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kPackSize,
                       rest = tail_count % kPackSize;
-    Sides best{-kInfinity, -kInfinity};
-    if (full > 0) best = ScanBlocks(metric, tail, full, coordinates, budget);
+    if (full > 0) best = ScanBlocks(metric, tail, full, best, budget);
     if (rest == 0) return best;
     std::array<Pack, kMaxVariables + 2> last;
     for (std::size_t p = 0; p < coordinates + 2; ++p) {
       last[p] = Fill(p < coordinates ? 0 : -kInfinity);
       for (std::size_t lane = 0; lane < rest; ++lane) last[p].set(lane, tail[full * (coordinates + 2) + p].at(lane));
     }
-    return Highest(best, ScanBlocks(metric, last.data(), 1, coordinates, budget));
+    return ScanBlocks(metric, last.data(), 1, best, budget);
   }
 
   // The boxes of a tree say little in many coordinates, and an entry that is refined costs more than a block.
   template <class Metric>
   [[nodiscard]] std::size_t MaxFlatBlocks() const {
     const auto most = ToSize(options.max_flat_blocks);
-    return Metric::kRefines ? std::min(4 * most, internal::kMaxRefinedBlocks) : most;
+    return Metric::kRefines ? std::min(8 * most, internal::kMaxRefinedBlocks) : most;
   }
 
   // One function for each metric and instruction set, so that each has the registers to itself.
@@ -142,7 +138,7 @@ void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail
   bounds.lower = constant_lower_;
   bounds.upper = constant_upper_;
   bounds.capped = false;
-  if (tail)
+  if (count > 0)
     for (int k = 0; k < num_states(); ++k) {
       if (!row(k).is_constant()) continue;
       const auto i = ToSize(k);
@@ -155,7 +151,7 @@ void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail
     Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
     Sides best{-kInfinity, -kInfinity};
     if (std::isfinite(row.error))
-      best = Search{row, options_, budget, tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(set);
+      best = Search{row, options_, budget, bounds.found[i], tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(set);
     // Infinite errors leave no bound. A cap on the search leaves a sound one: any subset of the observations gives one.
     bounds.lower[i] = best.floor - row.error;
     bounds.upper[i] = -(best.negated_ceiling - row.error);

@@ -32,12 +32,12 @@ Work. Any subset of the observations gives a sound envelope, so a search may sto
 namespace forereach {
 
 struct EnvelopeOptions {
-  /** The number of leaves of 32 observations that the search for one side of one coordinate may visit, 1 to 2^20. It
-  may also try 64 sign patterns a leaf. A search that meets a limit gives wider bounds and sets `capped`. Only data made
-  for this purpose are known to meet one. */
+  /** The number of leaves of 32 observations that the search for one coordinate may visit, 1 to 2^20. It may also try
+  64 sign patterns a leaf. A search that meets a limit gives wider bounds and sets `capped`. Only data made for this
+  purpose are known to meet one. */
   int max_leaf_visits = 512;
   /** Up to this many blocks, a query scans all of them and skips the tree. */
-  int max_flat_blocks = 32;
+  int max_flat_blocks = 16;
   /** E_k holds for observations with |r~_ik| + eps_k up to this many times the largest one given, >= 1. Choose more
   than 1 if an EnvelopeTail will be added. */
   double value_headroom = 1;

@@ -2,6 +2,7 @@
 over an ObservationIndex (search.h).
 
 A metric has
+- coordinates(): those of an observation in this row;
 - common(): the part of D_i that is the same for every observation;
 - Block(block): D_i - common() for the eight observations of a block;
 - Node(node, side): for each child, an upper bound on v_i - (D_i - common()) over the observations below it;
@@ -12,6 +13,7 @@ an observation. Only lipschitz_envelope.cpp includes this file: every function m
 is compiled for one instruction set. */
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <span>
 
@@ -40,22 +42,22 @@ struct Variable {
     center = is_state ? set.slice.center(l) : set.input[ToSize(l - n)];
     slack = is_state ? set.slice.slack(l) : 0;
     half_width = is_state ? set.half_width[ToSize(l)] : 0;
-    generators = is_state ? set.slice.row(l).data() : kNoGenerators.data();
+    generators = is_state ? set.slice.padded_row(l).data() : kNoGenerators.data();
   }
 };
 
 /** Reads a row of generators, eight at a time. Entries behind the last generator are zero. */
 class Chunks {
  public:
-  explicit Chunks(const Zonotope& slice) : generators_(ToSize(slice.num_generators())) {}
-  [[nodiscard]] std::size_t size() const { return (generators_ + kPackSize - 1) / kPackSize; }
+  explicit Chunks(const Zonotope& slice) : padded_(slice.padded_size()) {}
+  [[nodiscard]] std::size_t size() const { return (padded_ + kLaneCount) / kPackSize; }
   [[nodiscard]] Pack Get(const double* row, std::size_t chunk) const {
     const std::size_t first = chunk * kPackSize;
-    return first + kPackSize <= generators_ ? LoadPack(row + first) : LoadFirst(row + first, generators_ - first);
+    return first + kPackSize <= padded_ ? LoadPack(row + first) : Pack{LoadLanes(row + first), AllLanes(0)};
   }
 
  private:
-  std::size_t generators_;
+  std::size_t padded_;  // a multiple of four
 };
 
 /** The distance of x to each of eight intervals; zero inside. */
@@ -92,19 +94,29 @@ class PatternMetric {
       for (std::size_t l = 0; l < kColumns; ++l) term[l] = slope[l] * chunks.Get(generators[l], j);
       for (std::size_t s = 0; s < kPatterns; ++s) spread[s] = spread[s] + Abs(Signed(s, term));
     }
-    common_ = SumLanes(spread[0]) + slack;
-    double farthest = 0;
+    const auto lanes = [](auto get) __attribute__((always_inline)) {  // a pattern in each
+      const auto at = [&](std::size_t s) __attribute__((always_inline)) { return get(std::min(s, kPatterns - 1)); };
+      return std::array{at(0), at(1), at(2), at(3)};
+    };
+    const auto sums =
+        lanes([&](std::size_t s) __attribute__((always_inline)) { return spread[s].low + spread[s].high; });
+    const auto centers = lanes([&](std::size_t s) { return Signed(s, weighted); });
+    const Lanes spreads = SumEach(sums[0], sums[1], sums[2], sums[3]) + AllLanes(slack);
+    common_ = spreads[0];
+    const Lanes center{centers[0], centers[1], centers[2], centers[3]}, extra = spreads - AllLanes(common_);
+    const Lanes below = center - extra + AllLanes(margin), above = -center - extra + AllLanes(margin);
+    Lanes farthest = AllLanes(0);
     for (std::size_t s = 0; s < kPatterns; ++s) {
-      const double center = Signed(s, weighted), extra = SumLanes(spread[s]) + slack - common_;
-      center_[s] = Fill(center);
-      extra_[s] = Fill(extra);
-      from_below_[s] = Fill(center - extra + margin);
-      from_above_[s] = Fill(-center - extra + margin);
-      farthest = Max(farthest, extra);
+      center_[s] = {AllLanes(center[s])};
+      extra_[s] = {AllLanes(extra[s])};
+      from_below_[s] = {AllLanes(below[s])};
+      from_above_[s] = {AllLanes(above[s])};
+      farthest = Max(farthest, extra_[s].all);
     }
-    anywhere_ = Fill(margin - farthest);
+    anywhere_ = {AllLanes(margin) - farthest};
   }
 
+  [[nodiscard]] static constexpr std::size_t coordinates() { return kPatterns; }
   [[nodiscard]] double common() const { return common_; }
 
   [[nodiscard]] Pack Block(const Pack* block) const {
@@ -150,6 +162,7 @@ class CenterDistance {
   }
 
   [[nodiscard]] std::size_t columns() const { return columns_; }
+  [[nodiscard]] std::size_t coordinates() const { return columns_; }
   /** L_kl (c_l - z_il) of one observation. */
   [[nodiscard]] double Component(const Pack* block, std::size_t lane, std::size_t l) const {
     return center_[l].all[0] - block[l].at(lane);

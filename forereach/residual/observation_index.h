@@ -74,6 +74,9 @@ class ObservationIndex final {
   [[nodiscard]] const Pack* node(int level, std::size_t i) const {
     return nodes_.data() + (levels_[ToSize(level - 1)] + i) * node_packs();
   }
+  [[nodiscard]] std::size_t num_nodes(int level) const {
+    return level < height() ? levels_[ToSize(level)] - levels_[ToSize(level - 1)] : 1;
+  }
   [[nodiscard]] std::size_t node_packs() const {
     return shape_ == Shape::kLifted ? 4 * num_coordinates_ + 2 : 2 * num_coordinates_ + 2;
   }

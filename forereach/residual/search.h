@@ -1,9 +1,13 @@
 /** The search of the envelope, Eq. (set-envelope): max_i (v_i - D_i) over the entries i of an ObservationIndex, once
 with v_i = floor_i and once with v_i = -ceiling_i. D_i is the distance of the query set to entry i (metric.h).
 
-ScanBlocks looks at all blocks. SearchTree goes down the tree and skips every child whose bound does not exceed the best
-value so far. Both give the same bits, in plain arithmetic. Only lipschitz_envelope.cpp includes this file. */
+ScanBlocks looks at all blocks. TreeSearch looks where the last search found its bounds, and then goes down the tree,
+the child of highest bound first, past every one whose bound exceeds neither of the best values so far. Both give the
+same bits, in plain arithmetic. Only lipschitz_envelope.cpp includes this file. */
 #pragma once
+
+#include <bit>
+#include <cstdint>
 
 #include "forereach/numerics/size.h"
 #include "forereach/residual/metric.h"
@@ -16,7 +20,7 @@ namespace forereach::internal {
 
 /** The limits on the work of a search. A search that meets one sets `capped`; its result is still sound. */
 struct Budget {
-  int leaves;    ///< that one search for one side may visit
+  int leaves;    ///< that one search may visit
   int patterns;  ///< of signs that SignMetric::Refine may try
   bool capped = false;
 };
@@ -47,10 +51,11 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
   }
 }
 
-/** Both maxima over `count` adjacent blocks. */
+/** `best`, raised to both maxima over `count` adjacent blocks. */
 template <class Metric>
-Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget&) {
-  Pack floors = Fill(-kInfinity), ceilings = Fill(-kInfinity);
+Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, const Sides& best, Budget&) {
+  const std::size_t coordinates = metric.coordinates();
+  Pack floors = Fill(best.floor), ceilings = Fill(best.negated_ceiling);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
     const Pack distance = metric.Block(block);
     floors = Max(LoadPack(block[coordinates]) - distance, floors);
@@ -63,7 +68,8 @@ Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std
 best. */
 template <class Metric>
 requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
-                                           std::size_t coordinates, Budget& budget) {
+                                           const Sides& before, Budget& budget) {
+  const std::size_t coordinates = metric.coordinates();
   std::array<std::array<Pack, kMaxRefinedBlocks>, 2> optimistic;
   std::array<std::array<double, kMaxRefinedBlocks>, 2> highest;
   std::array<std::size_t, 2> first{0, 0};
@@ -78,7 +84,7 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
       top[side] = Max(highest[side][b], top[side]);
     }
   }
-  std::array<double, 2> best{-kInfinity, -kInfinity};
+  std::array<double, 2> best{before.floor, before.negated_ceiling};
   for (std::size_t side = 0; side < 2; ++side) {
     const auto refine = [&](std::size_t b) {
       const Pack* block = blocks + b * (coordinates + 2);
@@ -91,91 +97,115 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
   return {best[0], best[1]};
 }
 
-/** The larger of `best` and the maximum over one leaf, for one side. */
+/** The search of an index: first the leaves in which the last one found its bounds, then depth first what may hold a
+better one. */
 template <class Metric>
-double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best,
-                  Budget& budget) {
-  Pack highest = Fill(-kInfinity);
-  for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
-    const Pack values = LoadPack(block[coordinates + side]), optimistic = values - metric.Block(block);
-    if constexpr (Metric::kRefines)
-      best = BestOfBlock(metric, block, values, optimistic, best, budget);
-    else
-      highest = Max(optimistic, highest);
-  }
-  return Max(best, MaxLane(highest));
-}
-
-/** The search of one side of an index: depth first, the child with the largest bound first. It proceeds in steps, so
-that two searches can alternate and hide the latency of comparisons and memory. */
-template <class Metric>
-class Descent {
+class TreeSearch {
  public:
-  /** @param side 0 for the floors, 1 for the negated ceilings. */
-  Descent(const Metric& metric, const ObservationIndex& index, std::size_t side, int max_leaves)
-      : metric_(metric), index_(index), side_(side), leaves_(max_leaves), level_(index.height() + 1) {}
+  /** @param found where to begin; set to where the bounds are. */
+  TreeSearch(const Metric& metric, const ObservationIndex& index, FoundIn& found, Budget& budget)
+      : metric_(metric), index_(index), found_(found), budget_(budget), leaves_(budget.leaves) {}
 
-  /** Visits one node or one leaf, then selects the next child whose bound exceeds the best. False if there is none, or
-  if the budget allows no further leaf. */
-  bool Step(Budget& budget) {
-    if (level_ > 1) {
-      Level& at = levels_[ToSize(--level_)];
-      at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), side_));
-      at.first_child = child_ * kPackSize;
-    } else {
-      best_ = BestOfLeaf(metric_, index_.leaf(child_), index_.num_coordinates(), side_, best_, budget);
-      --leaves_;
+  Sides Run() {
+    first_ = second_ = LeafToBegin(found_.lower, 0);
+    const std::size_t second = LeafToBegin(found_.upper, 1);
+    Visit(first_);
+    if (second != first_ && leaves_ > 0) Visit(second_ = second);
+    // The bound of a root with two children says little.
+    const int top =
+        index_.height() > 1 && index_.num_nodes(index_.height() - 1) == 2 ? index_.height() - 1 : index_.height();
+    for (std::size_t node = 0; node < index_.num_nodes(top); ++node) {
+      Open(top, node);
+      while (level_ <= top) {
+        Level& at = levels_[ToSize(level_)];
+        const unsigned better = Better(at) & at.left;
+        if (better == 0) {
+          ++level_;
+          continue;
+        }
+        const std::size_t lane = BestOf(better, at);
+        at.left &= ~(1u << lane);
+        const std::size_t child = at.first_child + lane;
+        if (level_ > 1) {
+          Open(level_ - 1, child);
+        } else if (leaves_ > 0) {
+          Visit(child);
+        } else {
+          budget_.capped = true;
+          return best_;
+        }
+      }
     }
-    double next;
-    while (!((next = MaxLane(levels_[ToSize(level_)].bounds)) > Max(best_, ObservationIndex::kMissing)))
-      if (++level_ > index_.height()) return false;
-    budget.capped |= leaves_ == 0;
-    if (leaves_ == 0) return false;
-    Level& at = levels_[ToSize(level_)];
-    at.bounds = Replace(at.bounds, next, -kMaxDouble);
-    child_ = at.first_child + TaggedLane(next);
-    Prefetch();
-    return true;
+    return best_;
   }
-
-  [[nodiscard]] double best() const { return best_; }
 
  private:
   struct Level {
-    Pack bounds;  // of the children not yet visited
+    Pack floors, negated_ceilings;  // bounds of the children
     std::size_t first_child;
+    unsigned left;  // a bit for each child that is not yet passed
   };
 
-  void Prefetch() const {
-    if (level_ > 1) {
-      const Pack* node = index_.node(level_ - 1, child_);
-      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p)
-        __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
-    } else {
-      const Pack* leaf = index_.leaf(child_);
-      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p)
-        __builtin_prefetch(leaf + p);
+  // Where the last search found the bound of one side; else by the child with the highest bound on every level.
+  [[nodiscard]] std::size_t LeafToBegin(std::uint32_t found, std::size_t side) const {
+    if (found < index_.num_leaves()) return found;
+    std::size_t child = 0;
+    for (int level = index_.height(); level >= 1; --level) {
+      const Pack bounds = metric_.Node(index_.node(level, child), side);
+      child = child * kPackSize + TaggedLane(MaxLane(TagLanes(Max(bounds, Fill(-kMaxDouble)))));
     }
+    return child;
+  }
+
+  void Visit(std::size_t leaf) {
+    const Sides best = ScanBlocks(metric_, index_.leaf(leaf), ObservationIndex::kLeafBlocks, best_, budget_);
+    if (best.floor > best_.floor) found_.lower = static_cast<std::uint32_t>(leaf);
+    if (best.negated_ceiling > best_.negated_ceiling) found_.upper = static_cast<std::uint32_t>(leaf);
+    best_ = best;
+    --leaves_;
+  }
+
+  void Open(int level, std::size_t node) {
+    level_ = level;
+    Level& at = levels_[ToSize(level)];
+    at.floors = metric_.Node(index_.node(level, node), 0);
+    at.negated_ceilings = metric_.Node(index_.node(level, node), 1);
+    at.first_child = node * kPackSize;
+    at.left = level > 1 ? ~0u : ~(BitIn(node, first_) | BitIn(node, second_));
+  }
+
+  [[nodiscard]] static unsigned BitIn(std::size_t node, std::size_t leaf) {
+    return static_cast<unsigned>(leaf / kPackSize == node) << leaf % kPackSize;
+  }
+
+  // Of the children with these bits, the one whose bound exceeds the best of its side by most.
+  [[nodiscard]] std::size_t BestOf(unsigned better, const Level& at) const {
+    std::size_t best = 0;
+    for (double most = -kInfinity; better != 0; better &= better - 1) {
+      const auto lane = ToSize(std::countr_zero(better));
+      const double gain = Max(at.floors.at(lane) - best_.floor, at.negated_ceilings.at(lane) - best_.negated_ceiling);
+      best = gain > most ? lane : best;
+      most = Max(gain, most);
+    }
+    return best;
+  }
+
+  // A bit for each child whose bound exceeds the best of its side. That of a missing child does not.
+  [[nodiscard]] unsigned Better(const Level& at) const {
+    const Lanes floor = AllLanes(best_.floor), ceiling = AllLanes(best_.negated_ceiling);
+    return BitsOf((at.floors.low > floor) | (at.negated_ceilings.low > ceiling)) |
+           BitsOf((at.floors.high > floor) | (at.negated_ceilings.high > ceiling)) << kLaneCount;
   }
 
   const Metric& metric_;
   const ObservationIndex& index_;
-  const std::size_t side_;
-  int leaves_, level_;
-  std::size_t child_ = 0;
-  double best_ = -kInfinity;
+  FoundIn& found_;
+  Budget& budget_;
+  int leaves_, level_ = 0;
+  std::size_t first_ = 0, second_ = 0;  // the leaves in which the search began, perhaps one
+  Sides best_{-kInfinity, -kInfinity};
   std::array<Level, ObservationIndex::kMaxHeight + 1> levels_;
 };
-
-template <class Metric>
-Sides SearchTree(const Metric& metric, const ObservationIndex& index, Budget& budget) {
-  Descent<Metric> floors(metric, index, 0, budget.leaves), ceilings(metric, index, 1, budget.leaves);
-  for (bool more_floors = true, more_ceilings = true; more_floors || more_ceilings;) {
-    if (more_floors) more_floors = floors.Step(budget);
-    if (more_ceilings) more_ceilings = ceilings.Step(budget);
-  }
-  return {floors.best(), ceilings.best()};
-}
 
 }  // namespace forereach::internal
 

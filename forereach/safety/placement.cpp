@@ -160,7 +160,7 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
 
 void Placement::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
   projection_.EncloseHull(slice, half_width, hull);
-  for (std::size_t k = 0; k < ToSize(dim()); ++k) hull.half_width[k] = AddUp(hull.half_width[k], bulge_[k]);
+  for (std::size_t k = 0; sweeps_ && k < ToSize(dim()); ++k) hull.half_width[k] = AddUp(hull.half_width[k], bulge_[k]);
 }
 
 void Placement::EncloseHull(const Sample& sample, Hull& hull) const noexcept {

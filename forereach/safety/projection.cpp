@@ -1,5 +1,6 @@
 #include "forereach/safety/projection.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -17,6 +18,7 @@ Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(sta
   for (int k = 0; k < dim_; ++k)
     for (int l = 0; l < num_states; ++l)
       if (matrix(k, l) != 0) entries_.push_back({k, l, Interval(matrix(k, l))});
+  copies_ = (matrix.array() == 0 || matrix.array() == 1).all() && (matrix.rowwise().sum().array() == 1).all();
 }
 
 void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
@@ -32,6 +34,17 @@ void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half
   }
   for (std::size_t k = 0; k < ToSize(dim_); ++k)
     hull.half_width[k] += RoundingError(kMargin, size[k]) + std::numeric_limits<double>::min();
+}
+
+void Projection::Enclose(const Zonotope& slice, std::span<const double> half_width,
+                         Zonotope& projected) const noexcept {
+  if (!copies_) return EncloseLinearImage(entries_, slice, half_width, dim_, projected);
+  projected.Reset(dim_, slice.num_generators());
+  for (const auto& [row, column, one] : entries_) {
+    std::ranges::copy(slice.padded_row(column), projected.mutable_row(row));
+    projected.mutable_center(row) = slice.center(column);
+    projected.mutable_slack(row) = slice.slack(column);
+  }
 }
 
 }  // namespace forereach

@@ -24,12 +24,11 @@ class Projection final {
 
   /** Sets `projected` to a zonotope that contains P X. It equals P X if each row of P copies a coordinate.
   @param half_width as in EncloseHull. Cost O(nonzeros of P * generators). */
-  void Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope& projected) const noexcept {
-    EncloseLinearImage(entries_, slice, half_width, dim_, projected);
-  }
+  void Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope& projected) const noexcept;
 
  private:
   int dim_;
+  bool copies_;  // each row of P copies a coordinate
   std::vector<MatrixEntry> entries_;
 };
 

@@ -121,10 +121,10 @@ FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* s
 }
 
 // Moves all columns but the `drop` of smallest score to the front and adds the absolute values of those to `boxed`.
-FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores, const Lanes& inflation,
+FOREREACH_INLINE void Drop(Zonotope& set, std::size_t n, std::size_t drop, const double* scores, const Lanes& inflation,
                            Lengths& boxed) {
   constexpr std::size_t kMaxRows = 8;
-  const auto count = ToSize(set.num_generators()), n = ToSize(set.dim());
+  const auto count = ToSize(set.num_generators());
   const Lanes largest = AllLanes(drop <= 8 ? Smallest(scores, count, drop) : SmallestOfMany(scores, count, drop));
   std::size_t k = 0;
   for (; k + kMaxRows < n; k += kMaxRows) DropFromRows<kMaxRows>(set, k, scores, largest, inflation, boxed);
@@ -169,10 +169,12 @@ struct Axes {
   }
 };
 
+// kDim: the set's, or 0.
+template <int kDim>
 FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& scores, const double* first,
                                            const double* second, int order) {
-  const auto n = ToSize(set.dim());
-  const int count = set.num_generators(), most = order * set.dim(), keep = most - set.dim();
+  const std::size_t n = ToSize(kDim > 0 ? kDim : set.dim());
+  const int count = set.num_generators(), most = order * static_cast<int>(n), keep = most - static_cast<int>(n);
   Axes early = Axes::Nonzero(first, n), late = Axes::Nonzero(second, n);
   const int axes = early.size() + late.size();
   int left = count, stay = axes;  // columns and axes that are not boxed
@@ -185,15 +187,21 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& sc
     }
   }
   Lengths boxed;
-  for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
-  if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
+  if (stay == 0) {  // as most often: all of them
+    for (std::size_t k = 0; k < n; k += kLaneCount)
+      StoreLanes((AllLanes(0) + LoadLanes(first + k)) + LoadLanes(second + k), &boxed[k]);
+    early.which = late.which = 0;
+  } else {
+    for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
+    if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
+  }
   const Lanes inflation = AllLanes(1 + (2.0 * count + 8) * kUnitRoundoff);
   if (left < count)
-    Drop(set, ToSize(count - left), scores.data(), inflation, boxed);
+    Drop(set, n, ToSize(count - left), scores.data(), inflation, boxed);
   else
     for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(LoadLanes(&boxed[k]) * inflation, &boxed[k]);
   const Axes box = Axes::Nonzero(boxed.data(), n);
-  set.Resize(left, left + stay + box.size());
+  set.Resize<kDim>(left, left + stay + box.size());
   box.Write(set, late.Write(set, early.Write(set, left)));
 }
 
@@ -201,7 +209,14 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& sc
 
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second, int order,
                      InstructionSet instructions) noexcept {
-  Dispatch<&AppendAndReduceLanes>(instructions, set, scores, first, second, order);
+  const auto reduce = [&]<int kDim>() {
+    Dispatch<&AppendAndReduceLanes<kDim>>(instructions, set, scores, first, second, order);
+  };
+  switch (set.dim()) {
+    case 4: return reduce.operator()<4>();
+    case 6: return reduce.operator()<6>();
+    default: return reduce.operator()<0>();
+  }
 }
 
 }  // namespace forereach

@@ -37,17 +37,20 @@ class ZonotopeArrays {
     dim_ = dim;
     num_generators_ = num_generators;
   }
-  /** Keeps the first `kept` columns and sets the columns after them, up to `num_generators`, to zero. */
+  /** Keeps the first `kept` columns and sets the columns after them, up to `num_generators`, to zero.
+  @tparam kDim the dimension, if it is a constant. */
+  template <int kDim = 0>
   FOREREACH_INLINE void Resize(int kept, int num_generators) noexcept {
+    const int dim = kDim > 0 ? kDim : dim_;
     num_generators_ = num_generators;
     const std::size_t rest = ToSize(kept) % kLaneCount, end = padded_size();
     std::size_t j = ToSize(kept) - rest;
     if (rest > 0) {
-      for (int k = 0; k < dim_; ++k) StoreLanes(FirstLanes(LoadLanes(mutable_row(k) + j), rest, 0), mutable_row(k) + j);
+      for (int k = 0; k < dim; ++k) StoreLanes(FirstLanes(LoadLanes(mutable_row(k) + j), rest, 0), mutable_row(k) + j);
       j += kLaneCount;
     }
     for (; j < end; j += kLaneCount)
-      for (int k = 0; k < dim_; ++k) StoreLanes(AllLanes(0), mutable_row(k) + j);
+      for (int k = 0; k < dim; ++k) StoreLanes(AllLanes(0), mutable_row(k) + j);
   }
   /** Copies only the entries in use of another set: about 2 kB of the 15 kB of the whole value. */
   void Assign(const ZonotopeArrays& other) noexcept;

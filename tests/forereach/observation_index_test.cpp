@@ -103,6 +103,27 @@ TEST_P(Search, TreeAndRowAgreeToTheLastBitOnEveryInstructionSet) {
   }
 }
 
+// Where the last query found its bounds, or anywhere else.
+TEST_P(Search, GivesTheSameBitsWhereverItBegins) {
+  TracedRandom random(710 + static_cast<std::uint64_t>(GetParam()));
+  for (const int count : {33, 300, 3000}) {
+    const LipschitzEnvelope envelope =
+        EnvelopeOf(Make(random, count, GetParam(), 1), {.max_leaf_visits = 1 << 20, .max_flat_blocks = 0});
+    ResidualBounds after_last, anywhere;
+    for (int trial = 0; trial < 20; ++trial) {
+      const Query query(random, 1, random.Integer(0, 20));
+      const ResidualBounds expected = Ask(envelope, query);
+      const auto leaf = [&] { return static_cast<std::uint32_t>(random.Integer(0, 2 * count / 32)); };
+      anywhere.found[0] = {leaf(), leaf()};
+      for (ResidualBounds* bounds : {&after_last, &anywhere}) {
+        envelope.Enclose(query.set(), *bounds);
+        ASSERT_EQ(bounds->lower[0], expected.lower[0]);
+        ASSERT_EQ(bounds->upper[0], expected.upper[0]);
+      }
+    }
+  }
+}
+
 // Each observation by itself is an envelope of one: the best of them all is the envelope.
 TEST_P(Search, FindsTheTightestBoundOfAllObservations) {
   TracedRandom random(720 + static_cast<std::uint64_t>(GetParam()));

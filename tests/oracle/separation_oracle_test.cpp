@@ -500,13 +500,18 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
   TracedRandom random(708);
   for (int trial = 0; trial < 300; ++trial) {
     const int n = random.Integer(2, 6), p = random.Integer(1, 3);
-    const Eigen::MatrixXd matrix = random.Matrix(p, n);
-    const Zonotope slice = random.AnyZonotope(n, random.Integer(0, 12), std::ldexp(1, random.Integer(-300, 300)));
+    Eigen::MatrixXd matrix = random.Matrix(p, n);
+    if (trial % 3 == 1) matrix = (matrix.array() > 0.2).cast<double>();
+    if (trial % 3 == 2)  // copies coordinates
+      for (int k = 0; k < p; ++k) matrix.row(k) = Eigen::RowVectorXd::Unit(n, random.Integer(0, n - 1));
+    Zonotope slice = random.AnyZonotope(n, random.Integer(0, 12), std::ldexp(1, random.Integer(-300, 300)));
+    for (int k = 0; k < n; ++k)
+      slice.mutable_slack(k) = random.Coin() ? 0 : random.Uniform(0, 1) * slice.HalfWidthUpper(k);
     Zonotope projected;
     Projection(matrix, n).Enclose(slice, HalfWidths(slice), projected);
     for (int i = 0; i < 6; ++i) {
       const Eigen::VectorXd d = random.Vector(p);
-      Rational support = 0;  // of the exact image: d . P c + sum |d . P g|
+      Rational support = 0;  // of the exact image: d . P c + sum |d . P g| + |d . P| s
       const auto along = [&](auto entry) -> Rational {
         Rational sum = 0;
         for (int k = 0; k < p; ++k)
@@ -516,6 +521,7 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
       support += along([&](int l) { return slice.center(l); });
       for (int j = 0; j < slice.num_generators(); ++j)
         support += abs(along([&](int l) { return slice.generator(l, j); }));
+      for (int k = 0; k < n; ++k) support += abs(along([&](int l) { return l == k ? slice.slack(k) : 0.0; }));
       ASSERT_LE(support, exact::Support(projected, View(d)));
     }
   }
