@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "forereach/numerics/size.h"
 
 namespace forereach::verifier {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr int kMostPivots = 2000;
 // What doubles cannot tell apart, of the numbers that they add up.
 constexpr double kDoubt = 0x1p-40;
@@ -45,12 +43,6 @@ std::vector<Real> SolveLinear(std::vector<std::vector<Real>> a, std::vector<Real
 
 bool AllFinite(const std::vector<Real>& numbers) {
   return std::ranges::all_of(numbers, [](const Real& number) { return number.IsFinite(); });
-}
-
-Real Dot(const std::vector<Real>& a, const std::vector<Real>& b) {
-  Real sum;
-  for (std::size_t l = 0; l < a.size(); ++l) sum += a[l] * b[l];
-  return sum;
 }
 
 }  // namespace
@@ -169,16 +161,31 @@ void AffineRow::Judge(const Basis& basis, const std::vector<Real>& alpha, const 
   emptiness_ = is_visible || emptiness_ == Emptiness::kVisible ? Emptiness::kVisible : Emptiness::kHidden;
 }
 
+// The direction, off by so little that it does not matter, and so that no weight is zero on the way.
+std::vector<Real> AffineRow::Perturbed(std::vector<Real> direction) const {
+  const std::vector<Real> weights = Weights(basis_, direction);
+  Real largest;
+  for (const Real& weight : weights) largest = max(largest, abs(weight).middle());
+  for (std::size_t j = 0; j < basis_.size(); ++j) {
+    const Real size = Real(0x1p-120 * static_cast<double>(j + 1)) * largest;
+    const Real off = CertainlyBelow(weights[j], 0.0) ? -size : size;
+    for (Eigen::Index l = 0; l < rows_.cols(); ++l) direction[ToSize(static_cast<int>(l))] += off * Real(rows_(basis_[j], l));
+  }
+  for (Real& entry : direction) entry = entry.middle();
+  return direction;
+}
+
 std::optional<Real> AffineRow::Upper(const std::vector<Real>& direction) const {
   if (ToSize(static_cast<int>(rows_.cols())) != basis_.size() || IsEmpty()) return std::nullopt;
   std::optional<Real> best;
+  const std::vector<Real> perturbed = Perturbed(direction);
   for (int pivots = 0; pivots < kMostPivots; ++pivots) {
-    const std::vector<Real> weights = Weights(basis_, direction);
-    if (!AllFinite(weights)) break;
+    const std::vector<Real> exact = Weights(basis_, direction), weights = Weights(basis_, perturbed);
+    if (!AllFinite(exact) || !AllFinite(weights)) break;
     Real bound;
     for (std::size_t j = 0; j < basis_.size(); ++j) {
       const auto i = ToSize(static_cast<int>(basis_[j]));
-      bound += max(weights[j] * lower_[i], weights[j] * upper_[i]);
+      bound += max(exact[j] * lower_[i], exact[j] * upper_[i]);
     }
     best = best ? min(*best, bound.upper()) : bound.upper();
     const std::vector<Real> theta = Vertex(basis_, weights);

@@ -54,6 +54,7 @@ class AffineRow {
   };
   [[nodiscard]] Violated MostViolated(const Basis& basis, const std::vector<Real>& theta) const;
   [[nodiscard]] std::vector<Real> Weights(const Basis& basis, const std::vector<Real>& direction) const;
+  [[nodiscard]] std::vector<Real> Perturbed(std::vector<Real> direction) const;
   [[nodiscard]] std::vector<Real> Vertex(const Basis& basis, const std::vector<Real>& weights) const;
   void Judge(const Basis& basis, const std::vector<Real>& alpha, const Violated& violated) const;
 

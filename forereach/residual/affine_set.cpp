@@ -13,8 +13,12 @@ namespace {
 constexpr double kOfWidth = 0x1p-44, kOfValue = 0x1p-50;
 // Coefficients of an observation by others below this are taken for zero; rows nearer to a hyperplane, for in it.
 constexpr double kNoCoefficient = 0x1p-36, kFlat = 1e-9;
+// A search looks along a direction that is off by this share, so that no weight is zero: ties would let it go in circles.
+constexpr double kPerturbed = 0x1p-40;
 constexpr int kMostSteps = 400, kMostStepsOfAQuery = 24;
 constexpr int kSamples = 32;  // of the domain, and of the data
+// Up to this many observations a query looks at all of them.
+constexpr std::size_t kFew = 128;
 
 }  // namespace
 
@@ -219,19 +223,32 @@ bool AffineSet::BoundParameters(const Basis& basis) {
   return true;
 }
 
+void AffineSet::Perturb(const Vector& weights, const Basis& basis, Vector& direction) const noexcept {
+  double largest = 0;
+  for (const double weight : weights) largest = std::max(largest, std::abs(weight));
+  for (std::size_t j = 0; j < size_; ++j) {
+    const double share = 0.5 + 0.5 * static_cast<double>(j + 1) / static_cast<double>(size_);
+    const double off = std::copysign(kPerturbed * share * largest, weights[j]);
+    for (std::size_t l = 0; l < size_; ++l) direction[l] += off * phi(basis[j])[l];
+  }
+}
+
 AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int> rows, const Basis& start,
                                    int most_steps) const noexcept {
   Climb found;
   found.basis = start;
   const std::size_t q = size_;
+  Vector perturbed = direction;
   for (int step = 0;; ++step) {
     const Factors factors(*this, found.basis);
     if (!factors.is_regular()) break;
+    if (step == 0) Perturb(factors.Combine({direction.data(), q}), start, perturbed);
     found.weights = factors.Combine({direction.data(), q});
+    const Vector weights = factors.Combine({perturbed.data(), q});
     Vector y{};
     for (std::size_t j = 0; j < q; ++j) {
       const auto i = ToSize(found.basis[j]);
-      y[j] = found.weights[j] < 0 ? lower_[i] : upper_[i];
+      y[j] = weights[j] < 0 ? lower_[i] : upper_[i];
     }
     found.theta = factors.Solve(y);
     if (step == most_steps) break;
@@ -254,9 +271,9 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
     std::size_t leaving = q;
     double least = kInfinity;
     for (std::size_t j = 0; j < q; ++j) {
-      const double towards = found.weights[j] < 0 ? -sign * alpha[j] : sign * alpha[j];
+      const double towards = weights[j] < 0 ? -sign * alpha[j] : sign * alpha[j];
       if (!(towards > kNoCoefficient)) continue;
-      const double ratio = std::abs(found.weights[j]) / towards;
+      const double ratio = std::abs(weights[j]) / towards;
       if (ratio < least || (ratio == least && towards > std::abs(alpha[leaving]))) least = ratio, leaving = j;
     }
     if (leaving == q) {
@@ -373,6 +390,7 @@ void AffineSet::Derive() {
   }
   std::ranges::sort(active_);
   active_.erase(std::ranges::unique(active_).begin(), active_.end());
+  if (all_.size() <= kFew) active_ = all_;
   SetHull();
   is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_), [](const Interval& range) { return range.IsFinite(); });
 }

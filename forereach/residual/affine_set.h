@@ -61,7 +61,8 @@ class AffineSet final {
   [[nodiscard]] const Interval& hull(std::size_t j) const { return hull_[j]; }
 
   /** Bounds on phi . theta over A, phi of q entries, the last one 1: infinite if A is not bounded. Allocates nothing.
-  Cost: O(v q) for the v vertices, and some O(a q) for the a observations that decide at one of them. */
+  Cost: O(v q) for the v vertices, and some O(a q) for a observations: all of a few, or those that decide at a
+  vertex. */
   [[nodiscard]] Interval Enclose(std::span<const double> phi) const noexcept;
 
  private:
@@ -82,6 +83,7 @@ class AffineSet final {
   [[nodiscard]] std::span<const double> phi(int i) const { return {&phi_[static_cast<std::size_t>(i) * size_], size_}; }
   [[nodiscard]] bool ChooseBasis(Basis& basis);
   [[nodiscard]] bool BoundParameters(const Basis& basis);
+  void Perturb(const Vector& weights, const Basis& basis, Vector& direction) const noexcept;
   [[nodiscard]] Climb Search(const Vector& direction, std::span<const int> rows, const Basis& start,
                              int most_steps) const noexcept;
   [[nodiscard]] double SupportUpper(const Vector& direction, const Climb& found) const noexcept;
@@ -95,7 +97,7 @@ class AffineSet final {
   std::vector<double> domain_lower_, domain_upper_;
   std::vector<double> phi_, lower_, upper_;  // q, one and one entries for each observation
   std::vector<int> ids_;
-  std::vector<int> all_, active_;  // of the observations: all, and those that decide at a vertex
+  std::vector<int> all_, active_;  // of the observations: all, and those that a query looks at
   std::vector<Vertex> vertices_;
   Vector limit_{}, slope_{}, reach_{};
   std::array<Interval, kMostUnknowns> hull_{};

@@ -84,7 +84,7 @@ TEST_F(AffineResidual, HasNoBoundWhereTheDataVaryTogether) {
   problem.transitions.x_next.col(2) -= kDt * problem.transitions.z.col(4);
   problem.transitions.z.col(4) = 0.5 * problem.transitions.z.col(2);
   problem.transitions.x_next.col(2) += kDt * problem.transitions.z.col(4);
-  problem.declaration.noise_bound[2] = 1;
+  problem.declaration.noise_bound.setConstant(1);
   const Certifier certifier(Shared(problem));
   ASSERT_FALSE(certifier.violation());
   EXPECT_THAT(certifier.Unexcited(), HasSubstr("vx"));

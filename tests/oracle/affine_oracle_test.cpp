@@ -168,7 +168,7 @@ TEST(AffineSetOracle, AContradictionIsAProofAndNoneIsMissed) {
     EXPECT_TRUE(Vertices(few).empty());
     // The first is `gap` away from what the others admit, and not more.
     const double gap = set.contradiction()->gap;
-    for (const double share : {1 + 1e-6, 1 - 1e-6}) {
+    for (const double share : {1 + 1e-3, 1 - 1e-3}) {
       Data moved = few;
       moved.lower[0] -= share * gap;
       moved.upper[0] += share * gap;
