@@ -43,8 +43,7 @@ class Certifier final {
   [[nodiscard]] const Projection& projection() const { return safety_.placement().projection(); }
   /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Otherwise, with
   the second observation -1, the transition that contradicts a declared bound on a rate (rates.h): `difference` is the
-  least rate that it shows. In an affine row `first` lies `difference` off all that agree with others, the most
-  decisive of which is `second`. Learned observations are numbered after those of the problem. */
+  least rate that it shows. In an affine row it is as AsViolation says (affine_rows_enclosure.h). Learned observations are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
   /** Why an affine row of the residual has no bound: the direction in which the observations do not vary. Empty if all
   rows have one. */

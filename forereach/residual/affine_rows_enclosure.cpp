@@ -95,7 +95,9 @@ std::optional<AffineContradiction> FindAffineContradiction(const Declaration& de
 }
 
 Violation AsViolation(const AffineContradiction& contradiction) {
-  return {contradiction.rows[0], contradiction.rows[1], contradiction.coordinate, contradiction.gap, 0};
+  const std::vector<int>& rows = contradiction.rows;
+  const int latest = std::ranges::max(rows);
+  return {rows[0] == latest ? rows[1] : rows[0], latest, contradiction.coordinate, contradiction.gap, 0};
 }
 
 }  // namespace forereach

@@ -56,7 +56,8 @@ class AffineRowsEnclosure final : public ResidualEnclosure {
 [[nodiscard]] std::optional<AffineContradiction> FindAffineContradiction(const Declaration& declaration,
                                                                          const Observations& observations);
 
-/** As a violation: `first` is the observation that is predicted, `second` the most decisive of the others. */
+/** As a violation, with its gap as the difference and 0 as the bound: `second` is the latest of the observations, `first`
+the one that is predicted or, if that is the latest, the most decisive of the others. */
 [[nodiscard]] Violation AsViolation(const AffineContradiction& contradiction);
 
 }  // namespace forereach

@@ -34,7 +34,7 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
     Certificate narrower = certificate;
     const int row = problem->declaration.affine.rows[0];
     RecordedSlice& last = narrower.slices.back();
-    last.upper[row] -= 1e-3 * (last.upper[row] - last.lower[row]);
+    last.upper[row] -= 0.25 * (last.upper[row] - last.lower[row]);
     EXPECT_NE(judge.Verify(narrower).status, Status::kConfirmed);
     // Data by which the row's residual is another one, or none.
     const auto other = std::make_shared<Problem>(*problem);
