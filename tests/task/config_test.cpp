@@ -73,7 +73,7 @@ TEST(LoadConfig, ReadsWhichRowsAreAffine) {
   const auto with = [&](const std::string& affine, const std::string& task = kTask) {
     return files.Load(Replaced(task, line, line + "  affine: " + affine + "\n"));
   };
-  const std::string only_vy = Replaced(kTask, "[0, 0, 0.1, 0.05, 0, 0]", "[0, 0, 0, 0, 0, 0]");
+  const std::string only_vy = Replaced(kTask, "    vx: {vx: 0.1, vy: 0.05}\n", "");
   const Config config = with("{rows: [vx], columns: [ay, vx]}", only_vy);
   EXPECT_THAT(config.problem->declaration.affine.rows, testing::ElementsAre(2));
   EXPECT_THAT(config.problem->declaration.affine.columns, testing::ElementsAre(2, 5));
