@@ -425,13 +425,14 @@ class Examination final {
     const std::string& name = result_.states[k];
     const double sigma = problem_.declaration.noise_bound[violation.coordinate];
     if (problem_.declaration.affine.Contains(violation.coordinate))
-      return Add("declaration.affine",
-                 fmt::format("{}: no affine residual agrees with a few lines of {}, {} and {} among them: one is {} off "
-                             "what the others allow. The declaration is false, and nothing can be certified",
-                             name, result_.data, FileLine(violation.first), FileLine(violation.second),
-                             Down(violation.difference)),
-                 "look at these lines, and whether model.dt is the step of the data. If they are right, bound this row "
-                 "by declaration.lipschitz, or declare more noise_bound");
+      return Add(
+          "declaration.affine",
+          fmt::format("{}: no affine residual agrees with a few lines of {}, {} and {} among them: one is {} off "
+                      "what the others allow. The declaration is false, and nothing can be certified",
+                      name, result_.data, FileLine(violation.first), FileLine(violation.second),
+                      Down(violation.difference)),
+          "look at these lines, and whether model.dt is the step of the data. If they are right, bound this row "
+          "by declaration.lipschitz, or declare more noise_bound");
     Add(RowKey(name),
         fmt::format("{}: lines {} and {} of {} differ in the model's error by {}, and the declaration allows {}: it is "
                     "false, and nothing can be certified",

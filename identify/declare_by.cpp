@@ -69,9 +69,10 @@ std::string Explain(const Unexplained& found, const Config& config, const Propos
 
 void RequireSlopes(const Config& config) {
   if (!config.problem->declaration.affine.rows.empty())
-    throw ConfigError(config.path +
-                      ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it back "
-                      "in place of the proposed rows");
+    throw ConfigError(
+        config.path +
+        ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it back "
+        "in place of the proposed rows");
 }
 
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {

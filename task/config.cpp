@@ -132,9 +132,10 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   FillStanding(draft);
   auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
   if (!problem.declaration.affine.rows.empty() && problem.declaration.HasErrorInZ())
-    file.Fail("declaration.affine",
-              "with state_error or input_error: what these make of the residual follows from lipschitz alone. Leave them "
-              "out, or zero, or declare these rows by lipschitz");
+    file.Fail(
+        "declaration.affine",
+        "with state_error or input_error: what these make of the residual follows from lipschitz alone. Leave them "
+        "out, or zero, or declare these rows by lipschitz");
   const NominalModel& model = *problem.model;
   if (!instead.transitions.empty()) transitions_path = instead.transitions;
   if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;

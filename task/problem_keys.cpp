@@ -153,11 +153,12 @@ std::vector<Key> DeclarationKeys() {
       Required(Vectors("declaration.lipschitz", "of the state per that of the coordinate", kNotNegative,
                        Between(1, kMaxStates), Size::kVariables, "L as a matrix: one row a state.",
                        ReadLipschitzMatrix)),
-      Optional(Map("declaration.affine",
-                   "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
-                   "domain. Data bound M and b; L is not read there. For records without errors of states and inputs.",
-                   ReadAffine),
-               "none"),
+      Optional(
+          Map("declaration.affine",
+              "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
+              "domain. Data bound M and b; L is not read there. For records without errors of states and inputs.",
+              ReadAffine),
+          "none"),
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
       Required(Names("declaration.affine.columns", Between(1, AffineRows::kMaxColumns), Size::kVariables,
                      "The states and inputs that they depend on.")),

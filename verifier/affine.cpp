@@ -169,7 +169,8 @@ std::vector<Real> AffineRow::Perturbed(std::vector<Real> direction) const {
   for (std::size_t j = 0; j < basis_.size(); ++j) {
     const Real size = Real(0x1p-120 * static_cast<double>(j + 1)) * largest;
     const Real off = CertainlyBelow(weights[j], 0.0) ? -size : size;
-    for (Eigen::Index l = 0; l < rows_.cols(); ++l) direction[ToSize(static_cast<int>(l))] += off * Real(rows_(basis_[j], l));
+    for (Eigen::Index l = 0; l < rows_.cols(); ++l)
+      direction[ToSize(static_cast<int>(l))] += off * Real(rows_(basis_[j], l));
   }
   for (Real& entry : direction) entry = entry.middle();
   return direction;

@@ -642,10 +642,8 @@ std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& aff
     }
     auto row = std::make_unique<AffineRow>(z, std::move(lower), std::move(upper), std::move(sizes));
     if (row->IsEmpty())
-      return Failure{0, "some affine residual of " + name + " agrees with all data", "none", "",
-                     row->IsVisiblyEmpty()};
-    if (!row->IsBounded())
-      return Failure{0, "data bound the affine residual of " + name, "no bound", "", false};
+      return Failure{0, "some affine residual of " + name + " agrees with all data", "none", "", row->IsVisiblyEmpty()};
+    if (!row->IsBounded()) return Failure{0, "data bound the affine residual of " + name, "no bound", "", false};
     if (row->IsAmbiguous())
       return Failure{0, "the slopes of the affine residual of " + name + " are known to the last bit", "a tie", "",
                      false};
@@ -779,8 +777,8 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
   return offset;
 }
 
-// <f0(c), (J + A) G>, A the slopes of affine rows. With parameters that are intervals, the middles; `slack` then is set to what they may be off,
-// coordinate by coordinate, the slice's own slack included.
+// <f0(c), (J + A) G>, A the slopes of affine rows. With parameters that are intervals, the middles; `slack` then is set
+// to what they may be off, coordinate by coordinate, the slice's own slack included.
 Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const {
   const std::size_t n = slack.size(), num_columns = query.slice.columns.size() - query.slice.num_slack;
   Slice next;

@@ -2,8 +2,9 @@
 and (set-envelope), implemented directly. It shares data types with the certifier, but no arithmetic.
 
 For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [(J + A) G, diag(q), diag(h + w)] >,
-with A the slopes of affine rows of the residual (verifier/affine.h), zero in the others, and w the declared bound on the disturbance. It counts twice, for different steps: an observation's r~_i differs from
-r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So is it by inputs that are off. */
+with A the slopes of affine rows of the residual (verifier/affine.h), zero in the others, and w the declared bound on
+the disturbance. It counts twice, for different steps: an observation's r~_i differs from r(z_i) by what disturbed that
+step, and the step from X_t is disturbed anew. So is it by inputs that are off. */
 #pragma once
 
 #include <limits>

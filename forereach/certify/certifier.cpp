@@ -142,8 +142,10 @@ std::string Flat(const std::vector<double>& normal, const std::vector<int>& colu
   std::string sum;
   for (std::size_t j = 0; j < normal.size(); ++j) {
     if (std::abs(normal[j]) < 1e-3) continue;
-    if (!sum.empty()) sum += normal[j] < 0 ? " - " : " + ";
-    else if (normal[j] < 0) sum += "-";
+    if (!sum.empty())
+      sum += normal[j] < 0 ? " - " : " + ";
+    else if (normal[j] < 0)
+      sum += "-";
     const bool is_one = std::abs(normal[j]) == 1;
     sum += (is_one ? "" : ToText(std::round(std::abs(normal[j]) * 1e3) / 1e3) + " ") +
            model.variable_names()[ToSize(columns[j])];

@@ -43,13 +43,14 @@ class Certifier final {
   [[nodiscard]] const Projection& projection() const { return safety_.placement().projection(); }
   /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Otherwise, with
   the second observation -1, the transition that contradicts a declared bound on a rate (rates.h): `difference` is the
-  least rate that it shows. In an affine row it is as AsViolation says (affine_rows_enclosure.h). Learned observations are numbered after those of the problem. */
+  least rate that it shows. In an affine row it is as AsViolation says (affine_rows_enclosure.h). Learned observations
+  are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
   /** Why an affine row of the residual has no bound: the direction in which the observations do not vary. Empty if all
   rows have one. */
   [[nodiscard]] std::string Unexcited() const;
-  /** The transitions of violation(), one, two or, of an affine row, all that decide it, as they were recorded, whatever is declared of them; of learned ones
-  `longer` is that of their clock. @pre violation() has a value. */
+  /** The transitions of violation(), one, two or, of an affine row, all that decide it, as they were recorded, whatever
+  is declared of them; of learned ones `longer` is that of their clock. @pre violation() has a value. */
   [[nodiscard]] Transitions Contradiction() const;
   [[nodiscard]] std::size_t num_observations() const { return observed_ ? observed_->known.size() : 0; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */

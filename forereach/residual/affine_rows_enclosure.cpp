@@ -13,20 +13,21 @@ std::span<const double> View(const Eigen::VectorXd& entries) { return {entries.d
 }  // namespace
 
 AffineRowsEnclosure::AffineRowsEnclosure(const Declaration& declaration, const Observations& observations,
-                                 std::span<const double> domain_lower, std::span<const double> domain_upper,
-                                 const ResidualEnclosure& others)
+                                         std::span<const double> domain_lower, std::span<const double> domain_upper,
+                                         const ResidualEnclosure& others)
     : declaration_(declaration),
       others_(others),
       sets_(declaration.affine.rows.size(), AffineSet(declaration.affine.columns, domain_lower, domain_upper)) {
   for (int i = 0; i < observations.size(); ++i) {
-    const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i), upper = observations.upper.row(i);
+    const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
+                          upper = observations.upper.row(i);
     Insert(i, View(z), View(lower), View(upper));
   }
   for (std::size_t i = 0; i < sets_.size(); ++i) Derive(i);
 }
 
 void AffineRowsEnclosure::Insert(int id, std::span<const double> z, std::span<const double> lower,
-                             std::span<const double> upper) {
+                                 std::span<const double> upper) {
   for (std::size_t i = 0; i < sets_.size(); ++i) {
     const int k = declaration_.affine.rows[i];
     const double error = declaration_.ObservationError(k);
@@ -42,7 +43,7 @@ void AffineRowsEnclosure::Derive(std::size_t i) {
 }
 
 void AffineRowsEnclosure::Add(int id, std::span<const double> z, std::span<const double> lower,
-                          std::span<const double> upper) {
+                              std::span<const double> upper) {
   Insert(id, z, lower, upper);
   for (std::size_t i = 0; i < sets_.size(); ++i)
     if (sets_[i].MayNarrow()) Derive(i);

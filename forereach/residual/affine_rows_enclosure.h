@@ -21,11 +21,11 @@ namespace forereach {
 
 class AffineRowsEnclosure final : public ResidualEnclosure {
  public:
-  /** @param others bounds all rows, and sets no slope; it must outlive this object. @param domain_lower, domain_upper as
-  of LipschitzEnvelope. @pre declaration.Validate passed. Cost: AffineSet::Derive for each affine row. */
+  /** @param others bounds all rows, and sets no slope; it must outlive this object. @param domain_lower, domain_upper
+  as of LipschitzEnvelope. @pre declaration.Validate passed. Cost: AffineSet::Derive for each affine row. */
   AffineRowsEnclosure(const Declaration& declaration, const Observations& observations,
-                  std::span<const double> domain_lower, std::span<const double> domain_upper,
-                  const ResidualEnclosure& others);
+                      std::span<const double> domain_lower, std::span<const double> domain_upper,
+                      const ResidualEnclosure& others);
 
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
@@ -56,8 +56,8 @@ class AffineRowsEnclosure final : public ResidualEnclosure {
 [[nodiscard]] std::optional<AffineContradiction> FindAffineContradiction(const Declaration& declaration,
                                                                          const Observations& observations);
 
-/** As a violation, with its gap as the difference and 0 as the bound: `second` is the latest of the observations, `first`
-the one that is predicted or, if that is the latest, the most decisive of the others. */
+/** As a violation, with its gap as the difference and 0 as the bound: `second` is the latest of the observations,
+`first` the one that is predicted or, if that is the latest, the most decisive of the others. */
 [[nodiscard]] Violation AsViolation(const AffineContradiction& contradiction);
 
 }  // namespace forereach

@@ -13,7 +13,8 @@ namespace {
 constexpr double kOfWidth = 0x1p-44, kOfValue = 0x1p-50;
 // Coefficients of an observation by others below this are taken for zero; rows nearer to a hyperplane, for in it.
 constexpr double kNoCoefficient = 0x1p-36, kFlat = 1e-9;
-// A search looks along a direction that is off by this share, so that no weight is zero: ties would let it go in circles.
+// A search looks along a direction that is off by this share, so that no weight is zero: ties would let it go in
+// circles.
 constexpr double kPerturbed = 0x1p-40;
 constexpr int kMostSteps = 400, kMostStepsOfAQuery = 24;
 constexpr int kSamples = 32;  // of the domain, and of the data
@@ -130,7 +131,8 @@ bool AffineSet::ChooseBasis(Basis& basis) {
   std::vector<double> middle(q - 1), spread(q - 1), rows(count * q);
   for (std::size_t l = 0; l + 1 < q; ++l) {
     double least = kInfinity, most = -kInfinity;
-    for (std::size_t i = 0; i < count; ++i) least = std::min(least, phi_[i * q + l]), most = std::max(most, phi_[i * q + l]);
+    for (std::size_t i = 0; i < count; ++i)
+      least = std::min(least, phi_[i * q + l]), most = std::max(most, phi_[i * q + l]);
     middle[l] = least / 2 + most / 2;
     spread[l] = most / 2 - least / 2;
     if (!(spread[l] > kFlat * std::abs(middle[l])) || !(spread[l] > 0)) {
@@ -175,9 +177,8 @@ bool AffineSet::ChooseBasis(Basis& basis) {
     }
     if (const double square = Dot({left.data(), q}, left.data()); square > longest) longest = square, normal = left;
   }
-  const double largest = std::abs(*std::max_element(normal.begin(), normal.begin() + std::ssize(middle), [](double a, double b) {
-    return std::abs(a) < std::abs(b);
-  }));
+  const double largest = std::abs(*std::max_element(normal.begin(), normal.begin() + std::ssize(middle),
+                                                    [](double a, double b) { return std::abs(a) < std::abs(b); }));
   for (std::size_t l = 0; l + 1 < q; ++l) unexcited_.push_back(largest > 0 ? normal[l] / largest : 0);
   return false;
 }
@@ -260,7 +261,8 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
       const double allowed = kOfWidth * (upper_[i] - lower_[i]) + kOfValue * size_of_values_;
       const double above = value - upper_[i] - allowed, below = lower_[i] - value - allowed;
       if (!(std::max(above, below) > worst)) continue;
-      if (std::find(found.basis.begin(), found.basis.begin() + std::ptrdiff_t(q), row) != found.basis.begin() + std::ptrdiff_t(q))
+      if (std::find(found.basis.begin(), found.basis.begin() + std::ptrdiff_t(q), row) !=
+          found.basis.begin() + std::ptrdiff_t(q))
         continue;
       worst = std::max(above, below);
       sign = above > below ? 1 : -1;
@@ -345,7 +347,8 @@ bool AffineSet::Prove(const Climb& found) {
   Vector along{}, against{};
   std::ranges::copy(phi(found.contradicted), along.begin());
   for (std::size_t l = 0; l < size_; ++l) down.weights[l] = -up.weights[l], against[l] = -along[l];
-  const double gap = std::max(SubDown(lower_[i], SupportUpper(along, up)), SubDown(-SupportUpper(against, down), upper_[i]));
+  const double gap =
+      std::max(SubDown(lower_[i], SupportUpper(along, up)), SubDown(-SupportUpper(against, down), upper_[i]));
   if (!(gap > 0)) return false;
   std::vector<std::size_t> order(size_);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -392,7 +395,8 @@ void AffineSet::Derive() {
   active_.erase(std::ranges::unique(active_).begin(), active_.end());
   if (all_.size() <= kFew) active_ = all_;
   SetHull();
-  is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_), [](const Interval& range) { return range.IsFinite(); });
+  is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_),
+                            [](const Interval& range) { return range.IsFinite(); });
 }
 
 Interval AffineSet::Enclose(std::span<const double> at) const noexcept {

@@ -26,9 +26,9 @@ namespace forereach {
 /** A proof that A is empty: what q observations predict of another one is at least `gap` away from what it shows. */
 struct AffineContradiction {
   int coordinate;         ///< k
-  std::vector<int> rows;  ///< Of the observations, by their ids: first the one that is predicted, then the q others, the
-                          ///< most decisive first.
-  double gap;             ///< In the unit of state k, rounded down.
+  std::vector<int> rows;  ///< Of the observations, by their ids: first the one that is predicted, then the q others,
+                          ///< the most decisive first.
+  double gap;  ///< In the unit of state k, rounded down.
 };
 
 class AffineSet final {

@@ -35,14 +35,16 @@ bool AreIndices(const std::vector<int>& all, int size) {
 
 void ValidateAffine(const Declaration& declaration) {
   const auto& [rows, columns] = declaration.affine;
-  Require(AreIndices(rows, static_cast<int>(declaration.lipschitz.rows())), "rows are states, each once, in their order");
+  Require(AreIndices(rows, static_cast<int>(declaration.lipschitz.rows())),
+          "rows are states, each once, in their order");
   Require(AreIndices(columns, static_cast<int>(declaration.lipschitz.cols())),
           "columns are states and inputs, each once, in their order");
   Require(rows.empty() == columns.empty(), "rows and columns, or neither");
-  Require(columns.size() <= AffineRows::kMaxColumns, std::to_string(columns.size()) + " columns, must be at most " +
-                                                         std::to_string(AffineRows::kMaxColumns));
+  Require(columns.size() <= AffineRows::kMaxColumns,
+          std::to_string(columns.size()) + " columns, must be at most " + std::to_string(AffineRows::kMaxColumns));
   for (const int k : rows)
-    Require(declaration.lipschitz.row(k).isZero(0), "row " + std::to_string(k) + " is affine, lipschitz bounds it, too");
+    Require(declaration.lipschitz.row(k).isZero(0),
+            "row " + std::to_string(k) + " is affine, lipschitz bounds it, too");
   Require(rows.empty() || !declaration.HasErrorInZ(),
           "state_error and input_error count by lipschitz, which does not bound these rows: leave the errors out, or "
           "declare these rows by lipschitz");

@@ -148,7 +148,9 @@ TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
   };
   EXPECT_EQ(refusal([](Problem&) {}), "");
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.lipschitz(2, 2) = 0.1; }), HasSubstr("affine: row 2"));
-  EXPECT_THAT(refusal([](Problem& p) { p.declaration.state_error = Vec({0, 0, 1e-3, 0}); }),
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.declaration.state_error = Vec({0, 0, 1e-3, 0});
+              }),
               HasSubstr("state_error and input_error count by lipschitz"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.rows = {3, 2}; }), HasSubstr("in their order"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {2, 6}; }), HasSubstr("columns are"));

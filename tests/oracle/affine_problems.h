@@ -50,13 +50,15 @@ inline AffineTruth MakeAffine(Random& random, Problem& problem) {
   AffineTruth truth;
   for (const int k : affine.rows) {
     problem.declaration.lipschitz.row(k).setZero();
-    problem.declaration.noise_bound[k] = random.Coin(0.2) ? 0 : std::ldexp(random.Uniform(0.5, 1), -random.Integer(8, 14));
+    problem.declaration.noise_bound[k] =
+        random.Coin(0.2) ? 0 : std::ldexp(random.Uniform(0.5, 1), -random.Integer(8, 14));
     std::vector<Real>& theta = truth.emplace_back();
     for (std::size_t j = 0; j <= affine.columns.size(); ++j) theta.emplace_back(random.Uniform(-0.02, 0.02));
     for (int i = 0; i < problem.transitions.size(); ++i) {
       const Eigen::VectorXd z = problem.transitions.z.row(i);
       const std::vector<Real> at(z.begin(), z.end());
-      const double noise = problem.declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1));
+      const double noise =
+          problem.declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1));
       problem.transitions.x_next(i, k) = (NominalSuccessor(bicycle, at)[static_cast<std::size_t>(k)] +
                                           AffineValue(theta, affine.columns, at) + Real(noise))
                                              .ToDouble();
@@ -84,7 +86,8 @@ inline std::vector<Real> AdmissibleParameters(Random& random, const Problem& pro
       if (along < Real(0) && (!farthest || (lower - value) / along < *farthest)) farthest = (lower - value) / along;
     }
     if (!farthest) break;
-    const Real step = *farthest * (steps == 1 && random.Coin(0.3) ? Real(random.Uniform(0, 1)) : Real(1.0) - Real(0x1p-60));
+    const Real step =
+        *farthest * (steps == 1 && random.Coin(0.3) ? Real(random.Uniform(0, 1)) : Real(1.0) - Real(0x1p-60));
     for (std::size_t j = 0; j < theta.size(); ++j) theta[j] += step * direction[j];
   }
   return theta;
