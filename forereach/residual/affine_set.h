@@ -28,7 +28,7 @@ struct AffineContradiction {
   int coordinate;         ///< k
   std::vector<int> rows;  ///< Of the observations, by their ids: first the one that is predicted, then the q others,
                           ///< the most decisive first.
-  double gap;  ///< In the unit of state k, rounded down.
+  double gap;             ///< In the unit of state k, rounded down.
 };
 
 class AffineSet final {
