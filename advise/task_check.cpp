@@ -245,10 +245,7 @@ class Examination final {
       const Eigen::VectorXd residual = (observations.lower.col(c) + observations.upper.col(c)) / 2;
       const Eigen::VectorXd bounds = problem_.declaration.lipschitz.row(c).transpose();
       const double errors = 2 * problem_.declaration.ObservationError(c);
-      if (problem_.declaration.affine.Contains(c)) {  // the certifier judges them, not pairs
-        result_.rows.push_back({result_.states[k], false, 0, 0, 0});
-        continue;
-      }
+      if (problem_.declaration.affine.Contains(c)) continue;  // the certifier judges them, not pairs
       TaskCheck::Row row{result_.states[k], errors > 0 || (bounds.array() > 0).any(), 0, 0, 0};
       for (Eigen::Index i = 0; i < observations.size(); i += stride)
         for (Eigen::Index j = i + stride; j < observations.size(); j += stride) {
@@ -394,14 +391,14 @@ class Examination final {
       Add("task", error.what(), "correct it");
       return;
     }
-    if (const std::string flat = certifier->Unexcited(); !flat.empty())
-      Add("declaration.affine", flat + ", and nothing is certified without one",
-          "record steps that vary it, or leave a column out on which the residual does not depend");
     if (certifier->violation()) {
       if (certifier->violation()->second >= 0) ExplainViolation(*certifier->violation());  // else ExamineRates did
       return;
     }
     RemarkOnSlack();
+    if (const std::string flat = certifier->Unexcited(); !flat.empty())
+      return Add("declaration.affine", flat + ", and nothing is certified without one",
+                 "record steps that vary it, or leave a column out on which the residual does not depend");
     Tube tube;
     const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
     result_.tube = Explain(decision, certifier->problem(), plan, tube);

@@ -141,14 +141,13 @@ namespace {
 std::string Flat(const std::vector<double>& normal, const std::vector<int>& columns, const NominalModel& model) {
   std::string sum;
   for (std::size_t j = 0; j < normal.size(); ++j) {
-    if (std::abs(normal[j]) < 1e-3) continue;
+    const double share = std::round(std::abs(normal[j]) * 1e3) / 1e3;
+    if (share == 0) continue;
     if (!sum.empty())
       sum += normal[j] < 0 ? " - " : " + ";
     else if (normal[j] < 0)
       sum += "-";
-    const bool is_one = std::abs(normal[j]) == 1;
-    sum += (is_one ? "" : ToText(std::round(std::abs(normal[j]) * 1e3) / 1e3) + " ") +
-           model.variable_names()[ToSize(columns[j])];
+    sum += (share == 1 ? "" : ToText(share) + " ") + model.variable_names()[ToSize(columns[j])];
   }
   return sum;
 }

@@ -177,8 +177,8 @@ bool AffineSet::ChooseBasis(Basis& basis) {
     }
     if (const double square = Dot({left.data(), q}, left.data()); square > longest) longest = square, normal = left;
   }
-  const double largest = std::abs(*std::max_element(normal.begin(), normal.begin() + std::ssize(middle),
-                                                    [](double a, double b) { return std::abs(a) < std::abs(b); }));
+  double largest = 0;
+  for (std::size_t l = 0; l + 1 < q; ++l) largest = std::max(largest, std::abs(normal[l] /= spread[l]));
   for (std::size_t l = 0; l + 1 < q; ++l) unexcited_.push_back(largest > 0 ? normal[l] / largest : 0);
   return false;
 }
