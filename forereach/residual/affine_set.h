@@ -49,7 +49,7 @@ class AffineSet final {
   /** Whether A is bounded. If not, no query has a finite bound. */
   [[nodiscard]] bool IsBounded() const { return is_bounded_; }
   /** If the locations of the observations lie in a hyperplane: its normal, an entry for each column, the largest 1 in
-  size, after the columns are scaled to the spread of the data. Otherwise none. */
+  size. Otherwise none. */
   [[nodiscard]] const std::vector<double>& unexcited() const { return unexcited_; }
 
   /** The middle of the hull of M_kl over A, rounded to 2^-16 of its size so that who derives it again gets the same;
