@@ -31,6 +31,12 @@ std::string Disturbances(const std::vector<std::string>& names, const Declaratio
   return text;
 }
 
+std::string NamesOf(const std::vector<std::string>& names, const std::vector<int>& chosen) {
+  std::string text;
+  for (const int i : chosen) text += (text.empty() ? "" : ", ") + names[ToSize(i)];
+  return text;
+}
+
 // Who may find what is declared of states false.
 std::string WhoRefutesStateError(const Config& config) {
   const Declaration& declaration = config.problem->declaration;
@@ -134,9 +140,17 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
     all.push_back({"the robot's clock runs true while a plan is executed",
                    "declared; the guard sees that it was set only if a step is off its time then"});
   AddRatesAndTurns(config, all);
-  all.push_back({"the residual changes by no more than declaration.lipschitz, on the whole domain",
-                 std::string("declared; transitions of the file ") + (config.gate.learns ? "and of the bus " : "") +
-                     "that contradict it falsify it (F)"});
+  const std::string falsify = std::string("declared; transitions of the file ") +
+                              (config.gate.learns ? "and of the bus " : "") + "that contradict it falsify it (F)";
+  const auto& [rows, columns] = declaration.affine;
+  if (!rows.empty())
+    all.push_back({"the residual of " + NamesOf(model.state_names(), rows) + " is affine in " +
+                       NamesOf(model.variable_names(), columns) + ", on the whole domain",
+                   falsify});
+  if (std::ssize(rows) < model.num_states())
+    all.push_back({rows.empty() ? "the residual changes by no more than declaration.lipschitz, on the whole domain"
+                                : "that of the other states changes by no more than declaration.lipschitz, likewise",
+                   falsify});
   if (!declaration.noise_bound.isZero(0))
     all.push_back({"recorded successors are off by at most " + Bounds(model.state_names(), declaration.noise_bound),
                    "declared; transitions refute it likewise"});

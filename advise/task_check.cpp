@@ -161,7 +161,8 @@ class Examination final {
     const auto n = ToSize(model_.num_variables());
     for (std::size_t l = 0; l < n; ++l) {
       const auto column = all_.z.col(static_cast<Eigen::Index>(l));
-      const bool matters = (problem_.declaration.lipschitz.col(static_cast<Eigen::Index>(l)).array() > 0).any();
+      const bool matters = (problem_.declaration.lipschitz.col(static_cast<Eigen::Index>(l)).array() > 0).any() ||
+                           std::ranges::count(problem_.declaration.affine.columns, static_cast<int>(l)) > 0;
       result_.coordinates.push_back({names_[l], Lower(l), Upper(l), column.minCoeff(), column.maxCoeff(), matters});
     }
     KeepThoseInside();
@@ -244,6 +245,7 @@ class Examination final {
       const Eigen::VectorXd residual = (observations.lower.col(c) + observations.upper.col(c)) / 2;
       const Eigen::VectorXd bounds = problem_.declaration.lipschitz.row(c).transpose();
       const double errors = 2 * problem_.declaration.ObservationError(c);
+      if (problem_.declaration.affine.Contains(c)) continue;  // the certifier judges them, not pairs
       TaskCheck::Row row{result_.states[k], errors > 0 || (bounds.array() > 0).any(), 0, 0, 0};
       for (Eigen::Index i = 0; i < observations.size(); i += stride)
         for (Eigen::Index j = i + stride; j < observations.size(); j += stride) {
@@ -394,6 +396,9 @@ class Examination final {
       return;
     }
     RemarkOnSlack();
+    if (const std::string flat = certifier->Unexcited(); !flat.empty())
+      return Add("declaration.affine", flat + ", and nothing is certified without one",
+                 "record steps that vary it, or leave a column out on which the residual does not depend");
     Tube tube;
     const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
     result_.tube = Explain(decision, certifier->problem(), plan, tube);
@@ -416,6 +421,15 @@ class Examination final {
     const auto k = ToSize(violation.coordinate);
     const std::string& name = result_.states[k];
     const double sigma = problem_.declaration.noise_bound[violation.coordinate];
+    if (problem_.declaration.affine.Contains(violation.coordinate))
+      return Add(
+          "declaration.affine",
+          fmt::format("{}: no affine residual agrees with a few lines of {}, {} and {} among them: one is {} off "
+                      "what the others allow. The declaration is false, and nothing can be certified",
+                      name, result_.data, FileLine(violation.first), FileLine(violation.second),
+                      Down(violation.difference)),
+          "look at these lines, and whether model.dt is the step of the data. If they are right, bound this row "
+          "by declaration.lipschitz, or declare more noise_bound");
     Add(RowKey(name),
         fmt::format("{}: lines {} and {} of {} differ in the model's error by {}, and the declaration allows {}: it is "
                     "false, and nothing can be certified",

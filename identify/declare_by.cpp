@@ -67,6 +67,14 @@ std::string Explain(const Unexplained& found, const Config& config, const Propos
          "half of that, raise noise_bound (--noise estimated)";
 }
 
+void RequireSlopes(const Config& config) {
+  if (!config.problem->declaration.affine.rows.empty())
+    throw ConfigError(
+        config.path +
+        ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it back "
+        "in place of the proposed rows");
+}
+
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {
   const std::vector<std::string>& states = model.state_names();
   const std::vector<std::string> variables = model.variable_names();

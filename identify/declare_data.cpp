@@ -252,6 +252,7 @@ Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Confi
 
 int DeclareFromData(const DataCommand& command) {
   const Config config = LoadConfig(command.config);
+  RequireSlopes(config);
   RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
                         config.problem->transitions);
   const Problem& problem = *config.problem;

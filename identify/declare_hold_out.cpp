@@ -239,6 +239,7 @@ Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
 int DeclareHoldOut(const DataCommand& command) {
   const auto pictures = command.picture.empty() ? std::vector<std::string>() : PictureFiles(command.picture);
   const Config config = LoadConfig(command.config);
+  RequireSlopes(config);
   RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
                         config.problem->transitions);
   const Problem& problem = *config.problem;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include <Eigen/QR>
+
 #include "forereach/numerics/limits.h"
 
 namespace forereach {
@@ -50,6 +52,11 @@ ResidualEstimate::ResidualEstimate(std::shared_ptr<const Problem> problem)
     residuals_.row(i) -= Eigen::Map<const Eigen::RowVectorXd>(nominal.data(), residuals_.cols());
     for (const int k : problem_->model->angles()) residuals_(i, k) = std::remainder(residuals_(i, k), kTurn);
   }
+  const auto& [rows, columns] = problem_->declaration.affine;
+  if (rows.empty() || data.size() == 0) return;
+  Eigen::MatrixXd regressors(data.size(), std::ssize(columns) + 1);
+  regressors << data.z(Eigen::all, columns), Eigen::VectorXd::Ones(data.size());
+  fits_ = regressors.completeOrthogonalDecomposition().solve(residuals_(Eigen::all, rows));
 }
 
 void ResidualEstimate::Predict(std::span<const double> z, std::span<double> next) const {
@@ -58,6 +65,14 @@ void ResidualEstimate::Predict(std::span<const double> z, std::span<double> next
 }
 
 double ResidualEstimate::Estimate(int k, std::span<const double> z) const {
+  const auto& [rows, columns] = problem_->declaration.affine;
+  if (const auto row = std::ranges::find(rows, k); row != rows.end() && fits_.cols() > 0) {
+    const auto fit = fits_.col(row - rows.begin());
+    double sum = fit[fit.size() - 1];
+    for (std::size_t j = 0; j < columns.size(); ++j)
+      sum += fit[static_cast<Eigen::Index>(j)] * z[static_cast<std::size_t>(columns[j])];
+    return sum;
+  }
   const auto slopes = problem_->declaration.lipschitz.row(k);
   if ((slopes.array() == 0).all()) return residuals_.col(k).mean();
   const Eigen::MatrixXd& points = problem_->transitions.z;

@@ -74,6 +74,13 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
   add("state_error", declaration.state_error);
   add("input_error", declaration.input_error);
   if (declaration.given_are_exact && declaration.HasErrorInZ()) bytes.Text("given are exact");
+  if (!declaration.affine.rows.empty()) {
+    bytes.Text("affine");
+    for (const std::vector<int>* indices : {&declaration.affine.rows, &declaration.affine.columns}) {
+      bytes.Count(std::ssize(*indices));
+      for (const int index : *indices) bytes.Count(index);
+    }
+  }
   return bytes.digest();
 }
 

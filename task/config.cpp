@@ -131,6 +131,11 @@ Config Load(Document file, TransitionsFile transitions, const NamedFiles& instea
   file.Read(draft);
   FillStanding(draft);
   auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
+  if (!problem.declaration.affine.rows.empty() && problem.declaration.HasErrorInZ())
+    file.Fail(
+        "declaration.affine",
+        "with state_error or input_error: what these make of the residual follows from lipschitz alone. Leave them "
+        "out, or zero, or declare these rows by lipschitz");
   const NominalModel& model = *problem.model;
   if (!instead.transitions.empty()) transitions_path = instead.transitions;
   if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;

@@ -162,6 +162,20 @@ std::array<Key, 3> ErrorKeys(const std::string& of, Key::Size size, Eigen::Vecto
                  [=](const Field& at, TaskDraft& draft) { draft.problem.declaration.*errors = at.Vector(); })};
 }
 
+void ReadAffine(const Field& at, TaskDraft& draft) {
+  Declaration& declaration = draft.problem.declaration;
+  for (const std::string& name : at["rows"].Names()) {
+    const int k = IndexOf(draft.scope.states, name);
+    if (!declaration.lipschitz.row(k).isZero(0))
+      at["rows"].Fail("names " + name + ", which declaration.lipschitz bounds, too: one of the two bounds a row");
+    declaration.affine.rows.push_back(k);
+  }
+  for (const std::string& name : at["columns"].Names())
+    declaration.affine.columns.push_back(IndexOf(draft.scope.variables, name));
+  std::ranges::sort(declaration.affine.rows);
+  std::ranges::sort(declaration.affine.columns);
+}
+
 std::vector<Key> DeclarationKeys() {
   const auto state_error = ErrorKeys(
       "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,
@@ -182,6 +196,15 @@ std::vector<Key> DeclarationKeys() {
       Required(Vectors("declaration.lipschitz", "of the state per that of the coordinate", kNotNegative,
                        Between(1, kMaxStates), Size::kVariables, "L as a matrix: one row a state.",
                        ReadLipschitzMatrix)),
+      Optional(
+          Map("declaration.affine",
+              "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
+              "domain. Data bound M and b; L is not read there. For records without errors of states and inputs.",
+              ReadAffine),
+          "none"),
+      Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
+      Required(Names("declaration.affine.columns", Between(1, AffineRows::kMaxColumns), Size::kVariables,
+                     "The states and inputs that they depend on.")),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
                       "sigma: the largest error of a recorded successor, beside its last bit and state_error.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),

@@ -8,6 +8,7 @@
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/size.h"
 #include "forereach/residual/growing_disturbance.h"
+#include "verifier/affine.h"
 #include "verifier/functions.h"
 
 namespace forereach::verifier {
@@ -365,15 +366,34 @@ struct TubeMaker::Known {
   bool contradiction = false;  // one that doubles show too
 };
 
+// The affine rows of the residual, for one tube. The others are null.
+struct TubeMaker::Affine {
+  const std::vector<int>& columns;
+  std::vector<std::unique_ptr<AffineRow>> rows;
+
+  /** The slope of state k's residual by state l. */
+  [[nodiscard]] double Slope(std::size_t k, std::size_t l) const {
+    const auto found = std::ranges::lower_bound(columns, static_cast<int>(l));
+    if (!rows[k] || found == columns.end() || *found != static_cast<int>(l)) return 0;
+    return rows[k]->slopes()[ToSize(static_cast<int>(found - columns.begin()))];
+  }
+  /** Bounds on the residual of k less its slope times x - c: at the center, and beyond by what the slope may be off. */
+  [[nodiscard]] std::optional<Bounds> Enclose(const Query& query, std::size_t k) const;
+  /** sum over the slice's states of |slope| r. */
+  [[nodiscard]] Real Spread(const Query& query, std::size_t k) const;
+};
+
 // Z_t = X_t x {u_t}: the slice, and center, half-width and hull of every variable.
 struct TubeMaker::Query {
   int t;
   const Slice& slice;
   std::vector<Real> center, half_width, hull;
   std::vector<Real> acted;  // the hull, with all inputs that may act
+  const Affine& affine;
 
-  Query(int step, const Slice& set, const Eigen::VectorXd& input, const std::vector<Real>& input_error)
-      : t(step), slice(set), center(set.center) {
+  Query(int step, const Slice& set, const Eigen::VectorXd& input, const std::vector<Real>& input_error,
+        const Affine& affine_rows)
+      : t(step), slice(set), center(set.center), affine(affine_rows) {
     for (int k = 0; k < set.dim(); ++k) half_width.push_back(set.HalfWidth(k));
     for (const double u : input) {
       center.emplace_back(u);
@@ -391,6 +411,26 @@ struct TubeMaker::Query {
     return box;
   }
 };
+
+std::optional<Bounds> TubeMaker::Affine::Enclose(const Query& query, std::size_t k) const {
+  std::vector<Real> at;
+  Real around;
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    const auto l = ToSize(columns[j]);
+    at.push_back(query.center[l]);
+    around += rows[k]->reach()[j] * query.half_width[l];
+  }
+  at.emplace_back(1.0);
+  const std::optional<Real> upper = rows[k]->Upper(at), lower = rows[k]->Lower(at);
+  if (!upper || !lower) return std::nullopt;
+  return Bounds{*lower - around, *upper + around};
+}
+
+Real TubeMaker::Affine::Spread(const Query& query, std::size_t k) const {
+  Real sum;
+  for (std::size_t l = 0; l < query.slice.center.size(); ++l) sum += abs(Real(Slope(k, l))) * query.half_width[l];
+  return sum;
+}
 
 // What the offsets of the boundaries of a step add: d, and what is added without correlation.
 struct TubeMaker::Offset {
@@ -600,15 +640,44 @@ double TubeMaker::RemainderRounding() const {
 Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const {
   Tube tube;
   tube.slices.push_back(SliceOf(initial_set));
+  Affine affine{problem_.declaration.affine.columns, {}};
+  tube.failure = MakeAffine(options.known, affine);
   for (int t = 0, steps = static_cast<int>(controls.cols()); t < steps && !tube.failure; ++t) {
     Slice slice = tube.slices.back();
     if (options.follow) {
       slice = SliceOf((*options.follow)[ToSize(t)]);
       slice.offset = tube.recorded_offsets.back();
     }
-    tube.failure = Advance(tube, Query(t, slice, controls.col(t), input_error_), options);
+    tube.failure = Advance(tube, Query(t, slice, controls.col(t), input_error_, affine), options);
   }
   return tube;
+}
+
+std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& affine) const {
+  const Transitions& data = problem_.transitions;
+  affine.rows.resize(ToSize(problem_.model->num_states()));
+  std::vector<int> kept;
+  for (int i = 0; i < data.size(); ++i)
+    if (known.Contains(i)) kept.push_back(i);
+  const Eigen::MatrixXd z = data.z(kept, affine.columns);
+  for (const int k : problem_.declaration.affine.rows) {
+    const std::string& name = problem_.model->state_names()[ToSize(k)];
+    std::vector<Real> lower, upper, sizes;
+    for (const int i : kept) {
+      lower.push_back(residuals_[ToSize(i)][ToSize(k)].lower);
+      upper.push_back(residuals_[ToSize(i)][ToSize(k)].upper);
+      sizes.push_back(sizes_[ToSize(i)][ToSize(k)]);
+    }
+    auto row = std::make_unique<AffineRow>(z, std::move(lower), std::move(upper), std::move(sizes));
+    if (row->IsEmpty())
+      return Failure{0, "some affine residual of " + name + " agrees with all data", "none", "", row->IsVisiblyEmpty()};
+    if (!row->IsBounded()) return Failure{0, "data bound the affine residual of " + name, "no bound", "", false};
+    if (row->IsAmbiguous())
+      return Failure{0, "the slopes of the affine residual of " + name + " are known to the last bit", "a tie", "",
+                     false};
+    affine.rows[ToSize(k)] = std::move(row);
+  }
+  return std::nullopt;
 }
 
 std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const TubeOptions& options) const {
@@ -624,6 +693,12 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   step.remainder = Remainder(query, options.split_remainder);
   if (step.remainder.empty()) return no_bound("the nominal model's second derivative");
   for (int k = 0; k < n; ++k) {
+    if (query.affine.rows[ToSize(k)]) {
+      const std::optional<Bounds> affine = query.affine.Enclose(query, ToSize(k));
+      if (!affine) return no_bound("the affine residual");
+      step.envelope.push_back(*affine);
+      continue;
+    }
     const auto& [bounds, contradiction] = Envelope(query, k, options.known);
     if (contradiction)
       return Failure{query.t, "some residual is consistent with data and declaration", bounds.lower.text(),
@@ -724,15 +799,16 @@ TubeMaker::Offset TubeMaker::OffsetOf(const Query& query, const Step& step, cons
     } else if (declared(k) < kNone) {
       offset.spread[k] = ends * (error * Real(declared(k)) + abs(offset.column[k]));
     } else {
-      const Real unknown = max(abs(envelope[k].lower), abs(envelope[k].upper)) + unexpected[k];
+      const Real unknown =
+          max(abs(envelope[k].lower), abs(envelope[k].upper)) + query.affine.Spread(query, k) + unexpected[k];
       offset.spread[k] = ends * (moved[k] - offset.column[k]).magnitude() + growth * unknown;
     }
   }
   return offset;
 }
 
-// <f0(c), J G>. With parameters that are intervals, the middles; `slack` then is set to what they may be off,
-// coordinate by coordinate, the slice's own slack included.
+// <f0(c), (J + A) G>, A the slopes of affine rows. With parameters that are intervals, the middles; `slack` then is set
+// to what they may be off, coordinate by coordinate, the slice's own slack included.
 Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Real>& slack) const {
   const std::size_t n = slack.size(), num_columns = query.slice.columns.size() - query.slice.num_slack;
   Slice next;
@@ -744,6 +820,9 @@ Slice TubeMaker::Image(const Query& query, const Offset& offset, std::vector<Rea
     for (const auto& [output, variable, value] : jacobian)
       if (ToSize(variable) < n && !column[ToSize(variable)].IsZero())
         image[ToSize(output)] += value * column[ToSize(variable)];
+    for (std::size_t k = 0; k < n; ++k)
+      for (std::size_t l = 0; l < n && query.affine.rows[k]; ++l)
+        if (const double slope = query.affine.Slope(k, l); slope != 0) image[k] += Real(slope) * column[l];
     if (static_cast<int>(j) == query.slice.offset)
       for (std::size_t k = 0; k < n; ++k) image[k] -= offset.column[k];
     if (j >= num_columns)

@@ -1,10 +1,11 @@
 /** The verifier's own reachable tube in high precision, from a problem's doubles: Eqs. (propagation), (order-reduction)
 and (set-envelope), implemented directly. It shares data types with the certifier, but no arithmetic.
 
-For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h + w)] >,
-with w the declared bound on the disturbance. It counts twice, for different steps: an observation's r~_i differs from
-r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So is it by inputs that are off. Where the
-bound grows with state and input, it is the largest over the box of what is known of them. */
+For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [(J + A) G, diag(q), diag(h + w)] >,
+with A the slopes of affine rows of the residual (verifier/affine.h), zero in the others, and w the declared bound on
+the disturbance. It counts twice, for different steps: an observation's r~_i differs from r(z_i) by what disturbed that
+step, and the step from X_t is disturbed anew. So is it by inputs that are off. Where the bound grows with state and
+input, it is the largest over the box of what is known of them. */
 #pragma once
 
 #include <limits>
@@ -118,6 +119,7 @@ class TubeMaker final {
  private:
   struct Query;
   struct Row;
+  struct Affine;
 
   [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,
@@ -129,6 +131,7 @@ class TubeMaker final {
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
+  [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                    const std::vector<Real>& disturbance, std::vector<Real>& errors) const;
   struct Offset;

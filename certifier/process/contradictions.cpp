@@ -7,6 +7,7 @@
 #include "forereach/certify/learned.h"
 #include "forereach/certify/rates.h"
 #include "forereach/numerics/size.h"
+#include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/consistency.h"
 
 namespace forereach {
@@ -44,7 +45,8 @@ bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const
       rows.z.cols() != declaration.lipschitz.cols() || !AllCount(rows, problem))
     return false;
   if (!(problem.timing.error > 0)) rows.longer.setZero();  // steps are on time
-  return FindViolation(declaration, Observe(*problem.model, declaration, rows, problem.timing)) ||
+  const Observations observed = Observe(*problem.model, declaration, rows, problem.timing);
+  return FindViolation(declaration, observed) || FindAffineContradiction(declaration, observed) ||
          ExceedsARate(rows, problem);
 } catch (const std::invalid_argument&) {  // of Observe: they say nothing under this task
   return false;

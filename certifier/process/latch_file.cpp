@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forereach/numerics/limits.h"
+#include "forereach/residual/declaration.h"
 #include "lcmtypes/bad_input.h"
 #include "task/files.h"
 #include "task/json_text.h"
@@ -54,9 +55,9 @@ Json ToJson(const LatchFile::Content& content) {
 
 Eigen::MatrixXd RowsFrom(const Json& lists, std::size_t most) {
   const auto rows = lists.get<std::vector<std::vector<double>>>();
-  if (rows.empty() || rows.size() > 2 || rows[0].empty() || rows[0].size() > most ||
+  if (rows.empty() || rows.size() > AffineRows::kMaxColumns + 2 || rows[0].empty() || rows[0].size() > most ||
       rows[0].size() != rows.back().size())
-    throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
+    throw Json::other_error::create(501, "has rows that do not fit", nullptr);
   Eigen::MatrixXd matrix(std::ssize(rows), static_cast<Eigen::Index>(rows[0].size()));
   for (Eigen::Index i = 0; i < matrix.rows(); ++i)
     for (Eigen::Index k = 0; k < matrix.cols(); ++k)
@@ -79,7 +80,7 @@ LatchFile::Content ContentFrom(const Json& json) {
     found.rows.num_learned = entry.at("learned").get<int>();
     if (found.rows.x_next.rows() != found.rows.size() || found.rows.longer.size() != found.rows.size() ||
         found.rows.num_learned < 0 || found.rows.num_learned > found.rows.size())
-      throw Json::other_error::create(501, "has a pair of rows that do not fit", nullptr);
+      throw Json::other_error::create(501, "has rows that do not fit", nullptr);
     content.contradictions.push_back(std::move(found));
   }
   return content;

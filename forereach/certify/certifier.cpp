@@ -8,6 +8,7 @@
 #include "forereach/numerics/arithmetic.h"
 #include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
 
 namespace forereach {
 namespace {
@@ -59,16 +60,14 @@ void ValidateObservations(const Problem& problem) {
 }
 
 // The domain's box over z = (x, u) envelops every query.
-ObservationStore MakeStore(const Problem& problem) {
-  ValidateObservations(problem);
+ObservationStore MakeStore(const Problem& problem, const Observations& observations) {
   const auto [lower, upper] = problem.domain.Corners();
   StoreOptions options;
   options.max_observations = ToSize(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
   options.envelope.instructions = problem.instructions;
-  return ObservationStore(problem.declaration,
-                          Observe(*problem.model, problem.declaration, problem.transitions, problem.timing), lower,
-                          upper, options);
+  return ObservationStore(problem.declaration, WithoutAffineRows(problem.declaration, observations), lower, upper,
+                          options);
 }
 
 Decision Falsified(int step, int coordinate, Cause cause = Cause::kPairwise) {
@@ -120,9 +119,38 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
 
 }  // namespace
 
-Certifier::Observed::Observed(const Problem& problem) : store(MakeStore(problem)), known(store.snapshot()) {}
+Certifier::Observed::Observed(const Problem& problem, const Observations& observations)
+    : store(MakeStore(problem, observations)), known(store.snapshot()) {
+  if (problem.declaration.affine.rows.empty()) return;
+  const auto [lower, upper] = problem.domain.Corners();
+  affine.emplace(problem.declaration, observations, lower, upper, known);
+}
+
+Certifier::Observed::Observed(const Problem& problem)
+    : Observed(problem, (ValidateObservations(problem),
+                         Observe(*problem.model, problem.declaration, problem.transitions, problem.timing))) {}
+
+std::optional<Violation> Certifier::Observed::violation() const {
+  if (known.violation() || !affine || !affine->contradiction()) return known.violation();
+  return AsViolation(*affine->contradiction());
+}
 
 namespace {
+
+// "0.5 v - 1 a is constant": of a row whose parameters no observation bounds.
+std::string Flat(const std::vector<double>& normal, const std::vector<int>& columns, const NominalModel& model) {
+  std::string sum;
+  for (std::size_t j = 0; j < normal.size(); ++j) {
+    const double share = std::round(std::abs(normal[j]) * 1e3) / 1e3;
+    if (share == 0) continue;
+    if (!sum.empty())
+      sum += normal[j] < 0 ? " - " : " + ";
+    else if (normal[j] < 0)
+      sum += "-";
+    sum += (share == 1 ? "" : ToText(share) + " ") + model.variable_names()[ToSize(columns[j])];
+  }
+  return sum;
+}
 
 std::span<const double> EntriesOf(const Eigen::VectorXd& vector) { return {vector.data(), ToSize(vector.size())}; }
 
@@ -155,7 +183,10 @@ Transitions Certifier::Contradiction() const {
     rows.num_learned += is_learned ? 1 : 0;
   };
   const auto [first, second] = std::minmax(violation_->first, violation_->second);
-  for (const int id : {first, second}) {
+  std::vector<int> ids{first, second};
+  if (observed_ && !observed_->known.violation() && observed_->affine && observed_->affine->contradiction())
+    ids = observed_->affine->contradiction()->rows, std::ranges::sort(ids);
+  for (const int id : ids) {
     if (id < 0) continue;
     if (id < given.size()) {
       add(given.z.row(id), given.x_next.row(id), given.Longer(id), given.IsLearned(id));
@@ -170,9 +201,23 @@ Transitions Certifier::Contradiction() const {
   return rows;
 }
 
-// The store drops observations for want of room, but none with a contradiction among them.
+std::string Certifier::Unexcited() const {
+  std::string text;
+  if (!observed_ || !observed_->affine) return text;
+  const AffineRows& affine = problem_->declaration.affine;
+  for (const int k : affine.rows) {
+    const AffineSet& set = observed_->affine->set(k);
+    if (set.IsBounded() || set.contradiction()) continue;
+    const std::string sum = Flat(set.unexcited(), affine.columns, *problem_->model);
+    return "the residual of " + problem_->model->state_names()[ToSize(k)] + " has no bound: " +
+           (sum.empty() ? "its parameters are too uncertain" : sum + " is the same in all observations");
+  }
+  return text;
+}
+
+// The store drops observations for want of room, but none with a contradiction among them. Affine rows keep all.
 void Certifier::ForgetDropped() {
-  if (violation_ || learned_.size() <= 2 * observed_->known.size()) return;
+  if (violation_ || observed_->affine || learned_.size() <= 2 * observed_->known.size()) return;
   const std::vector<int> kept = observed_->known.ids();
   std::erase_if(learned_, [&](const Record& record) { return !std::ranges::binary_search(kept, record.id); });
 }
@@ -183,8 +228,8 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       limits_(*problem_),
       rates_(*problem_),
       observed_(std::in_place, *problem_),
-      violation_(observed_->known.violation()),
-      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
+      violation_(observed_->violation()),
+      propagator_(*problem_->model, problem_->domain, observed_->residual(), problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing,
                   ActedInputs(problem_->declaration), problem_->declaration.growing) {
   TestRates();
@@ -209,12 +254,14 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   const auto entries = [](const Eigen::MatrixXd& one_row) {
     return std::span<const double>(one_row.data(), ToSize(one_row.size()));
   };
-  const int id = observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id;
+  const Observations by_slopes = WithoutAffineRows(problem_->declaration, observed);
+  const int id = observed_->store.Insert(z, entries(by_slopes.lower), entries(by_slopes.upper)).id;
   if (id < 0) return Learned::kOutsideDomain;
+  if (observed_->affine) observed_->affine->Add(id, z, entries(observed.lower), entries(observed.upper));
   learned_.push_back({id, {z.begin(), z.end()}, {next.begin(), next.end()}, by_clock.value_or(longer)});
   observed_->known = observed_->store.snapshot();
   if (!too_fast_ && !rates_.bounds().empty()) too_fast_ = rates_.FindViolation(rates_.Shown(z, next, longer, true), id);
-  violation_ = observed_->known.violation();
+  violation_ = observed_->violation();
   if (!violation_) violation_ = too_fast_;
   ForgetDropped();
   return Learned::kAdded;

@@ -8,6 +8,7 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 
 #include <optional>
 #include <span>
+#include <string>
 
 #include "forereach/certify/decision.h"
 #include "forereach/certify/learned.h"
@@ -16,6 +17,7 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 #include "forereach/certify/rates.h"
 #include "forereach/certify/safety.h"
 #include "forereach/reach/propagator.h"
+#include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/residual/observation_store.h"
 #include "forereach/safety/projection.h"
@@ -41,10 +43,14 @@ class Certifier final {
   [[nodiscard]] const Projection& projection() const { return safety_.placement().projection(); }
   /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Otherwise, with
   the second observation -1, the transition that contradicts a declared bound on a rate (rates.h): `difference` is the
-  least rate that it shows. Learned observations are numbered after those of the problem. */
+  least rate that it shows. In an affine row it is as AsViolation says (affine_rows_enclosure.h). Learned observations
+  are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
-  /** The one or two transitions of violation() as they were recorded, whatever is declared of them; of learned ones
-  `longer` is that of their clock. @pre violation() has a value. */
+  /** Why an affine row of the residual has no bound: the direction in which the observations do not vary. Empty if all
+  rows have one. */
+  [[nodiscard]] std::string Unexcited() const;
+  /** The transitions of violation(), one, two or, of an affine row, all that decide it, as they were recorded, whatever
+  is declared of them; of learned ones `longer` is that of their clock. @pre violation() has a value. */
   [[nodiscard]] Transitions Contradiction() const;
   [[nodiscard]] std::size_t num_observations() const { return observed_ ? observed_->known.size() : 0; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
@@ -55,7 +61,8 @@ class Certifier final {
   noise bound, and its disturbance within the declared one. @param longer by how much the step lasted longer or shorter
   than dt, at most, s. @param by_clock the same by its clock, where steps are declared to be on time and the clock does
   not count: for Contradiction alone. Do not call it while Certify runs. Cost: about a microsecond. If Compact has not
-  been called for 256 transitions, it also builds an index. @pre no ResidualEnclosure was supplied. The same holds for
+  been called for 256 transitions, it also builds an index; if it narrows an affine row, that is derived anew
+  (AffineSet::Derive). @pre no ResidualEnclosure was supplied. The same holds for
   num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next, double longer = 0,
                 std::optional<double> by_clock = {});
@@ -133,9 +140,16 @@ class Certifier final {
   };
   struct Observed {
     explicit Observed(const Problem& problem);
+    Observed(const Problem& problem, const Observations& observations);
 
     ObservationStore store;
     ObservationStore::Snapshot known;
+    std::optional<AffineRowsEnclosure> affine;  // over `known`, where rows are affine
+
+    [[nodiscard]] const ResidualEnclosure& residual() const {
+      return affine ? static_cast<const ResidualEnclosure&>(*affine) : known;
+    }
+    [[nodiscard]] std::optional<Violation> violation() const;
   };
 
   std::shared_ptr<const Problem> problem_;

@@ -43,6 +43,10 @@ std::string ExplainFalsified(const Decision& decision, const Problem& problem) {
     return "abstain F: in transition " + std::to_string(decision.first_observation) + " " + coordinate +
            " changes by at least " + RoundedDown(decision.margin) + " a second, " +
            KeyOfRate(problem, decision.coordinate) + " declares " + ToText(decision.threshold) + " at most";
+  if (problem.declaration.affine.Contains(decision.coordinate) && decision.first_observation >= 0)
+    return "abstain F: no affine residual of " + coordinate + " agrees with a few observations, " +
+           std::to_string(decision.first_observation) + " and " + std::to_string(decision.second_observation) +
+           " among them: one is " + RoundedDown(decision.margin) + " off what the others allow";
   if (decision.first_observation < 0)
     return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
            " agrees with all observations and the declaration";

@@ -1,5 +1,7 @@
 #include "forereach/residual/declaration.h"
 
+#include <algorithm>
+#include <functional>
 #include <stdexcept>
 #include <string>
 
@@ -22,6 +24,32 @@ void RequireBounds(const std::string& name, const Eigen::VectorXd& bounds, int s
     throw std::invalid_argument("declaration: " + name + " has " + std::to_string(bounds.size()) +
                                 " entries, must have " + std::to_string(size) + " or none");
   for (Eigen::Index k = 0; k < bounds.size(); ++k) RequireBound(name + " " + std::to_string(k), bounds[k]);
+}
+
+void Require(bool holds, const std::string& what) {
+  if (!holds) throw std::invalid_argument("affine: " + what);
+}
+
+bool AreIndices(const std::vector<int>& all, int size) {
+  return std::ranges::is_sorted(all, std::ranges::less_equal{}) &&
+         (all.empty() || (all.front() >= 0 && all.back() < size));
+}
+
+void ValidateAffine(const Declaration& declaration) {
+  const auto& [rows, columns] = declaration.affine;
+  Require(AreIndices(rows, static_cast<int>(declaration.lipschitz.rows())),
+          "rows are states, each once, in their order");
+  Require(AreIndices(columns, static_cast<int>(declaration.lipschitz.cols())),
+          "columns are states and inputs, each once, in their order");
+  Require(rows.empty() == columns.empty(), "rows and columns, or neither");
+  Require(columns.size() <= AffineRows::kMaxColumns,
+          std::to_string(columns.size()) + " columns, must be at most " + std::to_string(AffineRows::kMaxColumns));
+  for (const int k : rows)
+    Require(declaration.lipschitz.row(k).isZero(0),
+            "row " + std::to_string(k) + " is affine, lipschitz bounds it, too");
+  Require(rows.empty() || !declaration.HasErrorInZ(),
+          "state_error and input_error count by lipschitz, which does not bound these rows: leave the errors out, or "
+          "declare these rows by lipschitz");
 }
 
 }  // namespace
@@ -66,6 +94,7 @@ void Declaration::Validate(int num_states, int num_variables) const {
   ValidateDisturbance(num_states);
   RequireBounds("state_error", state_error, num_states);
   RequireBounds("input_error", input_error, num_variables - num_states);
+  ValidateAffine(*this);
 }
 
 void Declaration::ValidateDisturbance(int num_states) const { RequireBounds("disturbance", disturbance, num_states); }

@@ -3,6 +3,7 @@ L_kl |z_l - z'_l| for all z, z' in Z_cert, Eq. (regularity); the bound sigma on 
 bound on the disturbance w, which the paper does not have (docs/soundness.md, 1). */
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,6 +15,17 @@ bound on the disturbance w, which the paper does not have (docs/soundness.md, 1)
 namespace forereach {
 
 class GrowingDisturbance;
+
+/** Rows k of the residual that are affine: there are M_k and b_k, the same in every step, with
+    r_k(z) = sum over columns l of M_kl z_l + b_k   for all z in Z_cert.
+Nothing else is said of M and b: data bound them (affine_set.h). */
+struct AffineRows {
+  static constexpr std::size_t kMaxColumns = 12;
+
+  std::vector<int> rows = {}, columns = {};  ///< Ascending: states, and variables of z.
+
+  [[nodiscard]] bool Contains(Eigen::Index k) const { return std::ranges::binary_search(rows, static_cast<int>(k)); }
+};
 
 struct Declaration {
   Eigen::MatrixXd
@@ -29,6 +41,8 @@ struct Declaration {
   /** e is not that of the given transitions, which are exact, as those of a simulation are; of those that are learned
   it is (Transitions::num_learned). */
   bool given_are_exact = false;
+  /** Rows that are affine, in place of L: their rows of L are zero and not read, and e is zero. */
+  AffineRows affine = {};
   /** What w^ has beyond that in a step at z: |w_k| <= w^_k + |d_k(z)|. Null: nothing. */
   std::shared_ptr<const GrowingDisturbance> growing = {};
 
@@ -54,7 +68,7 @@ struct Declaration {
   [[nodiscard]] double ObservationError(Eigen::Index k) const;
 
   /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ or e has another number of entries
-  and not none, or an entry is negative or not finite; the message names the entry. */
+  and not none, an entry is negative or not finite, or `affine` is not as above; the message names the entry. */
   void Validate(int num_states, int num_variables) const;
   /** The same for w^ alone. */
   void ValidateDisturbance(int num_states) const;

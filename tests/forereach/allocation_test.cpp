@@ -96,6 +96,14 @@ TEST_F(Allocation, CertifyAllocatesNothing) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
+TEST_F(Allocation, CertifyAllocatesNothingForAffineRows) {
+  Problem problem = BicycleProblem();
+  problem.declaration.lipschitz.setZero();
+  problem.declaration.affine = {{2, 3}, {3}};
+  certifier_.emplace(std::make_shared<Problem>(problem));
+  EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
+}
+
 TEST_F(Allocation, CertifyAllocatesNothingForExpressions) {
   Problem problem = BicycleProblem();
   problem.declaration.growing = Growing(*problem.model, {"0", "0", "0", "1e-4*abs(v*(a - delta))", "0", "0"});

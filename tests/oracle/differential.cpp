@@ -17,6 +17,7 @@
 
 #include "command_line/command_line.h"
 #include "forereach/dynamics/expression.h"
+#include "tests/oracle/affine_problems.h"
 #include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/motions.h"
@@ -37,6 +38,7 @@ struct Options {
   bool texts = false;   ///< Random models as text.
   bool kinks = false;   ///< Random models as text with kinks in and at the ends of slices, many of them points.
   bool worlds = false;  ///< Bodies, bounds between samples and obstacles that move, instead of the problems above.
+  bool affine = false;  ///< Some rows of the residual are affine.
   bool limits = false;  ///< Limits on random functions, instead of the problems above.
 };
 
@@ -493,12 +495,15 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   const bool absurd = random.Coin(0.25) && !options.texts && !options.kinks;
   auto problem = options.kinks   ? AnyTextProblem(random, KinkedText(random))
                  : options.texts ? AnyTextProblem(random)
-                                 : AnyProblem(random, random.Coin(), random.Integer(1, 20));
+                                 : AnyProblem(random, random.Coin(), random.Integer(1, options.affine ? 60 : 20));
   if (!problem) return counts;
   problem->method = options.method;
   Vary(random, *problem);
   if (winds.Coin(0.4)) Disturb(winds, *problem);
-  if (records.Coin(0.3)) problem = Recorded(records, *problem);
+  if (options.affine)
+    static_cast<void>(MakeAffine(records, *problem));
+  else if (records.Coin(0.3))
+    problem = Recorded(records, *problem);
   if (absurd) Exaggerate(random, *problem);
   if (absurd && winds.Coin(0.2))
     problem->declaration.disturbance =
@@ -570,6 +575,7 @@ int main(int argc, char** argv) {
                   {.name = "--kinks",
                    .variable = &options.kinks,
                    .help = "Random models as text with kinks at the states, many of them points"},
+                  {.name = "--affine", .variable = &options.affine, .help = "Some rows of the residual are affine"},
                   {.name = "--worlds",
                    .variable = &options.worlds,
                    .help = "Bodies, bounds between samples and obstacles that move, just accepted and just met"},

@@ -49,6 +49,13 @@ TEST(ResidualEstimate, PredictsFromASingleObservation) {
   EXPECT_NEAR(PredictedHeading(estimate, 9), 0.25, 1e-12);
 }
 
+TEST(ResidualEstimate, OfAnAffineRowItIsTheFunctionThatFits) {
+  auto problem = std::make_shared<Problem>(*WithResidual({1, 2, 3}, [](double v) { return 0.2 + 0.01 * v; }));
+  problem->declaration.lipschitz.row(2).setZero();
+  problem->declaration.affine = {{2}, {3, 5}};
+  EXPECT_NEAR(PredictedHeading(ResidualEstimate(problem), 9), 0.29, 1e-12);
+}
+
 TEST(ResidualEstimate, AConstantCoordinateTakesTheMean) {
   auto problem = std::make_shared<Problem>(*WithResidual({1, 2}, [](double) { return 0.0; }));
   problem->transitions.x_next(0, 4) += 0.1;

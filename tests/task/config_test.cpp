@@ -67,6 +67,28 @@ TEST(LoadConfig, TellsAnErrorThatIsNotDeclaredFromZero) {
   EXPECT_THAT(errors, testing::ElementsAre(0, 0, 0.01, 0, 0.1, 0.2));
 }
 
+TEST(LoadConfig, ReadsWhichRowsAreAffine) {
+  const TaskFiles files;
+  const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+  const auto with = [&](const std::string& affine, const std::string& task = kTask) {
+    return files.Load(Replaced(task, line, line + "  affine: " + affine + "\n"));
+  };
+  const std::string only_vy = Replaced(kTask, "    vx: {vx: 0.1, vy: 0.05}\n", "");
+  const Config config = with("{rows: [vx], columns: [ay, vx]}", only_vy);
+  EXPECT_THAT(config.problem->declaration.affine.rows, testing::ElementsAre(2));
+  EXPECT_THAT(config.problem->declaration.affine.columns, testing::ElementsAre(2, 5));
+  EXPECT_NE(config.grounds.declaration, files.Load(only_vy).grounds.declaration);
+  EXPECT_NE(config.grounds.declaration, with("{rows: [vx], columns: [ay]}", only_vy).grounds.declaration);
+  const auto error = [&](const std::string& affine, const std::string& task) {
+    return Thrown<ConfigError>([&] { static_cast<void>(with(affine, task)); });
+  };
+  EXPECT_THAT(error("{rows: [vx], columns: [vx]}", kTask), HasSubstr("which declaration.lipschitz bounds, too"));
+  EXPECT_THAT(error("{rows: [vx], columns: [speed]}", only_vy), HasSubstr("speed"));
+  EXPECT_THAT(error("{rows: [vx], columns: []}", only_vy), HasSubstr("declaration.affine.columns"));
+  EXPECT_THAT(error("{rows: [vx], columns: [vx]}\n  state_error: {px: 0.1}", only_vy),
+              HasSubstr("with state_error or input_error"));
+}
+
 TEST(LoadConfig, LeavesOutTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
   const TaskFiles files;
   const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n", rows = kTransitions;

@@ -70,6 +70,36 @@ TEST_F(VerifyDecision, EveryShippedCertificateIsConfirmed) {
   }
 }
 
+// A weak motor and a drag, which five steps bound. Data by which the gain is another refute it.
+TEST_F(VerifyDecision, OfAnAffineRowIsConfirmed) {
+  const auto write_steps = [&](double gain) {
+    std::ostringstream rows;
+    rows.precision(17);
+    rows << "x,v,a,x_next,v_next\n";
+    for (const auto& [v, a] : {std::pair{1.0, 0.5}, {0.0, -1.0}, {2.0, 1.0}, {1.5, -0.5}, {0.5, 0.0}})
+      rows << "0," << v << "," << a << "," << 0.1 * v << "," << v + 0.1 * (gain * a - 0.1 * v) << "\n";
+    scratch_.Write("steps.csv", rows.str());
+  };
+  write_steps(0.8);
+  scratch_.Write("plan.csv", "a\n1\n1\n-1\n-0.5\n");
+  WriteTask(
+      "model: {states: {x: m, v: m/s}, inputs: {a: m/s^2}, parameters: {dt: 0.1}, next: {x: x + dt*v, v: v + dt*a}}\n"
+      "domain: {state: {lower: [-9, -9], upper: [9, 9]}, input: {lower: [-2], upper: [2]}}\n"
+      "declaration: {lipschitz: {}, affine: {rows: [v], columns: [v, a]}, noise_bound: [1e-9, 1e-6]}\n"
+      "transitions: steps.csv\n"
+      "task: {initial_set: {center: [0, 1], half_width: [0.01, 0.01]}, projection: [x], between: samples,\n"
+      "       obstacles: [{half_plane: {normal: [1], offset: 2}}]}\n");
+  const std::string task = " --config " + scratch_ / "task.yaml", plan = " --plan " + scratch_ / "plan.csv";
+  decision_ = Json::parse(Forereach("certify --json" + task + plan).text);
+  ASSERT_EQ(decision_["outcome"], "certified") << decision_;
+  EXPECT_EQ(Verify().code, 0);
+  EXPECT_THAT(Forereach("check" + task + plan + " 2>&1").text,
+              HasSubstr("the residual of v is affine in v, a, on the whole domain"));
+  EXPECT_THAT(Forereach("declare --from-data" + task + " 2>&1").text, HasSubstr("declaration.affine: slopes are"));
+  write_steps(0.7);
+  EXPECT_NE(Verify().code, 0);
+}
+
 // A robot that stands: `parts` of its body, the half-widths of its initial set, and an obstacle.
 class StandingDecision : public VerifyDecision {
  protected:

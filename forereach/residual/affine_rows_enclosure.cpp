@@ -1,0 +1,104 @@
+#include "forereach/residual/affine_rows_enclosure.h"
+
+#include <algorithm>
+#include <array>
+
+#include "forereach/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+std::span<const double> View(const Eigen::VectorXd& entries) { return {entries.data(), ToSize(entries.size())}; }
+
+}  // namespace
+
+AffineRowsEnclosure::AffineRowsEnclosure(const Declaration& declaration, const Observations& observations,
+                                         std::span<const double> domain_lower, std::span<const double> domain_upper,
+                                         const ResidualEnclosure& others)
+    : declaration_(declaration),
+      others_(others),
+      sets_(declaration.affine.rows.size(), AffineSet(declaration.affine.columns, domain_lower, domain_upper)) {
+  for (int i = 0; i < observations.size(); ++i) {
+    const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
+                          upper = observations.upper.row(i);
+    Insert(i, View(z), View(lower), View(upper));
+  }
+  for (std::size_t i = 0; i < sets_.size(); ++i) Derive(i);
+}
+
+void AffineRowsEnclosure::Insert(int id, std::span<const double> z, std::span<const double> lower,
+                                 std::span<const double> upper) {
+  for (std::size_t i = 0; i < sets_.size(); ++i) {
+    const int k = declaration_.affine.rows[i];
+    const double error = declaration_.ObservationError(k);
+    sets_[i].Add(id, z, SubDown(lower[ToSize(k)], error), AddUp(upper[ToSize(k)], error));
+  }
+}
+
+void AffineRowsEnclosure::Derive(std::size_t i) {
+  sets_[i].Derive();
+  if (contradiction_ || !sets_[i].contradiction()) return;
+  contradiction_ = sets_[i].contradiction();
+  contradiction_->coordinate = declaration_.affine.rows[i];
+}
+
+void AffineRowsEnclosure::Add(int id, std::span<const double> z, std::span<const double> lower,
+                              std::span<const double> upper) {
+  Insert(id, z, lower, upper);
+  for (std::size_t i = 0; i < sets_.size(); ++i)
+    if (sets_[i].MayNarrow()) Derive(i);
+}
+
+const AffineSet& AffineRowsEnclosure::set(int k) const {
+  const std::vector<int>& rows = declaration_.affine.rows;
+  return sets_[ToSize(static_cast<int>(std::ranges::lower_bound(rows, k) - rows.begin()))];
+}
+
+void AffineRowsEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
+  others_.Enclose(query, bounds);
+  const auto n = ToSize(query.slice.dim());
+  const std::vector<int>&rows = declaration_.affine.rows, &columns = declaration_.affine.columns;
+  bounds.has_slope = true;
+  for (std::size_t k = 0; k < n; ++k) std::fill_n(bounds.slope[k].begin(), n, 0.0);
+  std::array<double, AffineRows::kMaxColumns + 1> phi;
+  phi[columns.size()] = 1;
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    const auto l = ToSize(columns[j]);
+    phi[j] = l < n ? query.slice.center(columns[j]) : query.input[l - n];
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto k = ToSize(rows[i]);
+    const Interval middle = sets_[i].Enclose({phi.data(), columns.size() + 1});
+    double around = 0;
+    for (std::size_t j = 0; j < columns.size() && sets_[i].IsBounded(); ++j) {
+      if (ToSize(columns[j]) >= n) continue;
+      bounds.slope[k][ToSize(columns[j])] = sets_[i].slope(j);
+      around = AddUp(around, MulUp(sets_[i].reach(j), query.half_width[ToSize(columns[j])]));
+    }
+    bounds.lower[k] = SubDown(middle.lower, around);
+    bounds.upper[k] = AddUp(middle.upper, around);
+  }
+}
+
+Observations WithoutAffineRows(const Declaration& declaration, Observations observations) {
+  for (const int k : declaration.affine.rows) observations.lower.col(k).setZero(), observations.upper.col(k).setZero();
+  return observations;
+}
+
+std::optional<AffineContradiction> FindAffineContradiction(const Declaration& declaration,
+                                                           const Observations& observations) {
+  if (declaration.affine.rows.empty() || observations.size() == 0) return std::nullopt;
+  const Eigen::VectorXd lower = observations.z.colwise().minCoeff(), upper = observations.z.colwise().maxCoeff();
+  class Nothing final : public ResidualEnclosure {
+    void Enclose(const QuerySet&, ResidualBounds&) const noexcept override {}
+  } nothing;
+  return AffineRowsEnclosure(declaration, observations, View(lower), View(upper), nothing).contradiction();
+}
+
+Violation AsViolation(const AffineContradiction& contradiction) {
+  const std::vector<int>& rows = contradiction.rows;
+  const int latest = std::ranges::max(rows);
+  return {rows[0] == latest ? rows[1] : rows[0], latest, contradiction.coordinate, contradiction.gap, 0};
+}
+
+}  // namespace forereach

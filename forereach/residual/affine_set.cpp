@@ -1,0 +1,410 @@
+#include "forereach/residual/affine_set.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "forereach/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+// An observation counts as violated at a vertex from this part of its width on, or of the largest value.
+constexpr double kOfWidth = 0x1p-44, kOfValue = 0x1p-50;
+// Coefficients of an observation by others below this are taken for zero; rows nearer to a hyperplane, for in it.
+constexpr double kNoCoefficient = 0x1p-36, kFlat = 1e-9;
+// A search looks along a direction that is off by this share, so that no weight is zero: ties would let it go in
+// circles.
+constexpr double kPerturbed = 0x1p-40;
+constexpr int kMostSteps = 400, kMostStepsOfAQuery = 24;
+constexpr int kSamples = 32;  // of the domain, and of the data
+// Up to this many observations a query looks at all of them.
+constexpr std::size_t kFew = 128;
+
+}  // namespace
+
+// L U = P Phi of a basis, by elimination with the largest pivot of each column.
+class AffineSet::Factors {
+ public:
+  Factors(const AffineSet& set, const Basis& basis) : n_(set.size_) {
+    for (std::size_t i = 0; i < n_; ++i) {
+      std::ranges::copy(set.phi(basis[i]), a_[i].begin());
+      order_[i] = i;
+    }
+    for (std::size_t c = 0; c < n_ && is_regular_; ++c) Eliminate(c);
+  }
+
+  [[nodiscard]] bool is_regular() const { return is_regular_; }
+
+  /** x with Phi x = y. */
+  [[nodiscard]] Vector Solve(const Vector& y) const {
+    Vector x{};
+    for (std::size_t i = 0; i < n_; ++i) {
+      x[i] = y[order_[i]];
+      for (std::size_t j = 0; j < i; ++j) x[i] -= a_[i][j] * x[j];
+    }
+    for (std::size_t i = n_; i-- > 0;) {
+      for (std::size_t j = i + 1; j < n_; ++j) x[i] -= a_[i][j] * x[j];
+      x[i] /= a_[i][i];
+    }
+    return x;
+  }
+
+  /** w with Phi^T w = d: d as a combination of the rows. */
+  [[nodiscard]] Vector Combine(std::span<const double> d) const {
+    Vector x{}, w{};
+    for (std::size_t i = 0; i < n_; ++i) {
+      x[i] = d[i];
+      for (std::size_t j = 0; j < i; ++j) x[i] -= a_[j][i] * x[j];
+      x[i] /= a_[i][i];
+    }
+    for (std::size_t i = n_; i-- > 0;) {
+      for (std::size_t j = i + 1; j < n_; ++j) x[i] -= a_[j][i] * x[j];
+      w[order_[i]] = x[i];
+    }
+    return w;
+  }
+
+ private:
+  void Eliminate(std::size_t c) {
+    std::size_t pivot = c;
+    for (std::size_t i = c + 1; i < n_; ++i)
+      if (std::abs(a_[i][c]) > std::abs(a_[pivot][c])) pivot = i;
+    std::swap(a_[c], a_[pivot]);
+    std::swap(order_[c], order_[pivot]);
+    is_regular_ = std::abs(a_[c][c]) > 0 && std::abs(a_[c][c]) < kInfinity;
+    for (std::size_t i = c + 1; i < n_ && is_regular_; ++i) {
+      const double factor = a_[i][c] /= a_[c][c];
+      for (std::size_t j = c + 1; j < n_; ++j) a_[i][j] -= factor * a_[c][j];
+    }
+  }
+
+  std::size_t n_;
+  std::array<Vector, kMostUnknowns> a_;
+  std::array<std::size_t, kMostUnknowns> order_{};
+  bool is_regular_ = true;
+};
+
+namespace {
+
+double Dot(std::span<const double> a, const double* b) {
+  double sum = 0;
+  for (std::size_t l = 0; l < a.size(); ++l) sum += a[l] * b[l];
+  return sum;
+}
+
+}  // namespace
+
+AffineSet::AffineSet(std::vector<int> columns, std::span<const double> domain_lower,
+                     std::span<const double> domain_upper)
+    : columns_(std::move(columns)), size_(columns_.size() + 1) {
+  for (const int l : columns_) {
+    domain_lower_.push_back(domain_lower[ToSize(l)]);
+    domain_upper_.push_back(domain_upper[ToSize(l)]);
+  }
+}
+
+void AffineSet::Add(int id, std::span<const double> z, double lower, double upper) {
+  if (!(-kInfinity < lower && lower <= upper && upper < kInfinity)) return;
+  for (const int l : columns_) phi_.push_back(z[ToSize(l)]);
+  phi_.push_back(1);
+  lower_.push_back(lower);
+  upper_.push_back(upper);
+  all_.push_back(static_cast<int>(ids_.size()));
+  ids_.push_back(id);
+  size_of_values_ = std::max({size_of_values_, std::abs(lower), std::abs(upper)});
+}
+
+bool AffineSet::MayNarrow() const {
+  if (!is_bounded_) return true;
+  const auto last = ids_.size() - 1;
+  return std::ranges::any_of(vertices_, [&](const Vertex& vertex) {
+    const double value = Dot(phi(static_cast<int>(last)), vertex.theta.data());
+    return !(lower_[last] <= value && value <= upper_[last]);
+  });
+}
+
+// The rows that are farthest from the span of those before them, in columns that are scaled to the data's spread.
+bool AffineSet::ChooseBasis(Basis& basis) {
+  const std::size_t count = ids_.size(), q = size_;
+  unexcited_.clear();
+  std::vector<double> middle(q - 1), spread(q - 1), rows(count * q);
+  for (std::size_t l = 0; l + 1 < q; ++l) {
+    double least = kInfinity, most = -kInfinity;
+    for (std::size_t i = 0; i < count; ++i)
+      least = std::min(least, phi_[i * q + l]), most = std::max(most, phi_[i * q + l]);
+    middle[l] = least / 2 + most / 2;
+    spread[l] = most / 2 - least / 2;
+    if (!(spread[l] > kFlat * std::abs(middle[l])) || !(spread[l] > 0)) {
+      unexcited_.assign(q - 1, 0);
+      unexcited_[l] = 1;
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t l = 0; l + 1 < q; ++l) rows[i * q + l] = (phi_[i * q + l] - middle[l]) / spread[l];
+    rows[i * q + q - 1] = 1;
+  }
+  std::vector<Vector> units;
+  const auto remove = [&](double* row) {  // its part along the last unit vector
+    const double along = Dot({row, q}, units.back().data());
+    for (std::size_t l = 0; l < q; ++l) row[l] -= along * units.back()[l];
+  };
+  while (units.size() < q) {
+    std::size_t farthest = 0;
+    double most = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      double* const row = &rows[i * q];
+      if (!units.empty()) remove(row);
+      if (const double square = Dot({row, q}, row); square > most) most = square, farthest = i;
+    }
+    if (!(most > kFlat * kFlat)) break;
+    basis[units.size()] = static_cast<int>(farthest);
+    Vector unit{};
+    for (std::size_t l = 0; l < q; ++l) unit[l] = rows[farthest * q + l] / std::sqrt(most);
+    units.push_back(unit);
+  }
+  if (units.size() == q) return true;
+  // What is left of the axis that is farthest from the span is orthogonal to all rows.
+  Vector normal{};
+  double longest = 0;
+  for (std::size_t axis = 0; axis + 1 < q; ++axis) {
+    Vector left{};
+    left[axis] = 1;
+    for (const Vector& unit : units) {
+      const double along = Dot({left.data(), q}, unit.data());
+      for (std::size_t l = 0; l < q; ++l) left[l] -= along * unit[l];
+    }
+    if (const double square = Dot({left.data(), q}, left.data()); square > longest) longest = square, normal = left;
+  }
+  double largest = 0;
+  for (std::size_t l = 0; l + 1 < q; ++l) largest = std::max(largest, std::abs(normal[l] /= spread[l]));
+  for (std::size_t l = 0; l + 1 < q; ++l) unexcited_.push_back(largest > 0 ? normal[l] / largest : 0);
+  return false;
+}
+
+bool AffineSet::BoundParameters(const Basis& basis) {
+  const Factors factors(*this, basis);
+  if (!factors.is_regular()) return false;
+  const std::size_t q = size_;
+  std::array<Vector, kMostUnknowns> inverse;  // by columns
+  for (std::size_t j = 0; j < q; ++j) {
+    Vector unit{};
+    unit[j] = 1;
+    inverse[j] = factors.Solve(unit);
+  }
+  std::array<Vector, kMostUnknowns> error;  // |I - R Phi|
+  Vector most{};                            // |R| |y|
+  for (std::size_t l = 0; l < q; ++l) {
+    for (std::size_t m = 0; m < q; ++m) {
+      Interval entry(l == m ? 1.0 : 0.0);
+      for (std::size_t j = 0; j < q; ++j) entry = entry - Interval(inverse[j][l]) * Interval(phi(basis[j])[m]);
+      error[l][m] = entry.Magnitude();
+    }
+    most[l] = 0x1p-1000;
+    for (std::size_t j = 0; j < q; ++j) {
+      const auto i = ToSize(basis[j]);
+      most[l] = AddUp(most[l], MulUp(std::abs(inverse[j][l]), std::max(std::abs(lower_[i]), std::abs(upper_[i]))));
+    }
+  }
+  const auto next = [&](const Vector& v, std::size_t l) {
+    double sum = most[l];
+    for (std::size_t m = 0; m < q; ++m) sum = AddUp(sum, MulUp(error[l][m], v[m]));
+    return sum;
+  };
+  Vector v = most;
+  for (int round = 0; round < 4; ++round) {
+    Vector grown{};
+    for (std::size_t l = 0; l < q; ++l) grown[l] = 1.25 * next(v, l);
+    v = grown;
+  }
+  limit_ = v;
+  for (std::size_t l = 0; l < q; ++l)
+    if (!(next(v, l) <= v[l] && v[l] < kInfinity)) return false;
+  return true;
+}
+
+void AffineSet::Perturb(const Vector& weights, const Basis& basis, Vector& direction) const noexcept {
+  double largest = 0;
+  for (const double weight : weights) largest = std::max(largest, std::abs(weight));
+  for (std::size_t j = 0; j < size_; ++j) {
+    const double share = 0.5 + 0.5 * static_cast<double>(j + 1) / static_cast<double>(size_);
+    const double off = std::copysign(kPerturbed * share * largest, weights[j]);
+    for (std::size_t l = 0; l < size_; ++l) direction[l] += off * phi(basis[j])[l];
+  }
+}
+
+AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int> rows, const Basis& start,
+                                   int most_steps) const noexcept {
+  Climb found;
+  found.basis = start;
+  const std::size_t q = size_;
+  Vector perturbed = direction;
+  for (int step = 0;; ++step) {
+    const Factors factors(*this, found.basis);
+    if (!factors.is_regular()) break;
+    if (step == 0) Perturb(factors.Combine({direction.data(), q}), start, perturbed);
+    found.weights = factors.Combine({direction.data(), q});
+    const Vector weights = factors.Combine({perturbed.data(), q});
+    Vector y{};
+    for (std::size_t j = 0; j < q; ++j) {
+      const auto i = ToSize(found.basis[j]);
+      y[j] = weights[j] < 0 ? lower_[i] : upper_[i];
+    }
+    found.theta = factors.Solve(y);
+    if (step == most_steps) break;
+    int entering = -1;
+    double worst = 0, sign = 0;
+    for (const int row : rows) {
+      const auto i = ToSize(row);
+      const double value = Dot(phi(row), found.theta.data());
+      const double allowed = kOfWidth * (upper_[i] - lower_[i]) + kOfValue * size_of_values_;
+      const double above = value - upper_[i] - allowed, below = lower_[i] - value - allowed;
+      if (!(std::max(above, below) > worst)) continue;
+      if (std::find(found.basis.begin(), found.basis.begin() + std::ptrdiff_t(q), row) !=
+          found.basis.begin() + std::ptrdiff_t(q))
+        continue;
+      worst = std::max(above, below);
+      sign = above > below ? 1 : -1;
+      entering = row;
+    }
+    if (entering < 0) break;
+    const Vector alpha = factors.Combine(phi(entering));
+    std::size_t leaving = q;
+    double least = kInfinity;
+    for (std::size_t j = 0; j < q; ++j) {
+      const double towards = weights[j] < 0 ? -sign * alpha[j] : sign * alpha[j];
+      if (!(towards > kNoCoefficient)) continue;
+      const double ratio = std::abs(weights[j]) / towards;
+      if (ratio < least || (ratio == least && towards > std::abs(alpha[leaving]))) least = ratio, leaving = j;
+    }
+    if (leaving == q) {
+      found.contradicted = entering;
+      break;
+    }
+    found.basis[leaving] = entering;
+  }
+  return found;
+}
+
+double AffineSet::SupportUpper(const Vector& direction, const Climb& found) const noexcept {
+  double sum = 0;
+  std::array<Interval, kMostUnknowns> rest;
+  std::ranges::copy(direction, rest.begin());
+  for (std::size_t j = 0; j < size_; ++j) {
+    const auto i = ToSize(found.basis[j]);
+    const double weight = found.weights[j];
+    if (!(std::abs(weight) < kInfinity)) return kInfinity;
+    sum = AddUp(sum, MulUp(weight, weight < 0 ? lower_[i] : upper_[i]));
+    for (std::size_t l = 0; l < size_; ++l) rest[l] = rest[l] - Interval(weight) * Interval(phi(found.basis[j])[l]);
+  }
+  for (std::size_t l = 0; l < size_; ++l) sum = AddUp(sum, MulUp(rest[l].Magnitude(), limit_[l]));
+  return sum < kInfinity ? sum : kInfinity;
+}
+
+const AffineSet::Basis& AffineSet::Nearest(const Vector& direction) const noexcept {
+  const Vertex* nearest = vertices_.data();
+  double most = -kInfinity;
+  for (const Vertex& vertex : vertices_)
+    if (const double value = Dot({vertex.theta.data(), size_}, direction.data()); value > most)
+      most = value, nearest = &vertex;
+  return nearest->basis;
+}
+
+// Along every axis, then at points of the domain and of the data; each in both senses.
+std::vector<AffineSet::Vector> AffineSet::Directions() const {
+  std::vector<Vector> all;
+  for (std::size_t l = 0; l < size_; ++l) all.push_back({}), all.back()[l] = 1;
+  constexpr std::array kPrimes{2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37};
+  for (int i = 1; i <= kSamples; ++i) {
+    Vector point{};
+    for (std::size_t l = 0; l + 1 < size_; ++l) {
+      double digit = 1, share = 0;  // the van der Corput sequence to a prime base
+      for (int left = i; left > 0; left /= kPrimes[l]) share += (digit /= kPrimes[l]) * (left % kPrimes[l]);
+      point[l] = domain_lower_[l] + share * (domain_upper_[l] - domain_lower_[l]);
+    }
+    point[size_ - 1] = 1;
+    all.push_back(point);
+  }
+  const std::size_t stride = ids_.size() / ToSize(kSamples) + 1;
+  for (std::size_t i = 0; i < ids_.size(); i += stride) {
+    all.push_back({});
+    std::ranges::copy(phi(static_cast<int>(i)), all.back().begin());
+  }
+  for (std::size_t i = all.size(); i-- > 0;) {
+    Vector opposite = all[i];
+    for (double& entry : opposite) entry = -entry;
+    all.push_back(opposite);
+  }
+  return all;
+}
+
+bool AffineSet::Prove(const Climb& found) {
+  const auto i = ToSize(found.contradicted);
+  const Factors factors(*this, found.basis);
+  Climb up = found, down = found;
+  up.weights = factors.Combine(phi(found.contradicted));
+  Vector along{}, against{};
+  std::ranges::copy(phi(found.contradicted), along.begin());
+  for (std::size_t l = 0; l < size_; ++l) down.weights[l] = -up.weights[l], against[l] = -along[l];
+  const double gap =
+      std::max(SubDown(lower_[i], SupportUpper(along, up)), SubDown(-SupportUpper(against, down), upper_[i]));
+  if (!(gap > 0)) return false;
+  std::vector<std::size_t> order(size_);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, std::ranges::greater{}, [&](std::size_t j) { return std::abs(up.weights[j]); });
+  contradiction_ = AffineContradiction{-1, {ids_[i]}, gap};
+  for (const std::size_t j : order) contradiction_->rows.push_back(ids_[ToSize(found.basis[j])]);
+  return true;
+}
+
+void AffineSet::SetHull() {
+  for (std::size_t l = 0; l < size_; ++l) {
+    Vector axis{}, opposite{};
+    axis[l] = 1;
+    opposite[l] = -1;
+    hull_[l] = {-SupportUpper(opposite, Search(opposite, all_, Nearest(opposite), kMostSteps)),
+                SupportUpper(axis, Search(axis, all_, Nearest(axis), kMostSteps))};
+    const double size = hull_[l].Magnitude();
+    const double unit = std::ldexp(1.0, std::max(std::ilogb(size), -900) - 16);
+    slope_[l] = hull_[l].IsFinite() && size > 0 ? std::nearbyint(hull_[l].Middle() / unit) * unit : 0;
+    reach_[l] = hull_[l].DistanceUpper(slope_[l]);
+    limit_[l] = std::min(limit_[l], size);
+  }
+}
+
+void AffineSet::Derive() {
+  if (contradiction_) return;
+  is_bounded_ = false;
+  vertices_.clear();
+  active_.clear();
+  Basis basis{};
+  if (ids_.empty() || !ChooseBasis(basis) || !BoundParameters(basis)) return;
+  vertices_.push_back({basis, {}});
+  for (const Vector& direction : Directions()) {
+    const Climb found = Search(direction, all_, Nearest(direction), kMostSteps);
+    if (found.contradicted >= 0 && Prove(found)) return;
+    if (active_.empty()) vertices_.clear();  // where the first search began
+    const bool is_known = std::ranges::any_of(
+        vertices_, [&](const Vertex& known) { return known.basis == found.basis && known.theta == found.theta; });
+    if (is_known) continue;
+    vertices_.push_back({found.basis, found.theta});
+    active_.insert(active_.end(), found.basis.begin(), found.basis.begin() + std::ptrdiff_t(size_));
+  }
+  std::ranges::sort(active_);
+  active_.erase(std::ranges::unique(active_).begin(), active_.end());
+  if (all_.size() <= kFew) active_ = all_;
+  SetHull();
+  is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_),
+                            [](const Interval& range) { return range.IsFinite(); });
+}
+
+Interval AffineSet::Enclose(std::span<const double> at) const noexcept {
+  if (!is_bounded_) return Interval::Entire();
+  Vector along{}, against{};
+  for (std::size_t l = 0; l < size_; ++l) along[l] = at[l], against[l] = -at[l];
+  const double upper = SupportUpper(along, Search(along, active_, Nearest(along), kMostStepsOfAQuery));
+  return {-SupportUpper(against, Search(against, active_, Nearest(against), kMostStepsOfAQuery)), upper};
+}
+
+}  // namespace forereach

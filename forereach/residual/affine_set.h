@@ -1,0 +1,110 @@
+/** The parameters of an affine row of the residual that agree with all observations, Eq. (affine-consistency-set):
+
+    A = {theta = (M_k, b_k) : lower_i <= phi_i . theta <= upper_i for all i},   phi_i = (z_i in the columns, 1).
+
+A search may be clever and wrong; what it returns is bounded by a rule that is simple and right. Any q = columns + 1
+observations B and any weights w give, for every theta in A and every direction d,
+    d . theta = sum_j w_j phi_j . theta + rest . theta,   rest = d - sum_j w_j phi_j,
+which is at most sum_j w_j (upper_j, or lower_j if w_j < 0) + sum_l |rest_l| limit_l. The search is a dual simplex in
+plain arithmetic: it walks from one B to a better one until no other observation is violated at its vertex. The rule is
+evaluated outward, and `limit` bounds |theta| beforehand: with R about the inverse of the matrix Phi of some B,
+|theta| <= |R| |y| + |I - R Phi| |theta| for y = Phi theta, so any v with |R| |y| + |I - R Phi| v <= v, v > 0, is a
+bound. docs/soundness.md, 3.19. */
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "forereach/numerics/interval.h"
+#include "forereach/residual/declaration.h"
+
+namespace forereach {
+
+/** A proof that A is empty: what q observations predict of another one is at least `gap` away from what it shows. */
+struct AffineContradiction {
+  int coordinate;         ///< k
+  std::vector<int> rows;  ///< Of the observations, by their ids: first the one that is predicted, then the q others,
+                          ///< the most decisive first.
+  double gap;             ///< In the unit of state k, rounded down.
+};
+
+class AffineSet final {
+ public:
+  /** @param domain_lower, domain_upper d_z entries each: where queries are expected. */
+  AffineSet(std::vector<int> columns, std::span<const double> domain_lower, std::span<const double> domain_upper);
+
+  /** Adds an observation, without a Derive. An interval that is not finite says nothing. */
+  void Add(int id, std::span<const double> z, double lower, double upper);
+  /** Whether the last observation may narrow what Derive found: if not, Derive changes nothing that is bounded. */
+  [[nodiscard]] bool MayNarrow() const;
+  /** Derives contradiction, hull, slope and the vertices from which queries start. Cost: about 100 linear programs of
+  the observations and q unknowns; a millisecond for some hundred observations. */
+  void Derive();
+
+  /** The observations of a proof that A is empty, if Derive found one. */
+  [[nodiscard]] const std::optional<AffineContradiction>& contradiction() const { return contradiction_; }
+  /** Whether A is bounded. If not, no query has a finite bound. */
+  [[nodiscard]] bool IsBounded() const { return is_bounded_; }
+  /** If the locations of the observations lie in a hyperplane: its normal, an entry for each column, the largest 1 in
+  size. Otherwise none. */
+  [[nodiscard]] const std::vector<double>& unexcited() const { return unexcited_; }
+
+  /** The middle of the hull of M_kl over A, rounded to 2^-16 of its size so that who derives it again gets the same;
+  for column index j. Meaningful if IsBounded(). */
+  [[nodiscard]] double slope(std::size_t j) const { return slope_[j]; }
+  /** At least |M_kl - slope| over A. */
+  [[nodiscard]] double reach(std::size_t j) const { return reach_[j]; }
+  /** Encloses {M_kl : theta in A}; the last entry is that of b. */
+  [[nodiscard]] const Interval& hull(std::size_t j) const { return hull_[j]; }
+
+  /** Bounds on phi . theta over A, phi of q entries, the last one 1: infinite if A is not bounded. Allocates nothing.
+  Cost: O(v q) for the v vertices, and some O(a q) for a observations: all of a few, or those that decide at a
+  vertex. */
+  [[nodiscard]] Interval Enclose(std::span<const double> phi) const noexcept;
+
+ private:
+  static constexpr std::size_t kMostUnknowns = AffineRows::kMaxColumns + 1;
+  using Vector = std::array<double, kMostUnknowns>;
+  using Basis = std::array<int, kMostUnknowns>;
+  class Factors;
+  struct Vertex {
+    Basis basis;
+    Vector theta;
+  };
+  struct Climb {
+    Basis basis{};
+    Vector weights{}, theta{};
+    int contradicted = -1;  // no vertex of `basis` agrees with this one, as far as plain arithmetic tells
+  };
+
+  [[nodiscard]] std::span<const double> phi(int i) const { return {&phi_[static_cast<std::size_t>(i) * size_], size_}; }
+  [[nodiscard]] bool ChooseBasis(Basis& basis);
+  [[nodiscard]] bool BoundParameters(const Basis& basis);
+  void Perturb(const Vector& weights, const Basis& basis, Vector& direction) const noexcept;
+  [[nodiscard]] Climb Search(const Vector& direction, std::span<const int> rows, const Basis& start,
+                             int most_steps) const noexcept;
+  [[nodiscard]] double SupportUpper(const Vector& direction, const Climb& found) const noexcept;
+  [[nodiscard]] const Basis& Nearest(const Vector& direction) const noexcept;
+  [[nodiscard]] std::vector<Vector> Directions() const;
+  [[nodiscard]] bool Prove(const Climb& found);
+  void SetHull();
+
+  std::vector<int> columns_;
+  std::size_t size_;  // q
+  std::vector<double> domain_lower_, domain_upper_;
+  std::vector<double> phi_, lower_, upper_;  // q, one and one entries for each observation
+  std::vector<int> ids_;
+  std::vector<int> all_, active_;  // of the observations: all, and those that a query looks at
+  std::vector<Vertex> vertices_;
+  Vector limit_{}, slope_{}, reach_{};
+  std::array<Interval, kMostUnknowns> hull_{};
+  double size_of_values_ = 0;
+  bool is_bounded_ = false;
+  std::vector<double> unexcited_;
+  std::optional<AffineContradiction> contradiction_;
+};
+
+}  // namespace forereach

@@ -1,0 +1,160 @@
+// Affine rows of the residual in the certifier: a wrong gain, what bounds it, and what contradicts it.
+#include "tests/test.h"
+
+#include "forereach/certify/certifier.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "tests/worlds.h"
+
+namespace forereach::affine_rows_test {
+
+constexpr double kDt = 0.125, kDrag = 0.05, kGain = 0.8;
+
+// A robot with a drag and a weaker motor than its model, a point mass; `steps` transitions of it, each successor off by
+// up to `noise`. vx and vy are affine in vx, vy, ax and ay.
+Problem DraggedPointMass(int steps, double noise) {
+  Problem problem = WorldOf(MakePointMass(kDt), Within({20, 20, 6, 6}), Within({3, 3}));
+  problem.declaration.noise_bound = Vec({0, 0, noise, noise});
+  problem.declaration.affine = {{2, 3}, {2, 3, 4, 5}};
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> any(-1, 1);
+  problem.transitions = {Eigen::MatrixXd(steps, 6), Eigen::MatrixXd(steps, 4)};
+  for (int i = 0; i < steps; ++i) {
+    Eigen::VectorXd z(6), next(4);
+    for (int l = 0; l < 6; ++l) z[l] = any(engine) * (l < 4 ? 2 : 1);
+    problem.model->Evaluate({z.data(), 6}, {next.data(), 4});
+    for (int k = 2; k < 4; ++k) next[k] += kDt * ((kGain - 1) * z[k + 2] - kDrag * z[k]) + 0.99 * noise * any(engine);
+    problem.transitions.z.row(i) = z;
+    problem.transitions.x_next.row(i) = next;
+  }
+  return problem;
+}
+
+std::shared_ptr<const Problem> Shared(Problem problem) { return std::make_shared<const Problem>(std::move(problem)); }
+
+class AffineResidual : public testing::Test {
+ protected:
+  Decision Certify(const Certifier& certifier) {
+    return certifier.Certify({controls_.data(), 2, 16, 2}, start_, {}, tube_);
+  }
+
+  const Eigen::MatrixXd controls_ = Eigen::Vector2d(1, -0.5).replicate(1, 16);
+  const Zonotope start_ = Zonotope::FromBox(Eigen::Vector4d(0, 0, 1, 0), Eigen::Vector4d::Constant(0.01));
+  Tube tube_;
+};
+
+// With eight steps. L is the least that is true: the slopes of the residual.
+TEST_F(AffineResidual, GivesAHandfulOfStepsATubeThatNoLipschitzBoundCan) {
+  const Problem affine = DraggedPointMass(8, 1e-4);
+  Problem lipschitz = affine;
+  lipschitz.declaration.affine = {};
+  for (int k = 2; k < 4; ++k) {
+    lipschitz.declaration.lipschitz(k, k) = kDt * kDrag;
+    lipschitz.declaration.lipschitz(k, k + 2) = kDt * (1 - kGain);
+  }
+  ASSERT_EQ(Certify(Certifier(Shared(affine))).outcome, Outcome::kCertified);
+  const double narrow = tube_.half_width(16)[0];
+  ASSERT_EQ(Certify(Certifier(Shared(lipschitz))).outcome, Outcome::kCertified);
+  const double wide = tube_.half_width(16)[0];
+  RecordProperty("affine", std::to_string(narrow));
+  RecordProperty("lipschitz", std::to_string(wide));
+  std::cout << "half-width of x after 2 s: affine " << narrow << " m, Lipschitz " << wide << " m\n";
+  EXPECT_LT(narrow, 0.25 * wide);
+  EXPECT_GT(narrow, 0.01);
+}
+
+TEST_F(AffineResidual, WithoutNoiseIsKnownAfterOneStepMoreThanItHasColumns) {
+  ASSERT_EQ(Certify(Certifier(Shared(DraggedPointMass(5, 0)))).outcome, Outcome::kCertified);
+  double x = 0, v = 1, y = 0, w = 0;
+  for (int t = 0; t < 16; ++t) {
+    x += kDt * v + kDt * kDt / 2;
+    y += kDt * w - kDt * kDt / 4;
+    v += kDt * (kGain - kDrag * v);
+    w += kDt * (-0.5 * kGain - kDrag * w);
+    EXPECT_NEAR(tube_.slice(t + 1).center(2), v, 1e-4);
+    EXPECT_NEAR(tube_.half_width(t + 1)[2], 0.01 * std::pow(1 - kDt * kDrag, t + 1), 1e-5);
+    EXPECT_TRUE(tube_.hull(t + 1, 0).Contains(x));
+  }
+}
+
+// Abstains, and says which direction the data do not excite.
+TEST_F(AffineResidual, HasNoBoundWhereTheDataVaryTogether) {
+  Problem problem = DraggedPointMass(12, 1e-4);
+  const Certifier enough(Shared(problem));
+  EXPECT_EQ(enough.Unexcited(), "");
+  problem.transitions.x_next.col(2) -= kDt * problem.transitions.z.col(4);
+  problem.transitions.z.col(4) = 0.5 * problem.transitions.z.col(2);
+  problem.transitions.x_next.col(2) += kDt * problem.transitions.z.col(4);
+  problem.declaration.noise_bound.setConstant(1);
+  const Certifier certifier(Shared(problem));
+  ASSERT_FALSE(certifier.violation());
+  EXPECT_THAT(certifier.Unexcited(), AnyOf(HasSubstr("0.5 vx - ax is the same in all observations"),
+                                           HasSubstr("-0.5 vx + ax is the same in all observations")));
+  const Decision decision = Certify(certifier);
+  EXPECT_EQ(decision.outcome, Outcome::kDomain);
+  EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
+  EXPECT_EQ(decision.step, 0);
+}
+
+TEST_F(AffineResidual, IsFalsifiedByAFewObservationsThatAreNamed) {
+  Problem problem = DraggedPointMass(40, 1e-4);
+  problem.transitions.x_next(17, 3) += 0.05;
+  const Certifier certifier(Shared(problem));
+  ASSERT_TRUE(certifier.violation());
+  EXPECT_EQ(certifier.violation()->coordinate, 3);
+  EXPECT_GT(certifier.violation()->difference, certifier.violation()->bound);
+  EXPECT_EQ(Certify(certifier).outcome, Outcome::kFalsified);
+  // They are six, for five unknowns, and contradict the declaration without the others.
+  const Transitions rows = certifier.Contradiction();
+  EXPECT_EQ(rows.size(), 6);
+  Problem few = problem;
+  few.transitions = rows;
+  EXPECT_TRUE(Certifier(Shared(few)).violation());
+}
+
+TEST_F(AffineResidual, IsNarrowedAndContradictedByWhatIsLearned) {
+  const Problem all = DraggedPointMass(60, 1e-3);
+  Problem first = all;
+  first.transitions = {all.transitions.z.topRows(6), all.transitions.x_next.topRows(6)};
+  Certifier certifier(Shared(first));
+  ASSERT_EQ(Certify(certifier).outcome, Outcome::kCertified);
+  double width = tube_.half_width(16)[0];
+  const double before = width;
+  for (int i = 6; i < 60; ++i) {
+    const Eigen::VectorXd z = all.transitions.z.row(i), next = all.transitions.x_next.row(i);
+    ASSERT_EQ(certifier.Learn({z.data(), 6}, {next.data(), 4}), Learned::kAdded);
+    ASSERT_EQ(Certify(certifier).outcome, Outcome::kCertified);
+    EXPECT_LE(tube_.half_width(16)[0], width * 1.01) << "more observations bound no less";
+    width = tube_.half_width(16)[0];
+  }
+  EXPECT_LT(width, 0.5 * before);
+  ASSERT_EQ(Certify(Certifier(Shared(all))).outcome, Outcome::kCertified);
+  EXPECT_NEAR(tube_.half_width(16)[0], width, 1e-3 * width);
+  const Eigen::VectorXd z = all.transitions.z.row(3);
+  Eigen::VectorXd next = all.transitions.x_next.row(3);
+  next[2] += 0.1;
+  ASSERT_EQ(certifier.Learn({z.data(), 6}, {next.data(), 4}), Learned::kAdded);
+  ASSERT_TRUE(certifier.violation());
+  const Transitions rows = certifier.Contradiction();
+  EXPECT_EQ(rows.size(), 6);
+  EXPECT_EQ(rows.x_next(5, 2), next[2]);
+  EXPECT_GT(rows.num_learned, 0);
+}
+
+TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
+  const auto refusal = [](const std::function<void(Problem&)>& change) {
+    Problem problem = DraggedPointMass(8, 1e-4);
+    change(problem);
+    return Thrown<std::invalid_argument>([&] { const Certifier certifier(Shared(problem)); });
+  };
+  EXPECT_EQ(refusal([](Problem&) {}), "");
+  EXPECT_THAT(refusal([](Problem& p) { p.declaration.lipschitz(2, 2) = 0.1; }), HasSubstr("affine: row 2"));
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.declaration.state_error = Vec({0, 0, 1e-3, 0});
+              }),
+              HasSubstr("state_error and input_error count by lipschitz"));
+  EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.rows = {3, 2}; }), HasSubstr("in their order"));
+  EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {2, 6}; }), HasSubstr("columns are"));
+  EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {}; }), HasSubstr("or neither"));
+}
+
+}  // namespace forereach::affine_rows_test

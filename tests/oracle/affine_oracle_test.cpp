@@ -1,0 +1,259 @@
+// Affine rows of the residual: bounds, hulls and contradictions against rationals, and rollouts of residuals that the
+// data admit, in 256 bits, against tubes.
+#include "tests/test.h"
+
+#include "forereach/certify/certifier.h"
+#include "forereach/residual/affine_rows_enclosure.h"
+#include "tests/oracle/admissible.h"
+#include "tests/oracle/affine_problems.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/traced_random.h"
+
+namespace forereach::affine_oracle_test {
+
+using exact::Rational;
+
+// N observations of q unknowns: lower_i <= phi_i . theta <= upper_i.
+struct Data {
+  std::vector<std::vector<double>> phi;
+  std::vector<double> lower, upper;
+
+  AffineSet Set() const {
+    const std::size_t columns = phi[0].size() - 1;
+    std::vector<int> all;
+    for (std::size_t l = 0; l < columns; ++l) all.push_back(static_cast<int>(l));
+    const std::vector<double> least(columns, -2), most(columns, 2);
+    AffineSet set(all, least, most);
+    for (std::size_t i = 0; i < phi.size(); ++i) set.Add(static_cast<int>(i), phi[i], lower[i], upper[i]);
+    set.Derive();
+    return set;
+  }
+};
+
+Data AnyData(Random& random, int columns, int count, double width, double off) {
+  Data data;
+  std::vector<double> theta;
+  for (int l = 0; l <= columns; ++l) theta.push_back(random.Uniform(-1, 1));
+  const double spread = random.Coin(0.2) ? 1e-3 : 1;
+  for (int i = 0; i < count; ++i) {
+    std::vector<double>& phi = data.phi.emplace_back();
+    double value = theta.back();
+    for (int l = 0; l < columns; ++l) {
+      phi.push_back(random.Coin(0.2) ? random.Integer(-2, 2) : 1 + spread * random.Uniform(-1, 1));
+      value += theta[static_cast<std::size_t>(l)] * phi.back();
+    }
+    phi.push_back(1);
+    value += off * random.Uniform(-1, 1);
+    data.lower.push_back(value - width * random.Uniform(0.5, 1));
+    data.upper.push_back(value + width * random.Uniform(0.5, 1));
+  }
+  return data;
+}
+
+// x with A x = b, by elimination; nothing if A is singular.
+std::optional<std::vector<Rational>> Solved(std::vector<std::vector<Rational>> a, std::vector<Rational> b) {
+  const std::size_t n = b.size();
+  for (std::size_t c = 0; c < n; ++c) {
+    std::size_t p = c;
+    while (p < n && a[p][c] == 0) ++p;
+    if (p == n) return std::nullopt;
+    std::swap(a[c], a[p]);
+    std::swap(b[c], b[p]);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == c || a[i][c] == 0) continue;
+      const Rational factor = a[i][c] / a[c][c];
+      for (std::size_t j = c; j < n; ++j) a[i][j] -= factor * a[c][j];
+      b[i] -= factor * b[c];
+    }
+  }
+  for (std::size_t c = 0; c < n; ++c) b[c] /= a[c][c];
+  return b;
+}
+
+// Every vertex of the set: q of the observations at one of their ends, and the others within theirs.
+std::vector<std::vector<Rational>> Vertices(const Data& data) {
+  const std::size_t q = data.phi[0].size(), count = data.phi.size();
+  std::vector<std::vector<Rational>> vertices;
+  std::vector<int> chosen(count);
+  std::fill_n(chosen.rbegin(), q, 1);
+  do {
+    std::vector<std::size_t> rows;
+    for (std::size_t i = 0; i < count; ++i)
+      if (chosen[i]) rows.push_back(i);
+    for (unsigned ends = 0; ends < 1U << q; ++ends) {
+      std::vector<std::vector<Rational>> a;
+      std::vector<Rational> b;
+      for (std::size_t j = 0; j < q; ++j) {
+        a.emplace_back(data.phi[rows[j]].begin(), data.phi[rows[j]].end());
+        b.emplace_back(ends >> j & 1 ? data.upper[rows[j]] : data.lower[rows[j]]);
+      }
+      const auto theta = Solved(a, b);
+      if (!theta) break;
+      bool is_in = true;
+      for (std::size_t i = 0; i < count && is_in; ++i) {
+        Rational value = 0;
+        for (std::size_t l = 0; l < q; ++l) value += Rational(data.phi[i][l]) * (*theta)[l];
+        is_in = Rational(data.lower[i]) <= value && value <= Rational(data.upper[i]);
+      }
+      if (is_in) vertices.push_back(*theta);
+    }
+  } while (std::ranges::next_permutation(chosen).found);
+  return vertices;
+}
+
+TEST(AffineSetOracle, BoundsEveryParameterThatTheDataAdmitAndLittleMore) {
+  TracedRandom random(861);
+  int bounded = 0;
+  for (int trial = 0; trial < 150; ++trial) {
+    const int columns = random.Integer(1, 2), count = random.Integer(columns + 1, 7);
+    const Data data = AnyData(random, columns, count, std::ldexp(1, -random.Integer(0, 30)), 0);
+    const AffineSet set = data.Set();
+    const auto vertices = Vertices(data);
+    ASSERT_FALSE(set.contradiction());
+    if (!set.IsBounded()) continue;
+    ASSERT_FALSE(vertices.empty());
+    ++bounded;
+    for (int query = 0; query < 6; ++query) {
+      std::vector<double> phi = random.Coin() ? data.phi[static_cast<std::size_t>(random.Below(count))]
+                                              : std::vector<double>(static_cast<std::size_t>(columns) + 1, 1.0);
+      for (int l = 0; l < columns && random.Coin(0.7); ++l) phi[static_cast<std::size_t>(l)] = random.Uniform(-2, 2);
+      std::optional<Rational> least, most;
+      for (const auto& theta : vertices) {
+        Rational value = 0;
+        for (std::size_t l = 0; l < phi.size(); ++l) value += Rational(phi[l]) * theta[l];
+        if (!least || value < *least) least = value;
+        if (!most || value > *most) most = value;
+      }
+      const Interval bounds = set.Enclose(phi);
+      ASSERT_TRUE(exact::AtMost(*most, bounds.upper)) << "no tolerance";
+      ASSERT_TRUE(exact::AtLeast(*least, bounds.lower)) << "no tolerance";
+      const double width = Rational(*most - *least).get_d();
+      EXPECT_LE(bounds.upper - bounds.lower, width * (1 + 1e-5) + 1e-9) << "tight";
+    }
+    for (std::size_t l = 0; l < vertices[0].size(); ++l)
+      for (const auto& theta : vertices) {
+        ASSERT_TRUE(exact::Inside(theta[l], set.hull(l)));
+        const Rational away = theta[l] - Rational(set.slope(l));
+        ASSERT_TRUE(exact::AtMost(away, set.reach(l)) && exact::AtMost(-away, set.reach(l)));
+      }
+  }
+  EXPECT_GT(bounded, 80);
+}
+
+// A contradiction that is reported holds in rationals, and one that is not tiny is reported.
+TEST(AffineSetOracle, AContradictionIsAProofAndNoneIsMissed) {
+  TracedRandom random(862);
+  int found = 0, agreed = 0;
+  for (int trial = 0; trial < 150; ++trial) {
+    const int columns = random.Integer(1, 2), count = random.Integer(columns + 2, 7);
+    const double width = std::ldexp(1, -random.Integer(2, 20));
+    const Data data = AnyData(random, columns, count, width, random.Coin() ? 2 * width : 0);
+    const AffineSet set = data.Set();
+    const bool is_empty = Vertices(data).empty();
+    if (!set.contradiction()) {
+      agreed += !is_empty;
+      EXPECT_FALSE(is_empty && set.IsBounded());
+      continue;
+    }
+    ++found;
+    ASSERT_TRUE(is_empty);
+    // Those that it names are enough.
+    Data few;
+    for (const int i : set.contradiction()->rows) {
+      few.phi.push_back(data.phi[static_cast<std::size_t>(i)]);
+      few.lower.push_back(data.lower[static_cast<std::size_t>(i)]);
+      few.upper.push_back(data.upper[static_cast<std::size_t>(i)]);
+    }
+    EXPECT_EQ(few.phi.size(), few.phi[0].size() + 1);
+    EXPECT_TRUE(Vertices(few).empty());
+    // The first is `gap` away from what the others admit, and not more.
+    const double gap = set.contradiction()->gap;
+    for (const double share : {1 + 1e-3, 1 - 1e-3}) {
+      Data moved = few;
+      moved.lower[0] -= share * gap;
+      moved.upper[0] += share * gap;
+      EXPECT_EQ(Vertices(moved).empty(), share < 1);
+    }
+  }
+  EXPECT_GT(found, 20);
+  EXPECT_GT(agreed, 20);
+}
+
+bool IsIn(Random& random, const Zonotope& slice, const std::vector<Real>& x) {
+  const int n = slice.dim();
+  for (int trial = 0; trial < 2 * n + 20; ++trial) {
+    Eigen::VectorXd d = random.Vector(n);
+    if (trial < 2 * n) d = (trial % 2 ? -1 : 1) * Eigen::VectorXd::Unit(n, trial / 2);
+    Real along;
+    for (int k = 0; k < n; ++k) along += Real(d[k]) * x[static_cast<std::size_t>(k)];
+    if (!(along <= Real(slice.SupportUpper(View(d))))) return false;
+  }
+  return true;
+}
+
+// The model, whether steps are disturbed, and whether they may be off their times.
+class AffineContainment : public testing::TestWithParam<std::tuple<bool, bool, bool>> {};
+
+TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
+  const auto [bicycle, disturbed, shifted] = GetParam();
+  TracedRandom random(871 + bicycle);
+  int certified = 0, slices = 0, learned = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    const auto problem = AnyProblem(random, bicycle, random.Integer(6, 24));
+    if (disturbed) Disturb(random, *problem);
+    const AffineTruth truth = MakeAffine(random, *problem);
+    if (shifted) Shift(random, *problem);
+    // All transitions at once, or the last ones learned.
+    const auto known = std::make_shared<Problem>(*problem);
+    const int first = random.Coin() ? problem->transitions.size() : problem->transitions.size() / 2;
+    known->transitions = {problem->transitions.z.topRows(first), problem->transitions.x_next.topRows(first)};
+    Certifier certifier(known);
+    for (int i = first; i < problem->transitions.size(); ++i, ++learned) {
+      const Eigen::VectorXd z = problem->transitions.z.row(i), next = problem->transitions.x_next.row(i);
+      ASSERT_EQ(certifier.Learn(View(z), View(next)), Learned::kAdded);
+    }
+    ASSERT_FALSE(certifier.violation()) << "the data come from a residual that satisfies the declaration";
+    Tube tube;
+    for (int q = 0; q < 2; ++q) {
+      const Query query = AnyQuery(random, *problem);
+      const Decision decision = certifier.Certify(query.plan(), query.initial_set, query.obstacles, tube);
+      ASSERT_NE(decision.outcome, Outcome::kFalsified);
+      certified += decision.outcome == Outcome::kCertified;
+      for (int rollout = 0; rollout < 4; ++rollout) {
+        const AdmissibleResidual others(random, *problem);
+        const AffineRows& affine = problem->declaration.affine;
+        AffineTruth parameters;
+        for (std::size_t i = 0; i < truth.size(); ++i)
+          parameters.push_back(AdmissibleParameters(random, *problem, affine.rows[i], truth[i]));
+        std::vector<Real> x = PointOf(random, query.initial_set);
+        Real offset;
+        for (int t = 0; t < tube.length(); ++t) {
+          std::vector<Real> z = x, unexpected = AnyDisturbance(random, *problem), most;
+          for (const double u : query.plan().input(t)) z.emplace_back(u);
+          for (std::size_t k = 0; k < x.size(); ++k) {
+            const auto row = std::ranges::find(affine.rows, static_cast<int>(k)) - affine.rows.begin();
+            const bool is_affine = row < std::ssize(affine.rows);
+            const Real r = is_affine ? AffineValue(parameters[static_cast<std::size_t>(row)], affine.columns, z)
+                                     : others(z, static_cast<int>(k));
+            unexpected[k] += r;
+            most.push_back(abs(r) + Real(problem->declaration.DisturbanceBound(static_cast<Eigen::Index>(k))));
+          }
+          const Real before = offset;
+          offset = AnyOffset(random, *problem);
+          x = LongerSuccessor(random, *problem, z, unexpected, most, offset - before);
+          ++slices;
+          ASSERT_TRUE(IsIn(random, tube.slice(t + 1), x)) << "slice " << t + 1;
+        }
+      }
+    }
+  }
+  EXPECT_GT(certified, shifted ? 8 : 20);
+  EXPECT_GT(slices, 500);
+  EXPECT_GT(learned, 50);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, AffineContainment,
+                         testing::Combine(testing::Bool(), testing::Bool(), testing::Bool()));
+
+}  // namespace forereach::affine_oracle_test

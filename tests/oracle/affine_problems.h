@@ -1,0 +1,96 @@
+/** Random problems some of whose residual's rows are affine, and affine residuals that their data admit. */
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "forereach/certify/problem.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/problems.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+
+/** (M_k, b_k) by rows, in the columns of the declaration. */
+using AffineTruth = std::vector<std::vector<Real>>;
+
+inline Real AffineValue(const std::vector<Real>& theta, const std::vector<int>& columns, const std::vector<Real>& z) {
+  Real sum = theta.back();
+  for (std::size_t j = 0; j < columns.size(); ++j) sum += theta[j] * z[static_cast<std::size_t>(columns[j])];
+  return sum;
+}
+
+/** The bounds that observation i sets on row k's residual, one unit in the last place of the successor included. */
+inline std::pair<Real, Real> AffineBounds(const Problem& problem, int i, int k) {
+  const bool bicycle = problem.model->num_states() == 6;
+  const Eigen::VectorXd z = problem.transitions.z.row(i);
+  const double next = problem.transitions.x_next(i, k);
+  const Real seen = Real(next) - NominalSuccessor(bicycle, {z.begin(), z.end()})[static_cast<std::size_t>(k)];
+  const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) + Real(problem.declaration.noise_bound[k]) +
+                     Real(problem.declaration.DisturbanceBound(k));
+  return {seen - slack, seen + slack};
+}
+
+/** Declares one to three rows of AnyProblem's affine, in one to four columns, and replaces what the transitions show of
+them by an affine residual with noise. */
+inline AffineTruth MakeAffine(Random& random, Problem& problem) {
+  const bool bicycle = problem.model->num_states() == 6;
+  const int n = problem.model->num_states(), variables = problem.model->num_variables();
+  AffineRows& affine = problem.declaration.affine;
+  const auto choose = [&](int most, int of) {
+    std::vector<int> all(static_cast<std::size_t>(of));
+    for (int l = 0; l < of; ++l) all[static_cast<std::size_t>(l)] = l;
+    while (static_cast<int>(all.size()) > most) all.erase(all.begin() + random.Below(static_cast<int>(all.size())));
+    return all;
+  };
+  affine.rows = choose(random.Integer(1, 3), n);
+  affine.columns = choose(random.Integer(1, 4), variables);
+  AffineTruth truth;
+  for (const int k : affine.rows) {
+    problem.declaration.lipschitz.row(k).setZero();
+    problem.declaration.noise_bound[k] =
+        random.Coin(0.2) ? 0 : std::ldexp(random.Uniform(0.5, 1), -random.Integer(8, 14));
+    std::vector<Real>& theta = truth.emplace_back();
+    for (std::size_t j = 0; j <= affine.columns.size(); ++j) theta.emplace_back(random.Uniform(-0.02, 0.02));
+    for (int i = 0; i < problem.transitions.size(); ++i) {
+      const Eigen::VectorXd z = problem.transitions.z.row(i);
+      const std::vector<Real> at(z.begin(), z.end());
+      const double noise =
+          problem.declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1));
+      problem.transitions.x_next(i, k) = (NominalSuccessor(bicycle, at)[static_cast<std::size_t>(k)] +
+                                          AffineValue(theta, affine.columns, at) + Real(noise))
+                                             .ToDouble();
+    }
+  }
+  return truth;
+}
+
+/** Parameters of row k on the edge of what the data admit, or within it: from the truth some steps along random
+directions, each as far as the data allow. */
+inline std::vector<Real> AdmissibleParameters(Random& random, const Problem& problem, int k, std::vector<Real> theta) {
+  const std::vector<int>& columns = problem.declaration.affine.columns;
+  std::vector<std::pair<Real, Real>> bounds;
+  for (int i = 0; i < problem.transitions.size(); ++i) bounds.push_back(AffineBounds(problem, i, k));
+  for (int steps = random.Integer(0, 8); steps > 0; --steps) {
+    std::vector<Real> direction;
+    for (std::size_t j = 0; j < theta.size(); ++j) direction.emplace_back(random.Uniform(-1, 1));
+    std::optional<Real> farthest;
+    for (int i = 0; i < problem.transitions.size(); ++i) {
+      const Eigen::VectorXd row = problem.transitions.z.row(i);
+      const std::vector<Real> z(row.begin(), row.end());
+      const Real value = AffineValue(theta, columns, z), along = AffineValue(direction, columns, z);
+      const auto& [lower, upper] = bounds[static_cast<std::size_t>(i)];
+      if (along > Real(0) && (!farthest || (upper - value) / along < *farthest)) farthest = (upper - value) / along;
+      if (along < Real(0) && (!farthest || (lower - value) / along < *farthest)) farthest = (lower - value) / along;
+    }
+    if (!farthest) break;
+    const Real step =
+        *farthest * (steps == 1 && random.Coin(0.3) ? Real(random.Uniform(0, 1)) : Real(1.0) - Real(0x1p-60));
+    for (std::size_t j = 0; j < theta.size(); ++j) theta[j] += step * direction[j];
+  }
+  return theta;
+}
+
+}  // namespace forereach

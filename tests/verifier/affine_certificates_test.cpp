@@ -1,0 +1,53 @@
+// Certificates of residuals with affine rows: what the certifier claims, the verifier derives by its own programs.
+#include "tests/test.h"
+
+#include "forereach/certify/certifier.h"
+#include "tests/oracle/affine_problems.h"
+#include "tests/oracle/traced_random.h"
+#include "tests/verifier/record.h"
+
+namespace forereach::verifier::affine_certificates_test {
+
+TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
+  TracedRandom random(95);
+  int certified = 0, changed = 0;
+  for (int trial = 0; trial < 80; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    const bool bicycle = random.Coin();
+    const auto problem = AnyProblem(random, bicycle, random.Integer(6, 40));
+    if (random.Coin()) Disturb(random, *problem);
+    static_cast<void>(MakeAffine(random, *problem));
+    if (random.Coin(0.3)) Shift(random, *problem);
+    const Certifier certifier(problem);
+    ASSERT_FALSE(certifier.violation());
+    const Verifier judge(problem, MethodOf(*problem));
+    forereach::Tube tube;
+    const Query query = AnyQuery(random, *problem);
+    const Decision decision = certifier.Certify(query.plan(), query.initial_set, query.obstacles, tube);
+    if (decision.outcome != Outcome::kCertified) continue;
+    ++certified;
+    const Certificate certificate = CertificateOf(certifier, query.plan(), query.initial_set, query.obstacles, tube);
+    const Verdict verdict = judge.Verify(certificate);
+    EXPECT_EQ(verdict.status, Status::kConfirmed)
+        << "step " << verdict.failure.step << ": " << verdict.failure.what << ": " << verdict.failure.found << ", "
+        << verdict.failure.bound << ", excess " << verdict.failure.excess;
+    Certificate narrower = certificate;
+    const int row = problem->declaration.affine.rows[0];
+    RecordedSlice& last = narrower.slices.back();
+    last.upper[row] -= 0.25 * (last.upper[row] - last.lower[row]);
+    EXPECT_NE(judge.Verify(narrower).status, Status::kConfirmed);
+    // Data by which the row's residual is another one, or none.
+    const auto other = std::make_shared<Problem>(*problem);
+    other->transitions.x_next.col(row).array() += 0.1;
+    EXPECT_NE(Verifier(other, MethodOf(*other)).Verify(certificate).status, Status::kConfirmed);
+    other->transitions.x_next = problem->transitions.x_next;
+    other->transitions.x_next(0, row) += 0.3;
+    const Verdict of_other = Verifier(other, MethodOf(*other)).Verify(certificate);
+    EXPECT_NE(of_other.status, Status::kConfirmed);
+    changed += of_other.failure.what.find("agrees with all data") != std::string::npos;
+  }
+  EXPECT_GT(certified, 15);
+  EXPECT_GT(changed, 5);
+}
+
+}  // namespace forereach::verifier::affine_certificates_test
