@@ -9,6 +9,7 @@ r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. So 
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -144,6 +145,8 @@ class TubeMaker final {
   /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
   included; e_ik is what the declared errors of the record may add. [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;
+  /** The same in doubles, to the nearest; [state][observation]. */
+  std::vector<std::vector<std::pair<double, double>>> rough_residuals_;
   /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
   /** The rounding error that the remainder may have added to the certifier's columns. */
