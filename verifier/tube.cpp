@@ -390,7 +390,6 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
       power_(PowerOf(*problem.model)),
       remainder_rounding_(RemainderRounding()) {
   std::ranges::copy(problem.declaration.input_error, input_error_.begin());
-  const Transitions& data = problem.transitions;
   disturbance_.resize(ToSize(problem.model->num_states()));
   rough_residuals_.resize(disturbance_.size());
   std::ranges::copy(problem.declaration.disturbance, disturbance_.begin());
@@ -401,33 +400,38 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
         unexpected_[k] += Real(problem.declaration.lipschitz(static_cast<Eigen::Index>(k),
                                                              static_cast<Eigen::Index>(unexpected_.size() + l))) *
                           input_error_[l];
-  for (int i = 0; i < data.size(); ++i) {
+  Learn();
+}
+
+void TubeMaker::Learn() {
+  const Transitions& data = problem_.transitions;
+  for (int i = static_cast<int>(residuals_.size()); i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
-    const std::vector<Real> nominal = equations.Value(z);
-    std::vector<Real> errors(ToSize(problem.model->num_states()));
-    if (!problem.declaration.given_are_exact || data.IsLearned(i)) errors = RecordErrors(z);
+    const std::vector<Real> nominal = equations_.Value(z);
+    std::vector<Real> errors(ToSize(problem_.model->num_states()));
+    if (!problem_.declaration.given_are_exact || data.IsLearned(i)) errors = RecordErrors(z);
     AddDuration(i, z, nominal, errors);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
-      const bool is_angle = std::ranges::count(problem.model->angles(), k) > 0;
+      const bool is_angle = std::ranges::count(problem_.model->angles(), k) > 0;
       const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
       const Real& error = errors[ToSize(k)];
-      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)] + error;
+      const Real allowed = Real(unit) + Real(problem_.declaration.noise_bound[k]) + disturbance_[ToSize(k)] + error;
       const Real difference = Real(x_next) - nominal[ToSize(k)];
       const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
       const Bounds bounds{observed - allowed, observed + allowed};
       // A transition for which the model has no value says nothing.
       row.push_back(!observed.IsFinite() || !error.IsFinite() ? Bounds{-kNone, kNone}
-                    : equations.IsExact()                     ? bounds
+                    : equations_.IsExact()                    ? bounds
                                                               : Outermost(bounds));
       rough_residuals_[ToSize(k)].emplace_back(row.back().lower.ToDouble(), row.back().upper.ToDouble());
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k)
       sizes.push_back(abs(Real(data.x_next(i, k))) + errors[ToSize(k)]);
-    for (const auto& [output, variable, value] : equations.First(z))
+    for (const auto& [output, variable, value] : equations_.First(z))
       sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
   }
 }

@@ -98,11 +98,14 @@ struct TubeOptions {
   const std::vector<RecordedSet>* follow = nullptr;
 };
 
-/** Computes tubes for any number of plans of one problem, with the precision at its construction. Immutable. */
+/** Computes tubes for any number of plans of one problem, with the precision at its construction. */
 class TubeMaker final {
  public:
   /** @param problem, equations must outlive this object. @pre a Certifier accepts the problem. */
   TubeMaker(const Problem& problem, const Equations& equations, Method method);
+
+  /** Follows the problem, which has got more transitions behind those that it had. */
+  void Learn();
 
   /** The tube of a plan. @param controls m-by-T, one column for each step. */
   [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls,
