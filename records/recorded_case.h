@@ -42,11 +42,10 @@ struct RecordedCase {
   return made;
 }
 
-/** A candidate, what was decided on it, and what that rests on. */
+/** A candidate, and what was decided on it. */
 struct JudgedCandidate {
   candidate_plan_t candidate;
   Schedule schedule;
-  Basis basis;
   int outcome, step;      ///< decision_t's.
   std::size_t place = 0;  ///< Of the judge's own record of it.
 
@@ -71,31 +70,32 @@ class CaseJudge {
   void Put(const RecordedCase& recorded, std::size_t place) {
     constexpr std::size_t kBatch = 256;
     if (waiting_.size() == kBatch) CertifyAgain();
-    waiting_.push_back({*recorded.candidate, ScheduleOf(*recorded.candidate, recorded.basis.task->gate), recorded.basis,
-                        recorded.decision.outcome, recorded.decision.step, place});
+    waiting_.push_back({{*recorded.candidate, ScheduleOf(*recorded.candidate, recorded.basis.task->gate),
+                         recorded.decision.outcome, recorded.decision.step, place},
+                        recorded.basis});
   }
 
   /** Certifies all that wait. Call it at the end, too. */
   void CertifyAgain() {
     std::vector<std::string> refusals(waiting_.size());
-    ForEachInParallel(
-        waiting_.size(), static_cast<unsigned>(followers_.size()), [&](std::size_t i, std::size_t thread) {
-          const JudgedCandidate& judged = waiting_[i];
-          const Plan plan = PlanOf(judged.candidate, judged.schedule);
-          const Certifier& certifier = followers_[thread].At(judged.basis);
-          Zonotope initial_set;
-          try {
-            initial_set = InitialSetOf(judged.candidate);
-            certifier.Require(plan, initial_set, *judged.basis.obstacles);
-          } catch (const std::invalid_argument& error) {
-            refusals[i] = error.what();
-            return;
-          }
-          Tube& tube = followers_[thread].tube;
-          Look(judged, certifier, certifier.Certify(plan, initial_set, *judged.basis.obstacles, tube), tube);
-        });
+    ForEachInParallel(waiting_.size(), static_cast<unsigned>(followers_.size()),
+                      [&](std::size_t i, std::size_t thread) {
+                        const auto& [judged, basis] = waiting_[i];
+                        const Plan plan = PlanOf(judged.candidate, judged.schedule);
+                        const Certifier& certifier = followers_[thread].At(basis);
+                        Zonotope initial_set;
+                        try {
+                          initial_set = InitialSetOf(judged.candidate);
+                          certifier.Require(plan, initial_set, *basis.obstacles);
+                        } catch (const std::invalid_argument& error) {
+                          refusals[i] = error.what();
+                          return;
+                        }
+                        Tube& tube = followers_[thread].tube;
+                        Look(judged, certifier, certifier.Certify(plan, initial_set, *basis.obstacles, tube), tube);
+                      });
     for (std::size_t i = 0; i < waiting_.size(); ++i)
-      refusals[i].empty() ? Take(waiting_[i]) : Refuse(waiting_[i], refusals[i]);
+      refusals[i].empty() ? Take(waiting_[i].judged) : Refuse(waiting_[i].judged, refusals[i]);
     waiting_.clear();
   }
 
@@ -129,8 +129,13 @@ class CaseJudge {
     }
   };
 
-  std::vector<Follower> followers_;       // one for each thread
-  std::vector<JudgedCandidate> waiting_;  // not yet certified again
+  struct Waiting {
+    JudgedCandidate judged;
+    Basis basis;
+  };
+
+  std::vector<Follower> followers_;  // one for each thread
+  std::vector<Waiting> waiting_;     // not yet certified again
 };
 
 }  // namespace forereach
