@@ -86,6 +86,7 @@ class CertificateReader final : public TimelineUser {
     if (is_new) order_.push_back(plan);
     if (decision.outcome == decision_t::CERTIFIED) {
       // A candidate that comes twice is rejected the second time: the certificate is the first's.
+      if (decided.certified.size() == kMostDecisions) decided.certified.pop_front();
       decided.certified.push_back(decision);
       if (rows_) in_log_.insert_or_assign(ToHex(plan), GroundsOf(decision));
       for (Open& open : open_)
@@ -173,6 +174,8 @@ class CertificateReader final : public TimelineUser {
   static constexpr std::size_t kPlans = 4096;        // more than a robot can have at one time
   static constexpr std::size_t kMostDecided = 4096;  // until then a repeated candidate is known
 
+  static constexpr std::size_t kMostDecisions = 16;  // on one plan
+
   // A certificate whose decisions may still come.
   struct Open {
     RecordedCertificate recorded;
@@ -183,7 +186,7 @@ class CertificateReader final : public TimelineUser {
   };
   // On one plan.
   struct Decided {
-    std::vector<decision_t> certified;  // those that say CERTIFIED
+    std::deque<decision_t> certified;  // the last ones that say CERTIFIED
     bool has_plan = false;
   };
   using Plan = std::pair<Digest, candidate_plan_t>;  // by its certificate
