@@ -22,6 +22,7 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
+#include "forereach/residual/recorded_successor.h"
 #include "forereach/safety/clearance.h"
 #include "planner_bridge/motion.h"
 #include "planner_bridge/reference.h"
@@ -345,10 +346,7 @@ class Examination final {
                      : problem_.declaration.BoxAround(recorded);
   }
   [[nodiscard]] Interval TrueNext(Eigen::Index i, int l) const {
-    const double next = problem_.transitions.x_next(i, l), unit = NextUp(std::abs(next)) - std::abs(next);
-    const double error =
-        AddUp(AddUp(IsExact() ? 0 : problem_.declaration.VariableError(l), unit), problem_.declaration.noise_bound[l]);
-    return {SubDown(next, error), AddUp(next, error)};
+    return EncloseSuccessor(problem_.declaration, l, problem_.transitions.x_next(i, l), model_.IsAngle(l), IsExact());
   }
 
   [[nodiscard]] int FileLine(Eigen::Index i) const { return static_cast<int>(rows_[ToSize(i)]) + 2; }

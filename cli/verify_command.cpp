@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <iostream>
 #include <iterator>
+#include <map>
+#include <memory>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -8,7 +10,6 @@
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/offline.h"
-#include "command_line/progress.h"
 #include "forereach/certify/certifier.h"
 #include "forereach/numerics/parallel.h"
 #include "lcmtypes/printable.h"
@@ -66,21 +67,6 @@ void RequireAcceptable(const Config& config) {
   }
 }
 
-// @param shows_progress of its certificates; otherwise it is one of many.
-std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned threads, bool shows_progress) {
-  const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
-  std::vector<Verdict> verdicts(file.certificates.size());
-  Progress progress("certificates verified", verdicts.size());
-  ForEachInParallel(verdicts.size(), threads, [&](std::size_t i, std::size_t) {
-    const RecordedCertificate& recorded = file.certificates[i];
-    verdicts[i] = recorded.missing.empty() ? verifier.Verify(recorded.certificate)
-                                           : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
-    if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed) verdicts[i].status = Status::kRefuted;
-    if (shows_progress) progress.Advance();
-  });
-  return verdicts;
-}
-
 std::string DescribeVerdict(const RecordedCertificate& recorded, const Verdict& verdict) {
   std::ostringstream text;
   text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << Printable(recorded.name) << "\n";
@@ -115,30 +101,81 @@ nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdic
   return document;
 }
 
-// @param robot whose certificates they are, if there are several runs.
-Verified Sum(const std::vector<CertificateFile>& files, unsigned threads, const std::string* robot) {
-  Verified sum;
-  for (const CertificateFile& file : files) {
-    RequireAcceptable(file.config);
-    const std::vector<Verdict> verdicts = VerifyAll(file, threads, robot == nullptr);
-    for (std::size_t i = 0; i < verdicts.size(); ++i) {
-      const RecordedCertificate& recorded = file.certificates[i];
-      const Status status = verdicts[i].status;
-      ++sum.certificates;
-      ++(status == Status::kConfirmed ? sum.confirmed : status == Status::kRefuted ? sum.refuted : sum.cannot_verify);
-      sum.remainders += recorded.certificate.is_remainder;
-      if (status == Status::kConfirmed) continue;
-      sum.failures.push_back(ToJson(recorded, verdicts[i]));
-      if (robot) sum.failures.back()["robot"] = *robot;
-      if (sum.first_failure.empty())
-        sum.first_failure = (robot ? *robot + ": " : "") + DescribeVerdict(recorded, verdicts[i]);
-    }
-    sum.not_certificates += static_cast<std::int64_t>(file.not_certificates);
-    sum.of_decision |= file.of_decision;
-    sum.passed_over += file.passed_over;
+// Verifies certificates on several threads. What it says does not depend on their number.
+class Verifying final : public CertificateUser {
+ public:
+  // @param robot whose certificates they are, if there are several runs.
+  Verifying(unsigned threads, const std::string* robot) : threads_(threads), robot_(robot) {}
+
+  void OnCertificate(RecordedCertificate&& recorded, const Basis* basis) override {
+    constexpr std::size_t kBatch = 256;
+    verifier::Verifier* const verifier = recorded.missing.empty() ? &VerifierOf(*basis) : nullptr;
+    waiting_.push_back({std::move(recorded), verifier, {}});
+    if (waiting_.size() == kBatch) VerifyWaiting();
   }
-  return sum;
-}
+
+  Verified Finish(const BesideCertificates& beside) {
+    VerifyWaiting();
+    sum_.not_certificates = beside.not_certificates;
+    sum_.passed_over = beside.passed_over;
+    return std::move(sum_);
+  }
+
+ private:
+  struct Waiting {
+    RecordedCertificate recorded;
+    verifier::Verifier* verifier;  // null if it cannot be derived
+    Verdict verdict;
+  };
+  // What is verified of one problem.
+  struct Known {
+    std::shared_ptr<const Problem> problem;
+    std::unique_ptr<verifier::Verifier> verifier;
+    std::shared_ptr<const std::vector<ExecutedTransition>> learned;
+  };
+
+  verifier::Verifier& VerifierOf(const Basis& basis) {
+    Known& known = known_[basis.task->problem.get()];
+    if (!known.verifier) {
+      RequireAcceptable(*basis.task);
+      known.problem = basis.task->problem;
+      known.verifier = std::make_unique<verifier::Verifier>(known.problem, verifier::MethodOf(*known.problem));
+    }
+    known.learned = basis.learned;
+    return *known.verifier;
+  }
+
+  void VerifyWaiting() {
+    for (const auto& [of, known] : known_)
+      if (known.learned) known.verifier->Learn(WithLearned(known.problem, *known.learned)->transitions);
+    ForEachInParallel(waiting_.size(), threads_, [&](std::size_t i, std::size_t) {
+      auto& [recorded, verifier, verdict] = waiting_[i];
+      verdict = verifier ? verifier->Verify(recorded.certificate)
+                         : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
+      if (!recorded.mismatches.empty() && verdict.status == Status::kConfirmed) verdict.status = Status::kRefuted;
+    });
+    for (const Waiting& each : waiting_) Add(each.recorded, each.verdict);
+    waiting_.clear();
+  }
+
+  void Add(const RecordedCertificate& recorded, const Verdict& verdict) {
+    const Status status = verdict.status;
+    ++sum_.certificates;
+    ++(status == Status::kConfirmed ? sum_.confirmed : status == Status::kRefuted ? sum_.refuted : sum_.cannot_verify);
+    sum_.remainders += recorded.certificate.is_remainder;
+    if (status == Status::kConfirmed) return;
+    sum_.failures.push_back(ToJson(recorded, verdict));
+    if (robot_) sum_.failures.back()["robot"] = *robot_;
+    if (sum_.first_failure.empty())
+      sum_.first_failure = (robot_ ? *robot_ + ": " : "") + DescribeVerdict(recorded, verdict);
+  }
+
+  const unsigned threads_;
+  const std::string* const robot_;
+  std::map<const Problem*, Known> known_;
+  std::vector<Waiting> waiting_;
+  Verified sum_;
+};
 
 void PrintJson(const Verified& sum, const NamedRuns& named) {
   nlohmann::json document{{"certificates", sum.certificates},
@@ -183,7 +220,7 @@ void PrintForPeople(const Verified& sum, const NamedRuns& named) {
   std::cout << DescribePassedOver(sum.passed_over) << "\n" << Extent(sum) << std::endl;
 }
 
-// Not logs: a decision, or what ReadAllCertificates refuses.
+// Not logs: a decision, or what ReadCertificates refuses.
 bool IsDocument(const std::vector<std::string>& files) {
   if (files.size() != 1) return false;
   const FileKind kind = KindOf(files[0]);
@@ -194,13 +231,17 @@ int Verify(const VerifyArguments& options) {
   NamedRuns named;
   Verified sum;
   if (IsDocument(options.files)) {
-    sum = Sum(ReadAllCertificates(options.files[0], options.config, options.key), options.each_run.jobs, nullptr);
+    Verifying verifying(options.each_run.jobs, nullptr);
+    sum = verifying.Finish(ReadCertificates(options.files[0], options.config, options.key, verifying));
+    sum.of_decision = true;
   } else {
     named = RunsNamedBy(options.files, options.each_run.jobs);
     const RunTasks tasks(options.config, options.key, named.is_many);
     const auto finished = ResultsOf(options.each_run, "verify", options.config, options.key);
     const auto verify = [&](const RunLogs& run, RunWork& work) {
-      return Sum(ReadRun(run, tasks, named.is_many), work.threads, named.is_many ? &run.robot : nullptr);
+      Verifying verifying(work.threads, named.is_many ? &run.robot : nullptr);
+      return verifying.Finish(
+          ReadRun(run, tasks, named.is_many, verifying, [&](std::int64_t bytes) { work.Read(bytes); }));
     };
     for (auto& each : ForEachRun<Verified>(named, options.each_run, "verified", finished.get(), verify))
       if (each) sum += std::move(*each);

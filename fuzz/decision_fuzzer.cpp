@@ -13,27 +13,28 @@ bool IsSmall(const verifier::Certificate& certificate) {
   return certificate.controls.cols() <= 4;
 }
 
-// @return whether there was a certificate to derive.
-bool Verify(const CertificateFile& file) {
-  bool any = false;
-  const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
-  for (const RecordedCertificate& recorded : file.certificates) {
-    if (!IsSmall(recorded.certificate)) continue;
+class Verifying final : public CertificateUser {
+ public:
+  void OnCertificate(RecordedCertificate&& recorded, const Basis* basis) override {
+    if (!basis || !IsSmall(recorded.certificate)) return;
     any = true;
-    const verifier::Verdict verdict = verifier.Verify(recorded.certificate);
+    const Problem& problem = *basis->task->problem;
+    const verifier::Verdict verdict =
+        verifier::Verifier(basis->task->problem, verifier::MethodOf(problem)).Verify(recorded.certificate);
     Require((verdict.status == verifier::Status::kConfirmed) == verdict.failure.what.empty());
     Require(verdict.status != verifier::Status::kConfirmed || recorded.certificate.controls.allFinite());
   }
-  return any;
-}
+
+  bool any = false;  // whether there was a certificate to derive
+};
 
 }  // namespace
 
 bool Try(Bytes data) {
   static MemoryFile file;
   const std::string& path = file.Write(data);
-  bool verified = false;
-  return IsTaken([&] { verified = Verify(ReadAllCertificates(path, FOREREACH_FUZZ_TASK).front()); }) && verified;
+  Verifying verifying;
+  return IsTaken([&] { ReadCertificates(path, FOREREACH_FUZZ_TASK, {}, verifying); }) && verifying.any;
 }
 
 }  // namespace forereach

@@ -11,10 +11,7 @@ namespace forereach {
 namespace {
 
 // What the model's next state is off in each step, by the line that the step starts in. @param size of the states.
-std::map<int, Eigen::VectorXd> ErrorsOf(const LogTable& table, const Problem& problem, const ImportOptions& options,
-                                        Eigen::VectorXd& size) {
-  const NominalModel& model = *problem.model;
-  const ImportedLog log = Import(table, problem, options);
+std::map<int, Eigen::VectorXd> ErrorsOf(const ImportedLog& log, const NominalModel& model, Eigen::VectorXd& size) {
   std::map<int, Eigen::VectorXd> errors;
   for (Eigen::Index i = 0; i < log.transitions.size(); ++i) {
     const Eigen::VectorXd z = log.transitions.z.row(i);
@@ -90,11 +87,11 @@ CommandDelay EstimateDelay(std::span<const LogTable* const> tables, const Proble
     const LogTable table = Beginning(*whole, rows);
     std::vector<std::map<int, Eigen::VectorXd>> by_delay;
     double rows_in_step = 1;
-    for (options.command_delay = 0; options.command_delay <= most; ++options.command_delay)
-      by_delay.push_back(ErrorsOf(table, problem, options, size));
-    options.command_delay = 0;
-    if (const double spacing = Import(table, problem, options).typical_spacing; spacing > 0)
-      rows_in_step = std::max(options.period / spacing, 1.0);
+    for (options.command_delay = 0; options.command_delay <= most; ++options.command_delay) {
+      const ImportedLog log = Import(table, problem, options);
+      by_delay.push_back(ErrorsOf(log, *problem.model, size));
+      if (log.typical_spacing > 0) rows_in_step = std::max(options.period / log.typical_spacing, 1.0);
+    }
     const int found = AddSpreads(by_delay, sums);
     count += found;
     delay.steps += found / rows_in_step;

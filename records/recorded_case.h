@@ -9,8 +9,8 @@
 
 #include "certifier/gate/candidate_message.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certify/batch.h"
 #include "forereach/certify/certifier.h"
+#include "forereach/numerics/parallel.h"
 #include "records/timeline.h"
 
 namespace forereach {
@@ -54,8 +54,9 @@ struct JudgedCandidate {
   }
 };
 
-/** Certifies the candidates of cases again, each with what the certifier knew. Cases of one task in the order of the
-log need one certifier, which learns from case to case; another order is as good, and slower. */
+/** Certifies the candidates of cases again, each with what the certifier knew, on several threads. What is found does
+not depend on their number. In the order of the log each thread's certifier learns from case to case; another order is
+as good, and slower. */
 class CaseJudge {
  public:
   virtual ~CaseJudge() = default;
@@ -63,39 +64,38 @@ class CaseJudge {
   CaseJudge& operator=(const CaseJudge&) = delete;
 
  protected:
-  explicit CaseJudge(unsigned threads) : threads_(threads) {}
+  explicit CaseJudge(unsigned threads) : followers_(threads) {}
 
-  /** Certifies a candidate again, together with others under the same obstacles and observations. @pre nothing is
-  missing. */
+  /** Certifies a candidate again, together with others. @pre nothing is missing. */
   void Put(const RecordedCase& recorded, std::size_t place) {
     constexpr std::size_t kBatch = 256;
-    if (waiting_.size() >= kBatch || !IsUnderSame(recorded.basis)) CertifyAgain();
-    basis_ = recorded.basis;
-    waiting_.push_back({*recorded.candidate, ScheduleOf(*recorded.candidate, basis_.task->gate),
-                        recorded.decision.outcome, recorded.decision.step, place});
+    if (waiting_.size() == kBatch) CertifyAgain();
+    waiting_.push_back({{*recorded.candidate, ScheduleOf(*recorded.candidate, recorded.basis.task->gate),
+                         recorded.decision.outcome, recorded.decision.step, place},
+                        recorded.basis});
   }
 
   /** Certifies all that wait. Call it at the end, too. */
   void CertifyAgain() {
-    if (waiting_.empty()) return;
-    Follow(basis_);
-    std::vector<Plan> plans;
-    std::vector<Zonotope> initial_sets;
-    std::vector<const JudgedCandidate*> asked;
-    for (const JudgedCandidate& judged : waiting_) try {
-        const Zonotope initial_set = InitialSetOf(judged.candidate);
-        const Plan plan = PlanOf(judged.candidate, judged.schedule);
-        certifier_->Require(plan, initial_set, *basis_.obstacles);
-        plans.push_back(plan);
-        initial_sets.push_back(initial_set);
-        asked.push_back(&judged);
-      } catch (const std::invalid_argument& error) {
-        Refuse(judged, error.what());
-      }
-    static_cast<void>(CertifyAll(
-        *certifier_, plans, initial_sets, *basis_.obstacles, threads_,
-        [&](std::size_t i, const Decision& again, const Tube& tube) { Look(*asked[i], *certifier_, again, tube); }));
-    for (const JudgedCandidate* judged : asked) Take(*judged);
+    std::vector<std::string> refusals(waiting_.size());
+    ForEachInParallel(waiting_.size(), static_cast<unsigned>(followers_.size()),
+                      [&](std::size_t i, std::size_t thread) {
+                        const auto& [judged, basis] = waiting_[i];
+                        const Plan plan = PlanOf(judged.candidate, judged.schedule);
+                        const Certifier& certifier = followers_[thread].At(basis);
+                        Zonotope initial_set;
+                        try {
+                          initial_set = InitialSetOf(judged.candidate);
+                          certifier.Require(plan, initial_set, *basis.obstacles);
+                        } catch (const std::invalid_argument& error) {
+                          refusals[i] = error.what();
+                          return;
+                        }
+                        Tube& tube = followers_[thread].tube;
+                        Look(judged, certifier, certifier.Certify(plan, initial_set, *basis.obstacles, tube), tube);
+                      });
+    for (std::size_t i = 0; i < waiting_.size(); ++i)
+      refusals[i].empty() ? Take(waiting_[i].judged) : Refuse(waiting_[i].judged, refusals[i]);
     waiting_.clear();
   }
 
@@ -105,33 +105,37 @@ class CaseJudge {
   /** It was certified again. Called by several threads, each with another candidate. */
   virtual void Look(const JudgedCandidate& judged, const Certifier& certifier, const Decision& again,
                     const Tube& tube) = 0;
-  /** The same, after all calls of Look for these candidates, in their order. */
+  /** The same, after the calls of Look for it and others. Take and Refuse are called in the order of Put. */
   virtual void Take(const JudgedCandidate& judged) = 0;
 
-  [[nodiscard]] bool IsUnderSame(const Basis& basis) const {
-    return basis.task == basis_.task && basis.obstacles == basis_.obstacles && basis.learned == basis_.learned &&
-           basis.learned_begin == basis_.learned_begin && basis.learned_end == basis_.learned_end;
-  }
+  // A thread's certifier, as the one of the log was.
+  struct Follower {
+    Tube tube;
+    std::unique_ptr<Certifier> certifier;
+    const Config* task = nullptr;      // the certifier's
+    std::size_t begin = 0, known = 0;  // what it has learned
 
-  // The certifier as the one of the log was under this basis.
-  void Follow(const Basis& basis) {
-    if (!certifier_ || task_ != basis.task || begin_ != basis.learned_begin || known_ > basis.learned_end) {
-      certifier_ = std::make_unique<Certifier>(basis.task->problem);
-      task_ = basis.task;
-      begin_ = known_ = basis.learned_begin;
+    const Certifier& At(const Basis& basis) {
+      if (!certifier || task != basis.task || begin != basis.learned_begin || known > basis.learned_end) {
+        certifier = std::make_unique<Certifier>(basis.task->problem);
+        task = basis.task;
+        begin = known = basis.learned_begin;
+      }
+      for (; known < basis.learned_end; ++known) {
+        const ExecutedTransition& transition = (*basis.learned)[known];
+        static_cast<void>(certifier->Learn(transition.z, transition.next, transition.longer));
+      }
+      return *certifier;
     }
-    for (; known_ < basis.learned_end; ++known_) {
-      const ExecutedTransition& transition = (*basis.learned)[known_];
-      static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
-    }
-  }
+  };
 
-  const unsigned threads_;
-  std::unique_ptr<Certifier> certifier_;
-  const Config* task_ = nullptr;          // of the certifier
-  std::size_t begin_ = 0, known_ = 0;     // what it has learned
-  std::vector<JudgedCandidate> waiting_;  // under the basis below, and not yet certified again
-  Basis basis_;
+  struct Waiting {
+    JudgedCandidate judged;
+    Basis basis;
+  };
+
+  std::vector<Follower> followers_;  // one for each thread
+  std::vector<Waiting> waiting_;     // not yet certified again
 };
 
 }  // namespace forereach

@@ -238,10 +238,13 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
   if (task) FollowReload(*task);
   recorded.basis =
       task ? Advance(GroundsOf(*decision), recorded.candidate ? recorded.candidate->place : -1) : Current();
-  if (recorded.candidate && decision->outcome == decision_t::CERTIFIED)
-    decided_.insert_or_assign(plan, Decided{recorded.basis, true});
-  else
-    decided_.try_emplace(plan, Decided{recorded.basis, recorded.candidate.has_value()});
+  const auto [decided, is_new] = decided_.try_emplace(plan, Decided{recorded.basis, recorded.candidate.has_value()});
+  if (is_new) decided_order_.push_back(plan);
+  if (recorded.candidate && decision->outcome == decision_t::CERTIFIED) decided->second = {recorded.basis, true};
+  if (decided_order_.size() > kMostDecided) {
+    decided_.erase(decided_order_.front());
+    decided_order_.pop_front();
+  }
   Tell(&TimelineUser::OnDecision, recorded);
 }
 

@@ -211,7 +211,11 @@ class Timeline final {
   std::int64_t place_ = 0, undecodable_ = 0, candidates_ = 0;
   LogDamage damage_;
   Undecided<RecordedCandidate> undecided_;
-  std::map<Digest, Decided> decided_;  // by plan; of several decisions on one plan the last CERTIFIED, if there is one
+  // Of the last kMostDecided plans that were decided on; of several decisions on one the last CERTIFIED, if there is
+  // one.
+  static constexpr std::size_t kMostDecided = 4096;
+  std::map<Digest, Decided> decided_;
+  std::deque<Digest> decided_order_;
 
   RepeatedWithdrawals withdrawals_;
 

@@ -449,7 +449,7 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
       power_(PowerOf(*problem.model)),
       remainder_rounding_(RemainderRounding()) {
   std::ranges::copy(problem.declaration.input_error, input_error_.begin());
-  const Transitions& data = problem.transitions;
+  rough_residuals_.resize(of_inputs_.size());
   std::ranges::copy(problem.declaration.disturbance, disturbance_.begin());
   for (std::size_t k = 0; k < of_inputs_.size(); ++k)
     for (std::size_t l = 0; l < input_error_.size(); ++l)
@@ -457,35 +457,41 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
         of_inputs_[k] += Real(problem.declaration.lipschitz(static_cast<Eigen::Index>(k),
                                                             static_cast<Eigen::Index>(of_inputs_.size() + l))) *
                          input_error_[l];
-  for (int i = 0; i < data.size(); ++i) {
+  Learn();
+}
+
+void TubeMaker::Learn() {
+  const Transitions& data = problem_.transitions;
+  for (int i = static_cast<int>(residuals_.size()); i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
-    const std::vector<Real> nominal = equations.Value(z);
-    std::vector<Real> errors(ToSize(problem.model->num_states()));
-    const bool is_exact = problem.declaration.given_are_exact && !data.IsLearned(i);
+    const std::vector<Real> nominal = equations_.Value(z);
+    std::vector<Real> errors(ToSize(problem_.model->num_states()));
+    const bool is_exact = problem_.declaration.given_are_exact && !data.IsLearned(i);
     if (!is_exact) errors = RecordErrors(z);
-    const std::vector<Real> disturbance = DisturbanceOver(is_exact ? z : BoxAround(problem.declaration, z));
+    const std::vector<Real> disturbance = DisturbanceOver(is_exact ? z : BoxAround(problem_.declaration, z));
     AddDuration(i, z, nominal, disturbance, errors);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
-      const bool is_angle = std::ranges::count(problem.model->angles(), k) > 0;
+      const bool is_angle = std::ranges::count(problem_.model->angles(), k) > 0;
       const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
       const Real& error = errors[ToSize(k)];
       const Real& w = disturbance[ToSize(k)];
-      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + w + error;
+      const Real allowed = Real(unit) + Real(problem_.declaration.noise_bound[k]) + w + error;
       const Real difference = Real(x_next) - nominal[ToSize(k)];
       const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
       const Bounds bounds{observed - allowed, observed + allowed};
       // A transition for which the model has no value says nothing.
       row.push_back(!observed.IsFinite() || !error.IsFinite() || !w.IsFinite() ? Bounds{-kNone, kNone}
-                    : equations.IsExact()                                      ? bounds
+                    : equations_.IsExact()                                     ? bounds
                                                                                : Outermost(bounds));
+      rough_residuals_[ToSize(k)].emplace_back(row.back().lower.ToDouble(), row.back().upper.ToDouble());
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k)
       sizes.push_back(abs(Real(data.x_next(i, k))) + errors[ToSize(k)]);
-    for (const auto& [output, variable, value] : equations.First(z))
+    for (const auto& [output, variable, value] : equations_.First(z))
       sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
   }
 }
@@ -1013,40 +1019,47 @@ struct TubeMaker::Row {
   }
 };
 
-// Every observation gives a bound; doubles choose those that may give the tightest.
+// Every observation gives a bound; doubles choose those that may give the tightest. They are good to 2^-36 of what goes
+// into a distance, and to 2^-50 of a residual.
 TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows& known) const {
+  struct Rough {
+    int row;
+    double lower, upper, slack;
+  };
   const Row row(problem_.declaration, query, k);
   const Eigen::MatrixXd& z = problem_.transitions.z;
-  std::vector<int> rows;
-  for (int i = 0; i < static_cast<int>(residuals_.size()); ++i)
-    if (known.Contains(i)) rows.push_back(i);
-  std::vector<double> lower, upper, slack;
+  std::vector<Rough> all;
   double highest = -kNone, lowest = kNone;
   bool trusted = true;
-  for (const int i : rows) {
-    const Bounds& residual = residuals_[ToSize(i)][ToSize(k)];
-    const double distance = row.Roughly(z, i), below = residual.lower.ToDouble(), above = residual.upper.ToDouble();
-    lower.push_back(below - distance);
-    upper.push_back(above + distance);
-    slack.push_back(0x1p-36 * (row.ScaleAt(z, i) + std::abs(below) + std::abs(above)));
-    trusted &= std::isfinite(slack.back()) && slack.back() > 1e-250;
-    highest = std::max(highest, lower.back() - slack.back());
-    lowest = std::min(lowest, upper.back() + slack.back());
+  for (int i = 0; i < problem_.transitions.size(); ++i) {
+    if (!known.Contains(i)) continue;
+    const auto [below, above] = rough_residuals_[ToSize(k)][ToSize(i)];
+    const double distance = row.Roughly(z, i);
+    const double slack = 0x1p-36 * row.ScaleAt(z, i) + 0x1p-50 * (std::abs(below) + std::abs(above));
+    all.push_back({i, below - distance, above + distance, slack});
+    trusted &= slack > 1e-250;
+    highest = std::max(highest, all.back().lower - slack);
+    lowest = std::min(lowest, all.back().upper + slack);
   }
-  // The second time with doubts in their favour as large as rounding to doubles could give rise to.
-  std::optional<Bounds> bounds, doubtful;
-  const auto add = [](std::optional<Bounds>& all, const Bounds& one) {
-    all = all ? Bounds{max(all->lower, one.lower), min(all->upper, one.upper)} : one;
+  if (trusted)
+    std::erase_if(
+        all, [&](const Rough& each) { return each.lower + each.slack < highest && each.upper - each.slack > lowest; });
+  const auto intersect = [&](bool in_doubt) {
+    std::optional<Bounds> tightest;
+    for (const Rough& each : all) {
+      Real away = row.Distance(z, each.row);
+      if (in_doubt)
+        away += Real(kSeenInDoubles) * (sizes_[ToSize(each.row)][ToSize(k)] + Real(row.ScaleAt(z, each.row)));
+      const auto& [lower, upper] = residuals_[ToSize(each.row)][ToSize(k)];
+      tightest = tightest ? Bounds{max(tightest->lower, lower - away), min(tightest->upper, upper + away)}
+                          : Bounds{lower - away, upper + away};
+    }
+    return *tightest;
   };
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (trusted && lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest) continue;
-    const Real distance = row.Distance(z, rows[i]);
-    const Bounds& residual = residuals_[ToSize(rows[i])][ToSize(k)];
-    add(bounds, {residual.lower - distance, residual.upper + distance});
-    const Real doubt = Real(kSeenInDoubles) * (sizes_[ToSize(rows[i])][ToSize(k)] + Real(row.ScaleAt(z, rows[i])));
-    add(doubtful, {residual.lower - distance - doubt, residual.upper + distance + doubt});
-  }
-  return {*bounds, CertainlyBelow(doubtful->upper, doubtful->lower)};
+  const auto contradicts = [](const Bounds& bounds) { return CertainlyBelow(bounds.upper, bounds.lower); };
+  const Bounds bounds = intersect(false);
+  // Again with doubts in their favour as large as rounding to doubles could give rise to.
+  return {bounds, contradicts(bounds) && contradicts(intersect(true))};
 }
 
 }  // namespace forereach::verifier

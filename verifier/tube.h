@@ -12,6 +12,7 @@ input, it is the largest over the box of what is known of them. */
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -102,12 +103,15 @@ struct TubeOptions {
   const std::vector<RecordedSet>* follow = nullptr;
 };
 
-/** Computes tubes for any number of plans of one problem, with the precision at its construction. Immutable. */
+/** Computes tubes for any number of plans of one problem, with the precision at its construction. */
 class TubeMaker final {
  public:
   /** @param problem, equations must outlive this object. @pre a Certifier accepts the problem.
   @throws ExpressionError (expressions.h) if a bound on the disturbance is none. */
   TubeMaker(const Problem& problem, const Equations& equations, Method method);
+
+  /** Follows the problem, which has got more transitions behind those that it had. */
+  void Learn();
 
   /** The tube of a plan. @param controls m-by-T, one column for each step. */
   [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls,
@@ -155,6 +159,8 @@ class TubeMaker final {
   /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
   included; e_ik is what the declared errors of the record may add. [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;
+  /** The same in doubles, to the nearest; [state][observation]. */
+  std::vector<std::vector<std::pair<double, double>>> rough_residuals_;
   /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
   /** The rounding error that the remainder may have added to the certifier's columns. */

@@ -119,8 +119,8 @@ Method MethodOf(const Problem& problem) {
   throw std::invalid_argument("problem: method " + std::to_string(static_cast<int>(problem.method)) + " is unknown");
 }
 
-Verifier::Verifier(std::shared_ptr<const Problem> problem, Method method)
-    : problem_(std::move(problem)), method_(method) {
+Verifier::Verifier(const std::shared_ptr<const Problem>& problem, Method method)
+    : problem_(std::make_unique<Problem>(*problem)), method_(method) {
   try {
     equations_ = EquationsOf(*problem_->model);
     functions_ = std::make_unique<TaskFunctions>(FunctionsOf(*problem_));
@@ -137,6 +137,14 @@ const TubeMaker& Verifier::MakerOf(int bits) const {
     maker = std::make_unique<TubeMaker>(*problem_, *equations_, method_);
   }
   return *maker;
+}
+
+void Verifier::Learn(const Transitions& transitions) {
+  problem_->transitions = transitions;
+  for (const auto& [bits, maker] : makers_) {
+    const Precision precision(bits);
+    maker->Learn();
+  }
 }
 
 Tube Verifier::Derive(const Certificate& certificate) const {

@@ -59,11 +59,16 @@ struct Verdict {
   Failure failure;  ///< Unless confirmed: the first claim that fails.
 };
 
-/** Verifies the certificates of one problem. Any number of threads may verify at once. */
+/** Verifies the certificates of one problem, whose transitions may become more. Any number of threads may verify at
+ * once. */
 class Verifier final {
  public:
   /** @pre a Certifier accepts the problem. */
-  Verifier(std::shared_ptr<const Problem> problem, Method method);
+  Verifier(const std::shared_ptr<const Problem>& problem, Method method);
+
+  /** What is known now. @pre the former transitions are its first, and no thread verifies meanwhile. Cost: that of the
+  new ones. */
+  void Learn(const Transitions& transitions);
 
   /** Verifies one certificate. If 256 bits do not decide, it repeats with more bits; with the last precision, sums of
   products of doubles are exact. Cost: about 0.1 s for 50 steps, 400 observations and 10 obstacles. */
@@ -76,7 +81,7 @@ class Verifier final {
   [[nodiscard]] std::optional<Failure> Check(const TubeMaker& maker, const Certificate& certificate) const;
   [[nodiscard]] const TubeMaker& MakerOf(int bits) const;
 
-  std::shared_ptr<const Problem> problem_;
+  std::unique_ptr<Problem> problem_;
   Method method_;
   std::unique_ptr<Equations> equations_;      // null if there are none
   std::unique_ptr<TaskFunctions> functions_;  // null if an expression is none

@@ -7,19 +7,9 @@
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
+#include "forereach/residual/recorded_successor.h"
 
 namespace forereach {
-namespace {
-
-// A recorded successor is known to its last unit, an angle to that of a turn taken off (observations.h).
-double UnitOf(double recorded, bool is_angle) {
-  const double unit = NextUp(std::abs(recorded)) - std::abs(recorded);
-  return is_angle ? std::max(unit, kAngleUnit) : unit;
-}
-
-Interval RecordedWithin(double x, double error) { return {SubDown(x, error), AddUp(x, error)}; }
-
-}  // namespace
 
 double LeastChange(const Interval& a, const Interval& b, bool is_angle) noexcept {
   const auto least = [](const Interval& difference) { return std::max(difference.lower, -difference.upper); };
@@ -51,8 +41,9 @@ Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const dou
   for (const Bound& bound : bounds_) {
     const auto k = ToSize(bound.state);
     const double error = is_exact ? 0 : declaration.VariableError(bound.state);
-    const double of_next = AddUp(AddUp(error, declaration.noise_bound[bound.state]), UnitOf(next[k], bound.is_angle));
-    const double change = LeastChange(RecordedWithin(z[k], error), RecordedWithin(next[k], of_next), bound.is_angle);
+    const Interval before(SubDown(z[k], error), AddUp(z[k], error));
+    const double change = LeastChange(
+        before, EncloseSuccessor(declaration, bound.state, next[k], bound.is_angle, is_exact), bound.is_angle);
     shown[bound.state] = DivDown(change, AddUp(period_, longer));
   }
   return shown;

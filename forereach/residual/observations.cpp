@@ -13,11 +13,10 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/growing_disturbance.h"
 #include "forereach/residual/no_nominal_value.h"
+#include "forereach/residual/recorded_successor.h"
 
 namespace forereach {
 namespace {
-
-double UlpOf(double x) { return NextUp(std::abs(x)) - std::abs(x); }
 
 [[noreturn]] void Refuse(int row, const char* why) {
   throw std::invalid_argument("transition " + std::to_string(row) + ": " + why);
@@ -32,7 +31,7 @@ Interval ResidualOf(double x_next, double unit, const Interval& nominal) {
 // within a quarter of a turn, no other number of turns gives such a result (docs/soundness.md, 3.14).
 Interval ResidualOfAngle(double x_next, const Interval& nominal) {
   const double turns = std::round((nominal.Middle() - x_next) / kTurn.lower);
-  return ResidualOf(x_next, std::max(UlpOf(x_next), kAngleUnit), nominal) + Interval(turns) * kTurn;
+  return ResidualOf(x_next, RecordedUnit(x_next, true), nominal) + Interval(turns) * kTurn;
 }
 
 bool IsWithinAQuarterTurn(const Interval& residual) {
@@ -61,8 +60,8 @@ class Observer final {
     model_.Linearize(z, linear_);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       const Interval& nominal = linear_.value[k];
-      residual_[k] =
-          IsAngle(k) ? ResidualOfAngle(x_next[k], nominal) : ResidualOf(x_next[k], UlpOf(x_next[k]), nominal);
+      residual_[k] = IsAngle(k) ? ResidualOfAngle(x_next[k], nominal)
+                                : ResidualOf(x_next[k], RecordedUnit(x_next[k], false), nominal);
       if (!residual_[k].IsFinite()) throw NoNominalValue(row, Name(k), NoNominalValue::At::kLocation);
     }
     if (has_errors_ && is_exact) error_.fill(0);
@@ -129,7 +128,7 @@ class Observer final {
   void RequireTurns(const Interval& seen, double x_next, double longer, std::size_t k, int row) const {
     Interval within = seen;
     if (longer > 0) {
-      const double unit = std::max(UlpOf(x_next), kAngleUnit);
+      const double unit = RecordedUnit(x_next, true);
       const double error = AddUp(declaration_.ObservationError(static_cast<Eigen::Index>(k)), grown_[k].upper);
       const double most = AddUp(MulUp(3, kTurn.upper / 4), error);
       within += OfDuration(longer, k, AddUp(most, unit));

@@ -12,14 +12,34 @@
 
 namespace forereach {
 
-/** The certificates of the first task. */
+/** All certificates of a file of one task, and the task with what was learned. */
+struct CertificateFile : BesideCertificates {
+  Config config;
+  std::vector<RecordedCertificate> certificates;
+};
+
+struct CertificateCollector final : CertificateUser {
+  void OnCertificate(RecordedCertificate&& recorded, const Basis* basis) override {
+    file.certificates.push_back(std::move(recorded));
+    if (!basis) return;
+    file.config = *basis->task;
+    if (basis->learned) file.config.problem = WithLearned(basis->task->problem, *basis->learned);
+  }
+  CertificateFile file;
+};
+
 inline CertificateFile ReadCertificates(const std::string& path, const std::string& config_path,
                                         const LogKey& key = {}) {
-  return std::move(ReadAllCertificates(path, config_path, key).front());
+  CertificateCollector collector;
+  static_cast<BesideCertificates&>(collector.file) = ReadCertificates(path, config_path, key, collector);
+  return std::move(collector.file);
 }
-inline CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path,
-                                const LogKey& key = {}) {
-  return std::move(ReadAllLogs(logs, config_path, key).front());
+/** Of one run. */
+inline CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path) {
+  CertificateCollector collector;
+  static_cast<BesideCertificates&>(collector.file) = ReadRun({.robot = "", .logs = logs, .database = "", .missing = {}},
+                                                             RunTasks(config_path, {}, false), false, collector);
+  return std::move(collector.file);
 }
 
 /** The first candidate of an unsigned log that was certified; zeros if none was. */

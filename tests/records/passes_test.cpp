@@ -1,9 +1,13 @@
-// Commands read a log once: this program counts the bytes that it reads while a command runs in it.
+// Commands that read logs: each reads a log once, and says the same on any number of threads. This program counts the
+// bytes that it reads while a command runs in it.
 #include "tests/test.h"
 
 #include "cli/commands.h"
+#include "forereach/certified_plan_t.hpp"
+#include "lcmtypes/seal.h"
 #include "tests/paths.h"
 #include "tests/records/course.h"
+#include "tests/records/logs.h"
 
 namespace forereach::passes_test {
 
@@ -27,8 +31,8 @@ class PassesTest : public testing::TestWithParam<const char*> {
     fs::copy(kCourseLog, log_);
   }
 
-  // How often the command reads the log, with everything else that it reads.
-  double Passes(std::string line) {
+  // @return what the command prints.
+  std::string Run(std::string line) {
     for (const auto& [name, value] : {std::pair<std::string, std::string>{"LOG", log_},
                                       {"DIRECTORY", scratch_ / "log"},
                                       {"OUT", scratch_ / "out"},
@@ -44,12 +48,18 @@ class PassesTest : public testing::TestWithParam<const char*> {
         .name = "forereach",
         .commands = {ReplayCommand(), VerifyCommand(), AdviseCommand(), ReportCommand(), ExportCommand(), LogCommand()},
         .chosen = &chosen};
-    const std::int64_t before = BytesRead();
     testing::internal::CaptureStdout();
     const bool is_parsed = !ParseCommandLine(program, static_cast<int>(argv.size()), argv.data());
     const int code = is_parsed ? std::ranges::find(program.commands, chosen, &Command::name)->run() : kExitBadInput;
     const std::string output = testing::internal::GetCapturedStdout();
     EXPECT_LE(code, 1) << line << "\n" << output;
+    return output;
+  }
+
+  // How often the command reads the log, with everything else that it reads.
+  double Passes(const std::string& line) {
+    const std::int64_t before = BytesRead();
+    Run(line);
     // An export reads the program, too, since what was kept of another program is not used.
     const std::int64_t own_bytes =
         line.starts_with("export") ? static_cast<std::int64_t>(fs::file_size(fs::read_symlink("/proc/self/exe"))) : 0;
@@ -74,5 +84,36 @@ INSTANTIATE_TEST_SUITE_P(Commands, PassesTest,
                                          "log list LOG", "report LOG --out OUT.html --config TASK",
                                          "report DIRECTORY --out OUT.html --config TASK",
                                          "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT"));
+
+class ThreadsTest : public PassesTest {
+ protected:
+  // Slices shrunken so that every certificate is refuted, and every other one sealed anew: there is much to say.
+  ThreadsTest() {
+    bool reseals = false;
+    std::filesystem::remove(log_);
+    CopyLog(kCourseLog, log_, [&](LogEvent& event) {
+      if (auto certified = Decoded<certified_plan_t>(event.data)) {
+        certified->slice_upper[1][0] -= 1e-9;
+        if (reseals = !reseals; reseals) SetDigest(certified->certificate_digest, CertificateDigest(*certified));
+        event.data = Encode(*certified);
+      }
+      return true;
+    });
+  }
+};
+
+TEST_P(ThreadsTest, FourSayWhatOneSays) {
+  const std::string page = scratch_ / "out.html", line = GetParam();
+  const std::string said = Run(line + " --jobs 1");
+  const std::vector<std::uint8_t> written = ReadBytes(page);
+  EXPECT_GT(said.size() + written.size(), 500u);
+  EXPECT_EQ(Run(line + " --jobs 4"), said);
+  EXPECT_EQ(ReadBytes(page), written);
+}
+
+INSTANTIATE_TEST_SUITE_P(Commands, ThreadsTest,
+                         testing::Values("verify --json LOG --config TASK", "replay --json LOG --config TASK",
+                                         "replay LOG --compare --config TASK --json",
+                                         "report LOG --out OUT.html --force --advice-seconds 0 --config TASK"));
 
 }  // namespace forereach::passes_test

@@ -1,6 +1,8 @@
 // A recorded run is read in one way: verify, replay, report and the timeline itself agree on the grounds of decisions.
 #include "records/timeline.h"
 
+#include <malloc.h>
+
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
@@ -14,6 +16,7 @@
 #include "tests/records/certificates.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
+#include "tests/sanitized.h"
 
 namespace forereach::timeline_test {
 
@@ -311,6 +314,35 @@ TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
   EXPECT_EQ(judged["passed_over"]["not_authentic"]["forged"], kForged);
   EXPECT_EQ(believed["plans"]["decided"], recorded["plans"]["decided"].get<int>() + 1);
   EXPECT_EQ(believed["passed_over"]["not_authentic"]["unsigned"], 0);
+}
+
+// The most that is allocated while the certificates of a log are handed on, and how many there are.
+class PeakOfMemory final : public CertificateUser {
+ public:
+  void OnCertificate(RecordedCertificate&&, const Basis*) override {
+    const struct mallinfo2 now = mallinfo2();
+    peak = std::max(peak, static_cast<std::int64_t>(now.uordblks + now.hblkhd));
+    ++certificates;
+  }
+
+  std::int64_t peak = 0;
+  int certificates = 0;
+};
+
+TEST_F(TimelineTest, ALogOfFourTimesTheCertificatesNeedsNotFourTimesTheMemory) {
+  if (FOREREACH_SANITIZED) GTEST_SKIP() << "a sanitizer allocates by itself";
+  const auto peak_with = [&](int certificates) {
+    while (certified_ < certificates) Certify();
+    PeakOfMemory user;
+    ReadCertificates(logs_[0], kConfig, {}, user);
+    EXPECT_EQ(user.certificates, certificates);
+    return user.peak;
+  };
+  constexpr int kFew = static_cast<int>(kPlansTogether) + 44;
+  const std::int64_t few = peak_with(kFew), bytes = static_cast<std::int64_t>(std::filesystem::file_size(logs_[0]));
+  const std::int64_t many = peak_with(4 * kFew);
+  EXPECT_GT(few, 0);
+  EXPECT_LT(many - few, 3 * bytes / 4) << "a quarter of what the log grew by: of each plan the controls are kept";
 }
 
 }  // namespace forereach::timeline_test

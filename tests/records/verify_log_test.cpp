@@ -157,7 +157,7 @@ TEST(VerifyLog, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   EXPECT_EQ(file.not_certificates, whole.not_certificates);
   EXPECT_EQ(DescribePassedOver(file.passed_over),
             "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
-  EXPECT_EQ(ReadLogs({log}, kConfig, {key}).passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_EQ(ReadCertificates(log, kConfig, {key}).passed_over.not_authentic.replayed, kRepeated);
   EXPECT_THROW((void)ReadCertificates(log, kConfig, {scratch / "none"}), KeyError);
   const Output output = Forereach("verify --json " + log + " --config " + kConfig + " --key " + key);
   EXPECT_EQ(output.code, 0);
