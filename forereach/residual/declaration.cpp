@@ -26,7 +26,7 @@ void RequireBounds(const std::string& name, const Eigen::VectorXd& bounds, int s
   for (Eigen::Index k = 0; k < bounds.size(); ++k) RequireBound(name + " " + std::to_string(k), bounds[k]);
 }
 
-void Require(bool holds, const std::string& what) {
+void RequireAffine(bool holds, const std::string& what) {
   if (!holds) throw std::invalid_argument("affine: " + what);
 }
 
@@ -37,19 +37,21 @@ bool AreIndices(const std::vector<int>& all, int size) {
 
 void ValidateAffine(const Declaration& declaration) {
   const auto& [rows, columns] = declaration.affine;
-  Require(AreIndices(rows, static_cast<int>(declaration.lipschitz.rows())),
-          "rows are states, each once, in their order");
-  Require(AreIndices(columns, static_cast<int>(declaration.lipschitz.cols())),
-          "columns are states and inputs, each once, in their order");
-  Require(rows.empty() == columns.empty(), "rows and columns, or neither");
-  Require(columns.size() <= AffineRows::kMaxColumns,
-          std::to_string(columns.size()) + " columns, must be at most " + std::to_string(AffineRows::kMaxColumns));
+  RequireAffine(AreIndices(rows, static_cast<int>(declaration.lipschitz.rows())),
+                "rows are states, each once, in their order");
+  RequireAffine(AreIndices(columns, static_cast<int>(declaration.lipschitz.cols())),
+                "columns are states and inputs, each once, in their order");
+  RequireAffine(rows.empty() == columns.empty(), "rows and columns, or neither");
+  RequireAffine(
+      columns.size() <= AffineRows::kMaxColumns,
+      std::to_string(columns.size()) + " columns, must be at most " + std::to_string(AffineRows::kMaxColumns));
   for (const int k : rows)
-    Require(declaration.lipschitz.row(k).isZero(0),
-            "row " + std::to_string(k) + " is affine, lipschitz bounds it, too");
-  Require(rows.empty() || !declaration.HasErrorInZ(),
-          "state_error and input_error count by lipschitz, which does not bound these rows: leave the errors out, or "
-          "declare these rows by lipschitz");
+    RequireAffine(declaration.lipschitz.row(k).isZero(0),
+                  "row " + std::to_string(k) + " is affine, lipschitz bounds it, too");
+  RequireAffine(
+      rows.empty() || !declaration.HasErrorInZ(),
+      "state_error and input_error count by lipschitz, which does not bound these rows: leave the errors out, or "
+      "declare these rows by lipschitz");
 }
 
 }  // namespace
