@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <iterator>
 #include <thread>
 
 #include <pybind11/stl.h>
@@ -11,6 +13,7 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/judgement.h"
+#include "records/outlines.h"
 #include "task/config_text.h"
 #include "task/wrapped_angle.h"
 
@@ -117,15 +120,22 @@ py::dict PictureDict(const Judgement& judgement) {
     const py::gil_scoped_release release;
     return PictureOf(judgement);
   }();
-  py::list circles, half_planes;
-  for (const Picture::Circle& circle : picture.circles)
-    circles.append(py::make_tuple(circle.center.x(), circle.center.y(), circle.radius));
-  for (const Picture::HalfPlane& half : picture.half_planes)
-    half_planes.append(py::make_tuple(half.normal.x(), half.normal.y(), half.offset));
+  py::list half_planes;
+  std::vector<Picture::Polygon> obstacles, predictions;
+  for (const Obstacle& obstacle : picture.obstacles) {
+    const std::int64_t stamp = obstacle.motion() ? obstacle.motion()->stamp_us : 0;
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+      const auto& normal = obstacle.points()[0];
+      half_planes.append(py::make_tuple(normal.x(), normal.y(), obstacle.offset()));
+    } else if (const auto place = PlaceOf(obstacle, static_cast<double>(stamp))) {
+      obstacles.push_back(HullOf(place->points, place->radius));
+    }
+    std::ranges::move(PredictionOf(obstacle, stamp), std::back_inserter(predictions));
+  }
   using namespace py::literals;
   return py::dict("tube"_a = PolygonsOf(picture.certified), "path"_a = PolygonsOf({picture.path})[0],
-                  "circles"_a = circles, "polygons"_a = PolygonsOf(picture.polygons), "half_planes"_a = half_planes,
-                  "predictions"_a = PolygonsOf(picture.predictions));
+                  "obstacles"_a = PolygonsOf(obstacles), "half_planes"_a = half_planes,
+                  "predictions"_a = PolygonsOf(predictions));
 }
 
 py::array_t<double> PerState(const TubeNumbers& tube, const std::vector<double>& numbers) {

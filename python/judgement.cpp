@@ -135,7 +135,7 @@ Picture PictureOf(const Judgement& judgement) {
     throw std::invalid_argument("plot: the task has " + std::to_string(judged.problem->projection.rows()) +
                                 " safety coordinates, a picture has 2");
   Picture picture;
-  for (const Obstacle& obstacle : judged.obstacles) AddObstacle(obstacle, picture);
+  picture.obstacles = judged.obstacles;
   if (judgement.tube.length < 0) return picture;
   const Certifier certifier(judged.problem);
   Tube tube;

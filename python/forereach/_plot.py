@@ -12,11 +12,8 @@ def plot(decision, ax=None):
     for corners in picture["tube"]:
         ax.add_patch(patches.Polygon(corners, facecolor=color, edgecolor=color, alpha=0.25))
     ax.plot(*picture["path"].T, color=color, linewidth=1, marker=".", markersize=3)
-    shapes = [patches.Circle((x, y), radius) for x, y, radius in picture["circles"]]
-    shapes += [patches.Polygon(corners) for corners in picture["polygons"]]
-    for shape in shapes:
-        shape.set(facecolor="0.4", edgecolor="black")
-        ax.add_patch(shape)
+    for corners in picture["obstacles"]:
+        ax.add_patch(patches.Polygon(corners, facecolor="0.4", edgecolor="black"))
     for corners in picture["predictions"]:
         ax.add_patch(patches.Polygon(corners, facecolor="none", edgecolor="0.4", linestyle=":"))
     ax.set_aspect("equal", adjustable="datalim")

@@ -229,15 +229,16 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
         std::vector<Real> x = PointOf(random, query.initial_set);
         Real offset;
         for (int t = 0; t < tube.length(); ++t) {
-          std::vector<Real> z = x, unexpected = AnyDisturbance(random, *problem), most;
+          std::vector<Real> z = x, most;
           for (const double u : query.plan().input(t)) z.emplace_back(u);
+          std::vector<Real> unexpected = AnyDisturbance(random, *problem, z);
           for (std::size_t k = 0; k < x.size(); ++k) {
             const auto row = std::ranges::find(affine.rows, static_cast<int>(k)) - affine.rows.begin();
             const bool is_affine = row < std::ssize(affine.rows);
             const Real r = is_affine ? AffineValue(parameters[static_cast<std::size_t>(row)], affine.columns, z)
                                      : others(z, static_cast<int>(k));
             unexpected[k] += r;
-            most.push_back(abs(r) + Real(problem->declaration.DisturbanceBound(static_cast<Eigen::Index>(k))));
+            most.push_back(abs(r) + DisturbanceAt(*problem, z, static_cast<Eigen::Index>(k)));
           }
           const Real before = offset;
           offset = AnyOffset(random, *problem);

@@ -994,7 +994,7 @@ TEST(RobotSim, AStepLastsAsLongAsTheClockSays) {
     ASSERT_EQ(rig.transitions.size(), 2u);
     EXPECT_EQ(rig.transitions[0].duration_us, kPeriod + 1400);
     EXPECT_EQ(rig.transitions[1].duration_us, kPeriod - 1200);
-    EXPECT_THAT(longer, looks_at_time ? ElementsAre(1400 * 1e-6, -1200 * 1e-6) : ElementsAre(0, 0));
+    EXPECT_THAT(longer, looks_at_time ? ElementsAre(1400 * 1e-6, -1200 * 1e-6) : ElementsAre(0.0, 0.0));
   }
 }
 
