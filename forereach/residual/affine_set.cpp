@@ -392,7 +392,7 @@ void AffineSet::Derive() {
     active_.insert(active_.end(), found.basis.begin(), found.basis.begin() + std::ptrdiff_t(size_));
   }
   std::ranges::sort(active_);
-  active_.erase(std::ranges::unique(active_).begin(), active_.end());
+  active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
   if (all_.size() <= kFew) active_ = all_;
   SetHull();
   is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_),
