@@ -201,9 +201,11 @@ class TreeSearch {
       : metric_(metric), index_(index), found_(found), budget_(budget) {}
 
   Sides Run() {
-    const std::size_t first = LeafToBegin(found_.lower, 0), second = LeafToBegin(found_.upper, 1);
+    const std::size_t first = LeafToBegin(found_.lower, 0);
+    std::size_t second = LeafToBegin(found_.upper, 1);
     Visit(first);
-    if (second != first && budget_.leaves > 0) Visit(second);
+    if (budget_.leaves <= 0) second = first;  // is not visited, and not passed
+    if (second != first) Visit(second);
     index_.num_nodes(1) <= kFewNodes ? VisitLeaves(first, second) : Descend();
     return best_;
   }
