@@ -112,32 +112,25 @@ double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t side, dou
   return Max(best, MaxLane(highest));
 }
 
-/** A search for one side in a tree: depth first, the child with the largest bound first. It proceeds in steps, so that
-two searches can alternate and hide the latency of comparisons and memory. */
-template <class Metric>
+/** A search for one side, 0 the floors and 1 the negated ceilings, in a tree: depth first, the child with the largest
+bound first. It proceeds in steps, so that two searches can alternate and hide the latency of comparisons and memory. */
+template <class Metric, std::size_t kSide>
 class Descent {
  public:
-  /** @param side 0 for the floors, 1 for the negated ceilings.
-  @param best what was found in the leaf `found`, which is passed. */
-  Descent(const Metric& metric, const ObservationIndex& index, std::size_t side, double best, std::uint32_t found)
-      : metric_(metric),
-        index_(index),
-        side_(side),
-        began_(found),
-        level_(index.height() + 1),
-        best_(best),
-        found_(found) {}
+  /** @param best what was found in the leaf `found`, which is passed. */
+  Descent(const Metric& metric, const ObservationIndex& index, double best, std::uint32_t found)
+      : metric_(metric), index_(index), began_(found), best_(best), found_(found) {}
 
   /** Visits one node or one leaf, then selects the next child whose bound exceeds the best. False if there is none, or
   if the budget allows no further leaf. */
   bool Step(Budget& budget) {
     if (level_ > 1) {
       Level& at = levels_[ToSize(--level_)];
-      at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), side_));
+      at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), kSide));
       at.first_child = child_ * kPackSize;
       if (level_ == 1) at.bounds = Without(at.bounds, began_ - at.first_child);
     } else {
-      const double best = BestOfLeaf(metric_, index_.leaf(child_), side_, best_, budget);
+      const double best = BestOfLeaf(metric_, index_.leaf(child_), kSide, best_, budget);
       found_ = best > best_ ? static_cast<std::uint32_t>(child_) : found_;
       best_ = best;
     }
@@ -170,21 +163,16 @@ class Descent {
   }
 
   void Prefetch() const {
-    if (level_ > 1) {
-      const Pack* node = index_.node(level_ - 1, child_);
-      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p)
-        __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
-    } else {
-      const Pack* leaf = index_.leaf(child_);
-      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p)
-        __builtin_prefetch(leaf + p);
-    }
+    const bool is_leaf = level_ == 1;
+    const std::size_t packs = is_leaf ? ObservationIndex::kLeafBlocks * index_.block_packs() : index_.node_packs() / 2;
+    const Pack* first = is_leaf ? index_.leaf(child_) : index_.node(level_ - 1, child_) + kSide * packs;
+    for (std::size_t p = 0; p < packs; ++p) __builtin_prefetch(first + p);
   }
 
   const Metric& metric_;
   const ObservationIndex& index_;
-  const std::size_t side_, began_;  // began_: a leaf
-  int level_;
+  const std::size_t began_;  // a leaf
+  int level_ = index_.height() + 1;
   std::size_t child_ = 0;
   double best_;
   std::uint32_t found_;
@@ -245,8 +233,8 @@ class TreeSearch {
 
   // The more leaves there are, the farther the best is from where the last step had it.
   void Descend() {
-    Descent<Metric> floors(metric_, index_, 0, best_.floor, found_.lower),
-        ceilings(metric_, index_, 1, best_.negated_ceiling, found_.upper);
+    Descent<Metric, 0> floors(metric_, index_, best_.floor, found_.lower);
+    Descent<Metric, 1> ceilings(metric_, index_, best_.negated_ceiling, found_.upper);
     for (bool more_floors = true, more_ceilings = true; more_floors || more_ceilings;) {
       if (more_floors) more_floors = floors.Step(budget_);
       if (more_ceilings) more_ceilings = ceilings.Step(budget_);
