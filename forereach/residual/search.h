@@ -1,9 +1,9 @@
 /** The search of the envelope, Eq. (set-envelope): max_i (v_i - D_i) over the entries i of an ObservationIndex, once
 with v_i = floor_i and once with v_i = -ceiling_i. D_i is the distance of the query set to entry i (metric.h).
 
-ScanBlocks looks at all blocks. TreeSearch looks where the last search found its bounds, and then goes down the tree,
-the child of highest bound first, past every one whose bound exceeds neither of the best values so far. Both give the
-same bits, in plain arithmetic. Only lipschitz_envelope.cpp includes this file. */
+ScanBlocks looks at all blocks. TreeSearch looks where the last search found its bounds, and then at every leaf, or down
+the tree once for each side, past every child whose bound does not exceed the best value so far. Both give the same
+bits, in plain arithmetic. Only lipschitz_envelope.cpp includes this file. */
 #pragma once
 
 #include <bit>
@@ -97,63 +97,116 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
   return {best[0], best[1]};
 }
 
-/** The search of an index: first the leaves in which the last one found its bounds, then depth first what may hold a
-better one. */
+/** The larger of `best` and the maximum over one leaf, for one side. */
+template <class Metric>
+double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t side, double best, Budget& budget) {
+  const std::size_t coordinates = metric.coordinates();
+  Pack highest = Fill(-kInfinity);
+  for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
+    const Pack values = LoadPack(block[coordinates + side]), optimistic = values - metric.Block(block);
+    if constexpr (Metric::kRefines)
+      best = BestOfBlock(metric, block, values, optimistic, best, budget);
+    else
+      highest = Max(optimistic, highest);
+  }
+  return Max(best, MaxLane(highest));
+}
+
+/** A search for one side, 0 the floors and 1 the negated ceilings, in a tree: depth first, the child with the largest
+bound first. It proceeds in steps, so that two searches can alternate and hide the latency of comparisons and memory. */
+template <class Metric, std::size_t kSide>
+class Descent {
+ public:
+  /** @param best what was found in the leaf `found`, which is passed. */
+  Descent(const Metric& metric, const ObservationIndex& index, double best, std::uint32_t found)
+      : metric_(metric), index_(index), began_(found), best_(best), found_(found) {}
+
+  /** Visits one node or one leaf, then selects the next child whose bound exceeds the best. False if there is none, or
+  if the budget allows no further leaf. */
+  bool Step(Budget& budget) {
+    if (level_ > 1) {
+      Level& at = levels_[ToSize(--level_)];
+      at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), kSide));
+      at.first_child = child_ * kPackSize;
+      if (level_ == 1) at.bounds = Without(at.bounds, began_ - at.first_child);
+    } else {
+      const double best = BestOfLeaf(metric_, index_.leaf(child_), kSide, best_, budget);
+      found_ = best > best_ ? static_cast<std::uint32_t>(child_) : found_;
+      best_ = best;
+    }
+    double next;
+    while (!((next = MaxLane(levels_[ToSize(level_)].bounds)) > best_))
+      if (++level_ > index_.height()) return false;
+    budget.capped |= budget.leaves <= 0;
+    if (budget.leaves <= 0) return false;
+    Level& at = levels_[ToSize(level_)];
+    at.bounds = Replace(at.bounds, next, -kMaxDouble);
+    child_ = at.first_child + TaggedLane(next);
+    budget.leaves -= level_ == 1;
+    Prefetch();
+    return true;
+  }
+
+  [[nodiscard]] double best() const { return best_; }
+  /** The leaf that holds it. */
+  [[nodiscard]] std::uint32_t found() const { return found_; }
+
+ private:
+  struct Level {
+    Pack bounds;  // of the children not yet visited
+    std::size_t first_child;
+  };
+
+  static Pack Without(const Pack& bounds, std::size_t lane) {
+    const Lanes missing = AllLanes(-kMaxDouble);
+    return {AtLane(lane) ? missing : bounds.low, AtLane(lane - kLaneCount) ? missing : bounds.high};
+  }
+
+  void Prefetch() const {
+    const bool is_leaf = level_ == 1;
+    const std::size_t packs = is_leaf ? ObservationIndex::kLeafBlocks * index_.block_packs() : index_.node_packs() / 2;
+    const Pack* first = is_leaf ? index_.leaf(child_) : index_.node(level_ - 1, child_) + kSide * packs;
+    for (std::size_t p = 0; p < packs; ++p) __builtin_prefetch(first + p);
+  }
+
+  const Metric& metric_;
+  const ObservationIndex& index_;
+  const std::size_t began_;  // a leaf
+  int level_ = index_.height() + 1;
+  std::size_t child_ = 0;
+  double best_;
+  std::uint32_t found_;
+  std::array<Level, ObservationIndex::kMaxHeight + 1> levels_;
+};
+
+/** The search of an index: first the leaves in which the last one found its bounds, then what may hold a better one. A
+leaf that both descents visit counts twice. */
 template <class Metric>
 class TreeSearch {
  public:
   /** @param found where to begin; set to where the bounds are. */
   TreeSearch(const Metric& metric, const ObservationIndex& index, FoundIn& found, Budget& budget)
-      : metric_(metric), index_(index), found_(found), budget_(budget), leaves_(budget.leaves) {}
+      : metric_(metric), index_(index), found_(found), budget_(budget) {}
 
   Sides Run() {
-    first_ = second_ = LeafToBegin(found_.lower, 0);
-    const std::size_t second = LeafToBegin(found_.upper, 1);
-    Visit(first_);
-    if (second != first_ && leaves_ > 0) Visit(second_ = second);
-    // The bound of a root with two children says little.
-    const int top =
-        index_.height() > 1 && index_.num_nodes(index_.height() - 1) == 2 ? index_.height() - 1 : index_.height();
-    for (std::size_t node = 0; node < index_.num_nodes(top); ++node) {
-      Open(top, node);
-      while (level_ <= top) {
-        Level& at = levels_[ToSize(level_)];
-        const unsigned better = Better(at) & at.left;
-        if (better == 0) {
-          ++level_;
-          continue;
-        }
-        const std::size_t lane = BestOf(better, at);
-        at.left &= ~(1u << lane);
-        const std::size_t child = at.first_child + lane;
-        if (level_ > 1) {
-          Open(level_ - 1, child);
-        } else if (leaves_ > 0) {
-          Visit(child);
-        } else {
-          budget_.capped = true;
-          return best_;
-        }
-      }
-    }
+    const std::size_t first = LeafToBegin(found_.lower, 0);
+    std::size_t second = LeafToBegin(found_.upper, 1);
+    Visit(first);
+    if (budget_.leaves <= 0) second = first;  // is not visited, and not passed
+    if (second != first) Visit(second);
+    index_.num_nodes(1) <= kFewNodes ? VisitLeaves(first, second) : Descend();
     return best_;
   }
 
  private:
-  struct Level {
-    Pack floors, negated_ceilings;  // bounds of the children
-    std::size_t first_child;
-    unsigned left;  // a bit for each child that is not yet passed
-  };
+  static constexpr std::size_t kFewNodes = 8;  // over 2048 observations
 
   // Where the last search found the bound of one side; else by the child with the highest bound on every level.
   [[nodiscard]] std::size_t LeafToBegin(std::uint32_t found, std::size_t side) const {
     if (found < index_.num_leaves()) return found;
     std::size_t child = 0;
-    for (int level = index_.height(); level >= 1; --level) {
-      const Pack bounds = metric_.Node(index_.node(level, child), side);
-      child = child * kPackSize + TaggedLane(MaxLane(TagLanes(Max(bounds, Fill(-kMaxDouble)))));
-    }
+    for (int level = index_.height(); level >= 1; --level)
+      child = child * kPackSize + TaggedLane(MaxLane(TagLanes(metric_.Node(index_.node(level, child), side))));
     return child;
   }
 
@@ -162,49 +215,50 @@ class TreeSearch {
     if (best.floor > best_.floor) found_.lower = static_cast<std::uint32_t>(leaf);
     if (best.negated_ceiling > best_.negated_ceiling) found_.upper = static_cast<std::uint32_t>(leaf);
     best_ = best;
-    --leaves_;
+    --budget_.leaves;
   }
 
-  void Open(int level, std::size_t node) {
-    level_ = level;
-    Level& at = levels_[ToSize(level)];
-    at.floors = metric_.Node(index_.node(level, node), 0);
-    at.negated_ceilings = metric_.Node(index_.node(level, node), 1);
-    at.first_child = node * kPackSize;
-    at.left = level > 1 ? ~0u : ~(BitIn(node, first_) | BitIn(node, second_));
+  // Every leaf that may hold a better bound, of either side. Among few leaves, few do after the first.
+  void VisitLeaves(std::size_t first, std::size_t second) {
+    for (std::size_t node = 0; node < index_.num_nodes(1); ++node) {
+      const Pack floors = metric_.Node(index_.node(1, node), 0), ceilings = metric_.Node(index_.node(1, node), 1);
+      for (unsigned left = ~(BitIn(node, first) | BitIn(node, second)); (left &= Better(floors, ceilings)) != 0;
+           left &= left - 1) {
+        budget_.capped |= budget_.leaves <= 0;
+        if (budget_.leaves <= 0) return;
+        Visit(node * kPackSize + ToSize(std::countr_zero(left)));
+      }
+    }
+  }
+
+  // The more leaves there are, the farther the best is from where the last step had it.
+  void Descend() {
+    Descent<Metric, 0> floors(metric_, index_, best_.floor, found_.lower);
+    Descent<Metric, 1> ceilings(metric_, index_, best_.negated_ceiling, found_.upper);
+    for (bool more_floors = true, more_ceilings = true; more_floors || more_ceilings;) {
+      if (more_floors) more_floors = floors.Step(budget_);
+      if (more_ceilings) more_ceilings = ceilings.Step(budget_);
+    }
+    best_ = {floors.best(), ceilings.best()};
+    found_ = {floors.found(), ceilings.found()};
   }
 
   [[nodiscard]] static unsigned BitIn(std::size_t node, std::size_t leaf) {
     return static_cast<unsigned>(leaf / kPackSize == node) << leaf % kPackSize;
   }
 
-  // Of the children with these bits, the one whose bound exceeds the best of its side by most.
-  [[nodiscard]] std::size_t BestOf(unsigned better, const Level& at) const {
-    std::size_t best = 0;
-    for (double most = -kInfinity; better != 0; better &= better - 1) {
-      const auto lane = ToSize(std::countr_zero(better));
-      const double gain = Max(at.floors.at(lane) - best_.floor, at.negated_ceilings.at(lane) - best_.negated_ceiling);
-      best = gain > most ? lane : best;
-      most = Max(gain, most);
-    }
-    return best;
-  }
-
   // A bit for each child whose bound exceeds the best of its side. That of a missing child does not.
-  [[nodiscard]] unsigned Better(const Level& at) const {
+  [[nodiscard]] unsigned Better(const Pack& floors, const Pack& ceilings) const {
     const Lanes floor = AllLanes(best_.floor), ceiling = AllLanes(best_.negated_ceiling);
-    return BitsOf((at.floors.low > floor) | (at.negated_ceilings.low > ceiling)) |
-           BitsOf((at.floors.high > floor) | (at.negated_ceilings.high > ceiling)) << kLaneCount;
+    return BitsOf((floors.low > floor) | (ceilings.low > ceiling)) |
+           BitsOf((floors.high > floor) | (ceilings.high > ceiling)) << kLaneCount;
   }
 
   const Metric& metric_;
   const ObservationIndex& index_;
   FoundIn& found_;
   Budget& budget_;
-  int leaves_, level_ = 0;
-  std::size_t first_ = 0, second_ = 0;  // the leaves in which the search began, perhaps one
   Sides best_{-kInfinity, -kInfinity};
-  std::array<Level, ObservationIndex::kMaxHeight + 1> levels_;
 };
 
 }  // namespace forereach::internal

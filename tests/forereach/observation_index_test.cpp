@@ -150,8 +150,9 @@ TEST_P(Search, FindsTheTightestBoundOfAllObservations) {
 TEST_P(Search, WithACapIsWiderAndSaysSo) {
   TracedRandom random(740 + static_cast<std::uint64_t>(GetParam()));
   int capped = 0, wider = 0;
-  for (const int cap : {1, 1, 1, 1, 2, 3, 4}) {
-    const Data data = Make(random, 3000, GetParam(), 1);
+  for (const auto& [cap, count] :
+       {std::pair(1, 3000), {1, 300}, {1, 3000}, {1, 300}, {2, 3000}, {3, 3000}, {4, 3000}}) {
+    const Data data = Make(random, count, GetParam(), 1);
     const LipschitzEnvelope all = EnvelopeOf(data, {.max_leaf_visits = 1 << 20, .max_flat_blocks = kFlat});
     const LipschitzEnvelope some = EnvelopeOf(data, {.max_leaf_visits = cap, .max_flat_blocks = 0});
     for (int trial = 0; trial < 25; ++trial) {
