@@ -199,7 +199,7 @@ std::vector<Key> DeclarationKeys() {
       Optional(
           Map("declaration.affine",
               "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
-              "domain. Data bound M and b; L is not read there. For records without errors of states and inputs.",
+              "domain. Data bound M and b; L has no entries there. For records without errors of states and inputs.",
               ReadAffine),
           "none"),
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
