@@ -35,6 +35,7 @@ RobotMotion::RobotMotion(const Config& config, Braking braking)
   const NominalModel& model = *problem_->model;
   for (const Law& law : braking == Braking::kHardest && !laws.emergency_stop.empty() ? laws.emergency_stop : laws.stop)
     stops_.push_back(MakeStopLaw(model, laws, law));
+  if (!laws.back_off.empty()) back_off_.emplace(MakeStopLaw(model, laws, laws.back_off));
   if (!laws.hints.empty()) hints_.emplace(MakeHints(model, laws));
   if (laws.speed) speed_.emplace(MakeSpeed(model, laws));
 }
@@ -102,6 +103,22 @@ bool RobotMotion::Brake(std::span<const double> x, int tail, int max_steps, Eige
   }
   controls = Eigen::Map<const Eigen::MatrixXd>(steps.data(), static_cast<Eigen::Index>(inputs()),
                                                std::ssize(steps) / static_cast<Eigen::Index>(inputs()));
+  return controls.allFinite();
+}
+
+bool RobotMotion::BackOff(std::span<const double> x, int steps, int max_tail, Eigen::MatrixXd& controls) const {
+  const auto m = static_cast<Eigen::Index>(inputs());
+  Eigen::MatrixXd away(m, steps), tail;
+  std::vector<double> state(x.begin(), x.end()), next(x.size());
+  for (Eigen::Index t = 0; t < steps; ++t) {
+    const std::span<double> u(away.col(t).data(), inputs());
+    Control(*back_off_, state, u);
+    Step(state, u, next);
+    state.swap(next);
+  }
+  if (!Brake(state, 0, max_tail, tail)) return false;
+  controls.resize(m, steps + tail.cols());
+  controls << away, tail;
   return controls.allFinite();
 }
 

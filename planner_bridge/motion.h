@@ -54,6 +54,13 @@ class RobotMotion final {
   /** Sets x to the state in which the robot's hold mode leaves it: at rest at its position. */
   void Hold(std::span<double> x) const;
 
+  /** Whether there is a BackOff. */
+  [[nodiscard]] bool has_back_off() const { return back_off_.has_value(); }
+
+  /** The controls of planner.back_off from x for a number of steps, and then of a braking tail, as Brake. @pre
+  has_back_off(). */
+  [[nodiscard]] bool BackOff(std::span<const double> x, int steps, int max_tail, Eigen::MatrixXd& controls) const;
+
   /** The number of ways to brake. Way 0 is the first of the task; try it first. */
   [[nodiscard]] int num_tails() const { return static_cast<int>(stops_.size()); }
 
@@ -75,7 +82,7 @@ class RobotMotion final {
   std::vector<int> held_;
   std::vector<RestBound> at_rest_;
   std::vector<TextFunction> stops_;
-  std::optional<TextFunction> hints_, speed_;
+  std::optional<TextFunction> back_off_, hints_, speed_;
 };
 
 }  // namespace forereach

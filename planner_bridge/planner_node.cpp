@@ -24,6 +24,10 @@
 namespace forereach {
 namespace {
 
+constexpr double kStuckWithin = 0.1;  // s at cruise speed, the way of a robot that is stuck
+constexpr double kSamePlace = 1;      // s at cruise speed, between dead ends that count as one
+constexpr int kBackOffs = 3;          // candidates of a round that backs off
+
 Eigen::VectorXd HalfWidth(const Config& config) {
   const std::vector<double>& given = config.planner.initial_half_width;
   const int n = config.problem->model->num_states();
@@ -73,6 +77,7 @@ void PlannerNode::OnRobotState(const Received& received) {
   }
   if (finished_) return;
   Follow(*state);
+  if (!obstacles_.WhyUnknown(received.utime).empty()) place_.resize(0);  // this time does not count
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
       NextPlanIsDue(*state))
     BeginRound(*state, config_.planner.lead_steps, false);
@@ -92,11 +97,13 @@ bool PlannerNode::TakeOrder(const robot_state_t& state, std::int64_t now_us) {
   return true;
 }
 
+Eigen::VectorXd PlannerNode::PlaceOf(const robot_state_t& state) const {
+  return config_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
+}
+
 bool PlannerNode::IsAtGoal(const robot_state_t& state) const {
   const std::vector<double>& goal = config_.planner.goal;
-  const Eigen::VectorXd position =
-      config_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
-  return (position - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm() <=
+  return (PlaceOf(state) - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm() <=
          config_.planner.goal_radius;
 }
 
@@ -112,6 +119,16 @@ void PlannerNode::Follow(const robot_state_t& state) {
   else if (!round_ && !waiting_start_)
     plans_.clear();
   std::erase_if(withdrawn_, [this](const auto& withdrawn) { return !plans_.contains(withdrawn.first); });
+}
+
+// Whether rounds have begun at this place for long.
+bool PlannerNode::IsStuck(const robot_state_t& state) {
+  const Eigen::VectorXd place = PlaceOf(state);
+  if (place_.size() == 0 || (place - place_).norm() > kStuckWithin * config_.planner.cruise_speed) {
+    place_ = place;
+    there_since_ = state.utime;
+  }
+  return state.utime - there_since_ >= kStuckUs;
 }
 
 // Whether holding changes the state by no more than a candidate's X0 allows. A robot that is still coming to rest will
@@ -170,6 +187,22 @@ void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps
   ++(stops ? stopping_rounds_ : rounds_);
   round_ = Round{state.utime + lead_steps * period_us_, *center, HalfWidthFor(state),
                  Lessons(config_.planner, config_.problem->limits.size()), stops};
+  if (stops || !proposer_->motion().has_back_off() || !IsStuck(state)) return;
+  ++back_off_rounds_;
+  there_since_ = state.utime;
+  round_->back_off_steps = StepsBack();
+}
+
+// For how long it backs off from its place.
+int PlannerNode::StepsBack() {
+  const PlannerOptions& options = config_.planner;
+  const bool again = stuck_at_ && (place_ - *stuck_at_).norm() <= kSamePlace * options.cruise_speed;
+  doublings_ = again ? doublings_ + 1 : 0;
+  stuck_at_ = place_;
+  const int most = kMaxSteps - options.tail_steps;
+  int steps = std::min(options.progress_steps, most);
+  for (int i = 0; i < doublings_ && 2 * steps <= most; ++i) steps *= 2;
+  return steps;
 }
 
 // ---- Withdrawals.
@@ -243,8 +276,7 @@ void PlannerNode::EndRound(bool certified) {
 void PlannerNode::SearchOnce(std::int64_t now_us) {
   const std::int64_t takes_us =
       round_->stops ? Microseconds(config_.gate.decision_budget_ms) : Microseconds(config_.planner.time_limit_ms);
-  const int most = round_->stops ? hardest_.num_tails() : config_.planner.candidates;
-  if (round_->searches == most || now_us + takes_us >= round_->start_utime) return EndRound(false);
+  if (round_->searches == MostCandidates() || now_us + takes_us >= round_->start_utime) return EndRound(false);
   ++round_->searches;
   ++searches_;
   const std::optional<Proposal> proposal = Propose();
@@ -260,10 +292,21 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   plans_[candidate.plan_id] = candidate;
 }
 
+int PlannerNode::MostCandidates() const {
+  if (round_->stops) return hardest_.num_tails();
+  return round_->back_off_steps > 0 ? kBackOffs : config_.planner.candidates;
+}
+
 std::optional<Proposal> PlannerNode::Propose() {
-  if (!round_->stops) return proposer_->Propose(RequestOf(*round_));
+  if (!round_->stops && round_->back_off_steps == 0) return proposer_->Propose(RequestOf(*round_));
   Proposal proposal;
   const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
+  if (round_->back_off_steps > 0) {
+    proposal.progress_steps = std::max(round_->back_off_steps >> (round_->searches - 1), 1);
+    if (proposer_->motion().BackOff(state, proposal.progress_steps, config_.planner.tail_steps, proposal.controls))
+      return proposal;
+    return std::nullopt;
+  }
   if (!hardest_.Brake(state, round_->searches - 1, kMaxSteps, proposal.controls) || proposal.controls.cols() == 0)
     return std::nullopt;
   return proposal;
@@ -379,6 +422,7 @@ std::string PlannerNode::Summary() const {
                                          {"withdrawn", withdrawals_},
                                          {"rounds", rounds_},
                                          {"stopping_rounds", stopping_rounds_},
+                                         {"back_off_rounds", back_off_rounds_},
                                          {"rounds_without_certificate", fruitless_rounds_},
                                          {"searches_without_result", fruitless_searches_},
                                          {"messages_ignored", ignored_},

@@ -22,6 +22,10 @@ left until its start; the next state begins another round. With gate.obstacles b
 are known, and a round ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a
 time. After the robot has reached the goal, or has reported FINISHED, no round begins.
 
+With planner.back_off, a robot that stays where it is for kStuckUs backs off. The candidates of this round follow that
+law for progress_steps steps and then brake; for twice as many each time near the same place, so that it does not end in
+the same dead end for ever; for half as many after each refusal. Only the certifier selects them.
+
 If the executing plan is withdrawn, the round ends, and a stopping round begins at once, unless a certified plan takes
 over while the plan still stands. Its candidates start at the first boundary for which a decision is in time, and not
 after what stands. They have no progress part: they brake by planner.emergency_stop, in each of its ways in turn
@@ -71,9 +75,13 @@ class PlannerNode final : public Node {
   /** As many rounds in a row without a certificate are logged, with the causes and where to look. */
   static constexpr int kLostRounds = 20;
 
+  /** A robot that moves by less than a tenth of a second's way at cruise speed in this time is stuck. */
+  static constexpr std::int64_t kStuckUs = 2'000'000;
+
   /** One JSON object: proposed, certified, abstained and rejected (counts by cause), advised (abstentions from which it
   has learned by the certifier's advice), unanswered, withdrawn (plans),
-  rounds, stopping_rounds, rounds_without_certificate, searches_without_result, messages_ignored, messages_not_sent. */
+  rounds, stopping_rounds, back_off_rounds, rounds_without_certificate, searches_without_result, messages_ignored,
+  messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
  private:
@@ -81,7 +89,8 @@ class PlannerNode final : public Node {
     std::int64_t start_utime;
     Eigen::VectorXd center, half_width;  // of X_0
     Lessons lessons;
-    bool stops = false;  // a stopping round
+    bool stops = false;      // a stopping round
+    int back_off_steps = 0;  // of its first candidate; 0: it does not back off
     int searches = 0;
     std::int64_t awaited_plan = -1;            // the plan whose decision is outstanding, -1 if none
     std::optional<decision_t> unadvised = {};  // the abstention whose advice is outstanding
@@ -96,6 +105,7 @@ class PlannerNode final : public Node {
 
   [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
   [[nodiscard]] bool TakeOrder(const robot_state_t& state, std::int64_t now_us);
+  [[nodiscard]] Eigen::VectorXd PlaceOf(const robot_state_t& state) const;
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool IsAtRest(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
@@ -104,10 +114,13 @@ class PlannerNode final : public Node {
   [[nodiscard]] bool TakesOver(int valid_steps) const;
   void BeginStop(int valid_steps, std::int64_t now_us);
   [[nodiscard]] std::optional<Proposal> Propose();
+  [[nodiscard]] int MostCandidates() const;
   void Follow(const robot_state_t& state);
   [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;
   void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
+  [[nodiscard]] bool IsStuck(const robot_state_t& state);
+  [[nodiscard]] int StepsBack();
   void LogLostRounds() const;
   void SearchOnce(std::int64_t now_us);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
@@ -139,9 +152,14 @@ class PlannerNode final : public Node {
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
-               stopping_rounds_ = 0, withdrawals_ = 0, advised_ = 0, fruitless_rounds_ = 0, ignored_ = 0;
+               stopping_rounds_ = 0, back_off_rounds_ = 0, withdrawals_ = 0, advised_ = 0, fruitless_rounds_ = 0,
+               ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
   int lost_in_a_row_ = 0;                                     // rounds that searched and found no certificate
+  Eigen::VectorXd place_;                                     // in safety coordinates, empty: nowhere yet
+  std::int64_t there_since_ = 0;                              // its first round there, or its last to back off
+  std::optional<Eigen::VectorXd> stuck_at_;                   // the place where it last backed off
+  int doublings_ = 0;                                         // of the time for which it backs off there
 };
 
 }  // namespace forereach

@@ -50,6 +50,7 @@ void CheckLaws(const std::string& file, const TaskDraft& draft) {
   try {
     for (const auto* ways : {&laws.stop, &laws.emergency_stop})
       for (const Law& law : *ways) static_cast<void>(MakeStopLaw(model, laws, law));
+    if (!laws.back_off.empty()) static_cast<void>(MakeStopLaw(model, laws, laws.back_off));
     if (laws.speed) static_cast<void>(MakeSpeed(model, laws));
     static_cast<void>(MakeHints(model, laws));  // checks the definitions, too
   } catch (const ExpressionError& error) {
@@ -76,6 +77,12 @@ std::vector<Key> LawKeys() {
                     std::back_inserter(keys));
   std::ranges::move(
       std::vector<Key>{
+          Map("planner.back_off",
+              "How the robot leaves a dead end, as a car in reverse. If it stands and finds no plan for some time, it "
+              "moves under this law and stops by planner.stop, further each time near the same place. One expression "
+              "an input, of what planner.stop may use. Without it the robot stays where it is.",
+              [](const Field& at, TaskDraft& draft) { draft.config.laws.back_off = ReadLaw(at, draft); }),
+          Expression("planner.back_off.<input>", "The control, clipped to domain.input."),
           Map("planner.hints",
               "A good control for driving in a direction. Where there is room a plan follows it "
               "(planner.clearance_step); a search tries it more often than others. One expression an input, of what "

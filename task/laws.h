@@ -1,5 +1,5 @@
-/** How the planner brakes and steers, as expressions of a task file: the keys planner.stop, emergency_stop, hints,
-at_rest and let. */
+/** How the planner brakes and steers, as expressions of a task file: the keys planner.stop, emergency_stop,
+back_off, hints, at_rest and let. */
 #pragma once
 
 #include <optional>
@@ -18,6 +18,7 @@ struct Laws {
   std::vector<ModelText::Definition> definitions;  ///< For the laws, after those of the model.
   std::vector<Law> stop;                           ///< Ways to brake to rest, tried in turn.
   std::vector<Law> emergency_stop;                 ///< Those of a stop after a withdrawal. Empty: as `stop`.
+  Law back_off;                                    ///< The way out of a dead end. Empty: none is known.
   Law hints;                                       ///< A control towards the goal. Empty: none is known.
   std::optional<ExpressionText> speed;             ///< m/s, negative in reverse. Not set: that of the place, unsigned.
   /** Where a braking tail ends: |x_k| is at most its bound for each of these. Empty: a tail has no end, and is as long
@@ -34,8 +35,8 @@ inline constexpr const char *kDesiredHeading = "desired_heading", *kDesiredSpeed
 inline constexpr int kDesired = 3;
 ///@}
 
-/** The function of the state x whose values are the controls of a law that stops the robot. It may use states,
-parameters, and definitions that depend on these only.
+/** The function of the state x whose values are the controls of a law that stops the robot or backs off. It may use
+states, parameters, and definitions that depend on these only.
 @throws ExpressionError, std::invalid_argument as MakeProgram, if a definition or the law is wrong. */
 [[nodiscard]] TextFunction MakeStopLaw(const NominalModel& model, const Laws& laws, const Law& law);
 

@@ -110,6 +110,45 @@ INSTANTIATE_TEST_SUITE_P(Kinds, MeasuredRun,
                          testing::Values(std::pair("random", 1), std::pair("adversarial", 1),
                                          std::pair("adversarial", 2)));
 
+// A car that stands before a post and cannot turn away from it.
+Config DeadEnd() {
+  Config config = Bicycle();
+  Problem problem = *config.problem;
+  Eigen::VectorXd lower = problem.domain.state.lower();
+  lower[3] = -2;
+  problem.domain.state = Box(lower, problem.domain.state.upper());
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  config.obstacles = {Obstacle::Circle(Vec({3, 0.5}), 1.5)};
+  config.planner.goal = {30, 0};
+  config.gate.obstacles = ObstaclesSource::kTask;
+  config.planner.candidates = 4;
+  config.robot.time_limit_s = 40;
+  config.grounds = GroundsOf(DigestOf(std::string_view("dead end")), *config.problem, config.obstacles);
+  return config;
+}
+
+TEST(DeadEnd, ACarThatMayBackOffLeavesItAndReachesItsGoal) {
+  Config config = DeadEnd();
+  config.laws.back_off = {{"(min(max((-1.2 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
+  const Ending run = Drive(config);
+  SCOPED_TRACE(run.robot.dump() + run.planner.dump());
+  EXPECT_EQ(run.robot["goal_reached"], true);
+  EXPECT_EQ(run.robot["contacts"], 0);
+  EXPECT_GE(run.planner["back_off_rounds"], 1);
+  EXPECT_EQ(run.faults, 0);
+}
+
+TEST(DeadEnd, ACarThatMayNotStaysInIt) {
+  Config config = DeadEnd();
+  config.robot.time_limit_s = 4;
+  const Ending run = Drive(config);
+  SCOPED_TRACE(run.robot.dump() + run.planner.dump());
+  EXPECT_EQ(run.robot["goal_reached"], false);
+  EXPECT_EQ(run.robot["contacts"], 0);
+  EXPECT_EQ(run.planner["back_off_rounds"], 0);
+  EXPECT_GT(run.planner["rounds_without_certificate"], PlannerNode::kLostRounds);
+}
+
 // A certifier that knows nothing of the disturbance stops the robot: its data contradict each other.
 TEST(UndeclaredDisturbance, StopsTheRobotBecauseItsDataContradictTheDeclaration) {
   Config config = Task("adversarial", 1);

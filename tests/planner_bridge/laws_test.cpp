@@ -103,6 +103,21 @@ TEST(Laws, EachStopLawGivesATailOfItsOwn) {
   EXPECT_TRUE(controls.row(1).isZero(0));
 }
 
+TEST(Laws, ABackOffIsWhatItsLawDoesAndThenATail) {
+  Config config = Unicycle();
+  EXPECT_FALSE(RobotMotion(config, Braking::kPlanned).has_back_off());
+  config.laws.back_off = {{"(-0.5 - v)/dt"}, {"theta"}};
+  const RobotMotion motion(config, Braking::kPlanned);
+  ASSERT_TRUE(motion.has_back_off());
+  Eigen::MatrixXd controls;
+  ASSERT_TRUE(motion.BackOff(Span(Vec({0, 0, 2, 0, 0})), 3, 30, controls));
+  ASSERT_EQ(controls.cols(), 3 + 6);
+  EXPECT_TRUE(controls.row(0).head(3).isConstant(-1)) << "clipped";
+  EXPECT_TRUE(controls.row(0).tail(6).isApproxToConstant(0.5, 1e-9)) << controls;
+  EXPECT_EQ(controls(1, 0), 2) << "of theta";
+  EXPECT_FALSE(motion.BackOff(Span(Vec({0, 0, 2, 0, 0})), 3, 2, controls)) << "no tail is so short";
+}
+
 TEST(Laws, HintsReadTheDesiredSpeedAndHeading) {
   Config config = Unicycle();
   EXPECT_FALSE(RobotMotion(config, Braking::kPlanned).has_hints());

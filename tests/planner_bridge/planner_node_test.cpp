@@ -424,6 +424,67 @@ TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
   EXPECT_THAT(lose(30), Not(HasSubstr("without a certificate"))) << "it has been said";
 }
 
+class StuckPlannerTest : public PlannerNodeTest {
+ protected:
+  void SetUp() override {
+    Config config = Bicycle();
+    config.planner.candidates = 4;
+    config.laws.back_off = {{"(min(max((-0.4 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
+    Start(config);
+  }
+
+  // Stands at x for so long, and has no candidate certified.
+  void StandAt(double x, std::int64_t us) {
+    for (const std::int64_t end = now_ + us; now_ < end; now_ += kPeriod - 12'000) {
+      robot_state_t state = Standing();
+      state.sequence = sequence_++;
+      state.state[0] = x;
+      Tell(state);
+      for (int i = 0; i < 3; ++i) {
+        if (!candidates_.empty() && candidates_.back().utime + 3000 >= now_) AbstainS();
+        Run(3);
+      }
+    }
+  }
+  // The progress parts of the candidates that drive in reverse.
+  std::vector<int> StepsBack() {
+    std::vector<int> steps;
+    for (const candidate_plan_t& plan : candidates_)
+      if (Executing(plan, plan.num_steps).state[0] < plan.initial_center[0]) steps.push_back(plan.progress_steps);
+    return steps;
+  }
+
+  std::int64_t sequence_ = 0;
+};
+
+TEST_F(StuckPlannerTest, ARobotThatDoesNotMoveBacksOffLessAfterEachRefusalAndThenFurther) {
+  StandAt(0, PlannerNode::kStuckUs);
+  EXPECT_THAT(StepsBack(), IsEmpty());
+  StandAt(0, 200'000);
+  const int first = config_.planner.progress_steps;
+  EXPECT_THAT(StepsBack(), ElementsAre(first, first / 2, first / 4));
+  StandAt(0, PlannerNode::kStuckUs);
+  EXPECT_THAT(StepsBack(), ElementsAre(first, first / 2, first / 4, 2 * first, first, first / 2))
+      << "in between it searches";
+  EXPECT_EQ(Summary()["back_off_rounds"], 2);
+  StandAt(config_.planner.cruise_speed + 1, PlannerNode::kStuckUs + 200'000);
+  ASSERT_EQ(StepsBack().size(), 9u);
+  EXPECT_EQ(StepsBack()[6], first) << "another place";
+}
+
+TEST_F(StuckPlannerTest, WithoutALawItStaysWhereItIs) {
+  config_.laws.back_off.clear();
+  Start(config_);
+  StandAt(0, 2 * PlannerNode::kStuckUs);
+  EXPECT_THAT(StepsBack(), IsEmpty());
+  EXPECT_GT(candidates_.size(), 20u);
+}
+
+TEST_F(StuckPlannerTest, ARobotThatMovesIsNotStuck) {
+  for (int i = 0; i < 8; ++i) StandAt(i, PlannerNode::kStuckUs / 2);
+  EXPECT_THAT(StepsBack(), IsEmpty());
+}
+
 TEST_F(PlannerNodeTest, SendsNothingThatWouldComeTooLate) {
   robot_state_t state = Standing();
   Say(state);
