@@ -66,8 +66,11 @@ ObservationStore MakeStore(const Problem& problem, const Observations& observati
   options.max_observations = ToSize(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
   options.envelope.instructions = problem.instructions;
-  return ObservationStore(problem.declaration, WithoutAffineRows(problem.declaration, observations), lower, upper,
-                          options);
+  const auto make = [&](const Observations& known) {
+    return ObservationStore(problem.declaration, known, lower, upper, options);
+  };
+  if (problem.declaration.affine.rows.empty()) return make(observations);
+  return make(WithoutAffineRows(problem.declaration, observations));
 }
 
 Decision Falsified(int step, int coordinate, Cause cause = Cause::kPairwise) {
@@ -130,9 +133,27 @@ Certifier::Observed::Observed(const Problem& problem)
     : Observed(problem, (ValidateObservations(problem),
                          Observe(*problem.model, problem.declaration, problem.transitions, problem.timing))) {}
 
+int Certifier::Observed::Add(std::span<const double> z, const Observations& observation) {
+  const auto entries = [](const Eigen::MatrixXd& one_row) {
+    return std::span<const double>(one_row.data(), ToSize(one_row.size()));
+  };
+  const auto insert = [&](const Observations& one) {
+    return store.Insert(z, entries(one.lower), entries(one.upper)).id;
+  };
+  if (!affine) return insert(observation);
+  const int id = insert(WithoutAffineRows(affine->declaration(), observation));
+  if (id >= 0) affine->Add(id, z, entries(observation.lower), entries(observation.upper));
+  return id;
+}
+
+const AffineContradiction* Certifier::Observed::affine_contradiction() const {
+  if (known.violation() || !affine || !affine->contradiction()) return nullptr;
+  return &*affine->contradiction();
+}
+
 std::optional<Violation> Certifier::Observed::violation() const {
-  if (known.violation() || !affine || !affine->contradiction()) return known.violation();
-  return AsViolation(*affine->contradiction());
+  const AffineContradiction* const found = affine_contradiction();
+  return found ? AsViolation(*found) : known.violation();
 }
 
 namespace {
@@ -184,8 +205,8 @@ Transitions Certifier::Contradiction() const {
   };
   const auto [first, second] = std::minmax(violation_->first, violation_->second);
   std::vector<int> ids{first, second};
-  if (observed_ && !observed_->known.violation() && observed_->affine && observed_->affine->contradiction())
-    ids = observed_->affine->contradiction()->rows, std::ranges::sort(ids);
+  if (const AffineContradiction* const found = observed_ ? observed_->affine_contradiction() : nullptr)
+    ids = found->rows, std::ranges::sort(ids);
   for (const int id : ids) {
     if (id < 0) continue;
     if (id < given.size()) {
@@ -202,8 +223,7 @@ Transitions Certifier::Contradiction() const {
 }
 
 std::string Certifier::Unexcited() const {
-  std::string text;
-  if (!observed_ || !observed_->affine) return text;
+  if (!observed_ || !observed_->affine) return {};
   const AffineRows& affine = problem_->declaration.affine;
   for (const int k : affine.rows) {
     const AffineSet& set = observed_->affine->set(k);
@@ -212,7 +232,7 @@ std::string Certifier::Unexcited() const {
     return "the residual of " + problem_->model->state_names()[ToSize(k)] + " has no bound: " +
            (sum.empty() ? "its parameters are too uncertain" : sum + " is the same in all observations");
   }
-  return text;
+  return {};
 }
 
 // The store drops observations for want of room, but none with a contradiction among them. Affine rows keep all.
@@ -251,13 +271,8 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
                          std::optional<double> by_clock) {
   Observations observed;
   if (const Learned learned = Observe(*problem_, z, next, longer, observed); learned != Learned::kAdded) return learned;
-  const auto entries = [](const Eigen::MatrixXd& one_row) {
-    return std::span<const double>(one_row.data(), ToSize(one_row.size()));
-  };
-  const Observations by_slopes = WithoutAffineRows(problem_->declaration, observed);
-  const int id = observed_->store.Insert(z, entries(by_slopes.lower), entries(by_slopes.upper)).id;
+  const int id = observed_->Add(z, observed);
   if (id < 0) return Learned::kOutsideDomain;
-  if (observed_->affine) observed_->affine->Add(id, z, entries(observed.lower), entries(observed.upper));
   learned_.push_back({id, {z.begin(), z.end()}, {next.begin(), next.end()}, by_clock.value_or(longer)});
   observed_->known = observed_->store.snapshot();
   if (!too_fast_ && !rates_.bounds().empty()) too_fast_ = rates_.FindViolation(rates_.Shown(z, next, longer, true), id);

@@ -62,8 +62,7 @@ class Certifier final {
   than dt, at most, s. @param by_clock the same by its clock, where steps are declared to be on time and the clock does
   not count: for Contradiction alone. Do not call it while Certify runs. Cost: about a microsecond. If Compact has not
   been called for 256 transitions, it also builds an index; if it narrows an affine row, that is derived anew
-  (AffineSet::Derive). @pre no ResidualEnclosure was supplied. The same holds for
-  num_unindexed and Compact. */
+  (AffineSet::Derive). @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next, double longer = 0,
                 std::optional<double> by_clock = {});
   /** Number of learned transitions that are not in the index yet. */
@@ -149,7 +148,11 @@ class Certifier final {
     [[nodiscard]] const ResidualEnclosure& residual() const {
       return affine ? static_cast<const ResidualEnclosure&>(*affine) : known;
     }
+    // What contradicts affine rows, if no pair contradicts the others; or null.
+    [[nodiscard]] const AffineContradiction* affine_contradiction() const;
     [[nodiscard]] std::optional<Violation> violation() const;
+    // Adds one observation. Its id, negative outside the domain.
+    int Add(std::span<const double> z, const Observations& observation);
   };
 
   std::shared_ptr<const Problem> problem_;

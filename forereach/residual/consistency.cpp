@@ -99,11 +99,10 @@ std::optional<Violation> TestPair(const Declaration& declaration, const Observat
 
 std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations,
                                        const LipschitzEnvelope* envelope) {
-  for (int k = 0; k < observations.num_states(); ++k)
-    if (declaration.affine.Contains(k))
-      continue;
-    else if (const auto violation = TestRow(declaration, observations, k, envelope))
-      return violation;
+  for (int k = 0; k < observations.num_states(); ++k) {
+    if (declaration.affine.Contains(k)) continue;
+    if (const auto violation = TestRow(declaration, observations, k, envelope)) return violation;
+  }
   return std::nullopt;
 }
 
