@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <sstream>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -131,7 +132,7 @@ class Verifying final : public CertificateUser {
   struct Known {
     std::shared_ptr<const Problem> problem;
     std::unique_ptr<verifier::Verifier> verifier;
-    std::shared_ptr<const std::vector<ExecutedTransition>> learned;
+    std::shared_ptr<const std::vector<ExecutedTransition>> learned;  // for what waits; null: nothing does
   };
 
   verifier::Verifier& VerifierOf(const Basis& basis) {
@@ -146,8 +147,9 @@ class Verifying final : public CertificateUser {
   }
 
   void VerifyWaiting() {
-    for (const auto& [of, known] : known_)
-      if (known.learned) known.verifier->Learn(WithLearned(known.problem, *known.learned)->transitions);
+    for (auto& [of, known] : known_)
+      if (const auto learned = std::exchange(known.learned, nullptr))
+        known.verifier->Learn(WithLearned(known.problem, *learned)->transitions);
     ForEachInParallel(waiting_.size(), threads_, [&](std::size_t i, std::size_t) {
       auto& [recorded, verifier, verdict] = waiting_[i];
       verdict = verifier ? verifier->Verify(recorded.certificate)

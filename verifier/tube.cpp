@@ -428,6 +428,7 @@ std::optional<Bounds> TubeMaker::Affine::Enclose(const Query& query, std::size_t
 
 Real TubeMaker::Affine::Spread(const Query& query, std::size_t k) const {
   Real sum;
+  if (!rows[k]) return sum;
   for (std::size_t l = 0; l < query.slice.center.size(); ++l) sum += abs(Real(Slope(k, l))) * query.half_width[l];
   return sum;
 }
@@ -662,6 +663,7 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
 std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& affine) const {
   const Transitions& data = problem_.transitions;
   affine.rows.resize(ToSize(problem_.model->num_states()));
+  if (problem_.declaration.affine.rows.empty()) return std::nullopt;
   std::vector<int> kept;
   for (int i = 0; i < data.size(); ++i)
     if (known.Contains(i)) kept.push_back(i);
