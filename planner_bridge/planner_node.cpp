@@ -13,6 +13,7 @@
 
 #include "bus/log.h"
 #include "certifier/gate/advice_message.h"
+#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/directed.h"
@@ -70,8 +71,8 @@ void PlannerNode::OnRobotState(const Received& received) {
   const auto state = Decoded<robot_state_t>(received.bytes);
   const SoleSender::Place place = robot_.Hear(received.sender, received.utime);
   if (place == SoleSender::Place::kTakesOver) states_ = {};
-  if (place == SoleSender::Place::kOther || !state || !IsUsable(*state, received.utime) ||
-      !TakeOrder(*state, received.utime)) {
+  if (place == SoleSender::Place::kOther || !state ||
+      !TakeState(*state, config_.problem->model->num_states(), received.utime, config_.gate, states_)) {
     ++ignored_;
     return;
   }
@@ -81,20 +82,6 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
       NextPlanIsDue(*state))
     BeginRound(*state, config_.planner.lead_steps, false);
-}
-
-bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
-  return FaultOf(state, config_.problem->model->num_states()).empty() &&
-         CheckStamp(state.utime, now_us, config_.gate).freshness != Freshness::kFuture;
-}
-
-// True for a state that is neither late nor repeated.
-bool PlannerNode::TakeOrder(const robot_state_t& state, std::int64_t now_us) {
-  const StreamPosition position{state.sequence, state.utime};
-  const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(config_.gate.max_ahead_ms));
-  if (!IsNews(states_.Compare(position, horizon))) return false;
-  states_.Take(position, horizon);
-  return true;
 }
 
 Eigen::VectorXd PlannerNode::PlaceOf(const robot_state_t& state) const {
@@ -333,14 +320,8 @@ candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Roun
   SetText(candidate.source, kSource);
   candidate.start_utime = round.start_utime;
   candidate.step_us = period_us_;
-  candidate.num_states = static_cast<std::int16_t>(half_width_.size());
-  candidate.num_inputs = static_cast<std::int16_t>(proposal.controls.rows());
-  candidate.num_steps = static_cast<std::int16_t>(proposal.controls.cols());
+  SetPlan(candidate, round.center, round.half_width, proposal.controls);
   candidate.progress_steps = static_cast<std::int16_t>(proposal.progress_steps);
-  std::copy(round.center.begin(), round.center.end(), candidate.initial_center);
-  std::ranges::copy(round.half_width, candidate.initial_half_width);
-  for (int t = 0; t < candidate.num_steps; ++t)
-    for (int k = 0; k < candidate.num_inputs; ++k) candidate.control[t][k] = proposal.controls(k, t);
   return candidate;
 }
 

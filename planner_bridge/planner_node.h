@@ -103,8 +103,6 @@ class PlannerNode final : public Node {
   void OnWithdrawn(const Received& received);
   void OnObstacles(const Received& received);
 
-  [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
-  [[nodiscard]] bool TakeOrder(const robot_state_t& state, std::int64_t now_us);
   [[nodiscard]] Eigen::VectorXd PlaceOf(const robot_state_t& state) const;
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool IsAtRest(const robot_state_t& state) const;

@@ -4,13 +4,13 @@
 
 #include <pybind11/stl.h>
 
+#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
-#include "lcmtypes/stream_order.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/judgement.h"
@@ -37,7 +37,7 @@ class PlannerBus final {
       const auto decision = Decoded<decision_t>(received.bytes);
       if (decision && GetText(decision->source) == source_) decisions_.push_back(*decision);
     });
-    opened_.bus().Subscribe(channels.robot_state, [this](const Received& received) { TakeState(received); });
+    opened_.bus().Subscribe(channels.robot_state, [this](const Received& received) { OnState(received); });
   }
 
   std::int64_t Propose(const py::object& controls, const py::object& x0, std::int64_t start,
@@ -54,15 +54,10 @@ class PlannerBus final {
     SetText(candidate.source, source_);
     candidate.start_utime = start;
     candidate.step_us = Microseconds(task_->config().robot.step_period_ms);
-    candidate.num_states = static_cast<std::int16_t>(center.size());
-    candidate.num_inputs = static_cast<std::int16_t>(plan.rows());
-    candidate.num_steps = static_cast<std::int16_t>(plan.cols());
+    SetPlan(candidate, center, width, plan);
     if (progress && (*progress < 0 || *progress > plan.cols()))
       throw std::invalid_argument("progress_steps: " + std::to_string(*progress) + ", must be 0 to the steps of U");
     candidate.progress_steps = static_cast<std::int16_t>(progress.value_or(candidate.num_steps));
-    std::ranges::copy(center, candidate.initial_center);
-    std::ranges::copy(width, candidate.initial_half_width);
-    for (Eigen::Index t = 0; t < plan.cols(); ++t) std::ranges::copy(plan.col(t), candidate.control[t]);
     opened_.Send(opened_.config().bus.candidate, Encode(candidate));
     ++proposed_;
     return candidate.plan_id;
@@ -96,17 +91,10 @@ class PlannerBus final {
   }
 
  private:
-  void TakeState(const Received& received) {
+  void OnState(const Received& received) {
     const auto state = Decoded<robot_state_t>(received.bytes);
-    const GateOptions& gate = task_->config().gate;
-    if (!state || !FaultOf(*state, task_->model().num_states()).empty() ||
-        CheckStamp(state->utime, received.utime, gate).freshness == Freshness::kFuture)
-      return;
-    const StreamPosition position{state->sequence, state->utime};
-    const std::int64_t horizon = StreamOrder::Horizon(received.utime, Microseconds(gate.max_ahead_ms));
-    if (!IsNews(order_.Compare(position, horizon))) return;
-    order_.Take(position, horizon);
-    state_ = state;
+    if (state && TakeState(*state, task_->model().num_states(), received.utime, task_->config().gate, states_))
+      state_ = state;
   }
 
   const std::shared_ptr<const JudgingTask> task_;
@@ -114,7 +102,7 @@ class PlannerBus final {
   const std::string source_;
   std::deque<decision_t> decisions_;
   std::optional<robot_state_t> state_;
-  StreamOrder order_;
+  StreamOrder states_;
   std::int64_t proposed_ = 0, last_plan_id_ = 0;
 };
 

@@ -20,6 +20,16 @@ Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule) {
   return {candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs, schedule};
 }
 
+void SetPlan(candidate_plan_t& candidate, const Eigen::VectorXd& center, const Eigen::VectorXd& half_width,
+             const Eigen::MatrixXd& controls) {
+  candidate.num_states = static_cast<std::int16_t>(center.size());
+  candidate.num_inputs = static_cast<std::int16_t>(controls.rows());
+  candidate.num_steps = candidate.progress_steps = static_cast<std::int16_t>(controls.cols());
+  std::ranges::copy(center, candidate.initial_center);
+  std::ranges::copy(half_width, candidate.initial_half_width);
+  for (Eigen::Index t = 0; t < controls.cols(); ++t) std::ranges::copy(controls.col(t), candidate.control[t]);
+}
+
 Schedule ScheduleOf(const candidate_plan_t& candidate, const GateOptions& options) {
   if (!options.max_clock_error_ms) return {};
   return {candidate.start_utime, candidate.step_us, ScheduleErrorUs(options)};

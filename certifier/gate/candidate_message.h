@@ -18,6 +18,11 @@ namespace forereach {
 Certifier::Require to say. */
 [[nodiscard]] Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule = {});
 
+/** Sets the numbers of a plan: X_0 by its center and half-widths, n entries each, and u_0 .. u_{T-1}, m-by-T. None of
+them is of a braking tail: progress_steps is T. @pre HasSizes then holds. */
+void SetPlan(candidate_plan_t& candidate, const Eigen::VectorXd& center, const Eigen::VectorXd& half_width,
+             const Eigen::MatrixXd& controls);
+
 /** Whether the candidate has the model's states and inputs, and 1 to kMaxSteps steps: whether its numbers may be read.
  */
 [[nodiscard]] bool HasSizes(const candidate_plan_t& candidate, const NominalModel& model);

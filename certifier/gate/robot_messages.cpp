@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "certifier/gate/stamp.h"
 #include "forereach/certify/learned.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/text.h"
@@ -23,6 +24,17 @@ std::string FaultOf(const robot_state_t& state, int num_states) {
   if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
     return fmt::format("unknown mode {}", state.mode);
   return {};
+}
+
+bool TakeState(const robot_state_t& state, int num_states, std::int64_t now_us, const GateOptions& options,
+               StreamOrder& states) {
+  if (!FaultOf(state, num_states).empty() || CheckStamp(state.utime, now_us, options).freshness == Freshness::kFuture)
+    return false;
+  const StreamPosition position{state.sequence, state.utime};
+  const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(options.max_ahead_ms));
+  if (!IsNews(states.Compare(position, horizon))) return false;
+  states.Take(position, horizon);
+  return true;
 }
 
 std::string WiderThanDeclared(const robot_state_t& state, const Problem& problem) {

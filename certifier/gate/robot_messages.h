@@ -1,13 +1,15 @@
 /** Checks of what a robot sends: its state, and executed transitions as a certifier learns them. */
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "forereach/certify/problem.h"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
-#include "lcmtypes/angle.h"
+#include "lcmtypes/stream_order.h"
+#include "task/gate_options.h"
 
 namespace forereach {
 
@@ -15,6 +17,11 @@ namespace forereach {
 not one for each state, negative or not finite, an unknown mode. Empty if it is usable. It does not check the stamp
 (stamp.h). */
 [[nodiscard]] std::string FaultOf(const robot_state_t& state, int num_states);
+
+/** Takes a state as the newest of its stream: true if it is usable, not from the future (stamp.h), and neither late nor
+repeated. */
+[[nodiscard]] bool TakeState(const robot_state_t& state, int num_states, std::int64_t now_us,
+                             const GateOptions& options, StreamOrder& states);
 
 /** Why a certifier does not take a state for known: an error of it is larger than the declared one, which its
 certificates and its comparison with the slices rest on. Empty if none is. @pre FaultOf is empty. */
