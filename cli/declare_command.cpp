@@ -4,7 +4,6 @@
 #include <iostream>
 #include <sstream>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -33,7 +32,7 @@ struct DeclareArguments {
   std::string noise = "declared", disturbance = "estimated";
   DataCommand data;
   SlopeBoundOptions search;
-  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+  unsigned jobs = AllCores();
 };
 
 // A residual of the model, as a task file may write it.

@@ -6,7 +6,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -26,7 +25,7 @@ namespace forereach {
 
 /** The options of such a command. */
 struct EachRunOptions {
-  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+  unsigned jobs = AllCores();
   std::string resume;  ///< The directory of FinishedRuns; empty for none.
 
   void AddTo(std::vector<Option>& options) {

@@ -8,13 +8,13 @@
 #include <numeric>
 #include <ranges>
 #include <set>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "forereach/certify/explain.h"
 #include "forereach/fault_t.hpp"
+#include "forereach/numerics/parallel.h"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
 #include "page/detail.h"
@@ -352,7 +352,7 @@ PageRun EmptyPage(const std::vector<std::string>& inputs) {
 
 PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
                    const DetailBounds& bounds) {
-  const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+  const unsigned threads = AllCores();
   NamedRuns named = RunsNamedBy(inputs, threads);
   const PageTasks tasks{config, key, RunTasks(config, key, named.is_many)};
   PageRun page = EmptyPage(inputs);

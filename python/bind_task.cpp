@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <iterator>
-#include <thread>
 
 #include <pybind11/stl.h>
 
 #include "forereach/numerics/directed.h"
+#include "forereach/numerics/parallel.h"
 #include "identify/declare_by.h"
 #include "identify/declare_data.h"
 #include "identify/fit.h"
@@ -85,8 +85,7 @@ Judgements CertifyPlans(const JudgingTask& task, const py::object& controls, con
   std::vector<Eigen::MatrixXd> plans = ManyControlsOf(controls);
   std::vector<Box> sets = BoxesOf(x0);
   const py::gil_scoped_release release;
-  return task.Certify(std::move(plans), std::move(sets),
-                      threads.value_or(std::max(1u, std::thread::hardware_concurrency())));
+  return task.Certify(std::move(plans), std::move(sets), threads.value_or(AllCores()));
 }
 
 std::string AddObservation(JudgingTask& task, const py::object& z, const py::object& next) {
@@ -185,7 +184,7 @@ py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, do
     try {
       const Observations observations = ObserveForProposal(*problem, problem->transitions);
       Declaration declaration = Propose(problem->declaration, observations, options).declaration;
-      held_out = JudgeByHeldOut(task.config(), declaration, std::max(1u, std::thread::hardware_concurrency()));
+      held_out = JudgeByHeldOut(task.config(), declaration, AllCores());
       return declaration;
     } catch (const Unexplained& unexplained) {
       throw ConfigError(task.config().path + ": " + Explain(unexplained, task.config(), options));

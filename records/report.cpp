@@ -8,7 +8,6 @@
 #include <optional>
 #include <ostream>
 #include <set>
-#include <thread>
 #include <utility>
 
 #include <fmt/core.h>
@@ -16,6 +15,7 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
+#include "forereach/numerics/parallel.h"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/printable.h"
 #include "records/log_tasks.h"
@@ -31,8 +31,7 @@ constexpr double kBetweenBodies = 4;  // metres of the path from one drawn body 
 
 class PictureMaker final : public TimelineUser, CaseJudge {
  public:
-  explicit PictureMaker(const BusOptions& channels)
-      : CaseJudge(std::max(1u, std::thread::hardware_concurrency())), channels_(channels) {}
+  explicit PictureMaker(const BusOptions& channels) : CaseJudge(AllCores()), channels_(channels) {}
 
   void OnStart(const Config& task) override {
     now_ = &task;
@@ -210,7 +209,7 @@ bool Report(const ReportOptions& options, std::ostream& out) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
   const RunTasks of_runs(options.config, options.key, false);
-  const NamedRuns named = RunsNamedBy(options.logs, std::max(1u, std::thread::hardware_concurrency()));
+  const NamedRuns named = RunsNamedBy(options.logs, AllCores());
   const std::vector<std::string>& logs = OnlyRun(named).logs;
   LogTasks tasks = of_runs.Of(logs);
   tasks.RequirePlans();

@@ -13,6 +13,9 @@
 
 namespace forereach {
 
+/** The number of threads that this machine runs at once, 1 if it does not say. */
+inline unsigned AllCores() { return std::max(1u, std::thread::hardware_concurrency()); }
+
 /** Calls work(i, thread) once for each i < count, in no fixed order, on min(threads, count) threads. `thread` is the
 number of the calling thread; the caller's own is 0. After an exception no further i is started, and the last exception
 is rethrown.
