@@ -72,6 +72,22 @@ class PlansInForceTest : public testing::Test {
     const auto due = plans_.TakeDue(now_, now_);
     return due ? std::optional(due->message) : std::nullopt;
   }
+  // The withdrawal of a plan that was certified under one task, as this is read again and is another.
+  std::optional<withdrawal_t> WithdrawnByReload(const Config& before, const Config& after) {
+    Gate gate(before);
+    PlanLedger plans(config_.gate, now_);
+    obstacles_t message = ToMessage({}, now_);
+    message.sequence = sequence_++;
+    EXPECT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
+    plans.Judge(gate, now_);
+    const auto certified = gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified;
+    plans.Add(certified.value(), now_);
+    Gate reloaded(after);
+    reloaded.Inherit(gate);
+    plans.Judge(reloaded, now_);
+    const auto due = plans.TakeDue(now_, now_);
+    return due ? std::optional(due->message) : std::nullopt;
+  }
   // The greatest px of slice t of the plan, by its certificate.
   static double Reach(const certified_plan_t& certified, int t) { return certified.slice_upper[t][0]; }
 
@@ -151,22 +167,10 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
       config.grounds.config = DigestOf("a period of " + std::to_string(period));
       return config;
     };
-    Gate gate(with_period(0.15));
-    PlanLedger plans(config_.gate, now_);
-    obstacles_t message = ToMessage({}, now_);
-    message.sequence = sequence_++;
-    ASSERT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
-    plans.Judge(gate, now_);
-    const auto certified = gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified;
-    ASSERT_TRUE(certified);
-    plans.Add(*certified, now_);
-    Gate reloaded(with_period(0.1));
-    reloaded.Inherit(gate);
-    plans.Judge(reloaded, now_);
-    const auto due = plans.TakeDue(now_, now_);
+    const auto due = WithdrawnByReload(with_period(0.15), with_period(0.1));
     ASSERT_TRUE(due);
-    EXPECT_EQ(due->message.cause, withdrawal_t::NOT_JUDGED);
-    EXPECT_EQ(due->message.valid_steps, 0);
+    EXPECT_EQ(due->cause, withdrawal_t::NOT_JUDGED);
+    EXPECT_EQ(due->valid_steps, 0);
   }
 }
 
@@ -192,23 +196,11 @@ TEST_F(PlansInForceTest, APlanStandsUnderANewTaskOnlyIfItsGuardUpholdsWhatThatRe
                      {5, 6, 0.01, 0.0101, false}};
   for (const auto& [before_ms, after_ms, before_m, after_m, stands] : cases) {
     SCOPED_TRACE(fmt::format("{} {} {} {}", before_ms, after_ms, before_m, after_m));
-    Gate gate(with(before_ms, before_m));
-    PlanLedger plans(config_.gate, now_);
-    obstacles_t message = ToMessage({}, now_);
-    message.sequence = sequence_++;
-    ASSERT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
-    plans.Judge(gate, now_);
-    const auto certified = gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified;
-    ASSERT_TRUE(certified);
-    plans.Add(*certified, now_);
-    Gate reloaded(with(after_ms, after_m));
-    reloaded.Inherit(gate);
-    plans.Judge(reloaded, now_);
-    const auto due = plans.TakeDue(now_, now_);
+    const auto due = WithdrawnByReload(with(before_ms, before_m), with(after_ms, after_m));
     EXPECT_EQ(due.has_value(), !stands);
     if (!due) continue;
-    EXPECT_EQ(due->message.cause, withdrawal_t::NOT_JUDGED);
-    EXPECT_EQ(due->message.valid_steps, 0);
+    EXPECT_EQ(due->cause, withdrawal_t::NOT_JUDGED);
+    EXPECT_EQ(due->valid_steps, 0);
   }
 }
 
