@@ -61,13 +61,13 @@ void ValidateObservations(const Problem& problem) {
 
 // The domain's box over z = (x, u) envelops every query.
 ObservationStore MakeStore(const Problem& problem, const Observations& observations) {
-  const auto [lower, upper] = problem.domain.Corners();
+  const auto corners = problem.domain.Corners();
   StoreOptions options;
   options.max_observations = ToSize(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
   options.envelope.instructions = problem.instructions;
   const auto make = [&](const Observations& known) {
-    return ObservationStore(problem.declaration, known, lower, upper, options);
+    return ObservationStore(problem.declaration, known, corners.first, corners.second, options);
   };
   if (problem.declaration.affine.rows.empty()) return make(observations);
   return make(WithoutAffineRows(problem.declaration, observations));
