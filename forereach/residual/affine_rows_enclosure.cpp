@@ -21,22 +21,25 @@ AffineRowsEnclosure::AffineRowsEnclosure(const Declaration& declaration, const O
   for (int i = 0; i < observations.size(); ++i) {
     const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
                           upper = observations.upper.row(i);
-    Insert(i, View(z), View(lower), View(upper));
+    for (std::size_t s = 0; s < sets_.size(); ++s) {
+      const Interval value = Observed(s, View(lower), View(upper));
+      sets_[s].Add(i, View(z), value.lower, value.upper);
+    }
   }
-  for (std::size_t i = 0; i < sets_.size(); ++i) Derive(i);
-}
-
-void AffineRowsEnclosure::Insert(int id, std::span<const double> z, std::span<const double> lower,
-                                 std::span<const double> upper) {
-  for (std::size_t i = 0; i < sets_.size(); ++i) {
-    const int k = declaration_.affine.rows[i];
-    const double error = declaration_.ObservationError(k);
-    sets_[i].Add(id, z, SubDown(lower[ToSize(k)], error), AddUp(upper[ToSize(k)], error));
+  for (std::size_t s = 0; s < sets_.size(); ++s) {
+    sets_[s].Derive();
+    TakeContradiction(s);
   }
 }
 
-void AffineRowsEnclosure::Derive(std::size_t i) {
-  sets_[i].Derive();
+Interval AffineRowsEnclosure::Observed(std::size_t i, std::span<const double> lower,
+                                       std::span<const double> upper) const {
+  const int k = declaration_.affine.rows[i];
+  const double error = declaration_.ObservationError(k);
+  return {SubDown(lower[ToSize(k)], error), AddUp(upper[ToSize(k)], error)};
+}
+
+void AffineRowsEnclosure::TakeContradiction(std::size_t i) {
   if (contradiction_ || !sets_[i].contradiction()) return;
   contradiction_ = sets_[i].contradiction();
   contradiction_->coordinate = declaration_.affine.rows[i];
@@ -44,9 +47,11 @@ void AffineRowsEnclosure::Derive(std::size_t i) {
 
 void AffineRowsEnclosure::Add(int id, std::span<const double> z, std::span<const double> lower,
                               std::span<const double> upper) {
-  Insert(id, z, lower, upper);
-  for (std::size_t i = 0; i < sets_.size(); ++i)
-    if (sets_[i].MayNarrow()) Derive(i);
+  for (std::size_t i = 0; i < sets_.size(); ++i) {
+    const Interval value = Observed(i, lower, upper);
+    sets_[i].Learn(id, z, value.lower, value.upper);
+    TakeContradiction(i);
+  }
 }
 
 const AffineSet& AffineRowsEnclosure::set(int k) const {

@@ -29,8 +29,8 @@ class AffineRowsEnclosure final : public ResidualEnclosure {
 
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
-  /** Adds an observation; the rest is not to be called meanwhile. Cost: O(vertices), and AffineSet::Derive if it
-  narrows. @param lower, upper n entries: enclosures of the observed residual. */
+  /** Adds an observation; the rest is not to be called meanwhile. Cost: AffineSet::Learn for each affine row. @param
+   * lower, upper n entries: enclosures of the observed residual. */
   void Add(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
   [[nodiscard]] const std::optional<AffineContradiction>& contradiction() const { return contradiction_; }
@@ -39,8 +39,8 @@ class AffineRowsEnclosure final : public ResidualEnclosure {
   [[nodiscard]] const Declaration& declaration() const { return declaration_; }
 
  private:
-  void Insert(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
-  void Derive(std::size_t i);
+  [[nodiscard]] Interval Observed(std::size_t i, std::span<const double> lower, std::span<const double> upper) const;
+  void TakeContradiction(std::size_t i);
 
   Declaration declaration_;
   const ResidualEnclosure& others_;

@@ -115,7 +115,7 @@ void AffineSet::Add(int id, std::span<const double> z, double lower, double uppe
   size_of_values_ = std::max({size_of_values_, std::abs(lower), std::abs(upper)});
 }
 
-bool AffineSet::MayNarrow() const {
+bool AffineSet::LatestMayNarrow() const {
   if (!is_bounded_) return true;
   const auto last = ids_.size() - 1;
   return std::ranges::any_of(vertices_, [&](const Vertex& vertex) {
@@ -124,8 +124,9 @@ bool AffineSet::MayNarrow() const {
   });
 }
 
-// The rows that are farthest from the span of those before them, in columns that are scaled to the data's spread.
-bool AffineSet::ChooseBasis(Basis& basis) {
+// The rows that are farthest from the span of those before them, in columns that are scaled to the data's spread (a
+// column without any is taken for zero); how many there are.
+std::size_t AffineSet::ChooseBasis(Basis& basis) {
   const std::size_t count = ids_.size(), q = size_;
   unexcited_.clear();
   std::vector<double> middle(q - 1), spread(q - 1), rows(count * q);
@@ -135,11 +136,7 @@ bool AffineSet::ChooseBasis(Basis& basis) {
       least = std::min(least, phi_[i * q + l]), most = std::max(most, phi_[i * q + l]);
     middle[l] = least / 2 + most / 2;
     spread[l] = most / 2 - least / 2;
-    if (!(spread[l] > kFlat * std::abs(middle[l])) || !(spread[l] > 0)) {
-      unexcited_.assign(q - 1, 0);
-      unexcited_[l] = 1;
-      return false;
-    }
+    if (!(spread[l] > kFlat * std::abs(middle[l]))) spread[l] = kInfinity;
   }
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t l = 0; l + 1 < q; ++l) rows[i * q + l] = (phi_[i * q + l] - middle[l]) / spread[l];
@@ -164,7 +161,7 @@ bool AffineSet::ChooseBasis(Basis& basis) {
     for (std::size_t l = 0; l < q; ++l) unit[l] = rows[farthest * q + l] / std::sqrt(most);
     units.push_back(unit);
   }
-  if (units.size() == q) return true;
+  if (units.size() == q) return q;
   // What is left of the axis that is farthest from the span is orthogonal to all rows.
   Vector normal{};
   double longest = 0;
@@ -178,9 +175,12 @@ bool AffineSet::ChooseBasis(Basis& basis) {
     if (const double square = Dot({left.data(), q}, left.data()); square > longest) longest = square, normal = left;
   }
   double largest = 0;
-  for (std::size_t l = 0; l + 1 < q; ++l) largest = std::max(largest, std::abs(normal[l] /= spread[l]));
+  for (std::size_t l = 0; l + 1 < q; ++l) {
+    if (spread[l] < kInfinity) normal[l] /= spread[l];
+    largest = std::max(largest, std::abs(normal[l]));
+  }
   for (std::size_t l = 0; l + 1 < q; ++l) unexcited_.push_back(largest > 0 ? normal[l] / largest : 0);
-  return false;
+  return units.size();
 }
 
 bool AffineSet::BoundParameters(const Basis& basis) {
@@ -379,8 +379,23 @@ void AffineSet::Derive() {
   vertices_.clear();
   active_.clear();
   Basis basis{};
-  if (ids_.empty() || !ChooseBasis(basis) || !BoundParameters(basis)) return;
-  vertices_.push_back({basis, {}});
+  const std::size_t rank = ids_.empty() ? 0 : ChooseBasis(basis);
+  if (rank == size_ && BoundParameters(basis)) FindVertices(basis);
+  if (!is_bounded_) {
+    active_.assign(basis.begin(), basis.begin() + std::ptrdiff_t(rank));
+    active_.insert(active_.end(), all_.end() - std::ptrdiff_t(std::min(all_.size(), kMostKept / 2)), all_.end());
+    SortActive();
+  }
+  Forget();
+}
+
+void AffineSet::SortActive() {
+  std::ranges::sort(active_);
+  active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
+}
+
+void AffineSet::FindVertices(const Basis& start) {
+  vertices_.push_back({start, {}});
   for (const Vector& direction : Directions()) {
     const Climb found = Search(direction, all_, Nearest(direction), kMostSteps);
     if (found.contradicted >= 0 && Prove(found)) return;
@@ -391,12 +406,43 @@ void AffineSet::Derive() {
     vertices_.push_back({found.basis, found.theta});
     active_.insert(active_.end(), found.basis.begin(), found.basis.begin() + std::ptrdiff_t(size_));
   }
-  std::ranges::sort(active_);
-  active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
+  SortActive();
   if (all_.size() <= kFew) active_ = all_;
   SetHull();
   is_bounded_ = std::all_of(hull_.begin(), hull_.begin() + std::ptrdiff_t(size_),
                             [](const Interval& range) { return range.IsFinite(); });
+}
+
+void AffineSet::Learn(int id, std::span<const double> z, double lower, double upper) {
+  if (contradiction_) return;
+  const std::size_t before = ids_.size();
+  Add(id, z, lower, upper);
+  if (ids_.size() == before) return;
+  if (LatestMayNarrow()) return Derive();
+  Forget();
+}
+
+// Leaves what is not active: a query finds the same as before.
+void AffineSet::Forget() {
+  if (ids_.size() <= kMostKept) return;
+  std::vector<int> place(ids_.size());
+  for (std::size_t kept = 0; kept < active_.size(); ++kept) {
+    const auto i = ToSize(active_[kept]);
+    place[i] = static_cast<int>(kept);
+    for (std::size_t l = 0; l < size_; ++l) phi_[kept * size_ + l] = phi_[i * size_ + l];
+    lower_[kept] = lower_[i];
+    upper_[kept] = upper_[i];
+    ids_[kept] = ids_[i];
+  }
+  const std::size_t kept = active_.size();
+  phi_.resize(kept * size_);
+  lower_.resize(kept);
+  upper_.resize(kept);
+  ids_.resize(kept);
+  all_.resize(kept);
+  active_ = all_;
+  for (Vertex& vertex : vertices_)
+    for (std::size_t j = 0; j < size_; ++j) vertex.basis[j] = place[ToSize(vertex.basis[j])];
 }
 
 Interval AffineSet::Enclose(std::span<const double> at) const noexcept {

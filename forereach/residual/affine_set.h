@@ -38,11 +38,16 @@ class AffineSet final {
 
   /** Adds an observation, without a Derive. An interval that is not finite says nothing. */
   void Add(int id, std::span<const double> z, double lower, double upper);
-  /** Whether the last observation may narrow what Derive found: if not, Derive changes nothing that is bounded. */
-  [[nodiscard]] bool MayNarrow() const;
-  /** Derives contradiction, hull, slope and the vertices from which queries start. Cost: about 100 linear programs of
-  the observations and q unknowns; a millisecond for some hundred observations. */
+  /** Derives contradiction, hull, slope and the vertices from which queries start. Of more than kMostKept observations
+  those are kept that decide at a vertex, or, where A is not bounded, that span what they excite, and the latest: a
+  bound by some of them holds, and no Learn takes longer for all that was learned before. Cost: about 100 linear
+  programs of the observations and q unknowns; a millisecond for some hundred observations. */
   void Derive();
+  /** Adds an observation to those of Derive. Cost: O(vertices), and Derive if the observation disagrees with one. */
+  void Learn(int id, std::span<const double> z, double lower, double upper);
+
+  static constexpr std::size_t kMostKept = 2048;
+  [[nodiscard]] std::size_t num_kept() const { return ids_.size(); }
 
   /** The observations of a proof that A is empty, if Derive found one. */
   [[nodiscard]] const std::optional<AffineContradiction>& contradiction() const { return contradiction_; }
@@ -81,7 +86,7 @@ class AffineSet final {
   };
 
   [[nodiscard]] std::span<const double> phi(int i) const { return {&phi_[static_cast<std::size_t>(i) * size_], size_}; }
-  [[nodiscard]] bool ChooseBasis(Basis& basis);
+  [[nodiscard]] std::size_t ChooseBasis(Basis& basis);
   [[nodiscard]] bool BoundParameters(const Basis& basis);
   void Perturb(const Vector& weights, const Basis& basis, Vector& direction) const noexcept;
   [[nodiscard]] Climb Search(const Vector& direction, std::span<const int> rows, const Basis& start,
@@ -91,13 +96,17 @@ class AffineSet final {
   [[nodiscard]] std::vector<Vector> Directions() const;
   [[nodiscard]] bool Prove(const Climb& found);
   void SetHull();
+  void FindVertices(const Basis& start);
+  void SortActive();
+  [[nodiscard]] bool LatestMayNarrow() const;
+  void Forget();
 
   std::vector<int> columns_;
   std::size_t size_;  // q
   std::vector<double> domain_lower_, domain_upper_;
   std::vector<double> phi_, lower_, upper_;  // q, one and one entries for each observation
   std::vector<int> ids_;
-  std::vector<int> all_, active_;  // of the observations: all, and those that a query looks at
+  std::vector<int> all_, active_;  // of the observations: all, and those that a query looks at or Forget keeps
   std::vector<Vertex> vertices_;
   Vector limit_{}, slope_{}, reach_{};
   std::array<Interval, kMostUnknowns> hull_{};

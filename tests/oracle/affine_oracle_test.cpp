@@ -140,6 +140,50 @@ TEST(AffineSetOracle, BoundsEveryParameterThatTheDataAdmitAndLittleMore) {
   EXPECT_GT(bounded, 80);
 }
 
+// 20,000 observations one by one: what is kept is bounded, encloses what all of them admit, and is hardly wider.
+TEST(AffineSetOracle, OfMuchThatIsLearnedKeepsWhatDecides) {
+  Random random(7);
+  const Data data = AnyData(random, 3, 20'000, 0.5, 0.1);
+  AffineSet learned({0, 1, 2}, std::vector<double>(3, -2), std::vector<double>(3, 2));
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < data.phi.size(); ++i) {
+    learned.Learn(static_cast<int>(i), data.phi[i], data.lower[i], data.upper[i]);
+    most = std::max(most, learned.num_kept());
+  }
+  EXPECT_EQ(most, AffineSet::kMostKept);
+  ASSERT_TRUE(learned.IsBounded());
+  const AffineSet all = data.Set();
+  EXPECT_LT(all.num_kept(), 200);
+  for (int query = 0; query < 100; ++query) {
+    std::vector<double> phi{random.Uniform(-2, 2), random.Uniform(-2, 2), random.Uniform(-2, 2), 1};
+    const Interval by_all = all.Enclose(phi), by_kept = learned.Enclose(phi);
+    const double slack = 0.02 * (by_all.upper - by_all.lower);
+    EXPECT_NEAR(by_kept.lower, by_all.lower, slack);
+    EXPECT_NEAR(by_kept.upper, by_all.upper, slack);
+  }
+  learned.Learn(20'000, data.phi[0], data.upper[0] + 1, data.upper[0] + 2);
+  ASSERT_TRUE(learned.contradiction());
+  EXPECT_EQ(learned.contradiction()->rows[0], 20'000);
+}
+
+TEST(AffineSetOracle, OfMuchThatExcitesTooLittleKeepsWhatSpansIt) {
+  Random random(11);
+  const Data data = AnyData(random, 3, 5000, 0.5, 0.1);
+  AffineSet learned({0, 1, 2}, std::vector<double>(3, -2), std::vector<double>(3, 2));
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < data.phi.size(); ++i) {
+    std::vector<double> phi = data.phi[i];
+    if (i >= 10) phi[1] = 0.25;                   // after ten observations of any x_1 ...
+    if (i < 10 || i + 10 < 5000) phi[2] = -0.75;  // ... and before ten of any x_2
+    if (i + 10 == 5000) EXPECT_EQ(learned.unexcited(), std::vector<double>({0, 0, 1}));
+    learned.Learn(static_cast<int>(i), phi, -10, 10);
+    most = std::max(most, learned.num_kept());
+    if (i + 10 < 5000) ASSERT_FALSE(learned.IsBounded());
+  }
+  EXPECT_EQ(most, AffineSet::kMostKept);
+  EXPECT_TRUE(learned.IsBounded());
+}
+
 // A contradiction that is reported holds in rationals, and one that is not tiny is reported.
 TEST(AffineSetOracle, AContradictionIsAProofAndNoneIsMissed) {
   TracedRandom random(862);
