@@ -13,6 +13,7 @@
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
 #include "task/config_text.h"

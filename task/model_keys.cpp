@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 
 #include "command_line/nearest.h"
-#include "forereach/dynamics/compiled_models.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"

@@ -9,6 +9,7 @@
 #include "forereach/certify/decision.h"
 #include "forereach/dynamics/model.h"
 #include "forereach/safety/body.h"
+#include "forereach/sets/zonotope.h"
 #include "lcmtypes/codec.h"
 #include "task/gate_options.h"
 

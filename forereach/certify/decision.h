@@ -1,19 +1,12 @@
 /** The result for one plan: a certificate, or an abstention with its cause and a witness. */
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <span>
-#include <vector>
 
-#include "forereach/numerics/directed.h"
-#include "forereach/numerics/interval.h"
-#include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
-#include "forereach/reach/propagator.h"
-#include "forereach/residual/consistency.h"
+#include "forereach/reach/domain.h"
 #include "forereach/safety/motion.h"
-#include "forereach/safety/separation.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 
@@ -76,35 +69,6 @@ struct Plan {
   [[nodiscard]] std::span<const double> input(int t) const {
     return {controls + static_cast<std::ptrdiff_t>(t) * stride, ToSize(num_inputs)};
   }
-};
-
-/** The computed part of the reachable tube: slices X_0 .. X_length and a record of each completed step. Construct it
-once and reuse it for every plan: it has room for the longest horizon, about 2.5 MB. */
-class Tube final {
- public:
-  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1), places_(kMaxPieces) {}
-
-  /** Upper bounds on the half-widths of the hull of X_t, t <= length(). */
-  [[nodiscard]] std::span<const double> half_width(int t) const {
-    return {step(t).half_width.data(), ToSize(slice(t).dim())};
-  }
-  /** An interval that contains coordinate k of every point of X_t, rounded outward. Cost O(1). */
-  [[nodiscard]] Interval hull(int t, int k) const {
-    const double center = slice(t).center(k), r = half_width(t)[ToSize(k)];
-    return {SubDown(center, r), AddUp(center, r)};
-  }
-  /** Number of completed steps; X_0 .. X_length() are valid. */
-  [[nodiscard]] int length() const { return length_; }
-  [[nodiscard]] const Zonotope& slice(int t) const { return slices_[ToSize(t)]; }
-  [[nodiscard]] const StepRecord& step(int t) const { return steps_[ToSize(t)]; }
-
- private:
-  friend class Certifier;
-  friend class SafetyTest;
-  std::vector<Zonotope> slices_;
-  std::vector<StepRecord> steps_;
-  std::vector<Zonotope> places_;  // scratch memory of SafetyTest
-  int length_ = 0;
 };
 
 }  // namespace forereach

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/angles.h"
 #include "forereach/dynamics/text_enclosure.h"
 #include "forereach/numerics/require.h"

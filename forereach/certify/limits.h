@@ -10,6 +10,8 @@
 
 namespace forereach {
 
+class Tube;
+
 /** Immutable, so any number of threads may use it, each with its own tube. */
 class LimitTest final {
  public:

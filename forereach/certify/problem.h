@@ -8,9 +8,9 @@ projection. */
 
 #include "forereach/dynamics/expansion.h"
 #include "forereach/dynamics/model.h"
+#include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/reach/domain.h"
-#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/declaration.h"
 #include "forereach/residual/transitions.h"
 #include "forereach/safety/body.h"

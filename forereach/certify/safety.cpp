@@ -9,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "forereach/certify/tube.h"
 #include "forereach/dynamics/angles.h"
 #include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/text_program.h"
@@ -334,6 +335,8 @@ Placement PlacementOf(const Problem& problem) {
 
 SafetyTest::SafetyTest(const Problem& problem)
     : placement_(PlacementOf(problem)), instructions_(problem.instructions) {}
+
+int SafetyTest::NumUnits(const Tube& tube) const { return tube.length() + (placement_.sweeps() ? 0 : 1); }
 
 PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obstacle, const Schedule& schedule) const {
   std::vector<Zonotope> places(2 * ToSize(placement_.num_points()));

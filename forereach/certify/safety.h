@@ -16,6 +16,8 @@ obstacle that moves (docs/soundness.md). */
 
 namespace forereach {
 
+class Tube;
+
 /** A separation, and the part of the body that comes closest; -1 if the bound is that of the whole body. */
 struct PartSeparation {
   Separation separation;
@@ -33,7 +35,7 @@ class SafetyTest final {
 
   [[nodiscard]] const Placement& placement() const { return placement_; }
   /** The number of units of a tube: its steps or its samples. */
-  [[nodiscard]] int NumUnits(const Tube& tube) const { return tube.length() + (placement_.sweeps() ? 0 : 1); }
+  [[nodiscard]] int NumUnits(const Tube& tube) const;
 
   /** Judges the units from `first` on. The outcome is kCertified only with a proof that the body is disjoint from every
   obstacle in each of them; otherwise it is kSafety with the first unit that is not proven as `step`, and the first

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "forereach/dynamics/text_model.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach {

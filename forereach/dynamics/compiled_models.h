@@ -35,9 +35,4 @@ void UseCompiled() {
                         });
 }
 
-/** The compiled model in the place of that of a text; `model` itself if this program has no compiled equations.
-@throws std::invalid_argument if it has some, and none of them are those of the text: it was built for another model, or
-before the text was changed. */
-[[nodiscard]] std::shared_ptr<const NominalModel> CompiledFor(std::shared_ptr<const NominalModel> model);
-
 }  // namespace forereach

@@ -7,7 +7,6 @@ rounding.h bounds the error of each number, once for the whole domain. */
 
 #include "forereach/dynamics/program.h"
 #include "forereach/sets/order_reduction.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

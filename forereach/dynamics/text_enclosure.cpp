@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "forereach/dynamics/evaluate.h"
+#include "forereach/sets/zonotope.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 

@@ -16,9 +16,10 @@ finite H. All of it is interval arithmetic. Parameters may be ranges. */
 #include "forereach/numerics/interval.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
+
+class Zonotope;
 
 /** One value h over a box around c: for every x in the box, h(x, u) lies in slope . (x - c) + offset and in range. */
 struct AffineEnclosure {

@@ -17,4 +17,10 @@ name is used twice or belongs to the language, if a range is empty or not finite
 angle is no state or is there twice. */
 [[nodiscard]] std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text);
 
+/** The compiled model (compiled_models.h) in the place of that of a text; `model` itself if this program has no
+compiled equations.
+@throws std::invalid_argument if it has some, and none of them are those of the text: it was built for another model, or
+before the text was changed. */
+[[nodiscard]] std::shared_ptr<const NominalModel> CompiledFor(std::shared_ptr<const NominalModel> model);
+
 }  // namespace forereach

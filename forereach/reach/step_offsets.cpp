@@ -11,6 +11,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/sets/order_reduction.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 
@@ -160,6 +161,21 @@ int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope
   for (std::size_t k = 0; k < states_; ++k)
     if (!(std::abs(spread.column[k]) + spread.half_width[k] < kInfinity)) return static_cast<int>(k);
   return 0;
+}
+
+void StepOffsets::Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
+  const auto last = ToSize(next.num_generators()), lane = last % kLaneCount, block = last - lane;
+  const LaneMask is_last = AtLane(lane);
+  next.Reset(next.dim(), next.num_generators() + 1);
+  for (int k = 0, n = next.dim(); k < n; ++k) {
+    double* const at = next.mutable_row(k) + block;
+    const Lanes kept = lane == 0 ? AllLanes(0) : FirstLanes(LoadLanes(at), lane, 0);
+    StoreLanes(is_last ? AllLanes(spread.column[ToSize(k)]) : kept, at);
+  }
+  for (std::size_t k = 0; k < ToSize(next.dim()); k += kLaneCount) {
+    const Lanes sum = LoadLanes(half_width + k) + Abs(LoadLanes(&spread.column[k]));
+    StoreLanes(sum * AllLanes(1 + 4 * kUnitRoundoff), half_width + k);
+  }
 }
 
 }  // namespace forereach

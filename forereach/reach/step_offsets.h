@@ -24,11 +24,12 @@ docs/soundness.md, 3.15. */
 #include "forereach/numerics/lanes.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/sets/eigen.h"
-#include "forereach/sets/zonotope.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
+
+class Zonotope;
 
 /** What the offsets of both ends add to one step. */
 struct OffsetSpread {
@@ -68,20 +69,7 @@ class StepOffsets final {
                         InstructionSet instructions) const noexcept;
 
   /** Appends d as a generator, and adds it to the half-widths of the hull. */
-  FOREREACH_INLINE static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
-    const auto last = ToSize(next.num_generators()), lane = last % kLaneCount, block = last - lane;
-    const LaneMask is_last = AtLane(lane);
-    next.Reset(next.dim(), next.num_generators() + 1);
-    for (int k = 0, n = next.dim(); k < n; ++k) {
-      double* const at = next.mutable_row(k) + block;
-      const Lanes kept = lane == 0 ? AllLanes(0) : FirstLanes(LoadLanes(at), lane, 0);
-      StoreLanes(is_last ? AllLanes(spread.column[ToSize(k)]) : kept, at);
-    }
-    for (std::size_t k = 0; k < ToSize(next.dim()); k += kLaneCount) {
-      const Lanes sum = LoadLanes(half_width + k) + Abs(LoadLanes(&spread.column[k]));
-      StoreLanes(sum * AllLanes(1 + 4 * kUnitRoundoff), half_width + k);
-    }
-  }
+  static void Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept;
 
  private:
   using PerState = std::array<double, kMaxStates>;

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 namespace {

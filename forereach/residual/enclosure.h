@@ -8,9 +8,10 @@ bounds on the values of every admissible residual over a query set. */
 
 #include "forereach/numerics/interval.h"
 #include "forereach/numerics/limits.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
+
+class Zonotope;
 
 /** The groups of observations in which a search found its bounds. */
 struct FoundIn {

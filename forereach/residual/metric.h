@@ -21,6 +21,7 @@ is compiled for one instruction set. */
 #include "forereach/numerics/size.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/residual/lipschitz_row.h"
+#include "forereach/sets/zonotope.h"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"

@@ -11,6 +11,7 @@
 #include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 namespace {

@@ -16,9 +16,10 @@ H, it is the box of their ranges. */
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/safety/body.h"
 #include "forereach/safety/projection.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
+
+class Zonotope;
 
 class Placement final {
  public:

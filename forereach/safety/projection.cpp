@@ -7,6 +7,7 @@
 #include <string>
 
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

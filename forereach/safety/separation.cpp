@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 namespace {

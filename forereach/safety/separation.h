@@ -15,9 +15,10 @@ case. */
 
 #include "forereach/numerics/instruction_set.h"
 #include "forereach/safety/obstacle.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
+
+class Zonotope;
 
 struct Separation {
   /** A lower bound on the distance from the set to the core, in metres. Not positive if no distance was proven. */

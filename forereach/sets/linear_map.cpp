@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

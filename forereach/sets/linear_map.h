@@ -4,9 +4,10 @@
 #include <span>
 
 #include "forereach/numerics/interval.h"
-#include "forereach/sets/zonotope.h"
 
 namespace forereach {
+
+class Zonotope;
 
 /** A nonzero entry of a sparse interval matrix M. Entries that are not listed are zero. */
 struct MatrixEntry {

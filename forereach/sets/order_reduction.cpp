@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 

@@ -9,11 +9,12 @@
 #include "forereach/numerics/interval.h"
 #include "forereach/numerics/lanes.h"
 #include "forereach/numerics/limits.h"
-#include "forereach/sets/zonotope.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
+
+class Zonotope;
 
 /** The scores |g|_1 - |g|_inf of all columns, Eq. (order-reduction). The last bits of a score hold the column's index,
 so no two scores are equal, and of two equal values the earlier column's score is larger. Zero columns have score -1. */
