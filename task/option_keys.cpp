@@ -212,6 +212,9 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
                       "A candidate starts so many steps after the state it was planned from."),
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates, "The most for one start."),
+      planner.Integer("policy_samples", Between(1, 10000), &PlannerOptions::policy_samples,
+                      "Of `source: policy`: so many candidates are sampled at once and sent in batches; `candidates` "
+                      "is then the most batches."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
                      "Acceleration and deceleration that the search expects of the robot."),

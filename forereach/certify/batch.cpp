@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "forereach/numerics/parallel.h"
 
@@ -93,18 +94,15 @@ std::vector<Index> Portions(std::span<const Plan> plans, std::span<const Index> 
   return begins;
 }
 
-// What a thread judged last.
-struct Judged {
-  Tube tube;
-  const Plan* plan = nullptr;
-};
-
 }  // namespace
 
 std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
                                  std::span<const Zonotope> initial_sets, std::span<const Obstacle> obstacles,
                                  const BatchOptions& options, const BatchListener& listener) {
   if (options.threads < 1) throw std::invalid_argument("batch: 0 threads, must be at least 1");
+  if (!options.tubes.empty() && options.tubes.size() < options.threads)
+    throw std::invalid_argument("batch: " + std::to_string(options.tubes.size()) + " tubes for " +
+                                std::to_string(options.threads) + " threads");
   const bool one_for_all = initial_sets.size() == 1;
   if (!one_for_all && initial_sets.size() != plans.size())
     throw std::invalid_argument("batch: " + std::to_string(initial_sets.size()) + " initial sets, must be 1 or " +
@@ -112,23 +110,25 @@ std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Pla
   std::vector<Decision> decisions(plans.size());
   const std::vector<Index> order = Gathered(plans, one_for_all);
   const std::vector<Index> begins = Portions(plans, order, one_for_all);
-  std::vector<Judged> last(std::clamp<Index>(begins.size() - 1, 1, options.threads));
+  std::vector<const Plan*> last(options.threads);  // that each thread judged
+  std::vector<Tube> own(options.tubes.empty() ? std::clamp<Index>(begins.size() - 1, 1, options.threads) : 0);
+  const std::span<Tube> tubes = options.tubes.empty() ? std::span(own) : options.tubes;
   std::atomic<Index> certified = plans.size();  // the first one so far
   const auto is_over = [&] { return options.clock && options.clock() >= options.deadline; };
-  const auto judge = [&](Index i, Judged& before) {
-    const int shared = one_for_all && before.plan != nullptr ? SharedSteps(*before.plan, plans[i]) : 0;
-    decisions[i] = certifier.Certify(plans[i], initial_sets[one_for_all ? 0 : i], obstacles, before.tube, shared);
-    before.plan = &plans[i];
+  const auto judge = [&](Index i, Index thread) {
+    const Plan* const before = std::exchange(last[thread], &plans[i]);
+    const int shared = one_for_all && before != nullptr ? SharedSteps(*before, plans[i]) : 0;
+    decisions[i] = certifier.Certify(plans[i], initial_sets[one_for_all ? 0 : i], obstacles, tubes[thread], shared);
     if (decisions[i].outcome == Outcome::kCertified)
       for (Index known = certified; i < known && !certified.compare_exchange_weak(known, i);) {
       }
-    if (listener) listener(i, decisions[i], before.tube);
+    if (listener) listener(i, decisions[i], tubes[thread]);
   };
   ForEachInParallel(begins.size() - 1, options.threads, [&](Index portion, Index thread) {
     for (Index k = begins[portion]; k < begins[portion + 1]; ++k) {
       if (options.until_certified && order[k] > certified) continue;
       if (is_over()) return;
-      judge(order[k], last[thread]);
+      judge(order[k], thread);
     }
   });
   // Other threads may have judged some of them before the first certified one was found.
