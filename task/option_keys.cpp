@@ -122,7 +122,7 @@ struct ChannelRow {
 };
 
 constexpr std::array kChannels{
-    ChannelRow{"candidate", &BusOptions::candidate, "candidate_plan_t, from planners."},
+    ChannelRow{"candidate", &BusOptions::candidate, "candidate_plan_t and candidate_batch_t, from planners."},
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
     ChannelRow{"certified", &BusOptions::certified, "certified_plan_t, what a robot may execute."},
     ChannelRow{"withdrawn", &BusOptions::withdrawn, "withdrawal_t, what of it a robot may no longer execute."},

@@ -11,6 +11,7 @@
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/seal.h"
 #include "records/event_log.h"
+#include "records/record_reader.h"
 #include "records/replay.h"
 #include "tests/certifier/small_task.h"
 #include "tests/cli/program.h"
@@ -103,6 +104,16 @@ TEST_F(ReplayTest, TheDecisionOnABatchIsThatOnItsCandidateAlone) {
   EXPECT_THAT(result.differences, testing::IsEmpty());
   EXPECT_EQ(result.agreed, 5);
   EXPECT_EQ(result.candidates, 5) << "a batch counts once";
+
+  struct Reader final : RecordUser {
+    void OnDecision(const DecisionRow&, const candidate_plan_t* candidate) override {
+      plan_ids.push_back(candidate ? candidate->plan_id : -1);
+    }
+    void OnGap(const GapRow& gap) override { ADD_FAILURE() << gap.lost; }
+    std::vector<std::int64_t> plan_ids;
+  } user;
+  RecordReader(config.bus, user).Read({path});
+  EXPECT_EQ(user.plan_ids, (std::vector<std::int64_t>{2, 2, 4, -1, 9}));
 }
 
 TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
