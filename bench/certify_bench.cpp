@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -22,6 +21,7 @@
 #include "bench/without_rounding.h"
 #include "forereach/certify/batch.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/parallel.h"
 
 namespace forereach::bench {
 namespace {
@@ -60,8 +60,34 @@ void RunBatch(State& state, int observations, unsigned threads) {
   std::vector<Plan> plans;
   for (const Eigen::MatrixXd& plan : controls) plans.push_back(Task::PlanOf(plan));
   const std::array initial_set{task.initial_set()};
-  for (auto _ : state) benchmark::DoNotOptimize(CertifyAll(certifier, plans, initial_set, task.obstacles, threads));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(CertifyAll(certifier, plans, initial_set, task.obstacles, {.threads = threads}));
   state.SetItemsProcessed(state.iterations() * kBatch);
+}
+
+// 1,000 chunks of 20 steps that share their beginnings five by five, or nothing: by CertifyAll, or with 0 threads one
+// after the other.
+void RunChunks(State& state, bool kin, unsigned threads) {
+  constexpr int kChunks = 1000, kKin = 5, kShared = 15;
+  const Task task = MakeChunkTask();
+  const Certifier certifier(task.problem);
+  std::vector<Eigen::MatrixXd> chunks = MakePlans(task, kChunks);
+  for (std::size_t i = 0; kin && i < chunks.size(); ++i)
+    chunks[i].leftCols(kShared) = chunks[i - i % kKin].leftCols(kShared);
+  std::vector<Plan> plans;
+  for (const Eigen::MatrixXd& chunk : chunks) plans.push_back(Task::PlanOf(chunk));
+  const std::array start{task.initial_set()};
+  const auto all = CertifyAll(certifier, plans, start, task.obstacles);
+  if (std::ranges::count(all, Outcome::kCertified, &Decision::outcome) != kChunks)
+    return state.SkipWithError("not all are certified");
+  Tube tube;
+  for (auto _ : state) {
+    if (threads > 0)
+      benchmark::DoNotOptimize(CertifyAll(certifier, plans, start, task.obstacles, {.threads = threads}));
+    for (std::size_t i = 0; threads == 0 && i < plans.size(); ++i)
+      benchmark::DoNotOptimize(certifier.Certify(plans[i], start[0], task.obstacles, tube));
+  }
+  state.SetItemsProcessed(state.iterations() * kChunks);
 }
 
 void RegisterCertify(Scenario scenario, int observations) {
@@ -189,11 +215,18 @@ void RegisterOffsets() {
 }
 
 void RegisterBatch() {
-  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
-  for (unsigned threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1)
-    benchmark::RegisterBenchmark(("batch/bicycle/400/" + std::to_string(threads)).c_str(), RunBatch, 400, threads)
-        ->UseRealTime()
-        ->Unit(benchmark::kMicrosecond);
+  const unsigned cores = AllCores();
+  const auto add = [](const std::string& name, const auto& run) {
+    benchmark::RegisterBenchmark(name.c_str(), run)->UseRealTime()->Unit(benchmark::kMicrosecond);
+  };
+  for (unsigned threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1) {
+    const std::string suffix = "/" + std::to_string(threads);
+    add("batch/bicycle/400" + suffix, [=](State& state) { RunBatch(state, 400, threads); });
+    add("chunks/apart" + suffix, [=](State& state) { RunChunks(state, false, threads); });
+    add("chunks/kin" + suffix, [=](State& state) { RunChunks(state, true, threads); });
+  }
+  add("chunks/apart/loop", [](State& state) { RunChunks(state, false, 0); });
+  add("chunks/kin/loop", [](State& state) { RunChunks(state, true, 0); });
 }
 
 void RegisterAll(int largest) {

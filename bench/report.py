@@ -177,7 +177,17 @@ class Report:
         rates = self.batch_rates()
         rows = [[str(threads), number(rate, 4), number(ratio(rate, rates[1]))] for threads, rate in sorted(rates.items())]
         return ("Bicycle, N = 400: `CertifyAll`, threads share one certifier, each with a tube of its own.\n\n"
-                + table(["threads", "plans a second", "over one thread"], rows))
+                + table(["threads", "plans a second", "over one thread"], rows) + "\n\n" + self.chunks())
+
+    def chunks(self):
+        rows = []
+        for kind, text in [("apart", "share nothing"), ("kin", "share 15 steps, five by five")]:
+            took = {by: self.benchmarks.get(f"chunks/{kind}/{by}/real_time") for by in ["loop", *sorted(self.batch_rates())]}
+            real = {by: benchmark and benchmark.real for by, benchmark in took.items()}
+            rows += [[f"{text}, " + ("loop" if by == "loop" else f"{by} threads"), number(us, 4), number(ratio(real["loop"], us))]
+                     for by, us in real.items()]
+        return ("1,000 chunks of 20 steps from one X0 among 11 circles: a loop of `Certify`, and `CertifyAll`. Microseconds on the "
+                "clock.\n\n" + table(["chunks", "us", "over the loop"], rows))
 
     def tail(self):
         keys = ["p50", "p99", "p99.9", "p99.99", "max"]

@@ -223,6 +223,17 @@ std::vector<Eigen::MatrixXd> MakePlans(const Task& task, int count) {
   return plans;
 }
 
+Task MakeChunkTask() {
+  constexpr int kSteps = 20, kPosts = 11;
+  Task task = CachedTask(Scenario::kBicycle, 400);
+  task.center[5] = 0.05;
+  task.controls = Vec({0.2, 0.01}).replicate(1, kSteps);
+  task.obstacles.clear();
+  for (int i = 0; i < kPosts; ++i)
+    task.obstacles.push_back(Obstacle::Circle(Vec({3.0 * i - 3, i % 2 == 0 ? -7.0 : 18.0}), 1));
+  return task;
+}
+
 const Task& CachedTask(Scenario scenario, int observations) {
   static std::map<std::pair<Scenario, int>, Task> tasks;
   const auto key = std::pair(scenario, observations);

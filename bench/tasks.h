@@ -52,6 +52,9 @@ the declaration; those of a smaller N are the first ones of a larger. Method kPa
 /** The same with a circle on the path: the whole tube is computed, and the answer is S. */
 [[nodiscard]] Task MakeBlockedTask(Scenario scenario, int observations);
 
+/** A chunk of a learned policy: the bicycle of N = 400, 20 steps in a slight bend, among 11 circles to both sides. */
+[[nodiscard]] Task MakeChunkTask();
+
 /** The nominal tube alone: the bicycle without a residual (L = 0), 12 steps of jerk 0.5 and steering rate 0.1 from the
 box (0.1, 0.1, 0.02, 0.2, 0.02, 0.005) around (0, 0, 0, 10, 0, 0.05), no obstacle. */
 [[nodiscard]] Task MakeNominalTube(Method method = Method::kPaper);

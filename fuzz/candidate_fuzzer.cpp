@@ -8,6 +8,7 @@
 #include "certifier/gate/gate.h"
 #include "forereach/safety/clearance.h"
 #include "fuzz/candidates.h"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach {
@@ -96,6 +97,23 @@ std::vector<std::unique_ptr<Gate>> GatesFor(const std::vector<Config>& tasks) {
   return gates;
 }
 
+// Some candidates of a batch, and something odd about their number and steps.
+candidate_batch_t AnyBatch(FuzzedDataProvider& input, std::int64_t now_us) {
+  candidate_batch_t batch{};
+  for (int left = input.ConsumeIntegralInRange(0, 4); left > 0; --left)
+    static_cast<void>(Append(batch, AnyCandidate(input, now_us)));
+  for (int left = NumOdd(input); left > 0; --left) {
+    switch (input.ConsumeIntegralInRange(0, 4)) {
+      case 0: batch.num_candidates = input.ConsumeIntegral<std::int16_t>(); break;
+      case 1: batch.num_steps[input.ConsumeIntegralInRange(0, 4)] = AnySmall(input, 129); break;
+      case 2: batch.progress_steps[input.ConsumeIntegralInRange(0, 4)] = AnySmall(input, 11); break;
+      case 3: batch.control[input.ConsumeIntegralInRange(0, 80)] = AnyNumber(input); break;
+      case 4: batch.plan_id = AnyInteger(input, batch.plan_id, 2000); break;
+    }
+  }
+  return batch;
+}
+
 }  // namespace
 
 bool Try(Bytes data) {
@@ -108,10 +126,14 @@ bool Try(Bytes data) {
   std::int64_t now = kNow, decided = 0, certified = 0;
   for (; input.remaining_bytes() > 0 && decided < 8; ++decided) {
     now += input.ConsumeBool() ? input.ConsumeIntegralInRange<std::int64_t>(-1'000'000, 1'000'000) : 0;
-    const std::vector<std::uint8_t> bytes = Damaged(input, AnyCandidate(input, now));
-    const GateAnswer answer = gate.Decide(bytes, now);
+    const std::vector<std::uint8_t> message = input.ConsumeIntegralInRange(0, 4) < 4
+                                                  ? Damaged(input, AnyCandidate(input, now))
+                                                  : Damaged(input, AnyBatch(input, now));
+    const GateAnswer answer = gate.Decide(message, now);
     Require(answer.decision.sequence == decided && answer.decision.utime == now);
-    Require(GetDigest(answer.decision.plan_digest) == DigestOf(bytes));
+    const Digest plan = GetDigest(answer.decision.plan_digest);
+    Require(std::ranges::count(DigestsIn(message), plan) > 0);
+    const std::vector<std::uint8_t> bytes = CandidateIn(message, plan);
     Require(answer.certified.has_value() == (answer.decision.outcome == decision_t::CERTIFIED));
     Require(answer.decision.cause != decision_t::CAUSE_INTERNAL_ERROR);
     if (!answer.certified) continue;

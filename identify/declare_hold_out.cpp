@@ -95,7 +95,8 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
   std::vector<std::array<int, 3>> found_in(plans.size());
   std::vector<double> widths(plans.size(), kInfinity);
   const auto decisions = CertifyAll(
-      certifier, plans, initial_sets, config.obstacles, jobs, [&](std::size_t i, const Decision&, const Tube& tube) {
+      certifier, plans, initial_sets, config.obstacles, {.threads = jobs},
+      [&](std::size_t i, const Decision&, const Tube& tube) {
         for (int t = 1; t <= tube.length(); ++t) {
           Conformance worst = Conformance::kInside;
           for (int k = 0; k < problem->model->num_states(); ++k) {

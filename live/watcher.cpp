@@ -16,6 +16,7 @@
 #include "forereach/fault_t.hpp"
 #include "forereach/sets/zonogon.h"
 #include "forereach/withdrawal_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "lcmtypes/why_failed.h"
@@ -146,8 +147,8 @@ void Watcher::TakeRows(const LogEvent& event) {
 bool Watcher::TakeMessage(const LogEvent& event) {
   const BusOptions& channels = task_.bus;
   if (event.channel == channels.candidate) {
-    if (!Decoded<candidate_plan_t>(event.message())) return false;
-    candidates_.Add(DigestOf(event.message()), Copy(event.message()));
+    if (!Decoded<candidate_plan_t>(event.message()) && !Decoded<candidate_batch_t>(event.message())) return false;
+    candidates_.Add(DigestsIn(event.message()), Copy(event.message()));
     return true;
   }
   if (event.channel == channels.certified) {
@@ -178,7 +179,7 @@ bool Watcher::TakeDecision(const LogEvent& event) {
   Decided& decided = decided_.back();  // its row was made just now
   const Digest plan = GetDigest(decision->plan_digest);
   decided.decision = *decision;
-  decided.candidate = candidates_.Take(plan);
+  if (const auto message = candidates_.Take(plan)) decided.candidate = CandidateIn(*message, plan);
   decided.certificate = certificates_.Take(plan);
   decided.obstacles = obstacles_;
   if (decision->outcome != decision_t::REJECTED) ReadAgainFor(GetDigest(decision->config_digest), event.utime);

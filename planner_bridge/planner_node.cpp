@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <ostream>
 #include <utility>
@@ -16,8 +17,10 @@
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
+#include "forereach/candidate_batch_t.hpp"
 #include "forereach/numerics/directed.h"
 #include "forereach/withdrawal_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 #include "task/json_text.h"
 #include "task/step_time.h"
@@ -263,20 +266,42 @@ void PlannerNode::EndRound(bool certified) {
 void PlannerNode::SearchOnce(std::int64_t now_us) {
   const std::int64_t takes_us =
       round_->stops ? Microseconds(config_.gate.decision_budget_ms) : Microseconds(config_.planner.time_limit_ms);
-  if (round_->searches == MostCandidates() || now_us + takes_us >= round_->start_utime) return EndRound(false);
-  ++round_->searches;
-  ++searches_;
-  const std::optional<Proposal> proposal = Propose();
-  if (!proposal) {
+  std::deque<Proposal>& found = round_->found;
+  if ((found.empty() && round_->searches == MostCandidates()) || now_us + takes_us >= round_->start_utime)
+    return EndRound(false);
+  if (found.empty()) {
+    ++round_->searches;
+    ++searches_;
+    std::ranges::move(Propose(), std::back_inserter(found));
+  }
+  if (found.empty()) {
     ++fruitless_searches_;
     round_->lessons.Ease();
     return;
   }
-  const candidate_plan_t candidate = MakeCandidate(*proposal, *round_, now_us);
-  if (!sender_.Send(config_.bus.candidate, candidate)) return;
+  SendNext(now_us);
+}
+
+// As many as one message has room for.
+void PlannerNode::SendNext(std::int64_t now_us) {
+  std::deque<Proposal>& found = round_->found;
+  const bool is_one = found.size() == 1;
+  candidate_batch_t batch{};
+  std::vector<candidate_plan_t> sent;
+  while (!found.empty()) {
+    const candidate_plan_t candidate = MakeCandidate(found.front(), *round_, now_us);
+    if (!is_one && !Append(batch, candidate)) break;
+    sent.push_back(candidate);
+    ++next_plan_id_;
+    found.pop_front();
+  }
+  const bool is_sent =
+      is_one ? sender_.Send(config_.bus.candidate, sent.front()) : sender_.Send(config_.bus.candidate, batch);
+  if (!is_sent) return;
   ++proposed_;
-  round_->awaited_plan = candidate.plan_id;
-  plans_[candidate.plan_id] = candidate;
+  round_->awaited_plan = sent.front().plan_id;
+  round_->awaited = std::ssize(sent);
+  for (const candidate_plan_t& candidate : sent) plans_[candidate.plan_id] = candidate;
 }
 
 int PlannerNode::MostCandidates() const {
@@ -284,16 +309,23 @@ int PlannerNode::MostCandidates() const {
   return round_->back_off_steps > 0 ? kBackOffs : config_.planner.candidates;
 }
 
-std::optional<Proposal> PlannerNode::Propose() {
-  if (!round_->stops && round_->back_off_steps == 0) return proposer_->Propose(RequestOf(*round_));
-  Proposal proposal;
+std::vector<Proposal> PlannerNode::Propose() {
+  if (!round_->stops && round_->back_off_steps == 0) return proposer_->ProposeMany(RequestOf(*round_));
   const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
-  if (round_->back_off_steps > 0) {
-    proposal.progress_steps = std::max(round_->back_off_steps >> (round_->searches - 1), 1);
-    if (proposer_->motion().BackOff(state, proposal.progress_steps, config_.planner.tail_steps, proposal.controls))
-      return proposal;
+  const std::optional<Proposal> one = round_->back_off_steps > 0 ? BackOffFrom(state) : StopFrom(state);
+  return one ? std::vector{*one} : std::vector<Proposal>{};
+}
+
+std::optional<Proposal> PlannerNode::BackOffFrom(std::span<const double> state) const {
+  Proposal proposal;
+  proposal.progress_steps = std::max(round_->back_off_steps >> (round_->searches - 1), 1);
+  if (!proposer_->motion().BackOff(state, proposal.progress_steps, config_.planner.tail_steps, proposal.controls))
     return std::nullopt;
-  }
+  return proposal;
+}
+
+std::optional<Proposal> PlannerNode::StopFrom(std::span<const double> state) const {
+  Proposal proposal;
   if (!hardest_.Brake(state, round_->searches - 1, kMaxSteps, proposal.controls) || proposal.controls.cols() == 0)
     return std::nullopt;
   return proposal;
@@ -316,7 +348,7 @@ candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Roun
   candidate_plan_t candidate{};
   candidate.utime = now_us;
   candidate.sequence = proposed_;
-  candidate.plan_id = next_plan_id_++;
+  candidate.plan_id = next_plan_id_;
   SetText(candidate.source, kSource);
   candidate.start_utime = round.start_utime;
   candidate.step_us = period_us_;
@@ -328,11 +360,14 @@ candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Roun
 void PlannerNode::OnDecision(const Received& received) {
   const auto decision = Decoded<decision_t>(received.bytes);
   if (!decision || GetText(decision->source) != kSource || !round_ || round_->awaited_plan < 0 ||
-      decision->plan_id != round_->awaited_plan) {
+      decision->plan_id < round_->awaited_plan || decision->plan_id - round_->awaited_plan >= round_->awaited) {
     ++ignored_;
     return;
   }
-  round_->awaited_plan = -1;
+  const std::int64_t first = std::exchange(round_->awaited_plan, -1);
+  std::erase_if(plans_, [&](const auto& plan) {
+    return first <= plan.first && plan.first - first < round_->awaited && plan.first != decision->plan_id;
+  });
   Learn(*decision, received.utime);
 }
 

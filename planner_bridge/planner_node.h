@@ -3,7 +3,8 @@
 A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
 the state that the executing plan will have reached by then. A round begins while the robot holds still, or when that
 start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
-start. A round sends one candidate at a time and waits for its decision:
+start. A round sends one candidate or batch at a time and waits for its decision (with planner.policy_samples what one
+search gives is sent in batches, one after the other):
  - certified: the round ends, the plan waits for its start;
  - abstention S: the next candidate keeps more distance than the searches before it, by clearance_step from obstacles or
    from the limit of the task by what the tube may reach beyond it (lessons.h);
@@ -37,10 +38,12 @@ stamped ahead of the clock by more than gate.max_ahead_ms; obstacles that the ga
 decisions on candidates of other planners; and advice that is not on the candidate that was just abstained on. */
 #pragma once
 
+#include <deque>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -78,9 +81,9 @@ class PlannerNode final : public Node {
   /** A robot that moves by less than a tenth of a second's way at cruise speed in this time is stuck. */
   static constexpr std::int64_t kStuckUs = 2'000'000;
 
-  /** One JSON object: proposed, certified, abstained and rejected (counts by cause), advised (abstentions from which it
-  has learned by the certifier's advice), unanswered, withdrawn (plans),
-  rounds, stopping_rounds, back_off_rounds, rounds_without_certificate, searches_without_result, messages_ignored,
+  /** One JSON object: proposed (a batch counts once), certified, abstained and rejected (counts by cause), advised
+  (abstentions from which it has learned by the certifier's advice), unanswered, withdrawn (plans), rounds,
+  stopping_rounds, back_off_rounds, rounds_without_certificate, searches_without_result, messages_ignored,
   messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
@@ -92,7 +95,9 @@ class PlannerNode final : public Node {
     bool stops = false;      // a stopping round
     int back_off_steps = 0;  // of its first candidate; 0: it does not back off
     int searches = 0;
-    std::int64_t awaited_plan = -1;            // the plan whose decision is outstanding, -1 if none
+    std::deque<Proposal> found = {};           // by the last search, and not sent yet
+    std::int64_t awaited_plan = -1;            // the first plan whose decision is outstanding, -1 if none
+    std::int64_t awaited = 0;                  // so many plans have one decision
     std::optional<decision_t> unadvised = {};  // the abstention whose advice is outstanding
     std::int64_t advice_until = 0;
   };
@@ -111,7 +116,10 @@ class PlannerNode final : public Node {
   [[nodiscard]] std::int64_t StepsToAStop(std::int64_t now_us) const;
   [[nodiscard]] bool TakesOver(int valid_steps) const;
   void BeginStop(int valid_steps, std::int64_t now_us);
-  [[nodiscard]] std::optional<Proposal> Propose();
+  [[nodiscard]] std::vector<Proposal> Propose();
+  [[nodiscard]] std::optional<Proposal> StopFrom(std::span<const double> state) const;
+  [[nodiscard]] std::optional<Proposal> BackOffFrom(std::span<const double> state) const;
+  void SendNext(std::int64_t now_us);
   [[nodiscard]] int MostCandidates() const;
   void Follow(const robot_state_t& state);
   [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 namespace forereach {
 namespace {
 
+constexpr double kSlowest = 0.3;  // of the cruise speed, that a sample may aim at
 constexpr Eigen::Index kTheta = 2, kV = 3, kA = 4, kDelta = 5;
 
 const std::vector<std::string> kCarStates{"x", "y", "theta", "v", "a", "delta"};
@@ -71,33 +73,86 @@ double PolicyProposer::Steering(const Eigen::VectorXd& state, double most, int a
   return fan[static_cast<std::size_t>(attempt - 1)];
 }
 
-Eigen::VectorXd PolicyProposer::ReferenceStart(const Eigen::VectorXd& state, int attempt) const {
+// The acceleration that leads from one speed to another in a block, as far as references accelerate.
+double PolicyProposer::Acceleration(const Eigen::VectorXd& state, double speed) const {
+  const double begin = std::clamp(state[kV], 0.0, kCruiseSpeed), end = std::min(speed, kCruiseSpeed);
+  return std::clamp((end - begin) / duration_, -kCruiseAcceleration, kCruiseAcceleration);
+}
+
+double PolicyProposer::MostSteering(const Eigen::VectorXd& state, double speed) const {
+  const double begin = std::clamp(state[kV], 0.0, kCruiseSpeed);
+  return CruiseSteering(std::max(begin, begin + Acceleration(state, speed) * duration_), wheelbase_);
+}
+
+PolicyProposer::Aim PolicyProposer::AimOf(const Eigen::VectorXd& state, int attempt) const {
+  const double speed = options_.cruise_speed;
+  return {Steering(state, MostSteering(state, speed), attempt), speed};
+}
+
+Eigen::VectorXd PolicyProposer::ReferenceStart(const Eigen::VectorXd& state, const Aim& aim) const {
   Eigen::VectorXd start = state;
   start[kV] = std::clamp(state[kV], 0.0, kCruiseSpeed);
-  const double end = std::min(options_.cruise_speed, kCruiseSpeed);
-  start[kA] = std::clamp((end - start[kV]) / duration_, -kCruiseAcceleration, kCruiseAcceleration);
-  const double fastest = std::max(start[kV], start[kV] + start[kA] * duration_);
-  start[kDelta] = Steering(state, CruiseSteering(fastest, wheelbase_), attempt);
+  start[kA] = Acceleration(state, aim.speed);
+  start[kDelta] = aim.steering;
   return start;
 }
 
+bool PolicyProposer::CanServe(const PlanRequest& request) const {
+  return request.state.size() == problem_->model->num_states() && request.state.allFinite();
+}
+
 std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
-  const NominalModel& model = *problem_->model;
-  if (request.state.size() != model.num_states() || !request.state.allFinite() || request.attempt > kFan)
-    return std::nullopt;
-  const Reference reference = MakeReference(model, ReferenceStart(request.state, request.attempt), policy_.num_steps());
-  Eigen::MatrixXd progress = policy_.Act(Features(request.state, reference)).leftCols(options_.progress_steps);
+  if (!CanServe(request) || request.attempt > kFan) return std::nullopt;
+  const auto progress = Progress(request.state, AimOf(request.state, request.attempt));
+  return progress ? WithTail(request.state, *progress, 0) : std::nullopt;
+}
+
+std::vector<Proposal> PolicyProposer::ProposeMany(const PlanRequest& request) {
+  if (options_.policy_samples == 1) return Proposer::ProposeMany(request);
+  if (!CanServe(request)) return {};
+  const int tails = motion_.num_tails(), samples = options_.policy_samples;
+  const int blocks = std::max((samples + tails - 1) / tails, std::min(samples, 1 + kFan));
+  std::mt19937_64 random(request.seed);
+  const auto draw = [&](double least, double most) {
+    return least + (most - least) * (static_cast<double>(random() >> 11) * 0x1p-53);  // the same with every library
+  };
+  std::vector<std::optional<Eigen::MatrixXd>> progress;
+  for (int i = 0; i < blocks; ++i) {
+    if (i <= kFan && request.attempt == 0) {
+      progress.push_back(Progress(request.state, AimOf(request.state, i)));
+      continue;
+    }
+    const double speed = draw(kSlowest, 1) * options_.cruise_speed, most = MostSteering(request.state, speed);
+    progress.push_back(Progress(request.state, {draw(-most, most), speed}));
+  }
+  std::vector<Proposal> all;
+  for (int i = 0; i < samples; ++i) {
+    const auto& block = progress[static_cast<std::size_t>(i % blocks)];
+    if (auto proposal = block ? WithTail(request.state, *block, i / blocks) : std::nullopt)
+      all.push_back(*std::move(proposal));
+  }
+  return all;
+}
+
+std::optional<Eigen::MatrixXd> PolicyProposer::Progress(const Eigen::VectorXd& state, const Aim& aim) const {
+  const Reference reference = MakeReference(*problem_->model, ReferenceStart(state, aim), policy_.num_steps());
+  Eigen::MatrixXd progress = policy_.Act(Features(state, reference)).leftCols(options_.progress_steps);
   if (!progress.allFinite()) return std::nullopt;  // weights are finite, their sums need not be
   const Box& inputs = problem_->domain.input;
   for (auto column : progress.colwise()) column = column.cwiseMax(inputs.lower()).cwiseMin(inputs.upper());
+  return progress;
+}
 
-  const Eigen::VectorXd end = Rollout(model, request.state, progress).rightCols<1>();
+std::optional<Proposal> PolicyProposer::WithTail(const Eigen::VectorXd& state, const Eigen::MatrixXd& progress,
+                                                 int way) const {
+  const NominalModel& model = *problem_->model;
+  const Eigen::VectorXd end = Rollout(model, state, progress).rightCols<1>();
   Eigen::MatrixXd tail;
-  if (!motion_.Brake({end.data(), static_cast<std::size_t>(end.size())}, 0, options_.tail_steps, tail))
+  if (!motion_.Brake({end.data(), static_cast<std::size_t>(end.size())}, way, options_.tail_steps, tail))
     return std::nullopt;
   Proposal proposal{Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), options_.progress_steps, {}};
   proposal.controls << progress, tail;
-  proposal.states = Rollout(model, request.state, proposal.controls);
+  proposal.states = Rollout(model, state, proposal.controls);
   if (!proposal.states.allFinite() || !KeepsAllLimits(proposal)) return std::nullopt;
   return proposal;
 }

@@ -4,7 +4,10 @@ The policy does not take obstacles or bounds into account. The proposer checks o
 that the nominal model keeps the task's limits at each sample. If the certifier refuses a candidate, the next candidate
 follows another reference. References start at the robot's state and speed and change the speed towards cruise_speed.
 The first one follows the arc to the goal. The next ones follow kFan steering angles over the range of the training
-(reference.h), starting with the angle nearest to that arc. */
+(reference.h), starting with the angle nearest to that arc.
+
+With planner.policy_samples, one request gives so many candidates: those of all references by the first way to brake;
+then of further ones, towards any angle and speed, by the seed; then the same by the task's other ways to brake. */
 #pragma once
 
 #include <memory>
@@ -32,10 +35,24 @@ class PolicyProposer final : public Proposer {
   candidate exceeds a limit, or if one of its numbers is not finite. Clearance, margins and seed of the request are
   ignored. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
+  /** Up to planner.policy_samples of them, fewer if some are no candidates. If it is 1, as Propose. With more, each
+  attempt draws others, and there is no last one. */
+  [[nodiscard]] std::vector<Proposal> ProposeMany(const PlanRequest& request) override;
 
  private:
-  [[nodiscard]] Eigen::VectorXd ReferenceStart(const Eigen::VectorXd& state, int attempt) const;
+  // Where a reference leads: to a steering angle of the fan, and a speed.
+  struct Aim {
+    double steering, speed;
+  };
+  [[nodiscard]] Aim AimOf(const Eigen::VectorXd& state, int attempt) const;
+  [[nodiscard]] Eigen::VectorXd ReferenceStart(const Eigen::VectorXd& state, const Aim& aim) const;
+  [[nodiscard]] bool CanServe(const PlanRequest& request) const;
+  [[nodiscard]] double Acceleration(const Eigen::VectorXd& state, double speed) const;
+  [[nodiscard]] double MostSteering(const Eigen::VectorXd& state, double speed) const;
   [[nodiscard]] double Steering(const Eigen::VectorXd& state, double most, int attempt) const;
+  [[nodiscard]] std::optional<Eigen::MatrixXd> Progress(const Eigen::VectorXd& state, const Aim& aim) const;
+  [[nodiscard]] std::optional<Proposal> WithTail(const Eigen::VectorXd& state, const Eigen::MatrixXd& progress,
+                                                 int way) const;
 
   [[nodiscard]] bool KeepsAllLimits(const Proposal& proposal) const;
 

@@ -55,6 +55,11 @@ class Proposer {
   /** One candidate, or nothing if none was found. The result depends only on the request, the construction and the
   obstacles. */
   [[nodiscard]] virtual std::optional<Proposal> Propose(const PlanRequest& request) = 0;
+  /** Candidates for one start, the preferred ones first; empty if none was found. By default what Propose gives. */
+  [[nodiscard]] virtual std::vector<Proposal> ProposeMany(const PlanRequest& request) {
+    std::optional<Proposal> one = Propose(request);
+    return one ? std::vector{*std::move(one)} : std::vector<Proposal>{};
+  }
 };
 
 /** Makes the proposer that planner.source names. @throws ConfigError if the options do not match the problem, as of a

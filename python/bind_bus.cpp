@@ -10,6 +10,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
@@ -42,25 +43,25 @@ class PlannerBus final {
 
   std::int64_t Propose(const py::object& controls, const py::object& x0, std::int64_t start,
                        std::optional<int> progress) {
-    const Eigen::MatrixXd plan = ControlsOf(controls);
-    const auto [given_center, given_width] = PairOf(x0);
-    const Eigen::VectorXd center = VectorOf(given_center, "x0: center"),
-                          width = VectorOf(given_width, "x0: half_width");
-    task_->Require(plan, Zonotope::FromBox(center, width));
-    candidate_plan_t candidate{};
-    candidate.utime = WallClockUs();
-    candidate.sequence = proposed_;
-    candidate.plan_id = last_plan_id_ = std::max(last_plan_id_ + 1, candidate.utime);
-    SetText(candidate.source, source_);
-    candidate.start_utime = start;
-    candidate.step_us = Microseconds(task_->config().robot.step_period_ms);
-    SetPlan(candidate, center, width, plan);
-    if (progress && (*progress < 0 || *progress > plan.cols()))
-      throw std::invalid_argument("progress_steps: " + std::to_string(*progress) + ", must be 0 to the steps of U");
-    candidate.progress_steps = static_cast<std::int16_t>(progress.value_or(candidate.num_steps));
-    opened_.Send(opened_.config().bus.candidate, Encode(candidate));
-    ++proposed_;
-    return candidate.plan_id;
+    const std::int64_t now = WallClockUs(), plan_id = std::max(last_plan_id_ + 1, now);
+    Send(CandidateOf(ControlsOf(controls), x0, start, progress, now, plan_id), plan_id);
+    return plan_id;
+  }
+
+  std::vector<std::int64_t> ProposeMany(const py::object& controls, const py::object& x0, std::int64_t start,
+                                        std::optional<int> progress) {
+    const std::int64_t now = WallClockUs(), first = std::max(last_plan_id_ + 1, now);
+    std::vector<std::int64_t> plan_ids;
+    candidate_batch_t batch{};
+    for (const Eigen::MatrixXd& plan : ManyControlsOf(controls)) {
+      plan_ids.push_back(first + std::ssize(plan_ids));
+      if (!Append(batch, CandidateOf(plan, x0, start, progress, now, plan_ids.back())))
+        throw std::invalid_argument("Us: at most " + std::to_string(kMaxBatch) + " plans and " +
+                                    std::to_string(kMaxBatchNumbers) + " numbers fit into one message");
+    }
+    if (plan_ids.empty()) throw std::invalid_argument("Us: has no plan");
+    Send(batch, plan_ids.back());
+    return plan_ids;
   }
 
   py::list Decisions(double timeout) {
@@ -91,6 +92,33 @@ class PlannerBus final {
   }
 
  private:
+  candidate_plan_t CandidateOf(const Eigen::MatrixXd& plan, const py::object& x0, std::int64_t start,
+                               std::optional<int> progress, std::int64_t now_us, std::int64_t plan_id) const {
+    const auto [given_center, given_width] = PairOf(x0);
+    const Eigen::VectorXd center = VectorOf(given_center, "x0: center"),
+                          width = VectorOf(given_width, "x0: half_width");
+    task_->Require(plan, Zonotope::FromBox(center, width));
+    candidate_plan_t candidate{};
+    candidate.utime = now_us;
+    candidate.sequence = proposed_;
+    candidate.plan_id = plan_id;
+    SetText(candidate.source, source_);
+    candidate.start_utime = start;
+    candidate.step_us = Microseconds(task_->config().robot.step_period_ms);
+    SetPlan(candidate, center, width, plan);
+    if (progress && (*progress < 0 || *progress > plan.cols()))
+      throw std::invalid_argument("progress_steps: " + std::to_string(*progress) + ", must be 0 to the steps of U");
+    candidate.progress_steps = static_cast<std::int16_t>(progress.value_or(candidate.num_steps));
+    return candidate;
+  }
+
+  template <class Message>
+  void Send(const Message& message, std::int64_t last_plan_id) {
+    opened_.Send(opened_.config().bus.candidate, Encode(message));
+    last_plan_id_ = last_plan_id;
+    ++proposed_;
+  }
+
   void OnState(const Received& received) {
     const auto state = Decoded<robot_state_t>(received.bytes);
     if (state && TakeState(*state, task_->model().num_states(), received.utime, task_->config().gate, states_))
@@ -123,6 +151,12 @@ Messages are signed and checked as those of the other processes. Only the thread
 
 U: (T, m). x0: (center, half_width), (n,) each: where the robot is expected at `start`, microseconds since the Unix
 epoch, at a boundary of its steps. progress_steps: the controls before the braking tail.)")
+      .def("propose_many", &PlannerBus::ProposeMany, py::arg("Us"), py::arg("x0"), py::arg("start"),
+           py::arg("progress_steps") = py::none(),
+           R"(Sends candidates that share x0 as one message, the preferred ones first, and returns their plan_ids.
+
+One decision comes: on the first that is certified, otherwise on the first of them. Us: (B, T, m), at most 256 plans and
+7680 numbers; the rest as of propose.)")
       .def("decisions", &PlannerBus::Decisions, py::arg("timeout") = 0.0,
            "The decisions on candidates of this source that came since the last call. Waits up to `timeout` s for one.")
       .def("robot_state", &PlannerBus::RobotState, py::arg("timeout") = 0.0,

@@ -81,11 +81,11 @@ std::vector<Box> BoxesOf(const py::object& x0) {
 }
 
 Judgements CertifyPlans(const JudgingTask& task, const py::object& controls, const py::object& x0,
-                        std::optional<unsigned> threads) {
+                        std::optional<unsigned> threads, bool until_certified) {
   std::vector<Eigen::MatrixXd> plans = ManyControlsOf(controls);
   std::vector<Box> sets = BoxesOf(x0);
   const py::gil_scoped_release release;
-  return task.Certify(std::move(plans), std::move(sets), threads.value_or(AllCores()));
+  return task.Certify(std::move(plans), std::move(sets), threads.value_or(AllCores()), until_certified);
 }
 
 std::string AddObservation(JudgingTask& task, const py::object& z, const py::object& next) {
@@ -299,9 +299,11 @@ Any number of threads may use one. n states, m inputs, T steps; the units are th
 
 U: (T, m) real numbers. x0: (center, half_width), (n,) each; by default the task's. The plan begins at time 0.)")
       .def("certify_many", &CertifyPlans, py::arg("Us"), py::arg("x0") = py::none(), py::arg("threads") = py::none(),
+           py::arg("until_certified") = false,
            R"(Decides on B plans at once, by default on all cores; the decisions are those of certify.
 
-Us: (B, T, m). x0: as of certify, for all plans; or (B, n) each, for one plan each.)")
+Us: (B, T, m). x0: as of certify, for all plans; or (B, n) each, for one plan each.
+until_certified: the plans after the first certified one are not judged, and the list ends with it.)")
       .def(
           "observe", &AddObservation, py::arg("z"), py::arg("x_next"),
           R"(Adds one executed step to the observations, for later decisions. z: (n + m,), state and input; x_next: (n,).

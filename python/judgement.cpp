@@ -52,8 +52,8 @@ Config Certifying(Config config) {
 
 JudgingTask::JudgingTask(Config config) : config_(Certifying(std::move(config))), certifier_(config_.problem) {}
 
-Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<Box> initial_sets,
-                                unsigned threads) const {
+Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<Box> initial_sets, unsigned threads,
+                                bool until_certified) const {
   RequireExactArithmetic();
   if (initial_sets.empty()) initial_sets.push_back(config_.initial_set);
   std::vector<std::shared_ptr<Judgement>> all;
@@ -73,19 +73,21 @@ Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<
   std::exception_ptr failure;
   std::mutex failing;
   const std::shared_lock lock(mutex_);
-  static_cast<void>(CertifyAll(certifier_, views, sets, config_.obstacles, threads,
-                               [&](std::size_t i, const Decision& decision, const Tube& tube) {
-                                 try {
-                                   all[i]->decision = decision;
-                                   all[i]->num_learned = learned_.size();
-                                   all[i]->message = Explain(decision, *config_.problem, views[i], tube);
-                                   all[i]->tube = NumbersOf(decision, tube, model().num_states());
-                                 } catch (...) {
-                                   const std::lock_guard guard(failing);
-                                   failure = std::current_exception();
-                                 }
-                               }));
+  const BatchOptions options{.threads = threads, .until_certified = until_certified};
+  const auto decisions = CertifyAll(certifier_, views, sets, config_.obstacles, options,
+                                    [&](std::size_t i, const Decision& decision, const Tube& tube) {
+                                      try {
+                                        all[i]->decision = decision;
+                                        all[i]->num_learned = learned_.size();
+                                        all[i]->message = Explain(decision, *config_.problem, views[i], tube);
+                                        all[i]->tube = NumbersOf(decision, tube, model().num_states());
+                                      } catch (...) {
+                                        const std::lock_guard guard(failing);
+                                        failure = std::current_exception();
+                                      }
+                                    });
   if (failure) std::rethrow_exception(failure);
+  all.resize(ToSize(std::ranges::find(decisions, Outcome::kNone, &Decision::outcome) - decisions.begin()));
   return {std::make_move_iterator(all.begin()), std::make_move_iterator(all.end())};
 }
 

@@ -51,9 +51,10 @@ class JudgingTask final : public std::enable_shared_from_this<JudgingTask> {
   /** As `forereach certify` decides, bit for bit. Each call tests its thread's arithmetic, which other libraries of the
   process may have changed.
   @param plans m-by-T each. @param initial_sets X_0 of each plan, or one for all; none: the task's.
+  @param until_certified the plans after the first certified one are not judged and left out.
   @throws std::invalid_argument as Certifier::Require and CertifyAll, std::runtime_error as RequireExactArithmetic. */
-  [[nodiscard]] Judgements Certify(std::vector<Eigen::MatrixXd> plans, std::vector<Box> initial_sets,
-                                   unsigned threads) const;
+  [[nodiscard]] Judgements Certify(std::vector<Eigen::MatrixXd> plans, std::vector<Box> initial_sets, unsigned threads,
+                                   bool until_certified = false) const;
 
   /** @throws std::invalid_argument as Certifier::Require for a plan, m-by-T, that begins in x0. */
   void Require(const Eigen::MatrixXd& controls, const Zonotope& x0) const;

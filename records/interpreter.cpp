@@ -15,6 +15,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -74,9 +75,11 @@ Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optiona
 std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
   const Stream plain{channel, ""};
   if (channel == channels_.candidate) {
-    const auto candidate = Decoded<candidate_plan_t>(bytes);
-    if (!candidate) return {plain, std::nullopt};
-    return {Stream{channel, GetText(candidate->source)}, StreamPosition{candidate->sequence, candidate->utime}};
+    const auto place = [&](const auto& message) -> std::pair<Stream, std::optional<StreamPosition>> {
+      if (!message) return {plain, std::nullopt};
+      return {Stream{channel, GetText(message->source)}, StreamPosition{message->sequence, message->utime}};
+    };
+    return IsBatch(bytes) ? place(Decoded<candidate_batch_t>(bytes)) : place(Decoded<candidate_plan_t>(bytes));
   }
   if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
   if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
@@ -104,7 +107,7 @@ void Interpreter::Observe(const LogEvent& event, Rows& rows) {
     rows.gaps.push_back(std::move(*gap));
   }
   if (event.channel == channels_.candidate) {
-    candidates_.Add(DigestOf(event.message()), event.utime);
+    candidates_.Add(DigestsIn(event.message()), event.utime);
   } else if (event.channel == channels_.decision) {
     if (const auto decision = Decoded<decision_t>(event.message())) {
       DecisionRow row = MakeRow(*decision, reference());

@@ -10,6 +10,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "records/log_survey.h"
 
 namespace forereach {
@@ -52,7 +53,7 @@ void LogTasks::Look(bool must_be_given) {
       ++events_;
       const auto named = NamedBy(event.message());
       if (!named) {
-        candidates_ += Decoded<candidate_plan_t>(event.message()).has_value();
+        candidates_ += Decoded<candidate_plan_t>(event.message()) || Decoded<candidate_batch_t>(event.message());
         continue;
       }
       const auto known = decisions_.find(named->first);

@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/message_fields.h"
 #include "lcmtypes/names.h"
 #include "task/json_text.h"
@@ -140,8 +141,8 @@ struct Types {
 };
 
 using AllTypes =
-    Types<advice_t, candidate_plan_t, certified_plan_t, certifier_status_t, command_t, decision_t, execution_event_t,
-          fault_t, logger_status_t, obstacles_t, robot_state_t, transition_t, withdrawal_t>;
+    Types<advice_t, candidate_batch_t, candidate_plan_t, certified_plan_t, certifier_status_t, command_t, decision_t,
+          execution_event_t, fault_t, logger_status_t, obstacles_t, robot_state_t, transition_t, withdrawal_t>;
 
 // Calls `use` with the decoded message.
 template <class Use>
@@ -160,6 +161,7 @@ void Describe(const candidate_plan_t& m, Bytes bytes, MessageSummary& summary) {
   summary.plan = DigestOf(bytes);
   summary.is_of_plan = true;
 }
+void Describe(const candidate_batch_t& m, Bytes, MessageSummary& summary) { summary.plan_id = m.plan_id; }
 template <class Answer>
 requires(std::same_as<Answer, decision_t> || std::same_as<Answer, advice_t>) void Describe(const Answer& m, Bytes,
                                                                                            MessageSummary& summary) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "forereach/decision_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "records/message_json.h"
 
 namespace forereach {
@@ -37,10 +38,7 @@ void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
   user_.OnMessage(event);
   const auto reference = [&] { return LogReference{log_file, event.number, ToHex(DigestOf(event))}; };
   if (event.channel == channels_.candidate) {
-    std::unique_ptr<candidate_plan_t> candidate;
-    if (const auto decoded = Decoded<candidate_plan_t>(event.message()))
-      candidate = std::make_unique<candidate_plan_t>(*decoded);
-    candidates_.Add(DigestOf(event.message()), std::move(candidate));
+    candidates_.Add(DigestsIn(event.message()), {event.message().begin(), event.message().end()});
   } else if (event.channel == channels_.certified) {
     if (const auto certified = Decoded<certified_plan_t>(event.message()))
       user_.OnCertified(*certified, reference());
@@ -55,8 +53,10 @@ void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
   for (const EventRow& execution : rows.events) user_.OnExecution(execution);
   if (rows.decisions.empty()) return;
   const auto decision = Decoded<decision_t>(event.message());
-  const auto candidate = candidates_.Take(GetDigest(decision->plan_digest));
-  user_.OnDecision(rows.decisions.front(), candidate ? candidate->get() : nullptr);
+  const Digest plan = GetDigest(decision->plan_digest);
+  const auto message = candidates_.Take(plan);
+  const auto candidate = message ? Decoded<candidate_plan_t>(CandidateIn(*message, plan)) : std::nullopt;
+  user_.OnDecision(rows.decisions.front(), candidate ? &*candidate : nullptr);
 }
 
 void RecordReader::TakeWithdrawal(const LogEvent& event, const std::string& log_file) {

@@ -65,8 +65,8 @@ class RecordReader final {
   RecordUser& user_;
   const std::function<void(std::int64_t)> on_bytes_;
   LogAuthenticator authenticator_;
-  std::optional<Interpreter> interpreter_;  // given authentic events only
-  Undecided<std::unique_ptr<candidate_plan_t>> candidates_{kCandidates};
+  std::optional<Interpreter> interpreter_;                        // given authentic events only
+  Undecided<std::vector<std::uint8_t>> candidates_{kCandidates};  // as they were sent
   RepeatedWithdrawals withdrawals_;
   LogDamage damage_;
   std::int64_t undecodable_ = 0;

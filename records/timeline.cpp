@@ -9,6 +9,7 @@
 #include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/certifier_status_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -73,7 +74,7 @@ void Timeline::Take(const LogEvent& event, const std::string& name) {
   Tell(&TimelineUser::OnEvent, event);
   if (event.channel == channels_.candidate) {
     ++candidates_;
-    undecided_.Add(DigestOf(event.message()), {{event.message().begin(), event.message().end()}, name, place_});
+    undecided_.Add(DigestsIn(event.message()), {{event.message().begin(), event.message().end()}, name, place_});
   } else if (event.channel == channels_.decision) {
     TakeDecision(event, name);
   } else if (event.channel == channels_.certified) {
@@ -233,6 +234,7 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
   if (Heed(decisions_, {decision->sequence, decision->utime}, event) == Told::kStarts) Start();
   const Digest plan = GetDigest(decision->plan_digest);
   RecordedDecision recorded{*decision, name, undecided_.Take(plan), true, {}};
+  if (recorded.candidate) recorded.candidate->bytes = CandidateIn(recorded.candidate->bytes, plan);
   const Config* task = find_(GetDigest(decision->config_digest));
   recorded.is_of_known_task = task != nullptr;
   if (task) FollowReload(*task);

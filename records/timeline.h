@@ -61,9 +61,11 @@ struct Basis {
 };
 
 struct RecordedCandidate {
-  std::vector<std::uint8_t> bytes;  ///< The message without its signature. It may not be a candidate_plan_t.
-  std::string event;                ///< "events-....lcmlog event 17"; without the file if only one was read.
-  std::int64_t place = 0;           ///< Position in the order of the log.
+  /** The message without its signature; of a batch that was decided on, the candidate of the decision. It may not be a
+  candidate_plan_t. */
+  std::vector<std::uint8_t> bytes;
+  std::string event;       ///< "events-....lcmlog event 17"; without the file if only one was read.
+  std::int64_t place = 0;  ///< Position in the order of the log.
 };
 
 struct RecordedDecision {

@@ -122,7 +122,7 @@ struct ChannelRow {
 };
 
 constexpr std::array kChannels{
-    ChannelRow{"candidate", &BusOptions::candidate, "candidate_plan_t, from planners."},
+    ChannelRow{"candidate", &BusOptions::candidate, "candidate_plan_t and candidate_batch_t, from planners."},
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
     ChannelRow{"certified", &BusOptions::certified, "certified_plan_t, what a robot may execute."},
     ChannelRow{"withdrawn", &BusOptions::withdrawn, "withdrawal_t, what of it a robot may no longer execute."},
@@ -212,6 +212,9 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
                       "A candidate starts so many steps after the state it was planned from."),
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates, "The most for one start."),
+      planner.Integer("policy_samples", Between(1, 10000), &PlannerOptions::policy_samples,
+                      "Of `source: policy`: so many candidates are sampled at once and sent in batches; `candidates` "
+                      "is then the most batches."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
                      "Acceleration and deceleration that the search expects of the robot."),

@@ -20,6 +20,10 @@ Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule) {
   return {candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs, schedule};
 }
 
+Plan PlanOf(const candidate_batch_t& batch, int k, const Schedule& schedule) {
+  return {batch.control + FirstNumberOf(batch, k), batch.num_inputs, batch.num_steps[k], batch.num_inputs, schedule};
+}
+
 void SetPlan(candidate_plan_t& candidate, const Eigen::VectorXd& center, const Eigen::VectorXd& half_width,
              const Eigen::MatrixXd& controls) {
   candidate.num_states = static_cast<std::int16_t>(center.size());
@@ -57,11 +61,12 @@ Zonotope InitialSetOf(const candidate_plan_t& candidate) {
 }
 
 std::int64_t StartOf(Bytes candidate) {
-  // After the fingerprint, utime, sequence, plan_id and source.
+  // After the fingerprint, utime, sequence, plan_id and source, of a batch, too.
   constexpr std::size_t kStartsAt = 4 * sizeof(std::int64_t) + sizeof candidate_plan_t::source;
-  if (candidate.size() != EncodedSize<candidate_plan_t>() ||
-      FromBigEndian<std::int64_t>(candidate) != candidate_plan_t::getHash())
-    return INT64_MAX;
+  const auto is = [&]<class Message>(const Message&) {
+    return candidate.size() == EncodedSize<Message>() && FromBigEndian<std::int64_t>(candidate) == Message::getHash();
+  };
+  if (!is(candidate_plan_t{}) && !is(candidate_batch_t{})) return INT64_MAX;
   return FromBigEndian<std::int64_t>(candidate.subspan(kStartsAt));
 }
 

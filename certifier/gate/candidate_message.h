@@ -10,6 +10,7 @@
 #include "forereach/dynamics/model.h"
 #include "forereach/safety/body.h"
 #include "forereach/sets/zonotope.h"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/codec.h"
 #include "task/gate_options.h"
 
@@ -18,6 +19,9 @@ namespace forereach {
 /** u_0 .. u_{T-1} and their schedule. Refers to the candidate's numbers; whether its counts fit is for
 Certifier::Require to say. */
 [[nodiscard]] Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule = {});
+
+/** The same of candidate k of a batch. @pre WhyNoBatch is empty. */
+[[nodiscard]] Plan PlanOf(const candidate_batch_t& batch, int k, const Schedule& schedule);
 
 /** Sets the numbers of a plan: X_0 by its center and half-widths, n entries each, and u_0 .. u_{T-1}, m-by-T. None of
 them is of a braking tail: progress_steps is T. @pre HasSizes then holds. */
@@ -40,8 +44,8 @@ longest step, or start_utime is further than Schedule::kLatest from the epoch. E
 /** X_0. @throws std::invalid_argument if num_states is not 1 to 16, or as Zonotope::FromBox does. */
 [[nodiscard]] Zonotope InitialSetOf(const candidate_plan_t& candidate);
 
-/** start_utime of the bytes of a candidate, read where it lies in them: nothing is decoded. INT64_MAX for bytes that
-Decode refuses. */
+/** start_utime of the bytes of a candidate or a batch, read where it lies in them: nothing is decoded. INT64_MAX for
+bytes that Decode refuses. */
 [[nodiscard]] std::int64_t StartOf(Bytes candidate);
 
 }  // namespace forereach

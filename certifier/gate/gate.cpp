@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,8 +12,11 @@
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
+#include "forereach/certify/batch.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
+#include "lcmtypes/candidate_batch.h"
+#include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "lcmtypes/why_failed.h"
 
@@ -61,10 +66,58 @@ GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause
       candidate, [now_us] { return now_us; }, Rejection{cause, why, outcome});
 }
 
-GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Rejection> from_outside) noexcept {
+GateAnswer Gate::Answer(Bytes message, const TimeSource& clock, std::optional<Rejection> from_outside) noexcept {
+  const std::int64_t now_us = clock();
+  try {
+    const auto batch = IsBatch(message) ? Decoded<candidate_batch_t>(message) : std::nullopt;
+    if (batch && WhyNoBatch(*batch).empty()) {
+      const Choice chosen = from_outside ? Choice{} : Choose(*batch, now_us, clock);
+      GateAnswer answer = AnswerOne(Encode(CandidateOf(*batch, chosen.candidate)), now_us, clock, from_outside);
+      SetText(answer.decision.message, chosen.how + GetText(answer.decision.message));
+      return answer;
+    }
+  } catch (const std::exception& error) {
+    from_outside = Rejection{decision_t::CAUSE_INTERNAL_ERROR, "internal error: " + WhyFailed(error)};
+  }
+  return AnswerOne(message, now_us, clock, std::move(from_outside));
+}
+
+// Whatever it chooses is decided on by itself: this search proves nothing.
+Gate::Choice Gate::Choose(const candidate_batch_t& batch, std::int64_t now_us, const TimeSource& clock) {
+  const int count = batch.num_candidates;
+  const auto at = [count](int k) { return fmt::format("candidate {} of 0..{}: ", k, count - 1); };
+  candidate_plan_t candidate{};
+  Zonotope initial_set;
+  std::vector<Plan> plans;
+  for (int k = 0; k < count; ++k) {
+    candidate = CandidateOf(batch, k);
+    if (CheckContent(candidate, initial_set) || sources_.IsUsed(candidate, now_us)) return {k, at(k)};
+    plans.push_back(PlanOf(batch, k, ScheduleOf(candidate, options_)));
+  }
+  if (CheckTimes(candidate, now_us) || !WhyNoSchedule(candidate, options_).empty() || CheckDeadline(candidate, now_us))
+    return {0, at(0)};
+  certifier_.Require(plans[0], initial_set, obstacles_.all());
+  const auto decisions = CertifyAll(certifier_, plans, std::span(&initial_set, 1), obstacles_.all(),
+                                    {.until_certified = true,
+                                     .clock = clock,
+                                     .deadline = now_us + Microseconds(options_.decision_budget_ms) / 2,
+                                     .tubes = std::span(&tube_, 1)});
+  const auto certified = std::ranges::find(decisions, Outcome::kCertified, &Decision::outcome) - decisions.begin();
+  if (certified < count) return {static_cast<int>(certified), at(static_cast<int>(certified))};
+  std::map<std::string, int> causes;
+  for (const Decision& decision : decisions)
+    ++causes[decision.outcome == Outcome::kNone ? "not judged"
+                                                : std::string(CauseName(static_cast<std::int16_t>(decision.cause)))];
+  std::string counts;
+  for (const auto& [cause, number] : causes)
+    counts += fmt::format("{}{} {}", counts.empty() ? "" : ", ", cause, number);
+  return {0, fmt::format("none of {} ({}); the first: ", count, counts)};
+}
+
+GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& clock,
+                           std::optional<Rejection> from_outside) noexcept {
   GateAnswer answer;
   decision_t& decision = answer.decision;
-  const std::int64_t now_us = clock();
   decision.utime = now_us;
   decision.sequence = decisions_++;
   decision.outcome = decision_t::REJECTED;
@@ -102,15 +155,28 @@ GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Reje
   return answer;
 }
 
+template <class Message>
+std::optional<Gate::Rejection> Gate::CheckBytes(Bytes bytes, Message& message) {
+  switch (Decode(bytes, message)) {
+    case DecodeStatus::kOk: return std::nullopt;
+    case DecodeStatus::kUnknownFingerprint:
+      return Rejection{decision_t::CAUSE_UNKNOWN_FINGERPRINT, "not a candidate_plan_t or a candidate_batch_t"};
+    case DecodeStatus::kTrailingBytes:
+    case DecodeStatus::kWrongLength: break;
+  }
+  return Rejection{
+      bytes.size() > EncodedSize<Message>() ? decision_t::CAUSE_TRAILING_BYTES : decision_t::CAUSE_WRONG_LENGTH,
+      fmt::format("{} bytes, must be {}", bytes.size(), EncodedSize<Message>())};
+}
+
 std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
                                            std::int64_t now_us) {
-  const DecodeStatus status = Decode(bytes, candidate);
-  if (status == DecodeStatus::kUnknownFingerprint)
-    return Rejection{decision_t::CAUSE_UNKNOWN_FINGERPRINT, "not a candidate_plan_t"};
-  if (status != DecodeStatus::kOk)
-    return Rejection{
-        status == DecodeStatus::kTrailingBytes ? decision_t::CAUSE_TRAILING_BYTES : decision_t::CAUSE_WRONG_LENGTH,
-        fmt::format("{} bytes, must be {}", bytes.size(), EncodedSize<candidate_plan_t>())};
+  if (IsBatch(bytes)) {  // one that stands for candidates comes here by them
+    candidate_batch_t batch;
+    if (auto rejection = CheckBytes(bytes, batch)) return rejection;
+    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, "batch: " + WhyNoBatch(batch)};
+  }
+  if (auto rejection = CheckBytes(bytes, candidate)) return rejection;
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;

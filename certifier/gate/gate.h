@@ -17,6 +17,7 @@ not, the caller calls Refuse. */
 #include "certifier/gate/sources.h"
 #include "certifier/gate/upheld.h"
 #include "forereach/advice_t.hpp"
+#include "forereach/candidate_batch_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
@@ -57,9 +58,13 @@ class Gate final {
   /** The tube of the last plan that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
-  /** Decides on one candidate. Never throws: an exception becomes a rejection. The caller sets elapsed_us; all other
-  fields of both messages are complete. Reads the clock twice. The first reading is the decision's utime. By the second,
-  a certificate that took longer than gate.decision_budget_ms is dropped. */
+  /** Decides on one candidate, or on one of a batch (lcmtypes/candidate_batch.h): the first that is certified by half
+  of gate.decision_budget_ms, otherwise candidate 0. It is then decided on as if it was sent alone; the message says
+  which one of how many it is and, if none is certified, counts the causes. A batch with a candidate that is refused for
+  its sizes or numbers, or whose plan_id was used, is answered by the refusal of the first such candidate. Never throws:
+  an exception becomes a rejection. The caller sets elapsed_us; all other fields of both messages are complete. Reads
+  the clock twice, of a batch more often. The first reading is the decision's utime. By the second, a certificate that
+  took longer than gate.decision_budget_ms is dropped. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, const TimeSource& clock) noexcept;
   /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
@@ -119,8 +124,19 @@ class Gate final {
     std::int16_t outcome = decision_t::REJECTED;
   };
 
-  [[nodiscard]] GateAnswer Answer(Bytes candidate, const TimeSource& clock,
+  /** The candidate of a batch that is decided on, and what the decision's message begins with. */
+  struct Choice {
+    int candidate = 0;
+    std::string how;
+  };
+
+  [[nodiscard]] GateAnswer Answer(Bytes message, const TimeSource& clock,
                                   std::optional<Rejection> from_outside) noexcept;
+  [[nodiscard]] GateAnswer AnswerOne(Bytes candidate, std::int64_t now_us, const TimeSource& clock,
+                                     std::optional<Rejection> from_outside) noexcept;
+  [[nodiscard]] Choice Choose(const candidate_batch_t& batch, std::int64_t now_us, const TimeSource& clock);
+  template <class Message>
+  [[nodiscard]] static std::optional<Rejection> CheckBytes(Bytes bytes, Message& message);
   [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
                                                std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const;

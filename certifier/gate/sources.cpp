@@ -8,6 +8,11 @@ namespace {
 
 StreamPosition PositionOf(const candidate_plan_t& candidate) { return {candidate.sequence, candidate.utime}; }
 
+// Of plan_ids, which may be any numbers, unsigned. @pre above >= below.
+std::uint64_t Apart(std::int64_t above, std::int64_t below) {
+  return static_cast<std::uint64_t>(above) - static_cast<std::uint64_t>(below);
+}
+
 }  // namespace
 
 std::string Sources::NameOf(const candidate_plan_t& candidate) {
@@ -22,21 +27,19 @@ void Sources::Source::ForgetAllBut(std::int64_t plan_id) {
   used.set(0);
 }
 
-// Differences of plan_ids, which may be any numbers, are taken unsigned.
+bool Sources::Source::Uses(std::int64_t plan_id) const {
+  const std::uint64_t below = Apart(highest, plan_id);
+  return plan_id <= highest && (below >= kWindow || used.test(below));
+}
+
 bool Sources::Source::Use(std::int64_t plan_id) {
-  const auto apart = [](std::int64_t above, std::int64_t below) {
-    return static_cast<std::uint64_t>(above) - static_cast<std::uint64_t>(below);
-  };
+  if (Uses(plan_id)) return false;
   if (plan_id > highest) {
-    const std::uint64_t shift = apart(plan_id, highest);
+    const std::uint64_t shift = Apart(plan_id, highest);
     used = shift < kWindow ? used << shift : std::bitset<kWindow>();
-    used.set(0);
     highest = plan_id;
-    return true;
   }
-  const std::uint64_t below = apart(highest, plan_id);
-  if (below >= kWindow || used.test(below)) return false;
-  used.set(below);
+  used.set(Apart(highest, plan_id));
   return true;
 }
 
@@ -60,6 +63,11 @@ Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_
   }
   known->second.heard_us = now_us;
   return Admission::kNew;
+}
+
+bool Sources::IsUsed(const candidate_plan_t& candidate, std::int64_t now_us) const {
+  const auto known = sources_.find(NameOf(candidate));
+  return known != sources_.end() && !IsSilent(known->second, now_us) && known->second.Uses(candidate.plan_id);
 }
 
 bool Sources::IsSilent(const Source& source, std::int64_t now_us) const {

@@ -38,6 +38,9 @@ class Sources final {
   /** Whether the candidate's plan_id is new. If it is, it counts as used from now on. Cost O(log sources). */
   [[nodiscard]] Admission Admit(const candidate_plan_t& candidate, std::int64_t now_us);
 
+  /** Whether Admit would say kUsed. */
+  [[nodiscard]] bool IsUsed(const candidate_plan_t& candidate, std::int64_t now_us) const;
+
   /** The number of lost candidates, from gaps in their `sequence`. */
   [[nodiscard]] std::int64_t lost() const;
   /** The highest plan_id that the candidate's source has used; 0 for an unknown source. */
@@ -51,6 +54,7 @@ class Sources final {
     std::int64_t first_sequence = 0, came = 0;
 
     void ForgetAllBut(std::int64_t plan_id);
+    [[nodiscard]] bool Uses(std::int64_t plan_id) const;
     [[nodiscard]] bool Use(std::int64_t plan_id);
     void StartCounting(const StreamPosition& position, std::int64_t horizon_us);
     [[nodiscard]] std::int64_t last_sequence() const { return order.newest()->sequence; }

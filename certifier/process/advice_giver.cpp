@@ -4,6 +4,7 @@
 
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/stamp.h"
+#include "lcmtypes/candidate_batch.h"
 
 namespace forereach {
 namespace {
@@ -15,7 +16,8 @@ constexpr int kHalvings = 4;  // a plan that gives way by a sixteenth too much i
 void AdviceGiver::Note(Bytes candidate, const decision_t& decision, const GateOptions& options) {
   abstained_.reset();
   if (!options.advises || !IsAdvisedOn(decision.cause)) return;
-  if (auto decoded = Decoded<candidate_plan_t>(candidate)) abstained_ = {*decoded, decision};
+  if (auto decoded = Decoded<candidate_plan_t>(CandidateIn(candidate, GetDigest(decision.plan_digest))))
+    abstained_ = {*decoded, decision};
 }
 
 std::optional<advice_t> AdviceGiver::Give(Gate& gate, const std::function<bool()>& is_wanted_elsewhere) {

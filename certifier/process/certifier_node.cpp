@@ -14,6 +14,7 @@
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/process/faults.h"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/freshness.h"
 #include "lcmtypes/names.h"
 
@@ -435,8 +436,10 @@ void CertifierNode::WithdrawPlans(std::int64_t now_us) {
 void CertifierNode::AnswerWaiting() {
   if (!is_in_charge()) return;
   for (int i = 0; i < kAtOnce && !queue_.empty(); ++i) {
-    Answer(queue_.TakeNewest(), false);
+    const CandidateQueue::Candidate newest = queue_.TakeNewest();
+    Answer(newest, false);
     AnswerDue();
+    if (IsBatch(newest)) break;  // it may take as long as many
   }
   const auto most = static_cast<std::size_t>(gate_->options().queue);
   for (int i = 1; queue_.size() > most; ++i) {

@@ -331,8 +331,8 @@ void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> o
 }
 
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
-                            Tube& tube) const noexcept {
-  tube.length_ = 0;
+                            Tube& tube, int known) const noexcept {
+  tube.length_ = std::clamp(known, 0, tube.length_);
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
   // A contradiction precedes every other cause: no residual is admissible, so a tube would say nothing.
@@ -346,7 +346,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
 }
 
 Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
-  for (int t = 0; t < plan.num_steps; ++t) {
+  for (int t = tube.length(); t < plan.num_steps; ++t) {
     const auto i = ToSize(t);
     StepRecord& record = tube.steps_[i];
     record.envelope.found = t > 0 ? tube.steps_[i - 1].envelope.found : decltype(record.envelope.found){};

@@ -115,13 +115,18 @@ class Certifier final {
   there, and would prove what is not so. Then the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop,
   step T). Then S (JudgeSafety): the first sample or step t at which a limit or an obstacle fails. X_T is not tested
   against the domain.
-  @param tube receives the slices. @pre Require passes.
+  @param tube receives the slices.
+  @param known so many first steps are not propagated again if `tube` has them: it is of the last call, which was for
+  the same initial set and a plan with the same first controls, with no call of Learn since. The result is the same bits
+  as with 0.
+  @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
   it, each with its own tube. */
   [[nodiscard]] Decision Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
-                                 Tube& tube) const noexcept;
+                                 Tube& tube, int known = 0) const noexcept;
 
  private:
+  // From step tube.length() on.
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
   /** Outcome kNone unless a step changes a state by more than its declared rate allows, whatever the states in its two
   slices. */

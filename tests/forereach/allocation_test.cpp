@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 
+#include "forereach/certify/batch.h"
 #include "forereach/certify/certifier.h"
 #include "tests/sanitized.h"
 #include "tests/worlds.h"
@@ -113,6 +114,20 @@ TEST_F(Allocation, CertifyAllocatesNothingForExpressions) {
   const std::vector<Obstacle> obstacles{Obstacle::Circle(Eigen::Vector2d(10, 8), 1)};
   EXPECT_EQ(Count(10, 0, obstacles, Outcome::kCertified), 0);
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
+}
+
+TEST_F(Allocation, ABatchAllocatesNothingForAStep) {
+  const Eigen::VectorXd center = (Eigen::VectorXd(6) << 0, 0, 0, 10, 0, 0).finished();
+  const Zonotope start = Zonotope::FromBox(center, Eigen::VectorXd::Constant(6, 0.01));
+  const auto count = [&](int steps) {
+    const std::vector<Plan> plans(20, Plan{controls_.data(), 2, steps, 2});
+    const long before = allocations;
+    const auto decisions = CertifyAll(*certifier_, plans, std::span(&start, 1), {});
+    const long counted = allocations - before;
+    EXPECT_EQ(std::ranges::count(decisions, Outcome::kCertified, &Decision::outcome), 20);
+    return counted;
+  };
+  EXPECT_EQ(count(3), count(12));
 }
 
 }  // namespace forereach::allocation_test

@@ -4,6 +4,7 @@
 
 #include "forereach/advice_change_t.hpp"
 #include "forereach/advice_t.hpp"
+#include "forereach/candidate_batch_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
@@ -27,14 +28,23 @@ struct Contract {
   std::size_t bytes;
 };
 const std::map<std::string, Contract> kContracts = {
-    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}}, {"decision_t", {0x6c785a9e090fc6f2, 562}},
-    {"execution_event_t", {0x4742c25e0eefd377, 336}}, {"obstacle_shape_t", {0x29158dc0270b76d4, 406}},
-    {"robot_state_t", {0x19608533667df4c6, 296}},     {"transition_t", {0xc3ce61d7539f6402, 356}},
-    {"logger_status_t", {0x2a2438623a759ef0, 260}},   {"command_t", {0x1b315e627593a95f, 58}},
-    {"fault_t", {0x85189bcc15840698, 866}},           {"certifier_status_t", {0xf224554c7bae02b5, 1220}},
-    {"obstacle_t", {0xbbad85e96469971b, 488}},        {"obstacles_t", {0xc1a2a66356f23f34, 30746}},
-    {"withdrawal_t", {0x143744ac67af3ba6, 482}},      {"certified_plan_t", {0xd6bfba8d7729f625, 41976}},
-    {"advice_change_t", {0x2820254c63772fe1, 56}},    {"advice_t", {0xc708fe6c4a3d4e09, 654}},
+    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}},
+    {"decision_t", {0x6c785a9e090fc6f2, 562}},
+    {"execution_event_t", {0x4742c25e0eefd377, 336}},
+    {"obstacle_shape_t", {0x29158dc0270b76d4, 406}},
+    {"robot_state_t", {0x19608533667df4c6, 296}},
+    {"transition_t", {0xc3ce61d7539f6402, 356}},
+    {"logger_status_t", {0x2a2438623a759ef0, 260}},
+    {"command_t", {0x1b315e627593a95f, 58}},
+    {"fault_t", {0x85189bcc15840698, 866}},
+    {"certifier_status_t", {0xf224554c7bae02b5, 1220}},
+    {"obstacle_t", {0xbbad85e96469971b, 488}},
+    {"obstacles_t", {0xc1a2a66356f23f34, 30746}},
+    {"withdrawal_t", {0x143744ac67af3ba6, 482}},
+    {"certified_plan_t", {0xd6bfba8d7729f625, 41976}},
+    {"advice_change_t", {0x2820254c63772fe1, 56}},
+    {"advice_t", {0xc708fe6c4a3d4e09, 654}},
+    {"candidate_batch_t", {0x6b70f57595232290, 62806}},
 };
 
 template <class Message>
@@ -52,9 +62,9 @@ class MessageTest : public testing::Test {
   std::mt19937 random_{seed_};
 };
 
-using Messages = testing::Types<advice_change_t, advice_t, candidate_plan_t, certified_plan_t, certifier_status_t,
-                                command_t, decision_t, execution_event_t, fault_t, logger_status_t, obstacle_shape_t,
-                                obstacle_t, obstacles_t, robot_state_t, transition_t, withdrawal_t>;
+using Messages = testing::Types<advice_change_t, advice_t, candidate_batch_t, candidate_plan_t, certified_plan_t,
+                                certifier_status_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t,
+                                obstacle_shape_t, obstacle_t, obstacles_t, robot_state_t, transition_t, withdrawal_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

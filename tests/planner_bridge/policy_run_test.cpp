@@ -3,6 +3,7 @@
 
 #include "certifier/process/certifier_node.h"
 #include "forereach/certified_plan_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "planner_bridge/planner_node.h"
 #include "planner_bridge/policy_proposer.h"
 #include "planner_bridge/reference.h"
@@ -17,6 +18,7 @@ const std::string kTask = FOREREACH_SOURCE_DIR "/config/policy.yaml";
 /** What the bus carried in one run on a simulated clock. */
 struct Traffic {
   std::vector<candidate_plan_t> candidates;
+  std::vector<candidate_batch_t> batches;
   std::vector<decision_t> decisions;
   std::set<std::int64_t> certified, executed;
   nlohmann::json planner, robot;
@@ -37,7 +39,10 @@ Traffic RunTask(const Config& config) {
       use(message);
     });
   };
-  keep(config.bus.candidate, candidate_plan_t{}, [&](const auto& plan) { traffic.candidates.push_back(plan); });
+  bus->Subscribe(config.bus.candidate, [&](const Received& received) {
+    if (IsBatch(received.bytes)) return traffic.batches.push_back(Decoded<candidate_batch_t>(received.bytes).value());
+    traffic.candidates.push_back(Decoded<candidate_plan_t>(received.bytes).value());
+  });
   keep(config.bus.decision, decision_t{}, [&](const auto& decision) { traffic.decisions.push_back(decision); });
   keep(config.bus.certified, certified_plan_t{},
        [&](const auto& plan) { traffic.certified.insert(plan.plan.plan_id); });
@@ -75,6 +80,31 @@ TEST(PolicyRun, ThePolicyProposesTheGateDecidesAndOnlyCertifiedPlansAreDriven) {
   EXPECT_EQ(traffic.robot["steps_inside_slice"], traffic.robot["steps_executed"]);
   EXPECT_EQ(traffic.robot["goal_reached"], true);
   EXPECT_EQ(traffic.planner["proposed"], traffic.candidates.size());
+}
+
+TEST(PolicyRun, ManySamplesAreSentInBatchesWithOneDecisionEach) {
+  Config config = LoadConfig(kTask);
+  config.planner.policy_samples = 100;
+  const Traffic traffic = RunTask(config);
+  ASSERT_FALSE(traffic.batches.empty());
+  EXPECT_EQ(traffic.decisions.size(), traffic.batches.size() + traffic.candidates.size());
+  EXPECT_EQ(traffic.planner["proposed"], traffic.decisions.size());
+  EXPECT_EQ(traffic.planner["messages_ignored"], 0);
+  std::map<std::int64_t, int> size_by_first, index_by_certified;
+  for (const candidate_batch_t& batch : traffic.batches) {
+    EXPECT_EQ(WhyNoBatch(batch), "");
+    size_by_first[batch.plan_id] = batch.num_candidates;
+  }
+  for (const std::int64_t plan_id : traffic.certified) {
+    const auto batch = std::prev(size_by_first.upper_bound(plan_id));
+    EXPECT_LT(plan_id - batch->first, batch->second) << "it is one of a batch";
+    index_by_certified[plan_id] = static_cast<int>(plan_id - batch->first);
+  }
+  EXPECT_TRUE(std::ranges::any_of(index_by_certified, [](const auto& entry) { return entry.second > 0; }));
+  EXPECT_TRUE(std::ranges::includes(traffic.certified, traffic.executed));
+  EXPECT_EQ(traffic.robot["contacts"], 0);
+  EXPECT_EQ(traffic.robot["steps_inside_slice"], traffic.robot["steps_executed"]);
+  EXPECT_EQ(traffic.robot["goal_reached"], true);
 }
 
 TEST(PolicyRun, TwoRunsAreIdentical) {
@@ -119,6 +149,32 @@ TEST(PolicyProposer, ItsPlansAreThePolicysBlocksAndEndInAStop) {
     directions.insert(proposer.Propose(request)->states(2, 8));
   EXPECT_EQ(directions.size(), static_cast<std::size_t>(PolicyProposer::kFan));
   EXPECT_FALSE(proposer.Propose(request));
+}
+
+TEST(PolicyProposer, SamplesReferencesFirstAndThenOtherWaysToBrake) {
+  Config config = LoadConfig(kTask);
+  const Policy policy = LoadPolicy(config.planner.policy);
+  PlanRequest request;
+  request.state = Vec({0, 0, 0, 5, 0, 0});
+  std::vector<Eigen::MatrixXd> alone;
+  PolicyProposer one(config, policy);
+  ASSERT_EQ(one.ProposeMany(request).size(), 1u);
+  for (request.attempt = 0; request.attempt <= PolicyProposer::kFan; ++request.attempt)
+    alone.push_back(one.Propose(request)->controls);
+  request.attempt = 0;
+  config.planner.policy_samples = 64;
+  PolicyProposer many(config, policy);
+  ASSERT_EQ(many.motion().num_tails(), 5);
+  const std::vector<Proposal> samples = many.ProposeMany(request);
+  ASSERT_EQ(samples.size(), 64u) << "13 blocks, and 5 ways to brake of each but the last";
+  for (std::size_t i = 0; i < alone.size(); ++i) EXPECT_EQ(samples[i].controls, alone[i]) << i;
+  for (std::size_t i = 13; i < 26; ++i)
+    EXPECT_EQ(samples[i].controls.leftCols(8), samples[i - 13].controls.leftCols(8)) << i;
+  for (std::size_t i = 13; i < 23; ++i)  // the slow ones brake straight ahead in every way
+    EXPECT_NE(samples[i].controls, samples[i - 13].controls) << i;
+  for (const Proposal& sample : samples) EXPECT_NEAR(sample.states(3, sample.states.cols() - 1), 0, 1e-9);
+  request.attempt = 1;
+  EXPECT_NE(many.ProposeMany(request)[0].controls, samples[0].controls) << "another attempt, other samples";
 }
 
 TEST(PolicyProposer, LeavesOutBlocksThatExceedALimit) {

@@ -9,6 +9,7 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/dynamics/models/named_residuals.h"
+#include "lcmtypes/candidate_batch.h"
 #include "simulator/sim_node.h"
 #include "tests/certifier/small_task.h"
 #include "tests/keys.h"
@@ -1388,6 +1389,24 @@ TEST_F(ArmedNodeTest, CommandsThatAreStaleOrUnknownAreRefused) {
   EXPECT_TRUE(node_->watch().fault());
   Reset();
   EXPECT_FALSE(node_->watch().fault());
+}
+
+// A batch may take as long as many candidates.
+TEST_F(CertifierNodeTest, LooksAtTheBusAfterEachBatch) {
+  for (int id = 1; id <= 3; ++id) {
+    candidate_batch_t batch{};
+    ASSERT_TRUE(Append(batch, Candidate(10 * id, kAccelerationIntoTheCircle)));
+    ASSERT_TRUE(Append(batch, Candidate(10 * id + 1)));
+    bus_->Publish("PLAN_CANDIDATE", batch);
+  }
+  for (int turn = 1; turn <= 3; ++turn) {
+    Run();
+    ASSERT_EQ(std::ssize(decisions_), turn);
+    ASSERT_EQ(std::ssize(certified_), turn);
+    EXPECT_EQ(decisions_.back().plan_id, 10 * (4 - turn) + 1) << "the newest first";
+    EXPECT_EQ(certified_.back().plan.plan_id, decisions_.back().plan_id);
+  }
+  EXPECT_EQ(order_, "cdcdcd");
 }
 
 class ReloadTest : public testing::Test {

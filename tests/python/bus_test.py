@@ -137,6 +137,9 @@ class Ends(BusTest):
             ("dimension 3", lambda: bus.propose(U, (np.zeros(3), np.zeros(3)), begin)),
             ("half", lambda: bus.propose(U, (np.zeros(4), np.full(4, -1.0)), begin)),
             ("progress_steps: 5", lambda: bus.propose(U, x0, begin, progress_steps=5)),
+            ("Us: has no plan", lambda: bus.propose_many(np.zeros((0, 4, 2)), x0, begin)),
+            ("3 inputs, the model has 2", lambda: bus.propose_many(np.zeros((2, 4, 3)), x0, begin)),
+            ("at most 256 plans and 7680 numbers", lambda: bus.propose_many(np.zeros((31, 128, 2)), x0, begin)),
             ("timeout", lambda: bus.decisions(timeout=-1)),
             ("timeout", lambda: bus.robot_state(timeout=float("nan"))),
         ]:
@@ -149,6 +152,11 @@ class Ends(BusTest):
         plan = buses[0].propose(np.zeros((4, 2)), (np.zeros(4), np.full(4, 0.01)), now())
         answer = buses[0].decisions(timeout=60)
         self.assertEqual([(each["plan_id"], each["outcome"]) for each in answer], [(plan, "rejected")])
+        plans = buses[0].propose_many(np.zeros((30, 128, 2)), (np.zeros(4), np.full(4, 0.01)), now())
+        self.assertEqual(plans, list(range(plans[0], plans[0] + 30)))
+        self.assertGreater(plans[0], plan)
+        answer = buses[0].decisions(timeout=60)
+        self.assertEqual([(each["plan_id"], each["outcome"]) for each in answer], [(plans[0], "rejected")])
         self.assertEqual(buses[1].decisions(), [])
 
     def test_take_the_keys_of_their_role_alone(self):

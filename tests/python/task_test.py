@@ -99,6 +99,14 @@ class Decisions(unittest.TestCase):
         self.assertNotEqual(own[0].message, own[1].message)
         self.assertEqual(task.certify_many(np.zeros((0, 3, 2))), [])
 
+    def test_of_many_end_with_the_first_certified_one_if_asked(self):
+        task = fr.Task.load(BICYCLE)
+        good, bad = plan("bicycle_certified")[0], plan("bicycle_safety")[0]
+        for threads in [1, 3]:
+            found = task.certify_many(np.stack([bad, bad, good, bad, good]), threads=threads, until_certified=True)
+            self.assertEqual([decision.certified for decision in found], [False, False, True])
+            self.assertEqual(len(task.certify_many(np.stack([bad, bad]), until_certified=True)), 2)
+
     def test_show_what_would_turn_them(self):
         task = fr.Task.load(BICYCLE)
         advice = task.advise(task.certify(plan("bicycle_safety")[0]))

@@ -8,8 +8,10 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/seal.h"
 #include "records/event_log.h"
+#include "records/record_reader.h"
 #include "records/replay.h"
 #include "tests/certifier/small_task.h"
 #include "tests/cli/program.h"
@@ -38,6 +40,13 @@ struct LoggedGate {
     const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
     EXPECT_EQ(decision.outcome, expected);
     Log(candidate, decision);
+  }
+  /** The plan_id that is decided on. */
+  std::int64_t Decide(const candidate_batch_t& batch) {
+    const decision_t decision = gate.Decide(Encode(batch), kNow).decision;
+    log.Append(kNow, config.bus.candidate, Encode(batch));
+    log.Append(kNow, config.bus.decision, Encode(decision));
+    return decision.plan_id;
   }
   void RefuseForNoObstacles(const candidate_plan_t& candidate) {
     Log(candidate, gate.Refuse(Encode(candidate), kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision);
@@ -72,6 +81,40 @@ class ReplayTest : public testing::Test {
   const ScratchDirectory scratch_;
   int logs_ = 0;
 };
+
+TEST_F(ReplayTest, TheDecisionOnABatchIsThatOnItsCandidateAlone) {
+  const std::string path = NewLog();
+  const Config config = SmallTask();
+  EventLogWriter log(path);
+  LoggedGate logged{config, log};
+  const auto batch = [](std::int64_t plan_id, std::initializer_list<double> accelerations) {
+    candidate_batch_t batch{};
+    for (const double acceleration : accelerations)
+      EXPECT_TRUE(Append(batch, Candidate(plan_id + batch.num_candidates, acceleration)));
+    return batch;
+  };
+  constexpr double kGood = kAccelerationThatCertifies, kBad = kAccelerationIntoTheCircle;
+  EXPECT_EQ(logged.Decide(batch(1, {kBad, kGood, kGood})), 2);
+  EXPECT_EQ(logged.Decide(batch(1, {kBad, kGood, kGood})), 2) << "it is a repetition";
+  EXPECT_EQ(logged.Decide(batch(4, {kBad, kBad})), 4);
+  EXPECT_EQ(logged.Decide(batch(6, {})), 0) << "it is no batch";
+  logged.Decide(Candidate(9), decision_t::CERTIFIED);
+  ASSERT_TRUE(log.Flush());
+  const ReplayResult result = Replay({path}, config);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_EQ(result.agreed, 5);
+  EXPECT_EQ(result.candidates, 5) << "a batch counts once";
+
+  struct Reader final : RecordUser {
+    void OnDecision(const DecisionRow&, const candidate_plan_t* candidate) override {
+      plan_ids.push_back(candidate ? candidate->plan_id : -1);
+    }
+    void OnGap(const GapRow& gap) override { ADD_FAILURE() << gap.lost; }
+    std::vector<std::int64_t> plan_ids;
+  } user;
+  RecordReader(config.bus, user).Read({path});
+  EXPECT_EQ(user.plan_ids, (std::vector<std::int64_t>{2, 2, 4, -1, 9}));
+}
 
 TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
   const Config config = LoadConfig(kConfig);
