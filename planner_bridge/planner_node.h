@@ -95,11 +95,14 @@ class PlannerNode final : public Node {
     std::int64_t awaited_plan = -1;            // the plan whose decision is outstanding, -1 if none
     std::optional<decision_t> unadvised = {};  // the abstention whose advice is outstanding
     std::int64_t advice_until = 0;
+    std::optional<advice_t> repair = {};  // the nearest that was proposed and not sent
   };
 
   void OnRobotState(const Received& received);
   void OnDecision(const Received& received);
   void OnAdvice(const Received& received);
+  [[nodiscard]] bool Heed(const advice_t& advice);
+  [[nodiscard]] bool TakeRepair(const advice_t& advice);
   void OnWithdrawn(const Received& received);
   void OnObstacles(const Received& received);
 
@@ -121,6 +124,9 @@ class PlannerNode final : public Node {
   [[nodiscard]] int StepsBack();
   void LogLostRounds() const;
   void SearchOnce(std::int64_t now_us);
+  [[nodiscard]] bool SendRepair(std::int64_t now_us);
+  [[nodiscard]] bool AsksForRepairs() const;
+  [[nodiscard]] bool Send(const candidate_plan_t& candidate);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
   [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
   void Learn(const decision_t& decision, std::int64_t now_us);
@@ -150,8 +156,8 @@ class PlannerNode final : public Node {
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
-               stopping_rounds_ = 0, back_off_rounds_ = 0, withdrawals_ = 0, advised_ = 0, fruitless_rounds_ = 0,
-               ignored_ = 0;
+               stopping_rounds_ = 0, back_off_rounds_ = 0, withdrawals_ = 0, advised_ = 0, repairs_ = 0,
+               fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
   int lost_in_a_row_ = 0;                                     // rounds that searched and found no certificate
   Eigen::VectorXd place_;                                     // in safety coordinates, empty: nowhere yet

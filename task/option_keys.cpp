@@ -212,6 +212,10 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
                       "A candidate starts so many steps after the state it was planned from."),
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates, "The most for one start."),
+      planner.Word<bool>(
+          "repair", {{"false", false}, {"true", true}}, &PlannerOptions::repairs,
+          "true: candidates ask the certifier for the nearest plan that it would certify, and a start for "
+          "which no candidate was certified gets the nearest of these."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
                      "Acceleration and deceleration that the search expects of the robot."),
