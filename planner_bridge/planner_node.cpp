@@ -412,7 +412,8 @@ bool PlannerNode::Heed(const advice_t& advice) {
 
 bool PlannerNode::TakeRepair(const advice_t& advice) {
   const candidate_plan_t& plan = advice.proposal;
-  if (!HasSizes(plan, *config_.problem->model) || plan.progress_steps < 0 || plan.progress_steps > plan.num_steps)
+  if (!HasSizes(plan, *config_.problem->model) || plan.progress_steps < 0 || plan.progress_steps > plan.num_steps ||
+      !(advice.nearness[0] >= 0))
     return false;
   if (!round_->repair || advice.nearness[0] < round_->repair->nearness[0]) round_->repair = advice;
   return true;

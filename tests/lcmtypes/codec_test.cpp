@@ -27,14 +27,14 @@ struct Contract {
   std::size_t bytes;
 };
 const std::map<std::string, Contract> kContracts = {
-    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}}, {"decision_t", {0x6c785a9e090fc6f2, 562}},
+    {"candidate_plan_t", {0xa26a21ec9821aaaa, 8538}}, {"decision_t", {0x6c785a9e090fc6f2, 562}},
     {"execution_event_t", {0x4742c25e0eefd377, 336}}, {"obstacle_shape_t", {0x29158dc0270b76d4, 406}},
     {"robot_state_t", {0x19608533667df4c6, 296}},     {"transition_t", {0xc3ce61d7539f6402, 356}},
     {"logger_status_t", {0x2a2438623a759ef0, 260}},   {"command_t", {0x1b315e627593a95f, 58}},
     {"fault_t", {0x85189bcc15840698, 866}},           {"certifier_status_t", {0xf224554c7bae02b5, 1220}},
     {"obstacle_t", {0xbbad85e96469971b, 488}},        {"obstacles_t", {0xc1a2a66356f23f34, 30746}},
-    {"withdrawal_t", {0x143744ac67af3ba6, 482}},      {"certified_plan_t", {0xd6bfba8d7729f625, 41976}},
-    {"advice_change_t", {0x2820254c63772fe1, 56}},    {"advice_t", {0xc708fe6c4a3d4e09, 654}},
+    {"withdrawal_t", {0x143744ac67af3ba6, 482}},      {"certified_plan_t", {0x35a4960598cd0ba9, 41978}},
+    {"advice_change_t", {0x2820254c63772fe1, 56}},    {"advice_t", {0xd9a32e31db904c49, 9202}},
 };
 
 template <class Message>
