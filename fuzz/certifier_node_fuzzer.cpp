@@ -2,6 +2,7 @@
 // out right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
 // A withdrawal names a plan that was certified, with fewer controls than the withdrawals of it before, unless it
 // repeats the last one; or a plan that the robot says it executes. An advice is on a plan that was just abstained on.
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>

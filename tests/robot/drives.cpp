@@ -36,10 +36,11 @@ struct Options {
 std::string TextOf(const DriveCounts& all) {
   const double share =
       all.proposed > 0 ? 100.0 * static_cast<double>(all.certified) / static_cast<double>(all.proposed) : 0;
+  const double seconds = all.goals > 0 ? all.seconds_to_goal / static_cast<double>(all.goals) : 0;
   return fmt::format(
-      "{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>5} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}", all.goals,
-      all.drives, all.contacts, all.limits, all.outside, all.steps, all.stops, all.emergency_stops, all.certified,
-      all.proposed, share, all.searches, all.lost_rounds, all.rounds);
+      "{:>3} of {:<3} {:>6.1f} s {:>8} {:>6} {:>4} of {:<6} {:>5} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}",
+      all.goals, all.drives, seconds, all.contacts, all.limits, all.outside, all.steps, all.stops, all.emergency_stops,
+      all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
 }
 
 struct Drive {
@@ -131,9 +132,9 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
 
 int Run(const Options& options) {
   bool all_good = true;
-  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>6} {:^14} {:>5} {:>9} {:^20} {:>8} {:^13} {:>6}\n", "task", "goals",
-                           "contacts", "limits", "steps outside", "stops", "emergency", "plans certified", "searches",
-                           "rounds lost", "time");
+  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>8} {:>6} {:^14} {:>5} {:>9} {:^20} {:>8} {:^13} {:>6}\n", "task",
+                           "goals", "to goal", "contacts", "limits", "steps outside", "stops", "emergency",
+                           "plans certified", "searches", "rounds lost", "time");
   for (const std::string& task : options.tasks) {
     Config config = WithErrors(LoadConfig(task), options.errors);
     const std::string name = std::filesystem::path(task).stem().string();
