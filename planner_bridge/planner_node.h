@@ -13,6 +13,9 @@ start. A round sends one candidate at a time and waits for its decision:
  - With gate.advice, after an abstention S or D, it waits twice gate.decision_budget_ms for the certifier's advice on
 this candidate. If it comes, the next candidate gives way as it says, and not by the rules above; after a search without
 a result, half as far;
+ - With planner.repair, each candidate asks for the nearest plan that would be certified, and after an abstention S or D
+it waits as long for the answer. When the round would end without a certificate, the nearest proposal is its last
+candidate, if it can still be decided on; only controls are taken from it;
  - rejected: the next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has
    latched a fault;
  - abstained, no time: the next candidate.
