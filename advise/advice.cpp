@@ -16,8 +16,8 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
-#include "planner_bridge/motion.h"
 #include "task/config_error.h"
+#include "task/motion.h"
 
 namespace forereach {
 namespace {

@@ -24,13 +24,13 @@
 #include "forereach/residual/observations.h"
 #include "forereach/residual/recorded_successor.h"
 #include "forereach/safety/clearance.h"
-#include "planner_bridge/motion.h"
 #include "planner_bridge/reference.h"
 #include "records/decision_json.h"
 #include "records/outlines.h"
 #include "task/config.h"
 #include "task/document.h"
 #include "task/draft.h"
+#include "task/motion.h"
 #include "task/wrapped_angle.h"
 
 namespace forereach {

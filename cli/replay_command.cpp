@@ -50,13 +50,10 @@ void PrintMissing(const NamedRuns& named) {
 }
 
 void PrintJson(const ReplayResult& result, const NamedRuns& named) {
-  nlohmann::json document{{"candidates", result.candidates},
-                          {"agreed", result.agreed},
-                          {"withdrawals", result.withdrawals},
-                          {"circumstances", result.circumstances},
-                          {"corruptions", result.corruptions},
-                          {"passed_over", ToJson(result.passed_over)},
-                          {"shown", result.shown},
+  nlohmann::json document{{"candidates", result.candidates},           {"agreed", result.agreed},
+                          {"withdrawals", result.withdrawals},         {"proposals", result.proposals},
+                          {"circumstances", result.circumstances},     {"corruptions", result.corruptions},
+                          {"passed_over", ToJson(result.passed_over)}, {"shown", result.shown},
                           {"differences", result.differences}};
   if (named.is_many) {
     document["runs"] = named.runs.size();
@@ -72,6 +69,7 @@ void PrintForPeople(const ReplayResult& result, const NamedRuns& named) {
   std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
             << result.differences.size() << " differ";
   if (result.withdrawals > 0) std::cout << ", " << result.withdrawals << " withdrawals agree";
+  if (result.proposals > 0) std::cout << ", " << result.proposals << " proposals are certified";
   if (result.circumstances > 0)
     std::cout << ", " << result.circumstances
               << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";

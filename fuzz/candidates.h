@@ -27,12 +27,13 @@ inline void Distort(FuzzedDataProvider& input, candidate_plan_t& plan) {
   }
 }
 
-/** One that certifies, unless the input wants another. */
+/** One that certifies, unless the input wants another. Every second one asks for a repair. */
 inline candidate_plan_t AnyCandidate(FuzzedDataProvider& input, std::int64_t now_us) {
   const int plan_id = input.ConsumeIntegralInRange(1, 8);
   const double acceleration = input.PickValueInArray(
       {kAccelerationThatCertifies, kAccelerationIntoTheCircle, kAccelerationOutsideDomain, -1.0});
   candidate_plan_t plan = Candidate(plan_id, acceleration, now_us);
+  plan.repair = static_cast<std::int16_t>(plan_id % 2);
   for (int left = NumOdd(input); left > 0; --left) Distort(input, plan);
   return plan;
 }

@@ -2,6 +2,7 @@
 // out right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
 // A withdrawal names a plan that was certified, with fewer controls than the withdrawals of it before, unless it
 // repeats the last one; or a plan that the robot says it executes. An advice is on a plan that was just abstained on.
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -68,9 +69,19 @@ class WitnessBus final : public Bus {
     Require(advice.has_value() && advice->sequence == advices_++);
     Require(abstained_ && GetDigest(advice->plan_digest) == *abstained_);
     abstained_.reset();
-    Require(1 <= advice->num_changes && advice->num_changes <= 8);
-    for (int i = 0; i < advice->num_changes; ++i)
-      Require(advice->change[i].index >= 0 && advice->change[i].value > 0 && std::isfinite(advice->change[i].value));
+    Require(0 <= advice->num_changes && advice->num_changes <= 8);
+    const candidate_plan_t& proposal = advice->proposal;
+    if (advice->changed == 0) return Require(proposal.num_steps == 0 && HasSense(*advice));
+    Require(0 < advice->changed && advice->changed < 8 && advice->num_changes == 0 && advice->nearness[0] >= 0);
+    Require(1 <= proposal.num_steps && proposal.num_steps <= 128 && proposal.progress_steps <= proposal.num_steps);
+    for (int t = 0; t < proposal.num_steps; ++t)
+      for (int k = 0; k < 2; ++k) Require(std::abs(proposal.control[t][k]) <= 3);  // the box of the small task
+  }
+
+  static bool HasSense(const advice_t& advice) {
+    return std::ranges::all_of(advice.change, advice.change + advice.num_changes, [](const advice_change_t& change) {
+      return change.index >= 0 && change.value > 0 && std::isfinite(change.value);
+    });
   }
 
   void TakeWithdrawal(const std::optional<withdrawal_t>& withdrawal) {

@@ -30,6 +30,7 @@ void CopyShared(const From& from, To& to) {
   to.step_us = from.step_us;
   to.num_states = from.num_states;
   to.num_inputs = from.num_inputs;
+  to.repair = from.repair;
   std::ranges::copy(from.source, to.source);
   std::ranges::copy(from.initial_center, to.initial_center);
   std::ranges::copy(from.initial_half_width, to.initial_half_width);

@@ -56,7 +56,8 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
-  if (config_.gate.advises) bus.Subscribe(config_.bus.advice, [this](const Received& received) { OnAdvice(received); });
+  if (config_.gate.advises || config_.planner.repairs)
+    bus.Subscribe(config_.bus.advice, [this](const Received& received) { OnAdvice(received); });
   bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) { OnWithdrawn(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
 }
@@ -267,8 +268,10 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   const std::int64_t takes_us =
       round_->stops ? Microseconds(config_.gate.decision_budget_ms) : Microseconds(config_.planner.time_limit_ms);
   std::deque<Proposal>& found = round_->found;
-  if ((found.empty() && round_->searches == MostCandidates()) || now_us + takes_us >= round_->start_utime)
-    return EndRound(false);
+  if ((found.empty() && round_->searches == MostCandidates()) || now_us + takes_us >= round_->start_utime) {
+    if (!SendRepair(now_us)) EndRound(false);
+    return;
+  }
   if (found.empty()) {
     ++round_->searches;
     ++searches_;
@@ -289,7 +292,8 @@ void PlannerNode::SendNext(std::int64_t now_us) {
   candidate_batch_t batch{};
   std::vector<candidate_plan_t> sent;
   while (!found.empty()) {
-    const candidate_plan_t candidate = MakeCandidate(found.front(), *round_, now_us);
+    candidate_plan_t candidate = MakeCandidate(found.front(), *round_, now_us);
+    candidate.repair = AsksForRepairs() ? 1 : 0;
     if (!is_one && !Append(batch, candidate)) break;
     sent.push_back(candidate);
     ++next_plan_id_;
@@ -297,11 +301,34 @@ void PlannerNode::SendNext(std::int64_t now_us) {
   }
   const bool is_sent =
       is_one ? sender_.Send(config_.bus.candidate, sent.front()) : sender_.Send(config_.bus.candidate, batch);
-  if (!is_sent) return;
+  if (is_sent) Await(sent);
+}
+
+void PlannerNode::Await(std::span<const candidate_plan_t> sent) {
   ++proposed_;
   round_->awaited_plan = sent.front().plan_id;
   round_->awaited = std::ssize(sent);
   for (const candidate_plan_t& candidate : sent) plans_[candidate.plan_id] = candidate;
+}
+
+// If the certifier can still decide on it. It asks for no other.
+bool PlannerNode::SendRepair(std::int64_t now_us) {
+  const std::optional<advice_t> repair = std::exchange(round_->repair, std::nullopt);
+  if (!repair || now_us + Microseconds(config_.gate.decision_budget_ms) > round_->start_utime) return false;
+  const candidate_plan_t& plan = repair->proposal;
+  const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> controls(
+      plan.control[0], plan.num_inputs, plan.num_steps, Eigen::OuterStride<>(kMaxInputs));
+  const candidate_plan_t candidate = MakeCandidate({controls, plan.progress_steps, {}}, *round_, now_us);
+  ++next_plan_id_;
+  if (!sender_.Send(config_.bus.candidate, candidate)) return false;
+  Await({&candidate, 1});
+  ++repairs_;
+  return true;
+}
+
+// Not of a stop or a way back: there the planner has others.
+bool PlannerNode::AsksForRepairs() const {
+  return config_.planner.repairs && !round_->stops && round_->back_off_steps == 0;
 }
 
 int PlannerNode::MostCandidates() const {
@@ -387,21 +414,44 @@ void PlannerNode::Learn(const decision_t& decision, std::int64_t now_us) {
     return EndRound(false);
   round_->unadvised = decision;
   round_->advice_until = now_us;
-  if (config_.gate.advises && IsAdvisedOn(decision.cause) && !round_->stops)
+  const bool is_repaired = AsksForRepairs() && (decision.outcome == decision_t::ABSTAIN_DOMAIN ||
+                                                decision.outcome == decision_t::ABSTAIN_SAFETY);
+  if (is_repaired || (config_.gate.advises && IsAdvisedOn(decision.cause) && !round_->stops))
     round_->advice_until += 2 * Microseconds(config_.gate.decision_budget_ms);
 }
 
-// Its numbers only say what the next candidate keeps away from: false ones cost time, and can have nothing executed.
+// Its numbers only say what the next candidate keeps away from, or are a candidate like all: false ones cost time, and
+// can have nothing executed.
 void PlannerNode::OnAdvice(const Received& received) {
   const auto advice = Decoded<advice_t>(received.bytes);
   if (!advice || !round_ || !round_->unadvised ||
       GetDigest(advice->plan_digest) != GetDigest(round_->unadvised->plan_digest) ||
-      GetDigest(advice->obstacles_digest) != obstacles_.digest() || !round_->lessons.Heed(*advice)) {
+      GetDigest(advice->obstacles_digest) != obstacles_.digest() || !Heed(*advice)) {
     ++ignored_;
     return;
   }
+}
+
+// With a proposal, or none, the abstention is learned from as without advice, and at once.
+bool PlannerNode::Heed(const advice_t& advice) {
+  if (AsksForRepairs() && advice.num_changes == 0) {
+    if (advice.changed != 0 && !TakeRepair(advice)) return false;
+    round_->advice_until = 0;
+    return true;
+  }
+  if (!round_->lessons.Heed(advice)) return false;
   ++advised_;
   round_->unadvised.reset();
+  return true;
+}
+
+bool PlannerNode::TakeRepair(const advice_t& advice) {
+  const candidate_plan_t& plan = advice.proposal;
+  if (!HasSizes(plan, *config_.problem->model) || plan.progress_steps < 0 || plan.progress_steps > plan.num_steps ||
+      !(advice.nearness[0] >= 0))
+    return false;
+  if (!round_->repair || advice.nearness[0] < round_->repair->nearness[0]) round_->repair = advice;
+  return true;
 }
 
 void PlannerNode::LearnWithoutAdvice() {
@@ -434,6 +484,7 @@ std::string PlannerNode::Summary() const {
                                          {"abstained", abstained_},
                                          {"rejected", rejected_},
                                          {"advised", advised_},
+                                         {"repairs", repairs_},
                                          {"unanswered", unanswered_},
                                          {"withdrawn", withdrawals_},
                                          {"rounds", rounds_},

@@ -14,6 +14,9 @@ search gives is sent in batches, one after the other):
  - With gate.advice, after an abstention S or D, it waits twice gate.decision_budget_ms for the certifier's advice on
 this candidate. If it comes, the next candidate gives way as it says, and not by the rules above; after a search without
 a result, half as far;
+ - With planner.repair, each candidate asks for the nearest plan that would be certified, and after an abstention S or D
+it waits as long for the answer. When the round would end without a certificate, the nearest proposal is its last
+candidate, if it can still be decided on; only controls are taken from it;
  - rejected: the next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has
    latched a fault;
  - abstained, no time: the next candidate.
@@ -100,11 +103,14 @@ class PlannerNode final : public Node {
     std::int64_t awaited = 0;                  // so many plans have one decision
     std::optional<decision_t> unadvised = {};  // the abstention whose advice is outstanding
     std::int64_t advice_until = 0;
+    std::optional<advice_t> repair = {};  // the nearest that was proposed and not sent
   };
 
   void OnRobotState(const Received& received);
   void OnDecision(const Received& received);
   void OnAdvice(const Received& received);
+  [[nodiscard]] bool Heed(const advice_t& advice);
+  [[nodiscard]] bool TakeRepair(const advice_t& advice);
   void OnWithdrawn(const Received& received);
   void OnObstacles(const Received& received);
 
@@ -129,6 +135,9 @@ class PlannerNode final : public Node {
   [[nodiscard]] int StepsBack();
   void LogLostRounds() const;
   void SearchOnce(std::int64_t now_us);
+  [[nodiscard]] bool SendRepair(std::int64_t now_us);
+  [[nodiscard]] bool AsksForRepairs() const;
+  void Await(std::span<const candidate_plan_t> sent);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
   [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
   void Learn(const decision_t& decision, std::int64_t now_us);
@@ -158,8 +167,8 @@ class PlannerNode final : public Node {
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
-               stopping_rounds_ = 0, back_off_rounds_ = 0, withdrawals_ = 0, advised_ = 0, fruitless_rounds_ = 0,
-               ignored_ = 0;
+               stopping_rounds_ = 0, back_off_rounds_ = 0, withdrawals_ = 0, advised_ = 0, repairs_ = 0,
+               fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
   int lost_in_a_row_ = 0;                                     // rounds that searched and found no certificate
   Eigen::VectorXd place_;                                     // in safety coordinates, empty: nowhere yet

@@ -10,8 +10,8 @@ guarantee; the certifier decides on it. */
 #include <Eigen/Core>
 
 #include "forereach/certify/problem.h"
-#include "planner_bridge/motion.h"
 #include "task/config.h"
+#include "task/motion.h"
 
 namespace forereach {
 

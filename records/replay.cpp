@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "bus/bus_options.h"
+#include "forereach/advice_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -41,6 +42,26 @@ class Replayer final : public GateFollower {
   void OnStart(const Config& task) override {
     GateFollower::OnStart(task);
     plans_.clear();
+    advice_ = task.bus.advice;
+  }
+
+  // Which plan a search proposes depends on the time that it had; that it is certified does not.
+  void OnEvent(const LogEvent& event) override {
+    if (event.channel != advice_) return;
+    const auto advice = Decoded<advice_t>(event.message());
+    if (!advice || advice->changed == 0) return;
+    if (GroundsOf(*advice) != gate().grounds()) {
+      ++result_.circumstances;
+      return;
+    }
+    const Upheld upheld = UpheldUnder(gate().certifier().problem(), gate().options());
+    const Decision verdict = gate().JudgeAgain(advice->proposal, upheld, 0).verdict;
+    if (verdict.outcome == Outcome::kCertified)
+      ++result_.proposals;
+    else
+      Differ(fmt::format("event {}", event.number), advice->plan_id,
+             fmt::format("what is proposed in its place is not certified: {}, step {}",
+                         CauseName(static_cast<std::int16_t>(verdict.cause)), verdict.step));
   }
 
   void OnDecision(const RecordedDecision& recorded) override {
@@ -148,7 +169,7 @@ class Replayer final : public GateFollower {
   };
 
   const std::string plan_digest_;
-
+  std::string advice_;      // the channel
   std::deque<Plan> plans_;  // the last ones
   ReplayResult result_;
 };
@@ -189,6 +210,7 @@ ReplayResult& ReplayResult::operator+=(ReplayResult&& other) {
   candidates += other.candidates;
   agreed += other.agreed;
   withdrawals += other.withdrawals;
+  proposals += other.proposals;
   circumstances += other.circumstances;
   corruptions += other.corruptions;
   passed_over += other.passed_over;

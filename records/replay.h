@@ -16,13 +16,15 @@ struct ReplayResult {
   std::int64_t candidates = 0;   ///< Candidates in the log.
   std::int64_t agreed = 0;       ///< Decisions with the recorded outcome, step, cause and digests.
   std::int64_t withdrawals = 0;  ///< Withdrawals with the recorded steps, cause and obstacle.
+  std::int64_t proposals = 0;    ///< Plans proposed in the place of a refused one, and certified again.
   /** Decisions that depend on the moment and not on the plan, which are not compared: displaced, out of time, not
-  armed, obstacles unknown, in fault. Withdrawals without a judgement. */
+  armed, obstacles unknown, in fault. Withdrawals without a judgement, and proposals under grounds that the log does not
+  give. */
   std::int64_t circumstances = 0;
   std::int64_t corruptions = 0;  ///< Damaged places in the log.
   PassedOver passed_over;
-  /** A line for each decision and withdrawal that differs, each candidate without a recorded decision, each recorded
-  decision without a candidate, and each fault of a certified plan's seal. */
+  /** A line for each decision and withdrawal that differs, each proposal that is not certified, each candidate without
+  a recorded decision, each recorded decision without a candidate, and each fault of a certified plan's seal. */
   std::vector<std::string> differences;
   /** What was recorded and what was decided again on the candidates that were asked for, a line each. */
   std::vector<std::string> shown;
@@ -33,9 +35,10 @@ struct ReplayResult {
 
 /** Gives the candidates of consecutive logs to a new gate, each at the time of its recorded decision and with the
 obstacles and executed transitions that the decision names by digest, and compares the results. Plans that were
-withdrawn are judged again under the grounds that the withdrawal names. It also checks the seals of certified plans
-(lcmtypes/seal.h). Where the certifier restarted or reloaded, replay starts with a new gate. With bus.key only authentic
-messages count. Each decision is compared under the task of its config digest; a decision of an unknown digest differs.
+withdrawn are judged again under the grounds that the withdrawal names, and so are plans that advice proposes. It also
+checks the seals of certified plans (lcmtypes/seal.h). Where the certifier restarted or reloaded, replay starts with a
+new gate. With bus.key only authentic messages count. Each decision is compared under the task of its config digest; a
+decision of an unknown digest differs.
 @param plan_digest the beginning of a candidate's digest, in hexadecimal: ReplayResult::shown has the decisions on such
 candidates. Empty: on none.
 @param names_files whether events are named with their log.

@@ -13,6 +13,7 @@ DriveCounts& DriveCounts::operator+=(const DriveCounts& other) {
         &Counts::consistent, &Counts::stops, &Counts::emergency_stops, &Counts::proposed, &Counts::certified,
         &Counts::searches, &Counts::rounds, &Counts::lost_rounds})
     this->*member += other.*member;
+  seconds_to_goal += other.seconds_to_goal;
   for (const auto& [cause, count] : other.abstained) abstained[cause] += count;
   for (const auto& [cause, count] : other.rejected) rejected[cause] += count;
   return *this;
@@ -25,6 +26,9 @@ DriveCounts CountsOf(const Lockstep& lockstep) {
   DriveCounts counts;
   counts.drives = 1;
   counts.goals = robot.at("goal_reached").get<bool>() ? 1 : 0;
+  if (counts.goals > 0)
+    counts.seconds_to_goal =
+        static_cast<double>(of(robot, "boundaries")) * lockstep.config().robot.step_period_ms / 1e3;
   counts.contacts = of(robot, "contacts");
   counts.limits = of(robot, "limits_exceeded");
   counts.steps = of(robot, "steps_executed");

@@ -12,6 +12,7 @@ namespace forereach {
 /** Sums over `drives` drives. */
 struct DriveCounts {
   std::int64_t drives = 0, goals = 0;           ///< How many, and how many reached the goal
+  double seconds_to_goal = 0;                   ///< Of those that reached it
   std::int64_t contacts = 0, limits = 0;        ///< At boundaries: touched, beyond a limit of the task
   std::int64_t steps = 0, outside = 0;          ///< Executed; those at whose end the certified slice was left
   std::int64_t consistent = 0;                  ///< Those that end outside it by no more than the state error

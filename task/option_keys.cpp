@@ -126,7 +126,8 @@ constexpr std::array kChannels{
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
     ChannelRow{"certified", &BusOptions::certified, "certified_plan_t, what a robot may execute."},
     ChannelRow{"withdrawn", &BusOptions::withdrawn, "withdrawal_t, what of it a robot may no longer execute."},
-    ChannelRow{"advice", &BusOptions::advice, "advice_t, what would have helped a candidate, if gate.advice is send."},
+    ChannelRow{"advice", &BusOptions::advice,
+               "advice_t, what would have helped a candidate, with gate.advice: send or for one that asks."},
     ChannelRow{"robot_state", &BusOptions::robot_state, "robot_state_t, from the robot."},
     ChannelRow{"obstacles", &BusOptions::obstacles, "obstacles_t, all perceived obstacles, sent repeatedly."},
     ChannelRow{"transition", &BusOptions::transition, "transition_t, executed steps."},
@@ -215,6 +216,10 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("policy_samples", Between(1, 10000), &PlannerOptions::policy_samples,
                       "Of `source: policy`: so many candidates are sampled at once and sent in batches; `candidates` "
                       "is then the most batches."),
+      planner.Word<bool>(
+          "repair", {{"false", false}, {"true", true}}, &PlannerOptions::repairs,
+          "true: candidates ask the certifier for the nearest plan that it would certify, and a start for "
+          "which no candidate was certified gets the nearest of these."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
                      "Acceleration and deceleration that the search expects of the robot."),

@@ -10,6 +10,7 @@
 
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/candidate_message.h"
+#include "certifier/gate/repair.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/certify/batch.h"
@@ -32,10 +33,20 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kBetween) == decision_t::CAUSE_BETWEEN &&
               static_cast<int>(Cause::kBound) == decision_t::CAUSE_BOUND);
 
+std::optional<RobotMotion> MotionOf(const Config& config) {
+  try {
+    if (!config.laws.stop.empty()) return RobotMotion(config, Braking::kPlanned);
+  } catch (const ConfigError&) {  // it does not say what being at rest is, either
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Gate::Gate(const Config& config)
     : certifier_(config.problem),
+      motion_(MotionOf(config)),
+      tail_steps_(config.planner.tail_steps),
       options_(config.gate),
       grounds_(config.grounds),
       transitions_(config.grounds.observations),
@@ -290,28 +301,57 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
   }
 }
 
+std::optional<Gate::Again> Gate::CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {
+  if (GroundsOf(decision) != grounds()) return std::nullopt;
+  Again again{PlanOf(candidate, ScheduleOf(candidate, options_)), InitialSetOf(candidate), {}};
+  certifier_.Require(again.plan, again.initial_set, obstacles_.all());
+  again.verdict = certifier_.Certify(again.plan, again.initial_set, obstacles_.all(), tube_);
+  if (static_cast<int>(again.verdict.cause) != decision.cause || again.verdict.step != decision.step)
+    return std::nullopt;
+  return again;
+}
+
+advice_t Gate::AdviceOn(const candidate_plan_t& candidate, const decision_t& decision) const {
+  advice_t advice{};
+  advice.candidate_utime = candidate.utime;
+  advice.plan_id = candidate.plan_id;
+  std::ranges::copy(candidate.source, advice.source);
+  std::ranges::copy(decision.plan_digest, advice.plan_digest);
+  advice.outcome = decision.outcome;
+  advice.cause = decision.cause;
+  SetGrounds(advice, grounds());
+  return advice;
+}
+
 std::optional<advice_t> Gate::Advise(const candidate_plan_t& candidate, const decision_t& decision,
                                      const SearchEffort& effort) noexcept {
   try {
-    if (GroundsOf(decision) != grounds() || !effort.goes_on()) return std::nullopt;
-    const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
-    const Zonotope initial_set = InitialSetOf(candidate);
-    certifier_.Require(plan, initial_set, obstacles_.all());
-    const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
-    if (static_cast<int>(verdict.cause) != decision.cause || verdict.step != decision.step) return std::nullopt;
+    if (!effort.goes_on()) return std::nullopt;
+    const std::optional<Again> again = CertifyAgain(candidate, decision);
+    if (!again) return std::nullopt;
     const std::vector<advice_change_t> changes =
-        ChangesFor({certifier_, plan, initial_set, obstacles_.all(), verdict}, tube_, effort);
+        ChangesFor({certifier_, again->plan, again->initial_set, obstacles_.all(), again->verdict}, tube_, effort);
     if (changes.empty()) return std::nullopt;
-    advice_t advice{};
-    advice.candidate_utime = candidate.utime;
-    advice.plan_id = candidate.plan_id;
-    std::ranges::copy(candidate.source, advice.source);
-    std::ranges::copy(decision.plan_digest, advice.plan_digest);
-    advice.outcome = decision.outcome;
-    advice.cause = decision.cause;
+    advice_t advice = AdviceOn(candidate, decision);
     advice.num_changes = static_cast<std::int16_t>(changes.size());
     std::ranges::copy(changes, advice.change);
-    SetGrounds(advice, grounds());
+    return advice;
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<advice_t> Gate::Repair(const candidate_plan_t& candidate, const decision_t& decision,
+                                     const std::function<bool()>& goes_on) noexcept {
+  try {
+    if (!AsksForRepair(candidate, decision) || !goes_on()) return std::nullopt;
+    const std::optional<Again> again = CertifyAgain(candidate, decision);
+    if (!again || candidate.progress_steps < 0 || candidate.progress_steps > candidate.num_steps) return std::nullopt;
+    advice_t advice = AdviceOn(candidate, decision);
+    const auto repair =
+        FindRepair({certifier_, again->plan, again->initial_set, obstacles_.all(), again->verdict},
+                   candidate.progress_steps, {motion_ ? &*motion_ : nullptr, tail_steps_}, tube_, goes_on);
+    if (repair) SetProposal(*repair, candidate, advice);
     return advice;
   } catch (const std::exception&) {
     return std::nullopt;

@@ -29,6 +29,7 @@ not, the caller calls Refuse. */
 #include "lcmtypes/codec.h"
 #include "lcmtypes/grounds.h"
 #include "task/config.h"
+#include "task/motion.h"
 
 namespace forereach {
 
@@ -82,6 +83,12 @@ class Gate final {
   [[nodiscard]] std::optional<advice_t> Advise(const candidate_plan_t& candidate, const decision_t& decision,
                                                const SearchEffort& effort) noexcept;
 
+  /** For a candidate that asks for it and that this gate has abstained on, D or S: advice with the nearest plan that
+  was certified (repair.h), or with none if none was found. Nothing if other inputs than the decision's are in force.
+  The caller sets utime and sequence. @param goes_on as FindRepair's. Cost: that of a decision, and FindRepair's. */
+  [[nodiscard]] std::optional<advice_t> Repair(const candidate_plan_t& candidate, const decision_t& decision,
+                                               const std::function<bool()>& goes_on) noexcept;
+
   /** Answers a candidate without certifying it, for a cause outside the candidate. The candidate's own defects take
   precedence over `cause`. */
   [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
@@ -130,6 +137,15 @@ class Gate final {
     std::string how;
   };
 
+  // The parts of a candidate that is judged once more, and whether it is judged as before.
+  struct Again {
+    Plan plan;
+    Zonotope initial_set;
+    Decision verdict;
+  };
+  [[nodiscard]] std::optional<Again> CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision);
+  [[nodiscard]] advice_t AdviceOn(const candidate_plan_t& candidate, const decision_t& decision) const;
+
   [[nodiscard]] GateAnswer Answer(Bytes message, const TimeSource& clock,
                                   std::optional<Rejection> from_outside) noexcept;
   [[nodiscard]] GateAnswer AnswerOne(Bytes candidate, std::int64_t now_us, const TimeSource& clock,
@@ -150,6 +166,8 @@ class Gate final {
   void Count(const decision_t& decision);
 
   Certifier certifier_;
+  std::optional<RobotMotion> motion_;  ///< Unless the task does not say how the robot brakes.
+  int tail_steps_;
   GateOptions options_;
   Grounds grounds_;  ///< Without the digest of the obstacles, which obstacles_ has.
   Digest transitions_;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "certifier/gate/advice_message.h"
+#include "certifier/gate/repair.h"
 #include "certifier/gate/stamp.h"
 #include "lcmtypes/candidate_batch.h"
 
@@ -15,17 +16,23 @@ constexpr int kHalvings = 4;  // a plan that gives way by a sixteenth too much i
 
 void AdviceGiver::Note(Bytes candidate, const decision_t& decision, const GateOptions& options) {
   abstained_.reset();
-  if (!options.advises || !IsAdvisedOn(decision.cause)) return;
-  if (auto decoded = Decoded<candidate_plan_t>(CandidateIn(candidate, GetDigest(decision.plan_digest))))
-    abstained_ = {*decoded, decision};
+  if (decision.outcome != decision_t::ABSTAIN_DOMAIN && decision.outcome != decision_t::ABSTAIN_SAFETY) return;
+  const auto decoded = Decoded<candidate_plan_t>(CandidateIn(candidate, GetDigest(decision.plan_digest)));
+  if (!decoded) return;
+  const bool says_changes = options.advises && IsAdvisedOn(decision.cause);
+  if (says_changes || AsksForRepair(*decoded, decision)) abstained_ = {*decoded, decision, says_changes};
 }
 
 std::optional<advice_t> AdviceGiver::Give(Gate& gate, const std::function<bool()>& is_wanted_elsewhere) {
   const auto abstained = std::exchange(abstained_, std::nullopt);
   if (!abstained) return std::nullopt;
+  const auto& [candidate, decision, says_changes] = *abstained;
   const std::int64_t end = steady_() + Microseconds(gate.options().decision_budget_ms);
-  auto advice = gate.Advise(abstained->candidate, abstained->decision,
-                            {kHalvings, [&] { return steady_() <= end && !is_wanted_elsewhere(); }});
+  const SearchEffort effort{kHalvings, [&] { return steady_() <= end && !is_wanted_elsewhere(); }};
+  auto advice = gate.Repair(candidate, decision, effort.goes_on);
+  if (says_changes && (!advice || advice->changed == 0))
+    if (auto changes = gate.Advise(candidate, decision, effort)) advice = std::move(changes);
+  if (is_wanted_elsewhere()) return std::nullopt;
   if (advice) advice->sequence = given_++;
   return advice;
 }

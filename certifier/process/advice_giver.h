@@ -1,7 +1,10 @@
-/** Advice on the newest abstention, for when there is nothing else to do (docs/decisions.md).
+/** Advice on the newest abstention, for when there is nothing else to do (docs/decisions.md): the repair that its
+candidate asks for; without one, with gate.advice, what would have helped.
 
 It keeps one candidate at most: a newer decision displaces it, because its planner has gone on. A search ends without a
-result when `is_wanted_elsewhere` says so or its time is up, and is not tried again. It uses no bus. */
+result when `is_wanted_elsewhere` says so, and when its time is up with the repair that was found, if one was. It is not
+tried again. So however many candidates ask, they get one search of gate.decision_budget_ms at a time, and none while
+anything else waits. It uses no bus. */
 #pragma once
 
 #include <cstdint>
@@ -25,7 +28,8 @@ class AdviceGiver final {
   /** Whether there is something to say. */
   [[nodiscard]] bool has_work() const { return abstained_.has_value(); }
 
-  /** The advice, complete but for its utime; nothing if the search ended without one. Then there is no work any more.
+  /** The advice, complete but for its utime; nothing if the search ended without one, which a search for a repair says
+  by advice without a proposal. Then there is no work any more.
   It takes as long as two decisions and a test of one obstacle after `is_wanted_elsewhere` became true, at most, and
   else not longer than that after gate.decision_budget_ms. */
   [[nodiscard]] std::optional<advice_t> Give(Gate& gate, const std::function<bool()>& is_wanted_elsewhere);
@@ -34,6 +38,7 @@ class AdviceGiver final {
   struct Abstained {
     candidate_plan_t candidate;
     decision_t decision;
+    bool says_changes;
   };
 
   const Clock steady_;

@@ -279,6 +279,7 @@ class Forged final : Kind {
     advice_t advice{};  // the task asks for none
     advice.sequence = kForgedSequence;
     advice.num_changes = 1;
+    advice.changed = 1;
     harmful[channels.advice] = Encode(advice);
     obstacles_t nothing_there{};
     nothing_there.utime = WallClockUs();

@@ -28,7 +28,7 @@ struct Contract {
   std::size_t bytes;
 };
 const std::map<std::string, Contract> kContracts = {
-    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}},
+    {"candidate_plan_t", {0xa26a21ec9821aaaa, 8538}},
     {"decision_t", {0x6c785a9e090fc6f2, 562}},
     {"execution_event_t", {0x4742c25e0eefd377, 336}},
     {"obstacle_shape_t", {0x29158dc0270b76d4, 406}},
@@ -41,10 +41,10 @@ const std::map<std::string, Contract> kContracts = {
     {"obstacle_t", {0xbbad85e96469971b, 488}},
     {"obstacles_t", {0xc1a2a66356f23f34, 30746}},
     {"withdrawal_t", {0x143744ac67af3ba6, 482}},
-    {"certified_plan_t", {0xd6bfba8d7729f625, 41976}},
+    {"certified_plan_t", {0x35a4960598cd0ba9, 41978}},
     {"advice_change_t", {0x2820254c63772fe1, 56}},
-    {"advice_t", {0xc708fe6c4a3d4e09, 654}},
-    {"candidate_batch_t", {0x6b70f57595232290, 62806}},
+    {"advice_t", {0xd9a32e31db904c49, 9202}},
+    {"candidate_batch_t", {0x6b70f57595232290, 62808}},
 };
 
 template <class Message>

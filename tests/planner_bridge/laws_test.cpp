@@ -3,7 +3,7 @@
 
 #include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/text_model.h"
-#include "planner_bridge/motion.h"
+#include "task/motion.h"
 #include "tests/planner_bridge/tasks.h"
 #include "tests/worlds.h"
 

@@ -361,6 +361,134 @@ TEST_F(AdvisedPlannerTest, FalseAdviceCostsARoundAtMost) {
   EXPECT_EQ(Summary()["certified"], 1);
 }
 
+class RepairingPlannerTest : public AdvisedPlannerTest {
+ protected:
+  void SetUp() override {
+    config_ = Bicycle();
+    config_.planner.repairs = true;
+    config_.planner.lead_steps = 20;
+    config_.planner.candidates = 2;
+    Start(config_);
+    Tell(Standing());
+    ASSERT_EQ(candidates_.size(), 1u);
+  }
+
+  // So far from the last candidate; told from others by the control of a step.
+  advice_t Proposal(double nearness, double control) {
+    advice_t advice{.changed = 4, .nearness = {nearness, nearness}};
+    SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
+    SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
+    advice.proposal = candidates_.back();
+    advice.proposal.plan_id = advice.proposal.start_utime = 1;
+    advice.proposal.initial_center[0] = 1e9;
+    advice.proposal.progress_steps = 5;
+    advice.proposal.control[3][1] = control;
+    return advice;
+  }
+  void Refuse(const std::optional<advice_t>& advice) {
+    AbstainOn(candidates_.back());
+    if (advice) Say(*advice);
+    Run(3);
+  }
+};
+
+TEST_F(RepairingPlannerTest, SendsTheNearestProposalAfterItsOwnCandidates) {
+  EXPECT_EQ(candidates_[0].repair, 1);
+  Refuse(Proposal(0.2, 0.25));
+  ASSERT_EQ(candidates_.size(), 2u) << "its own goes first";
+  EXPECT_EQ(candidates_[1].repair, 1);
+  EXPECT_NE(candidates_[1].control[3][1], 0.25);
+  Refuse(Proposal(0.5, 0.125));
+  ASSERT_EQ(candidates_.size(), 3u);
+  const candidate_plan_t &sent = candidates_[2], &own = candidates_[1];
+  EXPECT_EQ(sent.control[3][1], 0.25);
+  EXPECT_EQ(std::tuple(sent.progress_steps, sent.num_steps, sent.repair), std::tuple(5, candidates_[0].num_steps, 0));
+  EXPECT_EQ(std::tuple(sent.plan_id, sent.sequence), std::tuple(own.plan_id + 1, own.sequence + 1));
+  EXPECT_EQ(sent.start_utime, own.start_utime);
+  EXPECT_TRUE(std::ranges::equal(sent.initial_center, own.initial_center)) << "only controls are taken from a proposal";
+  EXPECT_EQ(Summary()["repairs"], 1);
+  Certify();
+  EXPECT_EQ(Summary()["certified"], 1);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 0);
+}
+
+TEST_F(RepairingPlannerTest, EndsItsRoundWhereTheProposalIsRefusedToo) {
+  Refuse(Proposal(0.2, 0.25));
+  Refuse(Proposal(0.1, 0.25));
+  ASSERT_EQ(candidates_.size(), 3u);
+  Refuse(std::nullopt);
+  Run(30);
+  EXPECT_EQ(candidates_.size(), 3u) << "of several, one is sent";
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+TEST_F(RepairingPlannerTest, SendsNoneWhoseStartIsTooNear) {
+  Refuse(Proposal(0.2, 0.25));
+  AbstainOn(candidates_.back());
+  const auto budget = static_cast<std::int64_t>(1000 * config_.gate.decision_budget_ms);
+  now_ = candidates_[0].start_utime - budget + 1;
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+TEST_F(RepairingPlannerTest, SendsOneThatIsJustInTime) {
+  Refuse(Proposal(0.2, 0.25));
+  AbstainOn(candidates_.back());
+  now_ = candidates_[0].start_utime - static_cast<std::int64_t>(1000 * config_.gate.decision_budget_ms) - 2000;
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(candidates_[2].control[3][1], 0.25);
+}
+
+TEST_F(RepairingPlannerTest, WaitsForTheAnswerThatNoneWasFoundAndNoLongerThanForAdvice) {
+  AbstainOn(candidates_.back());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u) << "it waits";
+  advice_t none = Proposal(0, 0);
+  none.changed = 0;
+  none.proposal = {};
+  Say(none);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  AbstainOn(candidates_.back());
+  Run(static_cast<int>(2 * config_.gate.decision_budget_ms) + 3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+// With no keys anybody can say this; with them, a certifier that is wrong.
+TEST_F(RepairingPlannerTest, IgnoresAProposalThatIsNoneForItsCandidate) {
+  const std::int64_t ignored = Summary()["messages_ignored"];
+  Say(Proposal(0.1, 0.25));  // nothing was abstained on
+  AbstainOn(candidates_.back());
+  const auto say = [&](const auto& change) {
+    advice_t wrong = Proposal(0.1, 0.25);
+    change(wrong);
+    Say(wrong);
+  };
+  say([](advice_t& advice) { advice.plan_digest[0] ^= 1; });
+  say([](advice_t& advice) { advice.obstacles_digest[0] ^= 1; });
+  for (const int steps : {-1, 0, 129, 32767})
+    say([&](advice_t& advice) { advice.proposal.num_steps = static_cast<std::int16_t>(steps); });
+  say([](advice_t& advice) { advice.proposal.progress_steps = -1; });
+  say([](advice_t& advice) { ++(advice.proposal.progress_steps = advice.proposal.num_steps); });
+  say([](advice_t& advice) { advice.proposal.num_inputs = 9; });
+  say([](advice_t& advice) { advice.proposal.num_states = 5; });
+  say([](advice_t& advice) { advice.nearness[0] = std::nan(""); });
+  EXPECT_EQ(Summary()["messages_ignored"], ignored + 12);
+  Run(static_cast<int>(2 * config_.gate.decision_budget_ms) + 3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  Refuse(std::nullopt);
+  Run(30);
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(PlannerNodeTest, AsksForNoRepairUnlessItsTaskSaysSo) {
+  Tell(Standing());
+  EXPECT_EQ(candidates_[0].repair, 0);
+}
+
 TEST_F(PlannerNodeTest, WaitsForNoAdviceUnlessItIsSent) {
   Tell(Standing());
   AbstainS();

@@ -107,6 +107,26 @@ TEST(PolicyRun, ManySamplesAreSentInBatchesWithOneDecisionEach) {
   EXPECT_EQ(traffic.robot["goal_reached"], true);
 }
 
+// A policy of two proposals for each start stands before the first obstacle. Every repair is a candidate like all.
+TEST(PolicyRun, WithRepairsItReachesTheGoalWhereItStopsWithout) {
+  for (const int samples : {1, 2}) {  // two are sent as a batch
+    SCOPED_TRACE(samples);
+    Config config = LoadConfig(kTask);
+    config.planner.candidates = 2 / samples;
+    config.planner.policy_samples = samples;
+    EXPECT_EQ(RunTask(config).robot["goal_reached"], false);
+    config.planner.repairs = true;
+    const Traffic traffic = RunTask(config);
+    EXPECT_EQ(traffic.robot["goal_reached"], true);
+    EXPECT_EQ(traffic.robot["stops"], 0);
+    EXPECT_EQ(traffic.robot["contacts"], 0);
+    EXPECT_EQ(traffic.robot["steps_inside_slice"], traffic.robot["steps_executed"]);
+    EXPECT_GT(traffic.planner["repairs"], 0);
+    EXPECT_EQ(traffic.decisions.size(), traffic.candidates.size() + traffic.batches.size());
+    EXPECT_TRUE(std::ranges::includes(traffic.certified, traffic.executed));
+  }
+}
+
 TEST(PolicyRun, TwoRunsAreIdentical) {
   const Config config = LoadConfig(kTask);
   const Traffic one = RunTask(config), two = RunTask(config);

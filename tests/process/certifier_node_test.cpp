@@ -189,6 +189,86 @@ TEST_F(AdvisingCertifierTest, DropsItsAdviceWhenTheObstaclesChange) {
   EXPECT_EQ(order_, "d");
 }
 
+class RepairingCertifierTest : public AdvisingCertifierTest {
+ protected:
+  RepairingCertifierTest() { Begin(false); }  // a candidate asks for it, not the task
+
+  void AskForRepair(int id, double acceleration) {
+    candidate_plan_t candidate = Candidate(id, acceleration);
+    candidate.repair = 1;
+    bus_->Publish("PLAN_CANDIDATE", candidate);
+  }
+};
+
+TEST_F(RepairingCertifierTest, AProposalComesAfterItsDecisionAndIsCertifiedWhenItIsSent) {
+  AskForRepair(1, kAccelerationIntoTheCircle);
+  Run();
+  EXPECT_EQ(order_, "d");
+  EXPECT_TRUE(node_->busy());
+  Run();
+  EXPECT_EQ(order_, "da");
+  EXPECT_FALSE(node_->busy());
+  ASSERT_EQ(advices_.size(), 1u);
+  EXPECT_EQ(GetDigest(advices_[0].plan_digest), GetDigest(decisions_[0].plan_digest));
+  EXPECT_NE(advices_[0].changed, 0);
+  EXPECT_TRUE(certified_.empty()) << "it is no certificate";
+
+  candidate_plan_t sent = advices_[0].proposal;
+  sent.utime = kNow;
+  sent.plan_id = 2;
+  bus_->Publish("PLAN_CANDIDATE", sent);
+  Run();
+  ASSERT_EQ(certified_.size(), 1u);
+  EXPECT_EQ(Encode(certified_[0].plan), Encode(sent)) << "byte for byte";
+}
+
+TEST_F(RepairingCertifierTest, SaysThatItFoundNone) {
+  config_.obstacles = {Obstacle::Circle(Eigen::Vector2d(0, 0), 1)};
+  Begin(false);
+  AskForRepair(1, kAccelerationThatCertifies);
+  Run();
+  Run();
+  ASSERT_EQ(advices_.size(), 1u);
+  EXPECT_EQ(std::tuple(advices_[0].changed, advices_[0].num_changes), std::tuple(0, 0));
+  Begin(true);  // a task that gives advice gives it then
+  AskForRepair(1, kAccelerationThatCertifies);
+  Run();
+  Run();
+  ASSERT_EQ(advices_.size(), 2u);
+  EXPECT_EQ(std::tuple(advices_[1].changed, advices_[1].num_changes), std::tuple(0, 1));
+}
+
+// However many ask: one search at a time, on the newest, and none while anything waits.
+TEST_F(RepairingCertifierTest, AFloodOfRequestsGetsOneSearchAfterAllDecisions) {
+  for (int id = 1; id <= 40; ++id) AskForRepair(id, kAccelerationIntoTheCircle);
+  for (int i = 0; i < 12; ++i) Run();
+  EXPECT_EQ(decisions_.size(), 40u);
+  ASSERT_EQ(advices_.size(), 1u);
+  EXPECT_EQ(order_.back(), 'a');
+}
+
+TEST_F(RepairingCertifierTest, DropsItsSearchWhenACandidateArrives) {
+  AskForRepair(1, kAccelerationIntoTheCircle);
+  Run();
+  Ask(2, kAccelerationThatCertifies);
+  node_->Tick(now_us_);  // in which it would search
+  Run();
+  EXPECT_EQ(order_, "dcd");
+  EXPECT_TRUE(advices_.empty());
+}
+
+TEST_F(RepairingCertifierTest, ASearchForARepairTakesNoLongerThanADecisionMay) {
+  const Clock slow = [this] { return now_us_ += 1000; };  // each look at the clock takes a millisecond
+  clocks_ = {slow, slow};
+  Begin(false);
+  AskForRepair(1, kAccelerationIntoTheCircle);
+  Run();
+  const std::int64_t before = now_us_;
+  Run();
+  EXPECT_LT(now_us_, before + 50'000);
+  EXPECT_FALSE(node_->busy()) << "and is not tried again";
+}
+
 TEST_F(CertifierNodeTest, AnswersWaitingCandidatesBeforeItEnds) {
   for (int id = 1; id <= 20; ++id) bus_->Publish("PLAN_CANDIDATE", Candidate(id));
   bus_->Dispatch(0);

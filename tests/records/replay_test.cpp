@@ -197,6 +197,56 @@ TEST_F(WithdrawnReplayTest, ListsNoDifferenceForAWithdrawalWithoutAJudgement) {
   }
 }
 
+// The candidate that was refused, what was proposed in its place, as `alter` changes it, and that as a candidate.
+class RepairedReplayTest : public ReplayTest {
+ protected:
+  template <class Alter>
+  ReplayResult Replayed(Alter alter) {
+    const std::string path = NewLog();
+    EventLogWriter log(path);
+    const Config config = SmallTask();
+    LoggedGate gate{config, log};
+    candidate_plan_t candidate = Candidate(1, kAccelerationIntoTheCircle);
+    candidate.repair = 1;
+    const decision_t decision = gate.gate.Decide(Encode(candidate), kNow).decision;
+    gate.Log(candidate, decision);
+    advice_t advice = gate.gate.Repair(candidate, decision, [] { return true; }).value();
+    EXPECT_NE(advice.changed, 0);
+    candidate_plan_t sent = advice.proposal;
+    alter(advice);
+    log.Append(kNow, config.bus.advice, Encode(advice));
+    sent.utime = kNow;
+    sent.plan_id = 2;
+    gate.Decide(sent, decision_t::CERTIFIED);
+    EXPECT_TRUE(log.Flush());
+    return Replay({path}, {config});
+  }
+};
+
+TEST_F(RepairedReplayTest, AProposalIsCertifiedAgainAndWhatIsSentIsACandidateLikeAll) {
+  const ReplayResult result = Replayed([](advice_t&) {});
+  EXPECT_EQ(std::tuple(result.proposals, result.agreed, result.candidates), std::tuple(1, 2, 2));
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+}
+
+TEST_F(RepairedReplayTest, ListsAProposalThatIsNotCertified) {
+  for (const double acceleration : {kAccelerationIntoTheCircle, kAccelerationOutsideDomain, std::nan("")}) {
+    const ReplayResult result = Replayed([=](advice_t& advice) {
+      for (auto& control : advice.proposal.control) control[0] = acceleration, control[1] = 0;
+    });
+    EXPECT_EQ(result.proposals, 0) << acceleration;
+    EXPECT_THAT(result.differences, testing::ElementsAre(HasSubstr("proposed in its place is not certified")));
+  }
+  EXPECT_EQ(Replayed([](advice_t& advice) { advice.proposal.num_steps = 129; }).differences.size(), 1u);
+  EXPECT_EQ(Replayed([](advice_t& advice) { advice.proposal.num_states = -1; }).differences.size(), 1u);
+}
+
+TEST_F(RepairedReplayTest, ComparesNoProposalUnderGroundsThatTheLogDoesNotGive) {
+  const ReplayResult result = Replayed([](advice_t& advice) { advice.observations_digest[0] ^= 1; });
+  EXPECT_EQ(std::tuple(result.proposals, result.circumstances), std::tuple(0, 1));
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+}
+
 TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {
   int certified = 0, domain = 0, safety = 0;
   EventLogReader reader(kLog);

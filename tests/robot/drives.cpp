@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "bus/process.h"
 #include "command_line/command_line.h"
 #include "command_line/progress.h"
+#include "forereach/certify/way_clear.h"
 #include "forereach/fault_t.hpp"
 #include "lcmtypes/codec.h"
 #include "simulator/drive_counts.h"
@@ -26,16 +28,19 @@ struct Options {
   std::vector<std::string> tasks;
   std::string obstacles;
   int seeds = 20, first_seed = 1;
-  bool advice = false;
+  bool advice = false, repair = false;
+  double scatter = 0;
   double errors = 0;
 };
 
 std::string TextOf(const DriveCounts& all) {
   const double share =
       all.proposed > 0 ? 100.0 * static_cast<double>(all.certified) / static_cast<double>(all.proposed) : 0;
-  return fmt::format("{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}",
-                     all.goals, all.drives, all.contacts, all.limits, all.outside, all.steps, all.emergency_stops,
-                     all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
+  const double seconds = all.goals > 0 ? all.seconds_to_goal / static_cast<double>(all.goals) : 0;
+  return fmt::format(
+      "{:>3} of {:<3} {:>6.1f} s {:>8} {:>6} {:>4} of {:<6} {:>5} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}",
+      all.goals, all.drives, seconds, all.contacts, all.limits, all.outside, all.steps, all.stops, all.emergency_stops,
+      all.certified, all.proposed, share, all.searches, all.lost_rounds, all.rounds);
 }
 
 struct Drive {
@@ -84,6 +89,19 @@ Config WithErrors(Config config, double share) {
   return config;
 }
 
+// Each obstacle elsewhere, in each coordinate by up to `most` metres.
+std::vector<Obstacle> Scattered(const std::vector<Obstacle>& obstacles, double most, int seed) {
+  std::mt19937 random(static_cast<std::uint32_t>(seed));
+  std::vector<Obstacle> scattered;
+  for (const Obstacle& obstacle : obstacles) {
+    Eigen::VectorXd by(obstacle.dim());
+    for (double& coordinate : by)
+      coordinate = most * (2 * static_cast<double>(random()) / static_cast<double>(std::mt19937::max()) - 1);
+    scattered.push_back(Shifted(obstacle, by));
+  }
+  return scattered;
+}
+
 // One row: the task with each seed. False if one of them was not good.
 bool DriveAll(const std::string& name, const Config& config, const Options& options) {
   const Config world = options.obstacles.empty() ? config : LoadConfig(options.obstacles, TransitionsFile::kIgnore);
@@ -94,7 +112,9 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
   {
     Progress progress(name + " drives", static_cast<std::size_t>(options.seeds));
     for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
-      const Drive drive = DriveOnce(config, world, seed);
+      Config scattered = config;
+      if (options.scatter > 0) scattered.obstacles = Scattered(config.obstacles, options.scatter, seed);
+      const Drive drive = DriveOnce(scattered, world, seed);
       const bool is_good = drive.fault.empty() && drive.counts.good();
       if (!is_good)
         bad += fmt::format("{:>26} {}, abstained {}, {}, ends at {:.2f}\n", fmt::format("seed {}", seed),
@@ -112,16 +132,22 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
 
 int Run(const Options& options) {
   bool all_good = true;
-  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>6} {:^14} {:>9} {:^20} {:>8} {:^13} {:>6}\n", "task", "goals",
-                           "contacts", "limits", "steps outside", "emergency", "plans certified", "searches",
-                           "rounds lost", "time");
+  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>8} {:>6} {:^14} {:>5} {:>9} {:^20} {:>8} {:^13} {:>6}\n", "task",
+                           "goals", "to goal", "contacts", "limits", "steps outside", "stops", "emergency",
+                           "plans certified", "searches", "rounds lost", "time");
   for (const std::string& task : options.tasks) {
     Config config = WithErrors(LoadConfig(task), options.errors);
     const std::string name = std::filesystem::path(task).stem().string();
     all_good = DriveAll(name, config, options) && all_good;
-    if (!options.advice) continue;
-    config.gate.advises = true;
-    all_good = DriveAll(name + ", advised", config, options) && all_good;
+    if (options.advice) {
+      config.gate.advises = true;
+      all_good = DriveAll(name + ", advised", config, options) && all_good;
+      config.gate.advises = false;
+    }
+    if (options.repair) {
+      config.planner.repairs = true;
+      all_good = DriveAll(name + ", repaired", config, options) && all_good;
+    }
   }
   return all_good ? 0 : 1;
 }
@@ -149,7 +175,12 @@ int main(int argc, char** argv) {
            .help = "Tasks without errors of measurement get this share of planner.initial_half_width, and steps "
                    "off their times by as much of a tenth of model.dt",
            .range = NumberRange{0, 1}},
-          {"--advice", &options.advice, "Drives each task once more with gate.advice: send"}}};
+          {.name = "--scatter",
+           .variable = &options.scatter,
+           .help = "Moves each obstacle of the task by up to so many metres in each coordinate, by the seed",
+           .range = NumberRange{0, 1000}},
+          {"--advice", &options.advice, "Drives each task once more with gate.advice: send"},
+          {"--repair", &options.repair, "Drives each task once more with planner.repair: true"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   logging::Silence();
   return Guarded("forereach_drives", [&] { return Run(options); });

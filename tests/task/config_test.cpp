@@ -148,7 +148,8 @@ TEST(LoadConfig, ReadsEveryOption) {
       "advice: M}\n"
       "planner: {source: policy, policy: p/own.json, algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4,\n"
       "  clearance_step: 5, progress_steps: 6,\n"
-      "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
+      "  tail_steps: 7, lead_steps: 8, candidates: 9, repair: true, cruise_speed: 10, braking: 11, time_limit_ms: 12, "
+      "seed: 13,\n"
       "  initial_half_width: [1, 2, 3, 4]}\n"
       "robot: {start: [4, 3, 2, 1], step_period_ms: 14, time_limit_s: 15, residual: {name: velocity_knee, knee: 2}}\n"
       "logger: {directory: here, queue: 16, flush_ms: 17, rotate_mb: 18, rotate_minutes: 19, quota_mb: 20, "
@@ -174,6 +175,7 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(std::tie(planner.goal_radius, planner.clearance, planner.clearance_step, planner.progress_steps,
                      planner.tail_steps, planner.lead_steps, planner.candidates),
             std::make_tuple(3.0, 4.0, 5.0, 6, 7, 8, 9));
+  EXPECT_TRUE(planner.repairs);
   EXPECT_EQ(std::tie(planner.cruise_speed, planner.braking, planner.time_limit_ms, planner.seed),
             std::make_tuple(10.0, 11.0, 12.0, 13));
   EXPECT_EQ(planner.initial_half_width, (std::vector<double>{1, 2, 3, 4}));

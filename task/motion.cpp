@@ -1,4 +1,4 @@
-#include "planner_bridge/motion.h"
+#include "task/motion.h"
 
 #include <algorithm>
 #include <array>
