@@ -70,7 +70,7 @@ void ValidateRegions(const Declaration& declaration) {
     for (const auto& [variable, range] : regions[i].box) {
       variables.push_back(variable);
       RequireRegion(range.lower < range.upper && range.IsFinite(), i,
-                    "[" + ToText(range.lower) + ", " + ToText(range.upper) + "] is no range");
+                    ToText(range.lower) + " to " + ToText(range.upper) + " is no range");
     }
     RequireRegion(!variables.empty() && AreIndices(variables, static_cast<int>(L.cols())), i,
                   "its box is of states and inputs, at least one, each once, in their order");

@@ -44,7 +44,8 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
     product += (product.empty() ? "" : " x ") + std::to_string(along.size() + 1);
     if (num_cells_ > 100 * Region::kMaxCells) num_cells_ = 100 * Region::kMaxCells;  // of many variables
   }
-  size_text_ = std::to_string(variables_.size()) + " variables and " + product + " cells";
+  size_text_ =
+      std::to_string(variables_.size()) + " variables and " + product + " = " + std::to_string(num_cells_) + " cells";
   num_axes_ = variables_.size();
   if (num_axes_ > kMaxAxes || num_cells_ > Region::kMaxCells) return;  // Validate refuses it
 
@@ -93,16 +94,33 @@ void RegionGrid::Find(Box& box) const noexcept {
     const auto first = std::upper_bound(cuts.begin(), cuts.end(), box.lower[l]) - cuts.begin(),
                last = std::lower_bound(cuts.begin(), cuts.end(), box.upper[l]) - cuts.begin();
     box.place.last[a] = static_cast<std::uint16_t>(last);
-    box.place.first[a] = static_cast<std::uint16_t>(std::min(first, last));  // a point on a cut is in both strips
+    box.place.first[a] = static_cast<std::uint16_t>(std::min(first, last));
+    box.place.on_cut[a] = first > last;
   }
 }
 
+// On a cut both strips hold: the lesser slope counts.
 double RegionGrid::LargestSlope(const std::vector<double>& slopes, const Place& place) const noexcept {
+  const auto& [first, last, on_cut] = place;
+  const auto least = [&](std::size_t cell) {
+    double slope = slopes[cell];
+    for (std::size_t next = 1; next < std::size_t{1} << kMaxAxes; ++next) {
+      std::size_t neighbour = cell;
+      bool is_near = true;
+      for (std::size_t a = 0; a < kMaxAxes; ++a)
+        if (next >> a & 1) neighbour += stride_[a], is_near &= on_cut[a];
+      if (is_near) slope = std::min(slope, slopes[neighbour]);
+    }
+    return slope;
+  };
+  const bool is_cut = on_cut[0] || on_cut[1] || on_cut[2];
   double largest = 0;
-  for (std::size_t i = place.first[0]; i <= place.last[0]; ++i)
-    for (std::size_t j = place.first[1]; j <= place.last[1]; ++j)
-      for (std::size_t k = place.first[2]; k <= place.last[2]; ++k)
-        largest = std::max(largest, slopes[i * stride_[0] + j * stride_[1] + k * stride_[2]]);
+  for (std::size_t i = first[0]; i <= last[0]; ++i)
+    for (std::size_t j = first[1]; j <= last[1]; ++j)
+      for (std::size_t k = first[2]; k <= last[2]; ++k) {
+        const std::size_t cell = i * stride_[0] + j * stride_[1] + k * stride_[2];
+        largest = std::max(largest, is_cut ? least(cell) : slopes[cell]);
+      }
   return largest;
 }
 
@@ -111,6 +129,7 @@ double RegionGrid::Ascent(const Row& row, std::size_t a, Place at, std::size_t s
                           double to) const noexcept {
   const std::vector<double>& cuts = cuts_[a];
   const bool up = from < to;
+  at.on_cut[a] = false;
   double cost = 0;
   for (bool is_last = false; !is_last; strip = up ? strip + 1 : strip - 1) {
     is_last = up ? strip == cuts.size() || to <= cuts[strip] : strip == 0 || cuts[strip - 1] <= to;
@@ -152,7 +171,8 @@ double RegionGrid::CostUpper(std::size_t index, const Box& from, const Box& to) 
   for (std::size_t moved = 0; moved + 1 < all; ++moved) {
     Place at = from.place;
     for (std::size_t a = 0; a < num_axes_; ++a)
-      if (moved >> a & 1) at.first[a] = to.place.first[a], at.last[a] = to.place.last[a];
+      if (moved >> a & 1)
+        at.first[a] = to.place.first[a], at.last[a] = to.place.last[a], at.on_cut[a] = to.place.on_cut[a];
     for (std::size_t move = 0; move < moves; ++move) {
       if (moved >> move & 1) continue;
       const double cost = move < num_axes_ ? AlongAxis(row, move, at, from, to) : OfOthers(row, at, from, to);

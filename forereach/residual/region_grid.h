@@ -41,9 +41,11 @@ class RegionGrid final {
   /** The rows whose slopes some cell has below L, ascending. */
   [[nodiscard]] const std::vector<int>& rows() const { return rows_; }
 
-  /** Along each axis the first and the last strip that a box meets: of a point, one. */
+  /** Along each axis the first and the last strip that a box meets. What has no width and lies on a cut is in one
+  strip, and in the next one as well. */
   struct Place {
     std::array<std::uint16_t, kMaxAxes> first{}, last{};
+    std::array<bool, kMaxAxes> on_cut{};
   };
   struct Box {
     std::array<double, kMaxVariables> lower, upper;  ///< of the variables of z
