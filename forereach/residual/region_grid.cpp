@@ -101,7 +101,8 @@ void RegionGrid::Find(Box& box) const noexcept {
 
 // On a cut both strips hold: the lesser slope counts.
 double RegionGrid::LargestSlope(const std::vector<double>& slopes, const Place& place) const noexcept {
-  const auto& [first, last, on_cut] = place;
+  const auto &first = place.first, &last = place.last;
+  const std::array<bool, kMaxAxes>& on_cut = place.on_cut;
   const auto least = [&](std::size_t cell) {
     double slope = slopes[cell];
     for (std::size_t next = 1; next < std::size_t{1} << kMaxAxes; ++next) {
