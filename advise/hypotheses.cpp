@@ -151,6 +151,10 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
     all.push_back({rows.empty() ? "the residual changes by no more than declaration.lipschitz, on the whole domain"
                                 : "that of the other states changes by no more than declaration.lipschitz, likewise",
                    falsify});
+  if (!declaration.regions.empty())
+    all.push_back(
+        {"it changes by less in " + std::to_string(declaration.regions.size()) + " boxes, as declaration.regions says",
+         falsify});
   if (!declaration.noise_bound.isZero(0))
     all.push_back({"recorded successors are off by at most " + Bounds(model.state_names(), declaration.noise_bound),
                    "declared; transitions refute it likewise"});

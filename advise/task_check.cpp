@@ -428,6 +428,19 @@ class Examination final {
                       Down(violation.difference)),
           "look at these lines, and whether model.dt is the step of the data. If they are right, bound this row "
           "by declaration.lipschitz, or declare more noise_bound");
+    const auto z = [&](int i) { return problem_.transitions.z.row(i); };
+    const double by_slopes = 2 * problem_.declaration.ObservationError(violation.coordinate) +
+                             problem_.declaration.lipschitz.row(violation.coordinate)
+                                 .dot((z(violation.first) - z(violation.second)).cwiseAbs());
+    if (violation.difference <= by_slopes)
+      return Add(
+          "declaration.regions",
+          fmt::format("{}: lines {} and {} of {} differ in the model's error by {}, and on the cheapest way found "
+                      "between them the regions allow {}: one of these is false, and nothing can be certified",
+                      name, FileLine(violation.first), FileLine(violation.second), result_.data,
+                      Down(violation.difference), Up(violation.bound)),
+          "look at these lines. If they are right, declare more in the regions between them, or make these "
+          "smaller: declaration.lipschitz alone allows the difference");
     Add(RowKey(name),
         fmt::format("{}: lines {} and {} of {} differ in the model's error by {}, and the declaration allows {}: it is "
                     "false, and nothing can be certified",

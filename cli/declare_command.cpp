@@ -11,7 +11,10 @@
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "command_line/progress.h"
+#include "forereach/certify/problem.h"
+#include "forereach/declare/region_search.h"
 #include "forereach/declare/slope_bound.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/parallel.h"
 #include "forereach/numerics/text.h"
 #include "identify/cover_file.h"
@@ -32,6 +35,7 @@ struct DeclareArguments {
   std::string noise = "declared", disturbance = "estimated";
   DataCommand data;
   SlopeBoundOptions search;
+  int regions = 1;
   unsigned jobs = AllCores();
 };
 
@@ -126,6 +130,56 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
   return text + (bounds.empty() ? "}" : "}}");
 }
 
+constexpr int kRegionDigits = 4;
+constexpr double kRoom = 1.001;  // --check has to prove what is printed, by boxes of its own
+
+// Cells of the domain with smaller slopes, cut along up to three of the variables of the slopes.
+std::vector<Region> RegionsFor(const std::vector<SlopeBound>& bounds, const Config& config,
+                               const DeclareArguments& options) {
+  const Problem& problem = *config.problem;
+  const TextSlopes slopes(*config.residual);
+  const std::vector<Interval> ranges = problem.domain.Ranges();
+  Eigen::MatrixXd lipschitz = Eigen::MatrixXd::Zero(slopes.num_states(), slopes.num_variables());
+  std::vector<int> variables;
+  for (const SlopeBound& bound : bounds) lipschitz(bound.row, bound.column) = bound.upper;
+  for (int l = 0; l < slopes.num_variables() && variables.size() < Region::kMaxVariables; ++l) {
+    Problem one = problem;
+    one.declaration.regions = {{{{l, {0, 1}}}, Eigen::MatrixXd::Zero(slopes.num_states(), slopes.num_variables())}};
+    const bool matters = std::ranges::any_of(
+        bounds, [&](const SlopeBound& bound) { return bound.upper > 0 && slopes.Occurs(bound.row, l); });
+    const Interval& range = ranges[static_cast<std::size_t>(l)];
+    if (matters && range.lower < range.upper && FindCoupledRegion(one).empty()) variables.push_back(l);
+  }
+  RegionSearchOptions search;
+  search.most_cells = static_cast<std::size_t>(options.regions);
+  return FindRegions(slopes, problem.domain, ParameterRanges(*config.residual), lipschitz, variables, search);
+}
+
+// Two lines a region.
+std::string Yaml(const std::vector<Region>& regions, const std::vector<SlopeBound>& bounds,
+                 const std::vector<std::string>& names) {
+  const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
+  std::string text;
+  for (const Region& region : regions) {
+    std::string box, rows;
+    for (const auto& [variable, range] : region.box)
+      box +=
+          (box.empty() ? "" : ", ") + name(variable) + ": [" + ToText(range.lower) + ", " + ToText(range.upper) + "]";
+    for (std::size_t i = 0; i < bounds.size(); ++i) {
+      const int row = bounds[i].row, column = bounds[i].column;
+      const double whole = bounds[i].upper;
+      const double slope = MulUp(kRoom, region.lipschitz(row, column));
+      if (i == 0 || bounds[i - 1].row != row) rows += (i > 0 ? "}, " : "") + name(row) + ": {";
+      if (!(slope > 0)) continue;
+      if (!rows.ends_with('{')) rows += ", ";
+      rows += name(column) + ": " +
+              (slope < whole / kRoom ? RoundedUp(slope, kRegionDigits) : RoundedUp(whole, kBoundDigits));
+    }
+    text += "\n    - in: {" + box + "}\n      lipschitz: {" + rows + "}}";
+  }
+  return text.empty() ? "" : "\n  regions:" + text;
+}
+
 double LargestGap(const std::vector<SlopeBound>& bounds) {
   double gap = 0;
   for (const SlopeBound& bound : bounds) gap = std::max(gap, bound.gap());
@@ -136,7 +190,8 @@ bool AllReached(const std::vector<SlopeBound>& bounds) {
   return std::ranges::all_of(bounds, [](const SlopeBound& bound) { return bound.reached; });
 }
 
-Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
+Json ToJson(const std::vector<SlopeBound>& bounds, const std::vector<Region>& regions, const Config& config,
+            double seconds) {
   const std::vector<std::string> names = ArgumentNames(config);
   const NominalModel& model = *config.problem->model;
   const auto columns = static_cast<std::size_t>(model.num_variables());
@@ -170,14 +225,15 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
           {"entries", entries},
           {"boxes", boxes},
           {"seconds", seconds},
-          {"yaml", Yaml(bounds, names)},
+          {"yaml", Yaml(bounds, names) + Yaml(regions, bounds, names)},
           {"digests",
            {{"config", ToHex(config.grounds.config)},
             {"model", ToHex(config.grounds.model)},
             {"residual", ToHex(ResidualDigest(config))}}}};
 }
 
-void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
+void PrintForPeople(const std::vector<SlopeBound>& bounds, const std::vector<Region>& regions, const Config& config,
+                    double seconds) {
   const TextSlopes slopes(*config.residual);
   const std::vector<std::string> names = ArgumentNames(config);
   const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
@@ -197,24 +253,25 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
     text << "\n";
   }
   std::cout << text.str() << "  all other entries are zero\n  took " << seconds << " s\n\ndeclaration:\n  "
-            << Yaml(bounds, names) << std::endl;
+            << Yaml(bounds, names) << Yaml(regions, bounds, names) << std::endl;
 }
 
 int Declare(const DeclareArguments& options) {
   const Config config = LoadWithResidual(options.config);
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<SlopeBound> bounds = BoundAll(config, options);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   RequireFinite(bounds, config, TextSlopes(*config.residual));
+  const std::vector<Region> regions = options.regions > 1 ? RegionsFor(bounds, config, options) : std::vector<Region>();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (!options.cover.empty()) {
     std::vector<verifier::SlopeClaim> claims;
     for (const SlopeBound& bound : bounds) claims.push_back({bound.row, bound.column, bound.upper, bound.cover});
     SaveCover(options.cover, config, claims);
   }
   if (options.json)
-    std::cout << JsonText(ToJson(bounds, config, seconds)) << std::endl;
+    std::cout << JsonText(ToJson(bounds, regions, config, seconds)) << std::endl;
   else
-    PrintForPeople(bounds, config, seconds);
+    PrintForPeople(bounds, regions, config, seconds);
   return AllReached(bounds) ? 0 : 1;
 }
 
@@ -264,12 +321,37 @@ std::vector<CoverFinding> CheckClaims(const CoverFile& file, const Config& confi
   return findings;
 }
 
+// The regions that the task declares: each slope of each, over its box, by the checker's own cuts.
+std::vector<CoverFinding> CheckRegions(const Config& config, std::size_t& count) {
+  const Problem& problem = *config.problem;
+  const std::vector<std::string> names = ArgumentNames(config);
+  std::vector<CoverFinding> findings;
+  for (std::size_t i = 0; i < problem.declaration.regions.size(); ++i) {
+    const Region& region = problem.declaration.regions[i];
+    const std::optional<Domain> part = PartIn(problem.domain, region);
+    if (!part) continue;
+    const verifier::CoverChecker checker(*part, *config.residual);
+    for (const auto& [row, column] : checker.Entries()) {
+      const double slope = region.lipschitz(row, column);
+      if (!(slope < problem.declaration.lipschitz(row, column))) continue;
+      const verifier::SlopeClaim claim{row, column, slope, {{Cover::Node{.number = slope}}}};
+      const verifier::CoverVerdict verdict = checker.Check(claim);
+      ++count;
+      findings.push_back(
+          {verdict.answer, "declaration.regions[" + std::to_string(i) + "]: " + NameOf(claim, names), verdict.what});
+    }
+  }
+  return findings;
+}
+
 int CheckCover(const DeclareArguments& options) {
   const Config config = LoadWithResidual(options.config);
   const CoverFile file = LoadCover(options.check, config);
   const verifier::CoverChecker checker(config.problem->domain, *config.residual);
   std::vector<CoverFinding> findings = CheckRecord(file, config, checker);
   std::ranges::move(CheckClaims(file, config, checker, options.jobs), std::back_inserter(findings));
+  std::size_t count = file.claims.size();
+  std::ranges::move(CheckRegions(config, count), std::back_inserter(findings));
   std::erase_if(findings, [](const CoverFinding& finding) { return finding.answer == verifier::Answer::kYes; });
 
   const bool refuted = std::ranges::any_of(
@@ -277,15 +359,14 @@ int CheckCover(const DeclareArguments& options) {
   const std::string unknown = options.json ? "cannot_verify" : "cannot verify";
   const std::string verdict = refuted ? "refuted" : findings.empty() ? "confirmed" : unknown;
   if (options.json) {
-    Json document{{"verdict", verdict}, {"entries", file.claims.size()}, {"failures", Json::array()}};
+    Json document{{"verdict", verdict}, {"entries", count}, {"failures", Json::array()}};
     for (const CoverFinding& finding : findings)
       document["failures"].push_back({{"entry", finding.entry}, {"claim", finding.what}});
     std::cout << JsonText(document) << std::endl;
   } else {
     for (const CoverFinding& finding : findings)
       std::cout << "  " << finding.entry << (finding.entry.empty() ? "" : ": ") << finding.what << "\n";
-    std::cout << "check: " << verdict << ": " << file.claims.size() << " bounds of " << config.residual->name
-              << std::endl;
+    std::cout << "check: " << verdict << ": " << count << " bounds of " << config.residual->name << std::endl;
   }
   return findings.empty() ? 0 : 1;
 }
@@ -311,6 +392,7 @@ Command DeclareCommand() {
           "docs/data.md. With --hold-out it shows how often fresh transitions contradict what the others propose.\n\n"
           "Examples:\n"
           "  forereach declare --config config/bicycle.yaml\n"
+          "  forereach declare --config config/bicycle.yaml --regions 64\n"
           "  forereach declare --config config/bicycle.yaml --cover cover.json\n"
           "  forereach declare --config config/bicycle.yaml --check cover.json\n"
           "  forereach declare --config config/demo.yaml --between\n"
@@ -324,6 +406,9 @@ Command DeclareCommand() {
                   {"--max-boxes", &options->search.max_boxes, "",
                    "Stop after this many boxes for each bound; the bound found by then is valid",
                    NumberRange{1, 100'000'000}},
+                  {"--regions", &options->regions, "",
+                   "Also cut the domain into up to so many cells, where that pays, with proven slopes in each",
+                   NumberRange{1, 1024}},
                   {.name = "--cover",
                    .variable = &options->cover,
                    .type = "FILE.json",

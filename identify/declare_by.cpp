@@ -73,6 +73,9 @@ void RequireSlopes(const Config& config) {
         config.path +
         ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it back "
         "in place of the proposed rows");
+  if (!config.problem->declaration.regions.empty())
+    throw ConfigError(config.path +
+                      ": declaration.regions: slopes are proposed for the whole domain. Take the regions out first");
 }
 
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {

@@ -16,7 +16,7 @@ namespace forereach {
 /** Which two lines of the transitions disagree, and what to change. `first_line` of observation 0. */
 [[nodiscard]] std::string Explain(const Unexplained& found, const Config& config, const ProposalOptions& options);
 
-/** @throws ConfigError if rows of the residual are declared affine: no slopes are proposed beside them. */
+/** @throws ConfigError if rows of the residual are declared affine, or regions: no slopes are proposed beside them. */
 void RequireSlopes(const Config& config);
 
 /** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", or by names, a line each,

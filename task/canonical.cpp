@@ -81,6 +81,19 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
       for (const int index : *indices) bytes.Count(index);
     }
   }
+  if (!declaration.regions.empty()) {
+    bytes.Text("regions");
+    bytes.Count(std::ssize(declaration.regions));
+    for (const Region& region : declaration.regions) {
+      bytes.Count(std::ssize(region.box));
+      for (const auto& [variable, range] : region.box) {
+        bytes.Count(variable);
+        bytes.Number(range.lower);
+        bytes.Number(range.upper);
+      }
+      bytes.Numbers(region.lipschitz);
+    }
+  }
   return bytes.digest();
 }
 

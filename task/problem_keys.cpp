@@ -8,11 +8,13 @@
 #include <fmt/format.h>
 
 #include "forereach/certify/limits.h"
+#include "forereach/certify/problem.h"
 #include "forereach/certify/safety.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/residual/growing_disturbance.h"
+#include "forereach/residual/region_grid.h"
 #include "forereach/safety/clearance.h"
 #include "task/key_rows.h"
 #include "task/number.h"
@@ -176,7 +178,53 @@ void ReadAffine(const Field& at, TaskDraft& draft) {
   std::ranges::sort(declaration.affine.columns);
 }
 
+// Rows as those of declaration.lipschitz; L in the others.
+void ReadRegion(const Field& at, TaskDraft& draft) {
+  const SchemaScope& scope = draft.scope;
+  Declaration& declaration = draft.problem.declaration;
+  Region region{{}, declaration.lipschitz};
+  for (const Field& range : at.Entries("in")) {
+    const Eigen::VectorXd ends = range.Vector();
+    if (!(ends[0] < ends[1]))
+      range.Fail(fmt::format("[{}, {}] is no range, has to be [least, largest]", ToText(ends[0]), ToText(ends[1])));
+    region.box.push_back({IndexOf(scope.variables, range.name()), {ends[0], ends[1]}});
+  }
+  if (region.box.empty())
+    at.Fail("in", "names no state or input; what holds everywhere belongs to declaration.lipschitz");
+  std::ranges::sort(region.box, {}, &Region::Side::variable);
+  for (const Field& row : at.Entries("lipschitz")) {
+    const int k = IndexOf(scope.states, row.name());
+    region.lipschitz.row(k).setZero();
+    for (const Field& slope : row.Entries()) {
+      const int l = IndexOf(scope.variables, slope.name());
+      if (const double everywhere = declaration.lipschitz(k, l); slope.Number() > everywhere)
+        slope.Fail(fmt::format("{} is above declaration.lipschitz, {}, which holds in the whole domain",
+                               ToText(slope.Number()), ToText(everywhere)));
+      region.lipschitz(k, l) = slope.Number();
+    }
+  }
+  declaration.regions.push_back(std::move(region));
+}
+
+// After the last one: what all of them are together.
+void CheckRegions(const Field& at, TaskDraft& draft) {
+  const RegionGrid grid(draft.problem.declaration);
+  if (grid.variables().size() > Region::kMaxVariables || grid.num_cells() > Region::kMaxCells)
+    at.Fail(fmt::format("cut {}, has to be at most {} variables and {} cells", grid.SizeText(), Region::kMaxVariables,
+                        Region::kMaxCells));
+  if (const std::string coupled = FindCoupledRegion(draft.problem); !coupled.empty())
+    at.Fail("are bounded by a variable that a constraint beyond the box of the domain names: " + coupled);
+}
+
 std::vector<Key> DeclarationKeys() {
+  Key range = Vector("declaration.regions[].in.<variable>", "of the variable", kReal, Size::kAny,
+                     "[least, largest]; both may lie outside the domain.");
+  range.count = Between(2, 2);
+  Key regions =
+      List("declaration.regions", Between(0, Region::kMaxRegions),
+           "Boxes in which the residual changes less than declaration.lipschitz says. Where boxes overlap, all "
+           "of them hold.");
+  regions.read = CheckRegions;
   const auto state_error = ErrorKeys(
       "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,
       "e by names: each state that is recorded differs from the true one by at most this, before a step and after it. "
@@ -205,6 +253,19 @@ std::vector<Key> DeclarationKeys() {
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
       Required(Names("declaration.affine.columns", Between(1, AffineRows::kMaxColumns), Size::kVariables,
                      "The states and inputs that they depend on.")),
+      Optional(std::move(regions), "[]"),
+      Map("declaration.regions[]", "One box.", ReadRegion),
+      Required(
+          Map("declaration.regions[].in",
+              "The box: ranges of states and inputs, of at most three in all regions. No inequality and no ball of "
+              "the domain names one of these.")),
+      std::move(range),
+      Required(Map("declaration.regions[].lipschitz",
+                   "L in the box, by names, at most declaration.lipschitz. A state that is not named has that; in the "
+                   "row of one that is, what is not named is zero.")),
+      Map("declaration.regions[].lipschitz.<state>", "Row k: the residual of this state."),
+      Number("declaration.regions[].lipschitz.<state>.<variable>", "of the state per that of the coordinate",
+             kNotNegative, "L_kl in the box."),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
                       "sigma: the largest error of a recorded successor, beside its last bit and state_error.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),

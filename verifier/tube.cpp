@@ -335,6 +335,13 @@ std::shared_ptr<const Functions> GrowthOf(const Problem& problem) {
   return growing ? std::make_shared<const Functions>(*problem.model, growing->bounds()) : nullptr;
 }
 
+// The least double that is not below any number of a range.
+double UpperDouble(const Real& range) {
+  double bound = range.upper().ToDouble();
+  while (!CertainlyAtMost(range.upper(), Real(bound))) bound = std::nextafter(bound, kNone);
+  return bound;
+}
+
 // Replaces a number by a point, and adds to `slack` how far it may be away.
 void Round(Real& number, Real& slack) {
   const Real point = number.middle();
@@ -442,6 +449,7 @@ struct TubeMaker::Offset {
 TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method method)
     : problem_(problem),
       equations_(equations),
+      ways_(problem),
       method_(method),
       disturbance_(ToSize(problem.model->num_states())),
       growing_(GrowthOf(problem)),
@@ -1056,12 +1064,37 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
       tightest = tightest ? Bounds{max(tightest->lower, lower - away), min(tightest->upper, upper + away)}
                           : Bounds{lower - away, upper + away};
     }
+    AddRegions(query, k, known, in_doubt, *tightest);
     return *tightest;
   };
   const auto contradicts = [](const Bounds& bounds) { return CertainlyBelow(bounds.upper, bounds.lower); };
   const Bounds bounds = intersect(false);
   // Again with doubts in their favour as large as rounding to doubles could give rise to.
   return {bounds, contradicts(bounds) && contradicts(intersect(true))};
+}
+
+// `bounds` narrowed by ways through the regions. Doubles choose those that may narrow them.
+void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const {
+  if (!ways_.Narrow(k)) return;
+  const Row row(problem_.declaration, query, k);
+  const Transitions& data = problem_.transitions;
+  Ways::Box hull;
+  for (const Real& range : query.hull) hull.emplace_back(-UpperDouble(-range), UpperDouble(range));
+  ways_.Cut(hull);
+  for (int i = 0; i < data.size(); ++i) {
+    if (!known.Contains(i)) continue;
+    const Eigen::VectorXd z = data.z.row(i);
+    const auto& [lower, upper] = residuals_[ToSize(i)][ToSize(k)];
+    const auto narrows = [&](const Real& away) {
+      return !CertainlyAtMost(lower - away, bounds.lower) || !CertainlyAtMost(bounds.upper, upper + away);
+    };
+    if (!narrows(Real())) continue;
+    if (const double scale = row.ScaleAt(data.z, i); scale > 1e-250 && scale < 1e250)
+      if (!narrows(max(Real(), Real(ways_.Cheapest<double>(k, z, hull)) - Real(0x1p-36 * scale)))) continue;
+    Real away = ways_.Cheapest<Real>(k, z, hull);
+    if (in_doubt) away += Real(kSeenInDoubles) * (sizes_[ToSize(i)][ToSize(k)] + Real(row.ScaleAt(data.z, i)));
+    bounds = {max(bounds.lower, lower - away), min(bounds.upper, upper + away)};
+  }
 }
 
 }  // namespace forereach::verifier

@@ -21,6 +21,7 @@ input, it is the largest over the box of what is known of them. */
 #include "verifier/answer.h"
 #include "verifier/equations.h"
 #include "verifier/real.h"
+#include "verifier/ways.h"
 
 namespace forereach::verifier {
 
@@ -135,6 +136,7 @@ class TubeMaker final {
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
+  void AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const;
   [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                    const std::vector<Real>& disturbance, std::vector<Real>& errors) const;
@@ -148,6 +150,7 @@ class TubeMaker final {
 
   const Problem& problem_;
   const Equations& equations_;
+  Ways ways_;
   Method method_;
   /** The declared disturbance, one entry for each state, and what it has beyond that, or null; the errors of the
   inputs, and what these add to the residual. */

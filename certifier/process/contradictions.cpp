@@ -9,6 +9,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/consistency.h"
+#include "forereach/residual/regional_enclosure.h"
 
 namespace forereach {
 namespace {
@@ -46,8 +47,9 @@ bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const
     return false;
   if (!(problem.timing.error > 0)) rows.longer.setZero();  // steps are on time
   const Observations observed = Observe(*problem.model, declaration, rows, problem.timing);
-  return FindViolation(declaration, observed) || FindAffineContradiction(declaration, observed) ||
-         ExceedsARate(rows, problem);
+  const auto [lower, upper] = problem.domain.Corners();
+  return FindViolation(declaration, observed) || FindRegionalViolation(declaration, observed, lower, upper) ||
+         FindAffineContradiction(declaration, observed) || ExceedsARate(rows, problem);
 } catch (const std::invalid_argument&) {  // of Observe: they say nothing under this task
   return false;
 }

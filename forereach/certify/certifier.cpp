@@ -57,6 +57,9 @@ void ValidateObservations(const Problem& problem) {
             "transition " + std::to_string(i) + ": lies outside the certification domain" +
                 (problem.declaration.HasErrorInZ() ? ", or may within the declared errors" : ""));
   }
+  const std::string coupled = FindCoupledRegion(problem);
+  Require(coupled.empty(),
+          "declaration: " + coupled + ", by which a region is bounded: paths have to stay in the domain");
 }
 
 // The domain's box over z = (x, u) envelops every query.
@@ -124,9 +127,10 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
 
 Certifier::Observed::Observed(const Problem& problem, const Observations& observations)
     : store(MakeStore(problem, observations)), known(store.snapshot()) {
-  if (problem.declaration.affine.rows.empty()) return;
   const auto [lower, upper] = problem.domain.Corners();
-  affine.emplace(problem.declaration, observations, lower, upper, known);
+  if (!problem.declaration.regions.empty()) regional.emplace(problem.declaration, observations, lower, upper, known);
+  if (!problem.declaration.affine.rows.empty())
+    affine.emplace(problem.declaration, observations, lower, upper, lipschitz());
 }
 
 Certifier::Observed::Observed(const Problem& problem)
@@ -140,20 +144,20 @@ int Certifier::Observed::Add(std::span<const double> z, const Observations& obse
   const auto insert = [&](const Observations& one) {
     return store.Insert(z, entries(one.lower), entries(one.upper)).id;
   };
-  if (!affine) return insert(observation);
-  const int id = insert(WithoutAffineRows(affine->declaration(), observation));
-  if (id >= 0) affine->Add(id, z, entries(observation.lower), entries(observation.upper));
+  const int id = insert(affine ? WithoutAffineRows(affine->declaration(), observation) : observation);
+  if (id >= 0 && regional) regional->Add(id, z, entries(observation.lower), entries(observation.upper));
+  if (id >= 0 && affine) affine->Add(id, z, entries(observation.lower), entries(observation.upper));
   return id;
 }
 
 const AffineContradiction* Certifier::Observed::affine_contradiction() const {
-  if (known.violation() || !affine || !affine->contradiction()) return nullptr;
+  if (pair_violation() || !affine || !affine->contradiction()) return nullptr;
   return &*affine->contradiction();
 }
 
 std::optional<Violation> Certifier::Observed::violation() const {
   const AffineContradiction* const found = affine_contradiction();
-  return found ? AsViolation(*found) : known.violation();
+  return found ? AsViolation(*found) : pair_violation();
 }
 
 namespace {
@@ -239,7 +243,10 @@ std::string Certifier::Unexcited() const {
 void Certifier::ForgetDropped() {
   if (violation_ || observed_->affine || learned_.size() <= 2 * observed_->known.size()) return;
   const std::vector<int> kept = observed_->known.ids();
-  std::erase_if(learned_, [&](const Record& record) { return !std::ranges::binary_search(kept, record.id); });
+  std::erase_if(learned_, [&](const Record& record) {
+    return !std::ranges::binary_search(kept, record.id) &&
+           !(observed_->regional && observed_->regional->Keeps(record.id));
+  });
 }
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem)

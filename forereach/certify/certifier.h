@@ -21,6 +21,7 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/residual/observation_store.h"
+#include "forereach/residual/regional_enclosure.h"
 #include "forereach/safety/projection.h"
 
 namespace forereach {
@@ -149,10 +150,19 @@ class Certifier final {
 
     ObservationStore store;
     ObservationStore::Snapshot known;
-    std::optional<AffineRowsEnclosure> affine;  // over `known`, where rows are affine
+    std::optional<RegionalEnclosure> regional;  // over `known`, where regions are declared
+    std::optional<AffineRowsEnclosure> affine;  // over lipschitz(), where rows are affine
 
+    // Of the rows that are not affine.
+    [[nodiscard]] const ResidualEnclosure& lipschitz() const {
+      return regional ? static_cast<const ResidualEnclosure&>(*regional) : known;
+    }
     [[nodiscard]] const ResidualEnclosure& residual() const {
-      return affine ? static_cast<const ResidualEnclosure&>(*affine) : known;
+      return affine ? static_cast<const ResidualEnclosure&>(*affine) : lipschitz();
+    }
+    // Of a pair, by L or the regions.
+    [[nodiscard]] const std::optional<Violation>& pair_violation() const {
+      return regional && !known.violation() ? regional->violation() : known.violation();
     }
     // What contradicts affine rows, if no pair contradicts the others; or null.
     [[nodiscard]] const AffineContradiction* affine_contradiction() const;

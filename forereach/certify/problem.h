@@ -4,6 +4,7 @@ projection. */
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "forereach/dynamics/expansion.h"
@@ -45,5 +46,9 @@ struct Problem {
   InstructionSet instructions = BestInstructionSet();  ///< Changes the computing time only, not a bit of the result
   std::vector<RestBound> rest;  ///< X_T of a certified plan satisfies all of these; empty: no condition
 };
+
+/** The first inequality or ball of the domain that names a variable by which a region is bounded, as
+"domain.balls[0] names v"; empty if none does. Without one, paths along the axes stay in the domain (region_grid.h). */
+[[nodiscard]] std::string FindCoupledRegion(const Problem& problem);
 
 }  // namespace forereach

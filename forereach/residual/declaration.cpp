@@ -9,6 +9,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/growing_disturbance.h"
+#include "forereach/residual/region_grid.h"
 
 namespace forereach {
 namespace {
@@ -54,6 +55,37 @@ void ValidateAffine(const Declaration& declaration) {
       "declare these rows by lipschitz");
 }
 
+void RequireRegion(bool holds, std::size_t i, const std::string& what) {
+  if (!holds) throw std::invalid_argument("region " + std::to_string(i) + ": " + what);
+}
+
+void ValidateRegions(const Declaration& declaration) {
+  const std::vector<Region>& regions = declaration.regions;
+  const Eigen::MatrixXd& L = declaration.lipschitz;
+  if (regions.size() > Region::kMaxRegions)
+    throw std::invalid_argument("regions: " + std::to_string(regions.size()) + ", must be at most " +
+                                std::to_string(Region::kMaxRegions));
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    std::vector<int> variables;
+    for (const auto& [variable, range] : regions[i].box) {
+      variables.push_back(variable);
+      RequireRegion(range.lower < range.upper && range.IsFinite(), i,
+                    ToText(range.lower) + " to " + ToText(range.upper) + " is no range");
+    }
+    RequireRegion(!variables.empty() && AreIndices(variables, static_cast<int>(L.cols())), i,
+                  "its box is of states and inputs, at least one, each once, in their order");
+    const Eigen::MatrixXd& slopes = regions[i].lipschitz;
+    RequireRegion(slopes.rows() == L.rows() && slopes.cols() == L.cols(), i, "its lipschitz has not the size of L");
+    RequireRegion((slopes.array() >= 0 && slopes.array() < kInfinity).all(), i,
+                  "an entry of its lipschitz is negative or not finite");
+  }
+  const RegionGrid grid(declaration);
+  if (grid.num_cells() > Region::kMaxCells || grid.variables().size() > Region::kMaxVariables)
+    throw std::invalid_argument("regions: " + grid.SizeText() + ", must be at most " +
+                                std::to_string(Region::kMaxVariables) + " variables and " +
+                                std::to_string(Region::kMaxCells) + " cells");
+}
+
 }  // namespace
 
 double Declaration::VariableError(Eigen::Index l) const {
@@ -97,6 +129,7 @@ void Declaration::Validate(int num_states, int num_variables) const {
   RequireBounds("state_error", state_error, num_states);
   RequireBounds("input_error", input_error, num_variables - num_states);
   ValidateAffine(*this);
+  ValidateRegions(*this);
 }
 
 void Declaration::ValidateDisturbance(int num_states) const { RequireBounds("disturbance", disturbance, num_states); }

@@ -27,6 +27,20 @@ struct AffineRows {
   [[nodiscard]] bool Contains(Eigen::Index k) const { return std::ranges::binary_search(rows, static_cast<int>(k)); }
 };
 
+/** A box in some variables of z in which the residual changes by less than L says: for all z, z' of it in Z_cert
+    |r_k(z) - r_k(z')| <= sum_l min(L'_kl, L_kl) |z_l - z'_l|.
+Where no region lies, L alone holds; where several overlap, all of them do. */
+struct Region {
+  static constexpr std::size_t kMaxRegions = 256, kMaxVariables = 3, kMaxCells = 1024;
+
+  struct Side {
+    int variable;
+    Interval range;  ///< May reach beyond the domain.
+  };
+  std::vector<Side> box;      ///< The other variables have no bound here.
+  Eigen::MatrixXd lipschitz;  ///< L', as L.
+};
+
 struct Declaration {
   Eigen::MatrixXd
       lipschitz;  ///< L, n-by-d_z, not negative; unit of state k per unit of z_l. A zero row: r_k is constant.
@@ -43,6 +57,9 @@ struct Declaration {
   bool given_are_exact = false;
   /** Rows that are affine, in place of L: their rows of L are zero and not read, and e is zero. */
   AffineRows affine = {};
+  /** At most kMaxRegions, which bound at most kMaxVariables variables and cut their ranges into kMaxCells cells. They
+  bound no affine row. */
+  std::vector<Region> regions = {};
   /** What w^ has beyond that in a step at z: |w_k| <= w^_k + |d_k(z)|. Null: nothing. */
   std::shared_ptr<const GrowingDisturbance> growing = {};
 
@@ -68,7 +85,8 @@ struct Declaration {
   [[nodiscard]] double ObservationError(Eigen::Index k) const;
 
   /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ or e has another number of entries
-  and not none, an entry is negative or not finite, or `affine` is not as above; the message names the entry. */
+  and not none, an entry is negative or not finite, or `affine` or a region is not as above; the message names the
+  entry. */
   void Validate(int num_states, int num_variables) const;
   /** The same for w^ alone. */
   void ValidateDisturbance(int num_states) const;

@@ -82,4 +82,17 @@ inline std::vector<Real> PointOf(Random& random, const Zonotope& set) {
   return x;
 }
 
+/** Whether no axis, and none of twenty random directions, separates x from a set. */
+inline bool IsNotOutside(Random& random, const Zonotope& slice, const std::vector<Real>& x) {
+  const int n = slice.dim();
+  for (int trial = 0; trial < 2 * n + 20; ++trial) {
+    Eigen::VectorXd d = random.Vector(n);
+    if (trial < 2 * n) d = (trial % 2 ? -1 : 1) * Eigen::VectorXd::Unit(n, trial / 2);
+    Real along;
+    for (int k = 0; k < n; ++k) along += Real(d[k]) * x[static_cast<std::size_t>(k)];
+    if (!(along <= Real(slice.SupportUpper(View(d))))) return false;
+  }
+  return true;
+}
+
 }  // namespace forereach

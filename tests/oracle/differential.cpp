@@ -23,6 +23,7 @@
 #include "tests/oracle/motions.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/region_problems.h"
 #include "tests/oracle/text_problems.h"
 #include "tests/verifier/record.h"
 
@@ -35,11 +36,12 @@ struct Options {
   int calls = 50;  ///< Of each problem.
   bool wide =
       false;  ///< Problems and queries are then changed as Tighten and Widen do, by random numbers of their own.
-  bool texts = false;   ///< Random models as text.
-  bool kinks = false;   ///< Random models as text with kinks in and at the ends of slices, many of them points.
-  bool worlds = false;  ///< Bodies, bounds between samples and obstacles that move, instead of the problems above.
-  bool affine = false;  ///< Some rows of the residual are affine.
-  bool limits = false;  ///< Limits on random functions, instead of the problems above.
+  bool texts = false;    ///< Random models as text.
+  bool kinks = false;    ///< Random models as text with kinks in and at the ends of slices, many of them points.
+  bool worlds = false;   ///< Bodies, bounds between samples and obstacles that move, instead of the problems above.
+  bool affine = false;   ///< Some rows of the residual are affine.
+  bool regions = false;  ///< The residual changes less in some boxes of the domain.
+  bool limits = false;   ///< Limits on random functions, instead of the problems above.
 };
 
 // What AnyProblem leaves out: any safety dimension, dense rows of L, high orders, domains cut by inequalities.
@@ -493,12 +495,14 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   Counts counts;
   counts.problems = 1;
   const bool absurd = random.Coin(0.25) && !options.texts && !options.kinks;
-  auto problem = options.kinks   ? AnyTextProblem(random, KinkedText(random))
-                 : options.texts ? AnyTextProblem(random)
-                                 : AnyProblem(random, random.Coin(), random.Integer(1, options.affine ? 60 : 20));
+  auto problem = options.kinks     ? AnyTextProblem(random, KinkedText(random))
+                 : options.texts   ? AnyTextProblem(random)
+                 : options.regions ? AnyRegionalProblem(random, random.Coin(), random.Integer(1, 8), false)
+                                   : AnyProblem(random, random.Coin(), random.Integer(1, options.affine ? 60 : 20));
   if (!problem) return counts;
   problem->method = options.method;
   Vary(random, *problem);
+  if (options.regions) problem->domain.inequalities.clear();  // paths have to stay in the domain
   if (winds.Coin(0.4)) Disturb(winds, *problem);
   if (options.affine)
     static_cast<void>(MakeAffine(records, *problem));
@@ -508,7 +512,7 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   if (absurd && winds.Coin(0.2))
     problem->declaration.disturbance =
         Eigen::VectorXd::Constant(problem->model->num_states(), std::ldexp(1, winds.Integer(-1074, 300)));
-  if (options.wide) Tighten(wide, *problem);
+  if (options.wide && !options.regions) Tighten(wide, *problem);
   if (Random times(start ^ 0x2545f4914f6cdd1d); times.Coin(0.4)) Shift(times, *problem);
   std::unique_ptr<Certifier> certifier;
   try {
@@ -576,6 +580,9 @@ int main(int argc, char** argv) {
                    .variable = &options.kinks,
                    .help = "Random models as text with kinks at the states, many of them points"},
                   {.name = "--affine", .variable = &options.affine, .help = "Some rows of the residual are affine"},
+                  {.name = "--regions",
+                   .variable = &options.regions,
+                   .help = "The residual changes less in some boxes of the domain"},
                   {.name = "--worlds",
                    .variable = &options.worlds,
                    .help = "Bodies, bounds between samples and obstacles that move, just accepted and just met"},

@@ -89,6 +89,50 @@ TEST(LoadConfig, ReadsWhichRowsAreAffine) {
               HasSubstr("with state_error or input_error"));
 }
 
+TEST(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
+  const TaskFiles files;
+  const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+  const auto text = [&](const std::string& regions) { return Replaced(kTask, line, line + "  regions:\n" + regions); };
+  const std::string good = "    - {in: {vy: [-1, 1], vx: [0, 0.5]}, lipschitz: {vx: {vy: 0.01}}}\n";
+  const Config config = files.Load(text(good));
+  const std::vector<Region>& regions = config.problem->declaration.regions;
+  ASSERT_EQ(regions.size(), 1);
+  ASSERT_EQ(regions[0].box.size(), 2);
+  EXPECT_EQ(regions[0].box[0].variable, 2);
+  EXPECT_EQ(regions[0].box[0].range, Interval(0, 0.5));
+  EXPECT_EQ(regions[0].box[1].variable, 3);
+  Eigen::MatrixXd slopes = config.problem->declaration.lipschitz;
+  EXPECT_EQ(slopes(2, 2), 0.1);
+  slopes.row(2).setZero();
+  slopes(2, 3) = 0.01;
+  EXPECT_EQ(regions[0].lipschitz, slopes) << "the rows that are not named are those of the whole domain";
+  const auto digest = [&](const std::string& regions) { return files.Load(text(regions)).grounds.declaration; };
+  EXPECT_NE(config.grounds.declaration, files.Load(kTask).grounds.declaration);
+  EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "0.5]", "0.25]")));
+  EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "vy: 0.01", "vy: 0.02")));
+  EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "vx: [0", "px: [0")));
+  EXPECT_EQ(files.Load(text(Replaced(good, "{vy: 0.01}", "{}"))).problem->declaration.regions[0].lipschitz(2, 3), 0);
+
+  const auto error = [&](const std::string& from, const std::string& to) {
+    return files.Error(text(Replaced(good, from, to)));
+  };
+  EXPECT_THAT(
+      error("vy: 0.01", "vy: 0.06"),
+      HasSubstr("declaration.regions[0].lipschitz.vx.vy: 0.06 is above declaration.lipschitz, 0.05, which holds"));
+  EXPECT_THAT(error("[0, 0.5]", "[0.5, 0]"), HasSubstr("regions[0].in.vx: [0.5, 0] is no range"));
+  EXPECT_THAT(error("[0, 0.5]", "[0, 0.5, 1]"), HasSubstr("declaration.regions[0].in.vx: "));
+  EXPECT_THAT(error("vy: [-1, 1]", "speed: [-1, 1]"), HasSubstr("declaration.regions[0].in.speed: unknown key"));
+  EXPECT_THAT(error("{vy: [-1, 1], vx: [0, 0.5]}", "{}"), HasSubstr("declaration.regions[0].in: names no state"));
+  EXPECT_THAT(error(", lipschitz: {vx: {vy: 0.01}}", ""), HasSubstr("declaration.regions[0].lipschitz: missing"));
+  const std::string many = Replaced(good, "vx: [0, 0.5]", "px: [0, 1], py: [0, 1], vx: [0, 0.5]");
+  EXPECT_THAT(files.Error(text(many)),
+              HasSubstr("declaration.regions: cut 4 variables and 3 x 3 x 3 x 3 = 81 cells, has to be at most 3"));
+  std::string fine;
+  for (int i = 1; i <= 33; ++i)
+    fine += fmt::format("    - {{in: {{vx: [0, {}], vy: [0, {}]}}, lipschitz: {{vx: {{}}}}}}\n", 0.01 * i, 0.02 * i);
+  EXPECT_THAT(files.Error(text(fine)), HasSubstr("35 x 35 = 1225 cells, has to be at most 3 variables and 1024 cells"));
+}
+
 TEST(LoadConfig, LeavesOutTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
   const TaskFiles files;
   const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n", rows = kTransitions;

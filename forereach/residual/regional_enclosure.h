@@ -1,0 +1,72 @@
+/** The enclosure of a residual that changes less in some regions of the domain (Declaration::regions):
+    max_i [r~_ik - eps_k - D_ik(Z)] <= r_k <= min_i [r~_ik + eps_k + D_ik(Z)],
+with D_ik(Z) the cost of a path from observation i to the hull of Z (RegionGrid::CostUpper), intersected with the bounds
+of another enclosure, which knows L alone: that sees the zonotope, this one its hull.
+
+Work. Any subset of the observations gives sound bounds. Kept are those that narrow a bound at their own location when
+they are added, and of these the last kMostKept; of more than kMostTried given at once, so many are tried, evenly. */
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "forereach/residual/consistency.h"
+#include "forereach/residual/declaration.h"
+#include "forereach/residual/enclosure.h"
+#include "forereach/residual/observations.h"
+#include "forereach/residual/region_grid.h"
+
+namespace forereach {
+
+class RegionalEnclosure final : public ResidualEnclosure {
+ public:
+  static constexpr std::size_t kMostKept = 512;
+  static constexpr int kMostTried = 4096;
+
+  /** @param domain_lower, domain_upper as of LipschitzEnvelope. @param others must outlive this object, and sets no
+  slope. @pre declaration.Validate passed; every path along the axes between points of the domain stays in it if it
+  moves the variables of the regions one after the other, and the others together. */
+  RegionalEnclosure(const Declaration& declaration, const Observations& observations,
+                    std::span<const double> domain_lower, std::span<const double> domain_upper,
+                    const ResidualEnclosure& others);
+
+  /** Cost: RegionGrid::CostUpper for each observation that is kept and may narrow a bound, in each row of
+  RegionGrid::rows(). */
+  void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
+
+  /** Adds an observation, and tests it against those that are kept; the rest is not to be called meanwhile.
+  @param lower, upper n entries: enclosures of the observed residual. */
+  void Add(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
+
+  /** The first pair found that contradicts the regions: |r~_ik - r~_jk| >= difference > bound >= D + 2 eps_k, in real
+  arithmetic. Another pair may be missed: some are not kept, and some paths are shorter than those along the axes. */
+  [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
+  [[nodiscard]] const RegionGrid& grid() const { return grid_; }
+  [[nodiscard]] bool Keeps(int id) const;
+
+ private:
+  struct Kept {
+    int id;
+    RegionGrid::Box at;
+    std::vector<double> floor, ceiling;  // r~ -+ eps rounded outward, of grid_.rows()
+  };
+
+  [[nodiscard]] Interval Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept;
+  void Test(const Kept& one);
+
+  RegionGrid grid_;
+  std::vector<double> error_;  // eps, of grid_.rows()
+  const ResidualEnclosure& others_;
+  std::vector<Kept> kept_;
+  std::optional<Violation> violation_;
+};
+
+/** The regions' part of FindViolation (consistency.h): whether these observations contradict the regions. Looks at all
+pairs of those that RegionalEnclosure keeps. */
+[[nodiscard]] std::optional<Violation> FindRegionalViolation(const Declaration& declaration,
+                                                             const Observations& observations,
+                                                             std::span<const double> domain_lower,
+                                                             std::span<const double> domain_upper);
+
+}  // namespace forereach

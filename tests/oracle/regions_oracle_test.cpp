@@ -1,0 +1,283 @@
+// Regions against rationals: residuals that use up what L and the regions allow, on the cheapest ways between many
+// points, stay within the bounds.
+#include "tests/test.h"
+
+#include "forereach/certify/certifier.h"
+#include "forereach/residual/regional_enclosure.h"
+#include "tests/oracle/admissible.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/region_problems.h"
+#include "tests/oracle/traced_random.h"
+
+namespace forereach::regions_oracle_test {
+
+using exact::Rational;
+
+constexpr double kReach = 2;  // of the domain, in each variable
+
+class Nothing final : public ResidualEnclosure {
+ public:
+  void Enclose(const QuerySet&, ResidualBounds& bounds) const noexcept override {
+    bounds.lower.fill(-kInfinity);
+    bounds.upper.fill(kInfinity);
+  }
+};
+
+struct Scene {
+  int variables;
+  Declaration declaration;
+  Observations observations;
+  std::vector<double> lower, upper;  // of the domain
+};
+
+double AnyPlace(Random& random) { return random.Coin(0.3) ? random.Integer(-2, 2) : random.Uniform(-kReach, kReach); }
+
+Scene AnyScene(Random& random) {
+  Scene scene{random.Integer(1, 3), {}, {}, {}, {}};
+  const int d = scene.variables;
+  scene.lower.assign(static_cast<std::size_t>(d), -kReach);
+  scene.upper.assign(static_cast<std::size_t>(d), kReach);
+  Declaration& declaration = scene.declaration;
+  declaration.lipschitz = Eigen::MatrixXd::Zero(d, d);
+  for (int l = 0; l < d; ++l) declaration.lipschitz(0, l) = random.Coin(0.1) ? 0 : random.Uniform(0, 1);
+  declaration.noise_bound = Eigen::VectorXd::Zero(d);
+  AddRegions(random, declaration, Eigen::VectorXd::Constant(d, kReach), random.Integer(1, 4));
+  return scene;
+}
+
+// A residual that is admissible for the regions, from some sources.
+RegionalFunction<Rational> AnyTruth(Random& random, const Scene& scene) {
+  std::vector<int> all;
+  for (int l = 0; l < scene.variables; ++l) all.push_back(l);
+  RegionalFunction<Rational> truth(scene.declaration, 0, all, scene.lower, scene.upper, scene.observations.z,
+                                   random.Sign());
+  for (int s = random.Integer(1, 4); s > 0; --s) truth.SetAnyNode(random, Rational(random.Uniform(-1, 1)));
+  truth.Spread();
+  return truth;
+}
+
+TEST(RegionsOracle, EveryResidualWithinTheRegionsLiesWithinTheBounds) {
+  TracedRandom random(2101);
+  int narrower = 0, touched = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    Scene scene = AnyScene(random);
+    const int d = scene.variables, count = random.Integer(1, 3);
+    scene.observations = {Eigen::MatrixXd(count, d), Eigen::MatrixXd::Zero(count, d), Eigen::MatrixXd::Zero(count, d)};
+    for (int i = 0; i < count; ++i)
+      for (int l = 0; l < d; ++l) scene.observations.z(i, l) = AnyPlace(random);
+    const RegionalFunction<Rational> truth = AnyTruth(random, scene);
+    for (int i = 0; i < count; ++i) {
+      const Eigen::VectorXd z = scene.observations.z.row(i);
+      const Rational value = truth({z.begin(), z.end()});
+      scene.observations.lower(i, 0) = exact::Floor(value);
+      scene.observations.upper(i, 0) = exact::Ceiling(value);
+    }
+    const Nothing nothing;
+    const RegionalEnclosure regional(scene.declaration, scene.observations, scene.lower, scene.upper, nothing);
+    Declaration plain = scene.declaration;
+    plain.regions = {{{{0, {-kReach, kReach}}}, 0.999 * plain.lipschitz}};
+    const RegionalEnclosure everywhere(plain, scene.observations, scene.lower, scene.upper, nothing);
+    ASSERT_FALSE(regional.violation()) << "rounding makes no contradiction";
+    if (regional.grid().rows().empty()) continue;
+    for (int query = 0; query < 5; ++query) {
+      Eigen::VectorXd center(d), width(d);
+      for (int l = 0; l < d; ++l) {
+        center[l] = AnyPlace(random);
+        width[l] = random.Coin(0.3) ? 0 : random.Uniform(0, 1) * (kReach - std::abs(center[l]));
+      }
+      const Zonotope slice = Zonotope::FromBox(center, width);
+      ResidualBounds bounds, wide;
+      regional.Enclose({slice, {}, {width.data(), static_cast<std::size_t>(d)}}, bounds);
+      everywhere.Enclose({slice, {}, {width.data(), static_cast<std::size_t>(d)}}, wide);
+      ASSERT_LE(bounds.lower[0], bounds.upper[0]);
+      narrower += bounds.upper[0] - bounds.lower[0] < 0.9 * (wide.upper[0] - wide.lower[0]);
+      for (int sample = 0; sample < 12; ++sample) {
+        std::vector<Rational> z;
+        for (int l = 0; l < d; ++l)
+          z.push_back(Rational(center[l]) +
+                      Rational(width[l]) * Rational(random.Coin() ? random.Sign() : random.Uniform(-1, 1)));
+        const Rational value = truth(z);
+        ASSERT_TRUE(exact::Inside(value, {bounds.lower[0], bounds.upper[0]})) << "no tolerance";
+        touched +=
+            Rational(bounds.upper[0] - value).get_d() < 1e-12 || Rational(value - bounds.lower[0]).get_d() < 1e-12;
+      }
+    }
+  }
+  EXPECT_GT(narrower, 200);
+  EXPECT_GT(touched, 200) << "the residuals use up what is allowed";
+}
+
+// The cost by every order of the moves, in rationals: of a point, along each variable with the slopes of the regions in
+// which all of the piece lies.
+class Costs {
+ public:
+  Costs(const Scene& scene, std::vector<double> from, std::vector<double> lower, std::vector<double> upper)
+      : scene_(scene), from_(std::move(from)), lower_(std::move(lower)), upper_(std::move(upper)) {}
+
+  Rational Least() const {
+    std::vector<int> order;
+    for (int l = 0; l < scene_.variables; ++l) order.push_back(l);
+    std::optional<Rational> least;
+    do {
+      // Those without a region move together: any order in which they are next to each other does.
+      const Rational cost = Of(order);
+      if (!least || cost < *least) least = cost;
+    } while (std::ranges::next_permutation(order).found);
+    return *least;
+  }
+
+ private:
+  Rational Of(const std::vector<int>& order) const {
+    std::vector<std::pair<double, double>> box;
+    for (const double at : from_) box.emplace_back(at, at);
+    Rational sum = 0;
+    for (const int l : order) {
+      const auto at = static_cast<std::size_t>(l);
+      Rational farthest = 0;
+      for (const double end : {lower_[at], upper_[at]}) farthest = std::max(farthest, Along(box, l, end));
+      sum += farthest;
+      box[at] = {lower_[at], upper_[at]};
+    }
+    return sum;
+  }
+  // From from_[l] to `end`, in pieces between all sides of regions.
+  Rational Along(const std::vector<std::pair<double, double>>& box, int l, double end) const {
+    std::vector<double> ticks{from_[static_cast<std::size_t>(l)], end};
+    for (const double side : Sides(l))
+      if (std::min(ticks[0], end) < side && side < std::max(ticks[0], end)) ticks.push_back(side);
+    std::ranges::sort(ticks);
+    Rational sum = 0;
+    for (std::size_t i = 0; i + 1 < ticks.size(); ++i) {
+      std::vector<std::pair<double, double>> piece = box;
+      piece[static_cast<std::size_t>(l)] = {ticks[i], ticks[i + 1]};
+      sum += Rational(Largest(piece, l, 0)) * (Rational(ticks[i + 1]) - Rational(ticks[i]));
+    }
+    return sum;
+  }
+  std::vector<double> Sides(int l) const {
+    std::vector<double> sides;
+    for (const Region& region : scene_.declaration.regions)
+      for (const auto& [variable, range] : region.box)
+        if (variable == l) sides.insert(sides.end(), {range.lower, range.upper});
+    std::ranges::sort(sides);
+    return sides;
+  }
+  // The largest slope over a box: it is halved at sides that lie in it.
+  double Largest(std::vector<std::pair<double, double>> box, int l, int m) const {
+    if (m == scene_.variables) {
+      double slope = scene_.declaration.lipschitz(0, l);
+      for (const Region& region : scene_.declaration.regions)
+        if (std::ranges::all_of(region.box, [&](const Region::Side& side) {
+              const auto& [lower, upper] = box[static_cast<std::size_t>(side.variable)];
+              return side.range.lower <= lower && upper <= side.range.upper;
+            }))
+          slope = std::min(slope, region.lipschitz(0, l));
+      return slope;
+    }
+    const auto [lower, upper] = box[static_cast<std::size_t>(m)];
+    for (const double side : Sides(m)) {
+      if (!(lower < side && side < upper)) continue;
+      std::vector<std::pair<double, double>> below = box, above = box;
+      below[static_cast<std::size_t>(m)].second = above[static_cast<std::size_t>(m)].first = side;
+      return std::max(Largest(below, l, m), Largest(above, l, m));
+    }
+    return Largest(box, l, m + 1);
+  }
+
+  const Scene& scene_;
+  std::vector<double> from_, lower_, upper_;
+};
+
+TEST(RegionsOracle, TheCostIsThatOfTheCheapestOrderRoundedUp) {
+  TracedRandom random(2102);
+  int compared = 0;
+  for (int trial = 0; trial < 1500; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    const Scene scene = AnyScene(random);
+    const RegionGrid grid(scene.declaration, scene.lower, scene.upper);
+    // All variables have regions, so that each of them is a move of its own.
+    if (grid.rows().empty() || static_cast<int>(grid.variables().size()) != scene.variables) continue;
+    RegionGrid::Box from, to;
+    std::vector<double> at, lower, upper;
+    for (std::size_t l = 0; l < static_cast<std::size_t>(scene.variables); ++l) {
+      at.push_back(AnyPlace(random));
+      lower.push_back(AnyPlace(random));
+      upper.push_back(random.Coin(0.3) ? lower[l] : random.Uniform(lower[l], kReach));
+      from.lower[l] = from.upper[l] = at[l];
+      to.lower[l] = lower[l], to.upper[l] = upper[l];
+    }
+    const bool on_a_side = std::ranges::any_of(scene.declaration.regions, [&](const Region& region) {
+      return std::ranges::any_of(region.box, [&](const Region::Side& side) {
+        const auto l = static_cast<std::size_t>(side.variable);
+        const auto is_side = [&](double x) { return side.range.lower == x || side.range.upper == x; };
+        return is_side(at[l]) || (lower[l] == upper[l] && is_side(lower[l]));
+      });
+    });
+    grid.Find(from);
+    grid.Find(to);
+    const double cost = grid.CostUpper(0, from, to);
+    const Rational least = Costs(scene, at, lower, upper).Least();
+    ASSERT_TRUE(exact::AtMost(least, cost)) << "no tolerance";
+    if (on_a_side) continue;  // there the grid takes the slopes of one of the strips
+    ++compared;
+    EXPECT_LE(cost, least.get_d() * (1 + 1e-14) + 1e-300);
+  }
+  EXPECT_GT(compared, 500);
+}
+
+// Residuals on the edge of what data, L and regions admit, in 256 bits: the model, and whether steps are disturbed.
+class RegionalContainment : public testing::TestWithParam<std::tuple<bool, bool>> {};
+
+TEST_P(RegionalContainment, NoAdmissibleRolloutLeavesTheTube) {
+  const auto [bicycle, disturbed] = GetParam();
+  TracedRandom random(2111 + bicycle);
+  int certified = 0, slices = 0, learned = 0, narrower = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    const auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 7), disturbed);
+    const auto known = std::make_shared<Problem>(*problem), plain = std::make_shared<Problem>(*problem);
+    const int first = random.Coin() ? problem->transitions.size() : 1;
+    known->transitions = {problem->transitions.z.topRows(first), problem->transitions.x_next.topRows(first)};
+    plain->declaration.regions = {};
+    Certifier certifier(known);
+    const Certifier without(plain);
+    for (int i = first; i < problem->transitions.size(); ++i, ++learned) {
+      const Eigen::VectorXd z = problem->transitions.z.row(i), next = problem->transitions.x_next.row(i);
+      ASSERT_EQ(certifier.Learn(View(z), View(next)), Learned::kAdded);
+    }
+    ASSERT_FALSE(certifier.violation()) << "the data come from a residual within the regions";
+    Tube tube, wider;
+    for (int q = 0; q < 2; ++q) {
+      const Query query = AnyQuery(random, *problem);
+      const Decision decision = certifier.Certify(query.plan(), query.initial_set, query.obstacles, tube);
+      ASSERT_NE(decision.outcome, Outcome::kFalsified);
+      certified += decision.outcome == Outcome::kCertified;
+      static_cast<void>(without.Certify(query.plan(), query.initial_set, query.obstacles, wider));
+      const int last = std::min(tube.length(), wider.length());
+      for (int k = 0; k < problem->model->num_states(); ++k)
+        narrower += tube.half_width(last)[static_cast<std::size_t>(k)] <
+                    0.9 * wider.half_width(last)[static_cast<std::size_t>(k)];
+      for (int rollout = 0; rollout < 3; ++rollout) {
+        const std::vector<RegionalFunction<Real>> residual = AnyAdmissible(random, *problem);
+        std::vector<Real> x = PointOf(random, query.initial_set);
+        for (int t = 0; t < tube.length(); ++t, ++slices) {
+          std::vector<Real> z = x;
+          for (const double u : query.plan().input(t)) z.emplace_back(u);
+          x = NominalSuccessor(bicycle, z);
+          const std::vector<Real> w = AnyDisturbance(random, *problem, z);
+          for (std::size_t k = 0; k < x.size(); ++k) x[k] += residual[k](z) + w[k];
+          ASSERT_TRUE(IsNotOutside(random, tube.slice(t + 1), x)) << "slice " << t + 1;
+        }
+      }
+    }
+  }
+  EXPECT_GT(certified, 10);
+  EXPECT_GT(slices, 500);
+  EXPECT_GT(learned, 30);
+  EXPECT_GT(narrower, 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, RegionalContainment, testing::Combine(testing::Bool(), testing::Bool()));
+
+}  // namespace forereach::regions_oracle_test
