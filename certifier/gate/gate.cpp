@@ -189,8 +189,8 @@ std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candi
 
 void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer) {
   const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
-  certifier_.Require(plan, initial_set, obstacles_.all());
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
+  certifier_.Require(plan, initial_set, obstacles_.indexed());
+  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
 
   decision_t& decision = answer.decision;
   decision.outcome = static_cast<std::int16_t>(verdict.outcome);
@@ -217,8 +217,8 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
     if (!upheld.Suffices(UpheldUnder(certifier_.problem(), options_))) return {};
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
-    certifier_.Require(plan, initial_set, obstacles_.all());
-    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.all(), tube_, first_step);
+    certifier_.Require(plan, initial_set, obstacles_.indexed());
+    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), tube_, first_step);
   } catch (const std::exception&) {
     return {};
   }
@@ -230,8 +230,8 @@ std::optional<advice_t> Gate::Advise(const candidate_plan_t& candidate, const de
     if (GroundsOf(decision) != grounds() || !effort.goes_on()) return std::nullopt;
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
-    certifier_.Require(plan, initial_set, obstacles_.all());
-    const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
+    certifier_.Require(plan, initial_set, obstacles_.indexed());
+    const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
     if (static_cast<int>(verdict.cause) != decision.cause || verdict.step != decision.step) return std::nullopt;
     const std::vector<advice_change_t> changes =
         ChangesFor({certifier_, plan, initial_set, obstacles_.all(), verdict}, tube_, effort);

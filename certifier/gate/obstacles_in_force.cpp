@@ -133,7 +133,10 @@ void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {
 void ObstaclesInForce::Put() {
   all_ = of_task_;
   all_.insert(all_.end(), state_.heard.begin(), state_.heard.end());
-  digest_ = ObstaclesDigest(all_);
+  const Digest digest = ObstaclesDigest(all_);
+  if (digest == digest_) return;
+  index_ = ObstacleIndex(all_);
+  digest_ = digest;
 }
 
 }  // namespace forereach

@@ -29,7 +29,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 
 #include "certifier/gate/stream_clock.h"
 #include "forereach/obstacles_t.hpp"
-#include "forereach/safety/obstacle.h"
+#include "forereach/safety/obstacle_index.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
 #include "lcmtypes/sole_sender.h"
@@ -55,6 +55,8 @@ class ObstaclesInForce final {
   void Inherit(const ObstaclesInForce& before);
 
   [[nodiscard]] const std::vector<Obstacle>& all() const { return all_; }
+  /** The same with their index, which is made anew when they change. */
+  [[nodiscard]] ObstacleView indexed() const { return {all_, index_}; }
   /** The digest of all(), as ObstaclesDigest computes it. */
   [[nodiscard]] const Digest& digest() const { return digest_; }
   /** The stamp of the message in force; nothing if none was received. */
@@ -88,8 +90,9 @@ class ObstaclesInForce final {
   std::optional<ClockBounds> clocks_;
   int dim_;  // of the safety coordinates
   std::vector<Obstacle> of_task_, all_;
+  ObstacleIndex index_;  // of all_
   State state_;
-  Digest digest_;
+  Digest digest_{};
 };
 
 }  // namespace forereach

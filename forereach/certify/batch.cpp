@@ -9,7 +9,7 @@
 namespace forereach {
 
 std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
-                                 std::span<const Zonotope> initial_sets, std::span<const Obstacle> obstacles,
+                                 std::span<const Zonotope> initial_sets, const ObstacleView& obstacles,
                                  unsigned threads, const BatchListener& listener) {
   if (threads < 1) throw std::invalid_argument("batch: 0 threads, must be at least 1");
   const bool one_for_all = initial_sets.size() == 1;

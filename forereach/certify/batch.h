@@ -24,7 +24,7 @@ Cost: the sum of the calls divided by the cores; each thread has a Tube of about
 @pre Certifier::Require passes for each plan. */
 [[nodiscard]] std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
                                                std::span<const Zonotope> initial_sets,
-                                               std::span<const Obstacle> obstacles, unsigned threads,
+                                               const ObstacleView& obstacles, unsigned threads,
                                                const BatchListener& listener = {});
 
 }  // namespace forereach

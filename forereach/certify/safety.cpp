@@ -36,7 +36,12 @@ struct Closest {
     Consider(found, found.separation.clearance(), t, o);
   }
   void Consider(const PartSeparation& found, double its_clearance, int t, int o) noexcept {
-    if (its_clearance < clearance) *this = {its_clearance, t, o, found.part, found.separation};
+    if (Yields(its_clearance, t, o)) *this = {its_clearance, t, o, found.part, found.separation};
+  }
+  // To what is closer, or as close and comes before.
+  [[nodiscard]] bool Yields(double its_clearance, int t, int o) const noexcept {
+    return its_clearance < clearance ||
+           (its_clearance == clearance && std::tie(t, o) < std::tie(step, obstacle));
   }
 };
 
@@ -88,11 +93,15 @@ class Nearest {
   }
   /** The least clearance for which there was no room. */
   [[nodiscard]] double left_out() const { return left_out_; }
-  /** Keeps what is closer than `clearance`, but not `other`: by step, then by obstacle. */
+  /** There is room for nothing that is further. */
+  [[nodiscard]] double farthest() const { return count_ == pairs_.size() ? pairs_[farthest_].clearance : kInfinity; }
+  /** What is further than farthest() has been left out, too. */
+  void LeaveOutFarther() noexcept { left_out_ = std::min(left_out_, farthest()); }
+  /** Keeps what is no further than `clearance`, but not `other`: by step, then by obstacle. */
   [[nodiscard]] std::span<Pair> InOrder(double clearance, const Pair* other) noexcept {
     std::size_t kept = 0;
     for (const Pair& pair : pairs())
-      if (pair.clearance < clearance && &pair != other) pairs_[kept++] = pair;
+      if (pair.clearance <= clearance && &pair != other) pairs_[kept++] = pair;
     count_ = kept;
     std::ranges::sort(pairs(), [](const Pair& a, const Pair& b) {
       return std::tie(a.step, a.obstacle) < std::tie(b.step, b.obstacle);
@@ -172,6 +181,9 @@ class SafetyTest::Unit {
     hulls_until_ = last_;
     hull_ = Join(hulls_[0], hulls_[1], placement().dim());
   }
+
+  // Of the frame, at all samples of the unit. @pre EncloseHulls.
+  [[nodiscard]] const Hull& hull() const noexcept { return hull_; }
 
   // By the interval hulls of the frame and a ball around the body: sound, not tight. @pre EncloseHulls.
   [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
@@ -347,8 +359,9 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
 
 // Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
 // they leave as possibly closest, is settled by the best direction. Any of these bounds proves a pair apart
-// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report.
-Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
+// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report. The result
+// does not depend on the order in which pairs are seen, so an index changes nothing.
+Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
                            int first) const noexcept {
   Closest closest;
   Nearest nearest;
@@ -357,27 +370,30 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
   for (int t = first; t < units; ++t) {
     unit.Enter(t);
     unit.EncloseHulls();
-    for (int o = 0; o < count; ++o) {
+    int touched = count;  // the first obstacle that is not proven apart
+    PartSeparation touch;
+    const auto judge = [&](int o) {
+      if (o >= touched) return;
       const Obstacle& obstacle = obstacles[ToSize(o)];
       const Encounter& meeting = unit.MeetIn(obstacle);
-      if (!meeting.is_there) continue;
+      if (!meeting.is_there) return;
       const Separation by_hulls = unit.ByHulls(obstacle, meeting);
-      if (by_hulls.IsProven()) {
-        nearest.Add(by_hulls, -1, t, o, placement_.is_at_frame());
-        continue;
-      }
+      if (by_hulls.IsProven()) return nearest.Add(by_hulls, -1, t, o, placement_.is_at_frame());
       const PartSeparation direct = unit.ByDirections({by_hulls, -1}, obstacle, meeting);
-      if (direct.separation.IsProven()) {
-        nearest.Add(direct.separation, direct.part, t, o, true);
-        continue;
-      }
+      if (direct.separation.IsProven()) return nearest.Add(direct.separation, direct.part, t, o, true);
       const PartSeparation best = unit.Best(direct, obstacle, meeting);
-      if (!best.separation.IsProven())
-        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation});
-      closest.Consider(best, t, o);
-    }
+      if (best.separation.IsProven()) return closest.Consider(best, t, o);
+      touched = o;
+      touch = best;
+    };
+    obstacles.ForEachNear(unit.hull(), placement_.reach(), [&] { return nearest.farthest(); }, judge);
+    if (touched < count)
+      return Judged(Outcome::kSafety, {touch.separation.clearance(), t, touched, touch.part, touch.separation});
   }
-  const auto is_closer = [&](const Pair* pair) { return pair != nullptr && pair->clearance < closest.clearance; };
+  if (obstacles.has_index()) nearest.LeaveOutFarther();
+  const auto is_closer = [&](const Pair* pair) {
+    return pair != nullptr && closest.Yields(pair->clearance, pair->step, pair->obstacle);
+  };
   const auto direct = [&](Pair& pair) {
     const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
     unit.Enter(pair.step);
@@ -396,20 +412,21 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
     if (is_closer(&pair) && !pair.is_direct) direct(pair);
     if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);
   };
-  if (nearest.left_out() >= closest.clearance) {
+  if (nearest.left_out() > closest.clearance) {
     for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
     return Judged(Outcome::kCertified, closest);
   }
   for (int t = first; t < units; ++t) {
     unit.Enter(t);
     unit.EncloseHulls();
-    for (int o = 0; o < count; ++o) {
+    const auto look = [&](int o) {
       const Encounter& meeting = unit.MeetIn(obstacles[ToSize(o)]);
-      if (!meeting.is_there) continue;
+      if (!meeting.is_there) return;
       const Separation found = unit.ByHulls(obstacles[ToSize(o)], meeting);
       Pair pair{{found, -1}, found.clearance(), t, o, placement_.is_at_frame()};
       consider_if_closer(pair);
-    }
+    };
+    obstacles.ForEachNear(unit.hull(), placement_.reach(), [&] { return closest.clearance; }, look);
   }
   return Judged(Outcome::kCertified, closest);
 }
