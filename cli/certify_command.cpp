@@ -69,9 +69,10 @@ int Certify(const CertifyArguments& options) {
   }
 
   Tube tube;
+  const ObstacleIndex index(config.obstacles);
   CertifyResult result;
   const auto begin = std::chrono::steady_clock::now();
-  result.decision = certifier.Certify(plan, initial_set, config.obstacles, tube);
+  result.decision = certifier.Certify(plan, initial_set, {config.obstacles, index}, tube);
   result.elapsed_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
   result.schedule = plan.schedule;
   result.controls = controls;

@@ -73,7 +73,8 @@ Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<
   std::exception_ptr failure;
   std::mutex failing;
   const std::shared_lock lock(mutex_);
-  static_cast<void>(CertifyAll(certifier_, views, sets, config_.obstacles, threads,
+  const ObstacleIndex index(config_.obstacles);
+  static_cast<void>(CertifyAll(certifier_, views, sets, {config_.obstacles, index}, threads,
                                [&](std::size_t i, const Decision& decision, const Tube& tube) {
                                  try {
                                    all[i]->decision = decision;

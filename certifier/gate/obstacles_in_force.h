@@ -71,6 +71,7 @@ class ObstaclesInForce final {
     SoleSender sender;
     StreamOrder order;                 // of the messages taken
     std::vector<Obstacle> heard;       // from the last of them
+    Digest heard_digest{};             // of these
     std::optional<Arrival> arrival;    // of the last of them
     std::optional<std::int64_t> next;  // the sequence after the last one seen, including refused messages
     std::string doubt;                 // why the last message was refused
@@ -83,13 +84,14 @@ class ObstaclesInForce final {
   void RequireClock(const std::vector<Obstacle>& obstacles) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
   [[nodiscard]] Freshness FreshnessOfLast(std::int64_t now_us) const;
-  // Sets all_ to the task's obstacles and the received ones.
+  // Sets all_ to the task's obstacles, which are its first, and the received ones.
   void Put();
 
   GateOptions options_;
   std::optional<ClockBounds> clocks_;
   int dim_;  // of the safety coordinates
-  std::vector<Obstacle> of_task_, all_;
+  std::size_t num_of_task_;
+  std::vector<Obstacle> all_;
   ObstacleIndex index_;  // of all_
   State state_;
   Digest digest_{};

@@ -93,10 +93,6 @@ class Nearest {
   }
   /** The least clearance for which there was no room. */
   [[nodiscard]] double left_out() const { return left_out_; }
-  /** There is room for nothing that is further. */
-  [[nodiscard]] double farthest() const { return count_ == pairs_.size() ? pairs_[farthest_].clearance : kInfinity; }
-  /** What is further than farthest() has been left out, too. */
-  void LeaveOutFarther() noexcept { left_out_ = std::min(left_out_, farthest()); }
   /** Keeps what is no further than `clearance`, but not `other`: by step, then by obstacle. */
   [[nodiscard]] std::span<Pair> InOrder(double clearance, const Pair* other) noexcept {
     std::size_t kept = 0;
@@ -361,74 +357,184 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
 // they leave as possibly closest, is settled by the best direction. Any of these bounds proves a pair apart
 // (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report. The result
 // does not depend on the order in which pairs are seen, so an index changes nothing.
+class SafetyTest::Judgement {
+ public:
+  Judgement(const SafetyTest& test, const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
+            int first) noexcept
+      : test_(test),
+        obstacles_(obstacles),
+        first_(first),
+        units_(test.NumUnits(tube)),
+        touched_(units_),
+        unit_(test, schedule, tube, tube.places_) {}
+
+  [[nodiscard]] Decision Run() noexcept {
+    if (first_ < units_) {
+      obstacles_.index() == nullptr ? SeeAll() : SeeNear(*obstacles_.index());
+      if (touched_ < units_) {
+        const Separation& touch = touch_.separation;
+        return Judged(Outcome::kSafety, {touch.clearance(), touched_, touched_obstacle_, touch_.part, touch});
+      }
+      FindClosest();
+    }
+    return Judged(Outcome::kCertified, closest_);
+  }
+
+ private:
+  [[nodiscard]] bool is_at_frame() const { return test_.placement_.is_at_frame(); }
+  [[nodiscard]] const Obstacle& obstacle(int o) const { return obstacles_[ToSize(o)]; }
+
+  void SeeAll() noexcept {
+    for (int t = first_; t < units_ && touched_ == units_; ++t) {
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      for (int o = 0; o < static_cast<int>(obstacles_.size()) && touched_ == units_; ++o) See(t, o);
+    }
+  }
+
+  // What moves or has no end in each unit; what stands where the index finds it near.
+  void SeeNear(const ObstacleIndex& index) noexcept {
+    for (int t = first_; t < units_; ++t) {
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      hulls_[ToSize(t - first_)] = unit_.hull();
+      if (touched_ == units_)
+        for (const int o : index.everywhere()) See(t, o);
+    }
+    SeeNear(index, first_, std::min(touched_ + 1, units_));
+  }
+
+  // Those that hulls do not prove apart, in the order of time: a unit's places are then made once. If there are too
+  // many, fewer units at once.
+  void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
+    std::array<std::pair<int, int>, 256> open;
+    std::size_t count = 0;
+    bool has_room = true;
+    ForEachNear(index, from, to, [] { return 0.0; }, [&](int t, int o, const Separation& by_hulls) {
+      if (by_hulls.IsProven()) return;
+      if (count < open.size())
+        open[count++] = {t, o};
+      else if (to - from > 1)
+        has_room = false;
+      else
+        Settle(t, o, by_hulls);
+    });
+    if (!has_room) {
+      const int middle = (from + to) / 2;
+      SeeNear(index, from, middle);
+      return touched_ == units_ ? SeeNear(index, middle, to) : void();
+    }
+    std::sort(open.begin(), open.begin() + static_cast<std::ptrdiff_t>(count));
+    for (std::size_t i = 0; i < count; ++i) Settle(open[i].first, open[i].second, ByHulls(open[i].first, open[i].second));
+  }
+
+  // Calls visit(t, o, the bound by hulls).
+  template <class Within, class Visit>
+  void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) const noexcept {
+    const HullTree hulls{std::span(hulls_).subspan(ToSize(from - first_), ToSize(to - from)), test_.placement_.dim()};
+    index.ForEachNear(hulls, test_.placement_.reach(), within,
+                      [&](int i, int o) { visit(from + i, o, ByHulls(from + i, o)); });
+  }
+
+  // Of what stands, with an index.
+  [[nodiscard]] Separation ByHulls(int t, int o) const noexcept {
+    return SeparateHulls(hulls_[ToSize(t - first_)], obstacle(o), test_.placement_.reach());
+  }
+
+  // @pre unit t is entered, with its hulls.
+  void See(int t, int o) noexcept {
+    const Encounter& meeting = unit_.MeetIn(obstacle(o));
+    if (!meeting.is_there) return;
+    const Separation by_hulls = unit_.ByHulls(obstacle(o), meeting);
+    if (by_hulls.IsProven())
+      nearest_.Add(by_hulls, -1, t, o, is_at_frame());
+    else
+      Settle(t, o, by_hulls);
+  }
+
+  // A pair that hulls do not prove apart.
+  void Settle(int t, int o, const Separation& by_hulls) noexcept {
+    if (std::tie(touched_, touched_obstacle_) < std::tie(t, o)) return;
+    unit_.Enter(t);
+    const Encounter& meeting = unit_.MeetIn(obstacle(o));
+    const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), meeting);
+    if (direct.separation.IsProven()) return nearest_.Add(direct.separation, direct.part, t, o, true);
+    const PartSeparation best = unit_.Best(direct, obstacle(o), meeting);
+    if (best.separation.IsProven()) return closest_.Consider(best, t, o);
+    touched_ = t;
+    touched_obstacle_ = o;
+    touch_ = best;
+  }
+
+  [[nodiscard]] bool IsCloser(const Pair& pair) const noexcept {
+    return closest_.Yields(pair.clearance, pair.step, pair.obstacle);
+  }
+  void Direct(Pair& pair) noexcept {
+    unit_.Enter(pair.step);
+    pair.Improve(unit_.ByDirections(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle))));
+  }
+  void Consider(const Pair& pair) noexcept {
+    unit_.Enter(pair.step);
+    closest_.Consider(unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle))),
+                      pair.step, pair.obstacle);
+  }
+  // What no cheap bound proves has been considered before.
+  void ConsiderIfCloser(Pair& pair) noexcept {
+    if (IsCloser(pair) && !pair.is_direct) Direct(pair);
+    if (IsCloser(pair) && pair.bound.separation.IsProven()) Consider(pair);
+  }
+  void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
+    Pair pair{{by_hulls, -1}, by_hulls.clearance(), t, o, is_at_frame()};
+    ConsiderIfCloser(pair);
+  }
+
+  void FindClosest() noexcept {
+    Pair* least = nearest_.Least();
+    for (; least != nullptr && IsCloser(*least) && !least->is_direct; least = nearest_.Least()) Direct(*least);
+    if (least != nullptr && IsCloser(*least)) Consider(*least);
+    const ObstacleIndex* const index = obstacles_.index();
+    const bool has_all = nearest_.left_out() > closest_.clearance;
+    if (has_all)
+      for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
+    else if (index == nullptr || !index->everywhere().empty())
+      LookAgain();
+    if (index == nullptr) return;
+    ForEachNear(*index, first_, units_, [&] { return closest_.clearance; },
+                [&](int t, int o, const Separation& by_hulls) {
+                  if (by_hulls.IsProven() || !has_all) ConsiderIfCloser(by_hulls, t, o);
+                });
+  }
+
+  // At those for which there was no room.
+  void LookAgain() noexcept {
+    const auto look = [&](int t, int o) {
+      const Encounter& meeting = unit_.MeetIn(obstacle(o));
+      if (meeting.is_there) ConsiderIfCloser(unit_.ByHulls(obstacle(o), meeting), t, o);
+    };
+    for (int t = first_; t < units_; ++t) {
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      if (obstacles_.index() != nullptr)
+        for (const int o : obstacles_.index()->everywhere()) look(t, o);
+      else
+        for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) look(t, o);
+    }
+  }
+
+  const SafetyTest& test_;
+  const ObstacleView& obstacles_;
+  const int first_, units_;
+  int touched_, touched_obstacle_ = -1;  // the first unit and obstacle that are not proven apart; units_: none
+  PartSeparation touch_;                 // there
+  Closest closest_;
+  Nearest nearest_;
+  Unit unit_;
+  std::array<Hull, HullTree::kMost> hulls_;  // of the units from the first on, with an index
+};
+
 Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
                            int first) const noexcept {
-  Closest closest;
-  Nearest nearest;
-  Unit unit(*this, schedule, tube, tube.places_);
-  const int count = static_cast<int>(obstacles.size()), units = NumUnits(tube);
-  for (int t = first; t < units; ++t) {
-    unit.Enter(t);
-    unit.EncloseHulls();
-    int touched = count;  // the first obstacle that is not proven apart
-    PartSeparation touch;
-    const auto judge = [&](int o) {
-      if (o >= touched) return;
-      const Obstacle& obstacle = obstacles[ToSize(o)];
-      const Encounter& meeting = unit.MeetIn(obstacle);
-      if (!meeting.is_there) return;
-      const Separation by_hulls = unit.ByHulls(obstacle, meeting);
-      if (by_hulls.IsProven()) return nearest.Add(by_hulls, -1, t, o, placement_.is_at_frame());
-      const PartSeparation direct = unit.ByDirections({by_hulls, -1}, obstacle, meeting);
-      if (direct.separation.IsProven()) return nearest.Add(direct.separation, direct.part, t, o, true);
-      const PartSeparation best = unit.Best(direct, obstacle, meeting);
-      if (best.separation.IsProven()) return closest.Consider(best, t, o);
-      touched = o;
-      touch = best;
-    };
-    obstacles.ForEachNear(unit.hull(), placement_.reach(), [&] { return nearest.farthest(); }, judge);
-    if (touched < count)
-      return Judged(Outcome::kSafety, {touch.separation.clearance(), t, touched, touch.part, touch.separation});
-  }
-  if (obstacles.has_index()) nearest.LeaveOutFarther();
-  const auto is_closer = [&](const Pair* pair) {
-    return pair != nullptr && closest.Yields(pair->clearance, pair->step, pair->obstacle);
-  };
-  const auto direct = [&](Pair& pair) {
-    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
-    unit.Enter(pair.step);
-    pair.Improve(unit.ByDirections(pair.bound, obstacle, unit.MeetIn(obstacle)));
-  };
-  const auto consider = [&](const Pair& pair) {
-    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
-    unit.Enter(pair.step);
-    closest.Consider(unit.Best(pair.bound, obstacle, unit.MeetIn(obstacle)), pair.step, pair.obstacle);
-  };
-  Pair* least = nearest.Least();
-  for (; is_closer(least) && !least->is_direct; least = nearest.Least()) direct(*least);
-  if (is_closer(least)) consider(*least);
-  // What no cheap bound proves has been considered above.
-  const auto consider_if_closer = [&](Pair& pair) {
-    if (is_closer(&pair) && !pair.is_direct) direct(pair);
-    if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);
-  };
-  if (nearest.left_out() > closest.clearance) {
-    for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
-    return Judged(Outcome::kCertified, closest);
-  }
-  for (int t = first; t < units; ++t) {
-    unit.Enter(t);
-    unit.EncloseHulls();
-    const auto look = [&](int o) {
-      const Encounter& meeting = unit.MeetIn(obstacles[ToSize(o)]);
-      if (!meeting.is_there) return;
-      const Separation found = unit.ByHulls(obstacles[ToSize(o)], meeting);
-      Pair pair{{found, -1}, found.clearance(), t, o, placement_.is_at_frame()};
-      consider_if_closer(pair);
-    };
-    obstacles.ForEachNear(unit.hull(), placement_.reach(), [&] { return closest.clearance; }, look);
-  }
-  return Judged(Outcome::kCertified, closest);
+  return Judgement(*this, obstacles, schedule, tube, first).Run();
 }
 
 }  // namespace forereach

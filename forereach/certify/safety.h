@@ -52,6 +52,7 @@ class SafetyTest final {
 
  private:
   class Unit;
+  class Judgement;
 
   Placement placement_;
   InstructionSet instructions_;

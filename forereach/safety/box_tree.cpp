@@ -5,6 +5,38 @@
 
 namespace forereach {
 
+HullTree::HullTree(std::span<const Hull> hulls, int dim) noexcept {
+  for (const Hull& hull : hulls) {
+    double size = 0;
+    for (std::size_t k = 0; k < ToSize(dim); ++k) size += std::abs(hull.center[k]) + hull.half_width[k];
+    if (!(size <= size_) && !std::isnan(size_)) size_ = size;
+  }
+  Build(hulls, dim, 0, static_cast<int>(hulls.size()));
+}
+
+// A comparison with NaN keeps it, and it is no distance.
+int HullTree::Build(std::span<const Hull> hulls, int dim, int first, int count) noexcept {
+  const int number = num_nodes_++;
+  Node& node = nodes_[ToSize(number)];
+  node = {{}, first, count, -1};
+  if (count == 1) {
+    const Hull& hull = hulls[ToSize(first)];
+    for (std::size_t k = 0; k < ToSize(dim); ++k) {
+      node.bounds.lower[k] = hull.center[k] - hull.half_width[k];
+      node.bounds.upper[k] = hull.center[k] + hull.half_width[k];
+    }
+    return number;
+  }
+  Build(hulls, dim, first, count / 2);
+  node.second = Build(hulls, dim, first + count / 2, count - count / 2);
+  const Bounds &a = nodes_[ToSize(number + 1)].bounds, &b = nodes_[ToSize(node.second)].bounds;
+  for (std::size_t k = 0; k < ToSize(dim); ++k) {
+    node.bounds.lower[k] = a.lower[k] >= b.lower[k] ? b.lower[k] : std::isnan(b.lower[k]) ? b.lower[k] : a.lower[k];
+    node.bounds.upper[k] = a.upper[k] <= b.upper[k] ? b.upper[k] : std::isnan(b.upper[k]) ? b.upper[k] : a.upper[k];
+  }
+  return number;
+}
+
 BoxTree::BoxTree(std::span<const Bounds> boxes, int dim) : dim_(dim), order_(boxes.size()) {
   std::iota(order_.begin(), order_.end(), 0);
   for (const Bounds& box : boxes)

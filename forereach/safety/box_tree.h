@@ -1,10 +1,11 @@
-/** A hierarchy over boxes in R^p: it finds those near a hull without a look at the others. */
+/** A hierarchy over boxes in R^p: it finds those near the hulls of a tube without a look at the others. */
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "forereach/numerics/directed.h"
@@ -18,49 +19,79 @@ struct Bounds {
   std::array<double, kMaxSafetyDim> lower{}, upper{};
 };
 
+/** The hulls of a tube, in the order of time, and a hierarchy over them. It allocates nothing. */
+class HullTree final {
+ public:
+  static constexpr int kMost = kMaxSteps + 1;
+
+  /** In plain arithmetic: BoxTree allows for its rounding. @pre 1 to kMost hulls. */
+  HullTree(std::span<const Hull> hulls, int dim) noexcept;
+
+  struct Node {
+    Bounds bounds;
+    std::int32_t first, count;  // hulls
+    std::int32_t second;        // child; the first follows the node
+  };
+  [[nodiscard]] const Node& node(int number) const { return nodes_[ToSize(number)]; }
+  /** The largest |center| + half-width, summed over the coordinates. */
+  [[nodiscard]] double size() const { return size_; }
+
+ private:
+  int Build(std::span<const Hull> hulls, int dim, int first, int count) noexcept;
+
+  std::array<Node, 2 * kMost> nodes_;
+  int num_nodes_ = 0;
+  double size_ = 0;
+};
+
 class BoxTree final {
  public:
   BoxTree() = default;
   /** @pre lower <= upper, and 1 <= dim <= kMaxSafetyDim. Cost O(n log^2 n). */
   BoxTree(std::span<const Bounds> boxes, int dim);
 
-  /** Calls visit(i) for the boxes i, each at most once and about from near to far. A box that is left out is further
-  from the hull than `reach` + `within()`, by more than what SeparateHulls may lose by rounding. `within()` is asked on
-  the way and may fall; what is below 0 counts as 0. It allocates nothing. Cost O(log n + boxes visited), about. */
+  /** Calls visit(t, i) for hulls t and boxes i, each pair at most once and about from near to far. A pair that is left
+  out is further apart than `reach` + `within()`, by more than what SeparateHulls may lose by rounding. `within()` is
+  asked on the way and may fall; what is below 0 counts as 0. It allocates nothing. Cost about O(log n + pairs
+  visited). */
   template <class Within, class Visit>
-  void ForEachNear(const Hull& hull, double reach, const Within& within, const Visit& visit) const {
+  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
     if (nodes_.empty()) return;
-    const Query query(hull, dim_);
-    const double hair = kHair * (size_ + query.size + reach);
     struct Entry {
-      std::int32_t node;
+      std::int32_t hulls, boxes;
       double distance;
     };
+    const auto entry = [&](std::int32_t t, std::int32_t i) {
+      return Entry{t, i, Distance(hulls.node(t).bounds, nodes_[ToSize(i)].bounds)};
+    };
+    const double hair = kHair * (size_ + hulls.size() + reach);
     std::array<Entry, 2 * kMostLevels> stack{};
     std::size_t count = 0;
-    stack[count++] = {0, query.DistanceLower(nodes_[0], dim_)};
+    const auto push = [&](Entry first, Entry second) {
+      if (second.distance < first.distance) std::swap(first, second);
+      stack[count++] = second;
+      stack[count++] = first;
+    };
+    stack[count++] = entry(0, 0);
     while (count > 0) {
-      const auto [number, distance] = stack[--count];
+      const auto [t, i, distance] = stack[--count];
       const double least = within();
       if (distance * (1 - kHair) - hair > reach + (least > 0 ? least : 0)) continue;
-      const Node& node = nodes_[ToSize(number)];
-      if (node.count > 0) {
-        for (int i = node.first; i < node.first + node.count; ++i) visit(order_[ToSize(i)]);
-        continue;
-      }
-      Entry near{number + 1, query.DistanceLower(nodes_[ToSize(number + 1)], dim_)},
-          far{node.first, query.DistanceLower(nodes_[ToSize(node.first)], dim_)};
-      if (far.distance < near.distance) std::swap(near, far);
-      stack[count++] = far;
-      stack[count++] = near;
+      const HullTree::Node& some = hulls.node(t);
+      const Node& node = nodes_[ToSize(i)];
+      const bool is_unit = some.count == 1, is_leaf = node.count > 0;
+      if (is_unit && is_leaf)
+        for (int place = node.first; place < node.first + node.count; ++place) visit(some.first, order_[ToSize(place)]);
+      else if (is_leaf || (!is_unit && Extent(some.bounds) >= Extent(node.bounds)))
+        push(entry(t + 1, i), entry(some.second, i));
+      else
+        push(entry(t, i + 1), entry(t, node.first));
     }
   }
 
-  [[nodiscard]] bool empty() const { return nodes_.empty(); }
-
  private:
-  static constexpr int kLeaf = 4;              // boxes in a leaf, at most
-  static constexpr std::size_t kMostLevels = 40;  // halves of at most 2^31 boxes
+  static constexpr int kLeaf = 2;                 // boxes in a leaf, at most
+  static constexpr std::size_t kMostLevels = 48;  // of both hierarchies together: halves of 2^31 boxes and of kMost hulls
   // Far above all rounding here and in SeparateHulls, relative to their operands.
   static constexpr double kHair = 0x1p-40;
 
@@ -70,28 +101,21 @@ class BoxTree final {
     std::int32_t count = 0;  // boxes of a leaf; otherwise 0
   };
 
-  // The ends of a hull, in plain arithmetic.
-  struct Query {
-    Query(const Hull& hull, int dim) {
-      for (std::size_t k = 0; k < ToSize(dim); ++k) {
-        ends.lower[k] = hull.center[k] - hull.half_width[k];
-        ends.upper[k] = hull.center[k] + hull.half_width[k];
-        size += std::abs(hull.center[k]) + hull.half_width[k];
-      }
+  // What is not a number is no distance.
+  [[nodiscard]] double Distance(const Bounds& a, const Bounds& b) const {
+    double square = 0;
+    for (std::size_t k = 0; k < ToSize(dim_); ++k) {
+      const double below = b.lower[k] - a.upper[k], above = a.lower[k] - b.upper[k];
+      const double gap = below > above ? below : above;
+      square += gap > 0 ? gap * gap : 0;
     }
-    // Of the boxes. What is not a number is no distance.
-    [[nodiscard]] double DistanceLower(const Node& node, int dim) const {
-      double square = 0;
-      for (std::size_t k = 0; k < ToSize(dim); ++k) {
-        const double below = node.bounds.lower[k] - ends.upper[k], above = ends.lower[k] - node.bounds.upper[k];
-        const double gap = below > above ? below : above;
-        square += gap > 0 ? gap * gap : 0;
-      }
-      return square > 0x1p-800 && square < kInfinity ? std::sqrt(square) : 0;
-    }
-    Bounds ends;
-    double size = 0;
-  };
+    return square > 0x1p-800 && square < kInfinity ? std::sqrt(square) : 0;
+  }
+  [[nodiscard]] double Extent(const Bounds& box) const {
+    double extent = 0;
+    for (std::size_t k = 0; k < ToSize(dim_); ++k) extent += box.upper[k] - box.lower[k];
+    return extent;
+  }
 
   void Build(std::span<const Bounds> boxes, std::int32_t first, std::int32_t count);
 

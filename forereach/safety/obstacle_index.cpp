@@ -2,13 +2,13 @@
 
 namespace forereach {
 
-ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : size_(obstacles.size()) {
+ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) {
   std::vector<Bounds> boxes;
   for (std::size_t o = 0; o < obstacles.size(); ++o) {
     const Obstacle& obstacle = obstacles[o];
     const bool is_bounded = obstacle.kind() != Obstacle::Kind::kHalfSpace;
     if (!is_bounded || obstacle.motion()) {
-      always_.push_back(static_cast<int>(o));
+      everywhere_.push_back(static_cast<int>(o));
       continue;
     }
     standing_.push_back(static_cast<int>(o));

@@ -17,18 +17,17 @@ class ObstacleIndex final {
   near everything. @pre all have one dimension. Cost O(n log^2 n). */
   explicit ObstacleIndex(std::span<const Obstacle> obstacles);
 
-  [[nodiscard]] std::size_t size() const { return size_; }
-  /** BoxTree::ForEachNear of their indices. One that is left out is proven apart by SeparateHulls, with `reach` added,
-  and its clearance there exceeds `within()`. */
+  /** Those that are near everything, by their indices. */
+  [[nodiscard]] std::span<const int> everywhere() const { return everywhere_; }
+  /** BoxTree::ForEachNear of the others: visit(t, o). One that is left out is proven apart by SeparateHulls, with
+  `reach` added, and its clearance there exceeds `within()`. */
   template <class Within, class Visit>
-  void ForEachNear(const Hull& hull, double reach, const Within& within, const Visit& visit) const {
-    for (const int o : always_) visit(o);
-    tree_.ForEachNear(hull, reach, within, [&](int i) { visit(standing_[ToSize(i)]); });
+  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
+    tree_.ForEachNear(hulls, reach, within, [&](int t, int i) { visit(t, standing_[ToSize(i)]); });
   }
 
  private:
-  std::size_t size_ = 0;
-  std::vector<int> always_, standing_;
+  std::vector<int> everywhere_, standing_;
   BoxTree tree_;  // of those that stand
 };
 
@@ -46,14 +45,8 @@ class ObstacleView final {
   [[nodiscard]] std::span<const Obstacle> all() const { return all_; }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
   [[nodiscard]] const Obstacle& operator[](std::size_t o) const { return all_[o]; }
-  [[nodiscard]] bool has_index() const { return index_ != nullptr; }
-
-  /** ObstacleIndex::ForEachNear; without an index, of all in their order. */
-  template <class Within, class Visit>
-  void ForEachNear(const Hull& hull, double reach, const Within& within, const Visit& visit) const {
-    if (index_ != nullptr) return index_->ForEachNear(hull, reach, within, visit);
-    for (int o = 0; o < static_cast<int>(all_.size()); ++o) visit(o);
-  }
+  /** Null if it has none. */
+  [[nodiscard]] const ObstacleIndex* index() const { return index_; }
 
  private:
   std::span<const Obstacle> all_;
