@@ -25,6 +25,7 @@
 #include "bench/without_rounding.h"
 #include "forereach/certify/batch.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/safety/obstacle_index.h"
 
 namespace forereach::bench {
 namespace {

@@ -9,6 +9,7 @@
 #include "forereach/certify/batch.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/arithmetic.h"
+#include "forereach/safety/obstacle_index.h"
 #include "records/decision_json.h"
 #include "records/outlines.h"
 #include "records/timeline.h"

@@ -23,8 +23,7 @@ depend on the number of threads.
 Cost: the sum of the calls divided by the cores; each thread has a Tube of about 2.5 MB.
 @pre Certifier::Require passes for each plan. */
 [[nodiscard]] std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
-                                               std::span<const Zonotope> initial_sets,
-                                               const ObstacleView& obstacles, unsigned threads,
-                                               const BatchListener& listener = {});
+                                               std::span<const Zonotope> initial_sets, const ObstacleView& obstacles,
+                                               unsigned threads, const BatchListener& listener = {});
 
 }  // namespace forereach

@@ -358,8 +358,7 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   return {};
 }
 
-Decision Certifier::JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube,
-                                int first) const noexcept {
+Decision Certifier::JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube, int first) const noexcept {
   const Decision limits = limits_.Judge(plan, tube, first);
   const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
   // The earlier failure is reported; of two at one step, the limit.

@@ -13,6 +13,7 @@
 #include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/size.h"
+#include "forereach/safety/obstacle_index.h"
 
 namespace forereach {
 namespace {
@@ -40,8 +41,7 @@ struct Closest {
   }
   // To what is closer, or as close and comes before.
   [[nodiscard]] bool Yields(double its_clearance, int t, int o) const noexcept {
-    return its_clearance < clearance ||
-           (its_clearance == clearance && std::tie(t, o) < std::tie(step, obstacle));
+    return its_clearance < clearance || (its_clearance == clearance && std::tie(t, o) < std::tie(step, obstacle));
   }
 };
 
@@ -407,32 +407,41 @@ class SafetyTest::Judgement {
   // Those that hulls do not prove apart, in the order of time: a unit's places are then made once. If there are too
   // many, fewer units at once.
   void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
-    std::array<std::pair<int, int>, 256> open;
+    struct Open {
+      int t, o;
+    };
+    std::array<Open, 256> open;
     std::size_t count = 0;
     bool has_room = true;
-    ForEachNear(index, from, to, [] { return 0.0; }, [&](int t, int o, const Separation& by_hulls) {
-      if (by_hulls.IsProven()) return;
-      if (count < open.size())
-        open[count++] = {t, o};
-      else if (to - from > 1)
-        has_room = false;
-      else
-        Settle(t, o, by_hulls);
-    });
+    ForEachNear(
+        index, from, to, [] { return 0.0; },
+        [&](int t, int o, const Separation& by_hulls) {
+          if (by_hulls.IsProven()) return;
+          if (count < open.size())
+            open[count++] = {t, o};
+          else if (to - from > 1)
+            has_room = false;
+          else
+            Settle(t, o, by_hulls);
+        });
     if (!has_room) {
       const int middle = (from + to) / 2;
       SeeNear(index, from, middle);
       return touched_ == units_ ? SeeNear(index, middle, to) : void();
     }
-    std::sort(open.begin(), open.begin() + static_cast<std::ptrdiff_t>(count));
-    for (std::size_t i = 0; i < count; ++i) Settle(open[i].first, open[i].second, ByHulls(open[i].first, open[i].second));
+    const auto found = std::span(open).first(count);
+    std::ranges::sort(found, [](const Open& a, const Open& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
+    for (const Open& pair : found) Settle(pair.t, pair.o, ByHulls(pair.t, pair.o));
   }
 
   // Calls visit(t, o, the bound by hulls).
   template <class Within, class Visit>
-  void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) const noexcept {
-    const HullTree hulls{std::span(hulls_).subspan(ToSize(from - first_), ToSize(to - from)), test_.placement_.dim()};
-    index.ForEachNear(hulls, test_.placement_.reach(), within,
+  void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) noexcept {
+    if (tree_from_ != from || tree_to_ != to)
+      tree_.Build(std::span(hulls_).subspan(ToSize(from - first_), ToSize(to - from)), test_.placement_.dim());
+    tree_from_ = from;
+    tree_to_ = to;
+    index.ForEachNear(tree_, test_.placement_.reach(), within,
                       [&](int i, int o) { visit(from + i, o, ByHulls(from + i, o)); });
   }
 
@@ -475,8 +484,8 @@ class SafetyTest::Judgement {
   }
   void Consider(const Pair& pair) noexcept {
     unit_.Enter(pair.step);
-    closest_.Consider(unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle))),
-                      pair.step, pair.obstacle);
+    closest_.Consider(unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle))), pair.step,
+                      pair.obstacle);
   }
   // What no cheap bound proves has been considered before.
   void ConsiderIfCloser(Pair& pair) noexcept {
@@ -499,10 +508,11 @@ class SafetyTest::Judgement {
     else if (index == nullptr || !index->everywhere().empty())
       LookAgain();
     if (index == nullptr) return;
-    ForEachNear(*index, first_, units_, [&] { return closest_.clearance; },
-                [&](int t, int o, const Separation& by_hulls) {
-                  if (by_hulls.IsProven() || !has_all) ConsiderIfCloser(by_hulls, t, o);
-                });
+    ForEachNear(
+        *index, first_, units_, [&] { return closest_.clearance; },
+        [&](int t, int o, const Separation& by_hulls) {
+          if (by_hulls.IsProven() || !has_all) ConsiderIfCloser(by_hulls, t, o);
+        });
   }
 
   // At those for which there was no room.
@@ -530,6 +540,8 @@ class SafetyTest::Judgement {
   Nearest nearest_;
   Unit unit_;
   std::array<Hull, HullTree::kMost> hulls_;  // of the units from the first on, with an index
+  HullTree tree_;                            // over those of the units tree_from_ .. tree_to_ - 1
+  int tree_from_ = -1, tree_to_ = -1;
 };
 
 Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,

@@ -11,7 +11,7 @@ obstacle that moves (docs/soundness.md). */
 
 #include "forereach/certify/decision.h"
 #include "forereach/certify/problem.h"
-#include "forereach/safety/obstacle_index.h"
+#include "forereach/safety/obstacle_view.h"
 #include "forereach/safety/placement.h"
 #include "forereach/safety/separation.h"
 

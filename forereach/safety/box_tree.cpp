@@ -1,11 +1,14 @@
 #include "forereach/safety/box_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace forereach {
 
-HullTree::HullTree(std::span<const Hull> hulls, int dim) noexcept {
+void HullTree::Build(std::span<const Hull> hulls, int dim) noexcept {
+  num_nodes_ = 0;
+  size_ = 0;
   for (const Hull& hull : hulls) {
     double size = 0;
     for (std::size_t k = 0; k < ToSize(dim); ++k) size += std::abs(hull.center[k]) + hull.half_width[k];
@@ -14,25 +17,25 @@ HullTree::HullTree(std::span<const Hull> hulls, int dim) noexcept {
   Build(hulls, dim, 0, static_cast<int>(hulls.size()));
 }
 
-// A comparison with NaN keeps it, and it is no distance.
+// What is compared with NaN may get lost, but size_ then is NaN, and no pair is left out.
 int HullTree::Build(std::span<const Hull> hulls, int dim, int first, int count) noexcept {
   const int number = num_nodes_++;
   Node& node = nodes_[ToSize(number)];
-  node = {{}, first, count, -1};
+  node = {{}, {}, first, count, -1};
   if (count == 1) {
     const Hull& hull = hulls[ToSize(first)];
     for (std::size_t k = 0; k < ToSize(dim); ++k) {
-      node.bounds.lower[k] = hull.center[k] - hull.half_width[k];
-      node.bounds.upper[k] = hull.center[k] + hull.half_width[k];
+      node.lower[k] = hull.center[k] - hull.half_width[k];
+      node.upper[k] = hull.center[k] + hull.half_width[k];
     }
     return number;
   }
   Build(hulls, dim, first, count / 2);
   node.second = Build(hulls, dim, first + count / 2, count - count / 2);
-  const Bounds &a = nodes_[ToSize(number + 1)].bounds, &b = nodes_[ToSize(node.second)].bounds;
-  for (std::size_t k = 0; k < ToSize(dim); ++k) {
-    node.bounds.lower[k] = a.lower[k] >= b.lower[k] ? b.lower[k] : std::isnan(b.lower[k]) ? b.lower[k] : a.lower[k];
-    node.bounds.upper[k] = a.upper[k] <= b.upper[k] ? b.upper[k] : std::isnan(b.upper[k]) ? b.upper[k] : a.upper[k];
+  const Node &a = nodes_[ToSize(number + 1)], &b = nodes_[ToSize(node.second)];
+  for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
+    node.lower[k] = std::min(a.lower[k], b.lower[k]);
+    node.upper[k] = std::max(a.upper[k], b.upper[k]);
   }
   return number;
 }
@@ -65,7 +68,7 @@ void BoxTree::Build(std::span<const Bounds> boxes, std::int32_t first, std::int3
       middles.upper[k] = std::max(middles.upper[k], middle(box, k));
     }
   }
-  nodes_[place].bounds = all;
+  static_cast<Bounds&>(nodes_[place]) = all;
   if (count <= kLeaf) {
     nodes_[place].first = first;
     nodes_[place].count = count;

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "forereach/certify/certifier.h"
+#include "forereach/safety/obstacle_index.h"
 #include "tests/sanitized.h"
 #include "tests/worlds.h"
 

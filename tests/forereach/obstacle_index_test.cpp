@@ -35,6 +35,12 @@ Rational SquareOfGap(const Bounds& box, const Hull& hull, int dim) {
   return square;
 }
 
+HullTree TreeOf(const std::vector<Hull>& hulls, int dim) {
+  HullTree tree;
+  tree.Build(hulls, dim);
+  return tree;
+}
+
 TEST(BoxTree, LeavesOutOnlyWhatIsFurtherThanAsked) {
   TracedRandom random(1);
   long left_out = 0;
@@ -56,8 +62,12 @@ TEST(BoxTree, LeavesOutOnlyWhatIsFurtherThanAsked) {
       }
     const double reach = random.Coin() ? 0 : scale * random.Uniform(0, 0.2), within = scale * random.Uniform(-0.1, 0.5);
     std::map<std::pair<int, int>, int> visits;
-    BoxTree(boxes, dim).ForEachNear({hulls, dim}, reach, [&] { return within; },
-                                    [&](int t, int i) { ++visits[{t, i}]; });
+    BoxTree(boxes, dim)
+        .ForEachNear(
+            TreeOf(hulls, dim), reach, [&] { return within; },
+            [&](int t, int i) {
+              ++visits[{t, i}];
+            });
     const Rational most = Rational(reach) + Rational(std::max(within, 0.0));
     for (int t = 0; t < std::ssize(hulls); ++t)
       for (int i = 0; i < count; ++i) {
@@ -77,14 +87,15 @@ TEST(BoxTree, VisitsAllIfTheHullHasNoBounds) {
     for (std::size_t which = 0; which < hulls.size(); ++which) {
       const Hull before = std::exchange(hulls[which], Hull{{0, 0, 0}, {end, 0, 0}});
       int visits = 0;
-      BoxTree(boxes, 2).ForEachNear({hulls, 2}, 0, [] { return 0.0; },
-                                    [&](int t, int) { visits += t == static_cast<int>(which) ? 1 : 0; });
+      BoxTree(boxes, 2).ForEachNear(
+          TreeOf(hulls, 2), 0, [] { return 0.0; }, [&](int t, int) { visits += t == static_cast<int>(which) ? 1 : 0; });
       EXPECT_EQ(visits, 20) << which;
       hulls[which] = before;
     }
   }
   const std::vector<Hull> one(1);
-  BoxTree().ForEachNear({one, 2}, 0, [] { return 0.0; }, [](int, int) { ADD_FAILURE(); });
+  BoxTree().ForEachNear(
+      TreeOf(one, 2), 0, [] { return 0.0; }, [](int, int) { ADD_FAILURE(); });
 }
 
 TEST(BoxTree, LooksAtFewOfMany) {
@@ -93,7 +104,8 @@ TEST(BoxTree, LooksAtFewOfMany) {
     for (int j = 0; j < 100; ++j) boxes.push_back({{1.0 * i, 1.0 * j, 0}, {i + 0.5, j + 0.5, 0}});
   int visits = 0;
   const std::vector<Hull> hull{{{50, 50, 0}, {1, 1, 0}}};
-  BoxTree(boxes, 2).ForEachNear({hull, 2}, 0.5, [] { return 1.0; }, [&](int, int) { ++visits; });
+  BoxTree(boxes, 2).ForEachNear(
+      TreeOf(hull, 2), 0.5, [] { return 1.0; }, [&](int, int) { ++visits; });
   EXPECT_GE(visits, 16);
   EXPECT_LE(visits, 80);
 }
