@@ -198,4 +198,35 @@ TEST(ObstacleIndex, FindsTheOneThatIsTouchedAmongThousands) {
   ExpectSame(found, certifier.Certify(plan, set, cells, tube));
 }
 
+// A long body: hulls prove none of the cells beside it apart, and there are more of them than the index keeps at once.
+TEST(ObstacleIndex, ChangesNoDecisionWhereMostAreBesideTheBody) {
+  Problem problem = PointMassInHalves();
+  problem.body.parts = {{{{-5, -0.1, 0}, {5, -0.1, 0}, {5, 0.1, 0}, {-5, 0.1, 0}}, 0}};
+  const Certifier certifier(std::make_shared<Problem>(problem));
+  std::vector<Obstacle> cells;
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 12; ++j) {
+      const Eigen::Vector2d corner(0.25 * i - 4, 0.25 * j + (j < 6 ? 0.5 : -4));
+      cells.push_back(Obstacle::AxisBox(corner, corner + Eigen::Vector2d(0.125, 0.125)));
+    }
+  const std::vector<double> controls(16, 0.0);
+  const Plan plan{controls.data(), 2, 8, 2};
+  const Zonotope set = Zonotope::FromBox(Vec({0, 0, 1, 0}), Vec({0, 0, 0, 0}));
+  Tube tube;
+  const ObstacleIndex index(cells);
+  const Decision clear = certifier.Certify(plan, set, {cells, index}, tube);
+  EXPECT_EQ(clear.outcome, Outcome::kCertified);
+  ExpectSame(clear, certifier.Certify(plan, set, cells, tube));
+  for (const double x : {5.25, 8.75}) {  // met at step 1, or at the last one
+    std::vector<Obstacle> blocked = cells;
+    for (const int place : {100, 700}) blocked[ToSize(place)] = Obstacle::Circle(Vec({x, 0}), 0.125);
+    const ObstacleIndex other(blocked);
+    const Decision touched = certifier.Certify(plan, set, {blocked, other}, tube);
+    EXPECT_EQ(touched.outcome, Outcome::kSafety);
+    EXPECT_EQ(touched.obstacle, 100);
+    EXPECT_EQ(touched.step, x < 6 ? 1 : 8);
+    ExpectSame(touched, certifier.Certify(plan, set, blocked, tube));
+  }
+}
+
 }  // namespace forereach::obstacle_index_test
