@@ -48,13 +48,15 @@ struct Closest {
 // A unit and an obstacle that are proven to be apart.
 struct Pair {
   PartSeparation bound;
+  Separation boxed;  // by a box around the body; not proven if the hulls do
   double clearance;
   int step, obstacle;
   bool is_direct;  // by the best of what is cheaper than a search
 
+  [[nodiscard]] bool IsProven() const noexcept { return bound.separation.IsProven() || boxed.IsProven(); }
   void Improve(const PartSeparation& found) noexcept {
     bound = found;
-    clearance = found.separation.clearance();
+    clearance = std::max(found.separation.clearance(), boxed.clearance());
     is_direct = true;
   }
 };
@@ -62,8 +64,8 @@ struct Pair {
 // The pairs of least clearance, as many as there is room for.
 class Nearest {
  public:
-  void Add(const Separation& found, int part, int t, int o, bool is_direct) noexcept {
-    const double clearance = found.clearance();
+  void Add(const Separation& found, int part, int t, int o, bool is_direct, const Separation& boxed = {}) noexcept {
+    const double clearance = std::max(found.clearance(), boxed.clearance());
     if (count_ == pairs_.size()) {
       left_out_ = std::min(left_out_, std::max(pairs_[farthest_].clearance, clearance));
       if (!(clearance < pairs_[farthest_].clearance)) return;
@@ -72,6 +74,7 @@ class Nearest {
     // Member by member: a load that spans several stores waits for all of them.
     pair->bound.separation = found;
     pair->bound.part = part;
+    pair->boxed = boxed;
     pair->clearance = clearance;
     pair->step = t;
     pair->obstacle = o;
@@ -185,6 +188,29 @@ class SafetyTest::Unit {
   [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
     const Hull& seen = meeting.moves ? Seen(meeting) : hull_;
     return SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach()));
+  }
+
+  // A hull around all parts of the body, by their supports along the axes. @pre Enter.
+  [[nodiscard]] Hull EncloseBody() noexcept {
+    Hull hull{};
+    for (int k = 0; k < placement().dim(); ++k) {
+      const auto farthest = [&](double sign) {
+        double support = -kInfinity;
+        for (int t = first_; t <= last_; ++t)
+          for (const Placement::Part& part : placement().parts()) {
+            const Eigen::Vector3d axis = sign * Eigen::Vector3d::Unit(k);
+            const double found = placement().SupportUpper(SampleAt(t), part, axis, test_.instructions_);
+            support = Larger(support, AddUp(found, part.radius));
+          }
+        return support;
+      };
+      const double upper = farthest(1), lower = -farthest(-1);
+      const bool is_finite = std::isfinite(lower) && std::isfinite(upper) && lower <= upper;
+      const Interval range = is_finite ? Interval(lower, upper) : Interval::Entire();
+      hull.center[ToSize(k)] = is_finite ? range.Middle() : 0;
+      hull.half_width[ToSize(k)] = is_finite ? range.DistanceUpper(hull.center[ToSize(k)]) : kInfinity;
+    }
+    return hull;
   }
 
   // By one direction for each part, from its middle to the obstacle, or as given if that is better.
@@ -464,6 +490,7 @@ class SafetyTest::Judgement {
   // A pair that hulls do not prove apart.
   void Settle(int t, int o, const Separation& by_hulls) noexcept {
     if (std::tie(touched_, touched_obstacle_) < std::tie(t, o)) return;
+    if (const Separation boxed = ByBox(t, o); boxed.IsProven()) return nearest_.Add(by_hulls, -1, t, o, false, boxed);
     unit_.Enter(t);
     const Encounter& meeting = unit_.MeetIn(obstacle(o));
     const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), meeting);
@@ -475,6 +502,16 @@ class SafetyTest::Judgement {
     touch_ = best;
   }
 
+  // A box around the body is tighter than a ball around it, but says nothing new of a ball, nor of what moves.
+  [[nodiscard]] Separation ByBox(int t, int o) noexcept {
+    if (is_at_frame() || obstacle(o).motion()) return {};
+    const std::size_t i = ToSize(t - first_);
+    unit_.Enter(t);
+    if (!has_body_[i]) bodies_[i] = unit_.EncloseBody();
+    has_body_[i] = true;
+    return SeparateHulls(bodies_[i], obstacle(o));
+  }
+
   [[nodiscard]] bool IsCloser(const Pair& pair) const noexcept {
     return closest_.Yields(pair.clearance, pair.step, pair.obstacle);
   }
@@ -484,16 +521,18 @@ class SafetyTest::Judgement {
   }
   void Consider(const Pair& pair) noexcept {
     unit_.Enter(pair.step);
-    closest_.Consider(unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle))), pair.step,
-                      pair.obstacle);
+    PartSeparation best = unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle)));
+    if (!best.separation.IsProven() && pair.boxed.IsProven()) best = {pair.boxed, -1};
+    closest_.Consider(best, pair.step, pair.obstacle);
   }
   // What no cheap bound proves has been considered before.
   void ConsiderIfCloser(Pair& pair) noexcept {
     if (IsCloser(pair) && !pair.is_direct) Direct(pair);
-    if (IsCloser(pair) && pair.bound.separation.IsProven()) Consider(pair);
+    if (IsCloser(pair) && pair.IsProven()) Consider(pair);
   }
   void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
-    Pair pair{{by_hulls, -1}, by_hulls.clearance(), t, o, is_at_frame()};
+    const Separation boxed = by_hulls.IsProven() ? Separation{} : ByBox(t, o);
+    Pair pair{{by_hulls, -1}, boxed, std::max(by_hulls.clearance(), boxed.clearance()), t, o, is_at_frame()};
     ConsiderIfCloser(pair);
   }
 
@@ -539,8 +578,10 @@ class SafetyTest::Judgement {
   Closest closest_;
   Nearest nearest_;
   Unit unit_;
-  std::array<Hull, HullTree::kMost> hulls_;  // of the units from the first on, with an index
-  HullTree tree_;                            // over those of the units tree_from_ .. tree_to_ - 1
+  std::array<Hull, HullTree::kMost> hulls_;   // of the units from the first on, with an index
+  std::array<Hull, HullTree::kMost> bodies_;  // around the whole body in these units, where has_body_
+  std::array<bool, HullTree::kMost> has_body_{};
+  HullTree tree_;  // over those of the units tree_from_ .. tree_to_ - 1
   int tree_from_ = -1, tree_to_ = -1;
 };
 
