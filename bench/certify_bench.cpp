@@ -4,11 +4,15 @@
 // of 10^7 take a minute and 8 GB to set up, and run only where it asks for them.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <optional>
+#include <random>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <tuple>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -22,6 +26,7 @@
 #include "forereach/certify/batch.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/parallel.h"
+#include "forereach/safety/obstacle_index.h"
 
 namespace forereach::bench {
 namespace {
@@ -174,6 +179,45 @@ void RegisterWorlds() {
     })->Unit(benchmark::kMicrosecond);
 }
 
+// The bicycle among the cells of a map and without them. Each cell would leave a certificate if it were 0.3 m larger.
+std::vector<Obstacle> MapCells(const Certifier& certifier, const Task& task, int count) {
+  const Plan plan = task.plan();
+  std::mt19937_64 random(1);
+  const auto within = [&](double most) { return (static_cast<double>(random() >> 11) * 0x1p-53 * 2 - 1) * most; };
+  std::vector<Obstacle> cells;
+  Tube tube;
+  static_cast<void>(certifier.Certify(plan, task.initial_set(), {}, tube));
+  while (std::ssize(cells) < count) {
+    const Eigen::Vector2d corner(std::floor(within(25) / 0.25) * 0.25, std::floor(within(25) / 0.25) * 0.25);
+    const Obstacle cell = Obstacle::AxisBox(corner, corner + Eigen::Vector2d(0.25, 0.25));
+    const Decision alone = certifier.JudgeSafety(plan, {&cell, 1}, tube);
+    if (alone.outcome == Outcome::kCertified && alone.margin - alone.threshold > 0.3) cells.push_back(cell);
+  }
+  return cells;
+}
+
+void RegisterMaps() {
+  for (const World& world : Worlds()) {
+    if (world.moves) continue;
+    for (const auto& [name, count, is_indexed] :
+         {std::tuple("none", 0, false), {"map_2000", 2000, true}, {"map_2000_without_index", 2000, false}})
+      benchmark::RegisterBenchmark((std::string("map/") + world.name + "/" + name).c_str(), [=](State& state) {
+        Task task = CachedTask(Scenario::kBicycle, 400);
+        Problem problem = *task.problem;
+        problem.body = world.body;
+        problem.between = world.between;
+        task.problem = std::make_shared<const Problem>(std::move(problem));
+        const Certifier certifier(task.problem);
+        task.obstacles = MapCells(certifier, task, count);
+        const ObstacleIndex index(task.obstacles);
+        if (is_indexed)
+          RunCertify(state, certifier, task, {task.obstacles, index});
+        else
+          RunCertify(state, certifier, task);
+      })->Unit(benchmark::kMicrosecond);
+  }
+}
+
 // The bicycle as text beside the compiled one, its integrators, and a large model.
 void RegisterTextModels() {
   using Integrator = ModelText::Integrator;
@@ -239,6 +283,7 @@ void RegisterAll(int largest) {
   }
   RegisterNominalTube();
   RegisterWorlds();
+  RegisterMaps();
   RegisterTextModels();
   RegisterOffsets();
   RegisterBatch();

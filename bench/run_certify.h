@@ -17,14 +17,18 @@ inline void AddWidths(benchmark::State& state, const std::function<double(int)>&
 }
 
 /** One call on one plan. Skips, loudly, where the answer is not the certificate that the task is made for. */
-inline void RunCertify(benchmark::State& state, const Certifier& certifier, const Task& task) {
+inline void RunCertify(benchmark::State& state, const Certifier& certifier, const Task& task,
+                       const ObstacleView& obstacles) {
   const Plan plan = task.plan();
   const Zonotope initial_set = task.initial_set();
   Tube tube;
-  if (certifier.Certify(plan, initial_set, task.obstacles, tube).outcome != Outcome::kCertified)
+  if (certifier.Certify(plan, initial_set, obstacles, tube).outcome != Outcome::kCertified)
     return state.SkipWithError("no certificate");
-  for (auto _ : state) benchmark::DoNotOptimize(certifier.Certify(plan, initial_set, task.obstacles, tube));
+  for (auto _ : state) benchmark::DoNotOptimize(certifier.Certify(plan, initial_set, obstacles, tube));
   AddWidths(state, [&](int k) { return tube.slice(tube.length()).HalfWidthUpper(k); });
+}
+inline void RunCertify(benchmark::State& state, const Certifier& certifier, const Task& task) {
+  RunCertify(state, certifier, task, task.obstacles);
 }
 
 }  // namespace forereach::bench

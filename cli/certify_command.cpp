@@ -6,6 +6,7 @@
 #include "cli/commands.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
+#include "forereach/safety/obstacle_index.h"
 #include "records/decision_json.h"
 #include "task/json_text.h"
 
@@ -69,9 +70,10 @@ int Certify(const CertifyArguments& options) {
   }
 
   Tube tube;
+  const ObstacleIndex index(config.obstacles);
   CertifyResult result;
   const auto begin = std::chrono::steady_clock::now();
-  result.decision = certifier.Certify(plan, initial_set, config.obstacles, tube);
+  result.decision = certifier.Certify(plan, initial_set, {config.obstacles, index}, tube);
   result.elapsed_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
   result.schedule = plan.schedule;
   result.controls = controls;

@@ -9,6 +9,7 @@
 #include "forereach/certify/batch.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/arithmetic.h"
+#include "forereach/safety/obstacle_index.h"
 #include "records/decision_json.h"
 #include "records/outlines.h"
 #include "records/timeline.h"
@@ -73,8 +74,9 @@ Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<
   std::exception_ptr failure;
   std::mutex failing;
   const std::shared_lock lock(mutex_);
+  const ObstacleIndex index(config_.obstacles);
   const BatchOptions options{.threads = threads, .until_certified = until_certified};
-  const auto decisions = CertifyAll(certifier_, views, sets, config_.obstacles, options,
+  const auto decisions = CertifyAll(certifier_, views, sets, {config_.obstacles, index}, options,
                                     [&](std::size_t i, const Decision& decision, const Tube& tube) {
                                       try {
                                         all[i]->decision = decision;

@@ -27,6 +27,8 @@ namespace {
 
 using Size = Key::Size;
 
+constexpr int kMostObstacles = 4096;  // of a file; a message has at most kMaxObstacles
+
 constexpr Range kWithinDecades = Between(-1e9, 1e9);  // in microseconds within the bounds of a schedule
 
 Box ReadBox(const Field& at) {
@@ -585,7 +587,7 @@ std::vector<Key> LimitKeys() {
 
 std::vector<Key> ObstacleKeys() {
   return {
-      Required(List("task.obstacles", Between(0, kMaxObstacles),
+      Required(List("task.obstacles", Between(0, kMostObstacles),
                     "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
       Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves.", ReadObstacle),
       ObstacleKind("circle", "A disc; for two safety coordinates.", ReadCircle),

@@ -107,8 +107,8 @@ Gate::Choice Gate::Choose(const candidate_batch_t& batch, std::int64_t now_us, c
   }
   if (CheckTimes(candidate, now_us) || !WhyNoSchedule(candidate, options_).empty() || CheckDeadline(candidate, now_us))
     return {0, at(0)};
-  certifier_.Require(plans[0], initial_set, obstacles_.all());
-  const auto decisions = CertifyAll(certifier_, plans, std::span(&initial_set, 1), obstacles_.all(),
+  certifier_.Require(plans[0], initial_set, obstacles_.indexed());
+  const auto decisions = CertifyAll(certifier_, plans, std::span(&initial_set, 1), obstacles_.indexed(),
                                     {.until_certified = true,
                                      .clock = clock,
                                      .deadline = now_us + Microseconds(options_.decision_budget_ms) / 2,
@@ -266,8 +266,8 @@ std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candi
 
 void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer) {
   const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
-  certifier_.Require(plan, initial_set, obstacles_.all());
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
+  certifier_.Require(plan, initial_set, obstacles_.indexed());
+  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
 
   decision_t& decision = answer.decision;
   decision.outcome = static_cast<std::int16_t>(verdict.outcome);
@@ -294,8 +294,8 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
     if (!upheld.Suffices(UpheldUnder(certifier_.problem(), options_))) return {};
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
-    certifier_.Require(plan, initial_set, obstacles_.all());
-    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.all(), tube_, first_step);
+    certifier_.Require(plan, initial_set, obstacles_.indexed());
+    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), tube_, first_step);
   } catch (const std::exception&) {
     return {};
   }
@@ -304,8 +304,8 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
 std::optional<Gate::Again> Gate::CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {
   if (GroundsOf(decision) != grounds()) return std::nullopt;
   Again again{PlanOf(candidate, ScheduleOf(candidate, options_)), InitialSetOf(candidate), {}};
-  certifier_.Require(again.plan, again.initial_set, obstacles_.all());
-  again.verdict = certifier_.Certify(again.plan, again.initial_set, obstacles_.all(), tube_);
+  certifier_.Require(again.plan, again.initial_set, obstacles_.indexed());
+  again.verdict = certifier_.Certify(again.plan, again.initial_set, obstacles_.indexed(), tube_);
   if (static_cast<int>(again.verdict.cause) != decision.cause || again.verdict.step != decision.step)
     return std::nullopt;
   return again;
@@ -330,7 +330,7 @@ std::optional<advice_t> Gate::Advise(const candidate_plan_t& candidate, const de
     const std::optional<Again> again = CertifyAgain(candidate, decision);
     if (!again) return std::nullopt;
     const std::vector<advice_change_t> changes =
-        ChangesFor({certifier_, again->plan, again->initial_set, obstacles_.all(), again->verdict}, tube_, effort);
+        ChangesFor({certifier_, again->plan, again->initial_set, obstacles_.indexed(), again->verdict}, tube_, effort);
     if (changes.empty()) return std::nullopt;
     advice_t advice = AdviceOn(candidate, decision);
     advice.num_changes = static_cast<std::int16_t>(changes.size());
@@ -349,7 +349,7 @@ std::optional<advice_t> Gate::Repair(const candidate_plan_t& candidate, const de
     if (!again || candidate.progress_steps < 0 || candidate.progress_steps > candidate.num_steps) return std::nullopt;
     advice_t advice = AdviceOn(candidate, decision);
     const auto repair =
-        FindRepair({certifier_, again->plan, again->initial_set, obstacles_.all(), again->verdict},
+        FindRepair({certifier_, again->plan, again->initial_set, obstacles_.indexed(), again->verdict},
                    candidate.progress_steps, {motion_ ? &*motion_ : nullptr, tail_steps_}, tube_, goes_on);
     if (repair) SetProposal(*repair, candidate, advice);
     return advice;

@@ -13,6 +13,14 @@
 #include "task/canonical.h"
 
 namespace forereach {
+namespace {
+
+void RequireRoom(std::size_t count) {
+  if (count > kMaxObstacles)
+    throw std::invalid_argument(fmt::format("{} obstacles, at most {} fit into a message", count, kMaxObstacles));
+}
+
+}  // namespace
 
 std::int64_t ObstacleSender::PeriodUs(const GateOptions& options) {
   return std::max<std::int64_t>(Microseconds(options.obstacles_timeout_ms) / 4, 1);
@@ -23,9 +31,7 @@ ObstacleSender::ObstacleSender(std::int64_t period_us) : period_us_(period_us) {
 }
 
 void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks) {
-  if (obstacles.size() > kMaxObstacles)
-    throw std::invalid_argument(
-        fmt::format("obstacles: {}, at most {} fit into a message", obstacles.size(), kMaxObstacles));
+  RequireRoom(obstacles.size());
   if (!tracks.empty() && tracks.size() != obstacles.size())
     throw std::invalid_argument(fmt::format("{} tracks of {} obstacles", tracks.size(), obstacles.size()));
   const Digest digest = ObstaclesDigest(obstacles);
@@ -73,9 +79,11 @@ void RequireSendable(const Config& config) try {
   std::set<std::int64_t> changes{0};
   for (const Obstacle& obstacle : config.obstacles)
     if (obstacle.motion()) changes.insert(std::max<std::int64_t>(obstacle.motion()->from_us, 0));
-  for (const std::int64_t time_us : changes)
-    static_cast<void>(FromMessage(ToMessage(SeenBy(time_us, config.obstacles), time_us),
-                                  static_cast<int>(config.problem->projection.rows())));
+  for (const std::int64_t time_us : changes) {
+    const std::vector<Obstacle> seen = SeenBy(time_us, config.obstacles);
+    RequireRoom(seen.size());
+    static_cast<void>(FromMessage(ToMessage(seen, time_us), static_cast<int>(config.problem->projection.rows())));
+  }
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": task.obstacles: " + error.what());
 }

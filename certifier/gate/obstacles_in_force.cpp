@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -16,8 +17,9 @@ ObstaclesInForce::ObstaclesInForce(const Config& config)
     : options_(config.gate),
       clocks_(ClockBoundsOf(config)),
       dim_(static_cast<int>(config.problem->projection.rows())),
-      of_task_(config.obstacles),
-      state_{SoleSender(Microseconds(config.gate.obstacles_timeout_ms)), {}, {}, {}, {}, {}, 0, 0} {
+      num_of_task_(config.obstacles.size()),
+      all_(config.obstacles),
+      state_{.sender = SoleSender(Microseconds(config.gate.obstacles_timeout_ms))} {
   Put();
 }
 
@@ -56,7 +58,8 @@ std::string ObstaclesInForce::Take(const obstacles_t& message, std::int64_t now_
   state_.order.Take(position, horizon);
   state_.arrival = Arrival{position.utime, now_us};
   state_.doubt.clear();
-  Put();
+  const Digest digest = ObstaclesDigest(state_.heard);
+  if (digest != std::exchange(state_.heard_digest, digest)) Put();
   return {};
 }
 
@@ -131,9 +134,12 @@ void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {
 }
 
 void ObstaclesInForce::Put() {
-  all_ = of_task_;
+  all_.erase(all_.begin() + static_cast<std::ptrdiff_t>(num_of_task_), all_.end());
   all_.insert(all_.end(), state_.heard.begin(), state_.heard.end());
-  digest_ = ObstaclesDigest(all_);
+  const Digest digest = ObstaclesDigest(all_);
+  if (digest == digest_) return;
+  index_ = ObstacleIndex(all_);
+  digest_ = digest;
 }
 
 }  // namespace forereach

@@ -29,7 +29,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 
 #include "certifier/gate/stream_clock.h"
 #include "forereach/obstacles_t.hpp"
-#include "forereach/safety/obstacle.h"
+#include "forereach/safety/obstacle_index.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
 #include "lcmtypes/sole_sender.h"
@@ -55,6 +55,8 @@ class ObstaclesInForce final {
   void Inherit(const ObstaclesInForce& before);
 
   [[nodiscard]] const std::vector<Obstacle>& all() const { return all_; }
+  /** The same with their index, which is made anew when they change. */
+  [[nodiscard]] ObstacleView indexed() const { return {all_, index_}; }
   /** The digest of all(), as ObstaclesDigest computes it. */
   [[nodiscard]] const Digest& digest() const { return digest_; }
   /** The stamp of the message in force; nothing if none was received. */
@@ -69,6 +71,7 @@ class ObstaclesInForce final {
     SoleSender sender;
     StreamOrder order;                 // of the messages taken
     std::vector<Obstacle> heard;       // from the last of them
+    Digest heard_digest{};             // of these
     std::optional<Arrival> arrival;    // of the last of them
     std::optional<std::int64_t> next;  // the sequence after the last one seen, including refused messages
     std::string doubt;                 // why the last message was refused
@@ -81,15 +84,17 @@ class ObstaclesInForce final {
   void RequireClock(const std::vector<Obstacle>& obstacles) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
   [[nodiscard]] Freshness FreshnessOfLast(std::int64_t now_us) const;
-  // Sets all_ to the task's obstacles and the received ones.
+  // Sets all_ to the task's obstacles, which are its first, and the received ones.
   void Put();
 
   GateOptions options_;
   std::optional<ClockBounds> clocks_;
   int dim_;  // of the safety coordinates
-  std::vector<Obstacle> of_task_, all_;
+  std::size_t num_of_task_;
+  std::vector<Obstacle> all_;
+  ObstacleIndex index_;  // of all_
   State state_;
-  Digest digest_;
+  Digest digest_{};
 };
 
 }  // namespace forereach

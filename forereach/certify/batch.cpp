@@ -97,7 +97,7 @@ std::vector<Index> Portions(std::span<const Plan> plans, std::span<const Index> 
 }  // namespace
 
 std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
-                                 std::span<const Zonotope> initial_sets, std::span<const Obstacle> obstacles,
+                                 std::span<const Zonotope> initial_sets, const ObstacleView& obstacles,
                                  const BatchOptions& options, const BatchListener& listener) {
   if (options.threads < 1) throw std::invalid_argument("batch: 0 threads, must be at least 1");
   if (!options.tubes.empty() && options.tubes.size() < options.threads)

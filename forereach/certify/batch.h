@@ -40,7 +40,7 @@ thread has a Tube of about 2.5 MB, which takes some 0.5 ms to be made. Nothing i
 @pre Certifier::Require passes for each plan. */
 [[nodiscard]] std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
                                                std::span<const Zonotope> initial_sets,
-                                               std::span<const Obstacle> obstacles, const BatchOptions& options = {},
+                                               const ObstacleView& obstacles, const BatchOptions& options = {},
                                                const BatchListener& listener = {});
 
 }  // namespace forereach

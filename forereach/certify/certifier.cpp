@@ -313,15 +313,15 @@ std::optional<Certifier::Misfit> Certifier::FindMisfit(const Plan& plan) const {
   return std::nullopt;
 }
 
-void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+void Certifier::Require(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles) const {
   if (const auto misfit = FindMisfit(plan)) throw std::invalid_argument(misfit->what);
   const bool moves =
-      std::ranges::any_of(obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
+      std::ranges::any_of(obstacles.all(), [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
   forereach::Require(!moves || plan.schedule.step_us > 0, "plan: no schedule, and an obstacle moves");
   Require(initial_set, obstacles);
 }
 
-void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+void Certifier::Require(const Zonotope& initial_set, const ObstacleView& obstacles) const {
   const NominalModel& model = *problem_->model;
   const auto number = [](auto value) { return std::to_string(value); };
   forereach::Require(initial_set.dim() == model.num_states(), "initial set: dimension " + number(initial_set.dim()) +
@@ -337,7 +337,7 @@ void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> o
                            ", the projection has " + std::to_string(projection().dim()));
 }
 
-Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
+Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles,
                             Tube& tube, int known) const noexcept {
   tube.length_ = std::clamp(known, 0, tube.length_);
   tube.slices_[0].Assign(initial_set);
@@ -365,8 +365,7 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   return {};
 }
 
-Decision Certifier::JudgeSafety(const Plan& plan, std::span<const Obstacle> obstacles, Tube& tube,
-                                int first) const noexcept {
+Decision Certifier::JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube, int first) const noexcept {
   const Decision limits = limits_.Judge(plan, tube, first);
   const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
   // The earlier failure is reported; of two at one step, the limit.

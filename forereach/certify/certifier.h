@@ -80,7 +80,7 @@ class Certifier final {
   /** The last tests of Certify alone, for a tube that Certify has made of this plan: among other obstacles, or from a
   later step on. A limit that may be exceeded at sample t comes before an obstacle that may be touched in unit t or
   later (safety.h). Outcome kCertified, or kSafety with the first failure. */
-  [[nodiscard]] Decision JudgeSafety(const Plan& plan, std::span<const Obstacle> obstacles, Tube& tube,
+  [[nodiscard]] Decision JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube,
                                      int first = 0) const noexcept;
   /** SafetyTest::Separate. */
   [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle,
@@ -100,9 +100,9 @@ class Certifier final {
   /** Checks the preconditions of Certify: a plan without a misfit, X_0 in the states with at most order * n generators,
   obstacles of the safety dimension p, and a schedule if one of them moves. @throws std::invalid_argument with the value
   and its bound if one is violated. */
-  void Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
+  void Require(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles) const;
   /** The same without the plan, which FindMisfit has passed. */
-  void Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
+  void Require(const Zonotope& initial_set, const ObstacleView& obstacles) const;
 
   /** Decides whether the plan is safe for every admissible residual, every disturbance and every initial state in
   `initial_set`. The outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)`
@@ -123,7 +123,7 @@ class Certifier final {
   @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
   it, each with its own tube. */
-  [[nodiscard]] Decision Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
+  [[nodiscard]] Decision Certify(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles,
                                  Tube& tube, int known = 0) const noexcept;
 
  private:

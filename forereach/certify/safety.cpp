@@ -14,6 +14,7 @@
 #include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/size.h"
+#include "forereach/safety/obstacle_index.h"
 
 namespace forereach {
 namespace {
@@ -37,20 +38,26 @@ struct Closest {
     Consider(found, found.separation.clearance(), t, o);
   }
   void Consider(const PartSeparation& found, double its_clearance, int t, int o) noexcept {
-    if (its_clearance < clearance) *this = {its_clearance, t, o, found.part, found.separation};
+    if (Yields(its_clearance, t, o)) *this = {its_clearance, t, o, found.part, found.separation};
+  }
+  // To what is closer, or as close and comes before.
+  [[nodiscard]] bool Yields(double its_clearance, int t, int o) const noexcept {
+    return its_clearance < clearance || (its_clearance == clearance && std::tie(t, o) < std::tie(step, obstacle));
   }
 };
 
 // A unit and an obstacle that are proven to be apart.
 struct Pair {
   PartSeparation bound;
+  Separation boxed;  // by a box around the body; not proven if the hulls do
   double clearance;
   int step, obstacle;
   bool is_direct;  // by the best of what is cheaper than a search
 
+  [[nodiscard]] bool IsProven() const noexcept { return bound.separation.IsProven() || boxed.IsProven(); }
   void Improve(const PartSeparation& found) noexcept {
     bound = found;
-    clearance = found.separation.clearance();
+    clearance = std::max(found.separation.clearance(), boxed.clearance());
     is_direct = true;
   }
 };
@@ -58,8 +65,8 @@ struct Pair {
 // The pairs of least clearance, as many as there is room for.
 class Nearest {
  public:
-  void Add(const Separation& found, int part, int t, int o, bool is_direct) noexcept {
-    const double clearance = found.clearance();
+  void Add(const Separation& found, int part, int t, int o, bool is_direct, const Separation& boxed = {}) noexcept {
+    const double clearance = std::max(found.clearance(), boxed.clearance());
     if (count_ == pairs_.size()) {
       left_out_ = std::min(left_out_, std::max(pairs_[farthest_].clearance, clearance));
       if (!(clearance < pairs_[farthest_].clearance)) return;
@@ -68,6 +75,7 @@ class Nearest {
     // Member by member: a load that spans several stores waits for all of them.
     pair->bound.separation = found;
     pair->bound.part = part;
+    pair->boxed = boxed;
     pair->clearance = clearance;
     pair->step = t;
     pair->obstacle = o;
@@ -89,11 +97,11 @@ class Nearest {
   }
   /** The least clearance for which there was no room. */
   [[nodiscard]] double left_out() const { return left_out_; }
-  /** Keeps what is closer than `clearance`, but not `other`: by step, then by obstacle. */
+  /** Keeps what is no further than `clearance`, but not `other`: by step, then by obstacle. */
   [[nodiscard]] std::span<Pair> InOrder(double clearance, const Pair* other) noexcept {
     std::size_t kept = 0;
     for (const Pair& pair : pairs())
-      if (pair.clearance < clearance && &pair != other) pairs_[kept++] = pair;
+      if (pair.clearance <= clearance && &pair != other) pairs_[kept++] = pair;
     count_ = kept;
     std::ranges::sort(pairs(), [](const Pair& a, const Pair& b) {
       return std::tie(a.step, a.obstacle) < std::tie(b.step, b.obstacle);
@@ -174,10 +182,36 @@ class SafetyTest::Unit {
     hull_ = Join(hulls_[0], hulls_[1], placement().dim());
   }
 
+  // Of the frame, at all samples of the unit. @pre EncloseHulls.
+  [[nodiscard]] const Hull& hull() const noexcept { return hull_; }
+
   // By the interval hulls of the frame and a ball around the body: sound, not tight. @pre EncloseHulls.
   [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
     const Hull& seen = meeting.moves ? Seen(meeting) : hull_;
     return SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach()));
+  }
+
+  // A hull around all parts of the body, by their supports along the axes. @pre Enter.
+  [[nodiscard]] Hull EncloseBody() noexcept {
+    Hull hull{};
+    for (int k = 0; k < placement().dim(); ++k) {
+      const auto farthest = [&](double sign) {
+        double support = -kInfinity;
+        for (int t = first_; t <= last_; ++t)
+          for (const Placement::Part& part : placement().parts()) {
+            const Eigen::Vector3d axis = sign * Eigen::Vector3d::Unit(k);
+            const double found = placement().SupportUpper(SampleAt(t), part, axis, test_.instructions_);
+            support = Larger(support, AddUp(found, part.radius));
+          }
+        return support;
+      };
+      const double upper = farthest(1), lower = -farthest(-1);
+      const bool is_finite = std::isfinite(lower) && std::isfinite(upper) && lower <= upper;
+      const Interval range = is_finite ? Interval(lower, upper) : Interval::Entire();
+      hull.center[ToSize(k)] = is_finite ? range.Middle() : 0;
+      hull.half_width[ToSize(k)] = is_finite ? range.DistanceUpper(hull.center[ToSize(k)]) : kInfinity;
+    }
+    return hull;
   }
 
   // By one direction for each part, from its middle to the obstacle, or as given if that is better.
@@ -350,71 +384,213 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
 
 // Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
 // they leave as possibly closest, is settled by the best direction. Any of these bounds proves a pair apart
-// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report.
-Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
+// (docs/soundness.md, 3.9); the order saves time, and the last pass finds the closest pair for the report. The result
+// does not depend on the order in which pairs are seen, so an index changes nothing.
+class SafetyTest::Judgement {
+ public:
+  Judgement(const SafetyTest& test, const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
+            int first) noexcept
+      : test_(test),
+        obstacles_(obstacles),
+        first_(first),
+        units_(test.NumUnits(tube)),
+        touched_(units_),
+        unit_(test, schedule, tube, tube.places_) {}
+
+  [[nodiscard]] Decision Run() noexcept {
+    if (first_ < units_) {
+      obstacles_.index() == nullptr ? SeeAll() : SeeNear(*obstacles_.index());
+      if (touched_ < units_) {
+        const Separation& touch = touch_.separation;
+        return Judged(Outcome::kSafety, {touch.clearance(), touched_, touched_obstacle_, touch_.part, touch});
+      }
+      FindClosest();
+    }
+    return Judged(Outcome::kCertified, closest_);
+  }
+
+ private:
+  [[nodiscard]] bool is_at_frame() const { return test_.placement_.is_at_frame(); }
+  [[nodiscard]] const Obstacle& obstacle(int o) const { return obstacles_[ToSize(o)]; }
+
+  void SeeAll() noexcept {
+    for (int t = first_; t < units_ && touched_ == units_; ++t) {
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      for (int o = 0; o < static_cast<int>(obstacles_.size()) && touched_ == units_; ++o) See(t, o);
+    }
+  }
+
+  // What moves or has no end in each unit; what stands where the index finds it near.
+  void SeeNear(const ObstacleIndex& index) noexcept {
+    for (int t = first_; t < units_; ++t) {
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      hulls_[ToSize(t - first_)] = unit_.hull();
+      if (touched_ == units_)
+        for (const int o : index.everywhere()) See(t, o);
+    }
+    SeeNear(index, first_, std::min(touched_ + 1, units_));
+  }
+
+  // Those that hulls do not prove apart, in the order of time: a unit's places are then made once. If there are too
+  // many, fewer units at once.
+  void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
+    struct Open {
+      int t, o;
+    };
+    std::array<Open, 256> open;
+    std::size_t count = 0;
+    bool has_room = true;
+    ForEachNear(
+        index, from, to, [] { return 0.0; },
+        [&](int t, int o, const Separation& by_hulls) {
+          if (by_hulls.IsProven()) return;
+          if (count < open.size())
+            open[count++] = {t, o};
+          else if (to - from > 1)
+            has_room = false;
+          else
+            Settle(t, o, by_hulls);
+        });
+    if (!has_room) {
+      const int middle = (from + to) / 2;
+      SeeNear(index, from, middle);
+      return touched_ == units_ ? SeeNear(index, middle, to) : void();
+    }
+    const auto found = std::span(open).first(count);
+    std::ranges::sort(found, [](const Open& a, const Open& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
+    for (const Open& pair : found) Settle(pair.t, pair.o, ByHulls(pair.t, pair.o));
+  }
+
+  // Calls visit(t, o, the bound by hulls).
+  template <class Within, class Visit>
+  void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) noexcept {
+    if (tree_from_ != from || tree_to_ != to)
+      tree_.Build(std::span(hulls_).subspan(ToSize(from - first_), ToSize(to - from)), test_.placement_.dim());
+    tree_from_ = from;
+    tree_to_ = to;
+    index.ForEachNear(tree_, test_.placement_.reach(), within,
+                      [&](int i, int o) { visit(from + i, o, ByHulls(from + i, o)); });
+  }
+
+  // Of what stands, with an index.
+  [[nodiscard]] Separation ByHulls(int t, int o) const noexcept {
+    return SeparateHulls(hulls_[ToSize(t - first_)], obstacle(o), test_.placement_.reach());
+  }
+
+  // @pre unit t is entered, with its hulls.
+  void See(int t, int o) noexcept {
+    const Encounter& meeting = unit_.MeetIn(obstacle(o));
+    if (!meeting.is_there) return;
+    const Separation by_hulls = unit_.ByHulls(obstacle(o), meeting);
+    if (by_hulls.IsProven())
+      nearest_.Add(by_hulls, -1, t, o, is_at_frame());
+    else
+      Settle(t, o, by_hulls);
+  }
+
+  // A pair that hulls do not prove apart.
+  void Settle(int t, int o, const Separation& by_hulls) noexcept {
+    if (std::tie(touched_, touched_obstacle_) < std::tie(t, o)) return;
+    if (const Separation boxed = ByBox(t, o); boxed.IsProven()) return nearest_.Add(by_hulls, -1, t, o, false, boxed);
+    unit_.Enter(t);
+    const Encounter& meeting = unit_.MeetIn(obstacle(o));
+    const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), meeting);
+    if (direct.separation.IsProven()) return nearest_.Add(direct.separation, direct.part, t, o, true);
+    const PartSeparation best = unit_.Best(direct, obstacle(o), meeting);
+    if (best.separation.IsProven()) return closest_.Consider(best, t, o);
+    touched_ = t;
+    touched_obstacle_ = o;
+    touch_ = best;
+  }
+
+  // A box around the body is tighter than a ball around it, but says nothing new of a ball, nor of what moves.
+  [[nodiscard]] Separation ByBox(int t, int o) noexcept {
+    if (is_at_frame() || obstacle(o).motion()) return {};
+    const std::size_t i = ToSize(t - first_);
+    unit_.Enter(t);
+    if (!has_body_[i]) bodies_[i] = unit_.EncloseBody();
+    has_body_[i] = true;
+    return SeparateHulls(bodies_[i], obstacle(o));
+  }
+
+  [[nodiscard]] bool IsCloser(const Pair& pair) const noexcept {
+    return closest_.Yields(pair.clearance, pair.step, pair.obstacle);
+  }
+  void Direct(Pair& pair) noexcept {
+    unit_.Enter(pair.step);
+    pair.Improve(unit_.ByDirections(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle))));
+  }
+  void Consider(const Pair& pair) noexcept {
+    unit_.Enter(pair.step);
+    PartSeparation best = unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle)));
+    if (!best.separation.IsProven() && pair.boxed.IsProven()) best = {pair.boxed, -1};
+    closest_.Consider(best, pair.step, pair.obstacle);
+  }
+  // What no cheap bound proves has been considered before.
+  void ConsiderIfCloser(Pair& pair) noexcept {
+    if (IsCloser(pair) && !pair.is_direct) Direct(pair);
+    if (IsCloser(pair) && pair.IsProven()) Consider(pair);
+  }
+  void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
+    const Separation boxed = by_hulls.IsProven() ? Separation{} : ByBox(t, o);
+    Pair pair{{by_hulls, -1}, boxed, std::max(by_hulls.clearance(), boxed.clearance()), t, o, is_at_frame()};
+    ConsiderIfCloser(pair);
+  }
+
+  void FindClosest() noexcept {
+    Pair* least = nearest_.Least();
+    for (; least != nullptr && IsCloser(*least) && !least->is_direct; least = nearest_.Least()) Direct(*least);
+    if (least != nullptr && IsCloser(*least)) Consider(*least);
+    const ObstacleIndex* const index = obstacles_.index();
+    const bool has_all = nearest_.left_out() > closest_.clearance;
+    if (has_all)
+      for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
+    else if (index == nullptr || !index->everywhere().empty())
+      LookAgain();
+    if (index == nullptr) return;
+    ForEachNear(
+        *index, first_, units_, [&] { return closest_.clearance; },
+        [&](int t, int o, const Separation& by_hulls) {
+          if (by_hulls.IsProven() || !has_all) ConsiderIfCloser(by_hulls, t, o);
+        });
+  }
+
+  // At those for which there was no room.
+  void LookAgain() noexcept {
+    const auto look = [&](int t, int o) {
+      const Encounter& meeting = unit_.MeetIn(obstacle(o));
+      if (meeting.is_there) ConsiderIfCloser(unit_.ByHulls(obstacle(o), meeting), t, o);
+    };
+    for (int t = first_; t < units_; ++t) {
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      if (obstacles_.index() != nullptr)
+        for (const int o : obstacles_.index()->everywhere()) look(t, o);
+      else
+        for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) look(t, o);
+    }
+  }
+
+  const SafetyTest& test_;
+  const ObstacleView& obstacles_;
+  const int first_, units_;
+  int touched_, touched_obstacle_ = -1;  // the first unit and obstacle that are not proven apart; units_: none
+  PartSeparation touch_;                 // there
+  Closest closest_;
+  Nearest nearest_;
+  Unit unit_;
+  std::array<Hull, HullTree::kMost> hulls_;   // of the units from the first on, with an index
+  std::array<Hull, HullTree::kMost> bodies_;  // around the whole body in these units, where has_body_
+  std::array<bool, HullTree::kMost> has_body_{};
+  HullTree tree_;  // over those of the units tree_from_ .. tree_to_ - 1
+  int tree_from_ = -1, tree_to_ = -1;
+};
+
+Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
                            int first) const noexcept {
-  Closest closest;
-  Nearest nearest;
-  Unit unit(*this, schedule, tube, tube.places_);
-  const int count = static_cast<int>(obstacles.size()), units = NumUnits(tube);
-  for (int t = first; t < units; ++t) {
-    unit.Enter(t);
-    unit.EncloseHulls();
-    for (int o = 0; o < count; ++o) {
-      const Obstacle& obstacle = obstacles[ToSize(o)];
-      const Encounter& meeting = unit.MeetIn(obstacle);
-      if (!meeting.is_there) continue;
-      const Separation by_hulls = unit.ByHulls(obstacle, meeting);
-      if (by_hulls.IsProven()) {
-        nearest.Add(by_hulls, -1, t, o, placement_.is_at_frame());
-        continue;
-      }
-      const PartSeparation direct = unit.ByDirections({by_hulls, -1}, obstacle, meeting);
-      if (direct.separation.IsProven()) {
-        nearest.Add(direct.separation, direct.part, t, o, true);
-        continue;
-      }
-      const PartSeparation best = unit.Best(direct, obstacle, meeting);
-      if (!best.separation.IsProven())
-        return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation});
-      closest.Consider(best, t, o);
-    }
-  }
-  const auto is_closer = [&](const Pair* pair) { return pair != nullptr && pair->clearance < closest.clearance; };
-  const auto direct = [&](Pair& pair) {
-    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
-    unit.Enter(pair.step);
-    pair.Improve(unit.ByDirections(pair.bound, obstacle, unit.MeetIn(obstacle)));
-  };
-  const auto consider = [&](const Pair& pair) {
-    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
-    unit.Enter(pair.step);
-    closest.Consider(unit.Best(pair.bound, obstacle, unit.MeetIn(obstacle)), pair.step, pair.obstacle);
-  };
-  Pair* least = nearest.Least();
-  for (; is_closer(least) && !least->is_direct; least = nearest.Least()) direct(*least);
-  if (is_closer(least)) consider(*least);
-  // What no cheap bound proves has been considered above.
-  const auto consider_if_closer = [&](Pair& pair) {
-    if (is_closer(&pair) && !pair.is_direct) direct(pair);
-    if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);
-  };
-  if (nearest.left_out() >= closest.clearance) {
-    for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
-    return Judged(Outcome::kCertified, closest);
-  }
-  for (int t = first; t < units; ++t) {
-    unit.Enter(t);
-    unit.EncloseHulls();
-    for (int o = 0; o < count; ++o) {
-      const Encounter& meeting = unit.MeetIn(obstacles[ToSize(o)]);
-      if (!meeting.is_there) continue;
-      const Separation found = unit.ByHulls(obstacles[ToSize(o)], meeting);
-      Pair pair{{found, -1}, found.clearance(), t, o, placement_.is_at_frame()};
-      consider_if_closer(pair);
-    }
-  }
-  return Judged(Outcome::kCertified, closest);
+  return Judgement(*this, obstacles, schedule, tube, first).Run();
 }
 
 }  // namespace forereach

@@ -11,6 +11,7 @@ obstacle that moves (docs/soundness.md). */
 
 #include "forereach/certify/decision.h"
 #include "forereach/certify/problem.h"
+#include "forereach/safety/obstacle_view.h"
 #include "forereach/safety/placement.h"
 #include "forereach/safety/separation.h"
 
@@ -39,11 +40,11 @@ class SafetyTest final {
 
   /** Judges the units from `first` on. The outcome is kCertified only with a proof that the body is disjoint from every
   obstacle in each of them; otherwise it is kSafety with the first unit that is not proven as `step`, and the first
-  obstacle there. A certificate names the closest approach; with no unit left it names none.
+  obstacle there. A certificate names the closest approach, of several as close the first; with no unit left none.
   @param tube its slices are read; its scratch memory is used. @pre the obstacles and the schedule are as
   Certifier::Require wants them. It allocates nothing. Cost for each unit and obstacle: O(p) if the hulls are far from
-  each other, otherwise as Separate for the points of the body. */
-  [[nodiscard]] Decision Judge(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
+  each other, otherwise as Separate for the points of the body; nothing for those that an index leaves out. */
+  [[nodiscard]] Decision Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
                                int first = 0) const noexcept;
 
   /** The proven distance between the body and an obstacle in unit t: the largest of the bounds by interval hulls and by
@@ -53,6 +54,7 @@ class SafetyTest final {
 
  private:
   class Unit;
+  class Judgement;
 
   Placement placement_;
   InstructionSet instructions_;

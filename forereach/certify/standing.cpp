@@ -18,7 +18,7 @@ int StandingSteps(const Decision& verdict, int num_steps, bool is_swept) {
 }  // namespace
 
 Standing JudgeAgain(const Certifier& certifier, const Plan& plan, const Zonotope& initial_set,
-                    std::span<const Obstacle> obstacles, Tube& tube, int first_step) noexcept {
+                    const ObstacleView& obstacles, Tube& tube, int first_step) noexcept {
   const auto standing = [&](const Decision& verdict) {
     return Standing{StandingSteps(verdict, plan.num_steps, certifier.problem().between.has_value()), verdict};
   };

@@ -26,6 +26,6 @@ none for t = 0.
 If D and S both fail, the fewer. The tube is computed again from X_0, with all observations so far.
 @param first_step 0..num_steps. @pre Certifier::Require passes. Cost as Certify's. */
 [[nodiscard]] Standing JudgeAgain(const Certifier& certifier, const Plan& plan, const Zonotope& initial_set,
-                                  std::span<const Obstacle> obstacles, Tube& tube, int first_step) noexcept;
+                                  const ObstacleView& obstacles, Tube& tube, int first_step) noexcept;
 
 }  // namespace forereach

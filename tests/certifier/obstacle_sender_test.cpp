@@ -118,6 +118,10 @@ TEST(ObstacleSenderTest, SendableIsWhatReceiversTakeAtAllTimes) {
   EXPECT_NO_THROW(RequireSendable(config));
   config.obstacles = {Obstacle::AxisBox(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones())};
   EXPECT_THROW(RequireSendable(config), ConfigError);
+  config.obstacles.assign(kMaxObstacles + 1, kOne[0]);  // more than a message has room for
+  EXPECT_THROW(RequireSendable(config), ConfigError);
+  config.obstacles.pop_back();
+  EXPECT_NO_THROW(RequireSendable(config));
   ObstacleMotion far;
   far.from_us = 2 * kFarthestStampUs;  // sent with a stamp that is a day older than its message
   config.obstacles = {kOne[0].Moving(far)};

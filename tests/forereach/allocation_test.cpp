@@ -6,6 +6,7 @@
 
 #include "forereach/certify/batch.h"
 #include "forereach/certify/certifier.h"
+#include "forereach/safety/obstacle_index.h"
 #include "tests/sanitized.h"
 #include "tests/worlds.h"
 
@@ -61,7 +62,7 @@ class Allocation : public testing::Test {
   }
 
   // Certifies from (0, 0, 0, v, 0, delta) and returns what that allocated.
-  long Count(double v, double delta, const std::vector<Obstacle>& obstacles, Outcome expected) {
+  long Count(double v, double delta, const ObstacleView& obstacles, Outcome expected) {
     const Eigen::VectorXd center = (Eigen::VectorXd(6) << 0, 0, 0, v, 0, delta).finished();
     const Zonotope start = Zonotope::FromBox(center, Eigen::VectorXd::Constant(6, 0.01));
     const long before = allocations;
@@ -95,6 +96,16 @@ TEST_F(Allocation, CertifyAllocatesNothing) {
   EXPECT_EQ(Count(30, 0, obstacles, Outcome::kDomain), 0);
   obstacles.push_back(Obstacle::Circle(Eigen::Vector2d(6, 0), 1));
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
+}
+
+TEST_F(Allocation, CertifyAllocatesNothingAmongThousands) {
+  std::vector<Obstacle> cells;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector2d corner(i % 50 - 20, 5 + i / 50.0);
+    cells.push_back(Obstacle::AxisBox(corner, corner + Eigen::Vector2d(0.5, 0.5)));
+  }
+  const ObstacleIndex index(cells);
+  EXPECT_EQ(Count(10, 0, {cells, index}, Outcome::kCertified), 0);
 }
 
 TEST_F(Allocation, CertifyAllocatesNothingForAffineRows) {

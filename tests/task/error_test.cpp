@@ -548,8 +548,10 @@ TEST_F(ErrorTest, AnImpossibleObstacleIsAnError) {
   EXPECT_EQ(with("{polygon: {vertices: [[0, 0], [1, 0]]}}"),
             "task.yaml:18: task.obstacles[0].polygon.vertices: has 2 entries, which is outside [3, 16]");
   std::string many = "{circle: {center: [3, 2], radius: 0.8}}";
-  for (int i = 0; i < 64; ++i) many += ", {circle: {center: [3, 2], radius: 0.8}}";
-  EXPECT_EQ(with(many), "task.yaml:18: task.obstacles: has 65 entries, which is outside [0, 64]");
+  for (int i = 1; i < 4096; ++i) many += ", {circle: {center: [3, 2], radius: 0.8}}";
+  EXPECT_EQ(with(many), "");
+  many += ", {circle: {center: [3, 2], radius: 0.8}}";
+  EXPECT_EQ(with(many), "task.yaml:18: task.obstacles: has 4097 entries, which is outside [0, 4096]");
 }
 
 TEST_F(ErrorTest, ATransitionOutsideTheDomainIsAnError) {
