@@ -3,7 +3,7 @@
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  return RunCommands({InitCommand(), ImportCommand(), CheckCommand(), FitCommand(), ExportModelCommand(), PlanCommand(),
+  return RunCommands({InitCommand(), ImportCommand(), ImportWorldCommand(), CheckCommand(), FitCommand(), ExportModelCommand(), PlanCommand(),
                       DeclareCommand(), VerifyCommand(), ReplayCommand(), AdviseCommand(), ReportCommand(),
                       ExportCommand(), LogCommand(), CheckLogCommand(), RunCommand()},
                      argc, argv);
