@@ -23,9 +23,9 @@ namespace forereach {
 namespace {
 
 constexpr std::int64_t kLargestScenario = 256 * kMegabyte;
-constexpr double kFarthestPoint = 1e8;    // m
-constexpr double kLastStep = 1e6;    // of time
-constexpr double kMostTurned = 1e5;  // rad
+constexpr double kFarthestPoint = 1e8;  // m
+constexpr double kLastStep = 1e6;       // of time
+constexpr double kMostTurned = 1e5;     // rad
 
 struct Span {
   double lower = 0, upper = 0;
@@ -68,13 +68,15 @@ class ScenarioReader {
       const double value = Number(*exact, lower, upper);
       return {value, value};
     }
-    const Span span{Number(Require(at, "intervalStart"), lower, upper), Number(Require(at, "intervalEnd"), lower, upper)};
+    const Span span{Number(Require(at, "intervalStart"), lower, upper),
+                    Number(Require(at, "intervalEnd"), lower, upper)};
     if (!(span.lower <= span.upper)) Fail(at, "its interval ends before it starts");
     return span;
   }
 
   [[nodiscard]] PlanePoint Point(const XmlElement& at) const {
-    return {Number(Require(at, "x"), -kFarthestPoint, kFarthestPoint), Number(Require(at, "y"), -kFarthestPoint, kFarthestPoint)};
+    return {Number(Require(at, "x"), -kFarthestPoint, kFarthestPoint),
+            Number(Require(at, "y"), -kFarthestPoint, kFarthestPoint)};
   }
 
   [[nodiscard]] Ring Points(const XmlElement& at) const {
@@ -89,8 +91,8 @@ class ScenarioReader {
 
 // ---- Shapes
 
-// Convex: the hull of points, and what is within the radius of it. Where it is placed, each of its exact points is within
-// `error` of the computed one.
+// Convex: the hull of points, and what is within the radius of it. Where it is placed, each of its exact points is
+// within `error` of the computed one.
 struct Convex {
   std::vector<PlanePoint> points;
   double radius = 0, error = 0;
@@ -117,10 +119,14 @@ class ShapeReader {
   [[nodiscard]] std::vector<Convex> Read(const XmlElement& at) const {
     std::vector<Convex> parts;
     for (const auto& child : at.children) {
-      if (child->name == "rectangle") parts.push_back(Rectangle(*child));
-      else if (child->name == "circle") parts.push_back(Circle(*child));
-      else if (child->name == "polygon") AddPolygon(*child, parts);
-      else in_.Fail(*child, "is no rectangle, circle or polygon");
+      if (child->name == "rectangle")
+        parts.push_back(Rectangle(*child));
+      else if (child->name == "circle")
+        parts.push_back(Circle(*child));
+      else if (child->name == "polygon")
+        AddPolygon(*child, parts);
+      else
+        in_.Fail(*child, "is no rectangle, circle or polygon");
     }
     if (parts.empty()) in_.Fail(at, "has no rectangle, circle or polygon");
     return parts;
@@ -259,7 +265,8 @@ class ObstacleReader {
         in_.Fail(at, "its states are not in the order of time");
     for (std::size_t i = 0; i == 0 || i + 1 < motion.size();) {
       std::size_t last = std::min(i + 1, motion.size() - 1);
-      while (last + 1 < motion.size() && motion[last + 1].time.upper - motion[i].time.lower <= steps_per_window_) ++last;
+      while (last + 1 < motion.size() && motion[last + 1].time.upper - motion[i].time.lower <= steps_per_window_)
+        ++last;
       AddWindow(name, {motion.begin() + static_cast<std::ptrdiff_t>(i),
                        motion.begin() + static_cast<std::ptrdiff_t>(last) + 1});
       i = std::max(i + 1, last);
@@ -271,11 +278,10 @@ class ObstacleReader {
   // parts than the one before are one set.
   void AddWindow(const std::string& name, const std::vector<Occupancy>& at) {
     const Window window{MulDown(at.front().time.lower, step_), MulUp(at.back().time.upper, step_)};
-    const bool are_alike = std::ranges::all_of(
-        at, [&](const Occupancy& each) { return each.parts.size() == at.front().parts.size(); });
+    const bool are_alike =
+        std::ranges::all_of(at, [&](const Occupancy& each) { return each.parts.size() == at.front().parts.size(); });
     double turned = 0;
-    for (std::size_t i = 0; i + 1 < at.size(); ++i)
-      turned = std::max(turned, TurnedUpper(at[i].yaw, at[i + 1].yaw));
+    for (std::size_t i = 0; i + 1 < at.size(); ++i) turned = std::max(turned, TurnedUpper(at[i].yaw, at[i + 1].yaw));
     const std::string label =
         fmt::format("{}, steps {} to {}", name, ToText(at.front().time.lower), ToText(at.back().time.upper));
     std::vector<PlanePoint> all;
@@ -299,7 +305,8 @@ class ObstacleReader {
     return AddUp(turned + 0x1p-30, AddUp(from.half(), to.half()));  // for the rounding of both middles
   }
 
-  // How far a corner leaves its chord while the shape turns evenly by so much: r (1 - cos(turned / 2)) <= r turned^2 / 8.
+  // How far a corner leaves its chord while the shape turns evenly by so much: r (1 - cos(turned / 2)) <= r turned^2
+  // / 8.
   static double ArcOf(const Convex& part, double turned) { return MulUp(part.own_reach, MulUp(turned, turned) / 8); }
 
   const ScenarioReader& in_;
@@ -440,10 +447,14 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
     ++counts[child->name];
     const std::string* id = child->Attribute("id");
     const std::string name = child->name + " " + (id ? *id : "?");
-    if (child->name == "staticObstacle") obstacles.ReadStanding(*child, name);
-    else if (child->name == "environmentObstacle") obstacles.ReadEnvironment(*child, name);
-    else if (child->name == "dynamicObstacle" || child->name == "phantomObstacle") obstacles.ReadMoving(*child, name);
-    else in.Fail(*child, "is no kind of obstacle that is known");
+    if (child->name == "staticObstacle")
+      obstacles.ReadStanding(*child, name);
+    else if (child->name == "environmentObstacle")
+      obstacles.ReadEnvironment(*child, name);
+    else if (child->name == "dynamicObstacle" || child->name == "phantomObstacle")
+      obstacles.ReadMoving(*child, name);
+    else
+      in.Fail(*child, "is no kind of obstacle that is known");
   }
   std::string text = fmt::format("{} lanelets", road.count());
   for (const auto& [kind, count] : counts) text += fmt::format(", {} {}", count, kind);

@@ -47,8 +47,8 @@ class TangentPlane {
     return PlanePoint{east.dot(offset), north.dot(offset)};
   }
 
-  // How far a side that is straight in degrees leaves the straight one between its ends, in metres. At constant rates of
-  // both angles the acceleration is at most (1 + 2 / sqrt(3) tan(latitude)) v^2 / R: v^2 / R towards the axis of
+  // How far a side that is straight in degrees leaves the straight one between its ends, in metres. At constant rates
+  // of both angles the acceleration is at most (1 + 2 / sqrt(3) tan(latitude)) v^2 / R: v^2 / R towards the axis of
   // curvature, the rest along the ground. A motion with the acceleration a leaves its chord by a / 8. The constants are
   // larger by what the ellipsoid's radii, and v within the reach, vary.
   [[nodiscard]] double Bend(double length) const {
@@ -85,13 +85,15 @@ class Drawing {
     TakeObject(JsonField(path_, document), nullptr, 0);
     if (!options_.origin && !options_.are_metres && any_ && LooksLikeDegrees())
       throw ConfigError(
-          path_ + ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if they are "
-                  "metres");
+          path_ +
+          ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if they are "
+          "metres");
     AddStayIn();
     if (plane_)
-      world_.notes.push_back(fmt::format("x east and y north in the tangent plane of WGS 84; each piece grown by up to {} "
-                                         "m, for sides that are straight in degrees.",
-                                         RoundedUp(largest_bend_, 3)));
+      world_.notes.push_back(
+          fmt::format("x east and y north in the tangent plane of WGS 84; each piece grown by up to {} "
+                      "m, for sides that are straight in degrees.",
+                      RoundedUp(largest_bend_, 3)));
     return std::move(world_);
   }
 

@@ -60,8 +60,7 @@ class PgmReader {
     std::int64_t value = 0;
     std::size_t digits = 0;
     for (; digits < rest_.size() && '0' <= rest_[digits] && rest_[digits] <= '9'; ++digits)
-      if ((value = 10 * value + (rest_[digits] - '0')) > most)
-        Fail(fmt::format("the {} is above {}", what, most));
+      if ((value = 10 * value + (rest_[digits] - '0')) > most) Fail(fmt::format("the {} is above {}", what, most));
     if (digits == 0) Fail(fmt::format("no number where the {} has to be", what));
     rest_.remove_prefix(digits);
     return static_cast<int>(value);
@@ -75,15 +74,13 @@ class PgmReader {
       Fail(fmt::format("the file is cut off: {} bytes of pixels, it has to have {}", rest_.size(), each * pixels));
     image.values.reserve(pixels);
     const auto byte = [this](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(rest_[i])); };
-    for (std::size_t i = 0; i < pixels; ++i)
-      Take(image, each == 1 ? byte(i) : 256 * byte(2 * i) + byte(2 * i + 1), i);
+    for (std::size_t i = 0; i < pixels; ++i) Take(image, each == 1 ? byte(i) : 256 * byte(2 * i) + byte(2 * i + 1), i);
   }
 
   void ReadWords(GrayImage& image, std::size_t pixels) {
     if (rest_.size() < 2 * pixels) Fail(fmt::format("the file is cut off: it has to have {} pixels", pixels));
     image.values.reserve(pixels);
-    for (std::size_t i = 0; i < pixels; ++i)
-      Take(image, static_cast<unsigned>(Number("next pixel", 65'535)), i);
+    for (std::size_t i = 0; i < pixels; ++i) Take(image, static_cast<unsigned>(Number("next pixel", 65'535)), i);
   }
 
   void Take(GrayImage& image, unsigned value, std::size_t i) const {
@@ -116,7 +113,8 @@ std::vector<Key> MapKeys(MapFile& map) {
                     [&map](const Field& at, TaskDraft&) { map.image = at.Text(); })),
       Required(Number("resolution", "m", kPositive, "The side of a cell.",
                       [&map](const Field& at, TaskDraft&) { map.resolution = at.Number(); })),
-      Required(Vector("origin", "m", key_rows::Between(-1e9, 1e9), Key::Size::kAny, "x, y and yaw of the lower left corner.",
+      Required(Vector("origin", "m", key_rows::Between(-1e9, 1e9), Key::Size::kAny,
+                      "x, y and yaw of the lower left corner.",
                       [&map](const Field& at, TaskDraft&) {
                         if (at.Count() != 2 && at.Count() != 3) at.Fail("has to have x, y and yaw");
                         if (at.Count() == 3 && std::abs(at[2].Number()) > 7) at.Fail("has a yaw above a turn");
@@ -138,8 +136,7 @@ std::vector<Key> MapKeys(MapFile& map) {
                         at.Fail("raw: values are costs, and nothing says which of them is free; use trinary or scale");
                     }),
                "trinary"),
-      Text("<name>", "Ignored.",
-           [&map](const Field& at, TaskDraft&) { map.unknown_keys.push_back(at.name()); }),
+      Text("<name>", "Ignored.", [&map](const Field& at, TaskDraft&) { map.unknown_keys.push_back(at.name()); }),
   };
 }
 
@@ -323,21 +320,21 @@ World ReadOccupancyMap(const std::string& path, const MapOptions& options) {
   const MapFile map = ReadMapFile(path);
   const std::string image_path = (std::filesystem::path(path).parent_path() / map.image).string();
   const GrayImage image = ReadPgm(image_path, ReadWhole(image_path, 12 * kMaxPixels, path + ": image: "));
-  const Grid grid = Coarsened({image.width, image.height, OccupiedCells(image, map, options.unknown_is_free)},
-                              options.coarsen);
+  const Grid grid =
+      Coarsened({image.width, image.height, OccupiedCells(image, map, options.unknown_is_free)}, options.coarsen);
   const Placing placing(map, options.coarsen);
   World world;
   for (const CellBlock& block : Blocks(grid.occupied, grid.width, grid.height))
     world.Add(fmt::format("{} by {} cells at column {}, row {}", block.width, block.height, block.column, block.row),
               placing.Corners(block));
-  world.notes.push_back(
-      fmt::format("{} by {} cells of {} m, {} of them occupied; rows count from below.", grid.width, grid.height,
-                  ToText(map.resolution * options.coarsen), std::ranges::count(grid.occupied, true)));
+  world.notes.push_back(fmt::format("{} by {} cells of {} m, {} of them occupied; rows count from below.", grid.width,
+                                    grid.height, ToText(map.resolution * options.coarsen),
+                                    std::ranges::count(grid.occupied, true)));
   if (options.coarsen > 1)
-    world.notes.push_back(fmt::format("A cell is {0} by {0} of the map's, occupied if one of them is.", options.coarsen));
-  world.notes.push_back(options.unknown_is_free
-                            ? "Unknown cells are free, and so is all beyond the image."
-                            : "Unknown cells are occupied, and so is all beyond the image.");
+    world.notes.push_back(
+        fmt::format("A cell is {0} by {0} of the map's, occupied if one of them is.", options.coarsen));
+  world.notes.push_back(options.unknown_is_free ? "Unknown cells are free, and so is all beyond the image."
+                                                : "Unknown cells are occupied, and so is all beyond the image.");
   if (map.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
   for (const std::string& key : map.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
   if (!options.unknown_is_free) AddOutside(world, Placing(map, 1), image);

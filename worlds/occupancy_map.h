@@ -27,8 +27,8 @@ struct GrayImage {
 inline constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
 
 /** An image in the format P2 or P5 of netpbm, with comments in its header and 1 to 65535 as its largest value.
-@param file its name in messages. @throws ConfigError if it is another format, has more than kMaxPixels, ends early, or has
-a value above the largest. */
+@param file its name in messages. @throws ConfigError if it is another format, has more than kMaxPixels, ends early, or
+has a value above the largest. */
 [[nodiscard]] GrayImage ReadPgm(const std::string& file, std::string_view bytes);
 
 /** Cells column..column + width - 1 of the rows row..row + height - 1, and which cells are occupied, row by row. */
@@ -44,8 +44,8 @@ its row or along its column, whichever covers more that was not covered. Cost: o
 /** The occupied cells of a map as boxes, or as polygons if its origin is turned. Each covers its cells and at most the
 rounding of its corners more. With unknown cells occupied, so is all beyond the image: half-planes, or bars as thick as
 the map if it is turned.
-A cell is occupied, free or unknown as for map_server in mode trinary. In mode scale, what is neither free nor occupied is
-occupied. @throws ConfigError with file, line, key and value. */
+A cell is occupied, free or unknown as for map_server in mode trinary. In mode scale, what is neither free nor occupied
+is occupied. @throws ConfigError with file, line, key and value. */
 [[nodiscard]] World ReadOccupancyMap(const std::string& path, const MapOptions& options);
 
 }  // namespace forereach

@@ -19,7 +19,8 @@ struct PlanePoint {
 /** The corners of a closed chain of segments, the last joined with the first. */
 using Ring = std::vector<PlanePoint>;
 
-/** The sign of the exact determinant of (b - a, c - a): 1 if c lies left of the line from a to b, -1 right of it, 0 on it.
+/** The sign of the exact determinant of (b - a, c - a): 1 if c lies left of the line from a to b, -1 right of it, 0 on
+it.
 @pre finite. */
 [[nodiscard]] int Turn(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c);
 
@@ -61,8 +62,8 @@ corners than kMaxAreaCorners. */
 /** Whether two closed segments have a point in common. Exact. */
 [[nodiscard]] bool Meet(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const PlanePoint& d);
 
-/** Whether the segment from a to b lies in the ring's polygon and its middle strictly inside. Exact; false where the ring
-crosses itself is not promised, so check such rings before. @pre a != b. */
+/** Whether the segment from a to b lies in the ring's polygon and its middle strictly inside. Exact; false where the
+ring crosses itself is not promised, so check such rings before. @pre a != b. */
 [[nodiscard]] bool IsInside(const PlanePoint& a, const PlanePoint& b, const Ring& ring);
 
 /** "(1.5, 2)" */

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-
 namespace forereach {
 
 Box RegionOf(const Config& config) {
@@ -15,9 +14,9 @@ Box RegionOf(const Config& config) {
   double reach = 0;
   for (const BodyPart& part : problem.body.parts)
     for (const Eigen::Vector3d& point : part.points) reach = std::max(reach, point.norm() + part.radius);
-  if (problem.between) reach += problem.between->acceleration.norm() * problem.between->period * problem.between->period;
-  return {middle - half - Eigen::VectorXd::Constant(2, reach),
-          middle + half + Eigen::VectorXd::Constant(2, reach)};
+  if (problem.between)
+    reach += problem.between->acceleration.norm() * problem.between->period * problem.between->period;
+  return {middle - half - Eigen::VectorXd::Constant(2, reach), middle + half + Eigen::VectorXd::Constant(2, reach)};
 }
 
 }  // namespace forereach

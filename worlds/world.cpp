@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/text.h"
 #include "lcmtypes/printable.h"
+#include "task/config_error.h"
 
 namespace forereach {
 namespace {
@@ -52,6 +55,45 @@ std::string ShapeText(const Obstacle& obstacle) {
   return "polygon: {vertices: [" + vertices + "]}";
 }
 
+std::string NotesText(const World& world, const std::string& origin, const std::string& indent) {
+  std::string text = indent + "# The obstacles of " + Printable(origin) + ", by forereach import-world.\n";
+  for (const std::string& note : world.notes) text += indent + "# " + Printable(note) + "\n";
+  return text;
+}
+
+std::string ListText(const World& world, const std::string& indent) {
+  if (world.pieces.empty()) return indent + "obstacles: []\n";
+  std::string text = indent + "obstacles:\n";
+  for (const auto& [name, obstacle, window] : world.pieces) {
+    text += fmt::format("{}  - {}  # {}\n", indent, ShapeText(obstacle), Printable(name));
+    if (window)
+      text += fmt::format("{}    motion: {{velocity: [0, 0], from: {}, until: {}}}\n", indent,
+                          ToText(window->from + 0.0), ToText(window->until + 0.0));  // no -0
+  }
+  return text;
+}
+
+// Beyond the lower and the upper end of x, then of y.
+using Sides = std::array<bool, 4>;
+
+// Behind which sides of the box all of an obstacle lies.
+Sides SidesBeyond(const Obstacle& obstacle, const Box& region) {
+  Sides is_beyond{};
+  for (int k = 0; k < 2; ++k) {
+    const auto at = static_cast<std::size_t>(2 * k);
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+      const Eigen::VectorXd& normal = obstacle.points()[0];
+      if (normal[1 - k] != 0) continue;
+      is_beyond[at] = normal[k] == -1 && -obstacle.offset() < region.lower()[k];
+      is_beyond[at + 1] = normal[k] == 1 && obstacle.offset() > region.upper()[k];
+    } else {
+      is_beyond[at] = AddUp(obstacle.upper()[k], obstacle.radius()) < region.lower()[k];
+      is_beyond[at + 1] = SubDown(obstacle.lower()[k], obstacle.radius()) > region.upper()[k];
+    }
+  }
+  return is_beyond;
+}
+
 }  // namespace
 
 void World::Add(const std::string& name, const std::vector<PlanePoint>& points, std::optional<Window> window) {
@@ -71,24 +113,14 @@ void World::AddBeyond(int axis, int sign, double at, const std::string& name) {
 }
 
 World Cropped(World world, const Box& region) {
-  std::array<bool, 4> is_cut{};  // beyond the lower and the upper end of x, then of y
+  Sides is_cut{};
   const auto is_dropped = [&](const World::Piece& piece) {
-    const Obstacle& obstacle = piece.obstacle;
-    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return false;
-    std::array<bool, 4> is_beyond{};
-    for (int k = 0; k < 2; ++k) {
-      const auto at = static_cast<std::size_t>(2 * k);
-      is_beyond[at] = AddUp(obstacle.upper()[k], obstacle.radius()) < region.lower()[k];
-      is_beyond[at + 1] = SubDown(obstacle.lower()[k], obstacle.radius()) > region.upper()[k];
-    }
+    const Sides is_beyond = SidesBeyond(piece.obstacle, region);
     const auto side = std::ranges::find(is_beyond, true);
     if (side == is_beyond.end()) return false;
-    const auto is_behind_a_cut = [&] {
-      for (std::size_t i = 0; i < 4; ++i)
-        if (is_beyond[i] && is_cut[i]) return true;
-      return false;
-    };
-    if (!is_behind_a_cut()) is_cut[static_cast<std::size_t>(side - is_beyond.begin())] = true;
+    bool is_behind_a_cut = false;
+    for (std::size_t i = 0; i < 4; ++i) is_behind_a_cut |= is_beyond[i] && is_cut[i];
+    if (!is_behind_a_cut) is_cut[static_cast<std::size_t>(side - is_beyond.begin())] = true;
     return true;
   };
   std::erase_if(world.pieces, is_dropped);
@@ -100,18 +132,19 @@ World Cropped(World world, const Box& region) {
 }
 
 std::string ObstaclesText(const World& world, const std::string& origin) {
-  std::string text = "# The obstacles of " + Printable(origin) + ", by forereach import-world.\n";
-  for (const std::string& note : world.notes) text += "# " + Printable(note) + "\n";
-  text += "task:\n  obstacles:";
-  if (world.pieces.empty()) text += " []\n";
-  if (!world.pieces.empty()) text += "\n";
-  for (const auto& [name, obstacle, window] : world.pieces) {
-    text += fmt::format("    - {}  # {}\n", ShapeText(obstacle), Printable(name));
-    if (window)
-      text += fmt::format("      motion: {{velocity: [0, 0], from: {}, until: {}}}\n", ToText(window->from),
-                          ToText(window->until));
-  }
-  return text;
+  return NotesText(world, origin, "") + "task:\n" + ListText(world, "  ");
+}
+
+std::string WithObstacles(const std::string& task, const World& world, const std::string& origin,
+                          const std::string& path) {
+  constexpr std::string_view kLine = "obstacles: []";
+  const std::size_t at = task.find(kLine), begin = task.rfind('\n', at) + 1;
+  const bool is_line = at != std::string::npos && task.find_first_not_of(' ', begin) == at;
+  if (!is_line || task.find(kLine, at + 1) != std::string::npos)
+    throw ConfigError(path + ": has to have one line `obstacles: []` in `task`, which is replaced");
+  const std::string indent(at - begin, ' ');
+  const std::size_t end = std::min(task.find('\n', at), task.size() - 1) + 1;
+  return task.substr(0, begin) + NotesText(world, origin, indent) + ListText(world, indent) + task.substr(end);
 }
 
 }  // namespace forereach

@@ -42,4 +42,9 @@ the rest is clear of the whole. */
 the same doubles. @param origin what it was made of, for the first line. */
 [[nodiscard]] std::string ObstaclesText(const World& world, const std::string& origin);
 
+/** A task file's text with the obstacles in the place of its line `obstacles: []`, and the notes before them.
+@throws ConfigError if it has no such line, or several. @param path its name in the message. */
+[[nodiscard]] std::string WithObstacles(const std::string& task, const World& world, const std::string& origin,
+                                        const std::string& path);
+
 }  // namespace forereach

@@ -24,8 +24,9 @@ class XmlElement final {
   [[nodiscard]] const std::string* Attribute(std::string_view attribute) const;
 };
 
-/** Reads a document without entities of its own: a document type declaration is refused, so that nothing is expanded and
-nothing else is read. Elements nest at most 64 deep. @param file its name in messages. @throws ConfigError with the line.
+/** Reads a document without entities of its own: a document type declaration is refused, so that nothing is expanded
+and nothing else is read. Elements nest at most 64 deep. @param file its name in messages. @throws ConfigError with the
+line.
 */
 [[nodiscard]] std::unique_ptr<XmlElement> ReadXml(const std::string& file, std::string_view bytes);
 
