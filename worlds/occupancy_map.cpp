@@ -10,6 +10,7 @@
 
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
 #include "task/config_error.h"
 #include "task/document.h"
 #include "task/draft.h"

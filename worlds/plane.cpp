@@ -146,7 +146,7 @@ Ring Joined(std::vector<Ring> rings) {
   rings.erase(rings.begin());
   std::ranges::sort(rings, [&](const Ring& a, const Ring& b) { return *rightmost(b) < *rightmost(a); });
   for (Ring& hole : rings) {
-    std::ranges::rotate(hole, hole.begin() + (rightmost(hole) - hole.cbegin()));
+    std::rotate(hole.begin(), hole.begin() + (rightmost(hole) - hole.cbegin()), hole.end());
     const auto at = Seen(joined, hole.front(), sides);
     if (!at) Refuse("the hole at " + ToText(hole.front()) + " is not inside");
     hole.push_back(hole.front());
@@ -228,8 +228,8 @@ class Joiner {
     if (pieces_[i].size() + pieces_[j].size() - 2 > most_) return;
     // From the end of the side around each piece to its beginning.
     Ring a = pieces_[i], b = pieces_[j];
-    std::ranges::rotate(a, std::ranges::find(a, side.second));
-    std::ranges::rotate(b, std::ranges::find(b, side.first));
+    std::rotate(a.begin(), std::ranges::find(a, side.second), a.end());
+    std::rotate(b.begin(), std::ranges::find(b, side.first), b.end());
     if (Turn(a[a.size() - 2], a.back(), b[1]) < 0 || Turn(b[b.size() - 2], b.back(), a[1]) < 0) return;
     a.insert(a.end(), b.begin() + 1, b.end() - 1);
     owners_.erase(one);

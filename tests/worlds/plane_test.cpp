@@ -91,7 +91,7 @@ TEST(ConvexPieces, OfAGridWithHolesAreExact) {
         Ring hole{{left, low}, {right, low}, {right, high}, {left, high}};
         if (random() % 2 == 0) hole = {{left, low}, {right, low}, {(left + right) / 2, (low + high) / 2}, {left, high}};
         if (random() % 2 == 0) std::ranges::reverse(hole);
-        std::ranges::rotate(hole, hole.begin() + random() % 4);
+        std::rotate(hole.begin(), hole.begin() + random() % 4, hole.end());
         area.holes.push_back(hole);
       }
     ExpectExact(area, 16, random);
