@@ -39,6 +39,7 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command ExportModelCommand();
 [[nodiscard]] Command PlanCommand();
 [[nodiscard]] Command ImportCommand();
+[[nodiscard]] Command ImportWorldCommand();
 [[nodiscard]] Command FitCommand();
 [[nodiscard]] Command DeclareCommand();
 [[nodiscard]] Command VerifyCommand();

@@ -32,7 +32,7 @@ namespace {
 using Json = nlohmann::json;
 
 struct ImportArguments {
-  std::string config, out, time, time_unit = "s", delimiter = "auto", comment = "#", header;
+  std::string config, out, time, time_unit = "s", delimiter = "auto", comment = "#", header, decimal = "point";
   std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
   std::string command_delay = "none";
   std::optional<double> rate, from, until;
@@ -79,9 +79,15 @@ std::string UnitOf(const NominalModel& model, std::size_t variable) {
 // ---- what is asked
 
 LogFormat FormatOf(const ImportArguments& options) {
-  LogFormat format{.delimiter = {}, .comment = options.comment, .header = Names(options.header)};
+  LogFormat format{.delimiter = {},
+                   .decimal_comma = options.decimal == "comma",
+                   .comment = options.comment,
+                   .header = Names(options.header)};
   if (options.delimiter != "auto")
-    format.delimiter = options.delimiter == "comma" ? ',' : options.delimiter == "semicolon" ? ';' : '\t';
+    format.delimiter = options.delimiter == "comma"       ? ','
+                       : options.delimiter == "semicolon" ? ';'
+                       : options.delimiter == "tab"       ? '\t'
+                                                          : ' ';
   return format;
 }
 
@@ -225,7 +231,7 @@ void PrintForPeople(const Source& source, const std::vector<std::string>& column
                         "fields of '" + columns[j] + "' that are no number");
   if (const Finding& commas = table.decimal_commas; commas.count > 0)
     std::cout << Line({commas.count, commas.first_line, "'" + commas.first + "'"},
-                      "numbers with a decimal comma: write a point");
+                      "numbers with a decimal comma: give --decimal comma");
   if (table.headers.count > 0) std::cout << Line(table.headers, "lines that repeat the header");
   for (std::size_t cause = 0; cause < log.dropped.size(); ++cause)
     if (log.dropped[cause].count > 0) {
@@ -413,6 +419,8 @@ int RunImport(ImportArguments options) {
   for (const std::string& path : options.logs) {
     Source& source = sources.emplace_back();
     source.table = ReadLog(path, columns, FormatOf(options));
+    if (source.table.dates.count > 0 && import.time_unit > 0 && options.time_unit != "s")
+      Refuse("time-unit", "the stamps are dates, whose unit is s");
     source.log = Import(source.table, *config.problem, import);
     progress->Advance();
   }
@@ -490,12 +498,16 @@ Command ImportCommand() {
                                "Task file (YAML): its model, dt and domain; its transitions are not read"),
                   Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
                   {"--time", &options->time, "COLUMN",
-                   "The column of the stamps; by default `time`, if there is such a column and no --rate"},
+                   "The column of the stamps, numbers or dates of ISO 8601, or seconds_of(SECONDS,NANOSECONDS); by "
+                   "default `time`, if "
+                   "there is such a column and no --rate"},
                   {"--time-unit", &options->time_unit, "UNIT", "Unit of the stamps: s, ms, us, ns, min, h"},
                   {"--rate", &options->rate, "", "There are no stamps: so many rows are recorded in a second",
                    NumberRange{1e-6, 1e9}},
                   {"--state", &options->states, "NAME=COLUMN",
-                   "The column of a state; by default the one of its name. May be repeated"},
+                   "The column of a state, or yaw_of(QX,QY,QZ,QW) of a quaternion's four, yaw_of(QZ,QW) of a turn "
+                   "about z alone; by "
+                   "default the one of its name. May be repeated"},
                   {"--input", &options->inputs, "NAME=COLUMN", "The same for an input"},
                   {"--unit", &options->units, "NAME=UNIT",
                    "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
@@ -522,7 +534,11 @@ Command ImportCommand() {
                   {.name = "--delimiter",
                    .variable = &options->delimiter,
                    .help = "What stands between two fields; by default the one that the header contains",
-                   .one_of = {"auto", "comma", "semicolon", "tab"}},
+                   .one_of = {"auto", "comma", "semicolon", "tab", "blank"}},
+                  {.name = "--decimal",
+                   .variable = &options->decimal,
+                   .help = "What stands before the decimals of a number",
+                   .one_of = {"point", "comma"}},
                   {"--comment", &options->comment, "TEXT", "A line that begins with this text is a comment"},
                   {"--header", &options->header, "NAMES",
                    "The names of the columns, with commas between, of a log that does not begin with them"},

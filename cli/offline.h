@@ -24,6 +24,10 @@ inline constexpr OfflineCommand kPlan{"plan",
 inline constexpr OfflineCommand kImport{"import",
                                         "Make the transitions of a task from logs of states and inputs: exit 0 with a "
                                         "CSV file, 1 if there is none, 2 bad input"};
+inline constexpr OfflineCommand kImportWorld{"import-world",
+                                             "Make a task's obstacles of a ROS map, a CommonRoad scenario or GeoJSON: "
+                                             "exit 0 with a YAML file, 1 if there are more "
+                                             "than a task takes, 2 bad input"};
 inline constexpr OfflineCommand kFit{"fit",
                                      "Fit the parameters of a model as text to the task's transitions: exit 0 if the "
                                      "search converged, 1 if not, 2 bad input"};
@@ -69,8 +73,8 @@ inline constexpr OfflineCommand kLive{"live",
 inline constexpr OfflineCommand kDemo{"demo",
                                       "Drive a car through circles and traffic, with a report and a picture in ./run"};
 
-inline constexpr OfflineCommand kOfflineCommands[] = {kInit,    kImport, kCheck,   kFit,    kExportModel, kPlan,
-                                                      kDeclare, kVerify, kReplay,  kAdvise, kReport,      kCheckLog,
-                                                      kRun,     kExport, kLogEdit, kLive,   kDemo};
+inline constexpr OfflineCommand kOfflineCommands[] = {
+    kInit,   kImport, kImportWorld, kCheck,    kFit, kExportModel, kPlan,    kDeclare, kVerify,
+    kReplay, kAdvise, kReport,      kCheckLog, kRun, kExport,      kLogEdit, kLive,    kDemo};
 
 }  // namespace forereach

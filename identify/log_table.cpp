@@ -1,8 +1,11 @@
 #include "identify/log_table.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <string_view>
 #include <utility>
 
@@ -36,12 +39,115 @@ Parsed<double> ParseLogged(std::string_view field) {
   return ParseNumber(digits.erase(first, zeros));
 }
 
+// Two or more digits at the front, taken off the text; -1 if there are none.
+int TakeDigits(std::string_view& text, std::size_t count) {
+  int value = 0;
+  if (text.size() < count) return -1;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!IsDigit(text[i])) return -1;
+    value = 10 * value + (text[i] - '0');
+  }
+  text.remove_prefix(count);
+  return value;
+}
+
+bool Take(std::string_view& text, char c) {
+  if (!text.starts_with(c)) return false;
+  text.remove_prefix(1);
+  return true;
+}
+
+// The seconds east of UTC of "Z", "+01:00", "-0130" or nothing.
+std::optional<int> ZoneOf(std::string_view text) {
+  if (text.empty() || text == "Z" || text == "z") return 0;
+  const int sign = text[0] == '-' ? -1 : 1;
+  if (!Take(text, '+') && !Take(text, '-')) return std::nullopt;
+  const int hours = TakeDigits(text, 2);
+  static_cast<void>(Take(text, ':'));
+  const int minutes = text.empty() ? 0 : TakeDigits(text, 2);
+  if (hours < 0 || hours > 23 || minutes < 0 || minutes > 59 || !text.empty()) return std::nullopt;
+  return sign * (3600 * hours + 60 * minutes);
+}
+
+// The seconds since 1970 of a date with a time, NaN if it is none.
+double SecondsOfDate(std::string_view text) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const int year = TakeDigits(text, 4);
+  if (year < 0 || !Take(text, '-')) return kNone;
+  const int month = TakeDigits(text, 2);
+  if (month < 0 || !Take(text, '-')) return kNone;
+  const int day = TakeDigits(text, 2);
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (day < 0 || !date.ok() || !(Take(text, 'T') || Take(text, 't') || Take(text, ' '))) return kNone;
+  const int hour = TakeDigits(text, 2);
+  if (hour < 0 || hour > 23 || !Take(text, ':')) return kNone;
+  const int minute = TakeDigits(text, 2);
+  if (minute < 0 || minute > 59 || !Take(text, ':')) return kNone;
+  const int second = TakeDigits(text, 2);
+  if (second < 0 || second > 60) return kNone;
+  double fraction = 0;
+  if (Take(text, '.') || Take(text, ',')) {
+    const std::size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());
+    if (digits == 0) return kNone;
+    fraction = ParseNumber("0." + std::string(text.substr(0, digits))).value;
+    text.remove_prefix(digits);
+  }
+  const std::optional<int> zone = ZoneOf(text);
+  if (!zone) return kNone;
+  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  return static_cast<double>(days * 86'400LL + hour * 3600 + minute * 60 + second - *zone) + fraction;
+}
+
 bool IsNumber(std::string_view field) { return ParseLogged(field).problem.empty(); }
 
 bool HasDecimalComma(std::string field) {
   const std::size_t at = field.find(',');
   return at != std::string::npos && IsNumber(field.replace(at, 1, "."));
 }
+
+// A wanted column: one of the file's, or what is made of several.
+struct Wanted {
+  enum class Kind { kPlain, kYaw, kHalfYaw, kSeconds };
+
+  Kind kind = Kind::kPlain;
+  std::vector<std::string> names;
+
+  explicit Wanted(const std::string& text) : names{text} {
+    const std::size_t open = text.find('(');
+    const std::string function = text.substr(0, open);
+    if (open == std::string::npos || !text.ends_with(')') || (function != "yaw_of" && function != "seconds_of")) return;
+    std::vector<std::string> arguments;
+    for (std::size_t begin = open + 1; begin < text.size();) {
+      const std::size_t end = std::min(text.find(',', begin), text.size() - 1);
+      arguments.emplace_back(Trimmed(std::string_view(text).substr(begin, end - begin)));
+      begin = end + 1;
+    }
+    const std::size_t count = arguments.size();
+    if (function == "yaw_of" && count != 2 && count != 4)
+      throw ConfigError(text + ": has to be yaw_of(qx,qy,qz,qw), or yaw_of(qz,qw) of a turn about z alone");
+    if (function == "seconds_of" && count != 2) throw ConfigError(text + ": has to be seconds_of(SECONDS,NANOSECONDS)");
+    kind = function == "seconds_of" ? Kind::kSeconds : count == 2 ? Kind::kHalfYaw : Kind::kYaw;
+    names = std::move(arguments);
+  }
+
+  // NaN where a value is none, or they are no unit quaternion.
+  [[nodiscard]] double Of(const std::vector<double>& v) const {
+    const auto if_unit = [](double square, double yaw) {
+      constexpr double kOff = 0.01;
+      return std::abs(std::sqrt(square) - 1) <= kOff ? yaw : std::numeric_limits<double>::quiet_NaN();
+    };
+    switch (kind) {
+      case Kind::kPlain: return v[0];
+      case Kind::kSeconds: return v[0] + v[1] * 1e-9;
+      case Kind::kHalfYaw:
+        return if_unit(v[0] * v[0] + v[1] * v[1], std::remainder(2 * std::atan2(v[0], v[1]), 2 * std::numbers::pi));
+      case Kind::kYaw: break;
+    }
+    const double x = v[0], y = v[1], z = v[2], w = v[3];
+    return if_unit(x * x + y * y + z * z + w * w, std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z));
+  }
+};
 
 // libcsv's parser, fed line by line. Its callbacks are called from C, so they throw nothing.
 class RowParser {
@@ -57,7 +163,7 @@ class RowParser {
     complete_ = goes_on_ = false;
     bytes_ += line.size() + 1;
     std::string problem;
-    if (!Parse(line) || !Parse("\n"))
+    if (!Parse(delimiter_ == ' ' ? WithTabs(line) : line) || !Parse("\n"))
       problem = "quotes inside a field";
     else if (goes_on_)  // libcsv ends a row there, which may be one of another recorder, or a row that was cut off
       problem = "a carriage return inside a row";
@@ -76,8 +182,20 @@ class RowParser {
  private:
   void Begin() {
     csv_init(&parser_, CSV_STRICT);
-    csv_set_delim(&parser_, static_cast<unsigned char>(delimiter_));
+    csv_set_delim(&parser_, static_cast<unsigned char>(delimiter_ == ' ' ? '\t' : delimiter_));
     complete_ = true;
+  }
+  // One tab for all blanks between two fields, which are not inside quotes.
+  static std::string WithTabs(const std::string& line) {
+    std::string text;
+    bool quoted = false;
+    for (const char c : Trimmed(line)) {
+      if (c == '"') quoted = !quoted;
+      const bool is_blank = !quoted && (c == ' ' || c == '\t');
+      if (!is_blank) text += c;
+      if (is_blank && !text.ends_with('\t')) text += '\t';
+    }
+    return text;
   }
   bool Parse(const std::string& text) {
     return csv_parse(&parser_, text.data(), text.size(), &RowParser::TakeField, &RowParser::EndRow, this) ==
@@ -101,7 +219,7 @@ class RowParser {
 class Reader {
  public:
   Reader(const std::string& path, const std::vector<std::string>& wanted, const LogFormat& format)
-      : wanted_(wanted), format_(format), lines_(path) {
+      : wanted_(wanted.begin(), wanted.end()), format_(format), lines_(path) {
     table_.path = path;
     table_.not_a_number.resize(wanted.size());
     if (!format.header.empty()) TakeHeader(format.header);
@@ -117,9 +235,8 @@ class Reader {
   std::vector<std::string> ReadColumns() {
     if (!format_.header.empty()) return format_.header;
     ReadLines([this] { return num_fields_ == 0; });
-    const std::vector<std::string>& names = parser_->fields();
-    if (const std::string why = WhyNoHeader(names); !why.empty()) Fail(first_line_, why);
-    return names;
+    if (const std::string why = WhyNoHeader(header_); !why.empty()) Fail(first_line_, why);
+    return header_;
   }
 
  private:
@@ -145,7 +262,7 @@ class Reader {
     const std::string_view content = Trimmed(line);
     if (!format_.comment.empty() && content.starts_with(format_.comment)) {
       table_.comments.Add(first_line_);
-      if (num_fields_ == 0) comments_.emplace_back(first_line_, Trimmed(content.substr(format_.comment.size())));
+      if (num_fields_ == 0) comments_.emplace_back(Trimmed(content.substr(format_.comment.size())));
       return false;
     }
     if (content.empty()) table_.blank.Add(first_line_);
@@ -159,7 +276,7 @@ class Reader {
       Lose(problem);
     } else if (parser_->is_complete()) {
       if (num_fields_ == 0)
-        TakeHeader(parser_->fields());
+        TakeFirst(parser_->fields());
       else if (!IsSecondHeader(parser_->fields()))
         TakeRow(parser_->fields());
     }
@@ -171,24 +288,71 @@ class Reader {
     bool quoted = false;
     for (const char c : line) {
       if (c == '"') quoted = !quoted;
-      if (!quoted && (c == ',' || c == ';' || c == '\t') && found.find(c) == std::string::npos) found += c;
+      const bool separates = c == ';' || c == '\t' || (c == ',' && !format_.decimal_comma);
+      if (!quoted && separates && found.find(c) == std::string::npos) found += c;
     }
     if (found.size() > 1)
       Fail(first_line_,
            "the fields may be separated by " + Name(found[0]) + " or by " + Name(found[1]) + "; say which it is");
-    return found.empty() ? ',' : found[0];
+    if (!found.empty()) return found[0];
+    return Trimmed(line).find(' ') == std::string_view::npos ? ',' : ' ';
+  }
+
+  // The first row names the columns; of numbers, a comment before it may.
+  void TakeFirst(const std::vector<std::string>& fields) {
+    const bool is_row = std::ranges::all_of(fields, [this](const std::string& field) { return IsValue(field); });
+    const std::vector<std::string> names = is_row ? NamesInComments(fields.size()) : std::vector<std::string>();
+    if (names.empty()) return TakeHeader(fields);
+    TakeHeader(names);
+    TakeRow(fields);
+  }
+
+  // The first comment with so many names, all wanted ones among them if there is such a comment.
+  [[nodiscard]] std::vector<std::string> NamesInComments(std::size_t count) const {
+    std::vector<std::string> first;
+    for (const std::string& comment : comments_) {
+      std::vector<std::string> names = NamesIn(comment);
+      if (names.size() != count) continue;
+      const bool has_all = std::ranges::all_of(wanted_, [&](const Wanted& wanted) {
+        return std::ranges::all_of(
+            wanted.names, [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); });
+      });
+      if (has_all) return names;
+      if (first.empty()) first = std::move(names);
+    }
+    return first;
+  }
+
+  [[nodiscard]] bool IsValue(const std::string& field) const {
+    return IsNumber(field) || (format_.decimal_comma && HasDecimalComma(field)) || !std::isnan(SecondsOfDate(field));
+  }
+
+  // A number or a date; NaN for anything else.
+  double ValueOf(std::string field) {
+    if (format_.decimal_comma)
+      if (const std::size_t at = field.find(','); at != std::string::npos) field[at] = '.';
+    const auto [value, problem] = ParseLogged(field);
+    if (problem.empty()) return value;
+    const double seconds = SecondsOfDate(field);
+    if (!std::isnan(seconds)) table_.dates.Add(first_line_, field.substr(0, kShown));
+    return seconds;
   }
 
   void TakeHeader(const std::vector<std::string>& names) {
     const int line = std::max(1, lines_.line());
-    for (const std::string& name : wanted_) {
-      const auto count = std::ranges::count(names, name);
-      if (count == 0) {
-        const std::string why = WhyNoHeader(names);
-        Fail(line, why.empty() ? "no column '" + name + "'; " + Suggestion(name, names) : why);
+    if (parser_ && parser_->delimiter() == ',' && format_.decimal_comma)
+      Fail(line, "commas separate the fields, so a number with a decimal comma is two");
+    for (const Wanted& wanted : wanted_) {
+      std::vector<std::size_t>& places = places_.emplace_back();
+      for (const std::string& name : wanted.names) {
+        const auto count = std::ranges::count(names, name);
+        if (count == 0) {
+          const std::string why = WhyNoHeader(names);
+          Fail(line, why.empty() ? "no column '" + name + "'; " + Suggestion(name, names) : why);
+        }
+        if (count > 1) Fail(line, fmt::format("{} columns are named '{}'", count, name));
+        places.push_back(static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()));
       }
-      if (count > 1) Fail(line, fmt::format("{} columns are named '{}'", count, name));
-      places_.push_back(static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()));
     }
     num_fields_ = names.size();
     header_ = names;
@@ -198,26 +362,22 @@ class Reader {
   [[nodiscard]] std::string WhyNoHeader(const std::vector<std::string>& fields) const {
     if (fields.size() == 1) {
       constexpr std::pair<char, const char*> kSeparators[] = {
-          {',', "commas"}, {';', "semicolons"}, {'\t', "tabs"}, {' ', "blanks; put commas in their place"}};
+          {',', "commas"}, {';', "semicolons"}, {'\t', "tabs"}, {' ', "blanks"}};
       for (const auto& [separator, name] : kSeparators)
         if (fields[0].find(separator) != std::string::npos)
           return std::string("the fields seem to be separated by ") + name;
     }
-    std::string commented;
-    if (std::ranges::any_of(fields, IsNumber))
-      for (const auto& [line, text] : comments_)
-        if (MayName(text, fields.size()))
-          commented = fmt::format("line {} looks like a header; remove its {}", line, format_.comment);
-    if (!commented.empty() || !std::ranges::all_of(fields, IsNumber)) return commented;
+    if (!std::ranges::all_of(fields, IsNumber)) return "";
     return "this line has numbers only, so no column has a name; give the names of the columns";
   }
 
-  // Whether a comment's text has so many fields, none of them empty or a number.
-  [[nodiscard]] bool MayName(const std::string& text, std::size_t count) const {
+  // The names in a comment; empty if one of its fields is empty or a number.
+  [[nodiscard]] std::vector<std::string> NamesIn(const std::string& text) const {
     RowParser parser(parser_->delimiter());
-    return parser.Feed(text).empty() && parser.is_complete() && parser.fields().size() == count &&
-           std::ranges::none_of(parser.fields(),
-                                [](const std::string& field) { return field.empty() || IsNumber(field); });
+    if (!parser.Feed(text).empty() || !parser.is_complete() ||
+        std::ranges::any_of(parser.fields(), [](const std::string& field) { return field.empty() || IsNumber(field); }))
+      return {};
+    return parser.fields();
   }
 
   // Skips a line that repeats the header; fails at one that has its names and differs.
@@ -247,12 +407,16 @@ class Reader {
       return;
     }
     for (std::size_t j = 0; j < places_.size(); ++j) {
-      const std::string& field = fields[places_[j]];
-      const auto [value, problem] = ParseLogged(field);
-      numbers_.push_back(problem.empty() ? value : std::numeric_limits<double>::quiet_NaN());
-      if (problem.empty()) continue;
+      std::vector<double> values;
+      for (const std::size_t place : places_[j]) values.push_back(ValueOf(fields[place]));
+      numbers_.push_back(wanted_[j].Of(values));
+      if (std::isfinite(numbers_.back())) continue;
+      const auto wrong = std::ranges::find_if(values, [](double value) { return std::isnan(value); });
+      const std::size_t at = wrong == values.end() ? 0 : static_cast<std::size_t>(wrong - values.begin());
+      const std::string& field = fields[places_[j][at]];
       table_.not_a_number[j].Add(first_line_, field.substr(0, kShown));
-      if (HasDecimalComma(field)) table_.decimal_commas.Add(first_line_, field.substr(0, kShown));
+      if (!format_.decimal_comma && HasDecimalComma(field))
+        table_.decimal_commas.Add(first_line_, field.substr(0, kShown));
     }
     table_.lines.push_back(first_line_);
     table_.after_loss.push_back(std::exchange(lost_, false));
@@ -263,17 +427,17 @@ class Reader {
     lost_ = true;
   }
 
-  const std::vector<std::string>& wanted_;
+  const std::vector<Wanted> wanted_;
   const LogFormat& format_;
   LineReader lines_;
   LogTable table_;
-  std::unique_ptr<RowParser> parser_;                  // from the first row on, which shows the delimiter
-  std::size_t num_fields_ = 0;                         // 0 before the header
-  std::vector<std::size_t> places_;                    // of the wanted columns
-  std::vector<double> numbers_;                        // row by row
-  std::vector<std::string> header_;                    // the names of all columns
-  std::vector<std::pair<int, std::string>> comments_;  // before the header, with their lines
-  int first_line_ = 0;                                 // of the row
+  std::unique_ptr<RowParser> parser_;             // from the first row on, which shows the delimiter
+  std::size_t num_fields_ = 0;                    // 0 before the header
+  std::vector<std::vector<std::size_t>> places_;  // of the wanted columns
+  std::vector<double> numbers_;                   // row by row
+  std::vector<std::string> header_;               // the names of all columns
+  std::vector<std::string> comments_;             // before the header
+  int first_line_ = 0;                            // of the row
   bool lost_ = false;
 };
 

@@ -2,9 +2,11 @@
 anything.
 
 Fields may be in double quotes, also column names. White space around a field is ignored, and so are blank lines and
-comment lines. Nothing is guessed: a field that is not one decimal number is NaN and counted, and a row with more or
-fewer fields than the header is left out and counted. Zeros in front of a number are part of it: 08.00 is 8. A line that
-repeats the header is skipped and counted; a header that differs is refused. libcsv reads the fields. */
+comment lines. Nothing is guessed: a field that is neither one decimal number nor a date is NaN and counted, and a row
+with more or fewer fields than the header is left out and counted. Zeros in front of a number are part of it: 08.00
+is 8. A date of ISO 8601, such as 2026-01-31T12:00:00.25+01:00, is its seconds since 1970; without a zone it is UTC. A
+line that repeats the header is skipped and counted; a header that differs is refused. If the file begins with numbers,
+a comment before them with as many names as they have fields is the header. libcsv reads the fields. */
 #pragma once
 
 #include <cstdint>
@@ -17,8 +19,11 @@ repeats the header is skipped and counted; a header that differs is refused. lib
 namespace forereach {
 
 struct LogFormat {
-  /** ',', ';' or a tab. None: the one of them that the header contains. */
+  /** ',', ';', a tab, or ' ' for any blanks and tabs. None: the one of them that the header contains, blanks if none
+   * else.
+   */
   std::optional<char> delimiter;
+  bool decimal_comma = false;  ///< 0,5 is a half. Fields are not separated by commas then.
   /** A line that begins with this text is a comment. Empty: there are no comments. */
   std::string comment = "#";
   /** The names of the columns, if the file does not begin with them. */
@@ -44,10 +49,16 @@ struct LogTable {
   Finding blank, comments, lost;      ///< Lines without a row, and rows left out.
   Finding headers;                    ///< Lines that repeat the header; a row is left out there.
   Finding decimal_commas;             ///< Fields of wanted columns such as 0,5, which are no number here.
+  Finding dates;                      ///< Fields that are dates.
   std::vector<Finding> not_a_number;  ///< For each wanted column.
 };
 
 /** Reads the wanted columns of a log. Cost: linear in the file.
+@param wanted names of columns, or what is made of several:
+    yaw_of(qx,qy,qz,qw)     the yaw of a unit quaternion, in (-pi, pi], as R = R_z(yaw) R_y R_x,
+    yaw_of(qz,qw)           the same of a turn about z alone: 2 atan2(qz, qw),
+    seconds_of(s,ns)        seconds and nanoseconds.
+A quaternion whose length differs from 1 by more than 1 % is no number.
 @throws ConfigError with file and line: the file cannot be read, has no header, names a wanted column twice or not at
 all, has a second header that differs, or ends inside a quoted field; the delimiter is not clear. */
 [[nodiscard]] LogTable ReadLog(const std::string& path, const std::vector<std::string>& wanted,

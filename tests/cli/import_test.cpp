@@ -163,32 +163,48 @@ TEST_F(ForeignLogTest, ALineOfUnitsIsNoSecondHeader) {
   EXPECT_EQ(Import(header_ + "s,m,m/s,m/s^2\n" + Rows(0, 40)).code, 0);
 }
 
-TEST_F(ForeignLogTest, AHeaderThatIsACommentIsNamed) {
-  for (const char* options : {"", "--time time"}) {
-    const Output output = Import("# made by hand\n# time,p,v,a\n" + Rows(0, 20), options);
-    EXPECT_EQ(output.code, 2) << options;
-    EXPECT_THAT(output.text, HasSubstr("line 2 looks like a header; remove its #")) << options;
-  }
-  EXPECT_THAT(Import("# monday, in the hall, two laps, dry\n" + header_ + Rows(0, 20)).text, Not(HasSubstr("remove")));
-  EXPECT_THAT(Import("# 1,2,3,4\n# hall,wet\n" + Rows(0, 20)).text, Not(HasSubstr("remove")));
+TEST_F(ForeignLogTest, AHeaderMayBeAComment) {
+  for (const char* options : {"", "--time time"})
+    for (const char* comments : {"# made by hand\n# time,p,v,a\n", "#time,p,v,a\n# s,m,m/s,m/s^2\n"})
+      EXPECT_THAT(Import(comments + Rows(0, 20), options), Exits(0, "19 transitions from 20 rows")) << options;
+  EXPECT_THAT(Import("# monday, in the hall, two laps, dry\n" + header_ + Rows(0, 20)), Exits(0, "from 20 rows"));
+  EXPECT_THAT(Import("# 1,2,3,4\n# hall,wet\n" + Rows(0, 20)), Exits(2, "this line has numbers only"));
 }
 
-TEST_F(ForeignLogTest, DecimalCommasAreNamed) {
+TEST_F(ForeignLogTest, DecimalCommasAreNamedAndReadIfAskedFor) {
   std::string rows = Rows(0, 20, "{:.1f};{:.4f};{:.2f};1\n");
   std::ranges::replace(rows, '.', ',');
   EXPECT_THAT(Import("time;p;v;a\n" + rows),
-              Exits(1, "60  numbers with a decimal comma: write a point; first in line 2 ('0,0')"));
+              Exits(1, "60  numbers with a decimal comma: give --decimal comma; first in line 2 ('0,0')"));
+  EXPECT_THAT(Import("time;p;v;a\n" + rows, "--decimal comma"), Exits(0, "19 transitions from 20 rows"));
+  EXPECT_EQ(LoadTransitions(scratch_ / "steps.csv", *LoadConfig(scratch_ / "task.yaml").problem->model).z(1, 0), 0.805);
+  EXPECT_THAT(Import("time,p,v,a\n" + Rows(0, 20), "--decimal comma --delimiter comma"),
+              Exits(2, "commas separate the fields"));
 }
 
-TEST_F(ForeignLogTest, OtherSeparatorsAreNamed) {
-  for (const char* options : {"", "--time time"}) {
-    const Output blanks = Import("time p v a\n" + Rows(0, 20, "{:.1f} {:.4f} {:.2f} 1\n"), options);
-    EXPECT_EQ(blanks.code, 2);
-    EXPECT_THAT(blanks.text, HasSubstr("log.csv:1: the fields seem to be separated by blanks"));
-  }
+TEST_F(ForeignLogTest, BlanksMaySeparateFields) {
+  for (const char* options : {"", "--time time", "--delimiter blank"})
+    for (const char* header : {"time p v a\n", "#  time   p v  a \n", "\"time\" p v a\n"})
+      EXPECT_THAT(Import(header + Rows(0, 20, "  {:.1f}   {:.4f} {:.2f} 1 \n"), options),
+                  Exits(0, "19 transitions from 20 rows"));
   const Output semicolons = Import("time;p;v;a\n" + Rows(0, 20, "{:.1f};{:.4f};{:.2f};1\n"), "--delimiter comma");
   EXPECT_EQ(semicolons.code, 2);
   EXPECT_THAT(semicolons.text, HasSubstr("log.csv:1: the fields seem to be separated by semicolons"));
+}
+
+TEST_F(ForeignLogTest, StampsMayBeDatesOrSecondsAndNanoseconds) {
+  std::string dates = header_, parts = "sec,nsec,p,v,a\n";
+  for (int i = 0; i < 20; ++i) {
+    const double t = 0.1 * i, p = 8 * t + t * t / 2, v = 8 + t;
+    dates += fmt::format("2026-01-31T23:59:{:04.1f}+01:00,{:.4f},{:.2f},1\n", 58 + t, p, v);
+    parts += fmt::format("{},{},{:.4f},{:.2f},1\n", 1'700'000'000 + i / 10, 100'000'000 * (i % 10), p, v);
+  }
+  EXPECT_THAT(Import(dates), Exits(0, "19 transitions from 20 rows", Not(HasSubstr("off t + dt"))));
+  EXPECT_THAT(Import(dates, "--time time --time-unit ms"), Exits(2, "--time-unit: the stamps are dates"));
+  EXPECT_THAT(Import(parts, "--time 'seconds_of(sec, nsec)'"),
+              Exits(0, "19 transitions from 20 rows", Not(HasSubstr("off t + dt"))));
+  EXPECT_THAT(Import(parts, "--time 'seconds_of(sec)'"), Exits(2, "seconds_of(SECONDS,NANOSECONDS)"));
+  EXPECT_THAT(Import(parts, "--time 'seconds_of(sec,nano)'"), Exits(2, "no column 'nano'"));
 }
 
 TEST_F(ForeignLogTest, StampsThatGoBackAreNamed) {

@@ -3,6 +3,9 @@
 
 #include "tests/test.h"
 
+#include <Eigen/Geometry>
+
+#include "forereach/numerics/text.h"
 #include "task/config_error.h"
 #include "tests/identify/seed.h"
 
@@ -91,11 +94,47 @@ TEST_F(LogTableTest, RefusesALogWhoseColumnsAreNotClear) {
 }
 
 TEST_F(LogTableTest, TakesAGivenFormat) {
-  EXPECT_EQ(Table("1,2\n3,4\n", {.delimiter = {}, .comment = "#", .header = {"t", "pos x"}}).values.rows(), 2);
-  EXPECT_EQ(Table("% x\nt;pos x\n1;2\n", {.delimiter = ';', .comment = "%", .header = {}}).values.rows(), 1);
-  EXPECT_EQ(Table("t,pos x\n#,2\n", {.delimiter = {}, .comment = "", .header = {}}).not_a_number[0].count, 1);
-  EXPECT_THAT(Error("t;pos x,y\n1;2\n", {.delimiter = ',', .comment = "#", .header = {}}),
-              HasSubstr("log.csv:1: no column 't'"));
+  EXPECT_EQ(Table("1,2\n3,4\n", {.header = {"t", "pos x"}}).values.rows(), 2);
+  EXPECT_EQ(Table("% x\nt;pos x\n1;2\n", {.delimiter = ';', .comment = "%"}).values.rows(), 1);
+  EXPECT_EQ(Table("t,pos x\n#,2\n", {.comment = ""}).not_a_number[0].count, 1);
+  EXPECT_THAT(Error("t;pos x,y\n1;2\n", {.delimiter = ','}), HasSubstr("log.csv:1: no column 't'"));
+}
+
+TEST_F(LogTableTest, ADateIsItsSecondsSince1970) {
+  const auto seconds = [&](const std::string& date) { return Table("t,pos x\n\"" + date + "\",0\n").values(0, 0); };
+  EXPECT_EQ(seconds("1970-01-01T00:00:00Z"), 0);
+  EXPECT_EQ(seconds("2026-01-31T12:34:56.25Z"), 1769862896.25);
+  EXPECT_EQ(seconds("2026-01-31 12:34:56,25"), 1769862896.25) << "UTC";
+  EXPECT_EQ(seconds("2026-01-31T13:34:56.25+01:00"), 1769862896.25);
+  EXPECT_EQ(seconds("2026-01-31T11:04:56.25-0130"), 1769862896.25);
+  EXPECT_EQ(seconds("1969-12-31T23:59:59Z"), -1);
+  EXPECT_EQ(seconds("2024-02-29T00:00:00Z") + 86400, seconds("2024-03-01T00:00:00Z"));
+  for (const char* none :
+       {"2026-02-29T00:00:00Z", "2026-01-31", "2026-01-31T24:00:00Z", "2026-13-01T00:00:00Z", "2026-01-31T12:00",
+        "2026-01-31T12:00:00.Z", "2026-01-31T12:00:00+1", "26-01-31T12:00:00Z", "2026-01-31T12:00:00 Z"})
+    EXPECT_TRUE(std::isnan(seconds(none))) << none;
+  EXPECT_EQ(Table("t,pos x\n2026-01-31T12:34:56Z,0\n").dates.count, 1);
+}
+
+TEST_F(LogTableTest, AYawIsMadeOfAQuaternion) {
+  const auto yaw = [&](double roll, double pitch, double angle, double scale) {
+    const Eigen::Quaterniond q = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()) *
+                                 Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+                                 Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
+    const std::string path =
+        files_.Write("q.csv", "w,x,y,z\n" + ToText(scale * q.w()) + "," + ToText(scale * q.x()) + "," +
+                                  ToText(scale * q.y()) + "," + ToText(scale * q.z()) + "\n");
+    return ReadLog(path, {"yaw_of(x, y,z,w)", "yaw_of(z,w)"}, {}).values;
+  };
+  for (const double angle : {-3.0, -1.0, 0.0, 0.5, 3.1}) {
+    EXPECT_NEAR(yaw(0, 0, angle, 1)(0), angle, 1e-12);
+    EXPECT_NEAR(yaw(0, 0, angle, -1.004)(1), angle, 1e-12) << "the negative is the same turn";
+    EXPECT_NEAR(yaw(0.3, -0.4, angle, 1)(0), angle, 1e-12);
+  }
+  EXPECT_TRUE(std::isnan(yaw(0, 0, 1, 1.02)(0)));
+  EXPECT_TRUE(std::isnan(yaw(0.3, 0, 1, 1)(1))) << "it is no turn about z alone";
+  EXPECT_THAT(Thrown<ConfigError>([&] { (void)ReadLog(files_.Write("q.csv", "w,x\n1,2\n"), {"yaw_of(x)"}, {}); }),
+              HasSubstr("yaw_of(qz,qw)"));
 }
 
 // Any bytes give a table or an error, and a table has as many numbers as it says.

@@ -1,0 +1,200 @@
+// Scenarios of CommonRoad: what a vehicle covers at any time between two of its states is in the world then.
+#include "worlds/commonroad.h"
+
+#include <fmt/format.h>
+
+#include "task/config_error.h"
+#include "tests/test.h"
+#include "tests/worlds/in_pieces.h"
+
+namespace forereach::commonroad_test {
+
+std::string Bound(const std::vector<PlanePoint>& points) {
+  std::string text;
+  for (const auto& [x, y] : points) text += fmt::format("<point><x>{}</x><y>{}</y></point>", x, y);
+  return text;
+}
+
+std::string Lanelet(int id, const std::vector<PlanePoint>& left, const std::vector<PlanePoint>& right,
+                    const std::string& more = "") {
+  return fmt::format("<lanelet id=\"{}\"><leftBound>{}</leftBound><rightBound>{}</rightBound>{}</lanelet>\n", id,
+                     Bound(left), Bound(right), more);
+}
+
+std::string Exact(const char* name, double value) { return fmt::format("<{0}><exact>{1}</exact></{0}>", name, value); }
+std::string Between(const char* name, double lower, double upper) {
+  return fmt::format("<{0}><intervalStart>{1}</intervalStart><intervalEnd>{2}</intervalEnd></{0}>", name, lower, upper);
+}
+
+std::string State(const char* name, double x, double y, double yaw, int step) {
+  return fmt::format("<{0}><position><point><x>{1}</x><y>{2}</y></point></position>{3}{4}</{0}>", name, x, y,
+                     Exact("orientation", yaw), Exact("time", step));
+}
+
+constexpr const char* kCar = "<shape><rectangle><length>4</length><width>2</width></rectangle></shape>";
+
+class CommonRoadTest : public testing::Test {
+ protected:
+  World Scenario(const std::string& content, const CommonRoadOptions& options = {}) {
+    return ReadCommonRoad(scratch_.Write("scenario.xml", kHead + content + "</commonRoad>\n"), options);
+  }
+  std::string WhyNot(const std::string& content) {
+    return scratch_.Cut(Thrown<ConfigError>([&] { static_cast<void>(Scenario(content)); }));
+  }
+  static ExactPoint At(double x, double y) { return ToExact({x, y}); }
+
+  std::string kHead = "<?xml version='1.0'?>\n<commonRoad timeStepSize=\"0.1\" commonRoadVersion=\"2020a\">\n";
+  ScratchDirectory scratch_;
+};
+
+TEST_F(CommonRoadTest, TheBoundaryIsWhereNoNeighbourIs) {
+  const World world =
+      Scenario(Lanelet(1, {{0, 4}, {10, 4}, {20, 4}}, {{0, 0}, {10, 0}, {20, 1}},
+                       "<adjacentLeft ref=\"2\" drivingDir=\"same\"/>") +
+               Lanelet(2, {{0, 8}, {20, 8}}, {{0, 4}, {20, 4}},
+                       "<adjacentLeft ref=\"7\" drivingDir=\"same\"/><adjacentRight ref=\"1\" drivingDir=\"same\"/>"));
+  EXPECT_TRUE(Contains(world, At(5, 0)) && Contains(world, At(20, 1)) && Contains(world, At(15, 8)))
+      << "lanelet 7 does not exist";
+  EXPECT_FALSE(Contains(world, At(5, 4)) || Contains(world, At(5, 0.01)));
+  EXPECT_EQ(world.pieces.size(), 3u);
+}
+
+TEST_F(CommonRoadTest, SegmentsNearTheirChordAreOnePiece) {
+  std::vector<PlanePoint> left, right;
+  for (int i = 0; i <= 40; ++i) {
+    left.push_back({i / 2.0, 4 + 0.0005 * i * i});
+    right.push_back({i / 2.0, 0.0005 * i * i});
+  }
+  const World exact = Scenario(Lanelet(1, left, right), {.thickness = 0}),
+              thin = Scenario(Lanelet(1, left, right), {.thickness = 0.05});
+  EXPECT_EQ(exact.pieces.size(), 80u);
+  EXPECT_LT(thin.pieces.size(), 12u);
+  for (std::size_t i = 0; i + 1 < left.size(); ++i)
+    EXPECT_TRUE(Contains(thin, {(Rational(left[i].x) + Rational(left[i + 1].x)) / 2,
+                                (Rational(left[i].y) + Rational(left[i + 1].y)) / 2}));
+}
+
+// Two roads cross: their bounds are open where the other road is.
+TEST_F(CommonRoadTest, ACrossingIsOpen) {
+  const std::vector<PlanePoint> low{{-20, -2}, {-2, -2}, {2, -2}, {20, -2}}, high{{-20, 2}, {-2, 2}, {2, 2}, {20, 2}};
+  std::vector<PlanePoint> west, east;
+  for (const auto& [x, y] : low) west.push_back({y, x}), east.push_back({-y, x});
+  const World world = Scenario(Lanelet(1, high, low) + Lanelet(2, west, east));
+  EXPECT_FALSE(Contains(world, At(0, 2)) || Contains(world, At(2, 0)) || Contains(world, At(0, -2)));
+  EXPECT_TRUE(Contains(world, At(-10, 2)) && Contains(world, At(2, 10)) && Contains(world, At(10, -2)));
+  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("4 segments inside another lanelet")));
+}
+
+TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {
+  const World world = Scenario(std::string("<staticObstacle id=\"3\"><type>car</type>") + kCar +
+                               State("initialState", 10, 5, std::numbers::pi / 2, 0) + "</staticObstacle>");
+  EXPECT_TRUE(Contains(world, At(10, 7)) && Contains(world, At(9.0000001, 3.0000001)));
+  EXPECT_FALSE(Contains(world, At(12, 5)) || Contains(world, At(10, 7.0001)));
+  EXPECT_EQ(world.pieces[0].name, "staticObstacle 3");
+}
+
+TEST_F(CommonRoadTest, IntervalsOfAStateAreCovered) {
+  const World world =
+      Scenario(std::string("<staticObstacle id=\"3\">") + kCar +
+               "<initialState><position><rectangle><length>2</length><width>1</width><center><x>10</x><y>5</y></center>"
+               "</rectangle></position>" +
+               Between("orientation", -0.2, 0.3) + "</initialState></staticObstacle>");
+  for (const double yaw : {-0.2, 0.0, 0.3})
+    for (const double x : {9.0, 11.0})
+      for (const double y : {4.5, 5.5})
+        for (const auto& [along, across] : {std::pair(2, 1), {-2, 1}, {2, -1}, {-2, -1}})
+          EXPECT_TRUE(Contains(world, At(x + along * std::cos(yaw) - across * std::sin(yaw),
+                                         y + along * std::sin(yaw) + across * std::cos(yaw))));
+}
+
+// The center on a straight line, an even turn: corners and middles of the sides at any time.
+TEST_F(CommonRoadTest, MotionBetweenStatesIsCovered) {
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int round = 0; round < 20; ++round) {
+    struct Pose {
+      double x, y, yaw;
+    };
+    std::vector<Pose> poses;
+    std::string states;
+    for (int i = 0; i < 6; ++i) {
+      poses.push_back({3.0 * i + unit(random), unit(random), 3.1 + 0.8 * unit(random)});
+      const double wrapped = std::remainder(poses[i].yaw, 2 * std::numbers::pi);
+      states +=
+          State(i == 0 ? "initialState" : "state", poses[i].x, poses[i].y, wrapped, i) + (i == 0 ? "<trajectory>" : "");
+    }
+    const World world =
+        Scenario(std::string("<dynamicObstacle id=\"1\">") + kCar + states + "</trajectory></dynamicObstacle>",
+                 {.steps_per_window = 1 + round % 3});
+    EXPECT_LE(world.pieces.size(), 5u);
+    for (int k = 0; k <= 500; ++k) {
+      const double s = k % 100 / 100.0;
+      const auto i = static_cast<std::size_t>(std::min(4, k / 100));
+      const Pose &a = poses[i], &b = poses[i + 1];
+      const double x = a.x + s * (b.x - a.x), y = a.y + s * (b.y - a.y), yaw = a.yaw + s * (b.yaw - a.yaw);
+      const double time = 0.1 * (static_cast<double>(i) + s);
+      for (const auto& [along, across] : {std::pair(2, 1), {-2, 1}, {2, -1}, {-2, -1}, {0, 1}, {2, 0}})
+        EXPECT_TRUE(Contains(
+            world,
+            At(x + along * std::cos(yaw) - across * std::sin(yaw), y + along * std::sin(yaw) + across * std::cos(yaw)),
+            time));
+    }
+  }
+}
+
+TEST_F(CommonRoadTest, OccupancySetsAndShapesOfSeveralParts) {
+  const auto occupancy = [](double x, const std::string& time) {
+    return fmt::format(
+        "<occupancy><shape><circle><radius>1</radius><center><x>{}</x><y>0</y></center></circle></shape>{}"
+        "</occupancy>",
+        x, time);
+  };
+  const World world = Scenario(std::string("<dynamicObstacle id=\"1\">") + kCar + State("initialState", 0, 0, 0, 0) +
+                               "<occupancySet>" + occupancy(3, Between("time", 1, 2)) + occupancy(9, Exact("time", 3)) +
+                               "</occupancySet></dynamicObstacle>" + "<phantomObstacle id=\"2\"><occupancySet>" +
+                               occupancy(50, Between("time", 0, 5)) + "</occupancySet></phantomObstacle>");
+  EXPECT_TRUE(Contains(world, At(3, 1), 0.15) && Contains(world, At(6, 1), 0.25) && Contains(world, At(50, 0), 0.5));
+  EXPECT_FALSE(Contains(world, At(3, 0), 0.35) || Contains(world, At(9, 0), 0.05) || Contains(world, At(50, 0), 0.6));
+  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("The first prediction ends at 0.30")));
+}
+
+TEST_F(CommonRoadTest, WithoutAPredictionItStands) {
+  const World world =
+      Scenario(std::string("<dynamicObstacle id=\"1\">") + kCar + State("initialState", 0, 0, 0, 0) +
+               "</dynamicObstacle><environmentObstacle id=\"9\"><shape><polygon>" +
+               Bound({{10, 0}, {14, 0}, {14, 4}, {13, 1}}) + "</polygon></shape></environmentObstacle>");
+  EXPECT_TRUE(Contains(world, At(0, 0), 100) && Contains(world, At(12, 0.1)));
+  EXPECT_FALSE(Contains(world, At(12.5, 1.5))) << "the polygon is not convex";
+  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("No prediction of dynamicObstacle 1")));
+}
+
+TEST_F(CommonRoadTest, RefusesWithTheLine) {
+  const std::string car = std::string("<staticObstacle id=\"3\">") + kCar;
+  EXPECT_THAT(WhyNot("\n" + car + "</staticObstacle>"),
+              HasSubstr("scenario.xml:4: staticObstacle: has no initialState"));
+  EXPECT_THAT(WhyNot(car + "<initialState><position><point><x>1</x><y>b</y></point></position>" +
+                     Exact("orientation", 0) + "</initialState></staticObstacle>"),
+              HasSubstr("y: 'b'"));
+  EXPECT_THAT(WhyNot(car + "<initialState><position><lanelet ref=\"1\"/></position>" + Exact("orientation", 0) +
+                     "</initialState></staticObstacle>"),
+              HasSubstr("lanelet: is no rectangle, circle or polygon"));
+  EXPECT_THAT(WhyNot("<environmentObstacle id=\"1\"><shape><polygon>" + Bound({{0, 0}, {1, 1}, {1, 0}, {0, 1}}) +
+                     "</polygon></shape></environmentObstacle>"),
+              HasSubstr("polygon: the side from"));
+  EXPECT_THAT(WhyNot(std::string("<dynamicObstacle id=\"1\">") + kCar + State("initialState", 0, 0, 0, 3) +
+                     "<trajectory>" + State("state", 0, 0, 0, 2) + "</trajectory></dynamicObstacle>"),
+              HasSubstr("not in the order of time"));
+  EXPECT_THAT(WhyNot("<mysteryObstacle id=\"1\"/>"), HasSubstr("no kind of obstacle"));
+  EXPECT_THAT(WhyNot("<lanelet>"), HasSubstr("scenario.xml:3: is no XML"));
+  std::string deep;
+  for (int i = 0; i < 100; ++i) deep += "<a>";
+  EXPECT_THAT(WhyNot(deep), HasSubstr("nest deeper"));
+  kHead = "<!DOCTYPE a [<!ENTITY b \"b\">]>\n<commonRoad>";
+  EXPECT_THAT(WhyNot(""), HasSubstr("document type declaration"));
+  kHead = "<commonRoad timeStepSize=\"0.1\" commonRoadVersion=\"2018b\">";
+  EXPECT_THAT(WhyNot(""), HasSubstr("commonRoadVersion is 2018b, has to be 2020a"));
+}
+
+}  // namespace forereach::commonroad_test

@@ -1,0 +1,173 @@
+// Maps of ROS: any bytes, and cells that are covered to the last bit.
+#include "worlds/occupancy_map.h"
+
+#include "task/config_error.h"
+#include "tests/test.h"
+#include "tests/worlds/in_pieces.h"
+
+namespace forereach::occupancy_map_test {
+
+using namespace std::string_literals;
+
+GrayImage Pgm(const std::string& bytes) { return ReadPgm("map.pgm", bytes); }
+std::string Refusal(const std::string& bytes) {
+  return Thrown<ConfigError>([&] { static_cast<void>(Pgm(bytes)); });
+}
+
+TEST(Pgm, IsReadInBothFormatsWithComments) {
+  const std::vector<std::uint16_t> expected{0, 205, 254, 100, 7, 255};
+  EXPECT_EQ(Pgm("P2 # a comment\n3\n# another\n2 255\n0 205 254\n100 7 255\n").values, expected);
+  const GrayImage image = Pgm("P5\n# CREATOR: map_saver\n3 2\n255\n\x00\xcd\xfe\x64\x07\xff"s);
+  EXPECT_EQ(image.values, expected);
+  EXPECT_EQ(image.width, 3);
+  EXPECT_EQ(image.height, 2);
+  EXPECT_EQ(Pgm("P5 1 2 65535 \x01\x02\xff\xff"s).values, (std::vector<std::uint16_t>{258, 65535}));
+}
+
+TEST(Pgm, RefusesWhatIsNoneAndAllocatesNothingForIt) {
+  EXPECT_THAT(Refusal(""), HasSubstr("no PGM image"));
+  EXPECT_THAT(Refusal("\x89PNG"), HasSubstr("no PGM image"));
+  EXPECT_THAT(Refusal("P5"), HasSubstr("no number where the width has to be"));
+  EXPECT_THAT(Refusal("P5 # no end"), HasSubstr("no number"));
+  EXPECT_THAT(Refusal("P5 99999999999999999999 1 255 "), HasSubstr("width is above"));
+  EXPECT_THAT(Refusal("P5 60000000 60000000 255 "), HasSubstr("3600000000000000 pixels"));
+  EXPECT_THAT(Refusal("P5 8000 8000 255 abc"), HasSubstr("cut off: 3 bytes of pixels, it has to have 64000000"));
+  EXPECT_THAT(Refusal("P2 8000 8000 255 1 2"), HasSubstr("cut off"));
+  EXPECT_THAT(Refusal("P5 2 1 65535 abc"), HasSubstr("cut off"));
+  EXPECT_THAT(Refusal("P5 0 4 255 "), HasSubstr("no pixels"));
+  EXPECT_THAT(Refusal("P5 1 1 65536 "), HasSubstr("largest value is above"));
+  EXPECT_THAT(Refusal("P5 1 1 0 a"), HasSubstr("no pixels"));
+  EXPECT_THAT(Refusal("P5 1 1 10 z"), HasSubstr("pixel 0 is 122, above the largest value 10"));
+  EXPECT_THAT(Refusal("P2 2 1 10 3 -4"), HasSubstr("no number"));
+  EXPECT_THAT(Refusal("P5 1 1 255"), HasSubstr("white space"));
+}
+
+TEST(Blocks, AreExactlyTheOccupiedCells) {
+  const unsigned seed = std::random_device()();
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  for (int round = 0; round < 300; ++round) {
+    const int width = 1 + static_cast<int>(random() % 20), height = 1 + static_cast<int>(random() % 20);
+    std::vector<bool> occupied(static_cast<std::size_t>(width * height)), covered(occupied.size());
+    for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = random() % (1 + round % 5) == 0;
+    for (const CellBlock& block : Blocks(occupied, width, height))
+      for (int row = block.row; row < block.row + block.height; ++row)
+        for (int column = block.column; column < block.column + block.width; ++column)
+          covered[static_cast<std::size_t>(row * width + column)] = true;
+    ASSERT_EQ(covered, occupied);
+  }
+}
+
+TEST(Blocks, AreFew) {
+  EXPECT_THAT(Blocks({}, 0, 0), IsEmpty());
+  EXPECT_EQ(Blocks(std::vector<bool>(600, true), 30, 20).size(), 1u);
+  // A cross: one along, one across, over each other.
+  EXPECT_EQ(Blocks({false, true, false, true, true, true, false, true, false}, 3, 3).size(), 2u);
+}
+
+class MapTest : public testing::Test {
+ protected:
+  static constexpr const char* kYaml =
+      "image: map.pgm\nresolution: 0.1\norigin: [-0.3, 0.7, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+  // From the top: occupied, unknown, free; free, free, occupied.
+  MapTest() { scratch_.Write("map.pgm", "P2 3 2 255 0 205 254 254 254 0"); }
+
+  World Map(const std::string& yaml, const MapOptions& options = {}) {
+    return ReadOccupancyMap(scratch_.Write("map.yaml", yaml), options);
+  }
+  std::string WhyNot(const std::string& yaml) {
+    return scratch_.Cut(Thrown<ConfigError>([&] { static_cast<void>(Map(yaml)); }));
+  }
+  static std::string With(const std::string& line) { return kYaml + line + "\n"; }
+  static std::string Instead(const std::string& key, const std::string& line) {
+    std::string yaml = kYaml;
+    const std::size_t at = yaml.find(key);
+    return yaml.replace(at, yaml.find('\n', at) - at, line);
+  }
+  // The middle of a cell, counted from the lower left.
+  static ExactPoint Middle(int column, int row) {
+    return {Rational(-0.3) + Rational(0.1) * Rational(column + 0.5),
+            Rational(0.7) + Rational(0.1) * Rational(row + 0.5)};
+  }
+
+  ScratchDirectory scratch_;
+};
+
+TEST_F(MapTest, CellsStandWhereTheOriginSays) {
+  const World world = Map(kYaml, {.unknown_is_free = true});
+  EXPECT_EQ(world.pieces.size(), 2u);
+  for (int column = -1; column < 4; ++column)
+    for (int row = -1; row < 3; ++row)
+      EXPECT_EQ(Contains(world, Middle(column, row)), (column == 0 && row == 1) || (column == 2 && row == 0))
+          << column << ", " << row;
+}
+
+TEST_F(MapTest, UnknownCellsAndAllBeyondAreOccupied) {
+  const World world = Map(kYaml);
+  for (int column = -3; column < 9; ++column)
+    for (int row = -3; row < 9; ++row) {
+      const bool is_free = (row == 0 && (column == 0 || column == 1)) || (row == 1 && column == 2);
+      EXPECT_EQ(Contains(world, Middle(column, row)), !is_free) << column << ", " << row;
+    }
+}
+
+TEST_F(MapTest, CornersAreCoveredToTheLastBit) {
+  const World world = Map(kYaml, {.unknown_is_free = true});
+  const Rational left = Rational(-0.3) + 2 * Rational(0.1), low(0.7), side(0.1);
+  for (const auto& [x, y] : {std::pair(left, low), {left + side, low}, {left + side, low + side}, {left, low + side}})
+    EXPECT_TRUE(Contains(world, {x, y}));
+}
+
+TEST_F(MapTest, ATurnedMapCoversItsCells) {
+  const World world = Map(Instead("origin", "origin: [-0.3, 0.7, 0.5]"));
+  const Real cosine = cos(Real(0.5)), sine = sin(Real(0.5));
+  // Each corner of an occupied cell is left of all sides of one polygon, or inside by 1e-30.
+  const auto is_covered = [&](const Real& u, const Real& v) {
+    const Real x = Real(-0.3) + cosine * u - sine * v, y = Real(0.7) + sine * u + cosine * v;
+    return std::ranges::any_of(world.pieces, [&](const World::Piece& piece) {
+      const Ring hull = CornersOf(piece.obstacle);
+      for (std::size_t i = 0; i < hull.size(); ++i) {
+        const PlanePoint &a = hull[i], &b = hull[(i + 1) % hull.size()];
+        const Real turn = (Real(b.x) - Real(a.x)) * (y - Real(a.y)) - (Real(b.y) - Real(a.y)) * (x - Real(a.x));
+        if (turn < Real(0)) return false;
+      }
+      return true;
+    });
+  };
+  for (int column = -1; column < 4; ++column)
+    for (int row = -1; row < 3; ++row) {
+      const bool is_free = (row == 0 && (column == 0 || column == 1)) || (row == 1 && column == 2);
+      const auto at = [&](double share_x, double share_y) {
+        return is_covered(Real(0.1) * Real(column + share_x), Real(0.1) * Real(row + share_y));
+      };
+      EXPECT_EQ(at(0.5, 0.5), !is_free) << column << ", " << row;
+      EXPECT_TRUE(is_free || (at(0, 0) && at(1, 0) && at(1, 1) && at(0, 1))) << column << ", " << row;
+    }
+}
+
+TEST_F(MapTest, CoarserCellsCoverTheFineOnes) {
+  const World world = Map(kYaml, {.unknown_is_free = true, .coarsen = 2});
+  EXPECT_EQ(world.pieces.size(), 1u) << "both blocks are occupied";
+  EXPECT_TRUE(Contains(world, Middle(0, 0)) && Contains(world, Middle(1, 1)) && Contains(world, Middle(2, 0)));
+  EXPECT_TRUE(Contains(Map(kYaml, {.coarsen = 5}), Middle(4, 1))) << "beyond the image, in the last coarse cell";
+}
+
+TEST_F(MapTest, NegatedAndScaledMaps) {
+  const World negated = Map(Instead("negate", "negate: 1"), {.unknown_is_free = true});
+  EXPECT_TRUE(Contains(negated, Middle(0, 0)) && !Contains(negated, Middle(0, 1)));
+  const World scaled = Map(With("mode: scale"), {.unknown_is_free = true});
+  EXPECT_TRUE(Contains(scaled, Middle(1, 1))) << "205 is between the thresholds";
+}
+
+TEST_F(MapTest, WhatTheFileLacksIsSaid) {
+  EXPECT_THAT(WhyNot(With("mode: raw")), HasSubstr("map.yaml:7: mode: raw: values are costs"));
+  EXPECT_THAT(WhyNot(Instead("resolution", "resolution: 0")), HasSubstr("map.yaml:2: resolution: 0 is outside"));
+  EXPECT_THAT(WhyNot(Instead("resolution", "")), HasSubstr("resolution: missing"));
+  EXPECT_THAT(WhyNot(Instead("origin", "origin: [0]")), HasSubstr("has to have x, y and yaw"));
+  EXPECT_THAT(WhyNot(Instead("free_thresh", "free_thresh: 0.9")), HasSubstr("is above occupied_thresh"));
+  EXPECT_THAT(WhyNot(Instead("image", "image: none.pgm")), HasSubstr("none.pgm"));
+  EXPECT_THAT(WhyNot("[]"), HasSubstr("is not a map"));
+  EXPECT_THAT(Map(With("author: someone")).notes, testing::Contains("Ignored: author of the map's file."));
+}
+
+}  // namespace forereach::occupancy_map_test

@@ -1,0 +1,474 @@
+#include "worlds/commonroad.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/text.h"
+#include "task/config_error.h"
+#include "task/files.h"
+#include "task/line_reader.h"
+#include "task/number.h"
+#include "worlds/placed.h"
+#include "worlds/xml.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kLargestScenario = 256 * kMegabyte;
+constexpr double kFarthestPoint = 1e8;  // m
+constexpr double kLastStep = 1e6;       // of time
+constexpr double kMostTurned = 1e5;     // rad
+
+struct Span {
+  double lower = 0, upper = 0;
+
+  [[nodiscard]] double middle() const { return lower + (upper - lower) / 2; }
+  // Of both sides of the middle, the larger one.
+  [[nodiscard]] double half() const { return std::max(SubUp(upper, middle()), SubUp(middle(), lower)); }
+};
+
+// ---- Elements with their places
+
+class ScenarioReader {
+ public:
+  explicit ScenarioReader(const std::string& path) : path_(path) {}
+
+  [[noreturn]] void Fail(const XmlElement& at, const std::string& what) const {
+    throw ConfigError(fmt::format("{}:{}: {}: {}", path_, at.line, at.name, what));
+  }
+
+  [[nodiscard]] const XmlElement& Require(const XmlElement& at, std::string_view child) const {
+    if (const XmlElement* found = at.Find(child)) return *found;
+    Fail(at, "has no " + std::string(child));
+  }
+
+  [[nodiscard]] double Number(const XmlElement& at, double lower, double upper) const {
+    return Checked(at, std::string(Trimmed(at.text)), lower, upper);
+  }
+
+  [[nodiscard]] double Checked(const XmlElement& at, const std::string& text, double lower, double upper) const {
+    const auto [value, problem] = ParseNumber(text);
+    if (!problem.empty()) Fail(at, "'" + text.substr(0, 40) + "' " + std::string(problem));
+    if (!(lower <= value && value <= upper))
+      Fail(at, fmt::format("{} is outside [{}, {}]", text, ToText(lower), ToText(upper)));
+    return value;
+  }
+
+  // exact, or intervalStart and intervalEnd.
+  [[nodiscard]] Span Interval(const XmlElement& at, double lower, double upper) const {
+    if (const XmlElement* exact = at.Find("exact")) {
+      const double value = Number(*exact, lower, upper);
+      return {value, value};
+    }
+    const Span span{Number(Require(at, "intervalStart"), lower, upper),
+                    Number(Require(at, "intervalEnd"), lower, upper)};
+    if (!(span.lower <= span.upper)) Fail(at, "its interval ends before it starts");
+    return span;
+  }
+
+  [[nodiscard]] PlanePoint Point(const XmlElement& at) const {
+    return {Number(Require(at, "x"), -kFarthestPoint, kFarthestPoint),
+            Number(Require(at, "y"), -kFarthestPoint, kFarthestPoint)};
+  }
+
+  [[nodiscard]] Ring Points(const XmlElement& at) const {
+    Ring points;
+    for (const XmlElement* point : at.All("point")) points.push_back(Point(*point));
+    return points;
+  }
+
+ private:
+  const std::string& path_;
+};
+
+// ---- Shapes
+
+// Convex: the hull of points, and what is within the radius of it. Where it is placed, each of its exact points is
+// within `error` of the computed one.
+struct Convex {
+  std::vector<PlanePoint> points;
+  double radius = 0, error = 0;
+  double own_reach = 0;  // placed: of the shape in its own frame
+
+  // The largest distance of a point from the origin, rounded up.
+  [[nodiscard]] double Reach() const {
+    double reach = 0;
+    for (const auto& [x, y] : points) reach = std::max(reach, std::hypot(x, y));
+    return AddUp(NextUp(NextUp(reach)), AddUp(radius, error));
+  }
+};
+
+Convex PlacedConvex(const Convex& shape, const Pose& pose) {
+  Placed placed = Place(shape.points, pose);
+  return {std::move(placed.points), shape.radius, AddUp(shape.error, placed.error)};
+}
+
+class ShapeReader {
+ public:
+  explicit ShapeReader(const ScenarioReader& in) : in_(in) {}
+
+  // All convex parts of a <shape> or <position>.
+  [[nodiscard]] std::vector<Convex> Read(const XmlElement& at) const {
+    std::vector<Convex> parts;
+    for (const auto& child : at.children) {
+      if (child->name == "rectangle")
+        parts.push_back(Rectangle(*child));
+      else if (child->name == "circle")
+        parts.push_back(Circle(*child));
+      else if (child->name == "polygon")
+        AddPolygon(*child, parts);
+      else
+        in_.Fail(*child, "is no rectangle, circle or polygon");
+    }
+    if (parts.empty()) in_.Fail(at, "has no rectangle, circle or polygon");
+    return parts;
+  }
+
+ private:
+  [[nodiscard]] PlanePoint Center(const XmlElement& at) const {
+    const XmlElement* center = at.Find("center");
+    return center ? in_.Point(*center) : PlanePoint{};
+  }
+
+  [[nodiscard]] Convex Rectangle(const XmlElement& at) const {
+    const double length = in_.Number(in_.Require(at, "length"), 0, kFarthestPoint) / 2;
+    const double width = in_.Number(in_.Require(at, "width"), 0, kFarthestPoint) / 2;
+    const XmlElement* orientation = at.Find("orientation");
+    const PlanePoint center = Center(at);
+    const double yaw = orientation ? in_.Number(*orientation, -kMostTurned, kMostTurned) : 0;
+    return PlacedConvex({{{-length, -width}, {length, -width}, {length, width}, {-length, width}}},
+                        {center.x, center.y, yaw});
+  }
+
+  [[nodiscard]] Convex Circle(const XmlElement& at) const {
+    return {{Center(at)}, in_.Number(in_.Require(at, "radius"), 0, kFarthestPoint), 0};
+  }
+
+  void AddPolygon(const XmlElement& at, std::vector<Convex>& parts) const {
+    try {
+      for (Ring& piece : ConvexPieces({in_.Points(at), {}}, kMaxObstaclePoints)) parts.push_back({std::move(piece)});
+    } catch (const NoPolygon& error) {
+      in_.Fail(at, error.what());
+    }
+  }
+
+  const ScenarioReader& in_;
+};
+
+// ---- What an obstacle covers
+
+// At the time steps of `time`: the parts, each with what its state's intervals add to its radius.
+struct Occupancy {
+  Span time{};
+  std::vector<Convex> parts{};
+  Span yaw{};
+};
+
+class ObstacleReader {
+ public:
+  ObstacleReader(const ScenarioReader& in, double step, int steps_per_window, World& world)
+      : in_(in), shapes_(in), step_(step), steps_per_window_(steps_per_window), world_(world) {}
+
+  void ReadStanding(const XmlElement& at, const std::string& name) {
+    AddStanding(name, AtState(shapes_.Read(in_.Require(at, "shape")), in_.Require(at, "initialState")));
+  }
+
+  void ReadEnvironment(const XmlElement& at, const std::string& name) {
+    AddStanding(name, {{}, shapes_.Read(in_.Require(at, "shape"))});
+  }
+
+  void ReadMoving(const XmlElement& at, const std::string& name) {
+    std::vector<Occupancy> motion;
+    const XmlElement* const shape = at.Find("shape");
+    if (const XmlElement* state = at.Find("initialState"); state && shape)
+      motion.push_back(AtState(shapes_.Read(*shape), *state));
+    const std::size_t known = motion.size();
+    if (const XmlElement* trajectory = at.Find("trajectory")) {
+      const std::vector<Convex> parts = shapes_.Read(in_.Require(at, "shape"));
+      for (const XmlElement* state : trajectory->All("state")) motion.push_back(AtState(parts, *state));
+    }
+    if (const XmlElement* set = at.Find("occupancySet"))
+      for (const XmlElement* each : set->All("occupancy"))
+        motion.push_back({in_.Interval(in_.Require(*each, "time"), -kLastStep, kLastStep),
+                          shapes_.Read(in_.Require(*each, "shape"))});
+    if (motion.empty()) in_.Fail(at, "has no state and no occupancy");
+    if (motion.size() == known) {
+      world_.notes.push_back("No prediction of " + name + ": it is taken to stand where it is.");
+      return AddStanding(name, motion.front());
+    }
+    AddMoving(at, name, motion);
+  }
+
+  // The last step of the first prediction that ends.
+  [[nodiscard]] const std::optional<double>& first_end() const { return first_end_; }
+
+ private:
+  [[nodiscard]] Occupancy AtState(const std::vector<Convex>& shape, const XmlElement& state) const {
+    Occupancy at;
+    if (const XmlElement* time = state.Find("time")) at.time = in_.Interval(*time, -kLastStep, kLastStep);
+    const XmlElement& position = in_.Require(state, "position");
+    const XmlElement* const orientation = state.Find("orientation");
+    const Span yaw = orientation ? in_.Interval(*orientation, -kMostTurned, kMostTurned) : Span{};
+    if (!orientation && std::ranges::any_of(shape, [](const Convex& part) { return part.points.size() > 1; }))
+      in_.Fail(state, "has no orientation");
+    PlanePoint middle;
+    const double uncertain = PositionOf(position, middle);
+    at.yaw = yaw;
+    for (const Convex& part : shape) {
+      Convex placed = PlacedConvex(part, {middle.x, middle.y, yaw.middle()});
+      placed.own_reach = part.Reach();
+      placed.radius = AddUp(placed.radius, AddUp(uncertain, MulUp(part.Reach(), yaw.half())));
+      at.parts.push_back(std::move(placed));
+    }
+    return at;
+  }
+
+  // The middle of where it may be, and the largest distance from there, rounded up.
+  double PositionOf(const XmlElement& at, PlanePoint& middle) const {
+    if (const XmlElement* point = at.Find("point")) {
+      middle = in_.Point(*point);
+      return 0;
+    }
+    Span x{kInfinity, -kInfinity}, y = x;
+    for (const Convex& part : shapes_.Read(at))
+      for (const PlanePoint& p : Grown(part.points, AddUp(part.radius, part.error))) {
+        x = {std::min(x.lower, p.x), std::max(x.upper, p.x)};
+        y = {std::min(y.lower, p.y), std::max(y.upper, p.y)};
+      }
+    middle = {x.middle(), y.middle()};
+    return NextUp(NextUp(std::hypot(x.half(), y.half())));
+  }
+
+  void AddStanding(const std::string& name, const Occupancy& at) {
+    for (const Convex& part : at.parts) {
+      const double radius = AddUp(part.radius, part.error);
+      if (part.points.size() == 1) {
+        const PlanePoint& center = part.points.front();
+        world_.pieces.push_back({name, Obstacle::Circle(Eigen::Vector2d(center.x, center.y), radius), {}});
+      } else {
+        world_.Add(name, Grown(part.points, radius));
+      }
+    }
+  }
+
+  void AddMoving(const XmlElement& at, const std::string& name, const std::vector<Occupancy>& motion) {
+    for (std::size_t i = 0; i + 1 < motion.size(); ++i)
+      if (!(motion[i].time.lower < motion[i + 1].time.lower && motion[i].time.upper <= motion[i + 1].time.upper))
+        in_.Fail(at, "its states are not in the order of time");
+    for (std::size_t i = 0; i == 0 || i + 1 < motion.size();) {
+      std::size_t last = std::min(i + 1, motion.size() - 1);
+      while (last + 1 < motion.size() && motion[last + 1].time.upper - motion[i].time.lower <= steps_per_window_)
+        ++last;
+      AddWindow(name, {motion.begin() + static_cast<std::ptrdiff_t>(i),
+                       motion.begin() + static_cast<std::ptrdiff_t>(last) + 1});
+      i = std::max(i + 1, last);
+    }
+    first_end_ = std::min(first_end_.value_or(kInfinity), motion.back().time.upper);
+  }
+
+  // The hull of all that is covered at some times. Each part of a shape moves on its own; occupancies that have other
+  // parts than the one before are one set.
+  void AddWindow(const std::string& name, const std::vector<Occupancy>& at) {
+    const Window window{MulDown(at.front().time.lower, step_), MulUp(at.back().time.upper, step_)};
+    const bool are_alike =
+        std::ranges::all_of(at, [&](const Occupancy& each) { return each.parts.size() == at.front().parts.size(); });
+    double turned = 0;
+    for (std::size_t i = 0; i + 1 < at.size(); ++i) turned = std::max(turned, TurnedUpper(at[i].yaw, at[i + 1].yaw));
+    const std::string label =
+        fmt::format("{}, steps {} to {}", name, ToText(at.front().time.lower), ToText(at.back().time.upper));
+    std::vector<PlanePoint> all;
+    for (std::size_t p = 0; p < at.front().parts.size(); ++p) {
+      std::vector<PlanePoint> hull;
+      for (const Occupancy& each : at)
+        for (std::size_t q = are_alike ? p : 0; q < (are_alike ? p + 1 : each.parts.size()); ++q) {
+          const Convex& part = each.parts[q];
+          std::ranges::copy(Grown(part.points, AddUp(AddUp(part.radius, part.error), ArcOf(part, turned))),
+                            std::back_inserter(hull));
+        }
+      world_.Add(label, ConvexHull(std::move(hull)), window);
+      if (!are_alike) break;
+    }
+  }
+
+  // The most that it turns from one state to the next, the shorter way.
+  static double TurnedUpper(const Span& from, const Span& to) {
+    const double turned = std::abs(std::remainder(to.middle() - from.middle(), 2 * std::numbers::pi));
+    if (turned + from.half() + to.half() == 0) return 0;
+    return AddUp(turned + 0x1p-30, AddUp(from.half(), to.half()));  // for the rounding of both middles
+  }
+
+  // How far a corner leaves its chord while the shape turns evenly by so much: r (1 - cos(turned / 2)) <= r turned^2
+  // / 8.
+  static double ArcOf(const Convex& part, double turned) { return MulUp(part.own_reach, MulUp(turned, turned) / 8); }
+
+  const ScenarioReader& in_;
+  const ShapeReader shapes_;
+  const double step_;
+  const int steps_per_window_;
+  World& world_;
+  std::optional<double> first_end_;
+};
+
+// ---- The road
+
+struct Lanelet {
+  std::string id;
+  Ring left, right, area;
+  bool has_left = false, has_right = false;  // a neighbour
+  PlanePoint lower, upper;
+};
+
+class RoadReader {
+ public:
+  RoadReader(const ScenarioReader& in, double thickness, World& world)
+      : in_(in), thickness_(thickness), world_(world) {}
+
+  void Read(const XmlElement& root) {
+    std::set<std::string> ids;
+    for (const XmlElement* at : root.All("lanelet")) ids.insert(IdOf(*at));
+    for (const XmlElement* at : root.All("lanelet")) lanelets_.push_back(ReadLanelet(*at, ids));
+    for (const Lanelet& lanelet : lanelets_) {
+      if (!lanelet.has_left) AddBound(lanelet, lanelet.left, "left bound of lanelet " + lanelet.id);
+      if (!lanelet.has_right) AddBound(lanelet, lanelet.right, "right bound of lanelet " + lanelet.id);
+    }
+  }
+
+  [[nodiscard]] std::size_t count() const { return lanelets_.size(); }
+  [[nodiscard]] int inside() const { return inside_; }
+
+ private:
+  [[nodiscard]] std::string IdOf(const XmlElement& at) const {
+    const std::string* id = at.Attribute("id");
+    return id ? *id : "?";
+  }
+
+  // A neighbour that the file does not have is none.
+  [[nodiscard]] static bool HasNeighbour(const XmlElement& at, const char* side, const std::set<std::string>& ids) {
+    const XmlElement* neighbour = at.Find(side);
+    const std::string* id = neighbour ? neighbour->Attribute("ref") : nullptr;
+    return id && ids.contains(*id);
+  }
+
+  [[nodiscard]] Lanelet ReadLanelet(const XmlElement& at, const std::set<std::string>& ids) const {
+    Lanelet lanelet;
+    lanelet.id = IdOf(at);
+    lanelet.left = in_.Points(in_.Require(at, "leftBound"));
+    lanelet.right = in_.Points(in_.Require(at, "rightBound"));
+    if (lanelet.left.size() < 2 || lanelet.right.size() < 2) in_.Fail(at, "a bound has fewer than two points");
+    lanelet.has_left = HasNeighbour(at, "adjacentLeft", ids);
+    lanelet.has_right = HasNeighbour(at, "adjacentRight", ids);
+    lanelet.area = lanelet.right;
+    lanelet.area.insert(lanelet.area.end(), lanelet.left.rbegin(), lanelet.left.rend());
+    lanelet.lower = lanelet.upper = lanelet.area.front();
+    for (const auto& [x, y] : lanelet.area) {
+      lanelet.lower = {std::min(lanelet.lower.x, x), std::min(lanelet.lower.y, y)};
+      lanelet.upper = {std::max(lanelet.upper.x, x), std::max(lanelet.upper.y, y)};
+    }
+    return lanelet;
+  }
+
+  // Whether another lanelet has the road on both sides of the segment.
+  [[nodiscard]] bool IsOnTheRoad(const Lanelet& own, const PlanePoint& a, const PlanePoint& b) const {
+    return std::ranges::any_of(lanelets_, [&](const Lanelet& other) {
+      const auto has = [&](const PlanePoint& p) {
+        return other.lower.x <= p.x && p.x <= other.upper.x && other.lower.y <= p.y && p.y <= other.upper.y;
+      };
+      return &other != &own && has(a) && has(b) && IsInside(a, b, other.area);
+    });
+  }
+
+  void AddBound(const Lanelet& own, const Ring& bound, const std::string& name) {
+    Ring run{bound.front()};
+    for (std::size_t i = 0; i + 1 < bound.size(); ++i) {
+      if (bound[i] == bound[i + 1]) continue;
+      if (IsOnTheRoad(own, bound[i], bound[i + 1])) {
+        ++inside_;
+        if (run.size() > 1) world_.Add(name, run);
+        run = {bound[i + 1]};
+        continue;
+      }
+      run.push_back(bound[i + 1]);
+      if (IsThin(run)) continue;
+      run.pop_back();
+      world_.Add(name, run);
+      run = {bound[i], bound[i + 1]};
+    }
+    if (run.size() > 1) world_.Add(name, run);
+  }
+
+  // Whether all points lie near the chord, none of them behind its ends.
+  [[nodiscard]] bool IsThin(const Ring& run) const {
+    constexpr std::size_t kLongest = 1000;
+    const PlanePoint &a = run.front(), &b = run.back();
+    const double x = b.x - a.x, y = b.y - a.y, length = std::hypot(x, y);
+    if (run.size() > kLongest || !(length > 0)) return false;
+    return std::ranges::all_of(run, [&](const PlanePoint& p) {
+      const double along = ((p.x - a.x) * x + (p.y - a.y) * y) / length;
+      const double across = std::abs(x * (p.y - a.y) - y * (p.x - a.x)) / length;
+      return -thickness_ <= along && along <= length + thickness_ && (across <= thickness_ || Turn(a, b, p) == 0);
+    });
+  }
+
+  const ScenarioReader& in_;
+  const double thickness_;
+  World& world_;
+  std::vector<Lanelet> lanelets_;
+  int inside_ = 0;
+};
+
+}  // namespace
+
+World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) {
+  const std::unique_ptr<XmlElement> root = ReadXml(path, ReadWhole(path, kLargestScenario));
+  const ScenarioReader in(path);
+  if (root->name != "commonRoad") in.Fail(*root, "is no scenario of CommonRoad");
+  const std::string* version = root->Attribute("commonRoadVersion");
+  const std::string* step_text = root->Attribute("timeStepSize");
+  if (!version || *version != "2020a")
+    in.Fail(*root, "commonRoadVersion is " + (version ? *version : "missing") +
+                       ", has to be 2020a; commonroad-io reads older ones and writes it");
+  if (!step_text) in.Fail(*root, "has no timeStepSize");
+  const double step = in.Checked(*root, *step_text, 1e-6, 1e3);
+  World world;
+  RoadReader road(in, options.thickness, world);
+  road.Read(*root);
+  ObstacleReader obstacles(in, step, options.steps_per_window, world);
+  std::map<std::string, int> counts;
+  for (const auto& child : root->children) {
+    if (!child->name.ends_with("Obstacle")) continue;
+    ++counts[child->name];
+    const std::string* id = child->Attribute("id");
+    const std::string name = child->name + " " + (id ? *id : "?");
+    if (child->name == "staticObstacle")
+      obstacles.ReadStanding(*child, name);
+    else if (child->name == "environmentObstacle")
+      obstacles.ReadEnvironment(*child, name);
+    else if (child->name == "dynamicObstacle" || child->name == "phantomObstacle")
+      obstacles.ReadMoving(*child, name);
+    else
+      in.Fail(*child, "is no kind of obstacle that is known");
+  }
+  std::string text = fmt::format("{} lanelets", road.count());
+  for (const auto& [kind, count] : counts) text += fmt::format(", {} {}", count, kind);
+  world.notes.insert(world.notes.begin(), text + ".");
+  world.notes.push_back(fmt::format(
+      "The boundary: bounds of lanelets without a neighbour there; {} segments inside another lanelet are left out. "
+      "Lanelets have open ends, and a change to a neighbour's lane in the other direction is allowed.",
+      road.inside()));
+  if (obstacles.first_end())
+    world.notes.push_back(fmt::format(
+        "Windows are seconds from time step 0, of {} s. From one state to the next, an obstacle is taken to move on a "
+        "straight line and to turn evenly. The first prediction ends at {} s: of later times nothing is known.",
+        ToText(step), ToText(*obstacles.first_end() * step)));
+  return world;
+}
+
+}  // namespace forereach

@@ -1,0 +1,300 @@
+#include "worlds/geojson.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/text.h"
+#include "task/config_error.h"
+#include "task/files.h"
+#include "task/json_field.h"
+#include "task/json_text.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::int64_t kLargestDrawing = 64 * kMegabyte;
+constexpr double kFarthest = 1e9;  // m, of a coordinate
+
+// ---- From degrees to metres
+
+// The tangent plane of WGS 84 at the origin, x to the east and y to the north, at height 0.
+class TangentPlane {
+ public:
+  static constexpr double kReach = 1e4, kLatitudes = 80;  // m, degrees
+  // Doubles round places on the ellipsoid, of 6.4e6 m, by less than a micrometre after a dozen operations.
+  static constexpr double kRounding = 1e-6;
+
+  explicit TangentPlane(const PlanePoint& origin) : origin_(Radians(origin)), at_(OnEllipsoid(origin_)) {}
+
+  // None if the place is out of reach.
+  [[nodiscard]] std::optional<PlanePoint> To(const PlanePoint& degrees) const {
+    const auto [longitude, latitude] = origin_;
+    const Eigen::Vector3d offset = OnEllipsoid(Radians(degrees)) - at_;
+    const Eigen::Vector3d east(-std::sin(longitude), std::cos(longitude), 0);
+    const Eigen::Vector3d north(-std::sin(latitude) * std::cos(longitude), -std::sin(latitude) * std::sin(longitude),
+                                std::cos(latitude));
+    if (!(offset.norm() <= kReach)) return std::nullopt;
+    return PlanePoint{east.dot(offset), north.dot(offset)};
+  }
+
+  // How far a side that is straight in degrees leaves the straight one between its ends, in metres. At constant rates
+  // of both angles the acceleration is at most (1 + 2 / sqrt(3) tan(latitude)) v^2 / R: v^2 / R towards the axis of
+  // curvature, the rest along the ground. A motion with the acceleration a leaves its chord by a / 8. The constants are
+  // larger by what the ellipsoid's radii, and v within the reach, vary.
+  [[nodiscard]] double Bend(double length) const {
+    constexpr double kSmallestRadius = 6.33e6, kFarther = 0.1 * std::numbers::pi / 180;
+    const double tangent = std::tan(std::abs(origin_.y) + kFarther);
+    return (1.05 + 1.2 * tangent) * 1.05 * length * length / (8 * kSmallestRadius);
+  }
+
+ private:
+  static PlanePoint Radians(const PlanePoint& degrees) {
+    return {degrees.x * std::numbers::pi / 180, degrees.y * std::numbers::pi / 180};
+  }
+  static Eigen::Vector3d OnEllipsoid(const PlanePoint& at) {
+    constexpr double kEquator = 6378137.0, kFlattening = 1 / 298.257223563;
+    constexpr double kSquare = kFlattening * (2 - kFlattening);
+    const double sine = std::sin(at.y), radius = kEquator / std::sqrt(1 - kSquare * sine * sine);
+    return {radius * std::cos(at.y) * std::cos(at.x), radius * std::cos(at.y) * std::sin(at.x),
+            radius * (1 - kSquare) * sine};
+  }
+
+  PlanePoint origin_;
+  Eigen::Vector3d at_;
+};
+
+// ---- The drawing
+
+class Drawing {
+ public:
+  Drawing(const std::string& path, const GeoJsonOptions& options) : path_(path), options_(options) {
+    if (options.origin) plane_.emplace(*options.origin);
+  }
+
+  World Read(const Json& document) {
+    TakeObject(JsonField(path_, document), nullptr, 0);
+    if (!options_.origin && !options_.are_metres && any_ && LooksLikeDegrees())
+      throw ConfigError(
+          path_ +
+          ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if they are "
+          "metres");
+    AddStayIn();
+    if (plane_)
+      world_.notes.push_back(
+          fmt::format("x east and y north in the tangent plane of WGS 84; each piece grown by up to {} "
+                      "m, for sides that are straight in degrees.",
+                      RoundedUp(largest_bend_, 3)));
+    return std::move(world_);
+  }
+
+ private:
+  struct Style {
+    std::string name;
+    bool keep_in = false;
+    std::optional<double> width, radius;
+  };
+
+  // ---- Objects
+
+  void TakeObject(const JsonField& at, const JsonField* properties, int depth) {
+    const std::string type = at["type"].Text();
+    if (type == "FeatureCollection") {
+      const JsonField features = at["features"];
+      for (std::size_t i = 0; i < features.Count(); ++i) TakeObject(features[i], nullptr, depth);
+    } else if (type == "Feature") {
+      const JsonField geometry = at["geometry"];
+      const bool has_properties = at.json().contains("properties") && at.json()["properties"].is_object();
+      const JsonField own = has_properties ? at["properties"] : at;
+      if (!geometry.json().is_null()) TakeObject(geometry, has_properties ? &own : nullptr, depth);
+    } else if (type == "GeometryCollection") {
+      const JsonField geometries = at["geometries"];
+      if (depth > 8) at.Fail("is nested too deeply");
+      for (std::size_t i = 0; i < geometries.Count(); ++i) TakeObject(geometries[i], properties, depth + 1);
+    } else {
+      TakeGeometry(type, at, StyleOf(properties));
+    }
+  }
+
+  void TakeGeometry(const std::string& type, const JsonField& at, Style style) {
+    if (style.name.empty()) style.name = at.name().empty() ? type : at.name();
+    const JsonField coordinates = at["coordinates"];
+    const auto each = [&](const auto& take) {
+      for (std::size_t i = 0; i < coordinates.Count(); ++i) take(coordinates[i], style);
+    };
+    if (type == "Polygon") return TakeArea(coordinates, style);
+    if (type == "MultiPolygon") return each([this](const auto& c, const auto& s) { TakeArea(c, s); });
+    if (type == "LineString") return TakeLine(coordinates, style);
+    if (type == "MultiLineString") return each([this](const auto& c, const auto& s) { TakeLine(c, s); });
+    if (type == "Point") return TakePoint(coordinates, style);
+    if (type == "MultiPoint") return each([this](const auto& c, const auto& s) { TakePoint(c, s); });
+    at.Fail("type " + type + " is none of GeoJSON's");
+  }
+
+  [[nodiscard]] Style StyleOf(const JsonField* properties) const {
+    Style style{"", options_.keep_in, options_.line_width, options_.point_radius};
+    if (!properties) return style;
+    const Json& json = properties->json();
+    if (json.contains("name") && json["name"].is_string()) style.name = json["name"].get<std::string>();
+    if (json.contains("keep_in")) style.keep_in = (*properties)["keep_in"].Bool();
+    if (json.contains("width")) style.width = Size((*properties)["width"]);
+    if (json.contains("radius")) style.radius = Size((*properties)["radius"]);
+    return style;
+  }
+
+  static double Size(const JsonField& at) {
+    const double size = at.Number();
+    if (!(size >= 0 && size <= kFarthest)) at.Fail(fmt::format("{} is outside [0, {}]", ToText(size), kFarthest));
+    return size;
+  }
+
+  // ---- Coordinates
+
+  PlanePoint PointAt(const JsonField& at) {
+    if (at.Count() < 2) at.Fail(fmt::format("has {} entries, has to have two or three", at.Count()));
+    PlanePoint point{at[std::size_t{0}].Number(), at[std::size_t{1}].Number()};
+    if (plane_) {
+      if (!(std::abs(point.x) <= 180 && std::abs(point.y) <= TangentPlane::kLatitudes))
+        at.Fail(fmt::format("is no longitude and a latitude of at most {} degrees", TangentPlane::kLatitudes));
+      const std::optional<PlanePoint> place = plane_->To(point);
+      if (!place)
+        at.Fail(fmt::format("is more than {} m from the origin, where a plane is no map of the ground any more",
+                            TangentPlane::kReach));
+      point = *place;
+    }
+    if (!(std::abs(point.x) <= kFarthest && std::abs(point.y) <= kFarthest))
+      at.Fail(fmt::format("is farther than {} m", kFarthest));
+    lower_ = {std::min(lower_.x, point.x), std::min(lower_.y, point.y)};
+    upper_ = {std::max(upper_.x, point.x), std::max(upper_.y, point.y)};
+    any_ = true;
+    return point;
+  }
+
+  Ring PointsAt(const JsonField& at) {
+    Ring points;
+    for (std::size_t i = 0; i < at.Count(); ++i) points.push_back(PointAt(at[i]));
+    if (points.empty()) at.Fail("has no points");
+    return points;
+  }
+
+  [[nodiscard]] bool LooksLikeDegrees() const {
+    constexpr double kDegrees = 1;  // 111 km
+    return std::abs(lower_.x) <= 180 && std::abs(upper_.x) <= 180 && std::abs(lower_.y) <= 90 &&
+           std::abs(upper_.y) <= 90 && upper_.x - lower_.x < kDegrees && upper_.y - lower_.y < kDegrees;
+  }
+
+  // How far the true sides between these points may be off the straight ones.
+  double BendOf(const Ring& points) {
+    if (!plane_) return 0;
+    double bend = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const PlanePoint &a = points[i], &b = points[(i + 1) % points.size()];
+      bend = std::max(bend, plane_->Bend(std::hypot(a.x - b.x, a.y - b.y)));
+    }
+    largest_bend_ = std::max(largest_bend_, bend + TangentPlane::kRounding);
+    return bend + TangentPlane::kRounding;
+  }
+
+  // ---- Shapes
+
+  void TakeArea(const JsonField& at, const Style& style) {
+    Area area;
+    double bend = 0;
+    for (std::size_t i = 0; i < at.Count(); ++i) {
+      Ring ring = PointsAt(at[i]);
+      bend = std::max(bend, BendOf(ring));
+      if (i == 0) area.outer = std::move(ring);
+      if (i > 0) area.holes.push_back(std::move(ring));
+    }
+    if (at.Count() == 0) at.Fail("has no ring");
+    if (!style.keep_in) return AddPieces(area, bend, style.name, at.name());
+    // What has to be left is what lies outside of it, and in its holes.
+    for (const Ring& hole : area.holes) AddPieces({hole, {}}, bend, "hole in " + style.name, at.name());
+    static_cast<void>(Pieces({area.outer, area.holes}, at.name()));  // it has to be an area
+    stay_in_.push_back(std::move(area.outer));
+    stay_in_bend_ = std::max(stay_in_bend_, bend);
+  }
+
+  [[nodiscard]] std::vector<Ring> Pieces(const Area& area, const std::string& place) const {
+    // A grown piece may have four corners more.
+    try {
+      return ConvexPieces(area, plane_ ? kMaxObstaclePoints - 4 : kMaxObstaclePoints);
+    } catch (const NoPolygon& error) {
+      throw ConfigError(path_ + ": " + place + ": " + error.what());
+    }
+  }
+
+  void AddPieces(const Area& area, double margin, const std::string& name, const std::string& place) {
+    for (const Ring& piece : Pieces(area, place)) world_.Add(name, Grown(piece, margin));
+  }
+
+  void TakeLine(const JsonField& at, const Style& style) {
+    const Ring points = PointsAt(at);
+    if (points.size() < 2) at.Fail("has one point, a line has two");
+    if (!style.width) at.Fail("has no width; give --line-width, or its feature the property width");
+    for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+      const Ring side{points[i], points[i + 1]};
+      world_.Add(style.name, Grown(side, AddUp(HalfUp(*style.width), BendOf(side))));
+    }
+  }
+
+  void TakePoint(const JsonField& at, const Style& style) {
+    const PlanePoint point = PointAt(at);
+    if (!style.radius) at.Fail("has no radius; give --point-radius, or its feature the property radius");
+    const double radius = AddUp(*style.radius, BendOf({point}));
+    world_.pieces.push_back({style.name, Obstacle::Circle(Eigen::Vector2d(point.x, point.y), radius), {}});
+  }
+
+  // All that is not in an area to stay in: a frame around them, with each of them as a hole, and what is beyond it.
+  void AddStayIn() {
+    if (stay_in_.empty()) return;
+    PlanePoint lower = stay_in_[0][0], upper = lower;
+    for (const Ring& ring : stay_in_)
+      for (const auto& [x, y] : ring) {
+        lower = {std::min(lower.x, x), std::min(lower.y, y)};
+        upper = {std::max(upper.x, x), std::max(upper.y, y)};
+      }
+    const double thick = std::max({upper.x - lower.x, upper.y - lower.y, 1.0});
+    lower = {lower.x - thick, lower.y - thick};
+    upper = {upper.x + thick, upper.y + thick};
+    const Ring frame{lower, {upper.x, lower.y}, upper, {lower.x, upper.y}};
+    AddPieces({frame, std::move(stay_in_)}, stay_in_bend_, "outside", "the areas to stay in");
+    for (const auto& [axis, low, high] : {std::tuple{0, lower.x, upper.x}, {1, lower.y, upper.y}}) {
+      world_.AddBeyond(axis, -1, low, "far outside");
+      world_.AddBeyond(axis, 1, high, "far outside");
+    }
+  }
+
+  const std::string& path_;
+  const GeoJsonOptions& options_;
+  std::optional<TangentPlane> plane_;
+  World world_;
+  std::vector<Ring> stay_in_;
+  double stay_in_bend_ = 0, largest_bend_ = 0;
+  PlanePoint lower_{kInfinity, kInfinity}, upper_{-kInfinity, -kInfinity};
+  bool any_ = false;
+};
+
+}  // namespace
+
+World ReadGeoJson(const std::string& path, const GeoJsonOptions& options) {
+  const std::string text = ReadWhole(path, kLargestDrawing);
+  Json document;
+  try {
+    document = ParseJson(text);
+  } catch (const Json::exception& error) {
+    throw ConfigError(path + ": " + DescribeJsonError(error));
+  }
+  return Drawing(path, options).Read(document);
+}
+
+}  // namespace forereach

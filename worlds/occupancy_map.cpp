@@ -1,0 +1,345 @@
+#include "worlds/occupancy_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/size.h"
+#include "forereach/numerics/text.h"
+#include "task/config_error.h"
+#include "task/document.h"
+#include "task/draft.h"
+#include "task/files.h"
+#include "task/key_rows.h"
+#include "worlds/placed.h"
+
+namespace forereach {
+namespace {
+
+// ---- The image
+
+class PgmReader {
+ public:
+  PgmReader(const std::string& file, std::string_view bytes) : file_(file), rest_(bytes), all_(bytes.size()) {}
+
+  GrayImage Read() {
+    const std::string_view kind = rest_.substr(0, 2);
+    if (kind != "P2" && kind != "P5")
+      Fail("is no PGM image, which begins with P2 or P5; `convert IMAGE map.pgm` of ImageMagick makes one");
+    rest_.remove_prefix(2);
+    GrayImage image;
+    image.width = Number("width", kMaxPixels);
+    image.height = Number("height", kMaxPixels);
+    image.largest = Number("largest value", 65'535);
+    if (image.width < 1 || image.height < 1 || image.largest < 1) Fail("has no pixels");
+    const std::int64_t pixels = std::int64_t{image.width} * image.height;
+    if (pixels > kMaxPixels) Fail(fmt::format("has {} pixels, at most {} are taken", pixels, kMaxPixels));
+    if (kind == "P5") ReadBytes(image, static_cast<std::size_t>(pixels));
+    if (kind == "P2") ReadWords(image, static_cast<std::size_t>(pixels));
+    return image;
+  }
+
+ private:
+  [[noreturn]] void Fail(const std::string& what) const {
+    throw ConfigError(fmt::format("{}: at byte {}: {}", file_, all_ - rest_.size(), what));
+  }
+
+  static bool IsSpace(char c) { return c == ' ' || ('\t' <= c && c <= '\r'); }
+
+  void SkipSpaceAndComments() {
+    while (!rest_.empty() && (IsSpace(rest_[0]) || rest_[0] == '#'))
+      rest_.remove_prefix(rest_[0] == '#' ? std::min(rest_.find('\n'), rest_.size()) : 1);
+  }
+
+  int Number(const char* what, std::int64_t most) {
+    SkipSpaceAndComments();
+    std::int64_t value = 0;
+    std::size_t digits = 0;
+    for (; digits < rest_.size() && '0' <= rest_[digits] && rest_[digits] <= '9'; ++digits)
+      if ((value = 10 * value + (rest_[digits] - '0')) > most) Fail(fmt::format("the {} is above {}", what, most));
+    if (digits == 0) Fail(fmt::format("no number where the {} has to be", what));
+    rest_.remove_prefix(digits);
+    return static_cast<int>(value);
+  }
+
+  void ReadBytes(GrayImage& image, std::size_t pixels) {
+    if (rest_.empty() || !IsSpace(rest_[0])) Fail("no white space behind the largest value");
+    rest_.remove_prefix(1);
+    const std::size_t each = image.largest < 256 ? 1 : 2;
+    if (rest_.size() < each * pixels)
+      Fail(fmt::format("the file is cut off: {} bytes of pixels, it has to have {}", rest_.size(), each * pixels));
+    image.values.reserve(pixels);
+    const auto byte = [this](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(rest_[i])); };
+    for (std::size_t i = 0; i < pixels; ++i) Take(image, each == 1 ? byte(i) : 256 * byte(2 * i) + byte(2 * i + 1), i);
+  }
+
+  void ReadWords(GrayImage& image, std::size_t pixels) {
+    if (rest_.size() < 2 * pixels) Fail(fmt::format("the file is cut off: it has to have {} pixels", pixels));
+    image.values.reserve(pixels);
+    for (std::size_t i = 0; i < pixels; ++i) Take(image, static_cast<unsigned>(Number("next pixel", 65'535)), i);
+  }
+
+  void Take(GrayImage& image, unsigned value, std::size_t i) const {
+    if (value > static_cast<unsigned>(image.largest))
+      Fail(fmt::format("pixel {} is {}, above the largest value {}", i, value, image.largest));
+    image.values.push_back(static_cast<std::uint16_t>(value));
+  }
+
+  const std::string& file_;
+  std::string_view rest_;
+  const std::size_t all_;
+};
+
+// ---- What the YAML file says
+
+struct MapFile {
+  std::string image, mode = "trinary";
+  double resolution = 0, occupied = 0, free = 0;
+  std::array<double, 3> origin{};  // x, y, yaw of the lower left corner
+  bool is_negated = false;
+  std::vector<std::string> unknown_keys;
+};
+
+std::vector<Key> MapKeys(MapFile& map) {
+  using namespace key_rows;
+  const Range share{0, 1, false, false};
+  return {
+      Map("", "A map of map_server."),
+      Required(Text("image", "The image, relative to this file.",
+                    [&map](const Field& at, TaskDraft&) { map.image = at.Text(); })),
+      Required(Number("resolution", "m", kPositive, "The side of a cell.",
+                      [&map](const Field& at, TaskDraft&) { map.resolution = at.Number(); })),
+      Required(Vector("origin", "m", key_rows::Between(-1e9, 1e9), Key::Size::kAny,
+                      "x, y and yaw of the lower left corner.",
+                      [&map](const Field& at, TaskDraft&) {
+                        if (at.Count() != 2 && at.Count() != 3) at.Fail("has to have x, y and yaw");
+                        if (at.Count() == 3 && std::abs(at[2].Number()) > 7) at.Fail("has a yaw above a turn");
+                        for (Eigen::Index k = 0; k < at.Count(); ++k) map.origin[ToSize(k)] = at[k].Number();
+                      })),
+      Optional(Word("negate", {"0", "1", "false", "true", "False", "True"}, "Whether white is occupied.",
+                    [&map](const Field& at, TaskDraft&) {
+                      map.is_negated = at.Text() == "1" || at.Text() == "true" || at.Text() == "True";
+                    }),
+               "0"),
+      Required(Number("occupied_thresh", "", share, "A cell that is darker is occupied.",
+                      [&map](const Field& at, TaskDraft&) { map.occupied = at.Number(); })),
+      Required(Number("free_thresh", "", share, "A cell that is lighter is free.",
+                      [&map](const Field& at, TaskDraft&) { map.free = at.Number(); })),
+      Optional(Word("mode", {"trinary", "scale", "raw"}, "What values between the two thresholds are.",
+                    [&map](const Field& at, TaskDraft&) {
+                      map.mode = at.Text();
+                      if (map.mode == "raw")
+                        at.Fail("raw: values are costs, and nothing says which of them is free; use trinary or scale");
+                    }),
+               "trinary"),
+      Text("<name>", "Ignored.", [&map](const Field& at, TaskDraft&) { map.unknown_keys.push_back(at.name()); }),
+  };
+}
+
+MapFile ReadMapFile(const std::string& path) {
+  MapFile map;
+  const std::vector<Key> keys = MapKeys(map);
+  Document document(path);
+  TaskDraft draft;
+  document.Read(draft, keys);
+  if (map.free > map.occupied) document.Fail("free_thresh", "is above occupied_thresh");
+  return map;
+}
+
+// ---- Cells
+
+std::vector<bool> OccupiedCells(const GrayImage& image, const MapFile& map, bool unknown_is_free) {
+  // By gray value, since there are few of them.
+  std::vector<bool> is_occupied(ToSize(image.largest) + 1);
+  for (int value = 0; value <= image.largest; ++value) {
+    const double dark = static_cast<double>(map.is_negated ? value : image.largest - value) / image.largest;
+    const bool takes_unknown = unknown_is_free && map.mode == "trinary";
+    is_occupied[ToSize(value)] = takes_unknown ? dark > map.occupied : !(dark < map.free);
+  }
+  std::vector<bool> cells(image.values.size());
+  const auto width = ToSize(image.width), height = ToSize(image.height);
+  for (std::size_t row = 0; row < height; ++row)  // the lowest first
+    for (std::size_t column = 0; column < width; ++column)
+      cells[row * width + column] = is_occupied[image.values[(height - 1 - row) * width + column]];
+  return cells;
+}
+
+struct Grid {
+  int width = 0, height = 0;
+  std::vector<bool> occupied;
+};
+
+Grid Coarsened(Grid fine, int factor) {
+  if (factor == 1) return fine;
+  Grid coarse{(fine.width + factor - 1) / factor, (fine.height + factor - 1) / factor, {}};
+  coarse.occupied.resize(ToSize(coarse.width) * ToSize(coarse.height));
+  for (int row = 0; row < fine.height; ++row)
+    for (int column = 0; column < fine.width; ++column)
+      if (fine.occupied[ToSize(row) * ToSize(fine.width) + ToSize(column)])
+        coarse.occupied[ToSize(row / factor) * ToSize(coarse.width) + ToSize(column / factor)] = true;
+  return coarse;
+}
+
+class BlockFinder {
+ public:
+  BlockFinder(const std::vector<bool>& occupied, int width, int height)
+      : occupied_(occupied), width_(width), height_(height), covered_(occupied.size()) {}
+
+  std::vector<CellBlock> Find() {
+    std::vector<CellBlock> blocks;
+    for (int row = 0; row < height_; ++row)
+      for (int column = 0; column < width_; ++column) {
+        if (!occupied_[At(column, row)] || covered_[At(column, row)]) continue;
+        const CellBlock wide = Wide(column, row), high = High(column, row);
+        const CellBlock& best = Uncovered(wide) >= Uncovered(high) ? wide : high;
+        ForEach(best, [this](std::size_t cell) { covered_[cell] = true; });
+        blocks.push_back(best);
+      }
+    return blocks;
+  }
+
+ private:
+  [[nodiscard]] std::size_t At(int column, int row) const { return ToSize(row) * ToSize(width_) + ToSize(column); }
+
+  [[nodiscard]] bool IsFull(const CellBlock& block) const {
+    for (int row = block.row; row < block.row + block.height; ++row)
+      for (int column = block.column; column < block.column + block.width; ++column)
+        if (!occupied_[At(column, row)]) return false;
+    return true;
+  }
+
+  template <class Use>
+  void ForEach(const CellBlock& block, const Use& use) const {
+    for (int row = block.row; row < block.row + block.height; ++row)
+      for (int column = block.column; column < block.column + block.width; ++column) use(At(column, row));
+  }
+
+  [[nodiscard]] std::int64_t Uncovered(const CellBlock& block) const {
+    std::int64_t count = 0;
+    ForEach(block, [&](std::size_t cell) { count += covered_[cell] ? 0 : 1; });
+    return count;
+  }
+
+  // Rows and columns next to the block are added while they are full.
+  void AddColumns(CellBlock& block) const {
+    while (block.column > 0 && IsFull({block.column - 1, block.row, 1, block.height})) --block.column, ++block.width;
+    while (block.column + block.width < width_ && IsFull({block.column + block.width, block.row, 1, block.height}))
+      ++block.width;
+  }
+  void AddRows(CellBlock& block) const {
+    while (block.row > 0 && IsFull({block.column, block.row - 1, block.width, 1})) --block.row, ++block.height;
+    while (block.row + block.height < height_ && IsFull({block.column, block.row + block.height, block.width, 1}))
+      ++block.height;
+  }
+
+  [[nodiscard]] CellBlock Wide(int column, int row) const {
+    CellBlock block{column, row, 1, 1};
+    AddColumns(block);
+    AddRows(block);
+    return block;
+  }
+  [[nodiscard]] CellBlock High(int column, int row) const {
+    CellBlock block{column, row, 1, 1};
+    AddRows(block);
+    AddColumns(block);
+    return block;
+  }
+
+  const std::vector<bool>& occupied_;
+  const int width_, height_;
+  std::vector<bool> covered_;
+};
+
+// ---- Places
+
+// Where the corners of cells are, in metres.
+class Placing {
+ public:
+  // @param cells how many of the map's are a side of one here.
+  Placing(const MapFile& map, int cells) : map_(map), cells_(cells) {}
+
+  [[nodiscard]] bool IsTurned() const { return map_.origin[2] != 0; }
+  [[nodiscard]] double Lower(int axis, int cell) const {
+    return AddDown(map_.origin[ToSize(axis)], MulDown(MulDown(map_.resolution, cells_), cell));
+  }
+  [[nodiscard]] double Upper(int axis, int cell) const {
+    return AddUp(map_.origin[ToSize(axis)], MulUp(MulUp(map_.resolution, cells_), cell));
+  }
+
+  // The corners of a convex set that contains the block.
+  [[nodiscard]] std::vector<PlanePoint> Corners(const CellBlock& block) const {
+    if (!IsTurned()) {
+      const double left = Lower(0, block.column), right = Upper(0, block.column + block.width),
+                   low = Lower(1, block.row), high = Upper(1, block.row + block.height);
+      return {{left, low}, {right, low}, {right, high}, {left, high}};
+    }
+    // In the frame of the map, with the rounding of the products.
+    const double side = map_.resolution * cells_;
+    const double left = side * block.column, right = side * (block.column + block.width), low = side * block.row,
+                 high = side * (block.row + block.height);
+    const double error = 4 * kUnitRoundoff * (std::abs(left) + std::abs(right) + std::abs(low) + std::abs(high));
+    const Pose pose{map_.origin[0], map_.origin[1], map_.origin[2]};
+    const Placed placed = Place({{left, low}, {right, low}, {right, high}, {left, high}}, pose);
+    return Grown(placed.points, AddUp(placed.error, 2 * error));
+  }
+
+ private:
+  const MapFile& map_;
+  const int cells_;
+};
+
+void AddOutside(World& world, const Placing& placing, const GrayImage& grid) {
+  const std::string name = "beyond the map";
+  if (!placing.IsTurned()) {
+    world.AddBeyond(0, -1, placing.Upper(0, 0), name);
+    world.AddBeyond(1, -1, placing.Upper(1, 0), name);
+    world.AddBeyond(0, 1, placing.Lower(0, grid.width), name);
+    world.AddBeyond(1, 1, placing.Lower(1, grid.height), name);
+    return;
+  }
+  const int thick = std::max(grid.width, grid.height), all = grid.width + 2 * thick;
+  world.Add(name, placing.Corners({-thick, -thick, all, thick}));
+  world.Add(name, placing.Corners({-thick, grid.height, all, thick}));
+  world.Add(name, placing.Corners({-thick, 0, thick, grid.height}));
+  world.Add(name, placing.Corners({grid.width, 0, thick, grid.height}));
+}
+
+}  // namespace
+
+GrayImage ReadPgm(const std::string& file, std::string_view bytes) { return PgmReader(file, bytes).Read(); }
+
+std::vector<CellBlock> Blocks(const std::vector<bool>& occupied, int width, int height) {
+  return BlockFinder(occupied, width, height).Find();
+}
+
+World ReadOccupancyMap(const std::string& path, const MapOptions& options) {
+  const MapFile map = ReadMapFile(path);
+  const std::string image_path = (std::filesystem::path(path).parent_path() / map.image).string();
+  const GrayImage image = ReadPgm(image_path, ReadWhole(image_path, 12 * kMaxPixels, path + ": image: "));
+  const Grid grid =
+      Coarsened({image.width, image.height, OccupiedCells(image, map, options.unknown_is_free)}, options.coarsen);
+  const Placing placing(map, options.coarsen);
+  World world;
+  for (const CellBlock& block : Blocks(grid.occupied, grid.width, grid.height))
+    world.Add(fmt::format("{} by {} cells at column {}, row {}", block.width, block.height, block.column, block.row),
+              placing.Corners(block));
+  world.notes.push_back(fmt::format("{} by {} cells of {} m, {} of them occupied; rows count from below.", grid.width,
+                                    grid.height, ToText(map.resolution * options.coarsen),
+                                    std::ranges::count(grid.occupied, true)));
+  if (options.coarsen > 1)
+    world.notes.push_back(
+        fmt::format("A cell is {0} by {0} of the map's, occupied if one of them is.", options.coarsen));
+  world.notes.push_back(options.unknown_is_free ? "Unknown cells are free, and so is all beyond the image."
+                                                : "Unknown cells are occupied, and so is all beyond the image.");
+  if (map.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
+  for (const std::string& key : map.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
+  if (!options.unknown_is_free) AddOutside(world, Placing(map, 1), image);
+  return world;
+}
+
+}  // namespace forereach

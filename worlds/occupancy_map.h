@@ -1,0 +1,51 @@
+/** Maps of ROS: a YAML file that names a PGM image of cells, as map_saver writes them and map_server reads them. */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "worlds/world.h"
+
+namespace forereach {
+
+struct MapOptions {
+  bool unknown_is_free = false;
+  /** A block of so many cells by so many is occupied if one of its cells is. */
+  int coarsen = 1;
+};
+
+/** Gray values, the rows from top to bottom. */
+struct GrayImage {
+  int width = 0, height = 0, largest = 0;  ///< `largest` is white.
+  std::vector<std::uint16_t> values;
+};
+
+/** The most pixels of an image: what it takes of memory is at most 16 bytes each. */
+inline constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
+
+/** An image in the format P2 or P5 of netpbm, with comments in its header and 1 to 65535 as its largest value.
+@param file its name in messages. @throws ConfigError if it is another format, has more than kMaxPixels, ends early, or
+has a value above the largest. */
+[[nodiscard]] GrayImage ReadPgm(const std::string& file, std::string_view bytes);
+
+/** Cells column..column + width - 1 of the rows row..row + height - 1, and which cells are occupied, row by row. */
+struct CellBlock {
+  int column = 0, row = 0, width = 0, height = 0;
+};
+
+/** Blocks whose union is exactly the occupied cells. They may overlap: each is made as large as it can be, first along
+its row or along its column, whichever covers more that was not covered. Cost: of a block, its cells.
+@pre occupied.size() == width * height. */
+[[nodiscard]] std::vector<CellBlock> Blocks(const std::vector<bool>& occupied, int width, int height);
+
+/** The occupied cells of a map as boxes, or as polygons if its origin is turned. Each covers its cells and at most the
+rounding of its corners more. With unknown cells occupied, so is all beyond the image: half-planes, or bars as thick as
+the map if it is turned.
+A cell is occupied, free or unknown as for map_server in mode trinary. In mode scale, what is neither free nor occupied
+is occupied. @throws ConfigError with file, line, key and value. */
+[[nodiscard]] World ReadOccupancyMap(const std::string& path, const MapOptions& options);
+
+}  // namespace forereach

@@ -1,0 +1,150 @@
+#include "worlds/world.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/limits.h"
+#include "forereach/numerics/text.h"
+#include "lcmtypes/printable.h"
+#include "task/config_error.h"
+
+namespace forereach {
+namespace {
+
+Eigen::Vector2d ToVector(const PlanePoint& p) { return {p.x, p.y}; }
+
+// A convex polygon; an axis-aligned box if it is one. A point or a segment is a polygon that repeats its last corner.
+Obstacle ToObstacle(const Ring& hull) {
+  PlanePoint lower = hull.front(), upper = hull.front();
+  for (const auto& [x, y] : hull) {
+    lower = {std::min(lower.x, x), std::min(lower.y, y)};
+    upper = {std::max(upper.x, x), std::max(upper.y, y)};
+  }
+  const bool is_box = std::ranges::all_of(hull, [&](const PlanePoint& p) {
+    return (p.x == lower.x || p.x == upper.x) && (p.y == lower.y || p.y == upper.y);
+  });
+  // A diagonal has its corners at those of a box, too.
+  if (is_box && (hull.size() == 4 || lower.x == upper.x || lower.y == upper.y))
+    return Obstacle::AxisBox(ToVector(lower), ToVector(upper));
+  std::vector<Eigen::VectorXd> vertices;
+  for (const PlanePoint& p : hull) vertices.emplace_back(ToVector(p));
+  while (vertices.size() < 3) vertices.push_back(vertices.back());
+  return Obstacle::Polygon(vertices);
+}
+
+std::string Numbers(const Eigen::VectorXd& y) { return fmt::format("[{}, {}]", ToText(y[0]), ToText(y[1])); }
+
+std::string ShapeText(const Obstacle& obstacle) {
+  const std::vector<Eigen::VectorXd>& points = obstacle.points();
+  switch (obstacle.kind()) {
+    case Obstacle::Kind::kCircle:
+      return fmt::format("circle: {{center: {}, radius: {}}}", Numbers(points[0]), ToText(obstacle.radius()));
+    case Obstacle::Kind::kBox:
+      return fmt::format("box: {{lower: {}, upper: {}}}", Numbers(points[0]), Numbers(points[1]));
+    case Obstacle::Kind::kHalfSpace:
+      return fmt::format("half_plane: {{normal: {}, offset: {}}}", Numbers(points[0]), ToText(obstacle.offset()));
+    case Obstacle::Kind::kPolygon: break;
+  }
+  std::string vertices;
+  for (const Eigen::VectorXd& point : points) vertices += (vertices.empty() ? "" : ", ") + Numbers(point);
+  return "polygon: {vertices: [" + vertices + "]}";
+}
+
+std::string NotesText(const World& world, const std::string& origin, const std::string& indent) {
+  std::string text = indent + "# The obstacles of " + Printable(origin) + ", by forereach import-world.\n";
+  for (const std::string& note : world.notes) text += indent + "# " + Printable(note) + "\n";
+  return text;
+}
+
+std::string ListText(const World& world, const std::string& indent) {
+  if (world.pieces.empty()) return indent + "obstacles: []\n";
+  std::string text = indent + "obstacles:\n";
+  for (const auto& [name, obstacle, window] : world.pieces) {
+    text += fmt::format("{}  - {}  # {}\n", indent, ShapeText(obstacle), Printable(name));
+    if (window)
+      text += fmt::format("{}    motion: {{velocity: [0, 0], from: {}, until: {}}}\n", indent,
+                          ToText(window->from + 0.0), ToText(window->until + 0.0));  // no -0
+  }
+  return text;
+}
+
+// Beyond the lower and the upper end of x, then of y.
+using Sides = std::array<bool, 4>;
+
+// Behind which sides of the box all of an obstacle lies.
+Sides SidesBeyond(const Obstacle& obstacle, const Box& region) {
+  Sides is_beyond{};
+  for (int k = 0; k < 2; ++k) {
+    const auto at = static_cast<std::size_t>(2 * k);
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+      const Eigen::VectorXd& normal = obstacle.points()[0];
+      if (normal[1 - k] != 0) continue;
+      is_beyond[at] = normal[k] == -1 && -obstacle.offset() < region.lower()[k];
+      is_beyond[at + 1] = normal[k] == 1 && obstacle.offset() > region.upper()[k];
+    } else {
+      is_beyond[at] = AddUp(obstacle.upper()[k], obstacle.radius()) < region.lower()[k];
+      is_beyond[at + 1] = SubDown(obstacle.lower()[k], obstacle.radius()) > region.upper()[k];
+    }
+  }
+  return is_beyond;
+}
+
+}  // namespace
+
+void World::Add(const std::string& name, const std::vector<PlanePoint>& points, std::optional<Window> window) {
+  const Ring hull = ConvexHull(points);
+  for (std::size_t begin = 1; begin == 1 || begin + 1 < hull.size(); begin += kMaxObstaclePoints - 2) {
+    Ring part{hull.front()};  // a fan from the first corner
+    for (std::size_t i = begin; i < std::min<std::size_t>(hull.size(), begin + kMaxObstaclePoints - 1); ++i)
+      part.push_back(hull[i]);
+    pieces.push_back({name, ToObstacle(part), window});
+  }
+}
+
+void World::AddBeyond(int axis, int sign, double at, const std::string& name) {
+  Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+  normal[axis] = sign;
+  pieces.push_back({name, Obstacle::HalfSpace(normal, sign * at), {}});
+}
+
+World Cropped(World world, const Box& region) {
+  Sides is_cut{};
+  const auto is_dropped = [&](const World::Piece& piece) {
+    const Sides is_beyond = SidesBeyond(piece.obstacle, region);
+    const auto side = std::ranges::find(is_beyond, true);
+    if (side == is_beyond.end()) return false;
+    bool is_behind_a_cut = false;
+    for (std::size_t i = 0; i < 4; ++i) is_behind_a_cut |= is_beyond[i] && is_cut[i];
+    if (!is_behind_a_cut) is_cut[static_cast<std::size_t>(side - is_beyond.begin())] = true;
+    return true;
+  };
+  std::erase_if(world.pieces, is_dropped);
+  for (int k = 0; k < 2; ++k) {
+    if (is_cut[static_cast<std::size_t>(2 * k)]) world.AddBeyond(k, -1, region.lower()[k], "outside of the region");
+    if (is_cut[static_cast<std::size_t>(2 * k + 1)]) world.AddBeyond(k, 1, region.upper()[k], "outside of the region");
+  }
+  return world;
+}
+
+std::string ObstaclesText(const World& world, const std::string& origin) {
+  return NotesText(world, origin, "") + "task:\n" + ListText(world, "  ");
+}
+
+std::string WithObstacles(const std::string& task, const World& world, const std::string& origin,
+                          const std::string& path) {
+  constexpr std::string_view kLine = "obstacles: []";
+  const std::size_t at = task.find(kLine), begin = task.rfind('\n', at) + 1;
+  const bool is_line = at != std::string::npos && task.find_first_not_of(' ', begin) == at;
+  if (!is_line || task.find(kLine, at + 1) != std::string::npos)
+    throw ConfigError(path + ": has to have one line `obstacles: []` in `task`, which is replaced");
+  const std::string indent(at - begin, ' ');
+  const std::size_t end = std::min(task.find('\n', at), task.size() - 1) + 1;
+  return task.substr(0, begin) + NotesText(world, origin, indent) + ListText(world, indent) + task.substr(end);
+}
+
+}  // namespace forereach
