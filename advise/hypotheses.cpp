@@ -14,7 +14,7 @@ namespace forereach {
 namespace {
 
 // "x 0.03, y 0.03": what is not zero.
-std::string Bounds(const std::vector<std::string>& names, const Eigen::VectorXd& bounds) {
+std::string NamedBounds(const std::vector<std::string>& names, const Eigen::VectorXd& bounds) {
   std::string text;
   for (Eigen::Index k = 0; k < bounds.size(); ++k)
     if (bounds[k] != 0)
@@ -126,13 +126,13 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   std::vector<Hypothesis> all{
       {declaration.state_error.isZero(0)
            ? "a measured state is the true one"
-           : "a measured state is off the true one by at most " + Bounds(model.state_names(), declaration.state_error),
+           : "a measured state is off the true one by at most " + NamedBounds(model.state_names(), declaration.state_error),
        WhoRefutesStateError(config)},
       {"the first state lies in X0",
        "the guard, which starts a plan only if all of the measured state +- its error does"},
       {declaration.input_error.isZero(0) ? "the robot applies the plan's controls, one a step"
                                          : "the robot applies the plan's controls, one a step, off by at most " +
-                                               Bounds(model.input_names(), declaration.input_error),
+                                               NamedBounds(model.input_names(), declaration.input_error),
        declaration.input_error.isZero(0) ? "the guard, which hands out no others"
                                          : "the guard, which hands out no others, and declaration.input_error"}};
   AddTimes(config, all);
@@ -156,7 +156,7 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
         {"it changes by less in " + std::to_string(declaration.regions.size()) + " boxes, as declaration.regions says",
          falsify});
   if (!declaration.noise_bound.isZero(0))
-    all.push_back({"recorded successors are off by at most " + Bounds(model.state_names(), declaration.noise_bound),
+    all.push_back({"recorded successors are off by at most " + NamedBounds(model.state_names(), declaration.noise_bound),
                    "declared; transitions refute it likewise"});
   if (declaration.given_are_exact)
     all.push_back({"the transitions of the file are exact", "declared (declaration.transitions_are)"});

@@ -39,7 +39,7 @@ double LeastDistanceOfMiddle(const Abstained& abstained, const Tube& tube, const
 }
 
 std::vector<advice_change_t> ChangesForObstacles(const Abstained& abstained, Tube& tube, const SearchEffort& effort) {
-  auto ways = FindWayClear(abstained.certifier, abstained.plan, abstained.obstacles, tube, effort);
+  auto ways = FindWayClear(abstained.certifier, abstained.plan, abstained.obstacles.all(), tube, effort);
   if (!ways) return {};
   std::ranges::stable_sort(*ways, {}, &GivingWay::step);
   if (ways->size() > kMaxAdviceChanges) ways->resize(kMaxAdviceChanges);
@@ -54,7 +54,7 @@ std::vector<advice_change_t> ChangesForObstacles(const Abstained& abstained, Tub
     for (Eigen::Index k = 0; k < way.shift.size(); ++k) change.direction[k] = -way.shift[k] / distance;
   }
   if (!effort.goes_on()) return {};
-  const std::vector<Obstacle> farther = Shifted(abstained.obstacles, *ways);
+  const std::vector<Obstacle> farther = Shifted(abstained.obstacles.all(), *ways);
   const Decision again = abstained.certifier.Certify(abstained.plan, abstained.initial_set, farther, tube);
   for (advice_change_t& change : changes) change.verified = again.outcome == Outcome::kCertified ? 1 : 0;
   return changes;

@@ -18,7 +18,7 @@ struct Abstained {
   const Certifier& certifier;
   const Plan& plan;
   const Zonotope& initial_set;
-  std::span<const Obstacle> obstacles;
+  ObstacleView obstacles;
   const Decision& verdict;
 };
 
