@@ -184,7 +184,7 @@ class Report:
         for kind, text in [("apart", "share nothing"), ("kin", "share 15 steps, five by five")]:
             took = {by: self.benchmarks.get(f"chunks/{kind}/{by}/real_time") for by in ["loop", *sorted(self.batch_rates())]}
             real = {by: benchmark and benchmark.real for by, benchmark in took.items()}
-            rows += [[f"{text}, " + ("loop" if by == "loop" else f"{by} threads"), number(us, 4), number(ratio(real["loop"], us))]
+            rows += [[f"{text}, " + ("loop" if by == "loop" else f"threads: {by}"), number(us, 4), number(ratio(real["loop"], us))]
                      for by, us in real.items()]
         return ("1,000 chunks of 20 steps from one X0 among 11 circles: a loop of `Certify`, and `CertifyAll`. Microseconds on the "
                 "clock.\n\n" + table(["chunks", "us", "over the loop"], rows))
