@@ -62,8 +62,8 @@ TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
   EXPECT_EQ(types.size(), 16u);
   EXPECT_THAT(types.at("candidate_plan_t").fields,
               testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
-                                   "num_inputs", "num_steps", "progress_steps", "initial_center", "initial_half_width",
-                                   "control"));
+                                   "num_inputs", "num_steps", "progress_steps", "repair", "initial_center",
+                                   "initial_half_width", "control"));
   EXPECT_EQ(types.at("decision_t").constants.size(), 36u);
 }
 
