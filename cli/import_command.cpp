@@ -20,6 +20,7 @@
 #include "forereach/numerics/text.h"
 #include "identify/command_delay.h"
 #include "identify/import.h"
+#include "identify/joined_logs.h"
 #include "identify/units.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
@@ -32,7 +33,8 @@ namespace {
 using Json = nlohmann::json;
 
 struct ImportArguments {
-  std::string config, out, time, time_unit = "s", delimiter = "auto", comment = "#", header, decimal = "point";
+  std::string config, out, inputs_from, inputs_time, time, time_unit = "s", delimiter = "auto", comment = "#", header,
+                                                           decimal = "point";
   std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
   std::string command_delay = "none";
   std::optional<double> rate, from, until;
@@ -91,20 +93,52 @@ LogFormat FormatOf(const ImportArguments& options) {
   return format;
 }
 
-// The columns: the stamp, the states, the inputs. A variable without an option has the column of its name.
-std::vector<std::string> ColumnsOf(const ImportArguments& options, const NominalModel& model) {
-  std::vector<std::string> columns;
-  if (!options.rate) columns.push_back(options.time);
-  const auto take = [&](const char* option, const auto& texts, const std::vector<std::string>& names) {
+// The columns of a log: of states, and of inputs, each after its stamp. A variable without an option has the column of
+// its name.
+struct Columns {
+  std::vector<std::string> states, inputs;
+
+  // Of the table that is made of both.
+  [[nodiscard]] std::vector<std::string> All(bool has_time) const {
+    std::vector<std::string> all = states;
+    all.insert(all.end(), inputs.begin() + (has_time ? 1 : 0), inputs.end());
+    return all;
+  }
+};
+
+Columns ColumnsOf(const ImportArguments& options, const NominalModel& model) {
+  Columns columns;
+  const auto take = [&](const char* option, const auto& texts, const std::vector<std::string>& names,
+                        std::vector<std::string>& into) {
     const auto given = Assignments(option, texts, names);
     for (const std::string& name : names) {
       const auto at = given.find(name);
-      columns.push_back(at == given.end() ? name : at->second);
+      into.push_back(at == given.end() ? name : at->second);
     }
   };
-  take("state", options.states, model.state_names());
-  take("input", options.inputs, model.input_names());
+  if (!options.rate) {
+    columns.states.push_back(options.time);
+    columns.inputs.push_back(options.inputs_time.empty() ? options.time : options.inputs_time);
+  }
+  take("state", options.states, model.state_names(), columns.states);
+  take("input", options.inputs, model.input_names(), columns.inputs);
   return columns;
+}
+
+LogTable TableOf(const std::string& path, const Columns& columns, const ImportArguments& options) {
+  const LogFormat format = FormatOf(options);
+  if (options.inputs_from.empty()) return ReadLog(path, columns.All(!options.rate), format);
+  return Joined(ReadLog(path, columns.states, format), ReadLog(options.inputs_from, columns.inputs, format));
+}
+
+// Rows of two logs are joined by their stamps, and a delay in rows of both is none.
+void CheckJoin(const ImportArguments& options) {
+  if (options.inputs_from.empty() && options.inputs_time.empty()) return;
+  if (options.inputs_from.empty()) Refuse("inputs-time", "needs --inputs-from");
+  if (options.rate) Refuse("inputs-from", "needs stamps, and --rate says that there are none");
+  if (options.logs.size() != 1) Refuse("inputs-from", "belongs to one log of states");
+  if (options.command_delay != "none")
+    Refuse("inputs-from", "has no rows to count --command-delay in; move its stamps");
 }
 
 std::vector<long double> FactorsOf(const ImportArguments& options, const NominalModel& model) {
@@ -176,7 +210,7 @@ Json ToJson(const Finding& finding) {
 
 Json ToJson(const Source& source, const std::vector<std::string>& columns) {
   Json document{{"log", source.table.path},
-                {"rows", source.table.values.rows()},
+                {"rows", source.table.num_rows()},
                 {"samples", source.log.samples},
                 {"spacing_s", source.log.typical_spacing},
                 {"transitions", source.log.transitions.size()},
@@ -220,7 +254,7 @@ void PrintGaps(const ImportedLog& log, const ImportArguments& options) {
 
 void PrintForPeople(const Source& source, const std::vector<std::string>& columns, const ImportArguments& options) {
   const auto& [table, log] = source;
-  std::cout << table.path << ": " << log.transitions.size() << " transitions from " << table.values.rows() << " rows";
+  std::cout << table.path << ": " << log.transitions.size() << " transitions from " << table.num_rows() << " rows";
   if (log.typical_spacing > 0) std::cout << fmt::format(", typically {:.6g} s apart", log.typical_spacing);
   if (table.blank.count + table.comments.count > 0)
     std::cout << "; " << table.blank.count << " blank lines, " << table.comments.count << " comments";
@@ -411,14 +445,16 @@ int RunImport(ImportArguments options) {
   FindTime(options);
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const NominalModel& model = *config.problem->model;
-  const std::vector<std::string> columns = ColumnsOf(options, model);
+  CheckJoin(options);
+  const Columns wanted = ColumnsOf(options, model);
+  const std::vector<std::string> columns = wanted.All(!options.rate);
   ImportOptions import = ImportOptionsOf(options, config);
   std::vector<Source> sources;
   Transitions all{Eigen::MatrixXd(0, model.num_variables()), Eigen::MatrixXd(0, model.num_states())};
   std::optional<Progress> progress(std::in_place, "logs read", options.logs.size());
   for (const std::string& path : options.logs) {
     Source& source = sources.emplace_back();
-    source.table = ReadLog(path, columns, FormatOf(options));
+    source.table = TableOf(path, wanted, options);
     if (source.table.dates.count > 0 && import.time_unit > 0 && options.time_unit != "s")
       Refuse("time-unit", "the stamps are dates, whose unit is s");
     source.log = Import(source.table, *config.problem, import);
@@ -426,7 +462,7 @@ int RunImport(ImportArguments options) {
   }
   progress.reset();
   std::optional<CommandDelay> delay;
-  if (options.command_delay == "none" || options.command_delay == "auto")
+  if (options.inputs_from.empty() && (options.command_delay == "none" || options.command_delay == "auto"))
     if (model.num_inputs() > 0) delay = DelayOf(sources, *config.problem, import);
   import.command_delay = ShiftBy(options, delay);
   for (Source& source : sources) {
@@ -509,6 +545,9 @@ Command ImportCommand() {
                    "about z alone; by "
                    "default the one of its name. May be repeated"},
                   {"--input", &options->inputs, "NAME=COLUMN", "The same for an input"},
+                  {"--inputs-from", &options->inputs_from, "LOG.csv",
+                   "The inputs are in this log: each holds from its stamp until the next one's"},
+                  {"--inputs-time", &options->inputs_time, "COLUMN", "Its column of stamps; by default that of --time"},
                   {"--unit", &options->units, "NAME=UNIT",
                    "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
                   {"--unwrap", &options->unwrapped, "STATE",

@@ -26,6 +26,7 @@ struct Sample {
   long double time;  // s; only differences within a piece are exact enough to mean something
   Eigen::Index row;
   bool begins_piece;  // no transition spans the boundary before it
+  bool has_states;    // otherwise commands alone begin there
 };
 
 // The middle one, of an even number the larger; 0 if there is none.
@@ -53,15 +54,15 @@ class Importer {
     CollectSamples();
     RequireFineEnough();
     for (std::size_t i = 0; i < samples_.size();) {
-      const std::size_t end = Try(i);
+      const std::size_t end = samples_[i].has_states ? Try(i) : 0;
       i = end == 0 || options_.overlapping ? i + 1 : end;
     }
     const auto count = std::ssize(log_.lines);
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Map<const RowMajor> rows(numbers_.data(), count, 2 * n_ + m_);
     log_.transitions = {rows.leftCols(n_ + m_), rows.rightCols(n_)};
-    log_.samples = static_cast<int>(samples_.size());
-    log_.rows = table_.values.rows() + table_.lost.count - log_.At(Dropped::kRepeatedRow).count -
+    log_.samples = static_cast<int>(CountStates(0, samples_.size()));
+    log_.rows = table_.num_rows() + table_.lost.count - log_.At(Dropped::kRepeatedRow).count -
                 log_.At(Dropped::kOutsideWindow).count;
     log_.median_gap = MedianOf(gaps_);
     log_.largest_gap = gaps_.empty() ? 0 : *std::ranges::max_element(gaps_);
@@ -85,6 +86,17 @@ class Importer {
   }
   [[nodiscard]] int LineOf(Eigen::Index row) const { return table_.lines[ToSize(row)]; }
   void Drop(Dropped cause, Eigen::Index row, const std::string& what = "") { log_.At(cause).Add(LineOf(row), what); }
+
+  // Commands are no rows that somebody misses.
+  void DropRow(Dropped cause, Eigen::Index row) {
+    if (table_.HasStates(row)) Drop(cause, row);
+  }
+
+  [[nodiscard]] std::int64_t CountStates(std::size_t begin, std::size_t end) const {
+    return std::count_if(samples_.begin() + static_cast<std::ptrdiff_t>(begin),
+                         samples_.begin() + static_cast<std::ptrdiff_t>(end),
+                         [](const Sample& sample) { return sample.has_states; });
+  }
 
   void CollectSamples() {
     log_.At(Dropped::kRowLost) = table_.lost;
@@ -114,9 +126,9 @@ class Importer {
         for (Eigen::Index i = row + 1; i < end; ++i) Drop(Dropped::kRepeatedRow, i);
         const long double since = time - origin;
         if (options_.from <= since && since <= options_.until)
-          samples_.push_back({time, row, std::exchange(broken, false)});
+          samples_.push_back({time, row, std::exchange(broken, false), table_.HasStates(row)});
         else
-          Drop(Dropped::kOutsideWindow, row), broken = true;
+          DropRow(Dropped::kOutsideWindow, row), broken = true;
       }
       row = end;
     }
@@ -133,8 +145,13 @@ class Importer {
 
   void RequireFineEnough() {
     std::vector<double> spacings;
-    for (std::size_t i = 1; i < samples_.size(); ++i)
-      if (!samples_[i].begins_piece) spacings.push_back(static_cast<double>(samples_[i].time - samples_[i - 1].time));
+    const Sample* last = nullptr;
+    for (const Sample& sample : samples_) {
+      if (sample.begins_piece) last = nullptr;
+      if (!sample.has_states) continue;
+      if (last) spacings.push_back(static_cast<double>(sample.time - last->time));
+      last = &sample;
+    }
     log_.typical_spacing = MedianOf(spacings);
     if (!(log_.typical_spacing > (1 + kJitter) * options_.period + options_.tolerance)) return;
     if (const Finding& back = log_.At(Dropped::kBackwards); back.count > 0)
@@ -174,11 +191,15 @@ class Importer {
   // The sample nearest to a step behind sample i in its piece, 0 with the cause counted if there is none.
   std::size_t EndOf(std::size_t i) {
     const long double target = TargetOf(i);
-    std::size_t j = i + 1;
-    while (j < samples_.size() && !samples_[j].begins_piece && samples_[j].time < target) ++j;
     const auto offset = [&](std::size_t at) { return std::abs(samples_[at].time - target); };
-    const bool ends = j == samples_.size() || samples_[j].begins_piece;
-    if (ends || (j > i + 1 && offset(j - 1) < offset(j))) --j;
+    std::size_t j = i, at = i + 1;  // the last one before the target, which may be i, or the nearest one
+    for (; at < samples_.size() && !samples_[at].begins_piece; ++at) {
+      if (!samples_[at].has_states) continue;
+      if (samples_[at].time >= target) break;
+      j = at;
+    }
+    const bool ends = at == samples_.size() || samples_[at].begins_piece;
+    if (!ends && (j == i || offset(at) <= offset(j))) j = at;
     if (j > i && offset(j) <= options_.tolerance + RoundingOf(i, j)) return j;
     if (!ends) gaps_.push_back(static_cast<double>(offset(j)));
     Drop(ends ? Dropped::kEnd : Dropped::kGap, samples_[i].row);
@@ -247,7 +268,7 @@ class Importer {
     numbers_.insert(numbers_.end(), location.begin(), location.end());
     numbers_.insert(numbers_.end(), successor.begin(), successor.end());
     log_.lines.push_back(LineOf(samples_[i].row));
-    log_.rows_used += static_cast<std::int64_t>(j + 1 - std::max(i, next_unused_));
+    log_.rows_used += CountStates(std::max(i, next_unused_), j + 1);
     next_unused_ = j + 1;
     Note(i, j, location, successor, deviation);
     return j;

@@ -9,6 +9,7 @@ line that repeats the header is skipped and counted; a header that differs is re
 a comment before them with as many names as they have fields is the header. libcsv reads the fields. */
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -44,13 +45,23 @@ struct LogTable {
   /** One row for each row of the file with the header's number of fields; the wanted columns in their order. NaN where
   a field is no finite number. */
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values;
-  std::vector<int> lines;             ///< In which line each row begins.
-  std::vector<bool> after_loss;       ///< Whether a row was left out directly before this one.
+  std::vector<int> lines;        ///< In which line each row begins.
+  std::vector<bool> after_loss;  ///< Whether a row was left out directly before this one.
+  /** Rows that say only which commands begin, between two rows with states (joined_logs.h). Empty: there are none. */
+  std::vector<bool> is_command;
   Finding blank, comments, lost;      ///< Lines without a row, and rows left out.
   Finding headers;                    ///< Lines that repeat the header; a row is left out there.
   Finding decimal_commas;             ///< Fields of wanted columns such as 0,5, which are no number here.
   Finding dates;                      ///< Fields that are dates.
   std::vector<Finding> not_a_number;  ///< For each wanted column.
+
+  [[nodiscard]] bool HasStates(Eigen::Index row) const {
+    return is_command.empty() || !is_command[static_cast<std::size_t>(row)];
+  }
+  /** The rows that have states. */
+  [[nodiscard]] Eigen::Index num_rows() const {
+    return values.rows() - std::count(is_command.begin(), is_command.end(), true);
+  }
 };
 
 /** Reads the wanted columns of a log. Cost: linear in the file.

@@ -192,6 +192,18 @@ TEST_F(ForeignLogTest, BlanksMaySeparateFields) {
   EXPECT_THAT(semicolons.text, HasSubstr("log.csv:1: the fields seem to be separated by semicolons"));
 }
 
+TEST_F(ForeignLogTest, InputsMayBeInALogOfTheirOwn) {
+  std::string states = "time,p,v\n", commands = "when,a\n";
+  for (int i = 0; i < 40; ++i) states += Row(i, "{:.1f},{:.4f},{:.4f}\n");
+  for (int i = 0; i < 9; ++i) commands += fmt::format("{:.2f},1\n", 0.5 * i - 0.05);
+  const std::string from = "--inputs-from " + scratch_.Write("commands.csv", commands);
+  EXPECT_THAT(Import(states, from + " --inputs-time when"), Exits(0, "39 transitions from 40 rows"));
+  EXPECT_THAT(Import(states, from), Exits(2, "commands.csv:1: no column 'time'"));
+  EXPECT_THAT(Import(states, from + " --inputs-time when --command-delay 1"), Exits(2, "--inputs-from: has no rows"));
+  EXPECT_THAT(Import(states, "--inputs-time when"), Exits(2, "--inputs-time: needs --inputs-from"));
+  EXPECT_THAT(Import(states, from + " --rate 10"), Exits(2, "--inputs-from: needs stamps"));
+}
+
 TEST_F(ForeignLogTest, StampsMayBeDatesOrSecondsAndNanoseconds) {
   std::string dates = header_, parts = "sec,nsec,p,v,a\n";
   for (int i = 0; i < 20; ++i) {
