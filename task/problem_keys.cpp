@@ -224,8 +224,8 @@ std::vector<Key> DeclarationKeys() {
   range.count = Between(2, 2);
   Key regions =
       List("declaration.regions", Between(0, Region::kMaxRegions),
-           "Boxes in which the residual changes less than declaration.lipschitz says. Where boxes overlap, all "
-           "of them hold.");
+           "Boxes in which the residual changes less than declaration.lipschitz says. Where boxes overlap, the "
+           "least of their slopes holds, entry by entry.");
   regions.read = CheckRegions;
   const auto state_error = ErrorKeys(
       "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,

@@ -29,7 +29,7 @@ struct AffineRows {
 
 /** A box in some variables of z in which the residual changes by less than L says: for all z, z' of it in Z_cert
     |r_k(z) - r_k(z')| <= sum_l min(L'_kl, L_kl) |z_l - z'_l|.
-Where no region lies, L alone holds; where several overlap, all of them do. */
+Where no region lies, L alone holds. For z, z' in several regions the least of their slopes holds, entry by entry. */
 struct Region {
   static constexpr std::size_t kMaxRegions = 256, kMaxVariables = 3, kMaxCells = 1024;
 
