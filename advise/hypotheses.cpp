@@ -124,9 +124,9 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   const NominalModel& model = *problem.model;
   const Declaration& declaration = problem.declaration;
   std::vector<Hypothesis> all{
-      {declaration.state_error.isZero(0)
-           ? "a measured state is the true one"
-           : "a measured state is off the true one by at most " + NamedBounds(model.state_names(), declaration.state_error),
+      {declaration.state_error.isZero(0) ? "a measured state is the true one"
+                                         : "a measured state is off the true one by at most " +
+                                               NamedBounds(model.state_names(), declaration.state_error),
        WhoRefutesStateError(config)},
       {"the first state lies in X0",
        "the guard, which starts a plan only if all of the measured state +- its error does"},
@@ -156,8 +156,9 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
         {"it changes by less in " + std::to_string(declaration.regions.size()) + " boxes, as declaration.regions says",
          falsify});
   if (!declaration.noise_bound.isZero(0))
-    all.push_back({"recorded successors are off by at most " + NamedBounds(model.state_names(), declaration.noise_bound),
-                   "declared; transitions refute it likewise"});
+    all.push_back(
+        {"recorded successors are off by at most " + NamedBounds(model.state_names(), declaration.noise_bound),
+         "declared; transitions refute it likewise"});
   if (declaration.given_are_exact)
     all.push_back({"the transitions of the file are exact", "declared (declaration.transitions_are)"});
   if (declaration.IsDisturbed())

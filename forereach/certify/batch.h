@@ -39,8 +39,7 @@ sets is neither 1 nor the number of plans. Cost: the sum of the calls, less what
 thread has a Tube of about 2.5 MB, which takes some 0.5 ms to be made. Nothing is allocated for a step.
 @pre Certifier::Require passes for each plan. */
 [[nodiscard]] std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
-                                               std::span<const Zonotope> initial_sets,
-                                               const ObstacleView& obstacles, const BatchOptions& options = {},
-                                               const BatchListener& listener = {});
+                                               std::span<const Zonotope> initial_sets, const ObstacleView& obstacles,
+                                               const BatchOptions& options = {}, const BatchListener& listener = {});
 
 }  // namespace forereach

@@ -337,8 +337,8 @@ void Certifier::Require(const Zonotope& initial_set, const ObstacleView& obstacl
                            ", the projection has " + std::to_string(projection().dim()));
 }
 
-Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles,
-                            Tube& tube, int known) const noexcept {
+Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles, Tube& tube,
+                            int known) const noexcept {
   tube.length_ = std::clamp(known, 0, tube.length_);
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());

@@ -5,6 +5,8 @@
 
 #include "tests/test.h"
 
+#include <fmt/format.h>
+
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/models/residuals.h"
 #include "task/schema.h"
