@@ -1,16 +1,13 @@
 /** The nearest plan to a refused one that can be certified.
 
 Plans are made from the refused one in plain arithmetic and tried in this order:
-
-| change | what is tried |
-|---|---|
-| kSlower | the nominal path of the progress part at a pace that falls evenly from its own to a share of it. Its
-controls are the least squares of the distances to this path (Gauss-Newton over all its steps). A braking tail follows |
-| kTail | the first controls of the plan, fewer and fewer, and then a braking tail, each way of planner.stop |
-| kPushed | the controls of the progress part move, by the least in parts of their ranges that gives enough of what
-refused the plan: the clearance from that obstacle, the room of that limit, bound or rest. It goes by the numerical
-gradient over the nominal rollout, again by what refuses the result, and then part of the way back | | combinations |
-slower, and then pushed or with an earlier tail; an earlier tail, and then pushed |
+- kSlower: the nominal path of the progress part at a pace that falls evenly from its own to a share of it. The controls
+are the least squares of the distances to this path (Gauss-Newton over all steps). A braking tail follows.
+- kTail: the first controls of the plan, fewer and fewer, and then a braking tail, by each way of planner.stop.
+- kPushed: the controls of the progress part move by the least, in parts of their ranges, that gives enough of what
+refused the plan: clearance from that obstacle, room of that limit, bound or rest. That goes by the numerical gradient
+over the nominal rollout, again by what refuses the result, and then part of the way back.
+- Combinations: slower, and then pushed or with an earlier tail; an earlier tail, and then pushed.
 
 Certifier::Certify alone decides which of them is certified: a search that goes wrong costs time and proves nothing.
 
