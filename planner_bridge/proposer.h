@@ -55,6 +55,11 @@ class Proposer {
   /** One candidate, or nothing if none was found. The result depends only on the request, the construction and the
   obstacles. */
   [[nodiscard]] virtual std::optional<Proposal> Propose(const PlanRequest& request) = 0;
+  /** Whether a robot at rest in the request's state has room to drive on in a direction, a unit vector in safety
+  coordinates, among the obstacles that stand. True if the planner does not know. */
+  [[nodiscard]] virtual bool HasRoom(const PlanRequest& /*request*/, const Eigen::VectorXd& /*direction*/) {
+    return true;
+  }
 };
 
 /** Makes the proposer that planner.source names. @throws ConfigError if the options do not match the problem, as of a
