@@ -22,12 +22,16 @@ double Slowness(const Box& region, const RoomAt& room_at, double clearance, cons
 
 }  // namespace
 
-RoomAt RoomOfPoint(const std::vector<Obstacle>& obstacles) {
-  return [&obstacles](const Eigen::VectorXd& y) {
+bool IsGone(const Obstacle& obstacle, std::int64_t time_us) {
+  return obstacle.motion() && obstacle.motion()->until_us < time_us;
+}
+
+RoomAt RoomOfPoint(const std::vector<Obstacle>& obstacles, std::int64_t time_us) {
+  return [&obstacles, time_us](const Eigen::VectorXd& y) {
     double room = kInfinity;
     for (const Obstacle& obstacle : obstacles) {
       const auto& motion = obstacle.motion();
-      if (motion && !motion->velocity.isZero(0)) continue;
+      if (motion && (!motion->velocity.isZero(0) || IsGone(obstacle, time_us))) continue;
       room = std::min(room, ApproximateDistance(obstacle, y) - (motion ? motion->uncertainty : 0));
     }
     return room;

@@ -1,6 +1,7 @@
 /** The travel distance to the goal around the obstacles. The search minimises it. */
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -14,8 +15,12 @@ namespace forereach {
 /** How far the robot is from obstacles when it is at y, metres; negative inside one. */
 using RoomAt = std::function<double(const Eigen::VectorXd& y)>;
 
-/** Of a point: the least distance to the obstacles; those with a velocity are left out. It refers to its argument. */
-[[nodiscard]] RoomAt RoomOfPoint(const std::vector<Obstacle>& obstacles);
+/** Of a point: the least distance to the obstacles that stand; those with a velocity, and those that are gone at a
+time, are left out. It refers to its first argument. */
+[[nodiscard]] RoomAt RoomOfPoint(const std::vector<Obstacle>& obstacles, std::int64_t time_us = 0);
+
+/** Whether the obstacle's motion has ended before this time. */
+[[nodiscard]] bool IsGone(const Obstacle& obstacle, std::int64_t time_us);
 
 /** For p = 2: the travel distance from y to the goal inside a region and around obstacles grown by a clearance, with a
 small penalty close to either. It is computed once on a grid by the fast

@@ -22,6 +22,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
+#include "planner_bridge/reference.h"
 #include "task/json_text.h"
 #include "task/step_time.h"
 
@@ -112,14 +113,16 @@ void PlannerNode::Follow(const robot_state_t& state) {
   std::erase_if(withdrawn_, [this](const auto& withdrawn) { return !plans_.contains(withdrawn.first); });
 }
 
-// Whether rounds have begun at this place for long.
-bool PlannerNode::IsStuck(const robot_state_t& state) {
+// For how long it has stood at this place, if it stands. One that moves may still get away.
+std::int64_t PlannerNode::StandsFor(const robot_state_t& state) {
   const Eigen::VectorXd place = PlaceOf(state);
-  if (place_.size() == 0 || (place - place_).norm() > kStuckWithin * config_.planner.cruise_speed) {
+  if (place_.size() > 0 && (place - place_).norm() > kStuckWithin * config_.planner.cruise_speed) place_.resize(0);
+  if (!IsAtRest(state)) return 0;
+  if (place_.size() == 0) {
     place_ = place;
     there_since_ = state.utime;
   }
-  return state.utime - there_since_ >= kStuckUs;
+  return state.utime - there_since_;
 }
 
 // Whether holding changes the state by no more than a candidate's X0 allows. A robot that is still coming to rest will
@@ -178,13 +181,29 @@ void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps
   ++(stops ? stopping_rounds_ : rounds_);
   round_ = Round{state.utime + lead_steps * period_us_, *center, HalfWidthFor(state),
                  Lessons(config_.planner, config_.problem->limits.size()), stops};
-  if (stops || !proposer_->motion().has_back_off() || !IsStuck(state)) return;
+  if (stops || !proposer_->motion().has_back_off()) return;
+  const std::int64_t stands_us = StandsFor(state);
+  if (stands_us < kStuckUs || (stands_us < kWaitsUs && HasRoomFurtherBack(0))) return;
   ++back_off_rounds_;
   there_since_ = state.utime;
   round_->back_off_steps = StepsBack();
 }
 
-// For how long it backs off from its place.
+// Whether it could drive on from where it stands after so many steps back.
+bool PlannerNode::HasRoomFurtherBack(int steps) const {
+  const Eigen::MatrixXd& projection = config_.problem->projection;
+  Eigen::MatrixXd controls;
+  const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
+  if (!proposer_->motion().BackOff(state, std::max(steps, 1), config_.planner.tail_steps, controls)) return false;
+  const Eigen::VectorXd end = Rollout(*config_.problem->model, round_->center, controls).rightCols(1);
+  const Eigen::VectorXd way = projection * (round_->center - end);
+  if (!(way.norm() > 0)) return false;
+  PlanRequest request = RequestOf(*round_);
+  if (steps > 0) request.state = end;
+  return proposer_->HasRoom(request, way.normalized());
+}
+
+// For how long it backs off from its place: as long as it takes until it can drive on, and longer each time.
 int PlannerNode::StepsBack() {
   const PlannerOptions& options = config_.planner;
   const bool again = stuck_at_ && (place_ - *stuck_at_).norm() <= kSamePlace * options.cruise_speed;
@@ -193,7 +212,9 @@ int PlannerNode::StepsBack() {
   const int most = kMaxSteps - options.tail_steps;
   int steps = std::min(options.progress_steps, most);
   for (int i = 0; i < doublings_ && 2 * steps <= most; ++i) steps *= 2;
-  return steps;
+  const int least = steps;
+  while (steps + options.progress_steps <= most && !HasRoomFurtherBack(steps)) steps += options.progress_steps;
+  return HasRoomFurtherBack(steps) ? steps : least;
 }
 
 // ---- Withdrawals.

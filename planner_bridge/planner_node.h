@@ -26,9 +26,11 @@ left until its start; the next state begins another round. With gate.obstacles b
 are known, and a round ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a
 time. After the robot has reached the goal, or has reported FINISHED, no round begins.
 
-With planner.back_off, a robot that stays where it is for kStuckUs backs off. The candidates of this round follow that
-law for progress_steps steps and then brake; for twice as many each time near the same place, so that it does not end in
-the same dead end for ever; for half as many after each refusal. Only the certifier selects them.
+With planner.back_off, a robot at rest that does not get away from its place for kStuckUs backs off; for kWaitsUs if it
+has room to drive on from there (Proposer::HasRoom). The candidates of this round follow that law until there is room,
+and then brake: for progress_steps steps or a multiple of them, for at least twice as many each time near the same
+place, so that it does not end in the same dead end for ever, and for half as many after each refusal. Only the
+certifier selects them.
 
 If the executing plan is withdrawn, the round ends, and a stopping round begins at once, unless a certified plan takes
 over while the plan still stands. Its candidates start at the first boundary for which a decision is in time, and not
@@ -81,8 +83,11 @@ class PlannerNode final : public Node {
   /** As many rounds in a row without a certificate are logged, with the causes and where to look. */
   static constexpr int kLostRounds = 20;
 
-  /** A robot that moves by less than a tenth of a second's way at cruise speed in this time is stuck. */
+  /** A robot that has come to rest again and again within a tenth of a second's way at cruise speed for this time is
+  stuck. */
   static constexpr std::int64_t kStuckUs = 2'000'000;
+  /** Likewise one that has room to drive on where it stands: what moves may be in its way, and waiting help. */
+  static constexpr std::int64_t kWaitsUs = 3 * kStuckUs;
 
   /** One JSON object: proposed (a batch counts once), certified, abstained and rejected (counts by cause), advised
   (abstentions from which it has learned by the certifier's advice), unanswered, withdrawn (plans), rounds,
@@ -131,7 +136,8 @@ class PlannerNode final : public Node {
   [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;
   void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
-  [[nodiscard]] bool IsStuck(const robot_state_t& state);
+  [[nodiscard]] std::int64_t StandsFor(const robot_state_t& state);
+  [[nodiscard]] bool HasRoomFurtherBack(int steps) const;
   [[nodiscard]] int StepsBack();
   void LogLostRounds() const;
   void SearchOnce(std::int64_t now_us);

@@ -55,7 +55,7 @@ constexpr double kArrivalSpeed = 0.35;  // ... down to this share of the cruise 
 struct Ambition {
   double share;    // of the distance that cruising straight at the goal would gain
   double heading;  // least cosine between the motion at the end and the way to the goal
-  bool room;       // to drive on from where the tail ends
+  bool room;       // to drive on from where the tail ends; a robot that can back off has to have it
   bool at_rest;    // only for a robot at rest: it may have to turn round, and takes any progress
 };
 constexpr std::array<Ambition, 6> kAmbitions{{{0.9, 0.98, true, false},
@@ -225,22 +225,27 @@ class Planner final : public Proposer {
     fields_.clear();
   }
 
-  const NavigationField& Field(double clearance) {
+  // At a time: what is gone by then is not in the way.
+  const NavigationField& Field(double clearance, std::int64_t time_us) {
     constexpr std::size_t kKept = 64;
     if (fields_.size() > kKept) fields_.clear();
-    const auto found = fields_.find(clearance);
-    return found != fields_.end() ? found->second : fields_.emplace(clearance, MakeField(clearance)).first->second;
+    const auto gone =
+        std::ranges::count_if(obstacles_, [&](const Obstacle& obstacle) { return IsGone(obstacle, time_us); });
+    const auto [field, is_new] = fields_.try_emplace({clearance, gone});
+    if (is_new) field->second.emplace(MakeField(clearance, time_us));
+    return *field->second;
   }
 
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
+  [[nodiscard]] bool HasRoom(const PlanRequest& request, const Eigen::VectorXd& direction) override;
 
  private:
   class Search;
 
   // Around obstacles. Where no part of the body is in its frame, P x is no place among them: what counts is where the
   // body is in a state with this P x, at rest.
-  [[nodiscard]] NavigationField MakeField(double clearance) const {
-    if (HasFrame(problem_->body)) return {region_, RoomOfPoint(obstacles_), clearance + half_breadth_, goal_};
+  [[nodiscard]] NavigationField MakeField(double clearance, std::int64_t time_us) const {
+    if (HasFrame(problem_->body)) return {region_, RoomOfPoint(obstacles_, time_us), clearance + half_breadth_, goal_};
     const RoomAt room = [this](const Eigen::VectorXd& y) {
       const Eigen::VectorXd x = shift_ * y;
       double least = kInfinity;
@@ -265,7 +270,8 @@ class Planner final : public Proposer {
   Eigen::VectorXd goal_;
   double half_breadth_ = HalfBreadth(problem_->body);
   std::vector<Obstacle> obstacles_;
-  std::map<double, NavigationField> fields_;  // by clearance
+  std::map<std::pair<double, std::ptrdiff_t>, std::optional<NavigationField>>
+      fields_;  // by clearance and how many are gone
 };
 
 /** One request: what is allowed, what counts as progress, and the work done so far. `more` is added to every distance
@@ -315,6 +321,11 @@ class Planner::Search {
   /** False if the start itself is not allowed. */
   [[nodiscard]] bool StartIsValid() const { return start_valid_; }
   [[nodiscard]] bool StartsAtRest() const { return at_rest_; }
+  /** Whether the robot at rest in the start can drive on in a direction. */
+  [[nodiscard]] bool StartHasRoom(const Eigen::VectorXd& direction) const {
+    const std::span<const double> x(start_.data(), n_);
+    return start_valid_ && HasRoom(x, Position(x), direction);
+  }
   [[nodiscard]] std::optional<Proposal> Run(const Ambition& ambition, std::int64_t allowance) {
     const auto setup = SetUp(ambition);
     const std::int64_t most = work_ + allowance;
@@ -530,23 +541,51 @@ class Planner::Search {
       position += moved;
       if (moved.norm() > kReverse) direction = moved.normalized();
     }
-    return !ambition.room || HasRoom({z.data(), n_}, position, direction);
+    return !ambition.room || HasRoom({z.data(), n_}, position, direction) || HintsLeadOn({z.data(), n_});
   }
 
   // Whether a robot at rest in x, at `position`, can drive on. A robot that cannot reverse could otherwise not leave
-  // the place. What moves may have gone by then.
+  // the place.
   [[nodiscard]] bool HasRoom(std::span<const double> x, const Eigen::VectorXd& position,
                              const Eigen::VectorXd& direction) const {
     const Eigen::Map<const Eigen::VectorXd> state(x.data(), std::ssize(x));
     const double room = kRoomAhead * planner_.options_.cruise_speed;
     for (int i = 1; i <= kRoomSamples; ++i) {
       const Eigen::VectorXd ahead = state + planner_.shift_ * (room * i / kRoomSamples * direction);
-      const Sweep sweep(BodyAt({ahead.data(), n_}), 0);
-      for (std::size_t o = 0; o < clearances_.size(); ++o)
-        if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
-          return false;
+      if (!StandsClear({ahead.data(), n_}, 0)) return false;
     }
     return planner_.region_.Contains(position + room * direction);
+  }
+
+  // Whether a robot at rest in x that does what its hints do gets as far, in much room: its turns may be wider.
+  [[nodiscard]] bool HintsLeadOn(std::span<const double> x) const {
+    if (!planner_.motion_.has_hints()) return false;
+    const double more = kRoomOfHints * planner_.options_.clearance_step;
+    const Box& region = planner_.region_;
+    std::array<double, kMaxStates> state, next;
+    std::array<double, kMaxInputs> u;
+    std::copy(x.begin(), x.end(), state.begin());
+    const Eigen::VectorXd from = Position(x);
+    for (int t = 0; t < planner_.options_.tail_steps; ++t) {
+      planner_.motion_.Pursue({state.data(), n_}, DesiredIn(state.data(), 0, 0), {u.data(), m_});
+      Step({state.data(), n_}, u.data(), {next.data(), n_});
+      state = next;
+      const Eigen::VectorXd position = Position({state.data(), n_});
+      const bool inside = (region.lower().array() + more <= position.array()).all() &&
+                          (position.array() <= region.upper().array() - more).all();
+      if (!inside || !StandsClear({state.data(), n_}, more)) return false;
+      if ((position - from).norm() >= kRoomAhead * planner_.options_.cruise_speed) return true;
+    }
+    return false;
+  }
+
+  // Of what stands. What moves may have gone by then.
+  [[nodiscard]] bool StandsClear(std::span<const double> x, double more) const {
+    const Sweep sweep(BodyAt(x), 0);
+    for (std::size_t o = 0; o < clearances_.size(); ++o)
+      if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o] + more, planner_.obstacles_[o], schedule_))
+        return false;
+    return true;
   }
 
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {
@@ -631,7 +670,7 @@ class Planner::Search {
 
 std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   if (request.state.size() != problem_->model->num_states() || !request.state.allFinite()) return std::nullopt;
-  const NavigationField& field = Field(request.clearance);
+  const NavigationField& field = Field(request.clearance, request.schedule.start_us);
   Search search(*this, request, field);
   if (!search.StartIsValid()) return std::nullopt;
   if (request.may_follow_hints && motion_.has_hints()) {
@@ -643,9 +682,14 @@ std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   const auto allowance = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs / kAmbitions.size());
   for (const Ambition& ambition : kAmbitions) {
     if (ambition.at_rest && !search.StartsAtRest()) continue;
+    if (!ambition.room && motion_.has_back_off()) continue;  // it would only drive deeper into a dead end
     if (std::optional<Proposal> proposal = search.Run(ambition, allowance)) return proposal;
   }
   return std::nullopt;
+}
+
+bool Planner::HasRoom(const PlanRequest& request, const Eigen::VectorXd& direction) {
+  return Search(*this, request, Field(request.clearance, request.schedule.start_us)).StartHasRoom(direction);
 }
 
 }  // namespace

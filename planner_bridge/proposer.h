@@ -60,6 +60,11 @@ class Proposer {
     std::optional<Proposal> one = Propose(request);
     return one ? std::vector{*std::move(one)} : std::vector<Proposal>{};
   }
+  /** Whether a robot at rest in the request's state has room to drive on in a direction, a unit vector in safety
+  coordinates, among the obstacles that stand. True if the planner does not know. */
+  [[nodiscard]] virtual bool HasRoom(const PlanRequest& /*request*/, const Eigen::VectorXd& /*direction*/) {
+    return true;
+  }
 };
 
 /** Makes the proposer that planner.source names. @throws ConfigError if the options do not match the problem, as of a

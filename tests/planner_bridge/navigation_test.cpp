@@ -22,6 +22,17 @@ TEST(NavigationField, AnObstacleCostsADetour) {
   EXPECT_LT(field.DistanceToGo(Vec({-20, 0})), 1.2 * around);
 }
 
+TEST(RoomOfPoint, IsThatOfWhatStandsAtTheTime) {
+  ObstacleMotion until_taken_away;
+  until_taken_away.until_us = 9'000'000;
+  ObstacleMotion driving;
+  driving.velocity = {1, 0, 0};
+  const Obstacle circle = Obstacle::Circle(Vec({0, 0}), 8);
+  const std::vector<Obstacle> obstacles{circle.Moving(until_taken_away), circle.Moving(driving)};
+  EXPECT_EQ(RoomOfPoint(obstacles, 9'000'000)(Vec({10, 0})), 2);
+  EXPECT_EQ(RoomOfPoint(obstacles, 9'000'001)(Vec({10, 0})), std::numeric_limits<double>::infinity());
+}
+
 TEST(NavigationField, FollowingTheDescentReachesTheGoalAndKeepsOutOfObstacles) {
   constexpr std::uint32_t kSeed = 5;
   SCOPED_TRACE("seed " + std::to_string(kSeed));

@@ -555,10 +555,17 @@ TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
 class StuckPlannerTest : public PlannerNodeTest {
  protected:
   void SetUp() override {
-    Config config = Bicycle();
-    config.planner.candidates = 4;
-    config.laws.back_off = {{"(min(max((-0.4 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
-    Start(config);
+    config_ = Bicycle();
+    config_.planner.candidates = 4;
+    config_.laws.back_off = {{"(min(max((-0.4 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
+    Start(config_);
+  }
+
+  // Before walls at these x.
+  void StartBefore(std::initializer_list<double> walls) {
+    config_.obstacles.clear();
+    for (const double x : walls) config_.obstacles.push_back(Obstacle::AxisBox(Vec({x, -15}), Vec({x + 0.5, 15})));
+    Start(config_);
   }
 
   // Stands at x for so long, and has no candidate certified.
@@ -586,6 +593,7 @@ class StuckPlannerTest : public PlannerNodeTest {
 };
 
 TEST_F(StuckPlannerTest, ARobotThatDoesNotMoveBacksOffLessAfterEachRefusalAndThenFurther) {
+  StartBefore({3, 12});
   StandAt(0, PlannerNode::kStuckUs);
   EXPECT_THAT(StepsBack(), IsEmpty());
   StandAt(0, 200'000);
@@ -598,6 +606,43 @@ TEST_F(StuckPlannerTest, ARobotThatDoesNotMoveBacksOffLessAfterEachRefusalAndThe
   StandAt(config_.planner.cruise_speed + 1, PlannerNode::kStuckUs + 200'000);
   ASSERT_EQ(StepsBack().size(), 9u);
   EXPECT_EQ(StepsBack()[6], first) << "another place";
+}
+
+TEST_F(StuckPlannerTest, ItBacksOffAsFarAsItTakesToDriveOn) {
+  const double room = config_.planner.cruise_speed + config_.planner.clearance;  // what it keeps free beyond a plan
+  StartBefore({room - 0.3});
+  StandAt(0, PlannerNode::kStuckUs + 200'000);
+  ASSERT_THAT(StepsBack(), Not(IsEmpty()));
+  EXPECT_GT(StepsBack()[0], config_.planner.progress_steps);
+  const auto first = std::ranges::find_if(
+      candidates_, [&](const candidate_plan_t& plan) { return plan.progress_steps == StepsBack()[0]; });
+  const double ends_at = Executing(*first, first->num_steps).state[0];
+  EXPECT_LT(ends_at, -0.3);
+  EXPECT_GT(ends_at, -0.3 - 0.4 * 0.1 * config_.planner.progress_steps) << "and no further";
+}
+
+TEST_F(StuckPlannerTest, WhereItHasRoomToDriveOnItWaitsLongerForWhatMoves) {
+  StandAt(0, PlannerNode::kWaitsUs);
+  EXPECT_THAT(StepsBack(), IsEmpty());
+  StandAt(0, 200'000);
+  EXPECT_THAT(StepsBack(), Not(IsEmpty()));
+}
+
+TEST_F(StuckPlannerTest, ARobotThatHasBegunToDriveDoesNotBackOff) {
+  StandAt(0, PlannerNode::kWaitsUs - 200'000);
+  robot_state_t state = Standing();
+  state.sequence = sequence_++;
+  Tell(state);
+  Certify();
+  const candidate_plan_t plan = candidates_.back();
+  const int step = plan.progress_steps - config_.planner.lead_steps;
+  now_ = plan.start_utime + step * kPeriod;
+  state = Executing(plan, step);
+  state.sequence = sequence_++;
+  const std::size_t before = candidates_.size();
+  Tell(state);
+  EXPECT_GT(candidates_.size(), before);
+  EXPECT_THAT(StepsBack(), IsEmpty());
 }
 
 TEST_F(StuckPlannerTest, WithoutALawItStaysWhereItIs) {

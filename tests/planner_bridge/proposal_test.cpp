@@ -315,6 +315,23 @@ TEST(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
   EXPECT_TRUE(proposed({Obstacle::AxisBox(Vec({60, -15}), Vec({62, 15})).Moving(motion)}));
 }
 
+// A crate stands in the way until it is taken away.
+TEST(Planner, GoesStraightOnWhereAnObstacleHasGone) {
+  Config config = Car();
+  ObstacleMotion until;
+  until.until_us = 4'000'000;
+  config.obstacles = {Obstacle::AxisBox(Vec({20, -3}), Vec({22, 15})).Moving(until)};
+  const auto planner = PlannerOf(config);
+  PlanRequest request = WithHints(From(Vec({0, 0, 0, 5, 0, 0}), 1));
+  const auto ends_at = [&](std::int64_t start_us) {
+    request.schedule = {start_us, 100'000, 10'000};
+    const auto proposal = planner->Propose(request);
+    return proposal ? proposal->states(1, proposal->progress_steps) : std::nan("");
+  };
+  EXPECT_LT(ends_at(1'000'000), -0.1) << "around it";
+  EXPECT_NEAR(ends_at(5'000'000), 0, 0.02);
+}
+
 Limit AtMost(const char* that, double bound) { return {.name = that, .that = {that, 1, 1}, .at_most = bound}; }
 
 // The point mass with limits of its speed, 1.2 m/s, and of its acceleration.
