@@ -110,8 +110,9 @@ std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Pla
   std::vector<Decision> decisions(plans.size());
   const std::vector<Index> order = Gathered(plans, one_for_all);
   const std::vector<Index> begins = Portions(plans, order, one_for_all);
-  std::vector<const Plan*> last(options.threads);  // that each thread judged
-  std::vector<Tube> own(options.tubes.empty() ? std::clamp<Index>(begins.size() - 1, 1, options.threads) : 0);
+  const Index threads = std::clamp<Index>(begins.size() - 1, 1, options.threads);
+  std::vector<const Plan*> last(threads);  // that each thread judged
+  std::vector<Tube> own(options.tubes.empty() ? threads : 0);
   const std::span<Tube> tubes = options.tubes.empty() ? std::span(own) : options.tubes;
   std::atomic<Index> certified = plans.size();  // the first one so far
   const auto is_over = [&] { return options.clock && options.clock() >= options.deadline; };

@@ -34,9 +34,10 @@ was not judged. Without a deadline the decisions do not depend on the number of 
 Plans are begun in their order, but those that begin with the same controls follow one another. If all begin in one X_0,
 a thread does not propagate again what a plan shares with the one before it; decisions and tubes are the same bits.
 @param initial_sets X_0 of each plan, or a single one for all plans.
-@throws std::invalid_argument if there are 0 threads, or fewer tubes than threads but some, or the number of initial
-sets is neither 1 nor the number of plans. Cost: the sum of the calls, less what is shared, divided by the cores; each
-thread has a Tube of about 2.5 MB, which takes some 0.5 ms to be made. Nothing is allocated for a step.
+@throws std::invalid_argument if there are 0 threads, tubes but fewer than threads, or the number of initial sets is
+neither 1 nor the number of plans.
+Cost: the sum of the calls, less what is shared, divided by the cores. Each thread has a Tube of about 2.5 MB, which
+takes some 0.5 ms to be made. Nothing is allocated for a step.
 @pre Certifier::Require passes for each plan. */
 [[nodiscard]] std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
                                                std::span<const Zonotope> initial_sets, const ObstacleView& obstacles,

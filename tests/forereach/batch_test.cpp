@@ -2,6 +2,8 @@
 #include "forereach/certify/batch.h"
 
 #include <atomic>
+#include <climits>
+#include <mutex>
 
 #include "tests/test.h"
 
@@ -236,8 +238,12 @@ class SharingTest : public testing::Test {
   // The indices of the plans in the order in which one thread judges them.
   std::vector<std::size_t> Begun(BatchOptions options = {}) {
     std::vector<std::size_t> begun;
+    std::mutex mutex;
     decisions_ = CertifyAll(certifier_, plans_, std::span(&start_, 1), obstacles_, options,
-                            [&](std::size_t i, const Decision&, const Tube&) { begun.push_back(i); });
+                            [&](std::size_t i, const Decision&, const Tube&) {
+                              const std::lock_guard lock(mutex);
+                              begun.push_back(i);
+                            });
     return begun;
   }
 
@@ -247,7 +253,7 @@ class SharingTest : public testing::Test {
     return all;
   }
 
-  const CountingEnclosure residual_;
+  const CountingEnclosure residual_{};
   const Certifier certifier_{std::make_shared<Problem>(PointMassInHalves(100)), residual_};
   const Zonotope start_ = Zonotope::FromBox(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Constant(4, 0.01));
   std::vector<Obstacle> obstacles_;
@@ -266,6 +272,15 @@ TEST_F(SharingTest, KeepsTheOrderOfPlansThatShareNothing) {
   Plans({{2, 1, 1, 1}, {1, 1, 1, 1}, {-1, 1, 1, 1}, {0, 1, 1, 1}, {-0.0, 1, 1, 1}});
   EXPECT_EQ(Begun(), (std::vector<std::size_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(residual_.steps, 5 * 4);
+}
+
+TEST_F(SharingTest, UsesTheTubesThatItIsGiven) {
+  Plans({{2, 1, 1, 1}, {1, 1, 1, 1}});
+  std::array<Tube, 2> tubes;
+  static_cast<void>(Begun({.tubes = tubes}));
+  EXPECT_EQ(tubes[0].length(), 4);
+  EXPECT_THROW(Begun({.threads = 3, .tubes = tubes}), std::invalid_argument);
+  EXPECT_EQ(Begun({.threads = UINT_MAX}).size(), 2u) << "no more threads than plans";
 }
 
 TEST_F(SharingTest, SharesNothingOfAPlanThatBeginsElsewhere) {
