@@ -25,25 +25,15 @@ class RegionSearch {
   }
 
   std::vector<Region> Run() {
-    double mean = Mean(cuts_);
-    const double enough = options_.least_gain * mean;
-    while (true) {
-      Cuts best;
-      double best_mean = mean, best_gain = 0;
-      for (std::size_t a = 0; a < cuts_.size(); ++a)
-        for (std::size_t i = 0; i + 1 < cuts_[a].size(); ++i) {
-          Cuts cuts = cuts_;
-          const double middle = cuts[a][i] / 2 + cuts[a][i + 1] / 2;
-          if (!(cuts[a][i] < middle && middle < cuts[a][i + 1])) continue;
-          cuts[a].insert(cuts[a].begin() + static_cast<std::ptrdiff_t>(i) + 1, middle);
-          if (Count(cuts) > options_.most_cells) continue;
-          const double of_cuts = Mean(cuts), gain = (mean - of_cuts) / static_cast<double>(Count(cuts) - Count(cuts_));
-          if (mean - of_cuts > enough && gain > best_gain) best = cuts, best_mean = of_cuts, best_gain = gain;
-        }
-      if (best.empty()) return Regions();
-      cuts_ = best;
-      mean = best_mean;
+    cuts_ = BestEven(cuts_, 0);
+    const double enough = options_.least_gain * Mean(cuts_);
+    // Each round moves the cuts that save least to where they save most.
+    for (double mean = kInfinity; mean - Mean(cuts_) > enough;) {
+      mean = Mean(cuts_);
+      RemoveWhatSavesNothing();
+      while (AddOne(enough)) continue;
     }
+    return Regions();
   }
 
  private:
@@ -51,6 +41,53 @@ class RegionSearch {
     std::size_t count = 1;
     for (const std::vector<double>& along : cuts) count *= along.size() - 1;
     return count;
+  }
+
+  // Strips of the same width along the axes from `axis` on, a power of two of them along each.
+  Cuts BestEven(const Cuts& begin, std::size_t axis) {
+    if (axis == begin.size()) return begin;
+    Cuts best = BestEven(begin, axis + 1), cuts = begin;
+    for (std::size_t strips = 2; Count(begin) * strips <= options_.most_cells; strips *= 2) {
+      const double lower = begin[axis].front(), upper = begin[axis].back();
+      cuts[axis] = begin[axis];
+      for (std::size_t i = 1; i < strips; ++i) {
+        const double share = static_cast<double>(i) / static_cast<double>(strips);
+        cuts[axis].insert(cuts[axis].end() - 1, lower * (1 - share) + upper * share);
+      }
+      if (const Cuts trial = BestEven(cuts, axis + 1); Mean(trial) < Mean(best)) best = trial;
+    }
+    return best;
+  }
+
+  void RemoveWhatSavesNothing() {
+    for (std::size_t a = 0; a < cuts_.size(); ++a)
+      for (std::size_t i = 1; i + 1 < cuts_[a].size();) {
+        Cuts cuts = cuts_;
+        cuts[a].erase(cuts[a].begin() + static_cast<std::ptrdiff_t>(i));
+        if (Mean(cuts) <= Mean(cuts_) * (1 + 1e-9))
+          cuts_ = cuts;
+        else
+          ++i;
+      }
+  }
+
+  // The cut in the middle of a strip that saves most for each cell that it adds, if it saves enough.
+  bool AddOne(double enough) {
+    const double mean = Mean(cuts_);
+    Cuts best;
+    double best_gain = 0;
+    for (std::size_t a = 0; a < cuts_.size(); ++a)
+      for (std::size_t i = 0; i + 1 < cuts_[a].size(); ++i) {
+        Cuts cuts = cuts_;
+        const double middle = cuts[a][i] / 2 + cuts[a][i + 1] / 2;
+        if (!(cuts[a][i] < middle && middle < cuts[a][i + 1])) continue;
+        cuts[a].insert(cuts[a].begin() + static_cast<std::ptrdiff_t>(i) + 1, middle);
+        if (Count(cuts) > options_.most_cells) continue;
+        const double saved = mean - Mean(cuts), gain = saved / static_cast<double>(Count(cuts) - Count(cuts_));
+        if (saved > enough && gain > best_gain) best = cuts, best_gain = gain;
+      }
+    if (!best.empty()) cuts_ = best;
+    return !best.empty();
   }
 
   static std::vector<Interval> CellAt(const Cuts& cuts, std::size_t index) {

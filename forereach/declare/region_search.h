@@ -1,8 +1,9 @@
 /** Regions (declaration.h) that pay, proven from a residual's equations.
 
-The domain is one cell. As long as there is room, the cut is made that lowers the mean of the slopes most for each cell
-that it adds: mean over the domain's volume, each slope L_kl relative to that of the whole domain. A cut halves a strip
-between two cuts along one axis. Every slope of every cell is bounded by BoundSlope over the cell and all parameters. */
+A grid of cells is chosen by the mean of their slopes over the domain's volume, each slope L_kl relative to that of the
+whole domain: first the best of the grids of even strips, a power of two along each axis; then cuts that save nothing
+give way to cuts in the middle of strips that save most for each cell that they add.
+Every slope of every cell is bounded by BoundSlope over the cell and all parameters. */
 #pragma once
 
 #include <optional>
@@ -17,7 +18,7 @@ namespace forereach {
 struct RegionSearchOptions {
   std::size_t most_cells = 64;  ///< At most Region::kMaxCells.
   SlopeBoundOptions slopes = {.gap = 1e-3, .max_boxes = 100'000};
-  double least_gain = 1e-3;  ///< The search ends if no cut lowers the mean by this share of that of the whole domain.
+  double least_gain = 1e-3;  ///< Of the mean: a cut that lowers it by less does not pay.
 };
 
 /** The cells of the grid that was found; neighbours along the first axis with the same slopes are one region.

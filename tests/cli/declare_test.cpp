@@ -96,6 +96,33 @@ TEST_F(DeclareTest, ItsLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
   EXPECT_THAT(Declare().text, HasSubstr("declaration:\n  " + document["yaml"].get<std::string>()));
 }
 
+// What it prints is pasted into the task; a slope that is too small, or a box that is too large, is refuted.
+TEST_F(DeclareTest, RegionsAreProvenAndCheckedInTheTask) {
+  WriteTask("residual: {name: heading_saturation}");
+  const Output output = Declare("--regions 16 --cover " + cover_);
+  ASSERT_EQ(output.code, 0);
+  const std::string text = Read(task_), found = output.text.substr(output.text.find("  lipschitz:")),
+                    declared = "  lipschitz: {theta: {v: 0.017926410, delta: 0.609638820}}\n";
+  std::ofstream(task_) << Replaced(text, declared, found);
+  const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
+  const std::vector<Region>& regions = config.problem->declaration.regions;
+  ASSERT_GT(regions.size(), 4);
+  EXPECT_LE(regions.size(), 16);
+  EXPECT_TRUE(std::ranges::any_of(regions, [](const Region& region) { return region.lipschitz.isZero(0); }));
+  EXPECT_THAT(Check(), Exits(0, "check: confirmed"));
+  EXPECT_THAT(Declare("--from-data --by v,delta"), Exits(2, "slopes are proposed for the whole domain"));
+
+  const auto with = [&](const std::string& region) {
+    std::ofstream(task_) << Replaced(text, declared, declared + "  regions:\n    - " + region + "\n");
+    return Check();
+  };
+  EXPECT_THAT(with("{in: {v: [0, 6]}, lipschitz: {theta: {}}}"), Exits(0, "check: confirmed: 4 bounds"));
+  EXPECT_THAT(with("{in: {v: [0, 9]}, lipschitz: {theta: {}}}"),
+              Exits(1, "declaration.regions[0]: theta by v: a box's bound is 0", "check: refuted"));
+  EXPECT_THAT(with("{in: {v: [20, 30]}, lipschitz: {theta: {v: 0.01, delta: 0.3}}}"),
+              Exits(1, "declaration.regions[0]: theta by delta: a box's bound is 0.3", "check: refuted"));
+}
+
 TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {
   const Output output = Forereach("declare --config tests/data/field.yaml --between");
   EXPECT_THAT(output, Exits(0, "from the equations of kinematic_bicycle\n", "The residual is not included"));

@@ -3,6 +3,8 @@
 
 #include <regex>
 
+#include <fmt/format.h>
+
 #include "tests/test.h"
 
 #include <fmt/format.h>
