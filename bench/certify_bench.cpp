@@ -201,7 +201,9 @@ void RegisterMaps() {
     if (world.moves) continue;
     for (const auto& [name, count, is_indexed] :
          {std::tuple("none", 0, false), {"map_2000", 2000, true}, {"map_2000_without_index", 2000, false}})
-      benchmark::RegisterBenchmark((std::string("map/") + world.name + "/" + name).c_str(), [=](State& state) {
+      benchmark::RegisterBenchmark((std::string("map/") + world.name + "/" + name).c_str(), [world, count = count,
+                                                                                             is_indexed = is_indexed](
+                                                                                                State& state) {
         Task task = CachedTask(Scenario::kBicycle, 400);
         Problem problem = *task.problem;
         problem.body = world.body;

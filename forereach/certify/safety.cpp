@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "forereach/certify/tube.h"
@@ -427,6 +428,7 @@ class SafetyTest::Judgement {
       unit_.Enter(t);
       unit_.EncloseHulls();
       hulls_[ToSize(t - first_)] = unit_.hull();
+      if (!is_at_frame()) EncloseBody(t);
       if (touched_ == units_)
         for (const int o : index.everywhere()) See(t, o);
     }
@@ -463,15 +465,22 @@ class SafetyTest::Judgement {
     for (const Open& pair : found) Settle(pair.t, pair.o, ByHulls(pair.t, pair.o));
   }
 
-  // Calls visit(t, o, the bound by hulls).
+  // Calls visit(t, o, the bound by hulls). By boxes around the body, unless all of it is at the frame; then what
+  // is left out is further by more than a search for the best direction may lose.
   template <class Within, class Visit>
   void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) noexcept {
+    constexpr double kSearchTolerance = 1e-5;
+    const double reach = test_.placement_.reach();
     if (tree_from_ != from || tree_to_ != to)
-      tree_.Build(std::span(hulls_).subspan(ToSize(from - first_), ToSize(to - from)), test_.placement_.dim());
+      tree_.Build(std::span(is_at_frame() ? hulls_ : bodies_).subspan(ToSize(from - first_), ToSize(to - from)),
+                  test_.placement_.dim());
     tree_from_ = from;
     tree_to_ = to;
-    index.ForEachNear(tree_, test_.placement_.reach(), within,
-                      [&](int i, int o) { visit(from + i, o, ByHulls(from + i, o)); });
+    const auto see = [&](int i, int o) { visit(from + i, o, ByHulls(from + i, o)); };
+    if (is_at_frame()) return index.ForEachNear(tree_, reach, within, see);
+    const double least = kSearchTolerance * (index.size() + reach);
+    index.ForEachNear(
+        tree_, 0, [&] { return within() * (1 + kSearchTolerance) + least; }, see);
   }
 
   // Of what stands, with an index.
@@ -508,11 +517,14 @@ class SafetyTest::Judgement {
   // A box around the body is tighter than a ball around it, but says nothing new of a ball, nor of what moves.
   [[nodiscard]] Separation ByBox(int t, int o) noexcept {
     if (is_at_frame() || obstacle(o).motion()) return {};
+    EncloseBody(t);
+    return SeparateHulls(bodies_[ToSize(t - first_)], obstacle(o));
+  }
+  void EncloseBody(int t) noexcept {
     const std::size_t i = ToSize(t - first_);
+    if (std::exchange(has_body_[i], true)) return;
     unit_.Enter(t);
-    if (!has_body_[i]) bodies_[i] = unit_.EncloseBody();
-    has_body_[i] = true;
-    return SeparateHulls(bodies_[i], obstacle(o));
+    bodies_[i] = unit_.EncloseBody();
   }
 
   [[nodiscard]] bool IsCloser(const Pair& pair) const noexcept {
@@ -553,7 +565,7 @@ class SafetyTest::Judgement {
     ForEachNear(
         *index, first_, units_, [&] { return closest_.clearance; },
         [&](int t, int o, const Separation& by_hulls) {
-          if (by_hulls.IsProven() || !has_all) ConsiderIfCloser(by_hulls, t, o);
+          if (by_hulls.IsProven() || !has_all || ByBox(t, o).IsProven()) ConsiderIfCloser(by_hulls, t, o);
         });
   }
 

@@ -88,6 +88,9 @@ class BoxTree final {
     }
   }
 
+  /** An upper bound on the absolute values of the coordinates. */
+  [[nodiscard]] double size() const { return size_; }
+
  private:
   static constexpr int kLeaf = 2;  // boxes in a leaf, at most
   static constexpr std::size_t kMostLevels =

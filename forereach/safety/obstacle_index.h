@@ -19,6 +19,8 @@ class ObstacleIndex final {
 
   /** Those that are near everything, by their indices. */
   [[nodiscard]] std::span<const int> everywhere() const { return everywhere_; }
+  /** An upper bound on the absolute values of the coordinates of the others, and on their radii. */
+  [[nodiscard]] double size() const { return tree_.size(); }
   /** BoxTree::ForEachNear of the others: visit(t, o). One that is left out is proven apart by SeparateHulls, with
   `reach` added, and its clearance there exceeds `within()`. */
   template <class Within, class Visit>
