@@ -146,9 +146,9 @@ double RegionGrid::AlongAxis(const Row& row, std::size_t a, const Place& across,
                              const Box& to) const noexcept {
   const auto l = ToSize(variables_[a]);
   const double begin = from.lower[l];
-  double cost = 0;
-  for (const double end : {to.lower[l], to.upper[l]})
-    if (end != begin) cost = std::max(cost, Ascent(row, a, across, from.place.first[a], begin, end));
+  double cost = 0;  // the nearer of two ends on one side costs no more
+  if (begin < to.upper[l]) cost = Ascent(row, a, across, from.place.first[a], begin, to.upper[l]);
+  if (to.lower[l] < begin) cost = std::max(cost, Ascent(row, a, across, from.place.first[a], begin, to.lower[l]));
   return cost;
 }
 
@@ -163,13 +163,14 @@ double RegionGrid::OfOthers(const Row& row, const Place& at, const Box& from, co
 }
 
 // The least cost of every set of moves that come first.
-double RegionGrid::CostUpper(std::size_t index, const Box& from, const Box& to) const noexcept {
+double RegionGrid::CostUpper(std::size_t index, const Box& from, const Box& to, double enough) const noexcept {
   const Row& row = slopes_[index];
   const std::size_t moves = num_axes_ + (row.others.empty() ? 0 : 1), all = std::size_t{1} << moves;
   std::array<double, std::size_t{2} << kMaxAxes> least;
   least.fill(kInfinity);
   least[0] = 0;
   for (std::size_t moved = 0; moved + 1 < all; ++moved) {
+    if (!(least[moved] < enough)) continue;
     Place at = from.place;
     for (std::size_t a = 0; a < num_axes_; ++a)
       if (moved >> a & 1)

@@ -55,9 +55,11 @@ class RegionGrid final {
   void Find(Box& box) const noexcept;
 
   /** At least |r_k(z) - r_k(from)| for every z in `to`, for all residuals within L and the regions, rounded up.
-  @param row of rows(), by its index. @pre both have their places. Cost: a few additions for each strip on the way, with
+  @param row of rows(), by its index. @param enough a cost from here on may be returned as infinity, which saves time.
+  @pre both have their places. Cost: a few additions for each strip on the way, with
   the slopes of the cells that `to` meets there, in each of up to 32 moves. */
-  [[nodiscard]] double CostUpper(std::size_t row, const Box& from, const Box& to) const noexcept;
+  [[nodiscard]] double CostUpper(std::size_t row, const Box& from, const Box& to,
+                                 double enough = std::numeric_limits<double>::infinity()) const noexcept;
 
  private:
   struct Column {

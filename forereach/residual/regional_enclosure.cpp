@@ -69,7 +69,8 @@ Interval RegionalEnclosure::Bound(std::size_t row, const RegionGrid::Box& to, In
   for (const Kept& one : kept_) {
     const double floor = one.floor[row], ceiling = one.ceiling[row];
     if (!(floor > bounds.lower) && !(ceiling < bounds.upper)) continue;
-    const double cost = grid_.CostUpper(row, one.at, to);
+    const double enough = std::max(floor - bounds.lower, bounds.upper - ceiling);  // rounded: it only saves time
+    const double cost = grid_.CostUpper(row, one.at, to, enough);
     bounds.lower = std::max(bounds.lower, SubDown(floor, cost));
     bounds.upper = std::min(bounds.upper, AddUp(ceiling, cost));
   }

@@ -110,7 +110,7 @@ TEST(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
   slopes.row(2).setZero();
   slopes(2, 3) = 0.01;
   EXPECT_EQ(regions[0].lipschitz, slopes) << "the rows that are not named are those of the whole domain";
-  const auto digest = [&](const std::string& regions) { return files.Load(text(regions)).grounds.declaration; };
+  const auto digest = [&](const std::string& changed) { return files.Load(text(changed)).grounds.declaration; };
   EXPECT_NE(config.grounds.declaration, files.Load(kTask).grounds.declaration);
   EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "0.5]", "0.25]")));
   EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "vy: 0.01", "vy: 0.02")));
