@@ -59,7 +59,7 @@ std::string SectionOn(const std::string& type) {
 
 TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
   const auto types = Types();
-  EXPECT_EQ(types.size(), 16u);
+  EXPECT_EQ(types.size(), 17u);
   EXPECT_THAT(types.at("candidate_plan_t").fields,
               testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
                                    "num_inputs", "num_steps", "progress_steps", "repair", "initial_center",
