@@ -21,6 +21,7 @@
 #include "identify/command_delay.h"
 #include "identify/import.h"
 #include "identify/joined_logs.h"
+#include "identify/lcm_table.h"
 #include "identify/units.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
@@ -35,7 +36,7 @@ using Json = nlohmann::json;
 struct ImportArguments {
   std::string config, out, inputs_from, inputs_time, time, time_unit = "s", delimiter = "auto", comment = "#", header,
                                                            decimal = "point";
-  std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
+  std::vector<std::string> logs, lcm_types, states, inputs, units, input_tolerances, unwrapped;
   std::string command_delay = "none";
   std::optional<double> rate, from, until;
   double tolerance_ms = 0.001;
@@ -125,15 +126,31 @@ Columns ColumnsOf(const ImportArguments& options, const NominalModel& model) {
   return columns;
 }
 
+bool IsLcm(const ImportArguments& options) {
+  return !options.lcm_types.empty() || options.logs.front().ends_with(".lcmlog");
+}
+
+// States and inputs of one channel, or of two that are joined by their stamps.
+LogTable LcmTableOf(const std::string& path, const Columns& columns, const ImportArguments& options) {
+  LcmTypes types;
+  for (const std::string& file : options.lcm_types) types.Add(file);
+  const std::vector<std::string> inputs(columns.inputs.begin() + 1, columns.inputs.end());
+  const std::vector<std::string> states(columns.states.begin() + 1, columns.states.end());
+  if (inputs.empty() || ChannelOf(inputs) == ChannelOf(states)) return ReadLcmLog(path, columns.All(true), types);
+  const std::string& from = options.inputs_from.empty() ? path : options.inputs_from;
+  return Joined(ReadLcmLog(path, columns.states, types), ReadLcmLog(from, columns.inputs, types));
+}
+
 LogTable TableOf(const std::string& path, const Columns& columns, const ImportArguments& options) {
   const LogFormat format = FormatOf(options);
+  if (IsLcm(options)) return LcmTableOf(path, columns, options);
   if (options.inputs_from.empty()) return ReadLog(path, columns.All(!options.rate), format);
   return Joined(ReadLog(path, columns.states, format), ReadLog(options.inputs_from, columns.inputs, format));
 }
 
 // Rows of two logs are joined by their stamps, and a delay in rows of both is none.
 void CheckJoin(const ImportArguments& options) {
-  if (options.inputs_from.empty() && options.inputs_time.empty()) return;
+  if (IsLcm(options) || (options.inputs_from.empty() && options.inputs_time.empty())) return;
   if (options.inputs_from.empty()) Refuse("inputs-time", "needs --inputs-from");
   if (options.rate) Refuse("inputs-from", "needs stamps, and --rate says that there are none");
   if (options.logs.size() != 1) Refuse("inputs-from", "belongs to one log of states");
@@ -431,6 +448,11 @@ int ShiftBy(const ImportArguments& options, const std::optional<CommandDelay>& d
 // Without --time and --rate, a column of this name has the stamps.
 void FindTime(ImportArguments& options) {
   constexpr const char* kUsual = "time";
+  if (IsLcm(options)) {
+    if (options.rate) Refuse("rate", "messages of LCM have stamps");
+    if (options.time.empty()) options.time = "recorded";
+    return;
+  }
   const bool has_time = !options.time.empty(), has_rate = options.rate.has_value();
   if (has_time != has_rate) return;
   std::vector<std::string> columns;
@@ -463,7 +485,8 @@ int RunImport(ImportArguments options) {
   progress.reset();
   std::optional<CommandDelay> delay;
   if (options.inputs_from.empty() && (options.command_delay == "none" || options.command_delay == "auto"))
-    if (model.num_inputs() > 0) delay = DelayOf(sources, *config.problem, import);
+    if (model.num_inputs() > 0 && sources.front().table.is_command.empty())
+      delay = DelayOf(sources, *config.problem, import);
   import.command_delay = ShiftBy(options, delay);
   for (Source& source : sources) {
     if (import.command_delay > 0) source.log = Import(source.table, *config.problem, import);
@@ -530,59 +553,62 @@ Command ImportCommand() {
           "  forereach import --config my_robot.yaml --time 'mocap time' --time-unit ms --tolerance-ms 2 \\\n"
           "    --state x='mocap x' --state theta='mocap yaw' --unit theta=deg --unwrap theta \\\n"
           "    --input a=cmd.accel --input-mean --out transitions.csv monday.csv tuesday.csv",
-      .options = {ConfigOption(options->config,
-                               "Task file (YAML): its model, dt and domain; its transitions are not read"),
-                  Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
-                  {"--time", &options->time, "COLUMN",
-                   "The column of the stamps, numbers or dates of ISO 8601, or seconds_of(SECONDS,NANOSECONDS); by "
-                   "default `time`, if "
-                   "there is such a column and no --rate"},
-                  {"--time-unit", &options->time_unit, "UNIT", "Unit of the stamps: s, ms, us, ns, min, h"},
-                  {"--rate", &options->rate, "", "There are no stamps: so many rows are recorded in a second",
-                   NumberRange{1e-6, 1e9}},
-                  {"--state", &options->states, "NAME=COLUMN",
-                   "The column of a state, or yaw_of(QX,QY,QZ,QW) of a quaternion's four, yaw_of(QZ,QW) of a turn "
-                   "about z alone; by "
-                   "default the one of its name. May be repeated"},
-                  {"--input", &options->inputs, "NAME=COLUMN", "The same for an input"},
-                  {"--inputs-from", &options->inputs_from, "LOG.csv",
-                   "The inputs are in this log: each holds from its stamp until the next one's"},
-                  {"--inputs-time", &options->inputs_time, "COLUMN", "Its column of stamps; by default that of --time"},
-                  {"--unit", &options->units, "NAME=UNIT",
-                   "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
-                  {"--unwrap", &options->unwrapped, "STATE",
-                   "An angle in rad: turns are added to the successor until it is within half a turn of the state"},
-                  {"--tolerance-ms", &options->tolerance_ms, "",
-                   "A stamp may be so far from t + dt; what the state moves in that time is part of its error",
-                   NumberRange{0, 1e6}},
-                  {"--input-tolerance", &options->input_tolerances, "NAME=VALUE",
-                   "An input may differ by so much during a step from the one that the step began with"},
-                  {.name = "--input-mean",
-                   .variable = &options->input_mean,
-                   .help = "Take the mean of each input over the step, however it changes",
-                   .excludes = "--input-tolerance"},
-                  {"--command-delay", &options->command_delay, "auto|N",
-                   "Commands act so many rows after theirs; auto: as many as the model's error says"},
-                  {"--overlapping", &options->overlapping, "",
-                   "Start a transition at each sample; by default where the one before it ended"},
-                  {"--keep-few", &options->keep_few, "",
-                   "Write the transitions also if less than half of the rows are in one"},
-                  {"--from", &options->from, "", "Leave out samples before so many seconds after a log's first stamp",
-                   NumberRange{0, 1e12}},
-                  {"--until", &options->until, "", "Leave out samples after so many seconds", NumberRange{0, 1e12}},
-                  {.name = "--delimiter",
-                   .variable = &options->delimiter,
-                   .help = "What stands between two fields; by default the one that the header contains",
-                   .one_of = {"auto", "comma", "semicolon", "tab", "blank"}},
-                  {.name = "--decimal",
-                   .variable = &options->decimal,
-                   .help = "What stands before the decimals of a number",
-                   .one_of = {"point", "comma"}},
-                  {"--comment", &options->comment, "TEXT", "A line that begins with this text is a comment"},
-                  {"--header", &options->header, "NAMES",
-                   "The names of the columns, with commas between, of a log that does not begin with them"},
-                  JsonFlag(options->json),
-                  Required({"logs", &options->logs, "LOG.csv", "Logs; no transition goes from one to the next"})},
+      .options =
+          {ConfigOption(options->config, "Task file (YAML): its model, dt and domain; its transitions are not read"),
+           Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
+           {"--time", &options->time, "COLUMN",
+            "The column of the stamps, numbers or dates of ISO 8601, or seconds_of(SECONDS,NANOSECONDS); by "
+            "default `time`, if "
+            "there is such a column and no --rate"},
+           {"--time-unit", &options->time_unit, "UNIT", "Unit of the stamps: s, ms, us, ns, min, h"},
+           {"--rate", &options->rate, "", "There are no stamps: so many rows are recorded in a second",
+            NumberRange{1e-6, 1e9}},
+           {"--state", &options->states, "NAME=COLUMN",
+            "The column of a state, or yaw_of(QX,QY,QZ,QW) of a quaternion's four, yaw_of(QZ,QW) of a turn "
+            "about z alone; by "
+            "default the one of its name. May be repeated"},
+           {"--input", &options->inputs, "NAME=COLUMN", "The same for an input"},
+           {"--inputs-from", &options->inputs_from, "LOG.csv",
+            "The inputs are in this log: each holds from its stamp until the next one's"},
+           {"--inputs-time", &options->inputs_time, "COLUMN", "Its column of stamps; by default that of --time"},
+           {"--lcm-types", &options->lcm_types, "FILE.lcm",
+            "LOG is an LCM event log with messages of these types. Columns are CHANNEL.field; `recorded`, the default "
+            "of --time, is when a message was received. Inputs may be of another channel. May be repeated"},
+           {"--unit", &options->units, "NAME=UNIT",
+            "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
+           {"--unwrap", &options->unwrapped, "STATE",
+            "An angle in rad: turns are added to the successor until it is within half a turn of the state"},
+           {"--tolerance-ms", &options->tolerance_ms, "",
+            "A stamp may be so far from t + dt; what the state moves in that time is part of its error",
+            NumberRange{0, 1e6}},
+           {"--input-tolerance", &options->input_tolerances, "NAME=VALUE",
+            "An input may differ by so much during a step from the one that the step began with"},
+           {.name = "--input-mean",
+            .variable = &options->input_mean,
+            .help = "Take the mean of each input over the step, however it changes",
+            .excludes = "--input-tolerance"},
+           {"--command-delay", &options->command_delay, "auto|N",
+            "Commands act so many rows after theirs; auto: as many as the model's error says"},
+           {"--overlapping", &options->overlapping, "",
+            "Start a transition at each sample; by default where the one before it ended"},
+           {"--keep-few", &options->keep_few, "",
+            "Write the transitions also if less than half of the rows are in one"},
+           {"--from", &options->from, "", "Leave out samples before so many seconds after a log's first stamp",
+            NumberRange{0, 1e12}},
+           {"--until", &options->until, "", "Leave out samples after so many seconds", NumberRange{0, 1e12}},
+           {.name = "--delimiter",
+            .variable = &options->delimiter,
+            .help = "What stands between two fields; by default the one that the header contains",
+            .one_of = {"auto", "comma", "semicolon", "tab", "blank"}},
+           {.name = "--decimal",
+            .variable = &options->decimal,
+            .help = "What stands before the decimals of a number",
+            .one_of = {"point", "comma"}},
+           {"--comment", &options->comment, "TEXT", "A line that begins with this text is a comment"},
+           {"--header", &options->header, "NAMES",
+            "The names of the columns, with commas between, of a log that does not begin with them"},
+           JsonFlag(options->json),
+           Required({"logs", &options->logs, "LOG.csv", "Logs; no transition goes from one to the next"})},
       .run = [options] { return RunImport(*options); }};
 }
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <string_view>
 #include <utility>
 
@@ -15,6 +14,7 @@
 
 #include "command_line/nearest.h"
 #include "forereach/numerics/text.h"
+#include "identify/wanted_column.h"
 #include "task/config_error.h"
 #include "task/line_reader.h"
 #include "task/number.h"
@@ -105,49 +105,6 @@ bool HasDecimalComma(std::string field) {
   const std::size_t at = field.find(',');
   return at != std::string::npos && IsNumber(field.replace(at, 1, "."));
 }
-
-// A wanted column: one of the file's, or what is made of several.
-struct Wanted {
-  enum class Kind { kPlain, kYaw, kHalfYaw, kSeconds };
-
-  Kind kind = Kind::kPlain;
-  std::vector<std::string> names;
-
-  explicit Wanted(const std::string& text) : names{text} {
-    const std::size_t open = text.find('(');
-    const std::string function = text.substr(0, open);
-    if (open == std::string::npos || !text.ends_with(')') || (function != "yaw_of" && function != "seconds_of")) return;
-    std::vector<std::string> arguments;
-    for (std::size_t begin = open + 1; begin < text.size();) {
-      const std::size_t end = std::min(text.find(',', begin), text.size() - 1);
-      arguments.emplace_back(Trimmed(std::string_view(text).substr(begin, end - begin)));
-      begin = end + 1;
-    }
-    const std::size_t count = arguments.size();
-    if (function == "yaw_of" && count != 2 && count != 4)
-      throw ConfigError(text + ": has to be yaw_of(qx,qy,qz,qw), or yaw_of(qz,qw) of a turn about z alone");
-    if (function == "seconds_of" && count != 2) throw ConfigError(text + ": has to be seconds_of(SECONDS,NANOSECONDS)");
-    kind = function == "seconds_of" ? Kind::kSeconds : count == 2 ? Kind::kHalfYaw : Kind::kYaw;
-    names = std::move(arguments);
-  }
-
-  // NaN where a value is none, or they are no unit quaternion.
-  [[nodiscard]] double Of(const std::vector<double>& v) const {
-    const auto if_unit = [](double square, double yaw) {
-      constexpr double kOff = 0.01;
-      return std::abs(std::sqrt(square) - 1) <= kOff ? yaw : std::numeric_limits<double>::quiet_NaN();
-    };
-    switch (kind) {
-      case Kind::kPlain: return v[0];
-      case Kind::kSeconds: return v[0] + v[1] * 1e-9;
-      case Kind::kHalfYaw:
-        return if_unit(v[0] * v[0] + v[1] * v[1], std::remainder(2 * std::atan2(v[0], v[1]), 2 * std::numbers::pi));
-      case Kind::kYaw: break;
-    }
-    const double x = v[0], y = v[1], z = v[2], w = v[3];
-    return if_unit(x * x + y * y + z * z + w * w, std::atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z));
-  }
-};
 
 // libcsv's parser, fed line by line. Its callbacks are called from C, so they throw nothing.
 class RowParser {
@@ -313,9 +270,9 @@ class Reader {
     for (const std::string& comment : comments_) {
       std::vector<std::string> names = NamesIn(comment);
       if (names.size() != count) continue;
-      const bool has_all = std::ranges::all_of(wanted_, [&](const Wanted& wanted) {
+      const bool has_all = std::ranges::all_of(wanted_, [&](const WantedColumn& wanted) {
         return std::ranges::all_of(
-            wanted.names, [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); });
+            wanted.names(), [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); });
       });
       if (has_all) return names;
       if (first.empty()) first = std::move(names);
@@ -342,9 +299,9 @@ class Reader {
     const int line = std::max(1, lines_.line());
     if (parser_ && parser_->delimiter() == ',' && format_.decimal_comma)
       Fail(line, "commas separate the fields, so a number with a decimal comma is two");
-    for (const Wanted& wanted : wanted_) {
+    for (const WantedColumn& wanted : wanted_) {
       std::vector<std::size_t>& places = places_.emplace_back();
-      for (const std::string& name : wanted.names) {
+      for (const std::string& name : wanted.names()) {
         const auto count = std::ranges::count(names, name);
         if (count == 0) {
           const std::string why = WhyNoHeader(names);
@@ -427,7 +384,7 @@ class Reader {
     lost_ = true;
   }
 
-  const std::vector<Wanted> wanted_;
+  const std::vector<WantedColumn> wanted_;
   const LogFormat& format_;
   LineReader lines_;
   LogTable table_;
