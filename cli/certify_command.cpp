@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <chrono>
 #include <iostream>
+#include <iterator>
 
 #include <nlohmann/json.hpp>
 
@@ -8,13 +10,15 @@
 #include "forereach/numerics/text.h"
 #include "forereach/safety/obstacle_index.h"
 #include "records/decision_json.h"
+#include "records/outlines.h"
+#include "records/picture.h"
 #include "task/json_text.h"
 
 namespace forereach {
 namespace {
 
 struct CertifyArguments {
-  std::string config, plan;
+  std::string config, plan, picture;
   bool json = false;
 };
 
@@ -55,9 +59,38 @@ void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& t
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }
 
+// The tube as far as it was judged, among the obstacles.
+Picture PictureOf(const Decision& decision, const Plan& plan, const Tube& tube, const Certifier& certifier,
+                  const Config& config) {
+  const Problem& problem = certifier.problem();
+  Picture picture;
+  picture.title = Explain(decision, problem, plan, tube);
+  picture.obstacles = config.obstacles;
+  const Eigen::VectorXd start = (config.initial_set.lower() + config.initial_set.upper()) / 2;
+  picture.bodies = BodyAt(problem, start);
+  picture.path = {Eigen::Vector2d(problem.projection * start)};
+  if (config.planner.goal.size() == 2)
+    picture.goal = {{config.planner.goal[0], config.planner.goal[1]}, config.planner.goal_radius};
+  const int last = decision.cause == Cause::kObstacle ? decision.step : certifier.safety().NumUnits(tube) - 1;
+  std::vector<Picture::Polygon> swept;
+  if (last >= 0)
+    for (std::vector<Picture::Polygon>& unit : Sweeps(certifier, tube, last))
+      std::ranges::move(unit, std::back_inserter(swept));
+  if (decision.outcome == Outcome::kSafety) {
+    picture.abstained = {std::move(swept)};
+  } else {
+    picture.expected = std::move(swept);
+    picture.expected_name = decision.outcome == Outcome::kCertified ? "certified" : "tube before the abstention";
+  }
+  return picture;
+}
+
 int Certify(const CertifyArguments& options) {
+  const auto pictures = options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
   const Config config = LoadConfig(options.config);
   RequireForCertifying(config);
+  if (!pictures.empty() && config.problem->projection.rows() != 2)
+    throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
   const Certifier certifier(config.problem);
   const Eigen::MatrixXd controls = LoadPlan(options.plan, *config.problem->model);
   const auto inputs = static_cast<int>(controls.rows()), steps = static_cast<int>(controls.cols());
@@ -78,6 +111,7 @@ int Certify(const CertifyArguments& options) {
   result.schedule = plan.schedule;
   result.controls = controls;
 
+  for (const std::string& file : pictures) DrawPicture(PictureOf(result.decision, plan, tube, certifier, config), file);
   if (options.json)
     std::cout << JsonText(ToJson(result, tube, certifier, config)) << std::endl;
   else
@@ -96,6 +130,8 @@ Command CertifyCommand() {
       .options = {ConfigOption(options->config),
                   Required(
                       {"--plan", &options->plan, "FILE.csv", "Controls, one row for each step (CSV with a header)"}),
+                  {"--picture", &options->picture, "NAME",
+                   "Draws obstacles, tube and goal into NAME.svg and NAME.png, or into one of them"},
                   JsonFlag(options->json, "Print one JSON document on standard output, and nothing else")},
       .run = [options] { return Certify(*options); }};
 }

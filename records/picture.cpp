@@ -205,7 +205,7 @@ class Painter final {
         std::ranges::any_of(picture_.obstacles, [](const Obstacle& each) { return !!each.motion(); });
     entry(!picture_.executed.empty(), "certified, executed", swatch(kExecuted, 0.55));
     entry(!picture_.certified.empty(), "certified, replaced", swatch(kCertified, 0.30));
-    entry(!picture_.expected.empty(), "tube without obstacles", swatch(kCertified, 0.30));
+    entry(!picture_.expected.empty(), picture_.expected_name, swatch(kCertified, 0.30));
     entry(!picture_.observations.empty(), "data", [&] { svg_.Dot(middle(), Line(kFaintInk, 5)); });
     entry(!picture_.abstained.empty(), "abstained (S)", swatch(kAbstained, 0));
     entry(!picture_.obstacles.empty(), "obstacle", swatch(kObstacle, 0.88));

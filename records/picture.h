@@ -38,7 +38,8 @@ struct Picture {
   std::vector<std::vector<Polygon>> abstained;  ///< Tubes refused for an obstacle (S), each up to
                                                 ///< the slice that may touch it.
 
-  std::vector<Polygon> expected;              ///< A tube that is expected, not of a plan that was sent.
+  std::vector<Polygon> expected;  ///< A tube of a plan that was not sent, and what the legend calls it.
+  std::string expected_name = "tube without obstacles";
   std::vector<Eigen::Vector2d> observations;  ///< Where recorded transitions begin.
 
   std::vector<Eigen::Vector2d> path;   ///< Measured positions, from the start on.

@@ -183,6 +183,20 @@ TEST(CertifyJsonTest, ACertificateNamesItsClosestObstacle) {
   EXPECT_NEAR(decision["margin"].get<double>() - decision["threshold"].get<double>(), least, 1e-12);
 }
 
+TEST(CertifyPicture, ShowsTheTubeAndWhatBecameOfIt) {
+  const ScratchDirectory scratch;
+  const std::pair<const char*, const char*> shown[] = {{"bicycle_certified", ">certified<"},
+                                                       {"bicycle_safety", ">abstained (S)<"},
+                                                       {"bicycle_domain", ">tube before the abstention<"}};
+  for (const auto& [plan, name] : shown) {
+    const std::string file = scratch / (std::string(plan) + ".svg");
+    const Output output = Forereach(std::string("certify --config config/bicycle.yaml --plan config/plans/") + plan +
+                                    ".csv --picture '" + file + "'");
+    EXPECT_LE(output.code, 1) << output.text;
+    EXPECT_THAT(Read(file), AllOf(HasSubstr(name), HasSubstr(">obstacle<")));
+  }
+}
+
 TEST(CertifyJsonTest, AnAbstentionSNamesTheObstacleAndWhatIsMissing) {
   const Json decision = CertifyJson("bicycle", "bicycle_safety");
   EXPECT_EQ(WitnessOf(decision), (Keys{"step", "obstacle", "closest_step", "margin", "threshold"}));
