@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/offline.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
 #include "forereach/safety/obstacle_index.h"
@@ -124,8 +125,8 @@ int Certify(const CertifyArguments& options) {
 Command CertifyCommand() {
   const auto options = std::make_shared<CertifyArguments>();
   return {
-      .name = "certify",
-      .purpose = "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input",
+      .name = kCertify.name,
+      .purpose = kCertify.purpose,
       .footer = "Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv",
       .options = {ConfigOption(options->config),
                   Required(

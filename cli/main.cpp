@@ -34,7 +34,7 @@ int Become(const char* path, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  std::vector<Command> commands{CertifyCommand()};
+  std::vector<Command> commands;
   for (const OfflineCommand& each : kOfflineCommands) {
     const std::string_view name = each.name;
     const char* const program = name == kLive.name   ? FOREREACH_LIVE

@@ -10,6 +10,8 @@ struct OfflineCommand {
   const char* purpose;
 };
 
+inline constexpr OfflineCommand kCertify{"certify",
+                                         "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input"};
 inline constexpr OfflineCommand kInit{
     "init",
     "Write a commented task file to begin with, from a model of the library or the header of a transitions file"};
@@ -74,7 +76,7 @@ inline constexpr OfflineCommand kDemo{"demo",
                                       "Drive a car through circles and traffic, with a report and a picture in ./run"};
 
 inline constexpr OfflineCommand kOfflineCommands[] = {
-    kInit,   kImport, kImportWorld, kCheck,    kFit, kExportModel, kPlan,    kDeclare, kVerify,
-    kReplay, kAdvise, kReport,      kCheckLog, kRun, kExport,      kLogEdit, kLive,    kDemo};
+    kCertify, kInit,   kImport, kImportWorld, kCheck, kFit,    kExportModel, kPlan, kDeclare, kVerify,
+    kReplay,  kAdvise, kReport, kCheckLog,    kRun,   kExport, kLogEdit,     kLive, kDemo};
 
 }  // namespace forereach
