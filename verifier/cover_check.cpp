@@ -1,6 +1,8 @@
 #include "verifier/cover_check.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -20,6 +22,10 @@ using Box = std::vector<Real>;
 Real Width(const Real& range) { return range.upper() - range.lower(); }
 
 std::string Text(const Real& x) { return x.text(); }
+std::string Text(double x) {
+  std::array<char, 32> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), x).ptr};
+}
 
 // One claim's derivative, its domain and its arguments w = (z, theta).
 class ClaimCheck {

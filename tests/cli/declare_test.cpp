@@ -19,7 +19,8 @@ class DeclareTest : public testing::Test {
  protected:
   void WriteTask(const std::string& residual) {
     const std::string text = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
-    std::ofstream(task_) << std::regex_replace(text, std::regex("\nresidual: .*"), "\n" + residual);
+    std::ofstream(task_) << Replaced(std::regex_replace(text, std::regex("\nresidual: .*"), "\n" + residual),
+                                     "transitions: ", "transitions: " FOREREACH_SOURCE_DIR "/config/");
   }
   Output Declare(const std::string& options = "") const {
     return Forereach("declare --config " + task_ + " " + options + " 2>&1");

@@ -44,7 +44,7 @@ const std::map<std::string, Contract> kContracts = {
     {"certified_plan_t", {0x35a4960598cd0ba9, 41978}},
     {"advice_change_t", {0x2820254c63772fe1, 56}},
     {"advice_t", {0xd9a32e31db904c49, 9202}},
-    {"candidate_batch_t", {0x6b70f57595232290, 62808}},
+    {"candidate_batch_t", {0x97b04e7ba99e785c, 62808}},
 };
 
 template <class Message>
