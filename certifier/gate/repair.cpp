@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 
 #include "certifier/gate/candidate_message.h"
 #include "forereach/numerics/size.h"
@@ -20,7 +21,7 @@ constexpr std::array kSlowdowns{0.25, 0.5, 0.75, 1.0};  // of the pace at the en
 constexpr double kEffort = 1e-3;                        // m^2, what half the range of an input counts as a distance
 constexpr int kFits = 3;                                // Gauss-Newton steps
 constexpr Eigen::Index kShapes = 3;                     // of a push over time, for each input
-constexpr int kPushes = 4;
+constexpr int kPushes = 6;
 constexpr int kHalvings = 3;
 constexpr double kProbe = 1e-3;      // of half the range of an input
 constexpr double kMore = 1.1;        // than what is missing, since the tube of another plan is another one
@@ -303,13 +304,19 @@ class RepairSearch final {
   // What a plan has too little of, as a function of its rollout.
   struct Lack {
     std::function<double(const Eigen::MatrixXd& states, const Eigen::MatrixXd& controls)> value;
-    double missing = 0;
+    double missing = 0;                                        // to the value that it had when it was found
+    double enough = std::numeric_limits<double>::quiet_NaN();  // the value to reach, from the first push on
   };
 
+  // Each push keeps what those before it have reached.
   void Push(Draft draft, Decision verdict) {
+    std::vector<Lack> lacks;
     for (int i = 0; draft.progress > 0 && i < kPushes; ++i) {
-      const std::optional<Lack> lack = LackOf(draft, verdict);
-      std::optional<Draft> pushed = lack ? Pushed(draft, *lack) : std::nullopt;
+      if (auto lack = LackOf(draft, verdict); lack && std::isfinite(lack->missing))
+        lacks.push_back(*std::move(lack));
+      else
+        return;
+      std::optional<Draft> pushed = Pushed(draft, lacks);
       if (!pushed) return;
       const Answer answer = Try(*pushed);
       if (answer == Answer::kCertified) return GoBack(draft, *pushed);
@@ -343,28 +350,40 @@ class RepairSearch final {
     return shapes;
   }
 
-  [[nodiscard]] std::optional<Draft> Pushed(const Draft& draft, const Lack& lack) {
+  // The least change that is enough for all, if each grows as at the start.
+  [[nodiscard]] std::optional<Draft> Pushed(const Draft& draft, std::vector<Lack>& lacks) {
     Eigen::MatrixXd progress = Clipped(draft.controls.leftCols(draft.progress));
-    const auto value = [&](const std::optional<Draft>& of) {
-      return of ? lack.value(Roll(of->controls), of->controls) : std::numeric_limits<double>::quiet_NaN();
+    const Eigen::Index count = std::ssize(lacks);
+    const auto values = [&](const std::optional<Draft>& of) {
+      Eigen::VectorXd all = Eigen::VectorXd::Constant(count, std::numeric_limits<double>::quiet_NaN());
+      if (!of) return all;
+      const Eigen::MatrixXd states = Roll(of->controls);
+      for (Eigen::Index i = 0; i < count; ++i) all[i] = lacks[ToSize(i)].value(states, of->controls);
+      return all;
     };
-    const double before = value(WithTail(progress, draft.way, 0));
+    const Eigen::VectorXd before = values(WithTail(progress, draft.way, 0));
+    if (!before.allFinite()) return std::nullopt;
+    lacks.back().enough = before[count - 1] + lacks.back().missing;
+    Eigen::VectorXd missing(count);
+    for (Eigen::Index i = 0; i < count; ++i) missing[i] = std::max(lacks[ToSize(i)].enough - before[i], 0.0);
     const std::vector<Eigen::RowVectorXd> shapes = ShapesOf(progress.cols());
-    Eigen::MatrixXd gradient(progress.rows(), std::ssize(shapes)), moved = progress;
+    const Eigen::Index num_shapes = std::ssize(shapes);
+    Eigen::MatrixXd gradient(count, progress.rows() * num_shapes), moved = progress;
     for (Eigen::Index k = 0; k < progress.rows(); ++k)
-      for (Eigen::Index j = 0; j < gradient.cols(); ++j) {
+      for (Eigen::Index j = 0; j < num_shapes; ++j) {
         if (!GoesOn()) return std::nullopt;
         const double middle = lower_[k] / 2 + upper_[k] / 2, own = progress.row(k).dot(shapes[ToSize(j)]);
         const double part = own <= middle * shapes[ToSize(j)].sum() ? kProbe : -kProbe;
         moved.row(k) += part * half_range_[k] * shapes[ToSize(j)];
-        gradient(k, j) = (value(WithTail(moved, draft.way, 0)) - before) / part;
+        gradient.col(k * num_shapes + j) = (values(WithTail(moved, draft.way, 0)) - before) / part;
         moved.row(k) = progress.row(k);
       }
     gradient = gradient.unaryExpr([](double slope) { return std::isfinite(slope) ? slope : 0.0; });
-    const double steepness = gradient.squaredNorm();
-    if (!std::isfinite(before) || !(steepness > 0)) return std::nullopt;
-    for (Eigen::Index j = 0; j < gradient.cols(); ++j)
-      progress += half_range_.cwiseProduct(gradient.col(j)) * (lack.missing / steepness) * shapes[ToSize(j)];
+    const Eigen::VectorXd change = gradient.completeOrthogonalDecomposition().solve(missing);
+    if (!change.allFinite() || change.isZero(0)) return std::nullopt;
+    for (Eigen::Index k = 0; k < progress.rows(); ++k)
+      for (Eigen::Index j = 0; j < num_shapes; ++j)
+        progress.row(k) += half_range_[k] * change[k * num_shapes + j] * shapes[ToSize(j)];
     return WithTail(progress, draft.way, draft.changes | kPushed);
   }
 
@@ -381,7 +400,6 @@ class RepairSearch final {
       case Cause::kBetween:
       case Cause::kBound: return std::nullopt;
     }
-    if (!std::isfinite(lack->missing)) return std::nullopt;
     lack->missing = kMore * std::max(lack->missing, 0.0) + kLeastGain;
     return lack;
   }

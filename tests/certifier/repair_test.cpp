@@ -299,4 +299,16 @@ TEST_F(RepairTest, OnlyPushesAPlanWithoutALawOfBraking) {
   EXPECT_TRUE(Sent(*advice).certified);
 }
 
+// What moves it away from the obstacle leaves it with a speed at its end, and the next push takes that away again.
+TEST_F(RepairTest, WithoutALawOfBrakingItsPushesKeepTheEndAtRest) {
+  Config config = BrakingTask();
+  config.laws.stop.clear();
+  Begin(config);
+  const auto advice = RepairOf(Asking(2));
+  ASSERT_EQ(decision_.cause, decision_t::CAUSE_OBSTACLE);
+  ASSERT_TRUE(advice);
+  EXPECT_EQ(advice->changed, kPushed);
+  EXPECT_TRUE(Sent(*advice).certified);
+}
+
 }  // namespace forereach::repair_test

@@ -159,6 +159,34 @@ class Ends(BusTest):
         self.assertEqual([(each["plan_id"], each["outcome"]) for each in answer], [(plans[0], "rejected")])
         self.assertEqual(buses[1].decisions(), [])
 
+    def test_of_a_planner_get_a_plan_near_a_refused_one_which_is_certified(self):
+        self.start_certifier()
+        self.start(sys.executable, "-B", "examples/python/own_robot.py", URL, self.keys)
+        task = fr.Task.load(TASK)
+        bus = fr.Bus(task, key=self.keys, url=URL)
+        width = np.array([0.02, 0.02, 0.01, 0.01])
+        push = 3 * np.array([0.9, 0.5]) / np.hypot(0.9, 0.5)
+        U = np.concatenate([np.tile(push, (10, 1)), np.tile(-push, (10, 1))])  # ends at the first obstacle
+
+        def decide(U, repair):
+            """The state that it was planned from, and the decision; nothing before the certifier is armed."""
+            state = bus.robot_state(timeout=30)
+            plan = bus.propose(U, (state["state"], width), state["utime"] + round(6 * task.dt * 1e6), 10, repair)
+            return next((each for each in bus.decisions(timeout=5) if each["plan_id"] == plan
+                         and each["outcome"] != "rejected"), None)
+
+        def soon(wanted):
+            return next(filter(None, (wanted() for _ in range(400))))  # the certifier hears the robot for 3 s first
+
+        refused = soon(lambda: decide(U, True))
+        self.assertEqual(refused["outcome"], "abstain_safety")
+        repair = bus.repairs(timeout=10)[0]
+        self.assertEqual((repair["plan_id"], repair["pushed"]), (refused["plan_id"], True))
+        self.assertEqual(repair["U"].shape[1], 2)
+        self.assertTrue(0 < repair["nearness"] < 0.75)
+        self.assertTrue(soon(lambda: decide(repair["U"], False))["certified"])
+        self.assertEqual(bus.repairs(), [])
+
     def test_take_the_keys_of_their_role_alone(self):
         task = fr.Task.load(TASK)
         self.assertRaisesRegex(fr.Error, "robot.key", fr.Bus, task, key=self.keys + "/robot.key", url=URL)
