@@ -21,7 +21,7 @@ constexpr std::array kSlowdowns{0.25, 0.5, 0.75, 1.0};  // of the pace at the en
 constexpr double kEffort = 1e-3;                        // m^2, what half the range of an input counts as a distance
 constexpr int kFits = 3;                                // Gauss-Newton steps
 constexpr Eigen::Index kShapes = 3;                     // of a push over time, for each input
-constexpr int kPushes = 6;
+constexpr int kPushes = 4, kPushesToRest = 8;           // the second where no tail brings the robot to rest
 constexpr int kHalvings = 3;
 constexpr double kProbe = 1e-3;      // of half the range of an input
 constexpr double kMore = 1.1;        // than what is missing, since the tube of another plan is another one
@@ -308,10 +308,11 @@ class RepairSearch final {
     double enough = std::numeric_limits<double>::quiet_NaN();  // the value to reach, from the first push on
   };
 
-  // Each push keeps what those before it have reached.
+  // A push keeps the rest that those before it have reached.
   void Push(Draft draft, Decision verdict) {
     std::vector<Lack> lacks;
-    for (int i = 0; draft.progress > 0 && i < kPushes; ++i) {
+    const int most = tails_.motion != nullptr ? kPushes : kPushesToRest;
+    for (int i = 0; draft.progress > 0 && i < most; ++i) {
       if (auto lack = LackOf(draft, verdict); lack && std::isfinite(lack->missing))
         lacks.push_back(*std::move(lack));
       else
@@ -321,6 +322,7 @@ class RepairSearch final {
       const Answer answer = Try(*pushed);
       if (answer == Answer::kCertified) return GoBack(draft, *pushed);
       if (answer != Answer::kRefused) return;
+      if (verdict.cause != Cause::kNoStop) lacks.pop_back();
       draft = std::move(*pushed);
       verdict = verdict_;
     }
@@ -364,8 +366,8 @@ class RepairSearch final {
     const Eigen::VectorXd before = values(WithTail(progress, draft.way, 0));
     if (!before.allFinite()) return std::nullopt;
     lacks.back().enough = before[count - 1] + lacks.back().missing;
-    Eigen::VectorXd missing(count);
-    for (Eigen::Index i = 0; i < count; ++i) missing[i] = std::max(lacks[ToSize(i)].enough - before[i], 0.0);
+    Eigen::VectorXd missing = Eigen::VectorXd::Zero(count);
+    missing[count - 1] = lacks.back().missing;
     const std::vector<Eigen::RowVectorXd> shapes = ShapesOf(progress.cols());
     const Eigen::Index num_shapes = std::ssize(shapes);
     Eigen::MatrixXd gradient(count, progress.rows() * num_shapes), moved = progress;
@@ -379,12 +381,30 @@ class RepairSearch final {
         moved.row(k) = progress.row(k);
       }
     gradient = gradient.unaryExpr([](double slope) { return std::isfinite(slope) ? slope : 0.0; });
-    const Eigen::VectorXd change = gradient.completeOrthogonalDecomposition().solve(missing);
+    const Eigen::VectorXd change = LeastChange(gradient, missing, before, lacks);
     if (!change.allFinite() || change.isZero(0)) return std::nullopt;
     for (Eigen::Index k = 0; k < progress.rows(); ++k)
       for (Eigen::Index j = 0; j < num_shapes; ++j)
         progress.row(k) += half_range_[k] * change[k * num_shapes + j] * shapes[ToSize(j)];
     return WithTail(progress, draft.way, draft.changes | kPushed);
+  }
+
+  // Of the last lack, and of those that this would take what they have reached.
+  [[nodiscard]] static Eigen::VectorXd LeastChange(const Eigen::MatrixXd& gradient, const Eigen::VectorXd& missing,
+                                                   const Eigen::VectorXd& before, const std::vector<Lack>& lacks) {
+    std::vector<Eigen::Index> heeded{missing.size() - 1};
+    for (;;) {
+      const Eigen::MatrixXd rows = gradient(heeded, Eigen::all);
+      const Eigen::VectorXd change = rows.completeOrthogonalDecomposition().solve(missing(heeded));
+      Eigen::Index worst = -1;
+      double most = kLeastGain / 2;
+      for (Eigen::Index i = 0; i < missing.size(); ++i) {
+        const double taken = std::min(before[i], lacks[ToSize(i)].enough) - before[i] - gradient.row(i).dot(change);
+        if (taken > most && std::ranges::find(heeded, i) == heeded.end()) worst = i, most = taken;
+      }
+      if (worst < 0) return change;
+      heeded.push_back(worst);
+    }
   }
 
   [[nodiscard]] std::optional<Lack> LackOf(const Draft& draft, const Decision& verdict) const {
