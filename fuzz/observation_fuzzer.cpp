@@ -8,6 +8,7 @@
 #include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/observation_store.h"
 #include "forereach/residual/retention.h"
+#include "forereach/sets/zonotope.h"
 #include "fuzz/fuzz.h"
 
 namespace forereach {

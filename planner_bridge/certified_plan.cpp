@@ -11,8 +11,6 @@
 namespace forereach {
 namespace {
 
-constexpr std::uint32_t kSpread = 1'000'003;  // so that two seeds share no search
-
 class PlanSearch final {
  public:
   PlanSearch(Proposer& proposer, const Certifier& certifier, const Config& config, std::uint32_t seed,
@@ -23,7 +21,7 @@ class PlanSearch final {
         initial_set_(Zonotope::Enclose(config.initial_set)),
         half_width_((config.initial_set.upper() - config.initial_set.lower()) / 2),
         schedule_(schedule),
-        seed_(seed * kSpread),
+        seed_(seed * kSeedSpread),
         lessons_(config.planner, config.problem->limits.size()) {}
 
   CertifiedPlan Run() {

@@ -380,11 +380,10 @@ std::optional<Proposal> PlannerNode::StopFrom(std::span<const double> state) con
 }
 
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
-  constexpr std::uint32_t kSpread = 1'000'003;
   return {round.center,
           round.lessons.clearance(),
           round.lessons.DomainMargin(round.half_width, config_.problem->projection),
-          static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
+          static_cast<std::uint32_t>(config_.planner.seed) * kSeedSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1,
           {round.start_utime, period_us_, ScheduleErrorUs(config_.gate)},
           round.lessons.limit_margin(),

@@ -21,14 +21,16 @@ struct ObstacleClearance {
   int first_step = 0;
 };
 
+inline constexpr std::uint32_t kSeedSpread = 1'000'003;
+
 struct PlanRequest {
   Eigen::VectorXd state;  ///< Initial state of the plan: n entries, model units.
   double clearance = 0;   ///< Distance to keep from obstacles, m; less if the start is nearer to an obstacle.
   Eigen::VectorXd
-      domain_margin;  ///< Distance to keep from the bounds of the state domain: n entries, or empty for none.
-  std::uint32_t seed = 1;
-  int attempt = 0;      ///< Number of earlier requests for this start.
-  Schedule schedule{};  ///< Of the plan: it is where moving obstacles are at each step.
+      domain_margin;       ///< Distance to keep from the bounds of the state domain: n entries, or empty for none.
+  std::uint32_t seed = 1;  ///< Of the search. Those of two runs are multiples of kSeedSpread, so they share none.
+  int attempt = 0;         ///< Number of earlier requests for this start.
+  Schedule schedule{};     ///< Of the plan: it is where moving obstacles are at each step.
   /** Distance to keep from the bounds of each limit of the task, in its unit, or empty for none; less if the start is
   nearer to them. */
   std::vector<double> limit_margin = {};

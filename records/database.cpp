@@ -162,7 +162,7 @@ class Database::Statement final {
 
   void Read(auto& row) {
     auto columns = ColumnsOf(row);
-    std::apply([this](auto&... values) { (ReadNext(values), ...); }, columns);
+    std::apply([this](auto&... values) { (this->ReadNext(values), ...); }, columns);
   }
 
  private:

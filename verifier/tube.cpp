@@ -1084,7 +1084,7 @@ void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bo
   for (int i = 0; i < data.size(); ++i) {
     if (!known.Contains(i)) continue;
     const Eigen::VectorXd z = data.z.row(i);
-    const auto& [lower, upper] = residuals_[ToSize(i)][ToSize(k)];
+    const Real &lower = residuals_[ToSize(i)][ToSize(k)].lower, &upper = residuals_[ToSize(i)][ToSize(k)].upper;
     const auto narrows = [&](const Real& away) {
       return !CertainlyAtMost(lower - away, bounds.lower) || !CertainlyAtMost(bounds.upper, upper + away);
     };
