@@ -3,8 +3,9 @@
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  return RunCommands({InitCommand(), ImportCommand(), ImportWorldCommand(), CheckCommand(), FitCommand(),
-                      ExportModelCommand(), PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(),
-                      AdviseCommand(), ReportCommand(), ExportCommand(), LogCommand(), CheckLogCommand(), RunCommand()},
-                     argc, argv);
+  return RunCommands(
+      {InitCommand(), ImportCommand(), ImportWorldCommand(), CheckCommand(), FitCommand(), ExportModelCommand(),
+       PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(), MergeCommand(), AdviseCommand(),
+       ReportCommand(), ExportCommand(), LogCommand(), CheckLogCommand(), RunCommand()},
+      argc, argv);
 }
