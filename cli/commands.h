@@ -44,6 +44,7 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command DeclareCommand();
 [[nodiscard]] Command VerifyCommand();
 [[nodiscard]] Command ReplayCommand();
+[[nodiscard]] Command MergeCommand();
 [[nodiscard]] Command AdviseCommand();
 [[nodiscard]] Command ReportCommand();
 [[nodiscard]] Command CheckLogCommand();

@@ -7,9 +7,7 @@
 
 namespace forereach {
 
-std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command, const std::string& config,
-                                        const LogKey& key) {
-  if (options.resume.empty()) return nullptr;
+std::string JobOf(std::string command, const std::string& config, const LogKey& key) {
   BusOptions bus;
   if (!config.empty()) {
     const Config task = LoadConfig(config);
@@ -22,7 +20,13 @@ std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::stri
     command += " " + keys->robot();
     for (const Role role : kAllRoles) command += " " + ToHex(DigestOf(Bytes(keys->public_key(role))));
   }
-  return std::make_unique<FinishedRuns>(options.resume, command);
+  return command;
+}
+
+std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command, const std::string& config,
+                                        const LogKey& key) {
+  if (options.resume.empty()) return nullptr;
+  return std::make_unique<FinishedRuns>(options.resume, JobOf(std::move(command), config, key));
 }
 
 }  // namespace forereach

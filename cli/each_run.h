@@ -126,9 +126,11 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
   });
 }
 
-/** The results of finished runs of one command, or null without --resume.
-@param command its name and every option that changes a result; task file and key are added to it.
-@throws BadInput if one cannot be read. */
+/** Everything besides the runs on which a command's result depends, a line each. @param command its name and the
+options that change a result; task file and key are added. @throws BadInput if one cannot be read. */
+[[nodiscard]] std::string JobOf(std::string command, const std::string& config, const LogKey& key);
+
+/** The results of finished runs of one command, or null without --resume. The parameters are those of JobOf. */
 [[nodiscard]] std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command,
                                                       const std::string& config, const LogKey& key);
 

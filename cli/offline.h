@@ -43,6 +43,10 @@ inline constexpr OfflineCommand kVerify{
     "certificates and all are confirmed, 1 with the first that is not and its first failing step, 2 bad input"};
 inline constexpr OfflineCommand kReplay{
     "replay", "Replay a recorded log through the gate: exit 0 if every decision equals the recorded one, otherwise 1"};
+inline constexpr OfflineCommand kMerge{"merge",
+                                       "Make one result of the files of replay --shard or verify --shard: exit as the "
+                                       "command without it, 2 if they do not "
+                                       "belong together"};
 inline constexpr OfflineCommand kAdvise{"advise",
                                         "Find what would have turned abstentions into certificates: exit 0 if each has "
                                         "such a change, 1 if not, 2 bad input"};
@@ -76,7 +80,7 @@ inline constexpr OfflineCommand kDemo{"demo",
                                       "Drive a car through circles and traffic, with a report and a picture in ./run"};
 
 inline constexpr OfflineCommand kOfflineCommands[] = {
-    kCertify, kInit,   kImport, kImportWorld, kCheck, kFit,    kExportModel, kPlan, kDeclare, kVerify,
-    kReplay,  kAdvise, kReport, kCheckLog,    kRun,   kExport, kLogEdit,     kLive, kDemo};
+    kCertify, kInit,  kImport, kImportWorld, kCheck,    kFit, kExportModel, kPlan,    kDeclare, kVerify,
+    kReplay,  kMerge, kAdvise, kReport,      kCheckLog, kRun, kExport,      kLogEdit, kLive,    kDemo};
 
 }  // namespace forereach

@@ -5,7 +5,7 @@ int main(int argc, char** argv) {
   using namespace forereach;
   return RunCommands(
       {CertifyCommand(), InitCommand(), ImportCommand(), ImportWorldCommand(), CheckCommand(), FitCommand(),
-       ExportModelCommand(), PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(), AdviseCommand(),
-       ReportCommand(), ExportCommand(), LogCommand(), CheckLogCommand(), RunCommand()},
+       ExportModelCommand(), PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(), MergeCommand(),
+       AdviseCommand(), ReportCommand(), ExportCommand(), LogCommand(), CheckLogCommand(), RunCommand()},
       argc, argv);
 }

@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/offline.h"
+#include "cli/shards.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/compare.h"
@@ -26,7 +27,13 @@ struct ReplayArguments {
   LogKey key;
   bool json = false, other_task = false, compare = false;
   EachRunOptions each_run;
+  ShardOptions shard;
 };
+
+// The command that a result depends on, and its part.
+std::string NameOfPart(const std::string& command, const ShardOptions& shard) {
+  return shard.is_given() ? command + " shard " + shard.shard : command;
+}
 
 // Of a run in which nothing was found. Of several runs, those with nothing to replay are passed over.
 void RequirePlans(const NamedRuns& named, const RunLogs& run, const LogKey& key) {
@@ -79,36 +86,45 @@ void PrintForPeople(const ReplayResult& result, const NamedRuns& named) {
   std::cout << DescribePassedOver(result.passed_over) << std::endl;
 }
 
+int PrintReplay(ResultsOfRuns<ReplayResult> results, const NamedRuns& named, bool json) {
+  ReplayResult sum;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (!results[i]) continue;
+    ReplayResult of_run = std::move(*results[i]).Sum();
+    NameRobot(named, named.runs[i], of_run.differences);
+    NameRobot(named, named.runs[i], of_run.shown);
+    sum += std::move(of_run);
+  }
+  json ? PrintJson(sum, named) : PrintForPeople(sum, named);
+  return sum.differences.empty() && sum.corruptions == 0 && sum.candidates > 0 && named.missing.empty() ? 0 : 1;
+}
+
 int RunReplay(const ReplayArguments& options) {
+  const Shard shard = options.shard.Get();
   NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
   const std::optional<Config> other = options.other_task ? std::optional(OtherTask(options)) : std::nullopt;
   const RunTasks own(other ? "" : options.config, options.key, named.is_many);
-  const auto finished =
-      ResultsOf(options.each_run, std::string("replay ") + (other ? "other " : "") + options.plan_digest,
-                options.config, options.key);
-  const auto replay = [&](const RunLogs& run, RunWork&) -> ReplayResult {
+  const std::string command = std::string("replay ") + (other ? "other " : "") + options.plan_digest;
+  const auto finished = ResultsOf(options.each_run, NameOfPart(command, options.shard), options.config, options.key);
+  const auto replay = [&](const RunLogs& run, RunWork&) -> CaseResults<ReplayResult> {
     if (run.logs.empty()) return {};
     const bool names_files = named.is_many || run.logs.size() > 1;
     if (other) {
-      ReplayResult result = Replay(run.logs, *other, options.plan_digest, names_files);
-      if (result.candidates == 0 && result.differences.empty()) RequirePlans(named, run, options.key);
+      auto result = Replay(run.logs, *other, options.plan_digest, names_files, shard);
+      if (result.of_run.candidates == 0 && result.cases == 0) RequirePlans(named, run, options.key);
       return result;
     }
     LogTasks tasks = own.Of(run.logs);
     if (!tasks.has_plans() && named.is_many) return {};  // nothing to replay
     tasks.RequirePlans();
-    return Replay(run.logs, tasks, options.plan_digest, names_files);
+    return Replay(run.logs, tasks, options.plan_digest, names_files, shard);
   };
-  ReplayResult sum;
-  auto results = ForEachRun<ReplayResult>(named, options.each_run, "replayed", finished.get(), replay);
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    if (!results[i]) continue;
-    NameRobot(named, named.runs[i], results[i]->differences);
-    NameRobot(named, named.runs[i], results[i]->shown);
-    sum += std::move(*results[i]);
-  }
-  options.json ? PrintJson(sum, named) : PrintForPeople(sum, named);
-  return sum.differences.empty() && sum.corruptions == 0 && sum.candidates > 0 && named.missing.empty() ? 0 : 1;
+  auto results = ForEachRun<CaseResults<ReplayResult>>(named, options.each_run, "replayed", finished.get(), replay);
+  if (options.shard.is_given())
+    return WriteShard(options.shard,
+                      {.name = "replay", .job = JobOf(command, options.config, options.key), .config = options.config},
+                      named, results);
+  return PrintReplay(std::move(results), named, options.json);
 }
 
 // ---- --compare.
@@ -214,31 +230,49 @@ void PrintJson(const Comparison& compared, const ByRobot& robots, const NamedRun
             << std::endl;
 }
 
-int RunCompare(const ReplayArguments& options) {
-  NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
-  const Config task = OtherTask(options);
-  const auto finished = ResultsOf(options.each_run, "compare", options.config, options.key);
-  const auto compare = [&](const RunLogs& run, RunWork&) -> Comparison {
-    if (run.logs.empty()) return {};
-    Comparison result = Compare(run.logs, task, named.is_many || run.logs.size() > 1);
-    if (result.candidates + result.circumstances + result.without_candidate + result.undecided == 0)
-      RequirePlans(named, run, options.key);
-    return result;
-  };
+int PrintComparison(ResultsOfRuns<Comparison> results, const NamedRuns& named, const std::string& config, bool json) {
   Comparison sum;
   ByRobot robots;
-  auto results = ForEachRun<Comparison>(named, options.each_run, "compared", finished.get(), compare);
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (!results[i]) continue;
-    NameRobot(named, named.runs[i], results[i]->lost_plans);
-    robots[named.runs[i].robot] += *results[i];
-    sum += *results[i];
+    Comparison of_run = std::move(*results[i]).Sum();
+    NameRobot(named, named.runs[i], of_run.lost_plans);
+    robots[named.runs[i].robot] += of_run;
+    sum += of_run;
   }
-  options.json ? PrintJson(sum, robots, named, options.config) : PrintForPeople(sum, robots, named, options.config);
+  json ? PrintJson(sum, robots, named, config) : PrintForPeople(sum, robots, named, config);
   return sum.num_lost() == 0 && sum.candidates > 0 && sum.corruptions == 0 && named.missing.empty() ? 0 : 1;
 }
 
+int RunCompare(const ReplayArguments& options) {
+  const Shard shard = options.shard.Get();
+  NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
+  const Config task = OtherTask(options);
+  const auto finished = ResultsOf(options.each_run, NameOfPart("compare", options.shard), options.config, options.key);
+  const auto compare = [&](const RunLogs& run, RunWork&) -> CaseResults<Comparison> {
+    if (run.logs.empty()) return {};
+    auto result = Compare(run.logs, task, named.is_many || run.logs.size() > 1, shard);
+    if (result.cases == 0) RequirePlans(named, run, options.key);
+    return result;
+  };
+  auto results = ForEachRun<CaseResults<Comparison>>(named, options.each_run, "compared", finished.get(), compare);
+  if (options.shard.is_given())
+    return WriteShard(
+        options.shard,
+        {.name = "compare", .job = JobOf("compare", options.config, options.key), .config = options.config}, named,
+        results);
+  return PrintComparison(std::move(results), named, options.config, options.json);
+}
+
 }  // namespace
+
+int PrintMergedReplay(const Shards& shards, bool json) {
+  return PrintReplay(shards.Results<ReplayResult>(), shards.named(), json);
+}
+
+int PrintMergedComparison(const Shards& shards, bool json) {
+  return PrintComparison(shards.Results<Comparison>(), shards.named(), shards.config(), json);
+}
 
 Command ReplayCommand() {
   const auto options = std::make_shared<ReplayArguments>();
@@ -250,7 +284,8 @@ Command ReplayCommand() {
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach replay run/log --resume night.replayed\n"
           "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config config/demo.yaml\n"
-          "  forereach replay run/log --compare --config config/demo.yaml",
+          "  forereach replay run/log --compare --config config/demo.yaml\n"
+          "  forereach replay run/log --shard 2/7 --out part2.json",
       .options = {Required({"logs", &options->logs, "LOG|DATABASE|DIRECTORY", kRuns}),
                   {"--config", &options->config, "FILE", kTaskOfLogs},
                   {.name = "--other-task",
@@ -268,6 +303,7 @@ Command ReplayCommand() {
                   JsonFlag(options->json)},
       .run = [options] { return options->compare ? RunCompare(*options) : RunReplay(*options); }};
   options->each_run.AddTo(command.options);
+  options->shard.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

@@ -11,6 +11,7 @@
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/offline.h"
+#include "cli/shards.h"
 #include "forereach/certify/certifier.h"
 #include "forereach/numerics/parallel.h"
 #include "lcmtypes/printable.h"
@@ -32,6 +33,7 @@ struct VerifyArguments {
   LogKey key;
   bool json = false;
   EachRunOptions each_run;
+  ShardOptions shard;
 };
 
 // What was found in one run, or in several.
@@ -105,26 +107,29 @@ nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdic
 // Verifies certificates on several threads. What it says does not depend on their number.
 class Verifying final : public CertificateUser {
  public:
-  // @param robot whose certificates they are, if there are several runs.
-  Verifying(unsigned threads, const std::string* robot) : threads_(threads), robot_(robot) {}
+  // @param robot whose certificates they are, if there are several runs. @param shard which of them are verified.
+  Verifying(unsigned threads, const std::string* robot, const Shard& shard)
+      : threads_(threads), robot_(robot), shard_(shard) {}
 
   void OnCertificate(RecordedCertificate&& recorded, const Basis* basis) override {
     constexpr std::size_t kBatch = 256;
     verifier::Verifier* const verifier = recorded.missing.empty() ? &VerifierOf(*basis) : nullptr;
-    waiting_.push_back({std::move(recorded), verifier, {}});
+    if (!results_.Next(shard_)) return;
+    waiting_.push_back({std::move(recorded), results_.cases - 1, verifier, {}});
     if (waiting_.size() == kBatch) VerifyWaiting();
   }
 
-  Verified Finish(const BesideCertificates& beside) {
+  CaseResults<Verified> Finish(const BesideCertificates& beside) {
     VerifyWaiting();
-    sum_.not_certificates = beside.not_certificates;
-    sum_.passed_over = beside.passed_over;
-    return std::move(sum_);
+    results_.of_run.not_certificates = beside.not_certificates;
+    results_.of_run.passed_over = beside.passed_over;
+    return std::move(results_);
   }
 
  private:
   struct Waiting {
     RecordedCertificate recorded;
+    std::int64_t number;           // of the case
     verifier::Verifier* verifier;  // null if it cannot be derived
     Verdict verdict;
   };
@@ -151,32 +156,36 @@ class Verifying final : public CertificateUser {
       if (const auto learned = std::exchange(known.learned, nullptr))
         known.verifier->Learn(WithLearned(known.problem, *learned)->transitions);
     ForEachInParallel(waiting_.size(), threads_, [&](std::size_t i, std::size_t) {
-      auto& [recorded, verifier, verdict] = waiting_[i];
+      auto& [recorded, number, verifier, verdict] = waiting_[i];
       verdict = verifier ? verifier->Verify(recorded.certificate)
                          : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
       if (!recorded.mismatches.empty() && verdict.status == Status::kConfirmed) verdict.status = Status::kRefuted;
     });
-    for (const Waiting& each : waiting_) Add(each.recorded, each.verdict);
+    for (const Waiting& each : waiting_)
+      Add(each.recorded, each.verdict,
+          each.verdict.status == Status::kConfirmed ? results_.counts : results_.told[each.number]);
     waiting_.clear();
   }
 
-  void Add(const RecordedCertificate& recorded, const Verdict& verdict) {
+  void Add(const RecordedCertificate& recorded, const Verdict& verdict, Verified& to) {
     const Status status = verdict.status;
-    ++sum_.certificates;
-    ++(status == Status::kConfirmed ? sum_.confirmed : status == Status::kRefuted ? sum_.refuted : sum_.cannot_verify);
-    sum_.remainders += recorded.certificate.is_remainder;
+    ++to.certificates;
+    ++(status == Status::kConfirmed ? to.confirmed : status == Status::kRefuted ? to.refuted : to.cannot_verify);
+    to.remainders += recorded.certificate.is_remainder;
     if (status == Status::kConfirmed) return;
-    sum_.failures.push_back(ToJson(recorded, verdict));
-    if (robot_) sum_.failures.back()["robot"] = *robot_;
-    if (sum_.first_failure.empty())
-      sum_.first_failure = (robot_ ? *robot_ + ": " : "") + DescribeVerdict(recorded, verdict);
+    to.failures.push_back(ToJson(recorded, verdict));
+    if (robot_) to.failures.back()["robot"] = *robot_;
+    if (!has_failed_) to.first_failure = (robot_ ? *robot_ + ": " : "") + DescribeVerdict(recorded, verdict);
+    has_failed_ = true;
   }
 
   const unsigned threads_;
   const std::string* const robot_;
+  const Shard shard_;
   std::map<const Problem*, Known> known_;
   std::vector<Waiting> waiting_;
-  Verified sum_;
+  bool has_failed_ = false;
+  CaseResults<Verified> results_;
 };
 
 void PrintJson(const Verified& sum, const NamedRuns& named) {
@@ -229,30 +238,52 @@ bool IsDocument(const std::vector<std::string>& files) {
   return kind != FileKind::kDirectory && kind != FileKind::kDatabase && kind != FileKind::kEventLog;
 }
 
-int Verify(const VerifyArguments& options) {
-  NamedRuns named;
-  Verified sum;
-  if (IsDocument(options.files)) {
-    Verifying verifying(options.each_run.jobs, nullptr);
-    sum = verifying.Finish(ReadCertificates(options.files[0], options.config, options.key, verifying));
-    sum.of_decision = true;
-  } else {
-    named = RunsNamedBy(options.files, options.each_run.jobs);
-    const RunTasks tasks(options.config, options.key, named.is_many);
-    const auto finished = ResultsOf(options.each_run, "verify", options.config, options.key);
-    const auto verify = [&](const RunLogs& run, RunWork& work) {
-      Verifying verifying(work.threads, named.is_many ? &run.robot : nullptr);
-      return verifying.Finish(
-          ReadRun(run, tasks, named.is_many, verifying, [&](std::int64_t bytes) { work.Read(bytes); }));
-    };
-    for (auto& each : ForEachRun<Verified>(named, options.each_run, "verified", finished.get(), verify))
-      if (each) sum += std::move(*each);
-  }
-  options.json ? PrintJson(sum, named) : PrintForPeople(sum, named);
+int PrintVerified(const Verified& sum, const NamedRuns& named, bool json) {
+  json ? PrintJson(sum, named) : PrintForPeople(sum, named);
   return sum.confirmed == sum.certificates && sum.certificates > 0 && named.missing.empty() ? 0 : 1;
 }
 
+Verified SumOf(ResultsOfRuns<Verified> results) {
+  Verified sum;
+  for (auto& each : results)
+    if (each) sum += std::move(*each).Sum();
+  return sum;
+}
+
+int VerifyDecision(const VerifyArguments& options) {
+  const std::string& file = options.files[0];
+  if (options.shard.is_given()) throw ConfigError(file + ": --shard divides logs, and this is a single decision");
+  Verifying verifying(options.each_run.jobs, nullptr, {});
+  Verified sum = verifying.Finish(ReadCertificates(file, options.config, options.key, verifying)).Sum();
+  sum.of_decision = true;
+  return PrintVerified(sum, {}, options.json);
+}
+
+int Verify(const VerifyArguments& options) {
+  const Shard shard = options.shard.Get();
+  if (IsDocument(options.files)) return VerifyDecision(options);
+  NamedRuns named = RunsNamedBy(options.files, options.each_run.jobs);
+  const RunTasks tasks(options.config, options.key, named.is_many);
+  const std::string part = options.shard.is_given() ? " shard " + options.shard.shard : "";
+  const auto finished = ResultsOf(options.each_run, "verify" + part, options.config, options.key);
+  const auto verify = [&](const RunLogs& run, RunWork& work) {
+    Verifying verifying(work.threads, named.is_many ? &run.robot : nullptr, shard);
+    return verifying.Finish(
+        ReadRun(run, tasks, named.is_many, verifying, [&](std::int64_t bytes) { work.Read(bytes); }));
+  };
+  auto results = ForEachRun<CaseResults<Verified>>(named, options.each_run, "verified", finished.get(), verify);
+  if (options.shard.is_given())
+    return WriteShard(options.shard,
+                      {.name = "verify", .job = JobOf("verify", options.config, options.key), .config = options.config},
+                      named, results);
+  return PrintVerified(SumOf(std::move(results)), named, options.json);
+}
+
 }  // namespace
+
+int PrintMergedVerification(const Shards& shards, bool json) {
+  return PrintVerified(SumOf(shards.Results<Verified>()), shards.named(), json);
+}
 
 Command VerifyCommand() {
   const auto options = std::make_shared<VerifyArguments>();
@@ -268,13 +299,15 @@ Command VerifyCommand() {
           "decision.json\n"
           "  forereach verify decision.json\n"
           "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
-          "  forereach verify run/log",
+          "  forereach verify run/log\n"
+          "  forereach verify run/log --shard 2/7 --out part2.json",
       .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                             std::string("The certificates: a decision (the output of certify --json), or ") + kRuns}),
                   {"--config", &options->config, "FILE", kTaskOfRecords},
                   JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
   options->each_run.AddTo(command.options);
+  options->shard.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

@@ -25,51 +25,56 @@ std::int64_t Sum(const std::map<Key, std::int64_t>& counts) {
 
 class Comparer final : public GateFollower {
  public:
+  explicit Comparer(const Shard& shard) : shard_(shard) {}
+
   void OnDecision(const RecordedDecision& recorded) override {
+    const bool is_mine = cases_.Next(shard_);
+    Comparison& counts = cases_.counts;
     const decision_t& before = recorded.decision;
     if (!recorded.candidate) {
-      ++result_.without_candidate;
+      counts.without_candidate += is_mine;
       return;
     }
     const std::vector<std::uint8_t>& bytes = recorded.candidate->bytes;
-    if (IsCircumstance(before)) {
-      static_cast<void>(gate().Refuse(bytes, before.utime, before.cause, ""));
-      ++result_.circumstances;
+    if (!is_mine || IsCircumstance(before)) {  // the gate knows that it was used
+      static_cast<void>(gate().Refuse(bytes, before.utime, is_mine ? before.cause : decision_t::CAUSE_FAULT, ""));
+      counts.circumstances += is_mine;
       return;
     }
     const decision_t after = gate().Decide(bytes, before.utime).decision;
     const bool was = before.outcome == decision_t::CERTIFIED, is = after.outcome == decision_t::CERTIFIED;
-    ++result_.candidates;
-    result_.certificates += was;
-    if (!was && is) ++result_.gained[WhyNotOf(before)];
+    ++counts.candidates;
+    counts.certificates += was;
+    if (!was && is) ++counts.gained[WhyNotOf(before)];
     if (was && !is) Lose(recorded, after);
     if (!was && !is) Refuse(before, after);
   }
 
-  Comparison Finish(const Timeline& timeline) {
-    timeline.undecided().ForEach([this](const RecordedCandidate&) { ++result_.undecided; });
-    result_.corruptions = timeline.damage().places;
-    result_.passed_over = timeline.passed_over();
-    return std::move(result_);
+  CaseResults<Comparison> Finish(const Timeline& timeline) {
+    timeline.undecided().ForEach([this](const RecordedCandidate&) { cases_.counts.undecided += cases_.Next(shard_); });
+    cases_.of_run.corruptions = timeline.damage().places;
+    cases_.of_run.passed_over = timeline.passed_over();
+    return std::move(cases_);
   }
 
  private:
   void Lose(const RecordedDecision& recorded, const decision_t& after) {
-    ++result_.lost[WhyNotOf(after)];
-    if (result_.lost_plans.size() < Comparison::kLostPlans)
-      result_.lost_plans.push_back(fmt::format("{}, plan {} of {}: {}", recorded.event, after.plan_id,
-                                               GetText(after.source), GetText(after.message)));
+    ++cases_.counts.lost[WhyNotOf(after)];
+    if (cases_.told.size() < Comparison::kLostPlans)
+      cases_.Tell().lost_plans.push_back(fmt::format("{}, plan {} of {}: {}", recorded.event, after.plan_id,
+                                                     GetText(after.source), GetText(after.message)));
   }
   void Refuse(const decision_t& before, const decision_t& after) {
     WhyNot then = WhyNotOf(before), now = WhyNotOf(after);
     then.step = now.step = -1;
     if (then == now)
-      ++result_.refused_alike;
+      ++cases_.counts.refused_alike;
     else
-      ++result_.otherwise[{then, now}];
+      ++cases_.counts.otherwise[{then, now}];
   }
 
-  Comparison result_;
+  const Shard shard_;
+  CaseResults<Comparison> cases_;
 };
 
 }  // namespace
@@ -77,8 +82,9 @@ class Comparer final : public GateFollower {
 std::int64_t Comparison::num_gained() const { return Sum(gained); }
 std::int64_t Comparison::num_lost() const { return Sum(lost); }
 
-Comparison Compare(const std::vector<std::string>& logs, const Config& task, bool names_files) {
-  Comparer comparer;
+CaseResults<Comparison> Compare(const std::vector<std::string>& logs, const Config& task, bool names_files,
+                                const Shard& shard) {
+  Comparer comparer(shard);
   Timeline timeline(task, {&comparer});
   timeline.Read(logs, names_files);
   return comparer.Finish(timeline);

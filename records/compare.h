@@ -10,6 +10,7 @@ changed. */
 #include <vector>
 
 #include "records/log_trust.h"
+#include "records/shard.h"
 #include "task/config.h"
 
 namespace forereach {
@@ -46,10 +47,14 @@ struct Comparison {
 /** Gives each recorded candidate to the gate of `task`, at the time of its recorded decision and with the obstacles and
 transitions that were known then. Channels and key are those of `task`.
 @param logs consecutive logs of one run. @param names_files whether events are named with their log.
-@throws as Replay. */
-[[nodiscard]] Comparison Compare(const std::vector<std::string>& logs, const Config& task, bool names_files = true);
+@param shard which of the decisions are compared. @throws as Replay. */
+[[nodiscard]] CaseResults<Comparison> Compare(const std::vector<std::string>& logs, const Config& task,
+                                              bool names_files, const Shard& shard);
+[[nodiscard]] inline Comparison Compare(const std::vector<std::string>& logs, const Config& task) {
+  return Compare(logs, task, true, {}).Sum();
+}
 
-/** Adds up the comparisons of several runs. */
+/** Adds up the comparisons of several runs or cases. */
 Comparison& operator+=(Comparison& sum, const Comparison& other);
 
 }  // namespace forereach

@@ -53,12 +53,14 @@ std::string DescribeTasks(const fs::path& directory) {
 
 }  // namespace
 
+std::string DigestOfProgram() { return DigestOfFile(fs::read_symlink("/proc/self/exe").string()); }
+
 FinishedRuns::FinishedRuns(std::string directory, const std::string& job) : directory_(std::move(directory)) {
   std::error_code error;
   fs::create_directories(directory_, error);
   if (error || !fs::is_directory(directory_, error))
     throw OutputError(directory_ + ": cannot be made a directory: " + error.message());
-  job_ = DigestOfFile(fs::read_symlink("/proc/self/exe").string()) + "\n" + job + "\n";
+  job_ = DigestOfProgram() + "\n" + job + "\n";
 }
 
 FinishedRuns::~FinishedRuns() {
@@ -66,8 +68,8 @@ FinishedRuns::~FinishedRuns() {
   fs::remove(directory_, ignored);  // fails unless it is empty
 }
 
-std::string FinishedRuns::KeyOf(const RunLogs& run) const {
-  std::string inputs = job_ + run.robot + "\n" + run.database + "\n";
+std::string KeyOf(const RunLogs& run, const std::string& job) {
+  std::string inputs = job + run.robot + "\n" + run.database + "\n";
   for (const std::string& log : run.logs) inputs += log + "\n" + DigestOfFile(log) + "\n";
   if (!run.database.empty()) {
     Database database(run.database);

@@ -16,6 +16,13 @@ again. A file appears whole or not at all, and a damaged one counts as none. The
 
 namespace forereach {
 
+/** The digest of the running program, in hexadecimal digits. */
+[[nodiscard]] std::string DigestOfProgram();
+
+/** Names what a run is made of, and a job, in hexadecimal digits. Cost: one pass over its logs. @throws BadInput if one
+cannot be read. */
+[[nodiscard]] std::string KeyOf(const RunLogs& run, const std::string& job);
+
 class FinishedRuns final {
  public:
   /** @param directory made if necessary. @param job the command, and the content of everything else on which a result
@@ -26,9 +33,8 @@ class FinishedRuns final {
   FinishedRuns(const FinishedRuns&) = delete;
   FinishedRuns& operator=(const FinishedRuns&) = delete;
 
-  /** Names the run's results, in hexadecimal digits. Cost: one pass over its logs. @throws BadInput if one cannot be
-  read. */
-  [[nodiscard]] std::string KeyOf(const RunLogs& run) const;
+  /** Names the run's results. @throws BadInput if a log cannot be read. */
+  [[nodiscard]] std::string KeyOf(const RunLogs& run) const { return forereach::KeyOf(run, job_); }
 
   /** The result that was kept last under this key, if there is one. */
   [[nodiscard]] std::optional<nlohmann::json> Find(const std::string& key) const;

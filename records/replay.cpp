@@ -37,7 +37,7 @@ std::string Difference(const decision_t& recorded, const decision_t& replayed) {
 
 class Replayer final : public GateFollower {
  public:
-  explicit Replayer(std::string plan_digest) : plan_digest_(std::move(plan_digest)) {}
+  Replayer(std::string plan_digest, const Shard& shard) : plan_digest_(std::move(plan_digest)), shard_(shard) {}
 
   void OnStart(const Config& task) override {
     GateFollower::OnStart(task);
@@ -49,15 +49,15 @@ class Replayer final : public GateFollower {
   void OnEvent(const LogEvent& event) override {
     if (event.channel != advice_) return;
     const auto advice = Decoded<advice_t>(event.message());
-    if (!advice || advice->changed == 0) return;
+    if (!advice || advice->changed == 0 || !result_.Next(shard_)) return;
     if (GroundsOf(*advice) != gate().grounds()) {
-      ++result_.circumstances;
+      ++result_.counts.circumstances;
       return;
     }
     const Upheld upheld = UpheldUnder(gate().certifier().problem(), gate().options());
     const Decision verdict = gate().JudgeAgain(advice->proposal, upheld, 0).verdict;
     if (verdict.outcome == Outcome::kCertified)
-      ++result_.proposals;
+      ++result_.counts.proposals;
     else
       Differ(fmt::format("event {}", event.number), advice->plan_id,
              fmt::format("what is proposed in its place is not certified: {}, step {}",
@@ -65,6 +65,7 @@ class Replayer final : public GateFollower {
   }
 
   void OnDecision(const RecordedDecision& recorded) override {
+    if (!result_.Next(shard_)) return Pass(recorded);
     const decision_t& decision = recorded.decision;
     if (!recorded.candidate)
       return Differ(recorded.event, decision.plan_id, "decided, but its candidate is not in the log");
@@ -75,7 +76,7 @@ class Replayer final : public GateFollower {
                         ", which is not kept next to the log");
     if (IsCircumstance(decision)) {
       static_cast<void>(gate().Refuse(bytes, decision.utime, decision.cause, ""));
-      ++result_.circumstances;
+      ++result_.counts.circumstances;
       Show(recorded.event, "recorded", decision, ", which depends on the moment");
       return;
     }
@@ -86,51 +87,64 @@ class Replayer final : public GateFollower {
     Show(recorded.event, "recorded", decision);
     Show(recorded.event, "replayed", again);
     if (difference.empty())
-      ++result_.agreed;
+      ++result_.counts.agreed;
     else
       Differ(event, decision.plan_id, difference);
   }
 
   void OnCertified(const RecordedPlan& recorded) override {
     const certified_plan_t& certified = recorded.certified;
-    for (const SealFault& fault : FindSealFaults(certified))
-      Differ(recorded.event, certified.plan.plan_id,
-             "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
     const Upheld upheld = UpheldBy(certified);
-    const Config& task = *recorded.basis.task;
-    for (const UpheldDifference& difference : FindDifferences(UpheldUnder(*task.problem, task.gate), upheld))
-      Differ(recorded.event, certified.plan.plan_id,
-             difference.field + " is " + difference.found + ", it is " + difference.expected + " in the task");
+    if (result_.Next(shard_)) CheckSeal(recorded, upheld);
     if (plans_.size() == kPlans) plans_.pop_front();
     plans_.push_back({GetDigest(certified.certificate_digest), upheld, certified.plan});
   }
 
   void OnWithdrawn(const RecordedWithdrawal& recorded) override {
+    if (!result_.Next(shard_)) return;
     const withdrawal_t& withdrawal = recorded.withdrawal;
     const auto& cause = withdrawal.cause;
     if (cause == withdrawal_t::NOT_JUDGED || cause == withdrawal_t::UNKNOWN_PLAN ||
         cause == withdrawal_t::OBSTACLES_LOST) {
-      ++result_.circumstances;
+      ++result_.counts.circumstances;
       return;
     }
     const std::string difference = JudgeAgain(recorded);
     if (difference.empty())
-      ++result_.withdrawals;
+      ++result_.counts.withdrawals;
     else
       Differ(recorded.event, withdrawal.plan_id, difference);
   }
 
-  ReplayResult Finish(const Timeline& timeline) {
-    result_.candidates = timeline.candidates();
-    result_.corruptions = timeline.damage().places;
-    result_.passed_over = timeline.passed_over();
-    timeline.undecided().ForEach(
-        [this](const RecordedCandidate& candidate) { Differ(candidate.event, -1, "no decision recorded"); });
+  CaseResults<ReplayResult> Finish(const Timeline& timeline) {
+    result_.of_run.candidates = timeline.candidates();
+    result_.of_run.corruptions = timeline.damage().places;
+    result_.of_run.passed_over = timeline.passed_over();
+    timeline.undecided().ForEach([this](const RecordedCandidate& candidate) {
+      if (result_.Next(shard_)) Differ(candidate.event, -1, "no decision recorded");
+    });
     return std::move(result_);
   }
 
  private:
   static constexpr std::size_t kPlans = 4096;  // more than a robot can have at one time
+
+  // Another shard judges it. The gate knows that it was used, as if it was judged here.
+  void Pass(const RecordedDecision& recorded) {
+    if (recorded.candidate && recorded.is_of_known_task)
+      static_cast<void>(gate().Refuse(recorded.candidate->bytes, recorded.decision.utime, decision_t::CAUSE_FAULT, ""));
+  }
+
+  void CheckSeal(const RecordedPlan& recorded, const Upheld& upheld) {
+    const certified_plan_t& certified = recorded.certified;
+    for (const SealFault& fault : FindSealFaults(certified))
+      Differ(recorded.event, certified.plan.plan_id,
+             "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
+    const Config& task = *recorded.basis.task;
+    for (const UpheldDifference& difference : FindDifferences(UpheldUnder(*task.problem, task.gate), upheld))
+      Differ(recorded.event, certified.plan.plan_id,
+             difference.field + " is " + difference.found + ", it is " + difference.expected + " in the task");
+  }
 
   // Empty if the plan's judgement is made again.
   [[nodiscard]] std::string JudgeAgain(const RecordedWithdrawal& recorded) {
@@ -152,14 +166,14 @@ class Replayer final : public GateFollower {
   }
 
   void Differ(const std::string& event, std::int64_t plan_id, const std::string& what) {
-    result_.differences.push_back(fmt::format("{}, plan {}: {}", event, plan_id, what));
+    result_.Tell().differences.push_back(fmt::format("{}, plan {}: {}", event, plan_id, what));
   }
 
   void Show(const std::string& event, const std::string& how, const decision_t& decision,
             const std::string& remark = "") {
     if (plan_digest_.empty() || !ToHex(GetDigest(decision.plan_digest)).starts_with(plan_digest_)) return;
-    result_.shown.push_back(fmt::format("{}, plan {}: {} {}{}: {}", event, decision.plan_id, how,
-                                        DescribeDecision(decision), remark, GetText(decision.message)));
+    result_.Tell().shown.push_back(fmt::format("{}, plan {}: {} {}{}: {}", event, decision.plan_id, how,
+                                               DescribeDecision(decision), remark, GetText(decision.message)));
   }
 
   struct Plan {
@@ -169,9 +183,10 @@ class Replayer final : public GateFollower {
   };
 
   const std::string plan_digest_;
+  const Shard shard_;
   std::string advice_;      // the channel
   std::deque<Plan> plans_;  // the last ones
-  ReplayResult result_;
+  CaseResults<ReplayResult> result_;
 };
 
 }  // namespace
@@ -190,17 +205,17 @@ bool IsCircumstance(const decision_t& decision) {
   }
 }
 
-ReplayResult Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
-                    bool names_files) {
-  Replayer replayer(plan_digest);
+CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
+                                 bool names_files, const Shard& shard) {
+  Replayer replayer(plan_digest, shard);
   Timeline timeline(tasks, {&replayer});
   timeline.Read(logs, names_files);
   return replayer.Finish(timeline);
 }
 
-ReplayResult Replay(const std::vector<std::string>& logs, const Config& task, const std::string& plan_digest,
-                    bool names_files) {
-  Replayer replayer(plan_digest);
+CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, const Config& task,
+                                 const std::string& plan_digest, bool names_files, const Shard& shard) {
+  Replayer replayer(plan_digest, shard);
   Timeline timeline(task, {&replayer});
   timeline.Read(logs, names_files);
   return replayer.Finish(timeline);

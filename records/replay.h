@@ -8,6 +8,7 @@
 #include "forereach/decision_t.hpp"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
+#include "records/shard.h"
 #include "task/config.h"
 
 namespace forereach {
@@ -29,7 +30,7 @@ struct ReplayResult {
   /** What was recorded and what was decided again on the candidates that were asked for, a line each. */
   std::vector<std::string> shown;
 
-  /** Adds the result of another run. */
+  /** Adds the result of another run, or of the next case. */
   ReplayResult& operator+=(ReplayResult&& other);
 };
 
@@ -42,14 +43,15 @@ decision of an unknown digest differs.
 @param plan_digest the beginning of a candidate's digest, in hexadecimal: ReplayResult::shown has the decisions on such
 candidates. Empty: on none.
 @param names_files whether events are named with their log.
+@param shard which of the decisions, certified plans, withdrawals and proposals are judged.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
-[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
-                                  bool names_files);
+[[nodiscard]] CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, LogTasks& tasks,
+                                               const std::string& plan_digest, bool names_files, const Shard& shard);
 /** The same, with every decision under one task. */
-[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& task,
-                                  const std::string& plan_digest, bool names_files);
+[[nodiscard]] CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, const Config& task,
+                                               const std::string& plan_digest, bool names_files, const Shard& shard);
 [[nodiscard]] inline ReplayResult Replay(const std::vector<std::string>& logs, const Config& task) {
-  return Replay(logs, task, "", logs.size() > 1);
+  return Replay(logs, task, "", logs.size() > 1, {}).Sum();
 }
 
 /** Whether a decision depends on the moment and not on the plan, so that no replay can give it again. */

@@ -1,4 +1,4 @@
-/** Results of runs as FinishedRuns keeps them. */
+/** Results of runs as FinishedRuns and the files of shards keep them. */
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,16 +8,29 @@
 #include "records/event_log.h"
 #include "records/log_trust.h"
 #include "records/replay.h"
+#include "records/shard.h"
 
 namespace forereach {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Refusals, unsigned_ones, forged, replayed, foreign)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Refusals, unsigned_ones, forged, replayed, foreign, old, ahead)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PassedOver, not_authentic, undecodable)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LogDamage, places, bytes)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReplayResult, candidates, agreed, withdrawals, circumstances, corruptions,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReplayResult, candidates, agreed, withdrawals, proposals, circumstances, corruptions,
                                    passed_over, differences, shown)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WhyNot, outcome, cause, obstacle, step)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Comparison, candidates, certificates, circumstances, without_candidate, undecided,
                                    gained, lost, otherwise, refused_alike, lost_plans, corruptions, passed_over)
+
+template <class Result>
+void to_json(nlohmann::json& json, const CaseResults<Result>& results) {
+  json = {{"of_run", results.of_run}, {"cases", results.cases}, {"counts", results.counts}, {"told", results.told}};
+}
+template <class Result>
+void from_json(const nlohmann::json& json, CaseResults<Result>& results) {
+  json.at("of_run").get_to(results.of_run);
+  json.at("cases").get_to(results.cases);
+  json.at("counts").get_to(results.counts);
+  json.at("told").get_to(results.told);
+}
 
 }  // namespace forereach

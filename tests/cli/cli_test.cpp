@@ -526,7 +526,8 @@ TEST(Help, EveryExampleRuns) {
   for (const auto& entry : std::filesystem::directory_iterator(scratch / "run/log"))
     if (entry.path().extension() == ".lcmlog")
       std::filesystem::copy_file(entry.path(), scratch / "run/log/events-20260101-120000-000000.lcmlog");
-  for (const char* command : {"", "certify", "plan", "declare", "verify", "replay", "report", "keygen", "keys"})
+  for (const char* command :
+       {"", "certify", "plan", "declare", "verify", "replay", "merge", "report", "keygen", "keys"})
     run_all_of(command);
   EXPECT_GE(ran.size(), 10u);
 }

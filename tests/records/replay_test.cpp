@@ -13,6 +13,7 @@
 #include "records/event_log.h"
 #include "records/record_reader.h"
 #include "records/replay.h"
+#include "records/result_json.h"
 #include "tests/certifier/small_task.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
@@ -64,6 +65,19 @@ void ExpectAgreed(const std::string& path, const Config& config, int decisions) 
   EXPECT_THAT(result.differences, testing::IsEmpty());
 }
 
+// The result, which three shards find together, too.
+ReplayResult ReplayedInShards(const std::string& path, const Config& config) {
+  const auto of_shard = [&](int index) { return Replay({path}, config, "", false, {index, 3}); };
+  CaseResults<ReplayResult> joined = of_shard(1);
+  joined.Join(of_shard(2));
+  joined.Join(of_shard(0));
+  const ReplayResult sum = nlohmann::json(joined).get<CaseResults<ReplayResult>>().Sum();
+  ReplayResult whole = Replay({path}, config);
+  EXPECT_EQ(nlohmann::json(sum), nlohmann::json(whole));
+  EXPECT_EQ(sum.proposals, whole.proposals);
+  return whole;
+}
+
 class ReplayTest : public testing::Test {
  protected:
   // The path of a log that is not there yet.
@@ -100,7 +114,7 @@ TEST_F(ReplayTest, TheDecisionOnABatchIsThatOnItsCandidateAlone) {
   EXPECT_EQ(logged.Decide(batch(6, {})), 0) << "it is no batch";
   logged.Decide(Candidate(9), decision_t::CERTIFIED);
   ASSERT_TRUE(log.Flush());
-  const ReplayResult result = Replay({path}, config);
+  const ReplayResult result = ReplayedInShards(path, config);
   EXPECT_THAT(result.differences, testing::IsEmpty());
   EXPECT_EQ(result.agreed, 5);
   EXPECT_EQ(result.candidates, 5) << "a batch counts once";
@@ -164,7 +178,7 @@ class WithdrawnReplayTest : public ReplayTest {
     see({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.8)});
     send_due(kNow + PlanLedger::kRepeatUs);
     EXPECT_TRUE(log.Flush());
-    return Replay({path}, {config});
+    return ReplayedInShards(path, config);
   }
 
   int sent_ = 0;
@@ -219,7 +233,7 @@ class RepairedReplayTest : public ReplayTest {
     sent.plan_id = 2;
     gate.Decide(sent, decision_t::CERTIFIED);
     EXPECT_TRUE(log.Flush());
-    return Replay({path}, {config});
+    return ReplayedInShards(path, config);
   }
 };
 

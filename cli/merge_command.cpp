@@ -1,0 +1,199 @@
+#include <charconv>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/offline.h"
+#include "cli/shards.h"
+#include "lcmtypes/codec.h"
+#include "lcmtypes/printable.h"
+#include "records/finished_runs.h"
+#include "records/output_file.h"
+#include "task/config_error.h"
+#include "task/files.h"
+#include "task/json_text.h"
+
+namespace forereach {
+namespace {
+
+using PrintMerged = int (*)(const Shards&, bool json);
+const std::map<std::string, PrintMerged> kMerged = {
+    {"compare", PrintMergedComparison}, {"replay", PrintMergedReplay}, {"verify", PrintMergedVerification}};
+
+constexpr int kMostShards = 100'000;
+constexpr std::string_view kBeginning = "{\"command\":\"";  // of a shard's file
+
+// The file of one shard.
+struct ShardFile {
+  std::string path;
+  nlohmann::json document;
+
+  [[nodiscard]] const nlohmann::json& operator[](const char* key) const { return document.at(key); }
+  [[nodiscard]] int number() const { return (*this)["shard"].get<int>(); }
+  [[nodiscard]] int count() const { return (*this)["of"].get<int>(); }
+  [[nodiscard]] std::string Name() const { return fmt::format("shard {} of {}", number(), count()); }
+};
+
+[[noreturn]] void RefuseShard(const std::string& path, const std::string& why) { throw ConfigError(path + ": " + why); }
+
+std::string DigestOfDocument(const nlohmann::json& document) { return ToHex(DigestOf(JsonText(document))); }
+
+ShardFile ReadShard(const std::string& path) {
+  try {
+    ShardFile file{path, ParseJson(ReadWhole(path, kLargestJsonFile))};
+    const auto digest = file["digest"].get<std::string>();
+    file.document.erase("digest");
+    if (DigestOfDocument(file.document) != digest) RefuseShard(path, "is damaged: its digest is that of other content");
+    if (file["program"] != DigestOfProgram()) RefuseShard(path, "another version of this program wrote it");
+    if (file.number() < 1 || file.number() > file.count() || file.count() > kMostShards ||
+        file["results"].size() != file["runs"].size() || !kMerged.contains(file["command"].get<std::string>()))
+      RefuseShard(path, "no shard is such");
+    return file;
+  } catch (const nlohmann::json::exception& error) {
+    RefuseShard(path, std::string("not the file of a shard: it ") + DescribeJsonError(error));
+  }
+}
+
+// Whether two files are of one command.
+void RequireTogether(const ShardFile& first, const ShardFile& file) {
+  const auto refuse = [&](const std::string& how) { RefuseShard(file.path, how + " than " + first.path); };
+  if (file["command"] != first["command"]) refuse("is of another command");
+  if (file["job"] != first["job"] || file["config"] != first["config"])
+    refuse("was made with another task, key or option");
+  for (const char* key : {"runs", "is_many", "missing"})
+    if (file[key] != first[key]) refuse("is of other runs");
+  if (file.count() != first.count())
+    RefuseShard(file.path, fmt::format("is {}, and {} is one of {}", file.Name(), first.path, first.count()));
+}
+
+// In the order of their numbers.
+std::map<int, ShardFile> ReadAllShards(const std::vector<std::string>& paths) {
+  std::map<int, ShardFile> shards;
+  for (const std::string& path : paths) {
+    ShardFile file = ReadShard(path);
+    if (!shards.empty()) RequireTogether(shards.begin()->second, file);
+    const int number = file.number();
+    const auto [found, is_new] = shards.try_emplace(number, std::move(file));
+    if (!is_new) RefuseShard(path, fmt::format("is {}, and so is {}", found->second.Name(), found->second.path));
+  }
+  const int count = shards.begin()->second.count();
+  for (int number = 1; number <= count; ++number)
+    if (!shards.contains(number))
+      RefuseShard(shards.begin()->second.path, fmt::format("shard {} of {} is missing", number, count));
+  return shards;
+}
+
+struct MergeArguments {
+  std::vector<std::string> files;
+  bool json = false;
+};
+
+int Merge(const MergeArguments& options) {
+  const Shards shards(options.files);
+  return kMerged.at(shards.name())(shards, options.json);
+}
+
+}  // namespace
+
+void ShardOptions::AddTo(std::vector<Option>& options) {
+  options.push_back({.name = "--shard",
+                     .variable = &shard,
+                     .type = "I/N",
+                     .help = "Judge the part I of N of each run's cases, I from 1, and write what was found to --out; "
+                             "forereach merge makes one result of all N files",
+                     .needs = "--out",
+                     .excludes = "--json"});
+  options.push_back({.name = "--out",
+                     .variable = &out,
+                     .type = "FILE",
+                     .help = "The file of the shard; an older one is replaced",
+                     .needs = "--shard"});
+}
+
+Shard ShardOptions::Get() const {
+  if (!is_given()) return {};
+  int number = 0, count = 0;
+  const char* const end = shard.data() + shard.size();
+  const auto [slash, error] = std::from_chars(shard.data(), end, number);
+  const bool has_count = error == std::errc() && slash != end && *slash == '/' &&
+                         std::from_chars(slash + 1, end, count).ptr == end && slash + 1 != end;
+  if (!has_count || number < 1 || number > count || count > kMostShards)
+    throw ConfigError(fmt::format("--shard: {} is not I/N with whole numbers 1 <= I <= N <= {}, for example 2/7",
+                                  Printable(shard), kMostShards));
+  if (std::filesystem::exists(out) && ReadBeginning(out, kBeginning.size()) != kBeginning)
+    throw OutputError(out + ": is not the file of a shard, and is not replaced");
+  return {number - 1, count};
+}
+
+int WriteShard(const ShardOptions& options, const ShardedCommand& command, const NamedRuns& named,
+               const nlohmann::json& results) {
+  const Shard shard = options.Get();
+  nlohmann::json runs = nlohmann::json::array();
+  for (const RunLogs& run : named.runs)
+    runs.push_back({{"robot", run.robot}, {"name", NameOf(run)}, {"key", KeyOf(run, "")}});
+  nlohmann::json document{{"shard", shard.index + 1}, {"of", shard.count},        {"program", DigestOfProgram()},
+                          {"command", command.name},  {"job", command.job},       {"config", command.config},
+                          {"is_many", named.is_many}, {"missing", named.missing}, {"runs", std::move(runs)},
+                          {"results", results}};
+  if (ParseJson(JsonText(document)) != document)
+    throw OutputError(options.out + ": a name or text of the result is not UTF-8, which this file cannot hold");
+  document["digest"] = DigestOfDocument(document);
+  OutputFile file(options.out, OutputFile::Existing::kReplaced);
+  file.Write(JsonText(document) + "\n");
+  file.Close();
+  std::cout << "shard " << options.shard << " of " << command.name << " is written to " << Printable(options.out)
+            << std::endl;
+  return 0;
+}
+
+Shards::Shards(const std::vector<std::string>& files) {
+  for (auto& [number, file] : ReadAllShards(files)) {
+    try {
+      if (results_.empty()) {
+        command_ = {file["command"].get<std::string>(), file["job"].get<std::string>(),
+                    file["config"].get<std::string>()};
+        named_.is_many = file["is_many"].get<bool>();
+        file["missing"].get_to(named_.missing);
+        for (const nlohmann::json& run : file["runs"])
+          named_.runs.push_back({.robot = run.at("robot").get<std::string>(),
+                                 .logs = {run.at("name").get<std::string>()},
+                                 .database = {},
+                                 .missing = {}});
+      }
+    } catch (const nlohmann::json::exception&) {
+      RefuseResults(file.path);
+    }
+    results_.push_back({file.path, file["results"]});
+  }
+}
+
+void Shards::RefuseResults(const std::string& file) { RefuseShard(file, "has no results of this command"); }
+
+void Shards::RefuseRun(const std::string& file, std::size_t run) const {
+  RefuseShard(file, "found other cases or messages in " + NameOf(named_.runs[run]) + " than " + results_.front().file);
+}
+
+Command MergeCommand() {
+  const auto options = std::make_shared<MergeArguments>();
+  return {.name = kMerge.name,
+          .purpose = kMerge.purpose,
+          .footer =
+              "It prints what the command prints without --shard, byte for byte, with its exit code. The files "
+              "have to be all N, of\nthe same command, program, options, task, key and logs under the same "
+              "names.\n\n"
+              "Examples:\n  forereach replay run/log --shard 1/2 --out part1.json\n"
+              "  forereach replay run/log --shard 2/2 --out part2.json\n"
+              "  forereach merge part1.json part2.json",
+          .options = {Required({"files", &options->files, "FILE", "The files of all shards, in any order"}),
+                      JsonFlag(options->json)},
+          .run = [options] { return Merge(*options); }};
+}
+
+}  // namespace forereach
