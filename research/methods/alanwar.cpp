@@ -6,6 +6,7 @@
 
 #include <Eigen/QR>
 
+#include "forereach/sets/zonotope.h"
 #include "research/methods/covering.h"
 #include "research/methods/samples.h"
 

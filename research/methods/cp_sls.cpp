@@ -10,6 +10,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "forereach/sets/zonotope.h"
 #include "research/methods/samples.h"
 
 namespace forereach::research {

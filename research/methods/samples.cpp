@@ -1,5 +1,7 @@
 #include "research/methods/samples.h"
 
+#include "forereach/sets/zonotope.h"
+
 namespace forereach::research {
 
 Eigen::MatrixXd ObservedResiduals(const Observations& observations) {
