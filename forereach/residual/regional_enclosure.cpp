@@ -4,6 +4,7 @@
 
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
+#include "forereach/sets/zonotope.h"
 
 namespace forereach {
 namespace {
