@@ -16,6 +16,7 @@
 #include "task/config.h"
 #include "task/files.h"
 #include "task/json_text.h"
+#include "task/most_obstacles.h"
 #include "task/number.h"
 #include "worlds/commonroad.h"
 #include "worlds/geojson.h"
@@ -100,13 +101,13 @@ int RunImportWorld(const ImportWorldArguments& options) {
   const std::size_t all = world.pieces.size();
   if (region) world = Cropped(std::move(world), *region);
   const std::size_t count = world.pieces.size();
-  const bool fits = count <= kMaxObstacles;
+  const bool fits = count <= kMostObstacles;
   if (fits) WriteNewFile(options.out, TextOf(options, world), options.force);
   if (options.json) {
     std::cout << JsonText(nlohmann::json{{"format", format},
                                          {"pieces", all},
                                          {"obstacles", count},
-                                         {"most", kMaxObstacles},
+                                         {"most", kMostObstacles},
                                          {"notes", world.notes},
                                          {"out", fits ? nlohmann::json(options.out) : nlohmann::json(nullptr)}})
               << std::endl;
@@ -120,7 +121,7 @@ int RunImportWorld(const ImportWorldArguments& options) {
         "forereach: {} obstacles, and a task takes {}: nothing is written. --task or --region keeps what lies where "
         "the "
         "robot drives; {} makes fewer and larger pieces.\n",
-        count, kMaxObstacles,
+        count, kMostObstacles,
         format == "ros"          ? "--coarsen"
         : format == "commonroad" ? "--thickness or --steps-per-window"
                                  : "a simpler drawing");

@@ -17,6 +17,7 @@
 #include "forereach/residual/region_grid.h"
 #include "forereach/safety/clearance.h"
 #include "task/key_rows.h"
+#include "task/most_obstacles.h"
 #include "task/number.h"
 #include "task/option_rows.h"
 #include "task/row_readers.h"
@@ -26,8 +27,6 @@ namespace forereach::key_rows {
 namespace {
 
 using Size = Key::Size;
-
-constexpr int kMostObstacles = 4096;  // of a file; a message has at most kMaxObstacles
 
 constexpr Range kWithinDecades = Between(-1e9, 1e9);  // in microseconds within the bounds of a schedule
 

@@ -5,6 +5,7 @@
 
 #include "forereach/numerics/limits.h"
 #include "task/config.h"
+#include "task/most_obstacles.h"
 #include "tests/cli/program.h"
 
 namespace forereach::import_world_test {
@@ -65,12 +66,12 @@ TEST_F(ImportWorldTest, WritesAPartOfATaskFile) {
 }
 
 TEST_F(ImportWorldTest, MoreThanATaskTakesAreNotWritten) {
-  std::string image = fmt::format("P2 {} 3 255\n", 2 * kMaxObstacles + 2);
-  for (int i = 0; i < 3 * (2 * kMaxObstacles + 2); ++i) image += i % 2 == 0 ? "0 " : "254 ";
+  std::string image = fmt::format("P2 {} 3 255\n", 2 * kMostObstacles + 2);
+  for (int i = 0; i < 3 * (2 * kMostObstacles + 2); ++i) image += i % 2 == 0 ? "0 " : "254 ";
   scratch_.Write("map.pgm", image);
   EXPECT_THAT(
       ImportWorld(scratch_ / "map.yaml" + " --unknown free"),
-      Exits(1, fmt::format("{} obstacles, and a task takes {}: nothing is written", kMaxObstacles + 1, kMaxObstacles),
+      Exits(1, fmt::format("{} obstacles, and a task takes {}: nothing is written", kMostObstacles + 1, kMostObstacles),
             "--task or --region", "--coarsen"));
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "out.yaml"));
   EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --unknown free --region 0,0,9,9"), Exits(0));
