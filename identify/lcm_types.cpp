@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::int64_t kLargestTypeFile = kMegabyte;
 constexpr std::size_t kDeepestType = 32;
+constexpr int kMostHashed = 1 << 16;  // structs in one another, each counted as often as it is used
 
 struct Primitive {
   std::string_view name;
@@ -275,8 +276,11 @@ std::string LcmTypes::Resolved(const std::string& type, const std::string& user)
   throw ConfigError("type " + user + " uses " + type + ", which no given .lcm file defines");
 }
 
-std::uint64_t LcmTypes::HashOf(const std::string& type, std::vector<std::string> outer) const {
+std::uint64_t LcmTypes::HashOf(const std::string& type, std::vector<std::string>& outer, int& hashed) const {
   if (std::ranges::find(outer, type) != outer.end()) return 0;
+  if (outer.size() > kDeepestType || ++hashed > kMostHashed)
+    throw ConfigError(fmt::format("type {} nests too much: more than {} types in one another, or {} in all",
+                                  outer.empty() ? type : outer.front(), kDeepestType, kMostHashed));
   std::int64_t own = 0x12345678;
   for (const Member& member : structs_.at(type).members) {
     own = Updated(own, member.name);
@@ -290,13 +294,18 @@ std::uint64_t LcmTypes::HashOf(const std::string& type, std::vector<std::string>
   outer.push_back(type);
   auto hash = static_cast<std::uint64_t>(own);
   for (const Member& member : structs_.at(type).members)
-    if (!PrimitiveOf(member.type)) hash += HashOf(Resolved(member.type, type), outer);
+    if (!PrimitiveOf(member.type)) hash += HashOf(Resolved(member.type, type), outer, hashed);
+  outer.pop_back();
   return std::rotl(hash, 1);
 }
 
 std::optional<std::string> LcmTypes::TypeOf(Bytes message) const {
   if (by_fingerprint_.empty())
-    for (const auto& [name, type] : structs_) by_fingerprint_.emplace(HashOf(name, {}), name);
+    for (const auto& [name, type] : structs_) {
+      std::vector<std::string> outer;
+      int hashed = 0;
+      by_fingerprint_.emplace(HashOf(name, outer, hashed), name);
+    }
   if (message.size() < 8) return std::nullopt;
   const auto found = by_fingerprint_.find(BigEndian(message.first(8)));
   return found == by_fingerprint_.end() ? std::nullopt : std::optional(found->second);

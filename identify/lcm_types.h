@@ -18,7 +18,8 @@ class LcmTypes final {
   /** The same of a text. */
   void AddText(const std::string& path, const std::string& text);
 
-  /** The name of the type with the fingerprint that a message begins with; none if no type has it. */
+  /** The name of the type with the fingerprint that a message begins with; none if no type has it.
+  @throws ConfigError if a type is incomplete, or nests more types than a fingerprint is computed of. */
   [[nodiscard]] std::optional<std::string> TypeOf(Bytes message) const;
 
   /** The numbers at these places of a message, such as "pose.position[0]"; NaN where an array is shorter. A boolean is
@@ -47,7 +48,7 @@ class LcmTypes final {
   class Parser;
   class Walker;
 
-  [[nodiscard]] std::uint64_t HashOf(const std::string& type, std::vector<std::string> outer) const;
+  [[nodiscard]] std::uint64_t HashOf(const std::string& type, std::vector<std::string>& outer, int& hashed) const;
   [[nodiscard]] std::string Resolved(const std::string& type, const std::string& user) const;
 
   std::map<std::string, Struct> structs_;  // by package.name

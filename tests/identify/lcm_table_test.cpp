@@ -3,6 +3,8 @@
 
 #include "tests/test.h"
 
+#include <fmt/format.h>
+
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "records/event_log.h"
@@ -85,6 +87,24 @@ TEST_F(LcmTableTest, LengthsInMessagesAreBounded) {
   EXPECT_FALSE(read({0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 0})) << "a string longer than the message";
   EXPECT_FALSE(read({0, 0, 0, 0})) << "cut off";
   EXPECT_FALSE(types.Read("p.a", {}, {}));
+}
+
+// Two of the next type in each: 2^24 in all. And each in the next.
+TEST_F(LcmTableTest, TypesThatNestTooMuchAreRefused) {
+  const auto why = [](int count, int copies) {
+    std::string text;
+    for (int i = 0; i < count; ++i) {
+      text += fmt::format("struct t{} {{", i);
+      for (int copy = 0; copy < copies; ++copy) text += fmt::format(" t{} m{};", i + 1, copy);
+      text += " }\n";
+    }
+    LcmTypes types;
+    types.AddText("a.lcm", text + fmt::format("struct t{} {{ int8_t x; }}\n", count));
+    return Thrown<ConfigError>([&] { static_cast<void>(types.TypeOf(Encode(robot_state_t{}))); });
+  };
+  EXPECT_THAT(why(24, 2), HasSubstr("type t0 nests too much"));
+  EXPECT_THAT(why(20'000, 1), HasSubstr("type t0 nests too much"));
+  EXPECT_EQ(why(31, 1), "");
 }
 
 TEST_F(LcmTableTest, WhatIsNoTypeIsRefusedWithItsLine) {
