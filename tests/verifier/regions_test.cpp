@@ -5,6 +5,7 @@
 #include "forereach/residual/region_grid.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/traced_random.h"
+#include "tests/verifier/is_confirmed.h"
 #include "tests/verifier/record.h"
 #include "verifier/ways.h"
 
@@ -28,10 +29,7 @@ TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotD
     if (decision.outcome != Outcome::kCertified) continue;
     ++certified;
     const Certificate certificate = CertificateOf(certifier, query.plan(), query.initial_set, query.obstacles, tube);
-    const Verdict verdict = judge.Verify(certificate);
-    EXPECT_EQ(verdict.status, Status::kConfirmed)
-        << "step " << verdict.failure.step << ": " << verdict.failure.what << ": " << verdict.failure.found << ", "
-        << verdict.failure.bound << ", excess " << verdict.failure.excess;
+    EXPECT_TRUE(IsConfirmed(judge.Verify(certificate)));
     Certificate narrower = certificate;
     RecordedSlice& last = narrower.slices.back();
     Eigen::Index widest = 0;

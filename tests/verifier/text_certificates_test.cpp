@@ -4,6 +4,7 @@
 #include "forereach/dynamics/text_model.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
+#include "tests/verifier/is_confirmed.h"
 #include "tests/verifier/record.h"
 #include "tests/worlds.h"
 
@@ -40,10 +41,7 @@ void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorX
       if (certifier.Certify(plan, initial, {}, tube).outcome != Outcome::kCertified) continue;
       ++certified;
       const Certificate certificate = CertificateOf(certifier, plan, initial, {}, tube);
-      const Verdict verdict = judge.Verify(certificate);
-      EXPECT_EQ(verdict.status, Status::kConfirmed)
-          << "step " << verdict.failure.step << ": " << verdict.failure.what << ": " << verdict.failure.found << ", "
-          << verdict.failure.bound << ", excess " << verdict.failure.excess;
+      EXPECT_TRUE(IsConfirmed(judge.Verify(certificate)));
       Certificate smaller = certificate;  // the last hull, a hair too narrow
       smaller.slices.back().upper[0] -= 1e-6;
       EXPECT_EQ(judge.Verify(smaller).status, Status::kRefuted);
