@@ -309,20 +309,30 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
 // As many as one message has room for.
 void PlannerNode::SendNext(std::int64_t now_us) {
   std::deque<Proposal>& found = round_->found;
-  const bool is_one = found.size() == 1;
+  if (found.size() == 1) {
+    static_cast<void>(SendOne(found.front(), AsksForRepairs(), now_us));
+    return found.clear();
+  }
   candidate_batch_t batch{};
   std::vector<candidate_plan_t> sent;
   while (!found.empty()) {
     candidate_plan_t candidate = MakeCandidate(found.front(), *round_, now_us);
     candidate.repair = AsksForRepairs() ? 1 : 0;
-    if (!is_one && !Append(batch, candidate)) break;
+    if (!Append(batch, candidate)) break;
     sent.push_back(candidate);
     ++next_plan_id_;
     found.pop_front();
   }
-  const bool is_sent =
-      is_one ? sender_.Send(config_.bus.candidate, sent.front()) : sender_.Send(config_.bus.candidate, batch);
-  if (is_sent) Await(sent);
+  if (sender_.Send(config_.bus.candidate, batch)) Await(sent);
+}
+
+bool PlannerNode::SendOne(const Proposal& proposal, bool asks_for_repair, std::int64_t now_us) {
+  candidate_plan_t candidate = MakeCandidate(proposal, *round_, now_us);
+  candidate.repair = asks_for_repair ? 1 : 0;
+  ++next_plan_id_;
+  if (!sender_.Send(config_.bus.candidate, candidate)) return false;
+  Await({&candidate, 1});
+  return true;
 }
 
 void PlannerNode::Await(std::span<const candidate_plan_t> sent) {
@@ -339,10 +349,7 @@ bool PlannerNode::SendRepair(std::int64_t now_us) {
   const candidate_plan_t& plan = repair->proposal;
   const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> controls(
       plan.control[0], plan.num_inputs, plan.num_steps, Eigen::OuterStride<>(kMaxInputs));
-  const candidate_plan_t candidate = MakeCandidate({controls, plan.progress_steps, {}}, *round_, now_us);
-  ++next_plan_id_;
-  if (!sender_.Send(config_.bus.candidate, candidate)) return false;
-  Await({&candidate, 1});
+  if (!SendOne({controls, plan.progress_steps, {}}, false, now_us)) return false;
   ++repairs_;
   return true;
 }

@@ -143,6 +143,7 @@ class PlannerNode final : public Node {
   void SearchOnce(std::int64_t now_us);
   [[nodiscard]] bool SendRepair(std::int64_t now_us);
   [[nodiscard]] bool AsksForRepairs() const;
+  [[nodiscard]] bool SendOne(const Proposal& proposal, bool asks_for_repair, std::int64_t now_us);
   void Await(std::span<const candidate_plan_t> sent);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
   [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
