@@ -63,10 +63,12 @@ Zonotope InitialSetOf(const candidate_plan_t& candidate) {
 std::int64_t StartOf(Bytes candidate) {
   // After the fingerprint, utime, sequence, plan_id and source, of a batch, too.
   constexpr std::size_t kStartsAt = 4 * sizeof(std::int64_t) + sizeof candidate_plan_t::source;
-  const auto is = [&]<class Message>(const Message&) {
-    return candidate.size() == EncodedSize<Message>() && FromBigEndian<std::int64_t>(candidate) == Message::getHash();
+  const auto is = [&](std::size_t size, std::int64_t hash) {
+    return candidate.size() == size && FromBigEndian<std::int64_t>(candidate) == hash;
   };
-  if (!is(candidate_plan_t{}) && !is(candidate_batch_t{})) return INT64_MAX;
+  if (!is(EncodedSize<candidate_plan_t>(), candidate_plan_t::getHash()) &&
+      !is(EncodedSize<candidate_batch_t>(), candidate_batch_t::getHash()))
+    return INT64_MAX;
   return FromBigEndian<std::int64_t>(candidate.subspan(kStartsAt));
 }
 
