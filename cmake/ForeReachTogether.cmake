@@ -29,7 +29,7 @@ function(forereach_batches target directory)
   endif()
   set(at_once 12)
   if(folder MATCHES "^tests")
-    set(at_once 5)  # many programs are built by both cores at the end
+    set(at_once 8)  # many programs are built by both cores at the end
   endif()
   set(alone "")
   set(content "")
