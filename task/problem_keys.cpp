@@ -251,7 +251,8 @@ std::vector<Key> DeclarationKeys() {
       Optional(
           Map("declaration.affine",
               "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
-              "domain. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at most that; errors of the "
+              "domain. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at most that; errors of "
+              "the "
               "column (`state_error`, `input_error`) count by it, and need it.",
               ReadAffine),
           "none"),

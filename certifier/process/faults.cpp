@@ -49,7 +49,8 @@ FoundFault DeclarationFalsified(const Violation& violation, const AffineRows& af
         "the executed transition {} contradicts the declaration: no affine residual {} agrees with it, observation {} "
         "and a few others; {}",
         second, coordinate, first,
-        bound > 0 ? fmt::format("one slope is {}, not {}", difference, bound) : fmt::format("one is {} off", difference));
+        bound > 0 ? fmt::format("one slope is {}, not {}", difference, bound)
+                  : fmt::format("one is {} off", difference));
   else
     why = fmt::format(
         "the executed transition {} contradicts the declaration: with observation {} its residual {} differs by {}, "

@@ -35,7 +35,7 @@ FOREREACH_INLINE void SubtractFromLast(const double* column, Zonotope& image, Im
   const std::size_t n = ToSize(image.dim()), last = ToSize(image.num_generators()) - 1;
   Lanes column_sum = AllLanes(0), largest = AllLanes(0);
   for (std::size_t k = 0; k < n; k += kLaneCount) {
-    const auto at = [&](std::size_t i) __attribute__((always_inline)) -> double& {
+    const auto at = [&](std::size_t i) __attribute__((always_inline))->double& {
       return image.mutable_row(static_cast<int>(std::min(k + i, n - 1)))[last];
     };
     const Lanes entries{at(0), at(1), at(2), at(3)};

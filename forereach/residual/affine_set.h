@@ -106,7 +106,7 @@ class AffineSet final {
   void Forget();
 
   std::vector<int> columns_;
-  std::size_t size_;  // q
+  std::size_t size_;                                    // q
   std::array<double, AffineRows::kMaxColumns> most_{};  // of each column; 0: nothing is declared
   std::vector<double> domain_lower_, domain_upper_;
   std::vector<double> phi_, lower_, upper_;  // q, one and one entries for each observation

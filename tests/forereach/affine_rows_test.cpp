@@ -200,7 +200,9 @@ TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.lipschitz(2, 0) = 0.1; }),
               HasSubstr("affine: row 2, variable 0: bounded by lipschitz, and no column"));
   EXPECT_EQ(refusal([](Problem& p) { p.declaration.state_error = Vec({1e-3, 0, 0, 0}); }), "") << "no column";
-  EXPECT_THAT(refusal([](Problem& p) { p.declaration.state_error = Vec({0, 0, 1e-3, 0}); }),
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.declaration.state_error = Vec({0, 0, 1e-3, 0});
+              }),
               HasSubstr("affine: row 2, variable 2: recorded with an error"));
   EXPECT_THAT(refusal([](Problem& p) {
                 p.declaration.state_error = Vec({0, 0, 1e-3, 0});

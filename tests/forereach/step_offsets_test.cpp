@@ -222,8 +222,8 @@ TEST(StepOffsets, AddUpOnlyWhereNothingSaysHowTheyAreRelated) {
   for (const int t : {1, 2, 8}) EXPECT_NEAR(half_width(t, 0), (2 * t - 1) * 2 * 0x1p-6, 1e-11) << t;
 }
 
-// Where a declaration is false, a motion leaves the slice, and the guard sees that: x is off by a residual of 1/16 at dt
-// that grows with the square of the duration, and no faster; software sets v, and time does not move it on.
+// Where a declaration is false, a motion leaves the slice, and the guard sees that: x is off by a residual of 1/16 at
+// dt that grows with the square of the duration, and no faster; software sets v, and time does not move it on.
 TEST(StepOffsets, WhatMovesFasterThanDeclaredLeavesTheSlice) {
   Problem problem = WorldOf(Cart(), Within(Vec({99, 9})), Within(Vec({1})));
   problem.projection = Eigen::MatrixXd::Identity(1, 2);

@@ -2,12 +2,12 @@
 
 A trial makes one random problem (problems.h, any_surroundings.h) and plans of it, and places obstacles that the
 certifier just accepts. In some, steps are disturbed, and off their times; in some, the transitions are
-recorded with errors, by which the inputs that act are off the plan's, too; often by all that is declared. Under each certificate it follows admissible residuals from sample
-to sample: none leaves its slice. Between two
-samples it follows motions whose second derivatives are piecewise constant, within the declared bounds and often equal
-to them, and that keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A
-contact is a broken promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what
-it says still stands is followed in the same way. */
+recorded with errors, by which the inputs that act are off the plan's, too; often by all that is declared. Under each
+certificate it follows admissible residuals from sample to sample: none leaves its slice. Between two samples it follows
+motions whose second derivatives are piecewise constant, within the declared bounds and often equal to them, and that
+keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A contact is a broken
+promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what it says still stands
+is followed in the same way. */
 #pragma once
 
 #include <algorithm>
@@ -56,9 +56,9 @@ struct Tally {
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
     text << problems << " problems, " << plans << " plans, " << certified << " certified (" << shifted
-         << " with steps off their times, " << recorded << " from records with errors, " << all_at_once << " with both and disturbed), " << withdrawn
-         << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly
-         << " of them decided in 256 bits";
+         << " with steps off their times, " << recorded << " from records with errors, " << all_at_once
+         << " with both and disturbed), " << withdrawn << " withdrawn in part; " << motions << " motions, " << moments
+         << " moments, " << decided_exactly << " of them decided in 256 bits";
     return text.str();
   }
 };
@@ -358,8 +358,7 @@ class MotionTrial {
     Real offset;
     for (int t = 0; t < standing; ++t) {
       std::vector<Real> z = x, most;
-      for (int l = 0; l < query.controls.rows(); ++l)
-        z.push_back(ActedInput(winds_, *told_, l, query.controls(l, t)));
+      for (int l = 0; l < query.controls.rows(); ++l) z.push_back(ActedInput(winds_, *told_, l, query.controls(l, t)));
       std::vector<Real> unexpected = AnyDisturbance(winds_, problem, z);
       for (std::size_t k = 0; k < unexpected.size(); ++k) {
         const Real r = residual(z, static_cast<int>(k));
