@@ -91,6 +91,7 @@ void AffineRowsEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds)
 
 Declaration WithoutAffineRows(Declaration declaration) {
   for (const int k : declaration.affine.rows) declaration.lipschitz.row(k).setZero();
+  declaration.affine = {};
   return declaration;
 }
 
