@@ -106,13 +106,13 @@ void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
 void AddObstacles(const Config& config, std::vector<Hypothesis>& all) {
   const GateOptions& gate = config.gate;
   if (gate.obstacles != ObstaclesSource::kBus) {
-    all.push_back({"no obstacle is there but those of the task", "declared"});
+    all.push_back({"no obstacle is there but those of the task, and they move as it says", "declared"});
     return;
   }
   std::string lost = "never withdrawn";
   if (gate.obstacles_lost_ms && *gate.obstacles_lost_ms != kNeverLost)
     lost = fmt::format("withdrawn after {} ms", ToText(*gate.obstacles_lost_ms));
-  all.push_back({"every obstacle is in the task or in the last message of perception",
+  all.push_back({"every obstacle is in the task or in the last message of perception, and moves as these say",
                  fmt::format("perception; after {} ms without it nothing is certified, and plans under way are {}",
                              ToText(gate.obstacles_timeout_ms), lost)});
 }
@@ -164,6 +164,7 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
   if (declaration.IsDisturbed())
     all.push_back({"each step is disturbed by at most " + Disturbances(model.state_names(), declaration),
                    "declared; transitions refute it likewise"});
+  if (problem.body != Body()) all.push_back({"the robot lies within the parts of task.body", "declared"});
   if (problem.between)
     all.push_back(
         {"between two samples the motion keeps the bounds of task.between",

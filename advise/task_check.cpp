@@ -422,10 +422,13 @@ class Examination final {
     if (problem_.declaration.affine.Contains(violation.coordinate))
       return Add(
           "declaration.affine",
-          fmt::format("{}: no affine residual agrees with a few lines of {}, {} and {} among them: one is {} off "
-                      "what the others allow. The declaration is false, and nothing can be certified",
+          fmt::format("{}: no affine residual agrees with a few lines of {}, {} and {} among them: {}. The declaration "
+                      "is false, and nothing can be certified",
                       name, result_.data, FileLine(violation.first), FileLine(violation.second),
-                      Down(violation.difference)),
+                      violation.bound > 0
+                          ? fmt::format("one of its slopes is {} at least, declaration.lipschitz says {} at most",
+                                        Down(violation.difference), ToText(violation.bound))
+                          : fmt::format("one is {} off what the others allow", Down(violation.difference))),
           "look at these lines, and whether model.dt is the step of the data. If they are right, bound this row "
           "by declaration.lipschitz, or declare more noise_bound");
     const auto z = [&](int i) { return problem_.transitions.z.row(i); };

@@ -132,12 +132,15 @@ Config Load(Document file, TransitionsFile transitions, const NamedFiles& instea
   file.Read(draft);
   FillStanding(draft);
   auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
-  if (!problem.declaration.affine.rows.empty() && problem.declaration.HasErrorInZ())
-    file.Fail(
-        "declaration.affine",
-        "with state_error or input_error: what these make of the residual follows from lipschitz alone. Leave them "
-        "out, or zero, or declare these rows by lipschitz");
   const NominalModel& model = *problem.model;
+  for (const int k : problem.declaration.affine.rows)
+    for (const int l : problem.declaration.affine.columns)
+      if (problem.declaration.lipschitz(k, l) == 0 && problem.declaration.VariableError(l) > 0)
+        file.Fail("declaration.affine",
+                  fmt::format("{} is known up to an error (state_error, input_error), which the unknown slope of {} "
+                              "multiplies: declare a bound on that slope as declaration.lipschitz.{}.{}",
+                              model.variable_names()[ToSize(l)], model.state_names()[ToSize(k)],
+                              model.state_names()[ToSize(k)], model.variable_names()[ToSize(l)]));
   if (!instead.transitions.empty()) transitions_path = instead.transitions;
   if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;
   if (transitions == TransitionsFile::kRead) {

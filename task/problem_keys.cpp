@@ -169,14 +169,17 @@ void ReadAffine(const Field& at, TaskDraft& draft) {
   Declaration& declaration = draft.problem.declaration;
   for (const std::string& name : at["rows"].Names()) {
     const int k = IndexOf(draft.scope.states, name);
-    if (!declaration.lipschitz.row(k).isZero(0))
-      at["rows"].Fail("names " + name + ", which declaration.lipschitz bounds, too: one of the two bounds a row");
     declaration.affine.rows.push_back(k);
   }
   for (const std::string& name : at["columns"].Names())
     declaration.affine.columns.push_back(IndexOf(draft.scope.variables, name));
   std::ranges::sort(declaration.affine.rows);
   std::ranges::sort(declaration.affine.columns);
+  for (const int k : declaration.affine.rows)
+    for (int l = 0; l < std::ssize(draft.scope.variables); ++l)
+      if (declaration.lipschitz(k, l) != 0 && !std::ranges::binary_search(declaration.affine.columns, l))
+        at["columns"].Fail(fmt::format("leaves {} out, by which declaration.lipschitz says that the affine {} changes",
+                                       draft.scope.variables[ToSize(l)], draft.scope.states[ToSize(k)]));
 }
 
 // Rows as those of declaration.lipschitz; L in the others.
@@ -248,7 +251,9 @@ std::vector<Key> DeclarationKeys() {
       Optional(
           Map("declaration.affine",
               "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
-              "domain. Data bound M and b; L has no entries there. For records without errors of states and inputs.",
+              "domain. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at most that; errors of "
+              "the "
+              "column (`state_error`, `input_error`) count by it, and need it.",
               ReadAffine),
           "none"),
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),

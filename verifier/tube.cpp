@@ -691,6 +691,11 @@ std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& aff
     if (row->IsAmbiguous())
       return Failure{0, "the slopes of the affine residual of " + name + " are known to the last bit", "a tie", "",
                      false};
+    for (std::size_t j = 0; j < affine.columns.size(); ++j)
+      if (const double most = problem_.declaration.lipschitz(k, affine.columns[j]);
+          most > 0 && CertainlyBelow(Real(most), abs(Real(row->slopes()[j])) - row->reach()[j]))
+        return Failure{0, "the slopes of the affine residual of " + name + " are at most what is declared",
+                       Real(row->slopes()[j]).text(), "at most " + Real(most).text()};
     affine.rows[ToSize(k)] = std::move(row);
   }
   return std::nullopt;

@@ -320,7 +320,7 @@ void CertifierNode::Learn(Bytes transition) {
   if (was_falsified || !violation) return;
   if (!contradictions_.ContradictInForce())
     contradictions_.Add({gate_->grounds().model, gate_->certifier().Contradiction()});
-  Fail(DeclarationFalsified(*violation));
+  Fail(DeclarationFalsified(*violation, gate_->certifier().problem().declaration.affine));
   latch_.Store();  // also where another fault stays
 }
 

@@ -36,18 +36,27 @@ FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger) {
   return found;
 }
 
-FoundFault DeclarationFalsified(const Violation& violation) {
+FoundFault DeclarationFalsified(const Violation& violation, const AffineRows& affine) {
   const auto& [first, second, coordinate, difference, bound] = violation;
-  FoundFault found = PlainFault(
-      fault_t::DECLARATION_FALSIFIED,
-      second < 0
-          ? fmt::format(
-                "the executed transition {} contradicts a declared rate: state coordinate {} changes by at least "
-                "{} a second, {} is declared",
-                first, coordinate, difference, bound)
-          : fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} "
-                        "differs by {}, the declaration allows {}",
-                        second, first, coordinate, difference, bound));
+  std::string why;
+  if (second < 0)
+    why = fmt::format(
+        "the executed transition {} contradicts a declared rate: state coordinate {} changes by at least {} a second, "
+        "{} is declared",
+        first, coordinate, difference, bound);
+  else if (affine.Contains(coordinate))
+    why = fmt::format(
+        "the executed transition {} contradicts the declaration: no affine residual {} agrees with it, observation {} "
+        "and a few others; {}",
+        second, coordinate, first,
+        bound > 0 ? fmt::format("one slope is {}, not {}", difference, bound)
+                  : fmt::format("one is {} off", difference));
+  else
+    why = fmt::format(
+        "the executed transition {} contradicts the declaration: with observation {} its residual {} differs by {}, "
+        "the declaration allows {}",
+        second, first, coordinate, difference, bound);
+  FoundFault found = PlainFault(fault_t::DECLARATION_FALSIFIED, std::move(why));
   found.fault.coordinate = static_cast<std::int16_t>(coordinate);
   found.fault.first_observation = first;
   found.fault.second_observation = second;

@@ -23,8 +23,8 @@ struct FoundFault {
 [[nodiscard]] FoundFault SliceLeft(const PlanLedger::Departure& departure);
 /** UNCERTIFIED_PLAN: the robot executes what no certifier has issued. */
 [[nodiscard]] FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger);
-/** DECLARATION_FALSIFIED: an executed transition, the second observation of the pair, contradicts the declaration; or,
-without a second one, the first contradicts a declared rate. */
-[[nodiscard]] FoundFault DeclarationFalsified(const Violation& violation);
+/** DECLARATION_FALSIFIED: an executed transition, the second observation of the pair, contradicts the declaration; in
+an affine row (AsViolation) with a few others; or, without a second one, the first contradicts a declared rate. */
+[[nodiscard]] FoundFault DeclarationFalsified(const Violation& violation, const AffineRows& affine);
 
 }  // namespace forereach

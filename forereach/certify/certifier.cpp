@@ -70,7 +70,7 @@ ObservationStore MakeStore(const Problem& problem, const Observations& observati
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
   options.envelope.instructions = problem.instructions;
   const auto make = [&](const Observations& known) {
-    return ObservationStore(problem.declaration, known, corners.first, corners.second, options);
+    return ObservationStore(WithoutAffineRows(problem.declaration), known, corners.first, corners.second, options);
   };
   if (problem.declaration.affine.rows.empty()) return make(observations);
   return make(WithoutAffineRows(problem.declaration, observations));

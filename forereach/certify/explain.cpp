@@ -46,7 +46,11 @@ std::string ExplainFalsified(const Decision& decision, const Problem& problem) {
   if (problem.declaration.affine.Contains(decision.coordinate) && decision.first_observation >= 0)
     return "abstain F: no affine residual of " + coordinate + " agrees with a few observations, " +
            std::to_string(decision.first_observation) + " and " + std::to_string(decision.second_observation) +
-           " among them: one is " + RoundedDown(decision.margin) + " off what the others allow";
+           " among them: " +
+           (decision.threshold > 0
+                ? "one of its slopes is " + RoundedDown(decision.margin) + " at least, declaration.lipschitz says " +
+                      ToText(decision.threshold) + " at most"
+                : "one is " + RoundedDown(decision.margin) + " off what the others allow");
   if (decision.first_observation < 0)
     return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
            " agrees with all observations and the declaration";

@@ -19,6 +19,8 @@ namespace {
 
 // Above the rounding of the sums and products below, that of the image's slack included: docs/soundness.md, 3.15.
 constexpr double kOffsetRelative = 0x1p-43, kOffsetSmallest = 0x1p-1000;
+// Of the sum of a row: above the rounding of that sum, from which one entry is taken and put back.
+constexpr double kSumRelative = 0x1p-46;
 
 // sum_l |slope_kl| r_l where the residual's bounds have a slope: what they leave out.
 [[gnu::noinline]] void AddSlopes(const StepSoFar& step, std::array<double, kMaxStates>& most) noexcept {
@@ -28,34 +30,24 @@ constexpr double kOffsetRelative = 0x1p-43, kOffsetSmallest = 0x1p-1000;
                               MulUp(std::abs(step.residual.slope[ToSize(k)][ToSize(l)]), step.half_width[ToSize(l)]));
 }
 
-// One pass over an image and the slice that it is of. Sets away[k] to sum_j |image_kj - slice_kj| in plain arithmetic.
-// Unless the step is the first, subtracts `column` from the last generator, and sets the image's sums anew.
-FOREREACH_INLINE void Compare(const Zonotope& slice, const double* column, bool is_first, Zonotope& image,
-                              ImageSums& sums, double* away) {
-  const auto count = ToSize(image.num_generators());
-  const std::size_t size = image.padded_size(), block = size - std::min(size, kLaneCount), last = count - block - 1;
-  const LaneMask is_last = AtLane(last);
+// Subtracts `column` from the last generator of an image, and sets its sums anew: docs/soundness.md, 3.15.
+FOREREACH_INLINE void SubtractFromLast(const double* column, Zonotope& image, ImageSums& sums) {
+  const std::size_t n = ToSize(image.dim()), last = ToSize(image.num_generators()) - 1;
   Lanes column_sum = AllLanes(0), largest = AllLanes(0);
-  for (int k = 0; k < image.dim(); ++k) {
-    double* const row = image.mutable_row(k);
-    const double* const before = slice.padded_row(k).data();
-    Lanes difference = AllLanes(0), sum = AllLanes(0), four = AllLanes(0);
-    for (std::size_t j = 0; j < size; j += kLaneCount) {
-      sum += Abs(four);
-      four = LoadLanes(row + j);
-      difference += Abs(four - LoadLanes(before + j));
-    }
-    away[k] = Sum(difference);
-    if (is_first) continue;
-    four = is_last ? four - AllLanes(column[k]) : four;
-    StoreLanes(four, row + block);
-    const Lanes absolute = Abs(four);
-    sums.row[ToSize(k)] = Sum(sum + absolute);
-    image.mutable_slack(k) += 2 * kUnitRoundoff * absolute[last];
-    column_sum += absolute;
-    largest = Max(largest, absolute);
+  for (std::size_t k = 0; k < n; k += kLaneCount) {
+    const auto at = [&](std::size_t i) __attribute__((always_inline))->double& {
+      return image.mutable_row(static_cast<int>(std::min(k + i, n - 1)))[last];
+    };
+    const Lanes entries{at(0), at(1), at(2), at(3)};
+    const Lanes moved = FirstLanes(entries - LoadLanes(column + k), n - k, 0), after = Abs(moved);
+    const Lanes sum = LoadLanes(&sums.row[k]);
+    StoreLanes(((sum - Abs(entries)) + after) + AllLanes(kSumRelative) * sum, &sums.row[k]);
+    StoreLanes(LoadLanes(image.slacks() + k) + AllLanes(2 * kUnitRoundoff) * after, image.mutable_slacks() + k);
+    column_sum += after;
+    largest = Max(largest, after);
+    for (std::size_t i = 0; i < std::min(kLaneCount, n - k); ++i) at(i) = moved[i];
   }
-  if (!is_first) sums.scores.Rewrite(block, count, column_sum, largest);
+  sums.scores.Rewrite(last, Sum(column_sum), std::max({largest[0], largest[1], largest[2], largest[3]}));
 }
 
 }  // namespace
@@ -98,7 +90,7 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing)
             "one duration only");
     growth_once_[i] = rate->Growth(share);
     growth_twice_[i] = rate->Growth(MulUp(2, share));
-    if (rate->IsProportional(k)) {
+    if (rate->IsProportional(k) && AddSlopesOf(model.program(), k)) {
       by_step_[i] = share;
     } else {
       by_intervals[i] = 1;
@@ -106,6 +98,20 @@ StepOffsets::StepOffsets(const NominalModel& model, const StepTiming& timing)
     }
   }
   if (!by_intervals_.empty()) rate_ = rate->Of(by_intervals);
+}
+
+bool StepOffsets::AddSlopesOf(const Program& program, int k) {
+  bool has_own = false;
+  for (int e = 0; e < program.num_first; ++e) {
+    const Program::First& entry = program.jacobian[ToSize(e)];
+    if (entry.row != k || entry.column >= program.states) continue;
+    const bool is_own = entry.column == k;
+    has_own = has_own || is_own;
+    if (is_own && entry.is_one) continue;
+    const auto index = [](int i) { return static_cast<unsigned short>(i); };
+    slopes_.push_back({index(k), index(entry.column), index(e), is_own ? 1.0 : 0.0});
+  }
+  return has_own;
 }
 
 int StepOffsets::Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
@@ -127,50 +133,53 @@ void StepOffsets::EncloseByIntervals(std::span<const PlainInterval> hull, PerSta
 }
 
 // Of each state, f0(z) - z lies within `reach` of p = f0~ - c + m, the middle of E g is share p, and d is that rounded.
+// `away` is sum_l |J - I|_kl r_l.
 int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
                            ImageSums& sums) const noexcept {
-  PerState middle{}, around{}, away, most;
-  if (!by_intervals_.empty()) EncloseByIntervals(step.hull, middle, around);
-  for (std::size_t k = 0; k < states_; k += kLaneCount) {
-    const Lanes moved = (LoadLanes(&step.expansion.value[k]) - LoadLanes(step.slice.centers() + k)) +
-                        LoadLanes(&step.remainder.center[k]);
-    const Lanes by_step = LoadLanes(&by_step_[k]);
-    StoreLanes(by_step > AllLanes(0) ? by_step * moved : LoadLanes(&middle[k]), &spread.column[k]);
-    StoreLanes(Max(Abs(LoadLanes(&step.residual.lower[k])), Abs(LoadLanes(&step.residual.upper[k]))), &most[k]);
-  }
-  if (step.residual.has_slope) AddSlopes(step, most);
-  Compare(step.slice, spread.column.data(), step.is_first, image, sums, away.data());
+  static constexpr PerState kNothing{};
+  PerState middle, around, away{}, sloped{};
+  const bool is_by_step = by_intervals_.empty();
+  if (!is_by_step) middle = around = {}, EncloseByIntervals(step.hull, middle, around);
+  const double* const middles = is_by_step ? kNothing.data() : middle.data();
+  const double* const arounds = is_by_step ? kNothing.data() : around.data();
+  for (const auto& [row, column, entry, own] : slopes_)
+    away[row] += std::abs(step.expansion.jacobian[entry] - own) * step.half_width[column];
+  if (step.residual.has_slope) AddSlopes(step, sloped);
   const Lanes ends = AllLanes(step.is_first ? 1 : 2);  // |j_{t+1} - j_t| / E at most
   const PerState& growths = step.is_first ? growth_once_ : growth_twice_;
   const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
-    const Lanes value = Abs(LoadLanes(&step.expansion.value[k])) + Abs(LoadLanes(step.slice.centers() + k)) +
-                        Abs(LoadLanes(&step.remainder.center[k]));
+    const Lanes value = LoadLanes(&step.expansion.value[k]), center = LoadLanes(step.slice.centers() + k),
+                moved = LoadLanes(&step.remainder.center[k]), by_step = LoadLanes(&by_step_[k]);
+    const Lanes column = by_step * ((value - center) + moved) + LoadLanes(middles + k);
+    const Lanes most =
+        Max(Abs(LoadLanes(&step.residual.lower[k])), Abs(LoadLanes(&step.residual.upper[k]))) + LoadLanes(&sloped[k]);
     const Lanes reach = LoadLanes(&away[k]) + LoadLanes(&step.error.value[k]) + LoadLanes(image.slacks() + k) +
-                        LoadLanes(step.slice.slacks() + k) + LoadLanes(&step.remainder.half_width[k]) +
-                        AllLanes(4 * kUnitRoundoff) * value + LoadLanes(step.of_inputs + k);
-    const Lanes growth = LoadLanes(&growths[k]), by_step = LoadLanes(&by_step_[k]), w = LoadLanes(step.unexpected + k);
-    const Lanes column = Abs(LoadLanes(&spread.column[k]));
-    const Lanes off =
-        by_step > AllLanes(0) ? by_step * reach + AllLanes(4 * kUnitRoundoff) * column : LoadLanes(&around[k]);
-    Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (LoadLanes(&most[k]) + w);
+                        LoadLanes(&step.remainder.half_width[k]) +
+                        AllLanes(4 * kUnitRoundoff) * (Abs(value) + Abs(center) + Abs(moved)) +
+                        LoadLanes(step.of_inputs + k);
+    const Lanes growth = LoadLanes(&growths[k]), w = LoadLanes(step.unexpected + k);
+    const Lanes off = by_step * reach + AllLanes(4 * kUnitRoundoff) * Abs(column) + LoadLanes(arounds + k);
+    Lanes added = ends * (off + LoadLanes(&declared_[k])) + growth * (most + w);
     added = growth > AllLanes(0) ? added * AllLanes(1 + kOffsetRelative) + AllLanes(kOffsetSmallest) : added;
+    StoreLanes(column, &spread.column[k]);
     StoreLanes(LoadLanes(step.disturbance + k) + added, &spread.half_width[k]);
-    return column + added < AllLanes(kInfinity);
+    return Abs(column) + added < AllLanes(kInfinity);
   };
-  if (HoldsForFirst(states_, is_finite)) return -1;
+  const bool all_finite = HoldsForFirst(states_, is_finite);
+  if (!step.is_first) SubtractFromLast(spread.column.data(), image, sums);
+  if (all_finite) return -1;
   for (std::size_t k = 0; k < states_; ++k)
     if (!(std::abs(spread.column[k]) + spread.half_width[k] < kInfinity)) return static_cast<int>(k);
   return 0;
 }
 
 void StepOffsets::Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
-  const auto last = ToSize(next.num_generators()), lane = last % kLaneCount, block = last - lane;
-  const LaneMask is_last = AtLane(lane);
+  const auto last = ToSize(next.num_generators());
   next.Reset(next.dim(), next.num_generators() + 1);
   for (int k = 0, n = next.dim(); k < n; ++k) {
-    double* const at = next.mutable_row(k) + block;
-    const Lanes kept = lane == 0 ? AllLanes(0) : FirstLanes(LoadLanes(at), lane, 0);
-    StoreLanes(is_last ? AllLanes(spread.column[ToSize(k)]) : kept, at);
+    double* const row = next.mutable_row(k);
+    if (last % kLaneCount == 0) StoreLanes(AllLanes(0), row + last);  // otherwise it is padding
+    row[last] = spread.column[ToSize(k)];
   }
   for (std::size_t k = 0; k < ToSize(next.dim()); k += kLaneCount) {
     const Lanes sum = LoadLanes(half_width + k) + Abs(LoadLanes(&spread.column[k]));

@@ -63,8 +63,8 @@ class StepOffsets final {
 
   /** Sets `spread`; unless the step is the first, subtracts d from the last generator of the image, adds the rounding
   to its slack, and updates `sums`. Returns the first coordinate that has no finite bound, -1 if all have. Allocates
-  nothing. @param image what Map made of the slice, and nothing else yet. Cost O(n m) for m generators, and the
-  operations of the rates that the step itself does not bound. */
+  nothing. @param image what Map made of the slice, and nothing else yet. Cost O(entries of J), and the operations of
+  the rates that the step itself does not bound. */
   [[nodiscard]] int Add(const StepSoFar& step, OffsetSpread& spread, Zonotope& image, ImageSums& sums,
                         InstructionSet instructions) const noexcept;
 
@@ -74,6 +74,14 @@ class StepOffsets final {
  private:
   using PerState = std::array<double, kMaxStates>;
 
+  // Of a row of J - I: the entry of J, less `own`, by which the row's state moves with that of the column.
+  struct Slope {
+    unsigned short row, column, entry;
+    double own;
+  };
+
+  // False if J has no entry for state k's own.
+  [[nodiscard]] bool AddSlopesOf(const Program& program, int k);
   [[nodiscard]] FOREREACH_INLINE int AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope& image,
                                                ImageSums& sums) const noexcept;
   void EncloseByIntervals(std::span<const PlainInterval> hull, PerState& middle, PerState& reach) const noexcept;
@@ -83,6 +91,7 @@ class StepOffsets final {
   // Of each state where its rate counts: the growth of what the model does not know, if one end is off and if both are;
   // E / dt, rounded up, where the rate follows from the step itself. E V_k where V_k is declared.
   PerState growth_once_{}, growth_twice_{}, by_step_{}, declared_{};
+  std::vector<Slope> slopes_;     // of the latter, where they are not zero
   std::optional<StepRate> rate_;  // of the others
   std::vector<int> by_intervals_;
   std::size_t states_;

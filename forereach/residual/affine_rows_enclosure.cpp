@@ -19,6 +19,9 @@ AffineRowsEnclosure::AffineRowsEnclosure(const Declaration& declaration, const O
     : declaration_(declaration),
       others_(others),
       sets_(declaration.affine.rows.size(), AffineSet(declaration.affine.columns, domain_lower, domain_upper)) {
+  for (std::size_t s = 0; s < sets_.size(); ++s)
+    for (std::size_t j = 0; j < declaration_.affine.columns.size(); ++j)
+      sets_[s].Declare(j, declaration_.lipschitz(declaration_.affine.rows[s], declaration_.affine.columns[j]));
   for (int i = 0; i < observations.size(); ++i) {
     const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
                           upper = observations.upper.row(i);
@@ -86,6 +89,12 @@ void AffineRowsEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds)
   }
 }
 
+Declaration WithoutAffineRows(Declaration declaration) {
+  for (const int k : declaration.affine.rows) declaration.lipschitz.row(k).setZero();
+  declaration.affine = {};
+  return declaration;
+}
+
 Observations WithoutAffineRows(const Declaration& declaration, Observations observations) {
   for (const int k : declaration.affine.rows) observations.lower.col(k).setZero(), observations.upper.col(k).setZero();
   return observations;
@@ -104,7 +113,8 @@ std::optional<AffineContradiction> FindAffineContradiction(const Declaration& de
 Violation AsViolation(const AffineContradiction& contradiction) {
   const std::vector<int>& rows = contradiction.rows;
   const int latest = std::ranges::max(rows);
-  return {rows[0] == latest ? rows[1] : rows[0], latest, contradiction.coordinate, contradiction.gap, 0};
+  return {rows[0] == latest ? rows[1] : rows[0], latest, contradiction.coordinate, contradiction.gap,
+          contradiction.most};
 }
 
 }  // namespace forereach

@@ -48,15 +48,15 @@ class AffineRowsEnclosure final : public ResidualEnclosure {
   std::optional<AffineContradiction> contradiction_;
 };
 
-/** The observations without their affine rows, which are zeros: for what knows of L alone, by which they are constant.
- */
+/** Declaration and observations without their affine rows, which are zeros: for what knows of L alone. */
+[[nodiscard]] Declaration WithoutAffineRows(Declaration declaration);
 [[nodiscard]] Observations WithoutAffineRows(const Declaration& declaration, Observations observations);
 
 /** Whether these observations contradict the affine rows of a declaration: a proof in real arithmetic, if any. */
 [[nodiscard]] std::optional<AffineContradiction> FindAffineContradiction(const Declaration& declaration,
                                                                          const Observations& observations);
 
-/** As a violation, with its gap as the difference and 0 as the bound: `second` is the latest of the observations,
+/** As a violation, with its gap as the difference and `most` as the bound: `second` is the latest of the observations,
 `first` the one that is predicted or, if that is the latest, the most decisive of the others. */
 [[nodiscard]] Violation AsViolation(const AffineContradiction& contradiction);
 

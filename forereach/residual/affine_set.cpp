@@ -363,14 +363,24 @@ void AffineSet::SetHull() {
     Vector axis{}, opposite{};
     axis[l] = 1;
     opposite[l] = -1;
-    hull_[l] = {-SupportUpper(opposite, Search(opposite, all_, Nearest(opposite), kMostSteps)),
-                SupportUpper(axis, Search(axis, all_, Nearest(axis), kMostSteps))};
+    const Climb least = Search(opposite, all_, Nearest(opposite), kMostSteps),
+                most = Search(axis, all_, Nearest(axis), kMostSteps);
+    hull_[l] = {-SupportUpper(opposite, least), SupportUpper(axis, most)};
+    if (l + 1 < size_) TestSlope(l, least, most);
     const double size = hull_[l].Magnitude();
     const double unit = std::ldexp(1.0, std::max(std::ilogb(size), -900) - 16);
     slope_[l] = hull_[l].IsFinite() && size > 0 ? std::nearbyint(hull_[l].Middle() / unit) * unit : 0;
     reach_[l] = hull_[l].DistanceUpper(slope_[l]);
     limit_[l] = std::min(limit_[l], size);
   }
+}
+
+void AffineSet::TestSlope(std::size_t l, const Climb& least, const Climb& most) {
+  const double size = std::max(hull_[l].lower, -hull_[l].upper);
+  if (contradiction_ || most_[l] == 0 || !(size > most_[l])) return;
+  contradiction_ = AffineContradiction{-1, {}, size, most_[l]};
+  const Basis& basis = (hull_[l].lower > most_[l] ? least : most).basis;
+  for (std::size_t j = 0; j < size_; ++j) contradiction_->rows.push_back(ids_[ToSize(basis[j])]);
 }
 
 void AffineSet::Derive() {

@@ -27,8 +27,9 @@ namespace forereach {
 struct AffineContradiction {
   int coordinate;         ///< k
   std::vector<int> rows;  ///< Of the observations, by their ids: first the one that is predicted, then the q others,
-                          ///< the most decisive first.
-  double gap;             ///< In the unit of state k, rounded down.
+                          ///< the most decisive first. Or q that give a slope of more than is declared.
+  double gap;             ///< In the unit of state k, rounded down; the least size of that slope.
+  double most = 0;        ///< What is declared of the slope; 0: no slope contradicts.
 };
 
 class AffineSet final {
@@ -36,6 +37,8 @@ class AffineSet final {
   /** @param domain_lower, domain_upper d_z entries each: where queries are expected. */
   AffineSet(std::vector<int> columns, std::span<const double> domain_lower, std::span<const double> domain_upper);
 
+  /** Declares that |M_kl| <= most, positive; for column index j. Derive tests it, and it bounds nothing. */
+  void Declare(std::size_t j, double most) { most_[j] = most; }
   /** Adds an observation, without a Derive. An interval that is not finite says nothing. */
   void Add(int id, std::span<const double> z, double lower, double upper);
   /** Derives contradiction, hull, slope and the vertices from which queries start. Of more than kMostKept observations
@@ -96,13 +99,15 @@ class AffineSet final {
   [[nodiscard]] std::vector<Vector> Directions() const;
   [[nodiscard]] bool Prove(const Climb& found);
   void SetHull();
+  void TestSlope(std::size_t l, const Climb& least, const Climb& most);
   void FindVertices(const Basis& start);
   void SortActive();
   [[nodiscard]] bool LatestMayNarrow() const;
   void Forget();
 
   std::vector<int> columns_;
-  std::size_t size_;  // q
+  std::size_t size_;                                    // q
+  std::array<double, AffineRows::kMaxColumns> most_{};  // of each column; 0: nothing is declared
   std::vector<double> domain_lower_, domain_upper_;
   std::vector<double> phi_, lower_, upper_;  // q, one and one entries for each observation
   std::vector<int> ids_;

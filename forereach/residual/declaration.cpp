@@ -47,12 +47,13 @@ void ValidateAffine(const Declaration& declaration) {
       columns.size() <= AffineRows::kMaxColumns,
       std::to_string(columns.size()) + " columns, must be at most " + std::to_string(AffineRows::kMaxColumns));
   for (const int k : rows)
-    RequireAffine(declaration.lipschitz.row(k).isZero(0),
-                  "row " + std::to_string(k) + " is affine, lipschitz bounds it, too");
-  RequireAffine(
-      rows.empty() || !declaration.HasErrorInZ(),
-      "state_error and input_error count by lipschitz, which does not bound these rows: leave the errors out, or "
-      "declare these rows by lipschitz");
+    for (Eigen::Index l = 0; l < declaration.lipschitz.cols(); ++l) {
+      const std::string entry = "row " + std::to_string(k) + ", variable " + std::to_string(l) + ": ";
+      const bool is_column = std::ranges::binary_search(columns, static_cast<int>(l));
+      RequireAffine(is_column || declaration.lipschitz(k, l) == 0, entry + "bounded by lipschitz, and no column");
+      RequireAffine(!is_column || declaration.lipschitz(k, l) > 0 || declaration.VariableError(l) == 0,
+                    entry + "recorded with an error, which counts by lipschitz: declare a bound on |M| there");
+    }
 }
 
 void RequireRegion(bool holds, std::size_t i, const std::string& what) {

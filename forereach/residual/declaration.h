@@ -18,7 +18,7 @@ class GrowingDisturbance;
 
 /** Rows k of the residual that are affine: there are M_k and b_k, the same in every step, with
     r_k(z) = sum over columns l of M_kl z_l + b_k   for all z in Z_cert.
-Nothing else is said of M and b: data bound them (affine_set.h). */
+Data bound them (affine_set.h). An entry L_kl > 0 says |M_kl| <= L_kl, by which errors of z_l count as in other rows. */
 struct AffineRows {
   static constexpr std::size_t kMaxColumns = 12;
 
@@ -55,10 +55,10 @@ struct Declaration {
   /** e is not that of the given transitions, which are exact, as those of a simulation are; of those that are learned
   it is (Transitions::num_learned). */
   bool given_are_exact = false;
-  /** Rows that are affine, in place of L: their rows of L are zero and not read, and e is zero. */
+  /** Rows that are affine: their rows of L are zero but in their columns. */
   AffineRows affine = {};
   /** At most kMaxRegions, which bound at most kMaxVariables variables and cut their ranges into kMaxCells cells. They
-  bound no affine row. */
+  narrow no affine row. */
   std::vector<Region> regions = {};
   /** What w^ has beyond that in a step at z: |w_k| <= w^_k + |d_k(z)|. Null: nothing. */
   std::shared_ptr<const GrowingDisturbance> growing = {};

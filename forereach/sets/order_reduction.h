@@ -47,17 +47,13 @@ class ColumnScores {
     LaneMask nonzero_{}, index_ = kFirstIndices;
   };
 
-  /** Writes the scores of columns first_column .. count - 1, the last of all, again. @pre first_column is a multiple of
-  kLaneCount, and the columns are four at most. @param sum, largest as in Writer::Add. */
-  FOREREACH_INLINE void Rewrite(std::size_t first_column, std::size_t count, const Lanes& sum, const Lanes& largest) {
-    const auto index = static_cast<std::int64_t>(first_column);
-    double* const at = &scores_[first_column];
-    const Lanes scores = Scores(sum, largest, kFirstIndices - LaneMask{index, index, index, index});
-    const Lanes after = FirstLanes(scores, count - first_column, -1),
-                before = FirstLanes(LoadLanes(at), count - first_column, -1);
-    const LaneMask more = (before >= AllLanes(0)) - (after >= AllLanes(0));
-    num_nonzero_ += static_cast<int>((more[0] + more[1]) + (more[2] + more[3]));
-    StoreLanes(FirstLanes(scores, count - first_column, kInfinity), at);
+  /** Writes the score of one column again. @param sum, largest its |g|_1 and |g|_inf. */
+  FOREREACH_INLINE void Rewrite(std::size_t column, double sum, double largest) {
+    const std::int64_t index = kMaxGenerators - static_cast<std::int64_t>(column);
+    double& score = scores_[column];
+    num_nonzero_ -= static_cast<int>(score >= 0);
+    score = Scores(AllLanes(sum), AllLanes(largest), LaneMask{index, index, index, index})[0];
+    num_nonzero_ += static_cast<int>(score >= 0);
   }
 
   /** One score for each column, padded with infinity to a multiple of kBlock. */

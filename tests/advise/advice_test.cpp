@@ -284,6 +284,9 @@ TEST(Hypotheses, NameThoseWhoUpholdThemAndNobodyElse) {
   EXPECT_EQ(upheld("clock"), "");
   config.gate.step_error_ms = 5;
   EXPECT_THAT(upheld("clock runs true"), HasSubstr("declared"));
+  EXPECT_EQ(upheld("task.body"), "");
+  problem.body.parts[0].radius = 0.5;
+  EXPECT_EQ(upheld("task.body"), "declared");
   EXPECT_EQ(upheld("turn"), "");
   problem.model = MakeKinematicBicycle(0.1, 2.5, {2});
   problem.timing.rate_bound = {};

@@ -2,6 +2,7 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
@@ -140,6 +141,55 @@ TEST_F(AffineResidual, IsNarrowedAndContradictedByWhatIsLearned) {
   EXPECT_GT(rows.num_learned, 0);
 }
 
+// The true slopes of vx are -0.00625 by vx and -0.025 by ax: a declared bound on them is refuted where data are exact
+// enough, and no sooner.
+TEST_F(AffineResidual, IsFalsifiedByASlopeOfMoreThanIsDeclared) {
+  const auto with = [](int column, double most, double noise) {
+    Problem problem = DraggedPointMass(40, noise);
+    problem.declaration.lipschitz(2, column) = most;
+    return Certifier(Shared(problem));
+  };
+  EXPECT_FALSE(with(4, 0.025, 1e-4).violation());
+  EXPECT_FALSE(with(4, 0.0245, 1e-2).violation());
+  EXPECT_FALSE(with(2, 0.00625, 1e-4).violation());
+  EXPECT_TRUE(with(2, 0.006, 1e-6).violation());
+  const Certifier certifier = with(4, 0.0245, 1e-4);
+  ASSERT_TRUE(certifier.violation());
+  EXPECT_EQ(certifier.violation()->coordinate, 2);
+  EXPECT_GT(certifier.violation()->difference, 0.0245);
+  EXPECT_LE(certifier.violation()->difference, 0.025);
+  const Decision decision = Certify(certifier);
+  EXPECT_EQ(decision.outcome, Outcome::kFalsified);
+  EXPECT_THAT(Explain(decision, certifier.problem()), HasSubstr("declaration.lipschitz says 0.0245 at most"));
+  Problem few = certifier.problem();
+  few.transitions = certifier.Contradiction();
+  EXPECT_EQ(few.transitions.size(), 5);
+  EXPECT_TRUE(Certifier(Shared(few)).violation());
+}
+
+// One step whose inputs are off by e: what that makes of vx is dt e by the model, and by the residual the declared
+// slopes times e, once in each observation and once in the step, where the inputs that act are off, too.
+TEST_F(AffineResidual, CountsErrorsOfRecordsAndInputsByTheDeclaredSlopes) {
+  const auto width = [&](double error, double most) {
+    Problem problem = DraggedPointMass(200, 1e-9);
+    problem.declaration.input_error = Vec({error, error});
+    for (int k = 2; k < 4; ++k) problem.declaration.lipschitz(k, 4) = problem.declaration.lipschitz(k, 5) = most;
+    const Certifier certifier(Shared(problem));
+    EXPECT_FALSE(certifier.violation());
+    const double u[] = {0.5, 0.25};
+    const auto start = Zonotope::FromBox(Eigen::Vector4d(0, 0, 0.5, 0), Eigen::Vector4d::Zero());
+    EXPECT_EQ(certifier.Certify({u, 2, 1, 2}, start, {}, tube_).outcome, Outcome::kCertified);
+    return tube_.half_width(1)[2];
+  };
+  EXPECT_LT(width(0, 0), 1e-7);
+  constexpr double kError = 1e-3;
+  for (const double most : {0.05, 0.5}) {
+    const double once = (kDt + 2 * most) * kError;  // of one record, or of the step
+    EXPECT_GE(width(kError, most), once);
+    EXPECT_LE(width(kError, most), 2 * once + 1e-8);
+  }
+}
+
 TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
   const auto refusal = [](const std::function<void(Problem&)>& change) {
     Problem problem = DraggedPointMass(8, 1e-4);
@@ -147,11 +197,18 @@ TEST(AffineDeclaration, IsRefusedWhereItIsNotBuilt) {
     return Thrown<std::invalid_argument>([&] { const Certifier certifier(Shared(problem)); });
   };
   EXPECT_EQ(refusal([](Problem&) {}), "");
-  EXPECT_THAT(refusal([](Problem& p) { p.declaration.lipschitz(2, 2) = 0.1; }), HasSubstr("affine: row 2"));
+  EXPECT_THAT(refusal([](Problem& p) { p.declaration.lipschitz(2, 0) = 0.1; }),
+              HasSubstr("affine: row 2, variable 0: bounded by lipschitz, and no column"));
+  EXPECT_EQ(refusal([](Problem& p) { p.declaration.state_error = Vec({1e-3, 0, 0, 0}); }), "") << "no column";
   EXPECT_THAT(refusal([](Problem& p) {
                 p.declaration.state_error = Vec({0, 0, 1e-3, 0});
               }),
-              HasSubstr("state_error and input_error count by lipschitz"));
+              HasSubstr("affine: row 2, variable 2: recorded with an error"));
+  EXPECT_THAT(refusal([](Problem& p) {
+                p.declaration.state_error = Vec({0, 0, 1e-3, 0});
+                p.declaration.lipschitz(2, 2) = 0.1;
+              }),
+              HasSubstr("affine: row 3, variable 2: recorded with an error"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.rows = {3, 2}; }), HasSubstr("in their order"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {2, 6}; }), HasSubstr("columns are"));
   EXPECT_THAT(refusal([](Problem& p) { p.declaration.affine.columns = {}; }), HasSubstr("or neither"));

@@ -222,6 +222,27 @@ TEST(StepOffsets, AddUpOnlyWhereNothingSaysHowTheyAreRelated) {
   for (const int t : {1, 2, 8}) EXPECT_NEAR(half_width(t, 0), (2 * t - 1) * 2 * 0x1p-6, 1e-11) << t;
 }
 
+// Where a declaration is false, a motion leaves the slice, and the guard sees that: x is off by a residual of 1/16 at
+// dt that grows with the square of the duration, and no faster; software sets v, and time does not move it on.
+TEST(StepOffsets, WhatMovesFasterThanDeclaredLeavesTheSlice) {
+  Problem problem = WorldOf(Cart(), Within(Vec({99, 9})), Within(Vec({1})));
+  problem.projection = Eigen::MatrixXd::Identity(1, 2);
+  problem.transitions = {Eigen::MatrixXd::Zero(1, 3), Vec({0.0625, 0}).transpose()};
+  problem.timing = {.error = 0x1p-6, .set_at_steps = {1}};  // an eighth of a step
+  const Certifier certifier(std::make_shared<Problem>(problem));
+  const Eigen::MatrixXd controls = Eigen::MatrixXd::Ones(1, 1);
+  Tube tube;
+  ASSERT_EQ(
+      certifier.Certify({controls.data(), 1, 1, 1}, Zonotope::FromBox(Vec({0, 2}), Vec({0, 0})), {}, tube).outcome,
+      Outcome::kCertified);
+  const double square = 0.0625 * 1.125 * 1.125;
+  EXPECT_TRUE(tube.hull(1, 0).Contains(2 * (0.125 + 0x1p-6) + square));
+  EXPECT_FALSE(tube.hull(1, 0).Contains(2 * (0.125 + 0x1p-6) + square + 0x1p-40));
+  EXPECT_TRUE(tube.hull(1, 1).Contains(3));
+  EXPECT_FALSE(tube.hull(1, 1).Contains(3 + 0x1p-40));
+  EXPECT_FALSE(tube.hull(1, 1).Contains(2 + 1.125)) << "u, for a longer step";
+}
+
 // 16 states, the highest order, and the column of the offset: the most columns that a step can have.
 TEST(StepOffsets, TheLargestSetsHaveRoom) {
   std::vector<std::pair<std::string, std::string>> states;

@@ -228,7 +228,7 @@ class AffineContainment : public testing::TestWithParam<std::tuple<bool, bool, b
 
 TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
   const auto [bicycle, disturbed, shifted] = GetParam();
-  TracedRandom random(871 + bicycle);
+  TracedRandom random(871 + bicycle), records(881 + bicycle);
   int certified = 0, slices = 0, learned = 0;
   for (int trial = 0; trial < 60; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
@@ -236,13 +236,16 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
     if (disturbed) Disturb(random, *problem);
     const AffineTruth truth = MakeAffine(random, *problem);
     if (shifted) Shift(random, *problem);
+    // Of some the slopes are declared, and the transitions are recorded with errors.
+    if (records.Coin()) DeclareSlopes(*problem);
+    const auto told = records.Coin() ? RecordedAffine(records, *problem) : problem;
     // All transitions at once, or the last ones learned.
-    const auto known = std::make_shared<Problem>(*problem);
-    const int first = random.Coin() ? problem->transitions.size() : problem->transitions.size() / 2;
-    known->transitions = {problem->transitions.z.topRows(first), problem->transitions.x_next.topRows(first)};
+    const auto known = std::make_shared<Problem>(*told);
+    const int all = told->transitions.size(), first = random.Coin() ? all : (all + 1) / 2;
+    known->transitions = {told->transitions.z.topRows(first), told->transitions.x_next.topRows(first)};
     Certifier certifier(known);
-    for (int i = first; i < problem->transitions.size(); ++i, ++learned) {
-      const Eigen::VectorXd z = problem->transitions.z.row(i), next = problem->transitions.x_next.row(i);
+    for (int i = first; i < all; ++i, ++learned) {
+      const Eigen::VectorXd z = told->transitions.z.row(i), next = told->transitions.x_next.row(i);
       ASSERT_EQ(certifier.Learn(View(z), View(next)), Learned::kAdded);
     }
     ASSERT_FALSE(certifier.violation()) << "the data come from a residual that satisfies the declaration";
@@ -257,12 +260,13 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
         const AffineRows& affine = problem->declaration.affine;
         AffineTruth parameters;
         for (std::size_t i = 0; i < truth.size(); ++i)
-          parameters.push_back(AdmissibleParameters(random, *problem, affine.rows[i], truth[i]));
+          parameters.push_back(AdmissibleParameters(random, *told, *problem, affine.rows[i], truth[i]));
         std::vector<Real> x = PointOf(random, query.initial_set);
         Real offset;
         for (int t = 0; t < tube.length(); ++t) {
           std::vector<Real> z = x, most;
-          for (const double u : query.plan().input(t)) z.emplace_back(u);
+          for (int l = 0; l < query.controls.rows(); ++l)
+            z.push_back(ActedInput(records, *told, l, query.controls(l, t)));
           std::vector<Real> unexpected = AnyDisturbance(random, *problem, z);
           for (std::size_t k = 0; k < x.size(); ++k) {
             const auto row = std::ranges::find(affine.rows, static_cast<int>(k)) - affine.rows.begin();

@@ -67,9 +67,24 @@ inline AffineTruth MakeAffine(Random& random, Problem& problem) {
   return truth;
 }
 
-/** Parameters of row k on the edge of what the data admit, or within it: from the truth some steps along random
-directions, each as far as the data allow. */
-inline std::vector<Real> AdmissibleParameters(Random& random, const Problem& problem, int k, std::vector<Real> theta) {
+/** Declares of each slope that it is at most twice what MakeAffine makes it. */
+inline void DeclareSlopes(Problem& problem) {
+  for (const int k : problem.declaration.affine.rows)
+    for (const int l : problem.declaration.affine.columns) problem.declaration.lipschitz(k, l) = 0.04;
+}
+
+/** The same as a robot records it (Recorded), with the slopes declared. */
+inline std::shared_ptr<Problem> RecordedAffine(Random& random, const Problem& truth) {
+  const auto problem = Recorded(random, truth);
+  DeclareSlopes(*problem);
+  return problem;
+}
+
+/** Parameters of row k on the edge of what the data of `problem` admit, or within it: from the truth some steps along
+random directions, each as far as the data allow. They keep the slopes that are declared in `told`. */
+inline std::vector<Real> AdmissibleParameters(Random& random, const Problem& told, const Problem& problem, int k,
+                                              std::vector<Real> theta) {
+  const std::vector<Real> truth = theta;
   const std::vector<int>& columns = problem.declaration.affine.columns;
   std::vector<std::pair<Real, Real>> bounds;
   for (int i = 0; i < problem.transitions.size(); ++i) bounds.push_back(AffineBounds(problem, i, k));
@@ -90,6 +105,9 @@ inline std::vector<Real> AdmissibleParameters(Random& random, const Problem& pro
         *farthest * (steps == 1 && random.Coin(0.3) ? Real(random.Uniform(0, 1)) : Real(1.0) - Real(0x1p-60));
     for (std::size_t j = 0; j < theta.size(); ++j) theta[j] += step * direction[j];
   }
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    if (const double most = told.declaration.lipschitz(k, columns[j]); most > 0 && abs(theta[j]) > Real(most))
+      return truth;
   return theta;
 }
 

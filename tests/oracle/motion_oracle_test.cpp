@@ -18,6 +18,7 @@ TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
   EXPECT_GT(total.decided_exactly, 10) << total.Text();
   EXPECT_GT(total.shifted, 30) << total.Text();
   EXPECT_GT(total.recorded, 30) << total.Text();
+  EXPECT_GT(total.all_at_once, 5) << total.Text();
 }
 
 class WithoutOnePart : public testing::TestWithParam<Untold> {};

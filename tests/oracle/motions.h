@@ -1,13 +1,13 @@
 /** What a certificate claims at all times, tried: continuous motions under certified plans, in 256 bits.
 
 A trial makes one random problem (problems.h, any_surroundings.h) and plans of it, and places obstacles that the
-certifier just accepts. In some, steps are disturbed, and off their times; in some, the states of the transitions are
-recorded with errors; often by all that is declared. Under each certificate it follows admissible residuals from sample
-to sample: none leaves its slice. Between two
-samples it follows motions whose second derivatives are piecewise constant, within the declared bounds and often equal
-to them, and that keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A
-contact is a broken promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what
-it says still stands is followed in the same way. */
+certifier just accepts. In some, steps are disturbed, and off their times; in some, the transitions are
+recorded with errors, by which the inputs that act are off the plan's, too; often by all that is declared. Under each
+certificate it follows admissible residuals from sample to sample: none leaves its slice. Between two samples it follows
+motions whose second derivatives are piecewise constant, within the declared bounds and often equal to them, and that
+keep the samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A contact is a broken
+promise. Then an obstacle appears that the certifier just accepts up to some step of the plan: what it says still stands
+is followed in the same way. */
 #pragma once
 
 #include <algorithm>
@@ -37,8 +37,8 @@ enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, k
 
 struct Tally {
   long problems = 0, plans = 0, certified = 0, withdrawn = 0, motions = 0, moments = 0, decided_exactly = 0,
-       inadmissible = 0, shifted = 0,
-       recorded = 0;  // of the certified: with steps off their times, with errors of records
+       inadmissible = 0, shifted = 0, recorded = 0,
+       all_at_once = 0;  // of the certified: with steps off their times, with errors of records, with disturbances, too
 
   void Add(const Tally& other) {
     problems += other.problems;
@@ -51,13 +51,14 @@ struct Tally {
     inadmissible += other.inadmissible;
     shifted += other.shifted;
     recorded += other.recorded;
+    all_at_once += other.all_at_once;
   }
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
     text << problems << " problems, " << plans << " plans, " << certified << " certified (" << shifted
-         << " with steps off their times, " << recorded << " from records with errors), " << withdrawn
-         << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly
-         << " of them decided in 256 bits";
+         << " with steps off their times, " << recorded << " from records with errors, " << all_at_once
+         << " with both and disturbed), " << withdrawn << " withdrawn in part; " << motions << " motions, " << moments
+         << " moments, " << decided_exactly << " of them decided in 256 bits";
     return text.str();
   }
 };
@@ -264,6 +265,7 @@ class MotionTrial {
     if (problem->between && (untold_ == Untold::kLateness || winds_.Coin()))
       problem->between->period += winds_.Uniform(0, 0.05);  // what a step may last longer
     const auto told = winds_.Coin() ? Recorded(winds_, *problem) : std::make_shared<Problem>(*problem);
+    told_ = told;
     if (untold_ == Untold::kOffsets) told->timing = {};
     step_error_us_ = static_cast<std::int64_t>(std::ceil(told->timing.error * 1e6));
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
@@ -306,8 +308,10 @@ class MotionTrial {
     if (certifier.Certify(plan, query.initial_set, told_obstacles, tube_).outcome != Outcome::kCertified)
       throw std::logic_error("a tube that is judged alone is certified among the same obstacles");
     ++tally_.certified;
-    if (problem.timing.error > 0) ++tally_.shifted;
-    if (certifier.problem().declaration.HasErrorInZ()) ++tally_.recorded;
+    const bool is_shifted = problem.timing.error > 0, is_recorded = told_->declaration.HasErrorInZ();
+    tally_.shifted += is_shifted;
+    tally_.recorded += is_recorded;
+    tally_.all_at_once += is_shifted && is_recorded && problem.declaration.IsDisturbed();
     const MotionJudge judge(problem, query.schedule);
     for (int r = 0; r < 3; ++r) Rollout(judge, query, obstacles, 0, plan.num_steps);
     Withdraw(certifier, judge, query, plan);
@@ -354,7 +358,7 @@ class MotionTrial {
     Real offset;
     for (int t = 0; t < standing; ++t) {
       std::vector<Real> z = x, most;
-      for (const double u : query.plan().input(t)) z.emplace_back(u);
+      for (int l = 0; l < query.controls.rows(); ++l) z.push_back(ActedInput(winds_, *told_, l, query.controls(l, t)));
       std::vector<Real> unexpected = AnyDisturbance(winds_, problem, z);
       for (std::size_t k = 0; k < unexpected.size(); ++k) {
         const Real r = residual(z, static_cast<int>(k));
@@ -427,6 +431,7 @@ class MotionTrial {
 
   Random random_, winds_;
   Untold untold_;
+  std::shared_ptr<const Problem> told_;
   std::int64_t step_error_us_ = 0;  // what the certifier is told
   Tally tally_;
   Tube tube_;

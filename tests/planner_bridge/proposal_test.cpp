@@ -332,6 +332,21 @@ TEST(Planner, GoesStraightOnWhereAnObstacleHasGone) {
   EXPECT_NEAR(ends_at(5'000'000), 0, 0.02);
 }
 
+// A robot that can back off ends its plans only where it could drive on: straight ahead, or along its hints.
+TEST(Planner, EndsBeforeAWallOnlyIfTheHintsLeadAroundIt) {
+  Config config = Bicycle();
+  config.laws.back_off = {{"(min(max((-0.4 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
+  const PlanRequest request = From(Vec({0, 0, 0, 2, 0, 0}), 1);
+  const auto proposes = [&](double wall_ends_at) {
+    config.obstacles = {Obstacle::AxisBox(Vec({10, wall_ends_at}), Vec({11, 15}))};
+    return PlannerOf(config)->Propose(request).has_value();
+  };
+  EXPECT_TRUE(proposes(-2));
+  EXPECT_FALSE(proposes(-15));
+  config.laws.hints.clear();
+  EXPECT_FALSE(proposes(-2));
+}
+
 Limit AtMost(const char* that, double bound) { return {.name = that, .that = {that, 1, 1}, .at_most = bound}; }
 
 // The point mass with limits of its speed, 1.2 m/s, and of its acceleration.

@@ -9,6 +9,7 @@
 #include "tests/test.h"
 
 #include "certifier/process/certifier_node.h"
+#include "certifier/process/faults.h"
 #include "forereach/withdrawal_t.hpp"
 #include "tests/certifier/small_task.h"
 #include "tests/reset.h"
@@ -162,6 +163,20 @@ TEST_F(LatchTest, WithoutAFaultTheNextCertifierArmsByItself) {
     EXPECT_TRUE(faults_.empty());
     EXPECT_EQ(std::filesystem::file_size(file_), LatchFile::kBytes);
   }
+}
+
+// Of an affine row no pair decides, and nothing allows a difference.
+TEST(DeclarationFalsified, SaysWhatContradictsOfEachKindOfDeclaration) {
+  const auto why = [](const Violation& violation) {
+    return DeclarationFalsified(violation, {.rows = {2}, .columns = {4}}).why;
+  };
+  EXPECT_THAT(why({3, 40, 1, 0.5, 0.25}), EndsWith("with observation 3 its residual 1 differs by 0.5, the declaration "
+                                                   "allows 0.25"));
+  EXPECT_THAT(why({3, 40, 2, 0.5, 0}),
+              AllOf(HasSubstr("transition 40 contradicts the declaration: no affine residual 2 agrees with it, "
+                              "observation 3 and a few others; one is 0.5 off"),
+                    Not(HasSubstr("allows"))));
+  EXPECT_THAT(why({40, -1, 2, 0.5, 0.25}), EndsWith("changes by at least 0.5 a second, 0.25 is declared"));
 }
 
 TEST_F(LatchTest, AFaultOutlivesTheProcessUntilAReset) {

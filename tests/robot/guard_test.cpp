@@ -616,6 +616,17 @@ TEST(GuardSchedule, AStartIsWithinTheJitterToo) {
   EXPECT_EQ(late.TryStart(kStart + kJitter + 1, kStart + kJitter + 1, State{1, -2}).cause, GuardCause::kTooLate);
 }
 
+// In the middle of a plan, and not back again.
+TEST(GuardSchedule, AClockThatIsSetByMoreThanTheJitterEndsThePlan) {
+  for (const std::int64_t set : {-kJitter - 1, -kJitter, kJitter, kJitter + 1}) {
+    Guard guard = ExecutingOnTime();
+    ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
+    const bool is_seen = std::abs(set) > kJitter;
+    EXPECT_EQ(guard.Check(2, State{0, 0}, kStart + 2 * kStep + set).ok(), !is_seen) << set;
+    EXPECT_EQ(guard.executing() == nullptr, is_seen);
+  }
+}
+
 // Half a step stays the bound where the jitter is larger.
 TEST(GuardSchedule, ALargeJitterAllowsNoOtherBoundary) {
   Guard guard = OnTime(kMost);

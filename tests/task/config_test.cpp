@@ -86,11 +86,14 @@ TEST(LoadConfig, ReadsWhichRowsAreAffine) {
   const auto error = [&](const std::string& affine, const std::string& task) {
     return Thrown<ConfigError>([&] { static_cast<void>(with(affine, task)); });
   };
-  EXPECT_THAT(error("{rows: [vx], columns: [vx]}", kTask), HasSubstr("which declaration.lipschitz bounds, too"));
+  EXPECT_THAT(error("{rows: [vx], columns: [vx]}", kTask),
+              HasSubstr("leaves vy out, by which declaration.lipschitz says that the affine vx changes"));
+  EXPECT_EQ(with("{rows: [vx], columns: [vx, vy]}", kTask).problem->declaration.lipschitz(2, 3), 0.05);
   EXPECT_THAT(error("{rows: [vx], columns: [speed]}", only_vy), HasSubstr("speed"));
   EXPECT_THAT(error("{rows: [vx], columns: []}", only_vy), HasSubstr("declaration.affine.columns"));
-  EXPECT_THAT(error("{rows: [vx], columns: [vx]}\n  state_error: {px: 0.1}", only_vy),
-              HasSubstr("with state_error or input_error"));
+  EXPECT_EQ(error("{rows: [vx], columns: [vx]}\n  state_error: {px: 0.1}", only_vy), "");
+  EXPECT_THAT(error("{rows: [vx], columns: [vx]}\n  state_error: {vx: 0.1}", only_vy),
+              HasSubstr("declare a bound on that slope as declaration.lipschitz.vx.vx"));
 }
 
 TEST(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {

@@ -11,14 +11,15 @@ namespace forereach::verifier::affine_certificates_test {
 
 TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
   TracedRandom random(95);
-  int certified = 0, changed = 0;
+  int certified = 0, changed = 0, steep = 0;
   for (int trial = 0; trial < 80; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
     const bool bicycle = random.Coin();
-    const auto problem = AnyProblem(random, bicycle, random.Integer(6, 40));
-    if (random.Coin()) Disturb(random, *problem);
-    static_cast<void>(MakeAffine(random, *problem));
-    if (random.Coin(0.3)) Shift(random, *problem);
+    const auto exact = AnyProblem(random, bicycle, random.Integer(6, 40));
+    if (random.Coin()) Disturb(random, *exact);
+    static_cast<void>(MakeAffine(random, *exact));
+    if (random.Coin(0.3)) Shift(random, *exact);
+    const auto problem = random.Coin(0.4) ? RecordedAffine(random, *exact) : exact;
     const Certifier certifier(problem);
     ASSERT_FALSE(certifier.violation());
     const Verifier judge(problem, MethodOf(*problem));
@@ -34,6 +35,12 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
     RecordedSlice& last = narrower.slices.back();
     last.upper[row] -= 0.25 * (last.upper[row] - last.lower[row]);
     EXPECT_NE(judge.Verify(narrower).status, Status::kConfirmed);
+    // Slopes of almost nothing, which data that are not tell from what is declared.
+    const auto flat = std::make_shared<Problem>(*problem);
+    for (const int l : problem->declaration.affine.columns) flat->declaration.lipschitz(row, l) = 1e-6;
+    const Verdict of_flat = Verifier(flat, MethodOf(*flat)).Verify(certificate);
+    steep += of_flat.failure.what.find("are at most what is declared") != std::string::npos;
+    if (Certifier(flat).violation()) EXPECT_NE(of_flat.status, Status::kConfirmed);
     // Data by which the row's residual is another one, or none.
     const auto other = std::make_shared<Problem>(*problem);
     other->transitions.x_next.col(row).array() += 0.1;
@@ -46,6 +53,7 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
   }
   EXPECT_GT(certified, 15);
   EXPECT_GT(changed, 5);
+  EXPECT_GT(steep, 5);
 }
 
 }  // namespace forereach::verifier::affine_certificates_test
