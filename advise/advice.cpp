@@ -254,7 +254,7 @@ class Adviser {
     AdviseInitialSet();
     AdviseHorizon();
     if (options.tails) AdviseTail(options.tails);
-    AdviseSlopes();
+    AdviseSmallerDeclaration();
     if (options.most_observations > 0) AdviseObservation(options.most_observations);
   }
 
@@ -426,37 +426,58 @@ class Adviser {
     return states;
   }
 
-  void AdviseSlopes() {
+  // Numbers of the declaration that may be declared smaller, all by one factor.
+  struct Smaller {
+    Change change;
+    std::string name;
+    std::function<void(Declaration&, double factor)> scale;
+    int row = -1, column = -1;
+  };
+
+  [[nodiscard]] std::vector<Smaller> SmallerSlopes() const {
+    constexpr std::size_t kMostEntries = 24;  // of a dense matrix only all together
     const Eigen::MatrixXd& lipschitz = case_.problem->declaration.lipschitz;
-    std::vector<std::pair<int, int>> entries;
+    std::vector<Smaller> slopes;
     for (int k = 0; k < lipschitz.rows(); ++k)
       for (int l = 0; l < lipschitz.cols(); ++l)
-        if (lipschitz(k, l) > 0) entries.emplace_back(k, l);
-    if (entries.empty()) return;
-    if (entries.size() > 1) entries.emplace_back(-1, -1);
-    constexpr std::size_t kMostEntries = 24;  // of a dense matrix only all together
-    if (entries.size() > kMostEntries) entries = {{-1, -1}};
-    for (const auto& [k, l] : entries) {
-      const auto smaller = [&, row = k, column = l](double less) {
-        return WithProblem(case_, [&](Problem& problem) {
-          if (row < 0)
-            problem.declaration.lipschitz *= 1 - less;
-          else
-            problem.declaration.lipschitz(row, column) *= 1 - less;
-        });
+        if (lipschitz(k, l) > 0)
+          slopes.push_back({Change::kSlopes, "the slope of " + StateName(model_, k) + " in " + VariableName(model_, l),
+                            [k, l](Declaration& declaration, double factor) { declaration.lipschitz(k, l) *= factor; },
+                            k, l});
+    if (slopes.size() > kMostEntries) slopes.clear();
+    if (slopes.size() != 1 && !lipschitz.isZero(0))
+      slopes.push_back({Change::kSlopes, "all slopes",
+                        [](Declaration& declaration, double factor) { declaration.lipschitz *= factor; }});
+    return slopes;
+  }
+
+  void AdviseSmallerDeclaration() {
+    std::vector<Smaller> all = SmallerSlopes();
+    const auto add = [&](Change change, const std::string& name, Eigen::VectorXd Declaration::*bounds) {
+      if (!(case_.problem->declaration.*bounds).isZero(0))
+        all.push_back(
+            {change, name, [bounds](Declaration& declaration, double factor) { declaration.*bounds *= factor; }});
+    };
+    add(Change::kDisturbance, "disturbance", &Declaration::disturbance);
+    add(Change::kLessNoise, "noise_bound", &Declaration::noise_bound);
+    add(Change::kStateError, "state_error", &Declaration::state_error);
+    for (const Smaller& each : all) {
+      const auto smaller = [&](double less) {
+        return WithProblem(case_, [&](Problem& problem) { each.scale(problem.declaration, 1 - less); });
       };
       // Below some factor the observations contradict the declaration.
       const double most = Least(1, kHalvings, [&](double kept) {
                             return Judged(smaller(1 - kept)).decision.outcome != Outcome::kFalsified;
                           }).value_or(1);
+      if (most == 1) continue;
       const double less = Least(1 - most, 7, [&](double amount) { return Turns(smaller(amount)); }).value_or(1 - most);
-      const std::string which =
-          k < 0 ? "all slopes" : "the slope of " + StateName(model_, k) + " in " + VariableName(model_, l);
-      Add({.change = Change::kSlopes,
-           .what = "if " + which + " were declared " + RoundedDown(1 - less, 4) + " times as large",
+      const std::string factor = RoundedDown(1 - less, 4);
+      Add({.change = each.change,
+           .what = "if " + each.name + " were declared " + factor + " times as large",
+           .smaller = each.name + " " + factor,
            .amount = 1 - less,
-           .row = k,
-           .column = l,
+           .row = each.row,
+           .column = each.column,
            .after = {smaller(less)}});
     }
   }
@@ -609,6 +630,9 @@ const char* Name(Change change) {
     case Change::kHorizon: return "horizon";
     case Change::kTail: return "tail";
     case Change::kSlopes: return "slopes";
+    case Change::kDisturbance: return "disturbance";
+    case Change::kLessNoise: return "less_noise";
+    case Change::kStateError: return "state_error";
     case Change::kObservation: return "observation";
     case Change::kDomain: return "domain";
     case Change::kRest: return "rest";
@@ -616,6 +640,28 @@ const char* Name(Change change) {
     case Change::kLargerSlopes: return "larger_slopes";
     case Change::kNoise: return "noise";
     case Change::kOutlier: return "outlier";
+  }
+  return "";
+}
+
+ChangeKind KindOf(Change change) {
+  switch (change) {
+    case Change::kObstacles: return ChangeKind::kMove;
+    case Change::kHorizon:
+    case Change::kTail: return ChangeKind::kSlowDown;
+    case Change::kInitialSet:
+    case Change::kObservation:
+    case Change::kOutlier: return ChangeKind::kData;
+    default: return ChangeKind::kDeclaration;
+  }
+}
+
+const char* Name(ChangeKind kind) {
+  switch (kind) {
+    case ChangeKind::kMove: return "move";
+    case ChangeKind::kSlowDown: return "slow down";
+    case ChangeKind::kData: return "data";
+    case ChangeKind::kDeclaration: return "declaration";
   }
   return "";
 }

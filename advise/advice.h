@@ -23,6 +23,9 @@ enum class Change {
   kHorizon,       ///< S, D: the first steps of the plan alone.
   kTail,          ///< S, D: a braking tail from an earlier step on.
   kSlopes,        ///< S, D: one entry of L, or all, smaller by a factor.
+  kDisturbance,   ///< S, D: the bounds on the disturbance smaller by a factor.
+  kLessNoise,     ///< S, D: the noise bounds smaller by a factor.
+  kStateError,    ///< S, D: the errors of recorded states smaller by a factor.
   kObservation,   ///< S, D: one more observation.
   kDomain,        ///< D: bounds of the domain wider.
   kRest,          ///< D: bounds of rest wider.
@@ -35,15 +38,24 @@ enum class Change {
 /** "obstacles", "initial_set" and so on. */
 [[nodiscard]] const char* Name(Change change);
 
+/** Who makes a change, the cheapest first: a plan that passes elsewhere, one that ends or brakes earlier, better data,
+and whoever declares. */
+enum class ChangeKind { kMove, kSlowDown, kData, kDeclaration };
+[[nodiscard]] ChangeKind KindOf(Change change);
+/** "move", "slow down", "data", "declaration". */
+[[nodiscard]] const char* Name(ChangeKind kind);
+
 struct Advice {
   Change change;
   /** A clause with values and units that continues "it would be certified ". Numbers are rounded to the side on which
   it stays true. */
   std::string what;
-  /** The size of the change. kObstacles: the largest distance, m. kInitialSet, kSlopes: the factor. kHorizon: the
-  number of steps. kTail: the step at which it begins. kObservation: the number of outcomes that were tried. kDomain,
-  kRest, kLimits: the number of bounds. kLargerSlopes: the largest factor. kNoise: the largest addition, in the state's
-  unit. kOutlier: the observation. */
+  /** What is declared smaller by a factor, and that factor: "the slope of theta in v 0.59"; otherwise empty. */
+  std::string smaller = {};
+  /** The size of the change. kObstacles: the largest distance, m. kInitialSet, kSlopes to kStateError: the factor.
+  kHorizon: the number of steps. kTail: the step at which it begins. kObservation: the number of outcomes that were
+  tried. kDomain, kRest, kLimits: the number of bounds. kLargerSlopes: the largest factor. kNoise: the largest addition,
+  in the state's unit. kOutlier: the observation. */
   double amount = 0;
   int row = -1, column = -1;   ///< kSlopes: the entry of L; -1: all of them.
   Eigen::VectorXd place = {};  ///< kObservation: z.

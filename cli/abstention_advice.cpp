@@ -1,7 +1,6 @@
 #include "cli/abstention_advice.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -24,43 +23,15 @@ void to_json(nlohmann::json& json, const Advice& advice) {
   if (!advice.turns) json["then"] = advice.then;
 }
 
-void from_json(const nlohmann::json& json, Advice& advice) {
-  int change = 0;
-  while (change < static_cast<int>(Change::kOutlier) && json.at("change") != Name(static_cast<Change>(change)))
-    ++change;
-  advice.change = static_cast<Change>(change);
-  json.at("what").get_to(advice.what);
-  json.at("amount").get_to(advice.amount);
-  json.at("turns").get_to(advice.turns);
-  advice.row = json.value("row", -1);
-  advice.column = json.value("column", -1);
-  const auto place = json.value("place", std::vector<double>());
-  advice.place = Eigen::Map<const Eigen::VectorXd>(place.data(), static_cast<Eigen::Index>(place.size()));
-  advice.then = json.value("then", std::string());
-}
-
 void to_json(nlohmann::json& json, const Remedy& remedy) {
   json = {{"what", remedy.what}, {"turns", remedy.turns}};
   if (!remedy.key.empty()) json.update({{"key", remedy.key}, {"value", remedy.value}});
-}
-
-void from_json(const nlohmann::json& json, Remedy& remedy) {
-  json.at("what").get_to(remedy.what);
-  json.at("turns").get_to(remedy.turns);
-  remedy.key = json.value("key", std::string());
-  remedy.value = json.value("value", 0.0);
 }
 
 void to_json(nlohmann::json& json, const AbstentionAdvice& advice) {
   json = {{"advice", advice.advices}};
   if (!advice.missing.empty()) json["missing"] = advice.missing;
   if (advice.remedy) json["remedy"] = *advice.remedy;
-}
-
-void from_json(const nlohmann::json& json, AbstentionAdvice& advice) {
-  json.at("advice").get_to(advice.advices);
-  advice.missing = json.value("missing", std::string());
-  if (json.contains("remedy")) advice.remedy = json.at("remedy").get<Remedy>();
 }
 
 namespace {
@@ -88,17 +59,6 @@ double Shortfall(const RecordedAbstention& abstention) {
   return std::isfinite(shortfall) ? shortfall : 0;
 }
 
-// Whether what was kept is of these abstentions. Places are used as they are.
-bool Fits(const std::vector<AbstentionAdvice>& kept, const std::vector<RecordedAbstention>& all) {
-  return std::ranges::equal(kept, all, [](const AbstentionAdvice& advice, const RecordedAbstention& abstention) {
-    const auto& problem = abstention.judged.problem;
-    if (!problem) return advice.advices.empty();
-    return std::ranges::all_of(advice.advices, [&](const Advice& each) {
-      return each.place.size() == 0 || (each.place.size() == problem->transitions.z.cols() && each.place.allFinite());
-    });
-  });
-}
-
 }  // namespace
 
 bool AbstentionAdvice::turned() const {
@@ -106,36 +66,38 @@ bool AbstentionAdvice::turned() const {
 }
 
 std::vector<AdviceGroup> GroupsOf(const AbstentionAdvice& advice) {
-  AdviceGroup enough{"it would be certified", {}}, not_enough{"not enough alone", {}};
+  AdviceGroup enough{"it would be certified"}, others{"other changes that certify it", true},
+      not_enough{"not enough alone", true};
+  std::map<ChangeKind, std::string> first;
+  std::string smaller;  // what is declared smaller and not enough, in one clause
   for (const Advice& each : advice.advices)
-    if (each.turns)
-      enough.clauses.push_back(each.what);
-    else
+    if (each.turns) {
+      const auto [of_kind, is_first] = first.try_emplace(KindOf(each.change), each.what);
+      if (!is_first) others.clauses.push_back(each.what);
+    } else if (!each.smaller.empty()) {
+      smaller += (smaller.empty() ? "" : ", ") + each.smaller;
+    } else {
       not_enough.clauses.push_back(each.what + ": then it is \"" + each.then + "\"");
+    }
+  for (const auto& [kind, what] : first) enough.clauses.push_back(std::string(Name(kind)) + ": " + what);
+  if (!smaller.empty())
+    not_enough.clauses.push_back("if one of these were declared so many times as large: " + smaller);
   std::vector<AdviceGroup> groups;
   if (const auto& remedy = advice.remedy)
-    groups.push_back({remedy->turns ? "it would be judged" : "it might be judged", {remedy->what}});
-  for (AdviceGroup* group : {&enough, &not_enough})
+    groups.push_back({remedy->turns ? "it would be judged" : "it might be judged", false, {remedy->what}});
+  for (AdviceGroup* group : {&enough, &others, &not_enough})
     if (!group->clauses.empty()) groups.push_back(std::move(*group));
   return groups;
 }
 
 std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
-                                                     const FinishedRuns* finished, const std::vector<std::string>& keys,
                                                      double seconds) {
   std::vector<std::vector<AbstentionAdvice>> advised(runs.size());
-  std::vector<std::atomic<std::size_t>> left(runs.size());
   std::vector<std::pair<std::size_t, std::size_t>> work;  // run, abstention
   std::map<const Config*, BrakingTails> tails;
   for (std::size_t run = 0; run < runs.size(); ++run) {
     const std::size_t count = runs[run].all.size();
-    if (finished)
-      if (auto kept = finished->FindAs<std::vector<AbstentionAdvice>>(keys[run]); kept && Fits(*kept, runs[run].all)) {
-        advised[run] = std::move(*kept);
-        continue;
-      }
     advised[run].assign(count, {});
-    left[run] = count;
     for (std::size_t i = 0; i < count; ++i) work.emplace_back(run, i);
     for (const auto& task : runs[run].tasks) tails[task.get()] = TailsOf(*task);
   }
@@ -151,7 +113,6 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
           "not searched within {:g} s: `forereach advise` searches all, or write a longer --advice-seconds", seconds);
     else
       advised[run][i] = AdviceFor(abstention, tails.at(abstention.task));
-    if (--left[run] == 0 && finished) finished->Keep(keys[run], advised[run]);
     progress.Advance();
   });
   return advised;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -22,8 +23,9 @@ struct AdviseArguments {
   std::vector<std::string> files;
   std::string config;
   LogKey key;
-  bool json = false;
-  EachRunOptions each_run;
+  bool json = false, all = false;
+  unsigned jobs = AllCores();
+  std::optional<double> seconds;
 };
 
 // Of one decision, or of runs: their logs, abstentions and advice.
@@ -70,13 +72,18 @@ std::vector<std::pair<std::string, int>> PlacesOf(const Advised& all) {
   return lines;
 }
 
-void PrintForPeople(const RecordedAbstention& abstention, const AbstentionAdvice& advice) {
+void PrintForPeople(const RecordedAbstention& abstention, const AbstentionAdvice& advice, bool all) {
   const std::vector<AdviceGroup> groups = GroupsOf(advice);
   if (groups.empty() && advice.missing.empty()) return;
   std::cout << Printable(abstention.name) << "\n  " << Printable(abstention.message) << "\n";
   if (!advice.missing.empty()) std::cout << "  " << Printable(advice.missing) << "\n";
   for (const AdviceGroup& group : groups) {
-    std::cout << "  " << group.heading << "\n";
+    std::cout << "  " << group.heading;
+    if (group.is_folded && !all) {
+      std::cout << ": " << group.clauses.size() << "; --all shows them\n";
+      continue;
+    }
+    std::cout << "\n";
     for (const std::string& clause : group.clauses) std::cout << "    " << Printable(clause) << "\n";
   }
 }
@@ -105,9 +112,10 @@ Totals TotalsOf(const Advised& all) {
   return totals;
 }
 
-void PrintForPeople(const Advised& all, const Totals& totals) {
-  all.ForEach(
-      [](const RecordedAbstention& abstention, const AbstentionAdvice& advice) { PrintForPeople(abstention, advice); });
+void PrintForPeople(const Advised& all, const Totals& totals, bool unfolds) {
+  all.ForEach([&](const RecordedAbstention& abstention, const AbstentionAdvice& advice) {
+    PrintForPeople(abstention, advice, unfolds);
+  });
   for (const std::string& missing : all.named.missing) std::cout << Printable(missing) << "\n";
   std::cout << "advise: " << totals.abstentions << " abstentions and rejections, " << totals.turned
             << " have a change that turns them, verified by certifying again; " << totals.certified
@@ -137,16 +145,12 @@ void PrintJson(const Advised& all, const Totals& totals) {
             << std::endl;
 }
 
-// Every run is read anew, since places are ranked over all of them; what takes long, the advice, may be kept.
 Advised AdviseRuns(const AdviseArguments& options) {
-  Advised all{RunsNamedBy(options.files, options.each_run.jobs), {}, {}};
+  Advised all{RunsNamedBy(options.files, options.jobs), {}, {}};
   NamedRuns& named = all.named;
   const RunTasks tasks(options.config, options.key, named.is_many);
-  const auto finished = ResultsOf(options.each_run, "advise", options.config, options.key);
-  std::vector<std::string> keys(named.runs.size());
-  auto read = ForEachRun<Abstentions>(named, options.each_run, "read", [&](const RunLogs& run, RunWork&) {
+  auto read = ForEachRun<Abstentions>(named, options.jobs, "read", [&](const RunLogs& run, RunWork&) {
     if (run.logs.empty()) return Abstentions{};
-    if (finished) keys[static_cast<std::size_t>(&run - named.runs.data())] = finished->KeyOf(run);
     Abstentions of_run = ReadAbstentions(run, tasks, named.is_many || run.logs.size() > 1);
     for (RecordedAbstention& each : of_run.all)
       if (named.is_many) each.name = run.robot + ": " + each.name;
@@ -155,14 +159,14 @@ Advised AdviseRuns(const AdviseArguments& options) {
   for (auto& of_run : read) all.runs.push_back(of_run ? std::move(*of_run) : Abstentions{});
   if (std::ranges::all_of(all.runs, [](const Abstentions& run) { return run.tasks.empty(); }))
     throw ConfigError(options.files[0] + ": " + (named.missing.empty() ? "no decisions" : named.missing[0]));
-  all.advice = AdviseAll(all.runs, options.each_run.jobs, finished.get(), keys);
+  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity));
   return all;
 }
 
 Advised AdviseDecision(const AdviseArguments& options) {
   Advised all;
   all.runs.push_back(AbstentionOf(options.files[0], options.config));
-  all.advice = AdviseAll(all.runs, options.each_run.jobs);
+  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity));
   return all;
 }
 
@@ -170,7 +174,7 @@ int RunAdvise(const AdviseArguments& options) {
   const bool is_document = options.files.size() == 1 && KindOf(options.files[0]) == FileKind::kJson;
   const Advised all = is_document ? AdviseDecision(options) : AdviseRuns(options);
   const Totals totals = TotalsOf(all);
-  options.json ? PrintJson(all, totals) : PrintForPeople(all, totals);
+  options.json ? PrintJson(all, totals) : PrintForPeople(all, totals, options.all);
   return all.named.missing.empty() && totals.turned == totals.abstentions ? 0 : 1;
 }
 
@@ -191,14 +195,19 @@ Command AdviseCommand() {
           "  forereach advise decision.json\n"
           "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach advise run/log\n"
-          "  forereach advise season --resume season.advice",
+          "  forereach advise season --advice-seconds 600",
       .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                             "The abstentions: a decision (the output of certify --json), or logs, databases and "
                             "directories, as in forereach replay"}),
                   {"--config", &options->config, "FILE", kTaskOfRecords},
+                  {"--advice-seconds", &options->seconds, "S",
+                   "How long to search, the abstentions that missed by least first; the others are said not to be "
+                   "searched. By default all are",
+                   NumberRange{0, 86400}},
+                  {"--all", &options->all, "", "Show every change, not the first of each kind alone"},
+                  JobsOption(options->jobs),
                   JsonFlag(options->json)},
       .run = [options] { return RunAdvise(*options); }};
-  options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

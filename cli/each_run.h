@@ -1,40 +1,22 @@
-/** Commands that go through many runs: on all cores, with a progress bar, and going on after an interruption. */
+/** Commands that go through many runs: on all cores, with a progress bar. */
 #pragma once
 
 #include <algorithm>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "cli/commands.h"
 #include "command_line/progress.h"
 #include "forereach/numerics/parallel.h"
 #include "lcmtypes/bad_input.h"
-#include "records/finished_runs.h"
 #include "records/log_trust.h"
 #include "records/output_file.h"
 #include "records/run_logs.h"
-#include "task/config.h"
 
 namespace forereach {
-
-/** The options of such a command. */
-struct EachRunOptions {
-  unsigned jobs = AllCores();
-  std::string resume;  ///< The directory of FinishedRuns; empty for none.
-
-  void AddTo(std::vector<Option>& options) {
-    options.push_back(JobsOption(jobs));
-    options.push_back({"--resume", &resume, "DIR",
-                       "Keep the results of finished runs in this directory, and take those that are there: a command "
-                       "that was interrupted goes on where it was"});
-  }
-};
 
 /** --key and --no-key. */
 inline void AddKeyOptions(std::vector<Option>& options, LogKey& key) {
@@ -72,18 +54,18 @@ class RunWork final {
   std::size_t told_ = 0;
 };
 
-/** Calls one(run, work) for each run, on `options.jobs` threads in all, and returns the results in the order of the
+/** Calls one(run, work) for each run, on `jobs` threads in all, and returns the results in the order of the
 runs. A run that cannot be read has none: its reason is added to `named.missing` if several runs were named, and is
 thrown otherwise. An error of the output ends everything.
 @tparam One Result(const RunLogs&, RunWork&).
 @param done what is done with the logs, for the progress bar: "replayed". @throws BadInput. */
 template <class Result, class One>
-std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOptions& options, const std::string& done,
+std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, unsigned jobs, const std::string& done,
                                               const One& one) {
   const std::size_t count = named.runs.size();
   std::vector<std::optional<Result>> results(count);
   std::vector<std::string> reasons(count);
-  const auto threads = static_cast<unsigned>(std::max<std::size_t>(options.jobs / std::max<std::size_t>(count, 1), 1));
+  const auto threads = static_cast<unsigned>(std::max<std::size_t>(jobs / std::max<std::size_t>(count, 1), 1));
   std::size_t units = 0;
   for (const RunLogs& run : named.runs) units += RunWork::UnitsOf(run);
   Progress progress("MB of logs " + done, units);
@@ -93,7 +75,7 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
     work.Finish(RunWork::UnitsOf(run));
     return result;
   };
-  ForEachInParallel(count, options.jobs, [&](std::size_t i, std::size_t) {
+  ForEachInParallel(count, jobs, [&](std::size_t i, std::size_t) {
     try {
       results[i] = make(named.runs[i]);
     } catch (const OutputError&) {
@@ -110,28 +92,5 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
     if (!reason.empty()) named.missing.push_back(std::move(reason));
   return results;
 }
-
-/** The same. Results are kept, and those that were kept are not made again.
-@tparam Result has to_json and from_json (nlohmann). @param finished null to keep none. */
-template <class Result, class One>
-std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOptions& options, const std::string& done,
-                                              const FinishedRuns* finished, const One& one) {
-  return ForEachRun<Result>(named, options, done, [&](const RunLogs& run, RunWork& work) -> Result {
-    if (!finished) return one(run, work);
-    const std::string key = finished->KeyOf(run);
-    if (auto kept = finished->FindAs<Result>(key)) return std::move(*kept);
-    Result result = one(run, work);
-    finished->Keep(key, result);
-    return result;
-  });
-}
-
-/** Everything besides the runs on which a command's result depends, a line each. @param command its name and the
-options that change a result; task file and key are added. @throws BadInput if one cannot be read. */
-[[nodiscard]] std::string JobOf(std::string command, const std::string& config, const LogKey& key);
-
-/** The results of finished runs of one command, or null without --resume. The parameters are those of JobOf. */
-[[nodiscard]] std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command,
-                                                      const std::string& config, const LogKey& key);
 
 }  // namespace forereach

@@ -24,7 +24,7 @@ struct ExportArguments {
   std::vector<std::string> inputs;
   std::string format, output;
   ExportOptions what;
-  EachRunOptions each_run;
+  unsigned jobs = AllCores();
 
   [[nodiscard]] bool is_table() const {
     return what.format == ExportFormat::kCsv || what.format == ExportFormat::kJsonLines;
@@ -136,12 +136,12 @@ int RunExport(ExportArguments options) {
   options.what.format =
       static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) - kExportFormats.begin());
   if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
-  NamedRuns named = RunsNamedBy(options.inputs, options.each_run.jobs);
+  NamedRuns named = RunsNamedBy(options.inputs, options.jobs);
   options.what.names_robot = named.is_many;
   RequireNoOutput(options, named);  // before the logs are read
   const PartsDirectory parts(options.output);
   const auto results =
-      ForEachRun<ExportResult>(named, options.each_run, "exported", [&](const RunLogs& run, RunWork& work) {
+      ForEachRun<ExportResult>(named, options.jobs, "exported", [&](const RunLogs& run, RunWork& work) {
         std::vector<std::string> files;
         for (const std::string& name : ExportFiles(options.what.format))
           files.push_back(parts.path / fmt::format("{}.{}", &run - named.runs.data(), name));
@@ -183,7 +183,7 @@ Command ExportCommand() {
                    "The task file of the recording, for its channels and its key; by default the one that the logger "
                    "kept next to the log, in tasks/, otherwise the usual channels"}},
       .run = [options] { return RunExport(*options); }};
-  command.options.push_back(JobsOption(options->each_run.jobs));
+  command.options.push_back(JobsOption(options->jobs));
   AddKeyOptions(command.options, options->what.key);
   return command;
 }

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string_view>
@@ -9,19 +11,23 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bus/bus_options.h"
+#include "bus/keys.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "cli/shards.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/grounds.h"
 #include "lcmtypes/printable.h"
-#include "records/finished_runs.h"
 #include "records/output_file.h"
-#include "task/config_error.h"
+#include "task/config.h"
 #include "task/files.h"
 #include "task/json_text.h"
 
 namespace forereach {
 namespace {
+
+namespace fs = std::filesystem;
 
 using PrintMerged = int (*)(const Shards&, bool json);
 const std::map<std::string, PrintMerged> kMerged = {
@@ -29,6 +35,64 @@ const std::map<std::string, PrintMerged> kMerged = {
 
 constexpr int kMostShards = 100'000;
 constexpr std::string_view kBeginning = "{\"command\":\"";  // of a shard's file
+
+// ---- On what a result depends.
+
+// Reads the file in blocks: a log may be larger than the memory.
+std::string DigestOfFile(const std::string& path) {
+  InputFile file(path, std::numeric_limits<std::int64_t>::max());
+  std::vector<char> block(1 << 20);
+  Digest digest{};
+  while (const std::size_t bytes = file.Read(block.data(), block.size()))
+    digest = ChainedDigest(digest, Bytes(reinterpret_cast<const std::uint8_t*>(block.data()), bytes));
+  return ToHex(digest);
+}
+
+std::string DigestOfProgram() { return DigestOfFile(fs::read_symlink("/proc/self/exe").string()); }
+
+// Names, sizes and times of the kept tasks: the content of each is checked against its name when it is read.
+std::string DescribeTasks(const fs::path& directory) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (fs::recursive_directory_iterator file(directory / "tasks", error), end; !error && file != end;
+       file.increment(error)) {
+    std::error_code none;
+    const auto bytes = file->is_regular_file(none) ? file->file_size(none) : 0;
+    files.push_back(fmt::format("{} {} {}\n", file->path().string(), bytes,
+                                file->last_write_time(none).time_since_epoch().count()));
+  }
+  std::ranges::sort(files);
+  std::string text;
+  for (const std::string& file : files) text += file;
+  return text;
+}
+
+// What a run is made of. Rows of a database are not in it: other rows are other cases, which merge finds.
+std::string DigestOfRun(const RunLogs& run) {
+  std::string inputs = run.robot + "\n" + run.database + "\n";
+  for (const std::string& log : run.logs) inputs += log + "\n" + DigestOfFile(log) + "\n";
+  return ToHex(DigestOf(inputs + DescribeTasks(fs::path(NameOf(run)).parent_path())));
+}
+
+// Everything besides the runs.
+std::string JobOf(const ShardedCommand& command) {
+  std::string job = command.name + " " + command.options;
+  BusOptions bus;
+  if (!command.config.empty()) {
+    const Config task = LoadConfig(command.config);
+    for (const auto& [name, digest] : kGrounds) job += " " + ToHex(task.grounds.*digest);
+    bus = task.bus;
+  }
+  command.key.Override(bus);
+  job += command.key.none ? "\nno key" : "\nkey";
+  if (const std::optional<KeyRing> keys = PublicKeysOf(bus)) {
+    job += " " + keys->robot();
+    for (const Role role : kAllRoles) job += " " + ToHex(DigestOf(Bytes(keys->public_key(role))));
+  }
+  return job;
+}
+
+// ---- Their files.
 
 // The file of one shard.
 struct ShardFile {
@@ -127,7 +191,7 @@ Shard ShardOptions::Get() const {
   if (!has_count || number < 1 || number > count || count > kMostShards)
     throw ConfigError(fmt::format("--shard: {} is not I/N with whole numbers 1 <= I <= N <= {}, for example 2/7",
                                   Printable(shard), kMostShards));
-  if (std::filesystem::exists(out) && ReadBeginning(out, kBeginning.size()) != kBeginning)
+  if (fs::exists(out) && ReadBeginning(out, kBeginning.size()) != kBeginning)
     throw OutputError(out + ": is not the file of a shard, and is not replaced");
   return {number - 1, count};
 }
@@ -137,9 +201,9 @@ int WriteShard(const ShardOptions& options, const ShardedCommand& command, const
   const Shard shard = options.Get();
   nlohmann::json runs = nlohmann::json::array();
   for (const RunLogs& run : named.runs)
-    runs.push_back({{"robot", run.robot}, {"name", NameOf(run)}, {"key", KeyOf(run, "")}});
+    runs.push_back({{"robot", run.robot}, {"name", NameOf(run)}, {"digest", DigestOfRun(run)}});
   nlohmann::json document{{"shard", shard.index + 1}, {"of", shard.count},        {"program", DigestOfProgram()},
-                          {"command", command.name},  {"job", command.job},       {"config", command.config},
+                          {"command", command.name},  {"job", JobOf(command)},    {"config", command.config},
                           {"is_many", named.is_many}, {"missing", named.missing}, {"runs", std::move(runs)},
                           {"results", results}};
   if (ParseJson(JsonText(document)) != document)
@@ -157,8 +221,8 @@ Shards::Shards(const std::vector<std::string>& files) {
   for (auto& [number, file] : ReadAllShards(files)) {
     try {
       if (results_.empty()) {
-        command_ = {file["command"].get<std::string>(), file["job"].get<std::string>(),
-                    file["config"].get<std::string>()};
+        name_ = file["command"].get<std::string>();
+        config_ = file["config"].get<std::string>();
         named_.is_many = file["is_many"].get<bool>();
         file["missing"].get_to(named_.missing);
         for (const nlohmann::json& run : file["runs"])

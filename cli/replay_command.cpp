@@ -26,14 +26,9 @@ struct ReplayArguments {
   std::string config, plan_digest;
   LogKey key;
   bool json = false, other_task = false, compare = false;
-  EachRunOptions each_run;
+  unsigned jobs = AllCores();
   ShardOptions shard;
 };
-
-// The command that a result depends on, and its part.
-std::string NameOfPart(const std::string& command, const ShardOptions& shard) {
-  return shard.is_given() ? command + " shard " + shard.shard : command;
-}
 
 // Of a run in which nothing was found. Of several runs, those with nothing to replay are passed over.
 void RequirePlans(const NamedRuns& named, const RunLogs& run, const LogKey& key) {
@@ -101,11 +96,9 @@ int PrintReplay(ResultsOfRuns<ReplayResult> results, const NamedRuns& named, boo
 
 int RunReplay(const ReplayArguments& options) {
   const Shard shard = options.shard.Get();
-  NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
+  NamedRuns named = RunsNamedBy(options.logs, options.jobs);
   const std::optional<Config> other = options.other_task ? std::optional(OtherTask(options)) : std::nullopt;
   const RunTasks own(other ? "" : options.config, options.key, named.is_many);
-  const std::string command = std::string("replay ") + (other ? "other " : "") + options.plan_digest;
-  const auto finished = ResultsOf(options.each_run, NameOfPart(command, options.shard), options.config, options.key);
   const auto replay = [&](const RunLogs& run, RunWork&) -> CaseResults<ReplayResult> {
     if (run.logs.empty()) return {};
     const bool names_files = named.is_many || run.logs.size() > 1;
@@ -119,11 +112,11 @@ int RunReplay(const ReplayArguments& options) {
     tasks.RequirePlans();
     return Replay(run.logs, tasks, options.plan_digest, names_files, shard);
   };
-  auto results = ForEachRun<CaseResults<ReplayResult>>(named, options.each_run, "replayed", finished.get(), replay);
+  auto results = ForEachRun<CaseResults<ReplayResult>>(named, options.jobs, "replayed", replay);
   if (options.shard.is_given())
     return WriteShard(options.shard,
-                      {.name = "replay", .job = JobOf(command, options.config, options.key), .config = options.config},
-                      named, results);
+                      {"replay", (other ? "other " : "") + options.plan_digest, options.config, options.key}, named,
+                      results);
   return PrintReplay(std::move(results), named, options.json);
 }
 
@@ -246,21 +239,17 @@ int PrintComparison(ResultsOfRuns<Comparison> results, const NamedRuns& named, c
 
 int RunCompare(const ReplayArguments& options) {
   const Shard shard = options.shard.Get();
-  NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
+  NamedRuns named = RunsNamedBy(options.logs, options.jobs);
   const Config task = OtherTask(options);
-  const auto finished = ResultsOf(options.each_run, NameOfPart("compare", options.shard), options.config, options.key);
   const auto compare = [&](const RunLogs& run, RunWork&) -> CaseResults<Comparison> {
     if (run.logs.empty()) return {};
     auto result = Compare(run.logs, task, named.is_many || run.logs.size() > 1, shard);
     if (result.cases == 0) RequirePlans(named, run, options.key);
     return result;
   };
-  auto results = ForEachRun<CaseResults<Comparison>>(named, options.each_run, "compared", finished.get(), compare);
+  auto results = ForEachRun<CaseResults<Comparison>>(named, options.jobs, "compared", compare);
   if (options.shard.is_given())
-    return WriteShard(
-        options.shard,
-        {.name = "compare", .job = JobOf("compare", options.config, options.key), .config = options.config}, named,
-        results);
+    return WriteShard(options.shard, {"compare", "", options.config, options.key}, named, results);
   return PrintComparison(std::move(results), named, options.config, options.json);
 }
 
@@ -282,7 +271,6 @@ Command ReplayCommand() {
       .footer =
           "With --compare: exit 0 if no certificate would have been lost, otherwise 1.\n\n"
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
-          "  forereach replay run/log --resume night.replayed\n"
           "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config config/demo.yaml\n"
           "  forereach replay run/log --compare --config config/demo.yaml\n"
           "  forereach replay run/log --shard 2/7 --out part2.json",
@@ -302,7 +290,7 @@ Command ReplayCommand() {
                    "Also print what was recorded and what is decided again on the candidates whose digest begins so"},
                   JsonFlag(options->json)},
       .run = [options] { return options->compare ? RunCompare(*options) : RunReplay(*options); }};
-  options->each_run.AddTo(command.options);
+  command.options.push_back(JobsOption(options->jobs));
   options->shard.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;

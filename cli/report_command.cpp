@@ -20,7 +20,7 @@ namespace {
 
 struct ReportArguments {
   ReportOptions report;
-  EachRunOptions each_run;
+  unsigned jobs = AllCores();
   std::string out, before;
   double advice_seconds = 2;
   bool force = false;
@@ -50,25 +50,25 @@ void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr
     std::erase_if(runs[run].all, [&](const RecordedAbstention& each) { return !row_of.contains(each.event); });
     for (const RecordedAbstention& each : runs[run].all) rows[run].push_back(row_of.at(each.event));
   }
-  const auto advised = AdviseAll(runs, options.each_run.jobs, nullptr, {}, options.advice_seconds);
+  const auto advised = AdviseAll(runs, options.jobs, options.advice_seconds);
   for (std::size_t run = 0; run < runs.size(); ++run)
     for (std::size_t i = 0; i < advised[run].size(); ++i) {
       PageAdvice& advice = page.advice.emplace_back();
       advice.decision = rows[run][i];
       advice.missing = advised[run][i].missing;
       for (AdviceGroup& group : GroupsOf(advised[run][i]))
-        advice.groups.push_back({std::move(group.heading), std::move(group.clauses)});
+        advice.groups.push_back({std::move(group.heading), group.is_folded, std::move(group.clauses)});
     }
 }
 
 PageRun GatherRuns(const ReportArguments& options) {
   const ReportOptions& report = options.report;
   const DetailBounds bounds;
-  NamedRuns named = RunsNamedBy(report.logs, options.each_run.jobs);
+  NamedRuns named = RunsNamedBy(report.logs, options.jobs);
   const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
   std::vector<std::unique_ptr<PageRead>> of_named(named.runs.size()), passes;
   std::atomic<std::size_t> cases = 0;
-  auto rows = ForEachRun<PageRun>(named, options.each_run, "read", [&](const RunLogs& run, RunWork&) {
+  auto rows = ForEachRun<PageRun>(named, options.jobs, "read", [&](const RunLogs& run, RunWork&) {
     auto& read = of_named[static_cast<std::size_t>(&run - named.runs.data())];
     read = std::make_unique<PageRead>(bounds);
     PageRun of_run = GatherRows(run, tasks, read->pass);
@@ -87,7 +87,7 @@ PageRun GatherRuns(const ReportArguments& options) {
   std::size_t bytes = bounds.bytes;
   const auto chosen = ChooseDetails(page, bounds), advised = ChooseAdvised(page, kMostAdvised);
   const RunLogs* const first = read.runs.data();
-  auto drawn = ForEachRun<PageRun>(read, options.each_run, "drawn", [&](const RunLogs& run, RunWork& work) {
+  auto drawn = ForEachRun<PageRun>(read, options.jobs, "drawn", [&](const RunLogs& run, RunWork& work) {
     const auto k = static_cast<std::size_t>(&run - first);
     if (chosen[k].empty() && advised[k].empty()) return PageRun();
     if (!passes[k]) {
@@ -164,7 +164,7 @@ Command ReportCommand() {
         if (!options->out.empty()) return WritePage(*options);
         return Report(options->report, std::cout) ? 0 : 1;
       }};
-  command.options.push_back(JobsOption(options->each_run.jobs));
+  command.options.push_back(JobsOption(options->jobs));
   AddKeyOptions(command.options, report.key);
   return command;
 }

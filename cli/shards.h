@@ -10,6 +10,7 @@ makes of all of them what the command prints without --shard. */
 #include <nlohmann/json.hpp>
 
 #include "command_line/command_line.h"
+#include "records/log_trust.h"
 #include "records/result_json.h"
 #include "records/run_logs.h"
 #include "records/shard.h"
@@ -28,9 +29,10 @@ struct ShardOptions {
 
 /** A command whose results can be merged. */
 struct ShardedCommand {
-  std::string name;    ///< replay, compare or verify
-  std::string job;     ///< Everything besides the runs on which its result depends: JobOf (each_run.h).
-  std::string config;  ///< The task file as it was named.
+  std::string name;     ///< replay, compare or verify
+  std::string options;  ///< Of those, the ones that change its result.
+  std::string config;   ///< The task file as it was named; empty for none.
+  LogKey key;
 };
 
 /** The results of one run are null if it could not be read. */
@@ -55,8 +57,8 @@ class Shards final {
   /** @throws BadInput with file and reason, unless they are all the shards of one command, of this program's. */
   explicit Shards(const std::vector<std::string>& files);
 
-  [[nodiscard]] const std::string& name() const { return command_.name; }
-  [[nodiscard]] const std::string& config() const { return command_.config; }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::string& config() const { return config_; }
   /** Of the runs, only their robots. */
   [[nodiscard]] const NamedRuns& named() const { return named_; }
   /** Of all cases. @throws BadInput if a shard does not say the same of a run as another, or has no such results. */
@@ -95,7 +97,7 @@ class Shards final {
   [[noreturn]] static void RefuseResults(const std::string& file);
   [[noreturn]] void RefuseRun(const std::string& file, std::size_t run) const;
 
-  ShardedCommand command_;
+  std::string name_, config_;
   NamedRuns named_;
   std::vector<OfShard> results_;  // in the order of their numbers
 };

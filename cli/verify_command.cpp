@@ -32,7 +32,7 @@ struct VerifyArguments {
   std::string config;
   LogKey key;
   bool json = false;
-  EachRunOptions each_run;
+  unsigned jobs = AllCores();
   ShardOptions shard;
 };
 
@@ -253,7 +253,7 @@ Verified SumOf(ResultsOfRuns<Verified> results) {
 int VerifyDecision(const VerifyArguments& options) {
   const std::string& file = options.files[0];
   if (options.shard.is_given()) throw ConfigError(file + ": --shard divides logs, and this is a single decision");
-  Verifying verifying(options.each_run.jobs, nullptr, {});
+  Verifying verifying(options.jobs, nullptr, {});
   Verified sum = verifying.Finish(ReadCertificates(file, options.config, options.key, verifying)).Sum();
   sum.of_decision = true;
   return PrintVerified(sum, {}, options.json);
@@ -262,20 +262,16 @@ int VerifyDecision(const VerifyArguments& options) {
 int Verify(const VerifyArguments& options) {
   const Shard shard = options.shard.Get();
   if (IsDocument(options.files)) return VerifyDecision(options);
-  NamedRuns named = RunsNamedBy(options.files, options.each_run.jobs);
+  NamedRuns named = RunsNamedBy(options.files, options.jobs);
   const RunTasks tasks(options.config, options.key, named.is_many);
-  const std::string part = options.shard.is_given() ? " shard " + options.shard.shard : "";
-  const auto finished = ResultsOf(options.each_run, "verify" + part, options.config, options.key);
   const auto verify = [&](const RunLogs& run, RunWork& work) {
     Verifying verifying(work.threads, named.is_many ? &run.robot : nullptr, shard);
     return verifying.Finish(
         ReadRun(run, tasks, named.is_many, verifying, [&](std::int64_t bytes) { work.Read(bytes); }));
   };
-  auto results = ForEachRun<CaseResults<Verified>>(named, options.each_run, "verified", finished.get(), verify);
+  auto results = ForEachRun<CaseResults<Verified>>(named, options.jobs, "verified", verify);
   if (options.shard.is_given())
-    return WriteShard(options.shard,
-                      {.name = "verify", .job = JobOf("verify", options.config, options.key), .config = options.config},
-                      named, results);
+    return WriteShard(options.shard, {"verify", "", options.config, options.key}, named, results);
   return PrintVerified(SumOf(std::move(results)), named, options.json);
 }
 
@@ -306,7 +302,7 @@ Command VerifyCommand() {
                   {"--config", &options->config, "FILE", kTaskOfRecords},
                   JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
-  options->each_run.AddTo(command.options);
+  command.options.push_back(JobsOption(options->jobs));
   options->shard.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;

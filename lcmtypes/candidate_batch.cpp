@@ -104,12 +104,16 @@ bool Append(candidate_batch_t& batch, const candidate_plan_t& candidate) {
   return true;
 }
 
-std::vector<Digest> DigestsIn(Bytes message) {
+Digest KeyOfCandidates(Bytes message) {
   const auto batch = BatchIn(message);
-  if (!batch) return {DigestOf(message)};
-  std::vector<Digest> digests;
-  for (int k = 0; k < batch->num_candidates; ++k) digests.push_back(DigestOf(Encode(CandidateOf(*batch, k))));
-  return digests;
+  return batch ? BatchKey(batch->source, batch->utime) : DigestOf(message);
+}
+
+Digest BatchKey(const std::uint8_t (&source)[32], std::int64_t utime) {
+  std::vector<std::uint8_t> bytes(std::begin(source), std::end(source));
+  const auto stamp = BigEndian(utime);
+  bytes.insert(bytes.end(), stamp.begin(), stamp.end());
+  return DigestOf(Bytes(bytes));
 }
 
 std::vector<std::uint8_t> CandidateIn(Bytes message, const Digest& plan) {

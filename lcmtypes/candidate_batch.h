@@ -35,9 +35,12 @@ if there is no room or its counts are out of range. @pre the others agree with t
 controls, and its plan_id is the next one. */
 [[nodiscard]] bool Append(candidate_batch_t& batch, const candidate_plan_t& candidate);
 
-/** The digests of the candidates that a message stands for; any other message stands for itself. Cost: 10 us for each.
- */
-[[nodiscard]] std::vector<Digest> DigestsIn(Bytes message);
+/** By what a message with candidates is found again for the decision on one of them: its digest; of one that stands for
+many, which would cost 10 us for each, BatchKey. */
+[[nodiscard]] Digest KeyOfCandidates(Bytes message);
+
+/** The key of a batch, by the source and the stamp that decisions repeat. */
+[[nodiscard]] Digest BatchKey(const std::uint8_t (&source)[32], std::int64_t utime);
 
 /** The bytes of the candidate with this digest: those of one of a batch, otherwise of the message itself. */
 [[nodiscard]] std::vector<std::uint8_t> CandidateIn(Bytes message, const Digest& plan);

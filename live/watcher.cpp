@@ -148,7 +148,7 @@ bool Watcher::TakeMessage(const LogEvent& event) {
   const BusOptions& channels = task_.bus;
   if (event.channel == channels.candidate) {
     if (!Decoded<candidate_plan_t>(event.message()) && !Decoded<candidate_batch_t>(event.message())) return false;
-    candidates_.Add(DigestsIn(event.message()), Copy(event.message()));
+    candidates_.Add(KeyOfCandidates(event.message()), Copy(event.message()));
     return true;
   }
   if (event.channel == channels.certified) {
@@ -177,10 +177,10 @@ bool Watcher::TakeDecision(const LogEvent& event) {
   const auto decision = Decoded<decision_t>(event.message());
   if (!decision) return false;
   Decided& decided = decided_.back();  // its row was made just now
-  const Digest plan = GetDigest(decision->plan_digest);
+  const PlanKeys keys(*decision);
   decided.decision = *decision;
-  if (const auto message = candidates_.Take(plan)) decided.candidate = CandidateIn(*message, plan);
-  decided.certificate = certificates_.Take(plan);
+  if (const auto message = candidates_.Take(keys)) decided.candidate = CandidateIn(*message, keys.plan);
+  decided.certificate = certificates_.Take(keys.plan);
   decided.obstacles = obstacles_;
   if (decision->outcome != decision_t::REJECTED) ReadAgainFor(GetDigest(decision->config_digest), event.utime);
   return true;

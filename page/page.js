@@ -156,7 +156,8 @@ const sortedOf = (run, name) => {
   let count = 0;
   for (let k = 0; k < run.size; ++k) {
     const value = values[run.rows[k]];
-    if (value > 0 && value < Infinity) sorted[count++] = value;  // zero: the simulated clock stops during computations
+    // Zero: the simulated clock stops during computations. An hour or more: the log's clock stepped.
+    if (value > 0 && value < 3.6e9) sorted[count++] = value;
   }
   return run.sorted[name] = sorted.subarray(0, count).sort();
 };
@@ -595,10 +596,11 @@ const showAdvice = (run, i, advise) => {
   const advice = run.drawings.adviceOf.get(i), box = byId('advice');
   box.hidden = nameAt(run.decisions.outcome, i) === 'certified';
   const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}`;
-  const parts = (advice?.groups ?? []).flatMap(([heading, clauses]) => {
-    const list = make('ul');
+  const parts = (advice?.groups ?? []).map(([heading, isFolded, clauses]) => {
+    const group = make(isFolded ? 'details' : 'div'), list = make('ul');
     list.append(...clauses.map((clause) => make('li', clause)));
-    return [make('p', sentence(heading)), list];
+    group.append(make(isFolded ? 'summary' : 'p', sentence(heading)), list);
+    return group;
   });
   if (advice?.missing) parts.unshift(make('p', sentence(advice.missing)));
   if (!advice) parts.push(make('p', advise ? `This page has advice on the last decisions only. This command prints the advice on all: ${advise}` : 'Its log was not read.'));

@@ -68,7 +68,8 @@ struct PageDetail {
 struct PageAdvice {
   struct Group {
     std::string heading;
-    std::vector<std::string> clauses;
+    bool is_folded = false;
+    std::vector<std::string> clauses = {};
   };
   std::size_t decision = 0;  ///< Index in PageRun::decisions.
   std::string missing;       ///< Why there is none; empty if there is some.

@@ -172,7 +172,7 @@ Json TasksJson(const std::vector<PageTask>& tasks) {
 Json ToJson(const PageAdvice& advice) {
   Json groups = Json::array();
   for (const PageAdvice::Group& group : advice.groups)
-    groups.push_back({Printable(group.heading), TextsJson(group.clauses)});
+    groups.push_back({Printable(group.heading), group.is_folded, TextsJson(group.clauses)});
   return {{"row", advice.decision}, {"missing", Printable(advice.missing)}, {"groups", std::move(groups)}};
 }
 

@@ -50,8 +50,9 @@ class Comparer final : public GateFollower {
     if (!was && !is) Refuse(before, after);
   }
 
+  void OnUndecided(const RecordedCandidate&) override { cases_.counts.undecided += cases_.Next(shard_); }
+
   CaseResults<Comparison> Finish(const Timeline& timeline) {
-    timeline.undecided().ForEach([this](const RecordedCandidate&) { cases_.counts.undecided += cases_.Next(shard_); });
     cases_.of_run.corruptions = timeline.damage().places;
     cases_.of_run.passed_over = timeline.passed_over();
     return std::move(cases_);
@@ -87,6 +88,7 @@ CaseResults<Comparison> Compare(const std::vector<std::string>& logs, const Conf
   Comparer comparer(shard);
   Timeline timeline(task, {&comparer});
   timeline.Read(logs, names_files);
+  timeline.End();
   return comparer.Finish(timeline);
 }
 

@@ -1,7 +1,6 @@
 #include "records/database.h"
 
 #include <array>
-#include <bit>
 #include <cerrno>
 #include <string_view>
 #include <tuple>
@@ -135,22 +134,6 @@ class Database::Statement final {
     if (result != SQLITE_ROW) sqlite3_reset(statement_);
     if (result != SQLITE_ROW && result != SQLITE_DONE) throw DatabaseError(WhySqlRefuses(handle_));
     return result == SQLITE_ROW;
-  }
-
-  /** All columns of the row with their types and lengths. Reals have all their digits. */
-  [[nodiscard]] std::string Text() const {
-    std::string text;
-    for (int i = 0; i < sqlite3_column_count(statement_); ++i) {
-      const int type = sqlite3_column_type(statement_, i);
-      const double real = type == SQLITE_FLOAT ? sqlite3_column_double(statement_, i) : 0;
-      const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, i));
-      const std::string value =
-          type == SQLITE_FLOAT
-              ? std::to_string(std::bit_cast<std::int64_t>(real))
-              : std::string(bytes ? bytes : "", static_cast<std::size_t>(sqlite3_column_bytes(statement_, i)));
-      text += fmt::format("{} {} {}", type, value.size(), value);
-    }
-    return text;
   }
 
   /** Runs it to its end and returns how many rows it changed. */
@@ -359,19 +342,6 @@ std::vector<RunRow> Database::Runs() {
       if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")
         throw DatabaseError("database: " + path_ + ": a run names a log that is not in its directory: " + file);
   return runs;
-}
-
-Digest Database::DigestOfRows(const std::string& log_file) {
-  Digest digest{};
-  for (const char* table : {"runs", "decisions", "execution_events", "gaps"}) {
-    Statement rows(handle_.get(),
-                   (std::string("SELECT * FROM ") + table + " WHERE log_file = ? ORDER BY rowid").c_str());
-    for (rows.Bind(log_file); rows.Step();) {
-      const std::string row = table + rows.Text();
-      digest = ChainedDigest(digest, Bytes(reinterpret_cast<const std::uint8_t*>(row.data()), row.size()));
-    }
-  }
-  return digest;
 }
 
 std::vector<LogReference> Database::References(const std::string& log_file) {

@@ -68,9 +68,6 @@ class Database final {
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
 
-  /** A digest of everything that the database has of one log file. @throws DatabaseError. */
-  [[nodiscard]] Digest DigestOfRows(const std::string& log_file);
-
   /** The events from which rows of one log file were made, by number. An event appears twice if two of its rows have
   different digests. @throws DatabaseError. */
   [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);

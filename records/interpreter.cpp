@@ -107,11 +107,11 @@ void Interpreter::Observe(const LogEvent& event, Rows& rows) {
     rows.gaps.push_back(std::move(*gap));
   }
   if (event.channel == channels_.candidate) {
-    candidates_.Add(DigestsIn(event.message()), event.utime);
+    candidates_.Add(KeyOfCandidates(event.message()), event.utime);
   } else if (event.channel == channels_.decision) {
     if (const auto decision = Decoded<decision_t>(event.message())) {
       DecisionRow row = MakeRow(*decision, reference());
-      row.latency_us = LatencyUs(GetDigest(decision->plan_digest), event.utime);
+      row.latency_us = LatencyUs(*decision, event.utime);
       rows.decisions.push_back(std::move(row));
     }
   } else if (event.channel == channels_.event) {
@@ -148,8 +148,8 @@ std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
   return gap;
 }
 
-double Interpreter::LatencyUs(const Digest& plan, std::int64_t utime) {
-  const std::optional<std::int64_t> received = candidates_.Take(plan);
+double Interpreter::LatencyUs(const decision_t& decision, std::int64_t utime) {
+  const std::optional<std::int64_t> received = candidates_.Take(PlanKeys(decision));
   return received ? static_cast<double>(utime - *received) : kNoNumber;
 }
 

@@ -62,7 +62,7 @@ class Interpreter final {
   };
 
   [[nodiscard]] std::optional<GapRow> CheckSequence(const LogEvent& event);  // without its event
-  [[nodiscard]] double LatencyUs(const Digest& plan, std::int64_t utime);
+  [[nodiscard]] double LatencyUs(const decision_t& decision, std::int64_t utime);
 
   BusOptions channels_;
   std::string log_file_;

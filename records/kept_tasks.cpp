@@ -100,6 +100,8 @@ TaskCopy CopyTask(const Config& config) {
 
 KeptTasks::KeptTasks(const std::string& log_directory) : path_((fs::path(log_directory) / kTasks).string()) {}
 
+KeptTasks KeptTasks::Beside(const std::string& log) { return KeptTasks(fs::path(log).parent_path().string()); }
+
 std::string KeptTasks::PathOf(const Digest& digest) const { return path_ + "/" + ToHex(digest); }
 
 void KeptTasks::Keep(const TaskCopy& copy) const {

@@ -35,6 +35,8 @@ class KeptTasks final {
  public:
   /** @param log_directory the directory of the logs. Keep creates it if necessary. */
   explicit KeptTasks(const std::string& log_directory);
+  /** Those of a log's directory. */
+  [[nodiscard]] static KeptTasks Beside(const std::string& log);
 
   /** Keeps a task unless it is kept already. Each file appears whole or not at all, and is on the disk on return.
   @throws BadInput if it cannot be written, or transitions and digest do not agree. */

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "lcmtypes/printable.h"
 #include "records/event_record.h"
 #include "records/log_survey.h"
 #include "records/output_file.h"
@@ -108,6 +109,17 @@ void ForEachByTime(const std::vector<std::string>& logs, const std::function<voi
   }
 }
 
+// A channel that was chosen by a name that is none says nothing of the log.
+void RequireChannels(const LogSelection& selection, const std::set<std::string>& seen) {
+  for (const std::string& channel : selection.channels) {
+    if (seen.contains(channel) || seen.size() == LogEditResult::kMostChannels) continue;
+    std::string names;
+    for (const std::string& name : seen) names += (names.empty() ? "" : ", ") + Printable(name);
+    throw LogError(Printable(channel) + ": no event has this channel; " +
+                   (names.empty() ? "there are no events" : "the channels are " + names));
+  }
+}
+
 std::int64_t FirstUtime(const std::vector<std::string>& logs) {
   LogEditResult ignored;
   for (const std::string& log : logs)
@@ -170,12 +182,14 @@ LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection&
   const Selector selector(selection, logs);
   LogEditResult result;
   const auto visit = [&](const Source& source) {
+    if (result.channels.size() < LogEditResult::kMostChannels) result.channels.insert(source.event().channel);
     const auto summary = Summarize(source.event().message());
     if (!selector.Takes(source.event(), summary)) return;
     ++result.chosen;
     user.on_event(source.event(), summary, source.path());
   };
   (sequence == LogSequence::kByTime ? ForEachByTime : ForEachInOrder)(logs, user.on_damage, result, visit);
+  RequireChannels(selection, result.channels);
   return result;
 }
 

@@ -45,13 +45,18 @@ struct LogEditResult {
   std::int64_t events = 0, chosen = 0;
   LogDamage damage;  ///< Without cut ends.
   std::int64_t cut_ends = 0;
+  /** Names of channels, at most kMostChannels. */
+  std::set<std::string> channels = {};
+
+  static constexpr std::size_t kMostChannels = 64;
 };
 
 enum class LogSequence { kAsNamed, kByTime };
 
 /** Reads logs, one behind the other or merged by time. Merged events of one log keep their order, also where its clock
 went back. Memory: one event of each log that is open, and 32 bytes for each plan with the outcome.
-@throws LogError if a log cannot be read, is named twice or is of another kind; if a time cannot be read. */
+@throws LogError if a log cannot be read, is named twice or is of another kind; if a time cannot be read; at the end, if
+no event has a channel that was chosen. */
 [[nodiscard]] LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection& selection,
                                      LogSequence sequence, const LogUser& user);
 

@@ -29,12 +29,10 @@ std::optional<std::pair<Digest, Digest>> NamedBy(Bytes message) {
   return std::nullopt;
 }
 
-std::string DirectoryOf(const std::string& log) { return std::filesystem::path(log).parent_path().string(); }
-
 }  // namespace
 
 LogTasks::LogTasks(std::vector<std::string> logs, std::shared_ptr<const Config> given, LogKey key, bool must_be_given)
-    : logs_(std::move(logs)), given_(std::move(given)), key_(std::move(key)), kept_(DirectoryOf(logs_.front())) {
+    : logs_(std::move(logs)), given_(std::move(given)), key_(std::move(key)), kept_(KeptTasks::Beside(logs_.front())) {
   RequireLogs(logs_);
   Look(must_be_given && given_);
   if (order_.empty() && given_) found_.push_back(given_);  // candidates, and no decision
@@ -138,7 +136,7 @@ BusOptions ChannelsOf(const std::vector<std::string>& logs, const std::string& g
   Config task;
   if (!given.empty()) {
     task = LoadConfig(given, TransitionsFile::kIgnore);
-  } else if (KeptTasks(DirectoryOf(logs.front())).HasAny()) {
+  } else if (KeptTasks::Beside(logs.front()).HasAny()) {
     const LogTasks tasks(logs, nullptr, key, false);
     if (!tasks.found().empty()) return tasks.first().bus;
   }

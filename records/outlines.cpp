@@ -123,6 +123,7 @@ std::optional<ObstaclePlace> PlaceOf(const Obstacle& obstacle, double time_us) {
     const double tau = (time_us - static_cast<double>(motion->stamp_us)) * 1e-6;
     place.shift = (motion->velocity * tau).head<2>();
     place.radius += motion->uncertainty + motion->growth * std::abs(tau) + motion->growth_rate * tau * tau / 2;
+    if (!(place.radius < Svg::kFarthest)) place.radius = Svg::kFarthest;  // it may be anywhere
   }
   std::vector<Vector2d> points;
   for (const Eigen::Vector3d& point : obstacle.hull()) points.push_back(point.head<2>() + place.shift);

@@ -38,7 +38,7 @@ void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
   user_.OnMessage(event);
   const auto reference = [&] { return LogReference{log_file, event.number, ToHex(DigestOf(event))}; };
   if (event.channel == channels_.candidate) {
-    candidates_.Add(DigestsIn(event.message()), {event.message().begin(), event.message().end()});
+    candidates_.Add(KeyOfCandidates(event.message()), {event.message().begin(), event.message().end()});
   } else if (event.channel == channels_.certified) {
     if (const auto certified = Decoded<certified_plan_t>(event.message()))
       user_.OnCertified(*certified, reference());
@@ -53,9 +53,9 @@ void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
   for (const EventRow& execution : rows.events) user_.OnExecution(execution);
   if (rows.decisions.empty()) return;
   const auto decision = Decoded<decision_t>(event.message());
-  const Digest plan = GetDigest(decision->plan_digest);
-  const auto message = candidates_.Take(plan);
-  const auto candidate = message ? Decoded<candidate_plan_t>(CandidateIn(*message, plan)) : std::nullopt;
+  const PlanKeys keys(*decision);
+  const auto message = candidates_.Take(keys);
+  const auto candidate = message ? Decoded<candidate_plan_t>(CandidateIn(*message, keys.plan)) : std::nullopt;
   user_.OnDecision(rows.decisions.front(), candidate ? &*candidate : nullptr);
 }
 

@@ -116,13 +116,14 @@ class Replayer final : public GateFollower {
       Differ(recorded.event, withdrawal.plan_id, difference);
   }
 
+  void OnUndecided(const RecordedCandidate& candidate) override {
+    if (result_.Next(shard_)) Differ(candidate.event, -1, "no decision recorded");
+  }
+
   CaseResults<ReplayResult> Finish(const Timeline& timeline) {
     result_.of_run.candidates = timeline.candidates();
     result_.of_run.corruptions = timeline.damage().places;
     result_.of_run.passed_over = timeline.passed_over();
-    timeline.undecided().ForEach([this](const RecordedCandidate& candidate) {
-      if (result_.Next(shard_)) Differ(candidate.event, -1, "no decision recorded");
-    });
     return std::move(result_);
   }
 
@@ -210,6 +211,7 @@ CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, LogTasks&
   Replayer replayer(plan_digest, shard);
   Timeline timeline(tasks, {&replayer});
   timeline.Read(logs, names_files);
+  timeline.End();
   return replayer.Finish(timeline);
 }
 
@@ -218,6 +220,7 @@ CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, const Con
   Replayer replayer(plan_digest, shard);
   Timeline timeline(task, {&replayer});
   timeline.Read(logs, names_files);
+  timeline.End();
   return replayer.Finish(timeline);
 }
 

@@ -1,4 +1,4 @@
-/** Results of runs as FinishedRuns and the files of shards keep them. */
+/** Results of runs as the files of shards keep them. */
 #pragma once
 
 #include <nlohmann/json.hpp>

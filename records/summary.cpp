@@ -17,6 +17,7 @@
 namespace forereach {
 namespace {
 
+constexpr std::int64_t kBackUs = 1'000'000, kAheadUs = 3'600'000'000;  // a step of the clock, and no passing of time
 constexpr std::size_t kRepeated = 256;  // answers to withdrawals that may be repeated at one time
 
 double NearestRank(std::vector<double>& values, double fraction) {
@@ -97,6 +98,10 @@ std::string ToText(const Summary& summary) {
     line("damage in the log", fmt::format("{} places, {} bytes skipped", summary.damage.places, summary.damage.bytes));
   if (const std::string refused = DescribeRefusals(summary.passed_over.not_authentic); !refused.empty())
     line("not authentic", refused + ", passed over");
+  if (summary.clock_steps > 0)
+    line("clock stepped",
+         fmt::format("{} times, first at event {} by {:+.3f} s; times across it are left out", summary.clock_steps,
+                     summary.first_step_event, static_cast<double>(summary.first_step_us) * 1e-6));
   line("duration", fmt::format("{:.1f} s", summary.duration_s));
   return text;
 }
@@ -131,6 +136,9 @@ nlohmann::json ToJson(const Summary& summary) {
   json["damage"] = {{"places", summary.damage.places}, {"bytes", summary.damage.bytes}};
   json["passed_over"] = ToJson(summary.passed_over);
   json["duration_s"] = summary.duration_s;
+  json["clock_steps"] = {{"count", summary.clock_steps},
+                         {"first_event", summary.clock_steps > 0 ? nlohmann::json(summary.first_step_event) : nullptr},
+                         {"first_us", summary.first_step_us}};
   return json;
 }
 
@@ -164,9 +172,7 @@ Quantiles SummaryBuilder::Samples::Get() const {
 }
 
 void SummaryBuilder::Add(const LogEvent& event) {
-  // Where the clock was set back, or a log of before follows, no time passes.
-  if (last_utime_ && event.utime > *last_utime_) elapsed_us_ += event.utime - *last_utime_;
-  last_utime_ = event.utime;
+  TakeTime(event);
   auto& messages = summary_.messages;
   ++messages[messages.size() < Summary::kMaxChannels || messages.contains(event.channel) ? event.channel : "*"];
   if (event.channel == channels_.candidate) ++summary_.proposed;
@@ -181,6 +187,19 @@ void SummaryBuilder::Add(const LogEvent& event) {
     state_.assign(state->state, state->state + std::clamp<int>(state->num_states, 0, 16));
 }
 
+// Where the clock was set back or ahead, or a log of before follows, no time passes.
+void SummaryBuilder::TakeTime(const LogEvent& event) {
+  const std::int64_t passed = last_utime_ ? event.utime - *last_utime_ : 0;
+  last_utime_ = event.utime;
+  if (-kBackUs < passed && passed < kAheadUs) {
+    elapsed_us_ += std::max<std::int64_t>(passed, 0);
+    return;
+  }
+  if (summary_.clock_steps++ > 0) return;
+  summary_.first_step_event = event.number;
+  summary_.first_step_us = passed;
+}
+
 void SummaryBuilder::Add(const DecisionRow& row) {
   ++summary_.decided;
   if (row.outcome == "certified") {
@@ -188,7 +207,7 @@ void SummaryBuilder::Add(const DecisionRow& row) {
   } else {
     ++(row.outcome == "rejected" ? summary_.rejected : summary_.abstained)[row.cause];
   }
-  latency_.Add(row.latency_us);
+  if (0 <= row.latency_us && row.latency_us < static_cast<double>(kAheadUs)) latency_.Add(row.latency_us);
   if (row.outcome != "rejected") certify_.Add(row.elapsed_us);
 }
 

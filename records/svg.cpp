@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kFarthest = 1e9, kTolerance = 0.005;
+constexpr double kTolerance = 0.005;
 constexpr int kGrid = 1 << 14;
 
 double DistanceToChord(const Vector2d& point, const Vector2d& from, const Vector2d& to) {
@@ -87,7 +87,7 @@ void Svg::Polygon(const Points& corners, std::string_view attributes, std::strin
 void Svg::Line(const Points& points, std::string_view attributes) { Path(points, false, attributes, ""); }
 
 void Svg::Circle(const Vector2d& center, double radius, std::string_view attributes, std::string_view inside) {
-  if (!CanBeDrawn(center) || !(radius >= 0 && radius < kFarthest)) return;
+  if (!CanBeDrawn(center) || !(radius >= 0 && radius <= kFarthest)) return;
   fmt::format_to(std::back_inserter(text_), "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" {}>{}</circle>",
                  Length(center.x() - origin_.x()), Length(origin_.y() - center.y()), Length(radius), attributes,
                  inside);

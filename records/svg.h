@@ -21,6 +21,8 @@ class Svg final {
   /** In a group that maps a grid of 2^14 cells over the frame to metres. Done ends it. @pre CanBeDrawn(frame). */
   explicit Svg(const Eigen::AlignedBox2d& frame);
 
+  static constexpr double kFarthest = 1e9;  ///< metres
+
   [[nodiscard]] static bool CanBeDrawn(const Eigen::Vector2d& point);
   /** Whether a frame has a place in the plane. */
   [[nodiscard]] static bool CanBeDrawn(const Eigen::AlignedBox2d& frame);

@@ -9,7 +9,6 @@
 #include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/certifier_status_t.hpp"
-#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -68,13 +67,19 @@ void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
   });
 }
 
+void Timeline::End() {
+  while (const auto candidate = undecided_.TakeFirst()) Tell(&TimelineUser::OnUndecided, *candidate);
+}
+
 void Timeline::Take(const LogEvent& event, const std::string& name) {
   if (!authenticator_.IsAuthentic(event)) return;
   ++place_;
   Tell(&TimelineUser::OnEvent, event);
   if (event.channel == channels_.candidate) {
     ++candidates_;
-    undecided_.Add(DigestsIn(event.message()), {{event.message().begin(), event.message().end()}, name, place_});
+    const auto oldest = undecided_.Add(KeyOfCandidates(event.message()),
+                                       {{event.message().begin(), event.message().end()}, name, place_});
+    if (oldest) Tell(&TimelineUser::OnUndecided, *oldest);
   } else if (event.channel == channels_.decision) {
     TakeDecision(event, name);
   } else if (event.channel == channels_.certified) {
@@ -232,8 +237,9 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
   const auto decision = Decoded<decision_t>(event.message());
   if (!decision) return;
   if (Heed(decisions_, {decision->sequence, decision->utime}, event) == Told::kStarts) Start();
-  const Digest plan = GetDigest(decision->plan_digest);
-  RecordedDecision recorded{*decision, name, undecided_.Take(plan), true, {}};
+  const PlanKeys keys(*decision);
+  const Digest& plan = keys.plan;
+  RecordedDecision recorded{*decision, name, undecided_.Take(keys), true, {}};
   if (recorded.candidate) recorded.candidate->bytes = CandidateIn(recorded.candidate->bytes, plan);
   const Config* task = find_(GetDigest(decision->config_digest));
   recorded.is_of_known_task = task != nullptr;
@@ -257,11 +263,12 @@ void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
     return;
   }
   if (Heed(certified_, {certified->sequence, certified->utime}, event) == Told::kStarts) Start();
-  const Digest plan = DigestOf(Encode(certified->plan));
+  const PlanKeys keys(certified->plan);
+  const Digest& plan = keys.plan;
   const Grounds named = GroundsOf(*certified);
   const Config* task = find_(named.config);
   RecordedPlan recorded{*certified, name, false, task != nullptr, {}};
-  const RecordedCandidate* const waiting = undecided_.Find(plan);
+  const RecordedCandidate* const waiting = undecided_.Find(keys);
   const auto decided = decided_.find(plan);
   recorded.has_candidate = waiting || (decided != decided_.end() && decided->second.has_candidate);
   if (decided != decided_.end() && !waiting) {

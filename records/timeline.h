@@ -111,6 +111,7 @@ class TimelineUser {
   virtual void OnDecision(const RecordedDecision&) {}
   virtual void OnCertified(const RecordedPlan&) {}
   virtual void OnWithdrawn(const RecordedWithdrawal&) {}
+  virtual void OnUndecided(const RecordedCandidate&) {}  ///< No decision follows, or one after kMostUndecided others.
 };
 
 /** The problem with these transitions behind its own; the problem itself if there are none. */
@@ -137,11 +138,15 @@ class Timeline final {
   /** Reads consecutive event logs of one run, which follow those that were read before.
   @param names_files whether names of events include the log's name. @throws LogError if a log cannot be read. */
   void Read(const std::vector<std::string>& logs, bool names_files);
+  /** Tells of the candidates that wait for a decision. */
+  void End();
+
+  /** Candidates that may wait for their decisions; of more, the oldest count as undecided. */
+  static constexpr std::size_t kMostUndecided = 4096;
 
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
   [[nodiscard]] PassedOver passed_over() const { return {authenticator_.refusals(), undecodable_}; }
   [[nodiscard]] std::int64_t candidates() const { return candidates_; }
-  [[nodiscard]] const Undecided<RecordedCandidate>& undecided() const { return undecided_; }
   /** All transitions that were learned under a task, in the order of the log. */
   [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) { return *LearnedUnder(task); }
   /** The obstacles in force after everything that was logged. */
@@ -212,7 +217,7 @@ class Timeline final {
 
   std::int64_t place_ = 0, undecodable_ = 0, candidates_ = 0;
   LogDamage damage_;
-  Undecided<RecordedCandidate> undecided_;
+  Undecided<RecordedCandidate> undecided_{kMostUndecided};
   // Of the last kMostDecided plans that were decided on; of several decisions on one the last CERTIFIED, if there is
   // one.
   static constexpr std::size_t kMostDecided = 4096;

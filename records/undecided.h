@@ -2,64 +2,74 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
-#include <vector>
 
-#include "lcmtypes/codec.h"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "lcmtypes/candidate_batch.h"
 
 namespace forereach {
 
-/** Pairs messages with decisions by the digest of a candidate's bytes: a message may stand for several candidates, of
-which one is decided on (lcmtypes/candidate_batch.h). Of equal candidates, the one that was sent first is paired first.
-`Entry` is a reader's data for a message. Cost: O(log n) for n candidates. */
+/** By what a decision, or a certified plan, finds the message with its candidate: the candidate's digest if it was sent
+alone, otherwise the key of its batch. */
+struct PlanKeys {
+  Digest plan, batch;
+
+  explicit PlanKeys(const decision_t& decision)
+      : plan(GetDigest(decision.plan_digest)), batch(BatchKey(decision.source, decision.candidate_utime)) {}
+  explicit PlanKeys(const candidate_plan_t& candidate)
+      : plan(DigestOf(Encode(candidate))), batch(BatchKey(candidate.source, candidate.utime)) {}
+};
+
+/** Pairs messages with decisions. Of equal messages, the one that was sent first is paired first. `Entry` is a reader's
+data for a message. Cost: O(log n) for n candidates. */
 template <class Entry>
 class Undecided final {
  public:
-  /** @param most the largest number of messages; beyond it the oldest is dropped. */
-  explicit Undecided(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_(most) {}
+  /** @param most the largest number of messages. */
+  explicit Undecided(std::size_t most) : most_(most) {}
 
-  /** @param plans the digests of its candidates, at least one. */
-  void Add(std::vector<Digest> plans, Entry entry) {
-    for (const Digest& plan : plans) of_plan_.emplace(plan, next_);  // equal keys keep their order
-    entries_.emplace(next_++, std::pair(std::move(plans), std::move(entry)));
-    if (entries_.size() > most_) static_cast<void>(Take(entries_.begin()));
+  /** @return the oldest message, if there is no room for all. */
+  std::optional<Entry> Add(const Digest& key, Entry entry) {
+    of_key_.emplace(key, next_);  // equal keys keep their order
+    entries_.emplace(next_++, std::pair(key, std::move(entry)));
+    return entries_.size() > most_ ? std::optional(Take(entries_.begin())) : std::nullopt;
   }
-  void Add(const Digest& plan, Entry entry) { Add(std::vector{plan}, std::move(entry)); }
 
-  /** The message for the next decision on this plan, or null. */
-  [[nodiscard]] const Entry* Find(const Digest& plan) const {
-    const auto found = of_plan_.lower_bound(plan);
-    return found == of_plan_.end() || found->first != plan ? nullptr : &entries_.at(found->second).second;
+  /** The next message with this key, or null. */
+  [[nodiscard]] const Entry* Find(const Digest& key) const {
+    const auto found = of_key_.lower_bound(key);
+    return found == of_key_.end() || found->first != key ? nullptr : &entries_.at(found->second).second;
+  }
+  [[nodiscard]] const Entry* Find(const PlanKeys& keys) const {
+    const Entry* const alone = Find(keys.plan);
+    return alone ? alone : Find(keys.batch);
   }
 
   /** Removes and returns this message. */
-  [[nodiscard]] std::optional<Entry> Take(const Digest& plan) {
-    const auto found = of_plan_.lower_bound(plan);
-    if (found == of_plan_.end() || found->first != plan) return std::nullopt;
+  [[nodiscard]] std::optional<Entry> Take(const Digest& key) {
+    const auto found = of_key_.lower_bound(key);
+    if (found == of_key_.end() || found->first != key) return std::nullopt;
     return Take(entries_.find(found->second));
   }
-
-  /** Calls `visit` with each message in the order in which they were sent. */
-  template <class Visit>
-  void ForEach(Visit visit) const {
-    for (const auto& [number, entry] : entries_) visit(entry.second);
+  [[nodiscard]] std::optional<Entry> Take(const PlanKeys& keys) {
+    std::optional<Entry> alone = Take(keys.plan);
+    return alone ? std::move(alone) : Take(keys.batch);
+  }
+  /** The one that was sent first. */
+  [[nodiscard]] std::optional<Entry> TakeFirst() {
+    return entries_.empty() ? std::nullopt : std::optional(Take(entries_.begin()));
   }
 
  private:
-  using Entries = std::map<std::int64_t, std::pair<std::vector<Digest>, Entry>>;
+  using Entries = std::map<std::int64_t, std::pair<Digest, Entry>>;
 
   Entry Take(typename Entries::iterator entry) {
-    for (const Digest& plan : entry->second.first) {
-      const auto [begin, end] = of_plan_.equal_range(plan);
-      for (auto at = begin; at != end; ++at)
-        if (at->second == entry->first) {
-          of_plan_.erase(at);
-          break;
-        }
-    }
+    auto [at, end] = of_key_.equal_range(entry->second.first);
+    while (at != end && at->second != entry->first) ++at;
+    of_key_.erase(at);
     Entry taken = std::move(entry->second.second);
     entries_.erase(entry);
     return taken;
@@ -67,7 +77,7 @@ class Undecided final {
 
   std::size_t most_;
   std::int64_t next_ = 0;
-  std::multimap<Digest, std::int64_t> of_plan_;
+  std::multimap<Digest, std::int64_t> of_key_;
   Entries entries_;
 };
 

@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/message_fields.h"
 #include "records/event_log.h"
@@ -82,10 +83,21 @@ std::vector<std::uint8_t> AnyMessage(std::mt19937_64& random, const LogEvent& ev
   return Encode(message);
 }
 
+/** Any candidates in one message, each of them possible for a part of the tries. */
+inline std::vector<std::uint8_t> AnyBatch(std::mt19937_64& random, const LogEvent& event, double share) {
+  candidate_batch_t batch = Decoded<candidate_batch_t>(event.message()).value_or(candidate_batch_t{});
+  if (const auto alone = Decoded<candidate_plan_t>(event.message()))
+    for (auto left = random() % 4; left > 0 && Append(batch, *alone); --left) continue;
+  AnyFields to(random, share);
+  Fields(batch, to);
+  return Encode(batch);
+}
+
 /** A message on a channel of the default names, a few or all of whose fields are any numbers. */
 inline LogEvent AnyEvent(std::mt19937_64& random, LogEvent event) {
   using Make = std::vector<std::uint8_t> (*)(std::mt19937_64&, const LogEvent&, double);
   static constexpr std::pair<std::string_view, Make> kTypes[] = {{"PLAN_CANDIDATE", AnyMessage<candidate_plan_t>},
+                                                                 {"PLAN_CANDIDATE", AnyBatch},
                                                                  {"PLAN_CERTIFIED", AnyMessage<certified_plan_t>},
                                                                  {"PLAN_DECISION", AnyMessage<decision_t>},
                                                                  {"PLAN_WITHDRAWN", AnyMessage<withdrawal_t>},
@@ -101,8 +113,10 @@ inline LogEvent AnyEvent(std::mt19937_64& random, LogEvent event) {
   const auto [channel, make] = kTypes[random() % std::size(kTypes)];
   if (random() % 2 == 0) event.channel = channel;
   const double share = std::array{.0, .003, .1, 1.}[random() % 4];
+  const bool is_batch = random() % 4 == 0;
   for (const auto& [name, make_of] : kTypes)
-    if (name == event.channel) event.data = make_of(random, event, share);
+    if (name == event.channel && (make_of == AnyBatch) == (is_batch && name == kTypes[0].first))
+      event.data = make_of(random, event, share);
   return event;
 }
 

@@ -46,7 +46,7 @@ class Claims {
 class SliceCheck {
  public:
   SliceCheck(const Problem& problem, const Certificate& certificate, const TaskFunctions& functions, const Tube& tube,
-             int t)
+             int t, std::optional<Frame>& frame)
       : problem_(problem),
         functions_(functions),
         certificate_(certificate),
@@ -55,6 +55,7 @@ class SliceCheck {
         next_(t + 1 < static_cast<int>(tube.slices.size()) ? &tube.slices[ToSize(t + 1)] : nullptr),
         step_(t < static_cast<int>(tube.steps.size()) ? &tube.steps[ToSize(t)] : nullptr),
         recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[ToSize(t)]),
+        frame_(frame),
         claims_(t, failure_) {}
 
   [[nodiscard]] std::optional<Failure> Run() {
@@ -238,27 +239,33 @@ class SliceCheck {
   // At this sample, or from this sample to the next; the last sample then belongs to the step before.
   void CheckSafety() {
     if (problem_.between && !next_) return;
-    const Slice* last = problem_.between ? next_ : nullptr;
+    if (!frame_) frame_.emplace(problem_, slice_);
+    std::optional<Frame> next;
+    if (problem_.between) next.emplace(problem_, *next_);
+    const bool is_swept = next.has_value();
     std::vector<std::vector<Sweep>> sweeps;
     for (std::size_t p = 0; p < problem_.body.parts.size(); ++p)
-      sweeps.push_back(SweepsOf(problem_, problem_.body.parts[p], slice_, last, &functions_.places[p]));
+      sweeps.push_back(
+          SweepsOf(problem_, problem_.body.parts[p], *frame_, next ? &*next : nullptr, &functions_.places[p]));
+    frame_ = std::move(next);
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
       if (!recorded_.clearance.empty() && !(claimed > 0))
         claims_.Judge(Answer::kNo, claimed, 0.0, 1.0, "above",
                       [&] { return "the record claims to be clear of obstacle " + std::to_string(o); });
       const Obstacle& obstacle = certificate_.obstacles[o];
-      const Passage passage = PassageOf(obstacle, certificate_.schedule, t_, last ? t_ + 1 : t_);
+      const Passage passage = PassageOf(obstacle, certificate_.schedule, t_, is_swept ? t_ + 1 : t_);
       if (!passage.is_there) continue;
       for (std::size_t p = 0; p < sweeps.size() && !failure_; ++p) {
         Real best;
         const Answer answer = IsClearOfAny(sweeps[p], obstacle, claimed, best, passage);
-        claims_.Judge(
-            answer, best, claimed, abs(best) + Real(obstacle.radius()), claimed > 0 ? "at least" : "above", [&] {
-              return std::string(last ? "the motion to the next sample" : "the slice") + " keeps clear of obstacle " +
-                     std::to_string(o) + (sweeps.size() > 1 ? " with part " + std::to_string(p) : "") +
-                     (claimed > 0 ? " by what is recorded" : "");
-            });
+        claims_.Judge(answer, best, claimed, abs(best) + Real(obstacle.radius()), claimed > 0 ? "at least" : "above",
+                      [&] {
+                        return std::string(is_swept ? "the motion to the next sample" : "the slice") +
+                               " keeps clear of obstacle " + std::to_string(o) +
+                               (sweeps.size() > 1 ? " with part " + std::to_string(p) : "") +
+                               (claimed > 0 ? " by what is recorded" : "");
+                      });
       }
     }
   }
@@ -286,6 +293,7 @@ class SliceCheck {
   const Slice* next_;
   const Step* step_;
   const RecordedSlice& recorded_;
+  std::optional<Frame>& frame_;  // of this slice, if the step before made it; then that of the next
   std::optional<Failure> failure_;
   Claims claims_;
 };
@@ -294,8 +302,9 @@ class SliceCheck {
 
 std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate,
                                       const TaskFunctions& functions, const Tube& tube) {
+  std::optional<Frame> frame;
   for (int t = 0; t < static_cast<int>(tube.slices.size()); ++t)
-    if (auto failure = SliceCheck(problem, certificate, functions, tube, t).Run()) return failure;
+    if (auto failure = SliceCheck(problem, certificate, functions, tube, t, frame).Run()) return failure;
   return std::nullopt;
 }
 

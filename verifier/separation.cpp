@@ -79,6 +79,27 @@ RealVector AffineMinimum(const std::vector<RealVector>& points) {
   return weights;
 }
 
+// A lower bound on the distance from a box around the sweep, along the best axis, less the distances to be kept. Most
+// obstacles are far away, and this is enough for them.
+Real DistanceAlongAnAxis(const Sweep& sweep, const Obstacle& obstacle, const Passage& passage) {
+  Real largest(-std::numeric_limits<double>::infinity());
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return largest;
+  for (int k = 0; k < obstacle.dim(); ++k) {
+    const auto [low, high] = std::ranges::minmax(obstacle.points(), {}, [k](const auto& point) { return point[k]; });
+    std::optional<Real> below, above;  // of the places, seen from the obstacle
+    for (std::size_t sample = 0; sample < 2; ++sample) {
+      if (sweep.boxes()[sample].empty()) continue;
+      Bounds box = sweep.boxes()[sample][ToSize(k)];
+      if (const RealVector& shift = passage.shift[sample]; !shift.empty())
+        box = {box.lower - shift[ToSize(k)], box.upper - shift[ToSize(k)]};
+      below = below ? max(*below, box.upper) : box.upper;
+      above = above ? min(*above, box.lower) : box.lower;
+    }
+    largest = max(largest, max(Real(low[k]) - *below, *above - Real(high[k])));
+  }
+  return (largest - Real(obstacle.radius()) - passage.growth - sweep.radius()).lower();
+}
+
 // The dual bound along directions, the best of which leads to the point of {core - sweep} nearest to the origin. The
 // sweep is taken without its radius and without the smallest of its balls: these are distances to be kept.
 class SeparationSearch {
@@ -308,6 +329,8 @@ class SeparationSearch {
 }  // namespace
 
 Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best, const Passage& passage) {
+  best = DistanceAlongAnAxis(sweep, obstacle, passage);
+  if (CertainlyBelow(clearance, best)) return Answer::kYes;
   SeparationSearch search(sweep, obstacle, clearance, passage);
   const bool proven = search.Run();
   best = search.best() ? *search.best() : Real(-std::numeric_limits<double>::infinity());

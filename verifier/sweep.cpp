@@ -28,9 +28,9 @@ bool IsZeroVector(const RealVector& vector) {
 
 Real Length(const Real& x, const Real& y) { return y.IsZero() ? abs(x) : sqrt(sqr(x) + sqr(y)); }
 
-// R(angle) q in the first two coordinates.
-std::array<Real, 2> Rotated(const Real& angle, const Real& x, const Real& y) {
-  const Real c = cos(angle), s = sin(angle);
+// R q in the first two coordinates.
+std::array<Real, 2> Rotated(const Turn& turn, const Real& x, const Real& y) {
+  const auto& [c, s] = turn;
   return {c * x - s * y, s * x + c * y};
 }
 
@@ -40,8 +40,8 @@ class Places {
   Places(const Problem& problem, bool sweeps) : problem_(problem), sweeps_(sweeps) {}
 
   // R(theta) q = R(c) q + R'(c) q d - d^2 / 2 R(theta') q, by Taylor's theorem; the last term is the bend.
-  [[nodiscard]] Place Of(const Eigen::Vector3d& point, const Slice& slice, int sample) const {
-    Place place = OfFrame(slice, sample);
+  [[nodiscard]] Place Of(const Eigen::Vector3d& point, const Frame& frame, int sample) const {
+    Place place = OfFrame(frame, sample);
     for (std::size_t k = 2; k < place.center.size(); ++k) place.center[k] += Real(point[static_cast<int>(k)]);
     const Real x(point[0]), y(place.center.size() > 1 ? point[1] : 0);
     if (!Turns(point)) {
@@ -50,19 +50,19 @@ class Places {
       return Widened(std::move(place), Real());
     }
     const auto h = ToSize(problem_.body.heading);
-    const Real& theta = slice.center[h];
-    const std::array<Real, 2> turned = Rotated(theta, x, y);
+    const std::array<Real, 2> turned = Rotated(frame.turns()[1], x, y);
     for (std::size_t k = 0; k < 2; ++k) place.center[k] += turned[k];
     place.generators.clear();
-    for (const RealVector& column : slice.columns) {
-      RealVector generator = Image(problem_.projection, column);
+    for (std::size_t j = 0; j < frame.images().size(); ++j) {
+      const RealVector& column = frame.slice().columns[j];
+      RealVector generator = frame.images()[j];
       if (!column[h].IsZero()) {
         generator[0] -= column[h] * turned[1];
         generator[1] += column[h] * turned[0];
       }
       if (!IsZeroVector(generator)) place.generators.push_back(std::move(generator));
     }
-    place.bend = Bend(theta, slice.HalfWidth(problem_.body.heading), x, y);
+    place.bend = Bend(frame.turns(), frame.heading_half_width(), x, y);
     return Widened(std::move(place), Deviation(point));
   }
 
@@ -100,13 +100,13 @@ class Places {
   }
 
   // Where no heading is known: the ball of the points' distance from the frame.
-  [[nodiscard]] Place Around(const BodyPart& part, const Slice& slice, int sample) const {
+  [[nodiscard]] Place Around(const BodyPart& part, const Frame& frame, int sample) const {
     Real ball;
     for (const Eigen::Vector3d& point : part.points) {
       const Real flat = Length(Real(point[0]), Real(point[1]));
       ball = max(ball, Length(flat, Real(point[2])) + Deviation(point));
     }
-    return Widened(OfFrame(slice, sample), ball);
+    return Widened(OfFrame(frame, sample), ball);
   }
 
   [[nodiscard]] bool Turns(const Eigen::Vector3d& point) const {
@@ -114,9 +114,11 @@ class Places {
   }
 
  private:
-  [[nodiscard]] Place OfFrame(const Slice& slice, int sample) const {
-    const ProjectedSlice frame(slice, problem_.projection);
-    return {frame.center(), frame.generators(), Bend(), Real(), sample};
+  [[nodiscard]] static Place OfFrame(const Frame& frame, int sample) {
+    Place place{frame.center(), {}, Bend(), Real(), sample};
+    for (const RealVector& image : frame.images())
+      if (!IsZeroVector(image)) place.generators.push_back(image);
+    return place;
   }
 
   // How far a point that turns may be from its chord.
@@ -182,11 +184,24 @@ Real ProjectedSlice::Radius() const {
   return sqrt(square).lower();
 }
 
-Bend::Bend(const Real& theta, const Real& r, const Real& qx, const Real& qy) {
+std::array<Turn, 3> TurnsAround(const Real& theta, const Real& r) {
+  const Real before = theta - r, behind = theta + r;
+  return {{{cos(before), sin(before)}, {cos(theta), sin(theta)}, {cos(behind), sin(behind)}}};
+}
+
+Frame::Frame(const Problem& problem, const Slice& slice)
+    : slice_(&slice), center_(Image(problem.projection, slice.center)) {
+  for (const RealVector& column : slice.columns) images_.push_back(Image(problem.projection, column));
+  if (problem.body.heading < 0) return;
+  heading_half_width_ = slice.HalfWidth(problem.body.heading);
+  turns_ = TurnsAround(slice.center[ToSize(problem.body.heading)], heading_half_width_);
+}
+
+Bend::Bend(const std::array<Turn, 3>& turns, const Real& r, const Real& qx, const Real& qy) {
   if (r.IsZero()) return;
   const Real half_square = Real(0.5) * sqr(r);
-  for (const Real& angle : {theta - r, theta, theta + r}) {
-    const std::array<Real, 2> turned = Rotated(angle, qx, qy);
+  for (const Turn& turn : turns) {
+    const std::array<Real, 2> turned = Rotated(turn, qx, qy);
     arc_.push_back({-(half_square * turned[0]), -(half_square * turned[1])});
   }
   radius_ = half_square * Length(qx, qy);
@@ -212,22 +227,36 @@ Bend::Extreme Bend::Farthest(const std::vector<Real>& d) const {
   return best;
 }
 
-Sweep::Sweep(const ProjectedSlice& slice) : places_{Place{slice.center(), slice.generators(), Bend(), Real(), 0}} {}
+Sweep::Sweep(const ProjectedSlice& slice) : Sweep({{slice.center(), slice.generators(), Bend(), Real(), 0}}, Real()) {}
 
-std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first, const Slice* last,
+Sweep::Sweep(std::vector<Place> places, const Real& radius) : places_(std::move(places)), radius_(radius) {
+  for (const Place& place : places_) {
+    std::vector<Bounds>& box = boxes_[ToSize(place.sample)];
+    const bool is_first = box.empty();
+    box.resize(place.center.size());
+    for (std::size_t k = 0; k < box.size(); ++k) {
+      Real reach = place.ball + place.bend.radius();
+      for (const RealVector& g : place.generators) reach += abs(g[k]);
+      const Real lower = place.center[k] - reach, upper = place.center[k] + reach;
+      box[k] = is_first ? Bounds{lower, upper} : Bounds{min(box[k].lower, lower), max(box[k].upper, upper)};
+    }
+  }
+}
+
+std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Frame& first, const Frame* last,
                             const Functions* functions) {
   const Places places(problem, last != nullptr);
   std::vector<Place> around, exact;
   for (int sample = 0; sample < (last ? 2 : 1); ++sample) {
-    const Slice& slice = sample == 0 ? first : *last;
+    const Frame& frame = sample == 0 ? first : *last;
     if (!part.places.empty()) {
-      std::vector<Place> at = places.At(*functions, slice, sample);
+      std::vector<Place> at = places.At(*functions, frame.slice(), sample);
       if (at.empty()) return {};
       std::ranges::move(at, std::back_inserter(exact));
       continue;
     }
-    around.push_back(places.Around(part, slice, sample));
-    for (const Eigen::Vector3d& point : part.points) exact.push_back(places.Of(point, slice, sample));
+    around.push_back(places.Around(part, frame, sample));
+    for (const Eigen::Vector3d& point : part.points) exact.push_back(places.Of(point, frame, sample));
   }
   const Real radius(part.radius);
   std::vector<Sweep> sweeps;

@@ -42,12 +42,41 @@ class ProjectedSlice final {
   std::vector<std::vector<Real>> generators_;
 };
 
+/** Cosine and sine of an angle. */
+using Turn = std::array<Real, 2>;
+
+/** The turns by theta - r, theta and theta + r. */
+[[nodiscard]] std::array<Turn, 3> TurnsAround(const Real& theta, const Real& r);
+
+/** A slice as the places of all points of a body see it. */
+class Frame final {
+ public:
+  /** @param slice must outlive it. */
+  Frame(const Problem& problem, const Slice& slice);
+
+  [[nodiscard]] const Slice& slice() const { return *slice_; }
+  [[nodiscard]] const std::vector<Real>& center() const { return center_; }  ///< P c
+  /** P g of each column g, zeros too. */
+  [[nodiscard]] const std::vector<std::vector<Real>>& images() const { return images_; }
+  /** Around the heading, by the half-width of the slice in it. @pre the body has one. */
+  [[nodiscard]] const std::array<Turn, 3>& turns() const { return turns_; }
+  [[nodiscard]] const Real& heading_half_width() const { return heading_half_width_; }
+
+ private:
+  const Slice* slice_;
+  std::vector<Real> center_;
+  std::vector<std::vector<Real>> images_;
+  std::array<Turn, 3> turns_;
+  Real heading_half_width_;
+};
+
 /** The second-order part of a place: conv {-1/2 s R(xi) q : 0 <= s <= r^2, |xi - theta| <= r}, the hull of the origin
 and an arc, in the first two coordinates. By default {0}. */
 class Bend final {
  public:
   Bend() = default;
-  Bend(const Real& theta, const Real& r, const Real& qx, const Real& qy);
+  /** @param turns TurnsAround(theta, r) */
+  Bend(const std::array<Turn, 3>& turns, const Real& r, const Real& qx, const Real& qy);
 
   [[nodiscard]] bool IsZero() const { return arc_.empty(); }
   /** max {d . y : y in this}, and a point that attains it but for rounding. @pre d has at least 2 entries. */
@@ -56,6 +85,8 @@ class Bend final {
     std::array<Real, 2> point;
   };
   [[nodiscard]] Extreme Farthest(const std::vector<Real>& d) const;
+  /** No point of it is farther from the origin. */
+  [[nodiscard]] const Real& radius() const { return radius_; }
 
  private:
   std::vector<std::array<Real, 2>> arc_;  // its points at theta - r, theta and theta + r
@@ -77,15 +108,18 @@ class Sweep final {
  public:
   /** The point P x over one slice. */
   Sweep(const ProjectedSlice& slice);  // NOLINT: a set is the hull of itself
-  Sweep(std::vector<Place> places, const Real& radius) : places_(std::move(places)), radius_(radius) {}
+  Sweep(std::vector<Place> places, const Real& radius);
 
   [[nodiscard]] int dim() const { return static_cast<int>(places_.front().center.size()); }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }
   [[nodiscard]] const Real& radius() const { return radius_; }
+  /** Of each coordinate a range that contains the places of a sample, without the radius; none if it has no place. */
+  [[nodiscard]] const std::array<std::vector<Bounds>, 2>& boxes() const { return boxes_; }
 
  private:
   std::vector<Place> places_;
   Real radius_;
+  std::array<std::vector<Bounds>, 2> boxes_;
 };
 
 /** Sets each of which contains all that `part` of the body sweeps: over the slice `first` or, with `last`, from one
@@ -93,8 +127,8 @@ sample to the next, where Problem::between widens the hull by [-e, e], e_k = acc
 of q by a ball of |q| (turn_rate^2 + turn_acceleration) period^2 / 8. One set is by Taylor's theorem. A part that turns
 has another before it, of P X and a ball of the largest |q|. None if an expression has no finite bound. @param places
 the expressions of a part that stands at some, one point after the other. @pre a Certifier accepts the problem. */
-[[nodiscard]] std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first,
-                                          const Slice* last, const Functions* places = nullptr);
+[[nodiscard]] std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Frame& first,
+                                          const Frame* last, const Functions* places = nullptr);
 
 /** How a moving obstacle is met between two samples of a plan, seen from the obstacle. By default: it stands. */
 struct Passage {

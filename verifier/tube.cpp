@@ -472,6 +472,7 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
 void TubeMaker::Learn() {
   const Transitions& data = problem_.transitions;
   for (int i = static_cast<int>(residuals_.size()); i < data.size(); ++i) {
+    if (const auto failure = WhyTooFast(i)) too_fast_.emplace_back(i, *failure);
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
     const std::vector<Real> nominal = equations_.Value(z);
@@ -495,7 +496,10 @@ void TubeMaker::Learn() {
       row.push_back(!observed.IsFinite() || !error.IsFinite() || !w.IsFinite() ? Bounds{-kNone, kNone}
                     : equations_.IsExact()                                     ? bounds
                                                                                : Outermost(bounds));
-      rough_residuals_[ToSize(k)].emplace_back(row.back().lower.ToDouble(), row.back().upper.ToDouble());
+      RoughResiduals& rough = rough_residuals_[ToSize(k)];
+      rough.lower.push_back(row.back().lower.ToDouble());
+      rough.upper.push_back(row.back().upper.ToDouble());
+      rough.scale.push_back(problem_.declaration.lipschitz.row(k).dot(data.z.row(i).cwiseAbs()));
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k)
@@ -506,12 +510,18 @@ void TubeMaker::Learn() {
 }
 
 std::optional<Failure> TubeMaker::FindTooFast(const KnownRows& known) const {
+  for (const auto& [i, failure] : too_fast_)
+    if (known.Contains(i)) return failure;
+  return std::nullopt;
+}
+
+std::optional<Failure> TubeMaker::WhyTooFast(int i) const {
   const Transitions& data = problem_.transitions;
   const Declaration& declaration = problem_.declaration;
   const NominalModel& model = *problem_.model;
   const double dt = StepOf(model);
   std::optional<Failure> failure;
-  const auto test = [&](int i, int k, double rate, bool is_angle) {
+  const auto test = [&](int k, double rate, bool is_angle) {
     const double x = data.z(i, k), x_next = data.x_next(i, k);
     Real change = abs(Real(x_next) - Real(x));
     if (is_angle) {
@@ -529,14 +539,12 @@ std::optional<Failure> TubeMaker::FindTooFast(const KnownRows& known) const {
     failure = Failure{-1, "no known transition changes " + model.state_names()[ToSize(k)] + " faster than is declared",
                       ((change - error) / longest).text(), "at most " + Real(rate).text(), true};
   };
-  for (int i = 0; i < data.size() && !failure && dt > 0; ++i) {
-    if (!known.Contains(i)) continue;
-    const Eigen::VectorXd& rates = problem_.timing.rate_bound;
-    for (int k = 0; k < rates.size(); ++k)
-      if (rates[k] < kNone) test(i, k, rates[k], model.IsAngle(k));
-    if (const int heading = problem_.body.heading; problem_.between && heading >= 0)
-      test(i, heading, problem_.between->turn_rate, model.IsAngle(heading));
-  }
+  if (!(dt > 0)) return failure;
+  const Eigen::VectorXd& rates = problem_.timing.rate_bound;
+  for (int k = 0; k < rates.size(); ++k)
+    if (rates[k] < kNone) test(k, rates[k], model.IsAngle(k));
+  if (const int heading = problem_.body.heading; problem_.between && heading >= 0)
+    test(heading, problem_.between->turn_rate, model.IsAngle(heading));
   return failure;
 }
 
@@ -1007,9 +1015,20 @@ struct TubeMaker::Row {
     return sum;
   }
 
-  [[nodiscard]] double Roughly(const Eigen::MatrixXd& z, int i) const {
-    double largest = 0;
-    for (std::size_t s = 0; s < patterns; ++s) largest = std::max(largest, Roughly(z, i, s));
+  // D_i of all observations.
+  [[nodiscard]] Eigen::ArrayXd Roughly(const Eigen::MatrixXd& z) const {
+    Eigen::ArrayXd largest = Eigen::ArrayXd::Zero(z.rows()), sum(z.rows());
+    for (std::size_t s = 0; s < patterns; ++s) {
+      sum.setZero();
+      for (std::size_t l = 0; l < columns.size(); ++l) {
+        const auto away = slopes[l] * (center[l] - z.col(columns[l]).array());
+        if (exact)
+          sum += Sign(s, l) * away;
+        else
+          sum += away.abs();
+      }
+      largest = largest.max(sum.abs() + spread[s]);
+    }
     return largest;
   }
 
@@ -1037,37 +1056,39 @@ struct TubeMaker::Row {
 // Every observation gives a bound; doubles choose those that may give the tightest. They are good to 2^-36 of what goes
 // into a distance, and to 2^-50 of a residual.
 TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows& known) const {
-  struct Rough {
-    int row;
-    double lower, upper, slack;
-  };
   const Row row(problem_.declaration, query, k);
   const Eigen::MatrixXd& z = problem_.transitions.z;
-  std::vector<Rough> all;
+  const RoughResiduals& rough = rough_residuals_[ToSize(k)];
+  const auto array = [&](const std::vector<double>& of) {
+    return Eigen::Map<const Eigen::ArrayXd>(of.data(), z.rows());
+  };
+  const Eigen::ArrayXd distance = row.Roughly(z), lower = array(rough.lower) - distance,
+                       upper = array(rough.upper) + distance,
+                       slack = 0x1p-36 * (row.scale + array(rough.scale)) +
+                               0x1p-50 * (array(rough.lower).abs() + array(rough.upper).abs());
   double highest = -kNone, lowest = kNone;
   bool trusted = true;
-  for (int i = 0; i < problem_.transitions.size(); ++i) {
-    if (!known.Contains(i)) continue;
-    const auto [below, above] = rough_residuals_[ToSize(k)][ToSize(i)];
-    const double distance = row.Roughly(z, i);
-    const double slack = 0x1p-36 * row.ScaleAt(z, i) + 0x1p-50 * (std::abs(below) + std::abs(above));
-    all.push_back({i, below - distance, above + distance, slack});
-    trusted &= slack > 1e-250;
-    highest = std::max(highest, all.back().lower - slack);
-    lowest = std::min(lowest, all.back().upper + slack);
-  }
-  if (trusted)
-    std::erase_if(
-        all, [&](const Rough& each) { return each.lower + each.slack < highest && each.upper - each.slack > lowest; });
+  const auto for_each = [&](const auto& visit) {
+    for (int i = 0; i < problem_.transitions.size(); ++i)
+      if (known.Contains(i)) visit(i);
+  };
+  for_each([&](int i) {
+    trusted &= slack[i] > 1e-250;
+    highest = std::max(highest, lower[i] - slack[i]);
+    lowest = std::min(lowest, upper[i] + slack[i]);
+  });
+  std::vector<int> tight;
+  for_each([&](int i) {
+    if (!trusted || !(lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest)) tight.push_back(i);
+  });
   const auto intersect = [&](bool in_doubt) {
     std::optional<Bounds> tightest;
-    for (const Rough& each : all) {
-      Real away = row.Distance(z, each.row);
-      if (in_doubt)
-        away += Real(kSeenInDoubles) * (sizes_[ToSize(each.row)][ToSize(k)] + Real(row.ScaleAt(z, each.row)));
-      const auto& [lower, upper] = residuals_[ToSize(each.row)][ToSize(k)];
-      tightest = tightest ? Bounds{max(tightest->lower, lower - away), min(tightest->upper, upper + away)}
-                          : Bounds{lower - away, upper + away};
+    for (const int i : tight) {
+      Real away = row.Distance(z, i);
+      if (in_doubt) away += Real(kSeenInDoubles) * (sizes_[ToSize(i)][ToSize(k)] + Real(row.ScaleAt(z, i)));
+      const auto& [below, above] = residuals_[ToSize(i)][ToSize(k)];
+      tightest = tightest ? Bounds{max(tightest->lower, below - away), min(tightest->upper, above + away)}
+                          : Bounds{below - away, above + away};
     }
     AddRegions(query, k, known, in_doubt, *tightest);
     return *tightest;

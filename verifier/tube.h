@@ -126,6 +126,7 @@ class TubeMaker final {
   struct Row;
   struct Affine;
 
+  [[nodiscard]] std::optional<Failure> WhyTooFast(int i) const;
   [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,
                                                     const std::vector<Real>& half_width) const;
@@ -162,10 +163,14 @@ class TubeMaker final {
   /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
   included; e_ik is what the declared errors of the record may add. [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;
-  /** The same in doubles, to the nearest; [state][observation]. */
-  std::vector<std::vector<std::pair<double, double>>> rough_residuals_;
+  /** The same in doubles, to the nearest, and sum_l L_kl |z_l|; an entry for each observation. */
+  struct RoughResiduals {
+    std::vector<double> lower, upper, scale;
+  };
+  std::vector<RoughResiduals> rough_residuals_;  // of each state
   /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
+  std::vector<std::pair<int, Failure>> too_fast_;  ///< The transitions of FindTooFast, in their order.
   /** The rounding error that the remainder may have added to the certifier's columns. */
   double remainder_rounding_;
 };

@@ -111,7 +111,10 @@ void ExpectOnly(Change change, const Case& before, const Case& after) {
   if (change != Change::kSlopes && change != Change::kLargerSlopes) {
     EXPECT_EQ(is.declaration.lipschitz, was.declaration.lipschitz);
   }
-  EXPECT_EQ(is.declaration.noise_bound == was.declaration.noise_bound, change != Change::kNoise);
+  EXPECT_EQ(is.declaration.noise_bound == was.declaration.noise_bound,
+            change != Change::kNoise && change != Change::kLessNoise);
+  EXPECT_EQ(is.declaration.disturbance == was.declaration.disturbance, change != Change::kDisturbance);
+  EXPECT_EQ(is.declaration.state_error == was.declaration.state_error, change != Change::kStateError);
   EXPECT_EQ(is.transitions.size() - was.transitions.size(), change == Change::kObservation ? 1
                                                             : change == Change::kOutlier   ? -1
                                                                                            : 0);

@@ -36,6 +36,13 @@ TEST_F(LogTest, ListsEveryEvent) {
   EXPECT_THAT(output.text, HasSubstr("PLAN_DECISION     decision_t"));
 }
 
+TEST_F(LogTest, SaysWhichChannelsThereAreIfNoEventHasTheChosenOne) {
+  const std::string small = Small("a.lcmlog", 1'000'000, "POSES"), out = scratch_ / "out.lcmlog";
+  for (const std::string action : {"list " + small, "cut " + small + " -o " + out})
+    EXPECT_THAT(Log(action + " --channel POSE"), Exits(2, "POSE: no event has this channel; the channels are POSES"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
 TEST_F(LogTest, ListsAsJson) {
   const Output output = Forereach("log list '" + kCourse + "' --json --outcome certified 2>/dev/null");
   std::istringstream lines(output.text);

@@ -104,7 +104,7 @@ PageRun Hostile() {
   detail.decision = 5;
   detail.missing = evil;
   run.details.push_back(detail);
-  run.advice = {{4, "", {{evil, {evil, ""}}}}, {5, evil, {}}, {6, "", {}}};
+  run.advice = {{4, "", {{evil, true, {evil, ""}}}}, {5, evil, {}}, {6, "", {}}};
   return run;
 }
 

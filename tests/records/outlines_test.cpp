@@ -92,4 +92,15 @@ TEST(Outlines, PredictionsGrowWhereTheObstacleIs) {
   EXPECT_TRUE(PredictionOf(Obstacle::HalfSpace(Vector2d(1, 0), 3).Moving(motion), motion.stamp_us).empty());
 }
 
+TEST(Outlines, AnObstacleThatMayBeAnywhereIsDrawnAsFarAsDrawingsGo) {
+  Svg svg({Vector2d(-1, -1), Vector2d(1, 1)});
+  const ObstacleMotion motion{.stamp_us = 1'000'000, .velocity = {2, 0, 0}, .growth_rate = 1e308};
+  for (const Obstacle& obstacle :
+       {Obstacle::Circle(Vector2d(1, 0), 0.5), Obstacle::AxisBox(Vector2d(0, 0), Vector2d(1, 1))})
+    DrawObstacle(obstacle.Moving(motion), {1e6, 1e9}, {Vector2d(-1, -1), Vector2d(1, 1)}, "", svg);
+  const std::string text = svg.Done();
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("inf")));
+  EXPECT_THAT(text, testing::Not(testing::HasSubstr("nan")));
+}
+
 }  // namespace forereach::outlines_test

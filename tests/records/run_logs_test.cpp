@@ -1,10 +1,9 @@
-// Which logs belong together, whose they are, and what is kept of finished runs.
+// Which logs belong together, and whose they are.
 #include "records/run_logs.h"
 
 #include "tests/test.h"
 
 #include "forereach/logger_status_t.hpp"
-#include "records/finished_runs.h"
 #include "records/log_survey.h"
 #include "records/output_file.h"
 #include "tests/cli/program.h"
@@ -130,58 +129,6 @@ TEST_F(RunLogsTest, WhatIsNamedTwiceIsAnError) {
   std::filesystem::create_directory(scratch_ / "empty");
   EXPECT_THROW(static_cast<void>(RunsNamedBy({scratch_ / "empty"}, 1)), BadInput);
   EXPECT_THROW(static_cast<void>(RunsNamedBy({scratch_ / "none"}, 1)), BadInput);
-}
-
-class FinishedRunsTest : public RunLogsTest {
- protected:
-  const std::string directory_ = scratch_ / "kept";
-};
-
-TEST_F(FinishedRunsTest, AResultIsReusedOnlyForTheInputsItWasMadeFrom) {
-  const RunLogs run{"r", {Log("log/a.lcmlog", 0, 3)}, "", {}};
-  std::string key;
-  {
-    const FinishedRuns finished(directory_, "replay");
-    key = finished.KeyOf(run);
-    EXPECT_FALSE(finished.Find(key));
-    finished.Keep(key, {{"n", 7}});
-  }
-  const FinishedRuns finished(directory_, "replay");
-  EXPECT_EQ(finished.KeyOf(run), key);
-  EXPECT_EQ(finished.Find(key), nlohmann::json({{"n", 7}}));
-  EXPECT_NE(FinishedRuns(directory_, "verify").KeyOf(run), key) << "another command";
-  RunLogs other = run;
-  other.robot = "s";
-  EXPECT_NE(finished.KeyOf(other), key);
-  std::filesystem::create_directories(scratch_ / "log/tasks/ab");
-  scratch_.Write("log/tasks/ab/task.yaml", "x");
-  EXPECT_NE(finished.KeyOf(run), key) << "a task is kept now";
-  std::filesystem::remove_all(scratch_ / "log/tasks");
-  EXPECT_EQ(finished.KeyOf(run), key);
-  auto bytes = ReadBytes(run.logs[0]);
-  bytes.back() ^= 1;
-  WriteBytes(run.logs[0], bytes);
-  EXPECT_NE(finished.KeyOf(run), key) << "another byte";
-}
-
-TEST_F(FinishedRunsTest, ADamagedResultIsNotReused) {
-  const std::string key(64, 'a');
-  const FinishedRuns finished(directory_, "replay");
-  finished.Keep(key, {{"n", 7}});
-  ASSERT_TRUE(finished.Find(key));
-  const std::string file = std::filesystem::directory_iterator(directory_)->path(), whole = Read(file);
-  for (std::size_t i = 0; i < whole.size(); i += 3) {
-    std::string damaged = whole;
-    damaged[i] ^= 1;
-    WriteBytes(file, {damaged.begin(), damaged.end()});
-    EXPECT_FALSE(finished.Find(key)) << i;
-    WriteBytes(file, {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(i)});
-    EXPECT_FALSE(finished.Find(key)) << "cut at " << i;
-  }
-  WriteBytes(file, {whole.begin(), whole.end()});
-  EXPECT_TRUE(finished.Find(key));
-  scratch_.Write("file", "x");
-  EXPECT_THROW(FinishedRuns(scratch_ / "file", ""), BadInput);
 }
 
 TEST(OutputFile, HasItsNameOnlyOnceItIsWhole) {

@@ -177,12 +177,6 @@ TEST_F(ShardsTest, WrittenAgainAreTheSameFileAndReplaceNoOther) {
   EXPECT_EQ(Read(PathOf(1)), "{\"n\":1}");
 }
 
-TEST_F(ShardsTest, KeepFinishedRunsEachForItself) {
-  const std::string command = "replay " + changed_ + config_, resume = " --resume " + (scratch_ / "kept");
-  for (int pass = 0; pass < 2; ++pass)
-    EXPECT_EQ(Merge(WriteShards(command + resume, 2)).text, Forereach(command + resume + " 2>&1").text) << pass;
-}
-
 TEST_F(ShardsTest, ThatDoNotBelongTogetherAreRefused) {
   const std::string replay = "replay " + kCourseLog + config_;
   const auto keep = [this](const std::string& command, int number, int count, const std::string& name) {

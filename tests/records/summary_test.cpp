@@ -186,6 +186,30 @@ TEST(Summary, TimesOfASimulatedClockAreNotMeasurements) {
   EXPECT_THAT(ToText(summary), testing::HasSubstr("p50 0.0 us, p99 3.0 us"));
 }
 
+TEST(Summary, LeavesOutWhatLiesAcrossAStepOfTheClock) {
+  const ScratchDirectory scratch;
+  constexpr std::int64_t kFar = std::int64_t{4'000'000'000'000'000'000};
+  {
+    EventLogWriter writer(scratch / "log");
+    std::int64_t sequence = 0;
+    for (const auto& [sent, decided] :
+         {std::pair{10'000'000, std::int64_t{10'000'400}}, {11'000'000, 5'000'000}, {6'000'000, kFar}}) {
+      const candidate_plan_t candidate = MakeCandidate(sequence, sequence);
+      writer.Append(sent, "PLAN_CANDIDATE", Encode(candidate));
+      writer.Append(decided, "PLAN_DECISION",
+                    Encode(MakeDecision(candidate, sequence++, decision_t::CERTIFIED, decision_t::CAUSE_NONE)));
+    }
+    ASSERT_TRUE(writer.Flush());
+  }
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
+  EXPECT_EQ(summary.latency_us.p99, 400);
+  EXPECT_EQ(summary.duration_s, 2);
+  EXPECT_EQ(summary.clock_steps, 2);
+  EXPECT_THAT(ToText(summary),
+              testing::HasSubstr("2 times, first at event 3 by -6.000 s; times across it are left out"));
+  EXPECT_EQ(ToJson(summary)["clock_steps"]["first_us"], -6'000'000);
+}
+
 TEST(Summary, InventedChannelsAreCountedTogether) {
   SummaryBuilder builder(GoalConfig());
   for (int i = 0; i < 1000; ++i) builder.Add(LogEvent{i, i, "invented " + std::to_string(i), {}});

@@ -110,7 +110,7 @@ TEST(Turning, AKnownHeadingPlacesTheCorner) {
   const auto problem = WithBody(Corner(kVy, 3, 4));
   const double angle = 0.5;
   const Slice slice = SliceOf(Eigen::Vector4d(1, 2, 0, angle), Eigen::MatrixXd(4, 0));
-  const auto sweeps = SweepsOf(*problem, problem->body.parts[0], slice, nullptr);
+  const auto sweeps = SweepsOf(*problem, problem->body.parts[0], Frame(*problem, slice), nullptr);
   const Eigen::Vector2d corner = Eigen::Vector2d(1, 2) + Rotated({3, 4}, angle);
   for (const Eigen::Vector2d& d :
        {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0, -1)}) {
@@ -126,7 +126,8 @@ TEST(Turning, AnUncertainHeadingBendsThePlace) {
   for (const double r : {0.125, 0.75, 2.0, 4.0}) {
     Eigen::MatrixXd column = Eigen::MatrixXd::Zero(4, 1);
     column(kVy, 0) = r;
-    const auto sweeps = SweepsOf(*problem, problem->body.parts[0], SliceOf(Eigen::Vector4d::Zero(), column), nullptr);
+    const Slice slice = SliceOf(Eigen::Vector4d::Zero(), column);
+    const auto sweeps = SweepsOf(*problem, problem->body.parts[0], Frame(*problem, slice), nullptr);
     EXPECT_EQ(ClearOfAny(sweeps, Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Up(2)), 0), Answer::kYes);
     EXPECT_EQ(ClearOfAny(sweeps, Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2), 0), Answer::kNo);
     const double aside = std::min(2.0, 2 * r + r * r * std::sin(std::min(r, std::acos(-1.0) / 2)));
@@ -140,7 +141,7 @@ TEST(Turning, TheBendHasTheSupportOfItsArc) {
   for (int trial = 0; trial < 400; ++trial) {
     const double theta = random.Uniform(-4, 4), r = random.Uniform(0, random.Coin() ? 0.5 : 4);
     const Eigen::Vector2d q = random.Vector(2, 3), d = random.Vector(2);
-    const auto [support, point] = Bend(theta, r, q.x(), q.y()).Farthest({d.x(), d.y()});
+    const auto [support, point] = Bend(TurnsAround(theta, r), r, q.x(), q.y()).Farthest({d.x(), d.y()});
     double largest = 0;
     for (int i = -500; i <= 500; ++i) largest = std::max(largest, -r * r / 2 * d.dot(Rotated(q, theta + r * i / 500)));
     ASSERT_GE(support.ToDouble(), largest - kHair) << "trial " << trial;
@@ -156,7 +157,8 @@ TEST(Turning, ThePlaceIsCorrelatedWithTheSlice) {
   Eigen::MatrixXd column = Eigen::MatrixXd::Zero(4, 1);
   column(1, 0) = 2 * r;
   column(kVy, 0) = -r;
-  const auto sweeps = SweepsOf(*problem, problem->body.parts[0], SliceOf(Eigen::Vector4d::Zero(), column), nullptr);
+  const Slice slice = SliceOf(Eigen::Vector4d::Zero(), column);
+  const auto sweeps = SweepsOf(*problem, problem->body.parts[0], Frame(*problem, slice), nullptr);
   EXPECT_EQ(ClearOfAny(sweeps, Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 1.001 * r * r * r), 0), Answer::kYes);
 }
 
@@ -223,7 +225,8 @@ TEST(Turning, NoAdmissibleMotionMeetsWhatIsProvenClear) {
     const Obstacle obstacle = Obstacle::AxisBox(core, core + random.Vector(p).cwiseAbs()).Moving(motion);
     const Passage passage = PassageOf(obstacle, schedule, 7, 8);
     ASSERT_TRUE(passage.is_there);
-    for (const Sweep& sweep : SweepsOf(*problem, part, slices[0], &slices[1])) {
+    const Frame first(*problem, slices[0]), last(*problem, slices[1]);
+    for (const Sweep& sweep : SweepsOf(*problem, part, first, &last)) {
       Real best;
       ASSERT_NE(IsClear(sweep, obstacle, 0, best, passage), Answer::kYes) << "trial " << trial;
       const Obstacle away = Obstacle::AxisBox(core + 20 * d, core + 20 * d).Moving(motion);
