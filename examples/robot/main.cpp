@@ -1,63 +1,46 @@
-// A robot that executes certified plans and nothing else: a point mass as in config/point_mass.yaml, without keys. Your
-// robot also sets guard.keys, config_digest, model_digest and domain (robot/guard.h), and signs its messages.
-//   robot [URL [BOUNDARIES]]      by default on the loopback bus, without end
-#include <chrono>
+// A robot that executes certified plans and nothing else: a point mass, as config/point_mass.yaml and
+// examples/python/rover.yaml have it. It reads sizes, digests, channels and key from the task file.
+//   robot TASK [KEYS [URL [BOUNDARIES]]]      without end, unless it is said after how many steps
+#include <csignal>
 #include <iostream>
-#include <stdexcept>
 
-#include <lcm/lcm-cpp.hpp>
+#include "bus/clock.h"
+#include "clients/robot_client.h"
 
-#include "robot/supervisor.h"
-
-using forereach::Bytes, forereach::Supervisor, lcm::ReceiveBuffer;
-
-static std::int64_t Now() {
-  return duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-static Bytes BytesOf(const ReceiveBuffer* m) { return {static_cast<const std::uint8_t*>(m->data), m->data_size}; }
-
-class Robot final : public Supervisor::Robot {
+class PointMass final : public forereach::RobotClient::Robot {
  public:
-  explicit Robot(lcm::LCM& lcm) : lcm_(lcm) {}
   std::span<const double> state() const override { return x_; }                                   // your sensors
   void Hold() override { x_[2] = x_[3] = 0; }                                                     // your brakes
   int StepsToRest(std::span<const double>, std::span<const double>) const override { return 0; }  // their time
-  void Reload() override {}  // without a digest it accepts plans of every task
-  void Send(const std::string& channel, Bytes message) override {
-    if (lcm_.publish(channel, message.data(), static_cast<unsigned>(message.size())) != 0)
-      throw std::runtime_error("not sent");  // the supervisor sends it again later
-  }
-  void Move(std::span<const double> control) {  // your actuators, for one step; without a control they hold
+  void Move(std::span<const double> control, double dt) {  // your actuators, for one step; without a control they hold
     for (std::size_t k = 0; k < control.size(); ++k) {
-      x_[k] += 0.15 * x_[k + 2] + 0.15 * 0.15 / 2 * control[k];
-      x_[k + 2] += 0.15 * control[k];
+      x_[k] += dt * x_[k + 2] + dt * dt / 2 * control[k];
+      x_[k + 2] += dt * control[k];
     }
   }
 
  private:
-  lcm::LCM& lcm_;
   double x_[4] = {0, 0, 0, 0};  // px, py, vx, vy
 };
 
-int main(int argc, char** argv) {
-  lcm::LCM lcm(argc > 1 ? argv[1] : "udpm://239.255.76.67:7667?ttl=0");
-  Robot robot(lcm);
-  Supervisor supervisor({.guard = {.num_states = 4, .num_inputs = 2, .step_us = 150'000}}, robot);
-  using Handler = void (*)(const ReceiveBuffer*, const std::string&, Supervisor*);
-  const Handler certified = [](auto* m, auto&, auto* to) { to->OnCertified(BytesOf(m), Now()); };
-  const Handler withdrawn = [](auto* m, auto&, auto* to) { to->OnWithdrawn(BytesOf(m), Now()); };
-  const Handler fault = [](auto* m, auto&, auto* to) { to->OnFault(BytesOf(m), Now()); };
-  const Handler command = [](auto* m, auto&, auto* to) {
-    if (const std::string why = to->OnCommand(BytesOf(m), Now()); !why.empty()) std::cerr << why << '\n';
-  };
-  for (const auto& [channel, handler] :
-       {std::pair("PLAN_CERTIFIED", certified), {"PLAN_WITHDRAWN", withdrawn}, {"FAULT", fault}, {"COMMAND", command}})
-    lcm.subscribeFunction(channel, handler, &supervisor);
-  std::int64_t boundary = Now();
-  for (int left = argc > 2 ? std::stoi(argv[2]) : -1; left != 0; --left, boundary += 150'000) {
-    while (Now() < boundary) lcm.handleTimeout(1);
-    robot.Move(supervisor.control());  // a simulated step; yours has ended by now
-    supervisor.Boundary(boundary, Now());
+static volatile std::sig_atomic_t is_told_to_end = 0;
+
+int main(int argc, char** argv) try {
+  std::signal(SIGTERM, [](int) { is_told_to_end = 1; });
+  const auto argument = [&](int k) { return argc > k ? argv[k] : ""; };
+  PointMass robot;
+  forereach::RobotClient client({argument(1), argument(2), argument(3)}, robot);
+  std::int64_t boundary = forereach::WallClockUs();
+  for (int left = argc > 4 ? std::stoi(argument(4)) : -1; left != 0 && !is_told_to_end; --left) {
+    client.Listen(boundary, [] { return is_told_to_end != 0; });
+    robot.Move(client.supervisor().control(), static_cast<double>(client.step_us()) * 1e-6);  // yours has ended by now
+    client.Boundary(boundary);
+    boundary += client.step_us();
   }
-  std::cout << supervisor.counts().boundaries << " boundaries, " << supervisor.counts().steps << " steps\n";
+  const auto& counts = client.supervisor().counts();
+  std::cout << counts.boundaries << " boundaries, " << counts.steps << " steps, " << counts.steps_inside
+            << " inside their slices\n";
+} catch (const std::exception& error) {
+  std::cerr << error.what() << '\n';
+  return 1;
 }
