@@ -1,5 +1,6 @@
 #include "clients/robot_client.h"
 
+#include <stdexcept>
 #include <utility>
 
 #include "bus/log.h"
@@ -10,8 +11,8 @@
 namespace forereach {
 
 struct RobotClient::Core {
-  Core(OpenedBus open, Robot& robot)
-      : opened(std::move(open)), supervisor(SupervisorOptionsOf(opened.config()), robot) {
+  Core(OpenedBus open, Robot& its_robot)
+      : opened(std::move(open)), robot(its_robot), supervisor(SupervisorOptionsOf(opened.config()), its_robot) {
     robot.bus_ = &opened;
     const BusOptions& channels = opened.config().bus;
     Bus& bus = opened.bus();
@@ -25,10 +26,14 @@ struct RobotClient::Core {
   }
 
   const OpenedBus opened;
+  Robot& robot;
   Supervisor supervisor;
 };
 
-void RobotClient::Robot::Send(const std::string& channel, Bytes message) { bus_->Send(channel, message); }
+void RobotClient::Robot::Send(const std::string& channel, Bytes message) {
+  if (!bus_) throw std::logic_error("a RobotClient::Robot without its RobotClient");
+  bus_->Send(channel, message);
+}
 
 RobotClient::RobotClient(const ClientOptions& options, Robot& robot)
     : core_(std::make_unique<Core>(OpenedBus(options, Role::kRobot), robot)) {}
@@ -37,7 +42,7 @@ RobotClient::RobotClient(const Config& task, const ClientOptions& instead, Robot
                          const std::function<void(const std::function<void()>&)>& around)
     : core_(std::make_unique<Core>(OpenedBus(task, Role::kRobot, instead, around), robot)) {}
 
-RobotClient::~RobotClient() = default;
+RobotClient::~RobotClient() { core_->robot.bus_ = nullptr; }
 
 const Problem& RobotClient::problem() const { return *core_->opened.config().problem; }
 std::int64_t RobotClient::step_us() const { return Microseconds(core_->opened.config().robot.step_period_ms); }

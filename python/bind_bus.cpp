@@ -1,6 +1,6 @@
 #include <pybind11/stl.h>
 
-#include "bus/bus_options.h"
+#include "certifier/gate/repair.h"
 #include "clients/planner_client.h"
 #include "lcmtypes/names.h"
 #include "python/arrays.h"
