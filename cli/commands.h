@@ -60,6 +60,7 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command KeygenCommand();
 [[nodiscard]] Command LiveCommand();
 [[nodiscard]] Command TailCommand();
+[[nodiscard]] Command TortureCommand();
 
 /** Runs the one of the commands that the command line chooses. @return the program's exit code. */
 [[nodiscard]] int RunCommands(std::vector<Command> commands, int argc, char** argv);

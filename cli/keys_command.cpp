@@ -1,4 +1,5 @@
 #include <iostream>
+#include <memory>
 
 #include "cli/commands.h"
 #include "task/schema.h"
@@ -6,8 +7,18 @@
 namespace forereach {
 
 Command KeysCommand() {
-  return {.name = "keys", .purpose = "Print every key of a task file: unit, range, default and meaning", .run = [] {
-            std::cout << SchemaMarkdown();
+  const auto as_schema = std::make_shared<bool>(false);
+  return {.name = "keys",
+          .purpose = "Print every key of a task file: unit, range, default and meaning",
+          .footer =
+              "An editor that speaks YAML's language server checks a file that begins with\n"
+              "  # yaml-language-server: $schema=task.schema.json\n"
+              "after  forereach keys --schema > task.schema.json",
+          .options = {{.name = "--schema",
+                       .variable = as_schema.get(),
+                       .help = "Print a JSON Schema instead, for editors"}},
+          .run = [as_schema] {
+            std::cout << (*as_schema ? SchemaJson() + "\n" : SchemaMarkdown());
             return 0;
           }};
 }

@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
     commands.push_back({.name = each.name, .purpose = each.purpose, .run = [=] { return Become(program, argv); }});
   }
   for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),
-                                   ResetCommand(), ReloadCommand(), KeygenCommand()})
+                                   TortureCommand(), ResetCommand(), ReloadCommand(), KeygenCommand()})
     commands.push_back(std::move(each));
   return RunCommands(std::move(commands), argc, argv);
 }

@@ -16,10 +16,13 @@ install(TARGETS forereach_options forereach_library forereach_lcmtypes forereach
   forereach_supervisor EXPORT ForeReachTargets)
 install(EXPORT ForeReachTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
-# For certifiers with compiled equations, find_package(ForeReach COMPONENTS process): the process as a library.
+# find_package(ForeReach COMPONENTS process): the certifier process as a library, for compiled equations;
+# COMPONENTS clients: the ends of a bus, for planners and robots that read the task file.
 set_target_properties(forereach_certifier_process PROPERTIES EXPORT_NAME certifier_process)
+set_target_properties(forereach_planner_client PROPERTIES EXPORT_NAME planner_client)
+set_target_properties(forereach_robot_client PROPERTIES EXPORT_NAME robot_client)
 install(TARGETS forereach_command_line forereach_bus forereach_process forereach_task forereach_gate
-  forereach_certifier_node forereach_certifier_process EXPORT ForeReachProcessTargets)
+  forereach_certifier_node forereach_certifier_process forereach_opened_bus forereach_planner_client forereach_robot_client EXPORT ForeReachProcessTargets)
 install(EXPORT ForeReachProcessTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
 # Users include <forereach/...>. In the tree the messages, too, are forereach/NAME_t.hpp; other folders stay folders.
@@ -27,10 +30,12 @@ set(headers ${CMAKE_INSTALL_INCLUDEDIR}/forereach)
 foreach(floor numerics sets dynamics residual safety reach declare certify)
   install(DIRECTORY forereach/${floor} DESTINATION ${headers} FILES_MATCHING PATTERN "*.h")
 endforeach()
+install(FILES clients/candidate_start.h clients/client_options.h clients/planner_client.h clients/robot_client.h
+  DESTINATION ${headers}/clients)
 install(FILES certifier/process/certifier_process.h DESTINATION ${headers}/certifier/process)
 install(FILES lcmtypes/angle.h lcmtypes/bad_input.h lcmtypes/codec.h lcmtypes/freshness.h lcmtypes/names.h lcmtypes/seal.h
   lcmtypes/sole_sender.h DESTINATION ${headers}/lcmtypes)
-install(FILES bus/authentic.h bus/keys.h DESTINATION ${headers}/bus)
+install(FILES bus/authentic.h bus/clock.h bus/keys.h DESTINATION ${headers}/bus)
 install(FILES robot/brake.h robot/guard.h robot/report_queue.h robot/supervisor.h DESTINATION ${headers}/robot)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach/ DESTINATION ${headers})
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach/lcmtypes FILES_MATCHING PATTERN "*.lcm")

@@ -21,6 +21,7 @@
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/log_survey.h"
+#include "records/shadow.h"
 
 namespace forereach {
 namespace {
@@ -183,7 +184,8 @@ void AddTasks(const LogTasks& tasks, PageRun& run) {
 // @param makes_rows false: they are known already.
 void ReadRows(const Logs& logs, LogTasks& tasks, bool makes_rows, PageRun& run, PagePass& pass) {
   RowReader reader(tasks.first().bus, makes_rows, run);
-  std::vector<TimelineUser*> users{&reader, &pass.cases};
+  ShadowTally shadow(1);
+  std::vector<TimelineUser*> users{&reader, &pass.cases, &shadow};
   users.insert(users.end(), pass.others.begin(), pass.others.end());
   Timeline timeline(tasks, users);
   for (const std::string& log : logs) {
@@ -191,6 +193,7 @@ void ReadRows(const Logs& logs, LogTasks& tasks, bool makes_rows, PageRun& run, 
     timeline.Read({log}, true);
   }
   run.damage += timeline.damage();
+  run.shadow = ToSentence(shadow.Finish());
   if (const std::string passed_over = DescribePassedOver(timeline.passed_over()); !passed_over.empty())
     run.notes.push_back("Messages were passed over" + passed_over + ".");
 }
@@ -277,6 +280,9 @@ PageRun GatherRows(const RunLogs& run, const PageTasks& tasks, PagePass& pass) {
     if (!has_database) throw;
     page.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
   }
+  const auto shadows = std::ranges::count(page.decisions, "shadow", &DecisionRow::cause);
+  if (page.shadow.empty() && shadows > 0)
+    page.shadow = fmt::format("Shadow mode: the gate certified nothing. It would have certified {} plans.", shadows);
   AddPart(run, tasks, page);
   return page;
 }
@@ -293,6 +299,7 @@ void AddRows(PageRun& page, PageRun&& run) {
   for (PageTask& task : run.tasks)
     if (std::ranges::find(page.tasks, task.config_digest, &PageTask::config_digest) == page.tasks.end())
       page.tasks.push_back(std::move(task));
+  if (!run.shadow.empty()) page.shadow += (page.shadow.empty() ? "" : " ") + run.shadow;
   page.damage += run.damage;
 }
 

@@ -695,6 +695,8 @@ const start = async () => {
   byId('what').textContent = `${data.run.name}: ${counted(run.count)} decisions` +
     (run.count ? `, ${timeText(from)} to ${timeText(to)} UTC` : '') + (before ? `. Before: ${data.before.name}` : '');
   document.title = `ForeReach report: ${data.run.name}`;
+  byId('shadow').textContent = data.run.shadow;
+  byId('shadow').hidden = !data.run.shadow;
   fillChoices(run);
   const groups = [['robot', 'By robot', (name) => name || '(no name)'], ['source', 'By source', (name) => name || '(no name)'],
     ['config', 'By task, with its config digest', (digest) => taskLabel(run, digest)],

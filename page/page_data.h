@@ -97,6 +97,7 @@ struct PageRun {
   std::vector<PageAdvice> advice;
   std::vector<PagePart> parts;  ///< The rows of each run, one behind the other.
   LogDamage damage;
+  std::string shadow;  ///< What a gate in shadow mode would have done, as sentences; empty if there was none.
   std::vector<std::string> notes;  ///< What is not on the page, as sentences.
 };
 

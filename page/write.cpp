@@ -198,11 +198,17 @@ Json RunsJson(const PageRun& run, bool only_figures) {
 }
 
 Json RunJson(const PageRun& run, bool only_figures) {
-  Json json{{"name", Printable(run.name)},      {"notes", TextsJson(run.notes)},
-            {"tasks", TasksJson(run.tasks)},    {"damaged_places", run.damage.places},
-            {"count", run.decisions.size()},    {"decisions", only_figures ? FiguresJson(run) : DecisionsJson(run)},
-            {"events", EventsJson(run.events)}, {"gaps", GapsJson(run.gaps)},
-            {"faults", FaultsJson(run.faults)}, {"withdrawals", WithdrawalsJson(run.withdrawals)}};
+  Json json{{"name", Printable(run.name)},
+            {"notes", TextsJson(run.notes)},
+            {"shadow", Printable(run.shadow)},
+            {"tasks", TasksJson(run.tasks)},
+            {"damaged_places", run.damage.places},
+            {"count", run.decisions.size()},
+            {"decisions", only_figures ? FiguresJson(run) : DecisionsJson(run)},
+            {"events", EventsJson(run.events)},
+            {"gaps", GapsJson(run.gaps)},
+            {"faults", FaultsJson(run.faults)},
+            {"withdrawals", WithdrawalsJson(run.withdrawals)}};
   json["events"]["run"] = RunColumn(run, &PagePart::events, run.events.size());
   json["gaps"]["run"] = RunColumn(run, &PagePart::gaps, run.gaps.size());
   json["faults"]["run"] = RunColumn(run, &PagePart::faults, run.faults.size());

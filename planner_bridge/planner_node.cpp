@@ -15,12 +15,9 @@
 #include "bus/log.h"
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
-#include "forereach/candidate_batch_t.hpp"
+#include "clients/planner_client.h"
 #include "forereach/numerics/directed.h"
-#include "forereach/withdrawal_t.hpp"
-#include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/names.h"
 #include "planner_bridge/reference.h"
 #include "task/json_text.h"
@@ -46,25 +43,22 @@ Eigen::VectorXd HalfWidth(const Config& config) {
 
 PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
     : config_(config),
-      sender_(bus),
       out_(out),
       period_us_(Microseconds(config.robot.step_period_ms)),
       half_width_(HalfWidth(config)),
       residual_(config.problem),
       proposer_(MakeProposer(config)),
       hardest_(config, Braking::kHardest),
-      robot_(Microseconds(config.gate.robot_timeout_ms)),
-      obstacles_(config) {
-  bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
-  bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
-  if (config_.gate.advises || config_.planner.repairs)
-    bus.Subscribe(config_.bus.advice, [this](const Received& received) { OnAdvice(received); });
-  bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) { OnWithdrawn(received); });
+      obstacles_(config),
+      messages_(config_, bus, kSource,
+                {[this](const robot_state_t& state, std::int64_t now_us) { OnRobotState(state, now_us); },
+                 [this](const decision_t& decision, std::int64_t now_us) { OnDecision(decision, now_us); },
+                 [this](const withdrawal_t& withdrawal, std::int64_t now_us) { OnWithdrawn(withdrawal, now_us); },
+                 HandlerOfAdvice()}) {
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
 }
 
 void PlannerNode::Tick(std::int64_t now_us) {
-  if (next_plan_id_ == 0) next_plan_id_ = now_us;
   if (!round_ || round_->awaited_plan >= 0) return;
   if (!obstacles_.WhyUnknown(now_us).empty()) return EndRound(false);
   if (round_->unadvised && now_us < round_->advice_until) return;
@@ -72,21 +66,18 @@ void PlannerNode::Tick(std::int64_t now_us) {
   SearchOnce(now_us);
 }
 
-void PlannerNode::OnRobotState(const Received& received) {
-  const auto state = Decoded<robot_state_t>(received.bytes);
-  const SoleSender::Place place = robot_.Hear(received.sender, received.utime);
-  if (place == SoleSender::Place::kTakesOver) states_ = {};
-  if (place == SoleSender::Place::kOther || !state ||
-      !TakeState(*state, config_.problem->model->num_states(), received.utime, config_.gate, states_)) {
-    ++ignored_;
-    return;
-  }
+PlannerMessages::Handler<advice_t> PlannerNode::HandlerOfAdvice() {
+  if (!config_.gate.advises && !config_.planner.repairs) return {};
+  return [this](const advice_t& advice, std::int64_t) { OnAdvice(advice); };
+}
+
+void PlannerNode::OnRobotState(const robot_state_t& state, std::int64_t now_us) {
   if (finished_) return;
-  Follow(*state);
-  if (!obstacles_.WhyUnknown(received.utime).empty()) place_.resize(0);  // this time does not count
-  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
-      NextPlanIsDue(*state))
-    BeginRound(*state, config_.planner.lead_steps, false);
+  Follow(state);
+  const bool knows_obstacles = obstacles_.WhyUnknown(now_us).empty();
+  if (!knows_obstacles) place_.resize(0);  // this time does not count
+  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && knows_obstacles && NextPlanIsDue(state))
+    BeginRound(state, config_.planner.lead_steps, false);
 }
 
 Eigen::VectorXd PlannerNode::PlaceOf(const robot_state_t& state) const {
@@ -104,7 +95,7 @@ void PlannerNode::Follow(const robot_state_t& state) {
   last_state_ = state;
   finished_ = state.mode == robot_state_t::FINISHED;
   arrived_ = arrived_ || IsAtGoal(state);
-  if (round_ && (arrived_ || finished_ || round_->start_utime <= state.utime)) EndRound(false);
+  if (round_ && (arrived_ || finished_ || round_->start.utime <= state.utime)) EndRound(false);
   if (waiting_start_ && *waiting_start_ <= state.utime) waiting_start_.reset();
   if (state.mode == robot_state_t::EXECUTING)
     plans_.erase(plans_.begin(), plans_.lower_bound(state.executing_plan_id));
@@ -179,8 +170,9 @@ void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps
   const std::optional<Eigen::VectorXd> center = PredictStart(state, lead_steps);
   if (!center) return;
   ++(stops ? stopping_rounds_ : rounds_);
-  round_ = Round{state.utime + lead_steps * period_us_, *center, HalfWidthFor(state),
-                 Lessons(config_.planner, config_.problem->limits.size()), stops};
+  round_ = Round{{state.utime + lead_steps * period_us_, *center, HalfWidthFor(state)},
+                 Lessons(config_.planner, config_.problem->limits.size()),
+                 stops};
   if (stops || !proposer_->motion().has_back_off()) return;
   const std::int64_t stands_us = StandsFor(state);
   if (stands_us < kStuckUs || (stands_us < kWaitsUs && HasRoomFurtherBack(0))) return;
@@ -193,10 +185,11 @@ void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps
 bool PlannerNode::HasRoomFurtherBack(int steps) const {
   const Eigen::MatrixXd& projection = config_.problem->projection;
   Eigen::MatrixXd controls;
-  const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
+  const std::span<const double> state(round_->start.center.data(),
+                                      static_cast<std::size_t>(round_->start.center.size()));
   if (!proposer_->motion().BackOff(state, std::max(steps, 1), config_.planner.tail_steps, controls)) return false;
-  const Eigen::VectorXd end = Rollout(*config_.problem->model, round_->center, controls).rightCols(1);
-  const Eigen::VectorXd way = projection * (round_->center - end);
+  const Eigen::VectorXd end = Rollout(*config_.problem->model, round_->start.center, controls).rightCols(1);
+  const Eigen::VectorXd way = projection * (round_->start.center - end);
   if (!(way.norm() > 0)) return false;
   PlanRequest request = RequestOf(*round_);
   if (steps > 0) request.state = end;
@@ -219,23 +212,18 @@ int PlannerNode::StepsBack() {
 
 // ---- Withdrawals.
 
-void PlannerNode::OnWithdrawn(const Received& received) {
-  const auto withdrawal = Decoded<withdrawal_t>(received.bytes);
-  if (!withdrawal || GetText(withdrawal->source) != kSource) {
-    ++ignored_;
-    return;
-  }
-  const auto plan = plans_.find(withdrawal->plan_id);
+void PlannerNode::OnWithdrawn(const withdrawal_t& withdrawal, std::int64_t now_us) {
+  const auto plan = plans_.find(withdrawal.plan_id);
   if (plan == plans_.end()) return;  // it is over
-  const int valid_steps = std::max<int>(withdrawal->valid_steps, 0);
-  const auto [known, is_first] = withdrawn_.try_emplace(withdrawal->plan_id, valid_steps);
+  const int valid_steps = std::max<int>(withdrawal.valid_steps, 0);
+  const auto [known, is_first] = withdrawn_.try_emplace(withdrawal.plan_id, valid_steps);
   if (!is_first && valid_steps >= known->second) return;  // a repetition
   known->second = valid_steps;
   ++withdrawals_;
-  if (waiting_start_ && waiting_plan_ == withdrawal->plan_id) waiting_start_.reset();
+  if (waiting_start_ && waiting_plan_ == withdrawal.plan_id) waiting_start_.reset();
   const bool executes = last_state_.mode == robot_state_t::EXECUTING && last_state_.executing_plan_id == plan->first &&
                         0 <= last_state_.executing_step && last_state_.executing_step < plan->second.num_steps;
-  if (executes && !finished_ && !TakesOver(valid_steps)) BeginStop(valid_steps, received.utime);
+  if (executes && !finished_ && !TakesOver(valid_steps)) BeginStop(valid_steps, now_us);
 }
 
 // Whether a certified plan starts while the executing one stands.
@@ -275,12 +263,12 @@ void PlannerNode::LogLostRounds() const {
 void PlannerNode::EndRound(bool certified) {
   if (round_->awaited_plan >= 0) ++unanswered_;
   if (certified) {
-    waiting_start_ = round_->start_utime;
+    waiting_start_ = round_->start.utime;
     lost_in_a_row_ = 0;
   } else {
     ++fruitless_rounds_;
     if (round_->searches > 0 && ++lost_in_a_row_ == kLostRounds) LogLostRounds();
-    refused_center_ = round_->center;
+    refused_center_ = round_->start.center;
   }
   round_.reset();
 }
@@ -289,7 +277,7 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   const std::int64_t takes_us =
       round_->stops ? Microseconds(config_.gate.decision_budget_ms) : Microseconds(config_.planner.time_limit_ms);
   std::deque<Proposal>& found = round_->found;
-  if ((found.empty() && round_->searches == MostCandidates()) || now_us + takes_us >= round_->start_utime) {
+  if ((found.empty() && round_->searches == MostCandidates()) || now_us + takes_us >= round_->start.utime) {
     if (!SendRepair(now_us)) EndRound(false);
     return;
   }
@@ -306,50 +294,31 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   SendNext(now_us);
 }
 
-// As many as one message has room for.
 void PlannerNode::SendNext(std::int64_t now_us) {
   std::deque<Proposal>& found = round_->found;
-  if (found.size() == 1) {
-    static_cast<void>(SendOne(found.front(), AsksForRepairs(), now_us));
-    return found.clear();
-  }
-  candidate_batch_t batch{};
-  std::vector<candidate_plan_t> sent;
-  while (!found.empty()) {
-    candidate_plan_t candidate = MakeCandidate(found.front(), *round_, now_us);
-    candidate.repair = AsksForRepairs() ? 1 : 0;
-    if (!Append(batch, candidate)) break;
-    sent.push_back(candidate);
-    ++next_plan_id_;
-    found.pop_front();
-  }
-  if (sender_.Send(config_.bus.candidate, batch)) Await(sent);
+  std::vector<PlannerMessages::Controls> plans;
+  for (const Proposal& proposal : found) plans.push_back({proposal.controls, proposal.progress_steps});
+  const int sent = Send(plans, AsksForRepairs(), now_us);
+  found.erase(found.begin(), sent > 0 ? found.begin() + sent : found.end());
 }
 
-bool PlannerNode::SendOne(const Proposal& proposal, bool asks_for_repair, std::int64_t now_us) {
-  candidate_plan_t candidate = MakeCandidate(proposal, *round_, now_us);
-  candidate.repair = asks_for_repair ? 1 : 0;
-  ++next_plan_id_;
-  if (!sender_.Send(config_.bus.candidate, candidate)) return false;
-  Await({&candidate, 1});
-  return true;
-}
-
-void PlannerNode::Await(std::span<const candidate_plan_t> sent) {
-  ++proposed_;
+// As many of them as one message has room for.
+int PlannerNode::Send(const std::vector<PlannerMessages::Controls>& plans, bool asks_for_repair, std::int64_t now_us) {
+  const std::vector<candidate_plan_t> sent = messages_.Send(round_->start, plans, asks_for_repair, now_us);
+  if (sent.empty()) return 0;
   round_->awaited_plan = sent.front().plan_id;
   round_->awaited = std::ssize(sent);
   for (const candidate_plan_t& candidate : sent) plans_[candidate.plan_id] = candidate;
+  return static_cast<int>(sent.size());
 }
 
 // If the certifier can still decide on it. It asks for no other.
 bool PlannerNode::SendRepair(std::int64_t now_us) {
   const std::optional<advice_t> repair = std::exchange(round_->repair, std::nullopt);
-  if (!repair || now_us + Microseconds(config_.gate.decision_budget_ms) > round_->start_utime) return false;
+  if (!repair || now_us + Microseconds(config_.gate.decision_budget_ms) > round_->start.utime) return false;
   const candidate_plan_t& plan = repair->proposal;
-  const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> controls(
-      plan.control[0], plan.num_inputs, plan.num_steps, Eigen::OuterStride<>(kMaxInputs));
-  if (!SendOne({controls, plan.progress_steps, {}}, false, now_us)) return false;
+  const Eigen::MatrixXd controls = ControlsOf(plan);
+  if (Send({{controls, plan.progress_steps}}, false, now_us) == 0) return false;
   ++repairs_;
   return true;
 }
@@ -366,7 +335,8 @@ int PlannerNode::MostCandidates() const {
 
 std::vector<Proposal> PlannerNode::Propose() {
   if (!round_->stops && round_->back_off_steps == 0) return proposer_->ProposeMany(RequestOf(*round_));
-  const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
+  const std::span<const double> state(round_->start.center.data(),
+                                      static_cast<std::size_t>(round_->start.center.size()));
   const std::optional<Proposal> one = round_->back_off_steps > 0 ? BackOffFrom(state) : StopFrom(state);
   return one ? std::vector{*one} : std::vector<Proposal>{};
 }
@@ -387,42 +357,28 @@ std::optional<Proposal> PlannerNode::StopFrom(std::span<const double> state) con
 }
 
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
-  return {round.center,
+  return {round.start.center,
           round.lessons.clearance(),
-          round.lessons.DomainMargin(round.half_width, config_.problem->projection),
+          round.lessons.DomainMargin(round.start.half_width, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSeedSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1,
-          {round.start_utime, period_us_, ScheduleErrorUs(config_.gate)},
+          {round.start.utime, period_us_, ScheduleErrorUs(config_.gate)},
           round.lessons.limit_margin(),
           round.lessons.obstacle_clearance(),
-          round.searches == 1 && !(refused_center_ && *refused_center_ == round.center)};
+          round.searches == 1 && !(refused_center_ && *refused_center_ == round.start.center)};
 }
 
-candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {
-  candidate_plan_t candidate{};
-  candidate.utime = now_us;
-  candidate.sequence = proposed_;
-  candidate.plan_id = next_plan_id_;
-  SetText(candidate.source, kSource);
-  candidate.start_utime = round.start_utime;
-  candidate.step_us = period_us_;
-  SetPlan(candidate, round.center, round.half_width, proposal.controls);
-  candidate.progress_steps = static_cast<std::int16_t>(proposal.progress_steps);
-  return candidate;
-}
-
-void PlannerNode::OnDecision(const Received& received) {
-  const auto decision = Decoded<decision_t>(received.bytes);
-  if (!decision || GetText(decision->source) != kSource || !round_ || round_->awaited_plan < 0 ||
-      decision->plan_id < round_->awaited_plan || decision->plan_id - round_->awaited_plan >= round_->awaited) {
+void PlannerNode::OnDecision(const decision_t& decision, std::int64_t now_us) {
+  if (!round_ || round_->awaited_plan < 0 || decision.plan_id < round_->awaited_plan ||
+      decision.plan_id - round_->awaited_plan >= round_->awaited) {
     ++ignored_;
     return;
   }
   const std::int64_t first = std::exchange(round_->awaited_plan, -1);
   std::erase_if(plans_, [&](const auto& plan) {
-    return first <= plan.first && plan.first - first < round_->awaited && plan.first != decision->plan_id;
+    return first <= plan.first && plan.first - first < round_->awaited && plan.first != decision.plan_id;
   });
-  Learn(*decision, received.utime);
+  Learn(decision, now_us);
 }
 
 void PlannerNode::Learn(const decision_t& decision, std::int64_t now_us) {
@@ -449,14 +405,11 @@ void PlannerNode::Learn(const decision_t& decision, std::int64_t now_us) {
 
 // Its numbers only say what the next candidate keeps away from, or are a candidate like all: false ones cost time, and
 // can have nothing executed.
-void PlannerNode::OnAdvice(const Received& received) {
-  const auto advice = Decoded<advice_t>(received.bytes);
-  if (!advice || !round_ || !round_->unadvised ||
-      GetDigest(advice->plan_digest) != GetDigest(round_->unadvised->plan_digest) ||
-      GetDigest(advice->obstacles_digest) != obstacles_.digest() || !Heed(*advice)) {
-    ++ignored_;
-    return;
-  }
+void PlannerNode::OnAdvice(const advice_t& advice) {
+  const bool is_on_last = round_ && round_->unadvised &&
+                          GetDigest(advice.plan_digest) == GetDigest(round_->unadvised->plan_digest) &&
+                          GetDigest(advice.obstacles_digest) == obstacles_.digest();
+  if (!is_on_last || !Heed(advice)) ++ignored_;
 }
 
 // With a proposal, or none, the abstention is learned from as without advice, and at once.
@@ -506,7 +459,7 @@ void PlannerNode::OnObstacles(const Received& received) {
 void PlannerNode::Stop() { out_ << Summary() << std::endl; }
 
 std::string PlannerNode::Summary() const {
-  return JsonText(nlohmann::ordered_json{{"proposed", proposed_},
+  return JsonText(nlohmann::ordered_json{{"proposed", messages_.sent()},
                                          {"certified", certified_},
                                          {"abstained", abstained_},
                                          {"rejected", rejected_},
@@ -519,8 +472,8 @@ std::string PlannerNode::Summary() const {
                                          {"back_off_rounds", back_off_rounds_},
                                          {"rounds_without_certificate", fruitless_rounds_},
                                          {"searches_without_result", fruitless_searches_},
-                                         {"messages_ignored", ignored_},
-                                         {"messages_not_sent", sender_.refused()}});
+                                         {"messages_ignored", ignored_ + messages_.ignored()},
+                                         {"messages_not_sent", messages_.not_sent()}});
 }
 
 }  // namespace forereach

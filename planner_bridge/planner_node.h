@@ -54,11 +54,7 @@ decisions on candidates of other planners; and advice that is not on the candida
 
 #include "bus/node.h"
 #include "certifier/gate/obstacles_in_force.h"
-#include "forereach/advice_t.hpp"
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/robot_state_t.hpp"
-#include "lcmtypes/stream_order.h"
+#include "clients/planner_messages.h"
 #include "planner_bridge/lessons.h"
 #include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"
@@ -97,8 +93,7 @@ class PlannerNode final : public Node {
 
  private:
   struct Round {
-    std::int64_t start_utime;
-    Eigen::VectorXd center, half_width;  // of X_0
+    CandidateStart start;
     Lessons lessons;
     bool stops = false;      // a stopping round
     int back_off_steps = 0;  // of its first candidate; 0: it does not back off
@@ -111,12 +106,13 @@ class PlannerNode final : public Node {
     std::optional<advice_t> repair = {};  // the nearest that was proposed and not sent
   };
 
-  void OnRobotState(const Received& received);
-  void OnDecision(const Received& received);
-  void OnAdvice(const Received& received);
+  [[nodiscard]] PlannerMessages::Handler<advice_t> HandlerOfAdvice();
+  void OnRobotState(const robot_state_t& state, std::int64_t now_us);
+  void OnDecision(const decision_t& decision, std::int64_t now_us);
+  void OnAdvice(const advice_t& advice);
   [[nodiscard]] bool Heed(const advice_t& advice);
   [[nodiscard]] bool TakeRepair(const advice_t& advice);
-  void OnWithdrawn(const Received& received);
+  void OnWithdrawn(const withdrawal_t& withdrawal, std::int64_t now_us);
   void OnObstacles(const Received& received);
 
   [[nodiscard]] Eigen::VectorXd PlaceOf(const robot_state_t& state) const;
@@ -143,15 +139,13 @@ class PlannerNode final : public Node {
   void SearchOnce(std::int64_t now_us);
   [[nodiscard]] bool SendRepair(std::int64_t now_us);
   [[nodiscard]] bool AsksForRepairs() const;
-  [[nodiscard]] bool SendOne(const Proposal& proposal, bool asks_for_repair, std::int64_t now_us);
-  void Await(std::span<const candidate_plan_t> sent);
+  [[nodiscard]] int Send(const std::vector<PlannerMessages::Controls>& plans, bool asks_for_repair,
+                         std::int64_t now_us);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
-  [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
   void Learn(const decision_t& decision, std::int64_t now_us);
   void LearnWithoutAdvice();
 
   const Config config_;
-  Sender sender_;
   std::ostream& out_;
   const std::int64_t period_us_;
   const Eigen::VectorXd half_width_;  // of X_0, without the state error
@@ -166,14 +160,12 @@ class PlannerNode final : public Node {
   std::int64_t waiting_plan_ = -1;                  // its plan_id
   robot_state_t last_state_{};                      // of the robot, the newest; num_states 0: none yet
   std::map<std::int64_t, int> withdrawn_;           // valid_steps, of plans in plans_
-  SoleSender robot_;                                // of two, it follows one
-  StreamOrder states_;                              // of that one
-  std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   ObstaclesInForce obstacles_;
+  PlannerMessages messages_;
   Digest planned_among_{};  // the digest of the obstacles that proposer_ has from a message
   bool arrived_ = false, finished_ = false;
 
-  std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
+  std::int64_t searches_ = 0, fruitless_searches_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
                stopping_rounds_ = 0, back_off_rounds_ = 0, withdrawals_ = 0, advised_ = 0, repairs_ = 0,
                fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause

@@ -4,21 +4,21 @@
 
 #include <pybind11/stl.h>
 
-#include "bus/log.h"
+#include "clients/robot_client.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/judgement.h"
-#include "python/open_bus.h"
-#include "simulator/supervised.h"
+#include "python/waiting.h"
 
 namespace forereach {
 namespace {
 
-// A robot that is an object of Python. What its functions raise stops the robot and goes to sys.unraisablehook, or,
-// what is to end the program (KeyboardInterrupt, SystemExit), to the caller of the supervisor.
-class PythonRobot final : public Supervisor::Robot {
+// A robot that is an object of Python. Its functions take Python's lock, which is free while messages come. What its
+// functions raise stops the robot and goes to sys.unraisablehook, or, what is to end the program (KeyboardInterrupt,
+// SystemExit), to the caller of the supervisor.
+class PythonRobot final : public RobotClient::Robot {
  public:
-  PythonRobot(py::object robot, const OpenedBus& opened) : robot_(std::move(robot)), opened_(opened) {}
+  explicit PythonRobot(py::object robot) : robot_(std::move(robot)) {}
 
   std::span<const double> state() const override { return Numbers("state", state_); }
   std::span<const double> state_error() const override {
@@ -38,7 +38,6 @@ class PythonRobot final : public Supervisor::Robot {
   void Reload() override {
     if (Has("reload")) Call("reload", [&](const py::object& reload) { reload(); });
   }
-  void Send(const std::string& channel, Bytes message) override { opened_.Send(channel, message); }
 
   [[nodiscard]] bool is_interrupted() const { return interrupt_ != nullptr; }
   void RaiseInterrupt() {
@@ -46,10 +45,14 @@ class PythonRobot final : public Supervisor::Robot {
   }
 
  private:
-  bool Has(const char* name) const { return py::hasattr(robot_, name); }
+  bool Has(const char* name) const {
+    const py::gil_scoped_acquire lock;
+    return py::hasattr(robot_, name);
+  }
 
   template <class Use>
   void Call(const char* name, const Use& use) const {
+    const py::gil_scoped_acquire lock;
     try {
       use(robot_.attr(name));
     } catch (py::error_already_set& error) {
@@ -74,7 +77,6 @@ class PythonRobot final : public Supervisor::Robot {
   }
 
   const py::object robot_;
-  const OpenedBus& opened_;
   mutable std::vector<double> state_, error_;
   mutable std::exception_ptr interrupt_;
 };
@@ -83,43 +85,27 @@ class BusSupervisor final {
  public:
   BusSupervisor(const std::shared_ptr<const JudgingTask>& task, py::object robot, const std::string& key,
                 const std::string& url)
-      : opened_(task->config(), Role::kRobot, key, url),
-        robot_(std::move(robot), opened_),
-        supervisor_(SupervisorOptionsOf(opened_.config()), robot_) {
-    const BusOptions& channels = opened_.config().bus;
-    // Handlers come without Python's lock, and the robot needs it.
-    const auto hear = [this](const std::string& channel, auto take) {
-      opened_.bus().Subscribe(channel, [this, take](const Received& received) {
-        const py::gil_scoped_acquire acquire;
-        take(received);
-      });
-    };
-    hear(channels.certified, [this](const Received& r) { supervisor_.OnCertified(r.raw, r.utime); });
-    hear(channels.withdrawn, [this](const Received& r) { supervisor_.OnWithdrawn(r.raw, r.utime); });
-    hear(channels.fault, [this](const Received& r) { supervisor_.OnFault(r.raw, r.utime); });
-    hear(channels.command, [this](const Received& r) {
-      if (const std::string why = supervisor_.OnCommand(r.raw, r.utime); !why.empty())
-        logging::Warn("{}: refused: {}", opened_.config().bus.command, why);
-    });
+      : robot_(std::move(robot)), client_(task->config(), {{}, key, url}, robot_, WithoutLock) {
+    WarnUnless(client_.is_signed());
   }
   BusSupervisor(const BusSupervisor&) = delete;
   BusSupervisor& operator=(const BusSupervisor&) = delete;
 
   void Listen(std::int64_t until_utime) {
-    opened_.Listen(until_utime, [this] { return robot_.is_interrupted(); });
+    client_.Listen(until_utime, [this] { return robot_.is_interrupted(); });
     robot_.RaiseInterrupt();
   }
   py::object Boundary(std::int64_t utime, bool ends) {
-    const py::object control = Control(Own().Boundary(utime, WallClockUs(), ends));
+    const py::object control = Control(client_.Boundary(utime, ends));
     robot_.RaiseInterrupt();
     return control;
   }
-  py::object Control() { return Control(Own().control()); }
-  void Expect(const JudgingTask& task) { ExpectTask(task.config(), Own()); }
-  bool halted() { return Own().halted(); }
+  py::object Control() { return Control(client_.supervisor().control()); }
+  void Expect(const JudgingTask& task) { client_.Expect(task.config()); }
+  bool halted() { return client_.supervisor().halted(); }
 
   py::dict Counts() {
-    const Supervisor::Counts& counts = Own().counts();
+    const Supervisor::Counts& counts = client_.supervisor().counts();
     using namespace py::literals;
     return py::dict(
         "boundaries"_a = counts.boundaries, "steps"_a = counts.steps, "steps_inside"_a = counts.steps_inside,
@@ -129,18 +115,13 @@ class BusSupervisor final {
   }
 
  private:
-  Supervisor& Own() {
-    static_cast<void>(opened_.bus());  // of this thread
-    return supervisor_;
-  }
   static py::object Control(std::span<const double> control) {
     if (control.empty()) return py::none();
     return ArrayOf({control.begin(), control.end()}, {std::ssize(control)});
   }
 
-  const OpenedBus opened_;
   PythonRobot robot_;
-  Supervisor supervisor_;
+  RobotClient client_;
 };
 
 }  // namespace

@@ -22,6 +22,7 @@
 #include "records/outlines.h"
 #include "records/recorded_case.h"
 #include "records/run_logs.h"
+#include "records/shadow.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -215,23 +216,28 @@ bool Report(const ReportOptions& options, std::ostream& out) {
   tasks.RequirePlans();
   Summarizer summarizer(tasks.first());
   PictureMaker maker(tasks.first().bus);
-  std::vector<TimelineUser*> users{&summarizer};
+  ShadowTally shadow_tally(AllCores());
+  std::vector<TimelineUser*> users{&summarizer, &shadow_tally};
   if (!files.empty()) users.push_back(&maker);
   Timeline timeline(tasks, users);
   timeline.Read(logs, false);
   const Config& last = *tasks.found().back();
   const Summary summary = summarizer.Finish(timeline, last);
+  const ShadowSummary shadow = shadow_tally.Finish();
   LogPicture drawn;
   if (!files.empty()) {
     drawn = maker.Finish(timeline, last);
     drawn.picture.title = TitleOf(last);
     drawn.picture.key_numbers = KeyNumbers(summary);
+    if (shadow.any())
+      drawn.picture.key_numbers.insert(drawn.picture.key_numbers.begin(), "SHADOW: nothing was certified");
   }
   for (const std::string& file : files) DrawPicture(drawn.picture, file);
 
   const bool is_whole = summary.damage.places == 0 && named.missing.empty();
   if (options.json) {
     nlohmann::json json = ToJson(summary);
+    json["shadow"] = ToJson(shadow);
     json["logs"] = logs;
     json["pictures"] = files;
     json["tubes_left_out"] = drawn.disagreements;
@@ -239,7 +245,7 @@ bool Report(const ReportOptions& options, std::ostream& out) {
     out << JsonText(json, 2) << "\n";
     return is_whole;
   }
-  out << ToText(summary);
+  out << ToText(shadow) << ToText(summary);
   for (const std::string& missing : named.missing) out << fmt::format("{:<26}{}\n", "not read", Printable(missing));
   for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
   if (drawn.disagreements > 0)

@@ -14,11 +14,11 @@
 #include "bus/bus_options.h"
 #include "bus/log.h"
 #include "certifier/gate/stamp.h"
+#include "clients/supervised.h"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "lcmtypes/why_failed.h"
-#include "simulator/supervised.h"
 #include "task/json_text.h"
 #include "task/step_time.h"
 

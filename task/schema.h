@@ -74,6 +74,10 @@ whose names or sizes depend on them. */
 /** All rows of a model file, which a task file includes by `model.file`. */
 [[nodiscard]] std::span<const Key> ModelFileSchema();
 
+/** A JSON Schema (draft 7) of task files, for editors: keys, forms, words, ranges, counts and what is required. It
+knows no names of a model's states and inputs, and no rule between keys but those by a map's `name`. */
+[[nodiscard]] std::string SchemaJson();
+
 /** The section "Keys" of config/README.md. */
 [[nodiscard]] std::string SchemaMarkdown();
 

@@ -11,9 +11,12 @@ void Charge::Hear(const Identity& other, State its_state) {
   if (other.instance == self_.instance) return;
   other_ = other;
   other_silent_us_ = 0;
-  const bool is_earlier = other < self_, decides = its_state == State::kInCharge;
+  if (other.is_shadow && !self_.is_shadow) return;
+  const bool is_earlier = other.IsEarlierThan(self_), decides = its_state == State::kInCharge,
+             will_decide = its_state == State::kListening && is_earlier;
+  const bool gives_way_at_once = self_.is_shadow && !other.is_shadow;
   const bool goes_before =
-      state_ == State::kInCharge ? decides && is_earlier : decides || (its_state == State::kListening && is_earlier);
+      state_ != State::kInCharge || gives_way_at_once ? decides || will_decide : decides && is_earlier;
   if (!goes_before) return;
   state_ = State::kStandingBy;
   leaderless_us_ = 0;

@@ -7,13 +7,15 @@ decision. It is a state machine over the heartbeats of other certifiers. It uses
     in charge    --hears an earlier one in charge--> standing by
     in charge    --was itself paused for kLapseUs--> listening
 
-A certifier is earlier if it has the smaller started_utime, or an equal one and the smaller instance. kLapseUs is
-shorter than kSilenceUs, so a paused certifier knows that it may have been replaced before it sends anything. */
+A certifier is earlier if it has the smaller started_utime, or an equal one and the smaller instance. One in shadow mode
+certifies nothing, so it holds up none that does: one that certifies is earlier than any shadow, passes over what
+shadows say, and is in charge without them; a shadow in charge stands by as soon as it hears one that listens. kLapseUs
+is shorter than kSilenceUs, so a paused certifier knows that it may have been replaced before it sends anything. */
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <optional>
+#include <tuple>
 
 namespace forereach {
 
@@ -30,7 +32,12 @@ class Charge final {
 
   struct Identity {
     std::int64_t started_utime, instance;
-    friend auto operator<=>(const Identity&, const Identity&) = default;
+    bool is_shadow = false;
+    friend bool operator==(const Identity&, const Identity&) = default;
+    [[nodiscard]] bool IsEarlierThan(const Identity& other) const {
+      return std::tuple(is_shadow, started_utime, instance) <
+             std::tuple(other.is_shadow, other.started_utime, other.instance);
+    }
   };
 
   /** @param self this certifier. @param listen_us how long it listens before it takes charge, microseconds. 0: it is in
@@ -39,6 +46,8 @@ class Charge final {
 
   /** Processes a certifier's heartbeat. Its own heartbeats are ignored. */
   void Hear(const Identity& other, State its_state);
+  /** After a reload: whether this certifier is a shadow. */
+  void Follow(bool is_shadow) { self_.is_shadow = is_shadow; }
   /** Processes the passing of time, by a monotonic clock in microseconds. */
   void Advance(std::int64_t steady_us);
 

@@ -67,7 +67,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       sender_(bus),
       gate_(std::make_unique<Gate>(config)),
       watch_(OptionsOf(config)),
-      charge_({clocks_.wall(), RandomInstance()}, listen_us),
+      charge_({clocks_.wall(), RandomInstance(), config.gate.shadow}, listen_us),
       has_begun_(is_in_charge()),
       plans_(config.gate, clocks_.steady()),
       robot_(Microseconds(config.gate.robot_timeout_ms)),
@@ -78,6 +78,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       contradictions_(config_),
       latch_(watch_, contradictions_, std::move(latch)),
       reporter_({channels_, bus_, sender_, watch_, charge_, contradictions_, latch_, reload_, queue_}) {
+  if (config.gate.shadow) logging::Warn(kShadowWarning);
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
     logging::Warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
   if (config.left_out > 0)
@@ -117,7 +118,7 @@ void CertifierNode::OnStatus(const Received& received) {
     return Refuse(channels_.status, "a heartbeat from another time");
   LookAtCharge();
   const Charge::State before = charge_.state(), its_state = ChargeOf(status->state);
-  charge_.Hear({status->started_utime, status->instance}, its_state);
+  charge_.Hear({status->started_utime, status->instance, status->shadow != 0}, its_state);
   if (its_state == Charge::State::kInCharge) Heed(*status);
   FollowCharge(before);
   if (is_in_charge()) reporter_.HurryToOthers();
@@ -126,7 +127,8 @@ void CertifierNode::OnStatus(const Received& received) {
 // Notes the fault and the contradictions of the certifier in charge, for the case that this one takes over.
 void CertifierNode::Heed(const certifier_status_t& status) {
   fault_of_other_.reset();
-  if (status.fault != 0) fault_of_other_ = Watch::Fault{status.fault, status.fault_utime, GetText(status.message)};
+  if (status.fault != 0 && status.shadow == 0)
+    fault_of_other_ = Watch::Fault{status.fault, status.fault_utime, GetText(status.message)};
   // Without a fault, ERROR means that data contradict its declaration or that it cannot store a fault.
   const bool is_false = status.fault == fault_t::DECLARATION_FALSIFIED ||
                         (status.fault == 0 && status.level == certifier_status_t::ERROR &&
@@ -389,8 +391,9 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   reporter_.Hurry();
 }
 
+// A shadow stops no robot, unless that may execute what was certified before the task made it a shadow.
 void CertifierNode::SendFault() {
-  if (!is_in_charge()) return;
+  if (!is_in_charge() || (gate_->options().shadow && plans_.num_in_force() == 0)) return;
   latch_.Sent(clocks_.steady());
   sender_.Send(channels_.fault, latch_.fault());
 }
@@ -521,6 +524,8 @@ void CertifierNode::TakeReload() {
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);
+  charge_.Follow(config_.gate.shadow);
+  if (config_.gate.shadow) logging::Warn(kShadowWarning);
   watch_.Follow(OptionsOf(config_));
   for (SoleSender* stream : {&robot_, &transitions_, &events_})
     stream->Follow(Microseconds(gate_->options().robot_timeout_ms));

@@ -34,6 +34,10 @@ a declaration that is known to be false is answered ABSTAIN_FALSIFIED; a reset d
 A certifier that is not in charge sends its heartbeat only, and learns nothing: one that takes charge knows as much as
 one that has just been started.
 
+With gate.mode: shadow it decides, reports and learns, and certifies nothing: there is no certificate that a guard could
+take, now or later. It sends no fault either, unless a plan that it certified before a reload is in force. It stands by
+as soon as a certifier that certifies is heard (charge.h).
+
 The certified plan, for which the robot waits, is sent before the decision: a planner that receives the decision knows
 that the plan was handed to the bus before. */
 #pragma once

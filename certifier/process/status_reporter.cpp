@@ -98,7 +98,10 @@ certifier_status_t StatusReporter::Report(const Gate& gate, std::int64_t now_us,
   const Refusals refusals = parts_.bus.refusals();
   const std::string clocks = DescribeClocks(refusals, std::exchange(refused_before_, refusals));
   const std::string why = WhyNotOk(gate);
-  SetText(status.message, clocks.empty() ? why : clocks + (why.empty() ? "" : "; ") + why);
+  std::string message = gate.options().shadow ? kShadowWarning : "";
+  for (const std::string& clause : {clocks, why})
+    if (!clause.empty()) message += (message.empty() ? "" : "; ") + clause;
+  SetText(status.message, message);
   counts.obstacles_refused = false;
   return status;
 }

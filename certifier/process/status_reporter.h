@@ -21,6 +21,9 @@ kToOthersUs while another certifier has to hear of this one. Of time it knows wh
 
 namespace forereach {
 
+/** What a certifier in shadow mode says in each heartbeat and in its log. */
+inline constexpr const char* kShadowWarning = "SHADOW: decides and records, certifies nothing";
+
 class StatusReporter final {
  public:
   static constexpr std::int64_t kPeriodUs = 500'000;

@@ -47,6 +47,29 @@ TEST(ChargeTest, EveryHeartbeatInEveryStateHasTheSpecifiedEffect) {
   }
 }
 
+TEST(ChargeTest, AShadowHoldsUpNoneThatCertifiesAndGivesWayToEach) {
+  for (const State state : {State::kListening, State::kInCharge, State::kStandingBy})
+    for (const State its : {State::kListening, State::kInCharge, State::kStandingBy})
+      for (const Charge::Identity& other : {kEarlier, kLater}) {
+        std::int64_t now = 0;
+        Charge certifies = InState(state, now);
+        certifies.Hear({other.started_utime, other.instance, true}, its);
+        EXPECT_EQ(certifies.state(), state);
+        Charge shadow = InState(state, now);
+        shadow.Follow(true);
+        shadow.Hear(other, its);
+        const bool yields = its != State::kStandingBy || state == State::kStandingBy;
+        EXPECT_EQ(shadow.state(), yields ? State::kStandingBy : state);
+      }
+  std::int64_t now = 0;
+  Charge waits = InState(State::kStandingBy, now);
+  for (int i = 0; i < 3; ++i) {
+    waits.Hear({99, 9, true}, State::kInCharge);
+    Pass(waits, now, Charge::kSilenceUs / 2);
+  }
+  EXPECT_EQ(waits.state(), State::kInCharge) << "a shadow in charge is no one in charge";
+}
+
 TEST(ChargeTest, IgnoresItsOwnHeartbeats) {
   for (const State state : {State::kListening, State::kInCharge, State::kStandingBy}) {
     std::int64_t now = 0;

@@ -4,15 +4,12 @@
 #include <utility>
 
 #include "bus/authentic.h"
-#include "forereach/advice_t.hpp"
 #include "forereach/command_t.hpp"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/withdrawal_t.hpp"
-#include "lcmtypes/seal.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
 #include "tests/keys.h"
 #include "tests/paths.h"
+#include "torture/hostile_messages.h"
 
 namespace forereach {
 namespace {
@@ -20,8 +17,7 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-using Sent = std::vector<std::uint8_t>;
-constexpr std::int64_t kForgedSequence = std::int64_t{1} << 40;
+using Sent = RawMessage;
 
 // Keeps the last message of each signed channel as it came, and notes what the robot obeys that nobody may have told
 // it: plans from a future that nobody certifies, withdrawals with the forged number, faults and resets.
@@ -254,54 +250,8 @@ class Forged final : Kind {
            "obstacles were believed");
   }
 
-  // For each channel a message that would do harm if it were believed; what was heard last where that is harm enough.
-  std::map<std::string, Sent> HarmfulOf(const Rig& rig, const std::map<std::string, Sent>& heard) const {
-    const BusOptions& channels = rig.config().bus;
-    std::map<std::string, Sent> harmful;
-    for (const auto& [channel, raw] : heard) {
-      const Bytes message = WithoutSignature(raw);
-      harmful[channel].assign(message.begin(), message.end());
-    }
-    command_t command{};
-    command.utime = WallClockUs();
-    command.kind = command_t::RELOAD;
-    harmful[channels.command] = Encode(command);
-    fault_t fault{};
-    fault.utime = WallClockUs();
-    fault.cause = fault_t::SLICE_LEFT;
-    harmful[channels.fault] = Encode(fault);
-    withdrawal_t withdrawal{};
-    withdrawal.sequence = kForgedSequence;
-    withdrawal.expires_utime = INT64_MAX;
-    if (const certified_plan_t* certified = rig.witness().last_certified())
-      withdrawal.plan_id = certified->plan.plan_id;
-    harmful[channels.withdrawn] = Encode(withdrawal);
-    advice_t advice{};  // the task asks for none
-    advice.sequence = kForgedSequence;
-    advice.num_changes = 1;
-    advice.changed = 1;
-    harmful[channels.advice] = Encode(advice);
-    obstacles_t nothing_there{};
-    nothing_there.utime = WallClockUs();
-    nothing_there.sequence = kForgedSequence;
-    harmful[channels.obstacles] = Encode(nothing_there);
-    if (const certified_plan_t* certified = rig.witness().last_certified())
-      harmful[channels.certified] = Encode(Widened(*certified));
-    return harmful;
-  }
-
-  // What an attacker's certificate looks like: slices that nothing leaves, for a plan that starts soon.
-  static certified_plan_t Widened(certified_plan_t certified) {
-    certified.utime = WallClockUs();
-    certified.plan.plan_id += std::int64_t{1} << 32;
-    certified.plan.start_utime = certified.utime + 200'000;
-    certified.expires_utime = certified.utime + 1'000'000;
-    for (int t = 0; t <= certified.plan.num_steps; ++t)
-      for (int k = 0; k < certified.plan.num_states; ++k)
-        certified.slice_lower[t][k] = -1e9, certified.slice_upper[t][k] = 1e9;
-    SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
-    SetDigest(certified.certificate_digest, CertificateDigest(certified));
-    return certified;
+  static std::map<std::string, Sent> HarmfulOf(const Rig& rig, const std::map<std::string, Sent>& heard) {
+    return HarmfulMessages(rig.config().bus, heard, rig.witness().last_certified(), WallClockUs());
   }
 
   // The adversary of the gate itself: a learned planner that has its key file, or another role's.
@@ -322,11 +272,10 @@ class Forged final : Kind {
         [&](int i) {
           const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
           for (int j = 0; j < 20; ++j) {
-            certified_plan_t certified = Widened(*rig.witness().last_certified());
+            certified_plan_t certified = Widened(*rig.witness().last_certified(), WallClockUs());
             certified.plan.plan_id += j;
             certified.plan.start_utime += 40'000 * j;
-            SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
-            SetDigest(certified.certificate_digest, CertificateDigest(certified));
+            certified = Sealed(certified);
             forged.insert(certified.plan.plan_id);
             const std::string& channel = rig.config().bus.certified;
             rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <limits>
 #include <thread>
 
 #include "bus/process.h"
@@ -11,6 +10,7 @@
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
 #include "tests/paths.h"
+#include "torture/hostile_messages.h"
 
 namespace forereach {
 namespace {
@@ -87,12 +87,10 @@ class Lied final : Kind {
           for (int j = 0; j < 50; ++j) {
             candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
             SetText(candidate.source, "nonsense");
-            if (j % 3 == 0) candidate.control[Below(6)][Below(2)] = std::numeric_limits<double>::quiet_NaN();
-            if (j % 3 == 1) candidate.num_steps = static_cast<std::int16_t>(random_());
-            if (j % 3 == 2) candidate.initial_half_width[Below(6)] = -1;
-            std::vector<std::uint8_t> bytes = Encode(candidate);
-            if (j % 7 == 0) bytes.resize(static_cast<std::size_t>(Below(20'000)));
-            rig.bus().Publish(rig.config().bus.candidate, Bytes(bytes));
+            const CandidateFlaw& flaw = CandidateFlaws()[static_cast<std::size_t>(j) % CandidateFlaws().size()];
+            const auto messages = flaw.make(candidate, WallClockUs());
+            rig.bus().Publish(rig.config().bus.candidate,
+                              Bytes(messages[static_cast<std::size_t>(random_()) % messages.size()]));
             if (j % 10 == 0) rig.Listen(milliseconds(5));
           }
         },

@@ -164,7 +164,7 @@ TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
   const candidate_plan_t& plan = candidates_[0];
   EXPECT_EQ(plan.utime, now_ - 2000);
   EXPECT_EQ(plan.sequence, 0);
-  EXPECT_EQ(plan.plan_id, kNow + 1000);  // of the first tick: it grows over restarts
+  EXPECT_EQ(plan.plan_id, plan.utime);  // so it grows over restarts
   EXPECT_EQ(GetText(plan.source), PlannerNode::kSource);
   EXPECT_EQ(plan.start_utime, state.utime + config_.planner.lead_steps * kPeriod);
   EXPECT_EQ(plan.step_us, kPeriod);
@@ -279,6 +279,7 @@ class AdvisedPlannerTest : public PlannerNodeTest {
   // Half a metre more to every obstacle.
   advice_t Advice() {
     advice_t advice{};
+    SetText(advice.source, PlannerNode::kSource);
     SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
     SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
     for (std::size_t o = 0; o < std::min<std::size_t>(config_.obstacles.size(), 8); ++o) {
@@ -376,6 +377,7 @@ class RepairingPlannerTest : public AdvisedPlannerTest {
   // So far from the last candidate; told from others by the control of a step.
   advice_t Proposal(double nearness, double control) {
     advice_t advice{.changed = 4, .nearness = {nearness, nearness}};
+    SetText(advice.source, PlannerNode::kSource);
     SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
     SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
     advice.proposal = candidates_.back();

@@ -8,6 +8,7 @@
 #include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
+#include "clients/supervised.h"
 #include "forereach/dynamics/models/named_residuals.h"
 #include "lcmtypes/candidate_batch.h"
 #include "simulator/sim_node.h"
@@ -668,6 +669,37 @@ TEST_F(TwoCertifiersTest, TheLaterOneRefusesToArmAndAnswersNobody) {
   EXPECT_EQ(second.by_cause[decision_t::CAUSE_SECOND_CERTIFIER], 5);
   EXPECT_THAT(GetText(second.message), testing::HasSubstr("is in charge on this bus: this one decides nothing"));
   EXPECT_LT(first.started_utime, second.started_utime);
+}
+
+// Whichever begins first: candidates get the answer of the one that certifies, and a shadow is alone in charge at most.
+TEST_F(TwoCertifiersTest, AShadowGivesWayToACertifierAndHoldsUpNone) {
+  for (SharedBus& bus : buses_) bus.clock = clock_;
+  config_.gate.shadow = true;
+  Start(0);
+  Pass(1'000'000);
+  auto answers = Answers();
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].cause, decision_t::CAUSE_SHADOW);
+  config_.gate.shadow = false;
+  Start(1);
+  Pass(Charge::kListenUs + 100'000);
+  EXPECT_EQ(States(), (Charged{kStandingBy, kInCharge}));
+  for (int i = 0; i < 3; ++i) {
+    answers = Answers();
+    ASSERT_EQ(answers.size(), 1u) << "one decision on each candidate";
+    EXPECT_EQ(answers[0].outcome, decision_t::CERTIFIED);
+  }
+  for (const auto& [channel, bytes] : buses_[0].sent) EXPECT_NE(channel, "PLAN_CERTIFIED");
+  EXPECT_EQ(Status(0).shadow, 1);
+  config_.gate.shadow = true;
+  Start(0);  // again, and later
+  Pass(1'000'000);
+  EXPECT_EQ(States(), (Charged{kStandingBy, kInCharge}));
+  nodes_[1].reset();
+  Pass(Charge::kSilenceUs + 2 * Charge::kListenUs);
+  answers = Answers();
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].cause, decision_t::CAUSE_SHADOW);
 }
 
 TEST_F(TwoCertifiersTest, OfTwoThatStartTogetherOneTakesChargeAndCandidatesWaitForIt) {
@@ -1432,6 +1464,47 @@ TEST_F(ArmedNodeTest, ShadowModeSaysWhatItWouldDoAndPassesNothingOn) {
   EXPECT_GT(decision.margin, decision.threshold);
   EXPECT_EQ(Ask(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
   EXPECT_TRUE(certified_.empty());
+}
+
+TEST_F(ArmedNodeTest, NothingThatAShadowSendsIsTakenByAGuardNowOrOnceTheTaskCertifies) {
+  std::vector<std::vector<std::uint8_t>> sent;
+  config_.robot.step_period_ms = 150;
+  Guard guard(SupervisorOptionsOf(config_).guard);
+  for (const bool shadow : {true, false}) {
+    config_.gate.shadow = shadow;
+    Restart();
+    bus_->Subscribe(Bus::kEveryChannel, [&](const Received& r) { sent.emplace_back(r.raw.begin(), r.raw.end()); });
+    SayState(State());
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(Ask().outcome, shadow ? decision_t::REJECTED : decision_t::CERTIFIED);
+    now_us_ += CertifierNode::kHeartbeatUs;
+    Run();
+    EXPECT_EQ(status_.back().shadow, shadow);
+    EXPECT_EQ(GetText(status_.back().message).starts_with("SHADOW"), shadow);
+    int taken = 0;
+    std::string why;
+    for (const auto& bytes : sent) {
+      const GuardVerdict verdict = guard.Accept(bytes, now_us_);
+      taken += verdict.ok() ? 1 : 0;
+      if (bytes.size() == EncodedSize<certified_plan_t>()) why += verdict.message + "; ";
+    }
+    EXPECT_GE(sent.size(), 9u);
+    if (shadow) EXPECT_EQ(taken, 0);
+    if (!shadow) EXPECT_GT(taken, 0) << "the guard is one that takes certificates of this task: " << why;
+    if (shadow) EXPECT_EQ(guard.pending(), nullptr);
+  }
+}
+
+TEST_F(ArmedNodeTest, AShadowStopsNoRobotAndSaysItsFaultInItsHeartbeat) {
+  config_.gate.shadow = true;
+  Restart();
+  bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+  SayState(State());
+  ASSERT_EQ(Ask().cause, decision_t::CAUSE_SHADOW);
+  now_us_ += 10'000'000;  // the robot has fallen silent
+  Run();
+  EXPECT_EQ(node_->watch().state(), Watch::State::kFault);
+  EXPECT_TRUE(faults_.empty());
+  EXPECT_EQ(status_.back().fault, fault_t::ROBOT_STATE_LOST);
 }
 
 TEST_F(ArmedNodeTest, TheBudgetDecidesBeforeTheDeadlineAndWithdrawsWhatTookLonger) {

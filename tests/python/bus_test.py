@@ -57,9 +57,9 @@ class BusTest(unittest.TestCase):
         self.addCleanup(end)
         return process
 
-    def start_certifier(self):
+    def start_certifier(self, task=TASK):
         program = f"{BUILD}/certifier/process/forereach-certifier"
-        certifier = self.start(program, "--config", TASK, "--lcm-url", URL, "--key", self.keys, "--state",
+        certifier = self.start(program, "--config", task, "--lcm-url", URL, "--key", self.keys, "--state",
                                str(self.scratch / "state"))
         self.assertIn("ready", certifier.stdout.readline())
 
@@ -78,6 +78,19 @@ class Drive(BusTest):
         robot.send_signal(signal.SIGINT)
         said = robot.communicate(timeout=60)[0]
         driven, steps, inside = map(int, re.search(r"(\d+) plans, (\d+) steps, (\d+) inside", said).groups())
+        self.assertGreater(driven, 1)
+        self.assertEqual(inside, steps)
+
+    def test_the_mowers_planner_takes_the_mower_to_the_goal_in_certified_plans(self):
+        task = "examples/mower/mower.yaml"
+        self.start_certifier(task)
+        robot = self.start(sys.executable, "-B", "examples/mower/robot.py", task, URL, self.keys)
+        command = [sys.executable, "-B", "examples/mower/planner.py", task, "0.8", "0.8", URL, self.keys]
+        planner = subprocess.run(command, capture_output=True, text=True, timeout=200)
+        self.assertEqual(planner.returncode, 0, planner.stderr)
+        self.assertGreater(int(re.search(r"at the goal after (\d+) certified plans", planner.stdout)[1]), 1)
+        robot.send_signal(signal.SIGINT)
+        driven, steps, inside = map(int, re.search(r"(\d+) plans, (\d+) steps, (\d+) inside", robot.communicate(timeout=60)[0]).groups())
         self.assertGreater(driven, 1)
         self.assertEqual(inside, steps)
 
@@ -141,6 +154,7 @@ class Ends(BusTest):
             ("3 inputs, the model has 2", lambda: bus.propose_many(np.zeros((2, 4, 3)), x0, begin)),
             ("at most 256 plans and 7680 numbers", lambda: bus.propose_many(np.zeros((31, 128, 2)), x0, begin)),
             ("timeout", lambda: bus.decisions(timeout=-1)),
+            ("timeout", lambda: bus.withdrawals(timeout=-1)),
             ("timeout", lambda: bus.robot_state(timeout=float("nan"))),
         ]:
             self.assertRaisesRegex(fr.Error, words, call)
@@ -157,7 +171,7 @@ class Ends(BusTest):
         self.assertGreater(plans[0], plan)
         answer = buses[0].decisions(timeout=60)
         self.assertEqual([(each["plan_id"], each["outcome"]) for each in answer], [(plans[0], "rejected")])
-        self.assertEqual(buses[1].decisions(), [])
+        self.assertEqual((buses[1].decisions(), buses[1].withdrawals()), ([], []))
 
     def test_of_a_planner_get_a_plan_near_a_refused_one_which_is_certified(self):
         self.start_certifier()

@@ -1,4 +1,4 @@
-#include "simulator/supervised.h"
+#include "clients/supervised.h"
 
 #include "certifier/gate/stamp.h"
 
