@@ -25,7 +25,11 @@ int Become(const char* path, char** argv) {
   }
   const std::filesystem::path program = self.parent_path() / path;
   execv(program.c_str(), argv);
-  std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(errno) << std::endl;
+  const int why = errno;
+  const char* const package =
+      why == ENOENT && path == std::string_view(FOREREACH_FLEET) ? "; it is in the package forereach-fleet" : "";
+  std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(why) << package
+            << std::endl;
   return 1;
 }
 
@@ -37,9 +41,10 @@ int main(int argc, char** argv) {
   std::vector<Command> commands;
   for (const OfflineCommand& each : kOfflineCommands) {
     const std::string_view name = each.name;
-    const char* const program = name == kLive.name   ? FOREREACH_LIVE
-                                : name == kDemo.name ? FOREREACH_DEMO
-                                                     : FOREREACH_OFFLINE;
+    const char* const program = name == kLive.name     ? FOREREACH_LIVE
+                                : name == kDemo.name   ? FOREREACH_DEMO
+                                : name == kIngest.name ? FOREREACH_FLEET
+                                                       : FOREREACH_OFFLINE;
     if (argc > 1 && name == argv[1]) return Become(program, argv);
     commands.push_back({.name = each.name, .purpose = each.purpose, .run = [=] { return Become(program, argv); }});
   }
