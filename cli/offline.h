@@ -1,7 +1,7 @@
 /** The commands that `forereach` leaves to other programs. Those of forereach-offline need no robot, and OMPL, SQLite,
 librsvg and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web
-server: the commands that stop and start a robot do without. `ingest` is forereach-fleet, which loads PostgreSQL's
-client and is a package of its own. `demo` is a script. */
+server: the commands that stop and start a robot do without. `ingest` and `report --database` are
+forereach-fleet, which loads PostgreSQL's client and is a package of its own. `demo` is a script. */
 #pragma once
 
 namespace forereach {
