@@ -20,6 +20,9 @@ inline constexpr const char* kTaskOfLogs =
 inline constexpr const char* kTaskOfRecords =
     "The task file; by default the one that a decision names, or that the logger kept next to a log, in tasks/";
 
+inline constexpr const char* kDatabaseAddress =
+    "The fleet's store, postgresql://[USER@]HOST[:PORT]/DATABASE; a password belongs into ~/.pgpass";
+
 // Options that several commands share.
 [[nodiscard]] inline Option ConfigOption(std::string& path, const char* help = "Task file (YAML)") {
   return Required({"--config", &path, "FILE", help});
@@ -49,6 +52,8 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command ReportCommand();
 [[nodiscard]] Command CheckLogCommand();
 [[nodiscard]] Command ExportCommand();
+[[nodiscard]] Command FleetReportCommand();
+[[nodiscard]] Command IngestCommand();
 [[nodiscard]] Command LogCommand();
 [[nodiscard]] Command RunCommand();
 [[nodiscard]] Command ObstaclesCommand();

@@ -25,8 +25,19 @@ int Become(const char* path, char** argv) {
   }
   const std::filesystem::path program = self.parent_path() / path;
   execv(program.c_str(), argv);
-  std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(errno) << std::endl;
+  const int why = errno;
+  const char* const package =
+      why == ENOENT && path == std::string_view(FOREREACH_FLEET) ? "; it is in the package forereach-fleet" : "";
+  std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(why) << package
+            << std::endl;
   return 1;
+}
+
+// `report --database` is of the fleet, too.
+bool NamesStore(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i)
+    if (std::string_view(argv[i]).starts_with("--database")) return true;
+  return false;
 }
 
 }  // namespace
@@ -37,8 +48,10 @@ int main(int argc, char** argv) {
   std::vector<Command> commands;
   for (const OfflineCommand& each : kOfflineCommands) {
     const std::string_view name = each.name;
+    const bool is_of_fleet = name == kIngest.name || (name == kReport.name && NamesStore(argc, argv));
     const char* const program = name == kLive.name   ? FOREREACH_LIVE
                                 : name == kDemo.name ? FOREREACH_DEMO
+                                : is_of_fleet        ? FOREREACH_FLEET
                                                      : FOREREACH_OFFLINE;
     if (argc > 1 && name == argv[1]) return Become(program, argv);
     commands.push_back({.name = each.name, .purpose = each.purpose, .run = [=] { return Become(program, argv); }});

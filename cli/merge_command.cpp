@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -33,7 +32,6 @@ using PrintMerged = int (*)(const Shards&, bool json);
 const std::map<std::string, PrintMerged> kMerged = {
     {"compare", PrintMergedComparison}, {"replay", PrintMergedReplay}, {"verify", PrintMergedVerification}};
 
-constexpr int kMostShards = 100'000;
 constexpr std::string_view kBeginning = "{\"command\":\"";  // of a shard's file
 
 // ---- On what a result depends.
@@ -182,18 +180,10 @@ void ShardOptions::AddTo(std::vector<Option>& options) {
 }
 
 Shard ShardOptions::Get() const {
-  if (!is_given()) return {};
-  int number = 0, count = 0;
-  const char* const end = shard.data() + shard.size();
-  const auto [slash, error] = std::from_chars(shard.data(), end, number);
-  const bool has_count = error == std::errc() && slash != end && *slash == '/' &&
-                         std::from_chars(slash + 1, end, count).ptr == end && slash + 1 != end;
-  if (!has_count || number < 1 || number > count || count > kMostShards)
-    throw ConfigError(fmt::format("--shard: {} is not I/N with whole numbers 1 <= I <= N <= {}, for example 2/7",
-                                  Printable(shard), kMostShards));
-  if (fs::exists(out) && ReadBeginning(out, kBeginning.size()) != kBeginning)
+  const Shard chosen = ShardOf(shard);
+  if (is_given() && std::filesystem::exists(out) && ReadBeginning(out, kBeginning.size()) != kBeginning)
     throw OutputError(out + ": is not the file of a shard, and is not replaced");
-  return {number - 1, count};
+  return chosen;
 }
 
 int WriteShard(const ShardOptions& options, const ShardedCommand& command, const NamedRuns& named,

@@ -1,6 +1,7 @@
 /** The commands that `forereach` leaves to other programs. Those of forereach-offline need no robot, and OMPL, SQLite,
 librsvg and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web
-server: the commands that stop and start a robot do without. `demo` is a script. */
+server: the commands that stop and start a robot do without. `ingest` and `report --database` are
+forereach-fleet, which loads PostgreSQL's client and is a package of its own. `demo` is a script. */
 #pragma once
 
 namespace forereach {
@@ -70,6 +71,10 @@ inline constexpr OfflineCommand kExport{
     "0 if all of it could be read, otherwise 1"};
 inline constexpr OfflineCommand kLogEdit{
     "log", "List, cut and merge LCM event logs: exit 0 if all of them could be read, 1 if one is damaged"};
+/** That of forereach-fleet. */
+inline constexpr OfflineCommand kIngest{"ingest",
+                                        "Send the rows of recorded runs to the fleet's store, a PostgreSQL: exit 0 if "
+                                        "it has all of them, 1 if some could not be read or sent"};
 /** That of forereach-live. */
 inline constexpr OfflineCommand kLive{"live",
                                       "Show the running robot on a page for this machine's browsers, until Ctrl-C: it "
@@ -80,7 +85,7 @@ inline constexpr OfflineCommand kDemo{"demo",
                                       "Drive a car through circles and traffic, with a report and a picture in ./run"};
 
 inline constexpr OfflineCommand kOfflineCommands[] = {
-    kCertify, kInit,  kImport, kImportWorld, kCheck,    kFit, kExportModel, kPlan,    kDeclare, kVerify,
-    kReplay,  kMerge, kAdvise, kReport,      kCheckLog, kRun, kExport,      kLogEdit, kLive,    kDemo};
+    kCertify, kInit,   kImport, kImportWorld, kCheck, kFit,    kExportModel, kPlan,   kDeclare, kVerify, kReplay,
+    kMerge,   kAdvise, kReport, kCheckLog,    kRun,   kExport, kLogEdit,     kIngest, kLive,    kDemo};
 
 }  // namespace forereach

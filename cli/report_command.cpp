@@ -131,7 +131,8 @@ Command ReportCommand() {
           "Examples:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo\n"
           "  forereach report run/log --out report.html\n"
           "  forereach report run --out season.html\n"
-          "  forereach report run/log --before old/log/decisions.sqlite --out both.html",
+          "  forereach report run/log --before old/log/decisions.sqlite --out both.html\n"
+          "  forereach report --database postgresql://fleet.example/forereach --out fleet.html",
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
                             std::string(kLogs) + "; with --out also databases, directories and logs of several runs"}),
                   {"--config", &report.config, "FILE", kTaskOfLogs},

@@ -4,6 +4,9 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim)
 install(TARGETS forereach-live forereach-offline DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
+if(FOREREACH_FLEET)
+  install(TARGETS forereach-fleet DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
+endif()
 install(PROGRAMS scripts/drive-demo DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach RENAME demo)
 install(PROGRAMS scripts/ready-bus DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
 

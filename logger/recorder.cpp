@@ -50,6 +50,7 @@ Rows WithoutEvents(Rows rows) {
   for (GapRow& gap : rows.gaps) {
     gap.event.event_number = -1;
     gap.event.digest.clear();
+    gap.event.utime = gap.utime;
   }
   return {{}, {}, std::move(rows.gaps)};
 }
@@ -74,7 +75,7 @@ std::vector<GapRow> MergedWithoutEvents(const std::vector<GapRow>& gaps) {
     all.source = key.second.source;
     if (is_first) continue;
     all.lost = SumOfLost(all.lost, gap.lost);
-    all.utime = std::min(all.utime, gap.utime);
+    all.utime = all.event.utime = std::min(all.utime, gap.utime);
     all.expected = all.got = -1;
   }
   std::vector<GapRow> rows;
@@ -360,8 +361,14 @@ void Recorder::CountLoss(const Stream& stream, std::int64_t lost, std::int64_t u
 void Recorder::MakeGaps(std::int64_t now_us) {
   for (const auto& [key, loss] : losses_) {
     const auto& [reason, stream] = key;
-    rows_.gaps.push_back(
-        {{log_file_, -1, ""}, stream.channel, stream.source, -1, -1, loss.lost, loss.first_utime, reason});
+    rows_.gaps.push_back({{log_file_, -1, "", loss.first_utime},
+                          stream.channel,
+                          stream.source,
+                          -1,
+                          -1,
+                          loss.lost,
+                          loss.first_utime,
+                          reason});
   }
   losses_.clear();
   gaps_.Start(now_us);

@@ -12,6 +12,7 @@
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
 
+#include "records/schema.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -22,38 +23,13 @@ constexpr int kApplicationId = 0x46524C47;  // "FRLG", so that no other program'
 // With a write-ahead log: the disk need not confirm a transaction before the next begins.
 constexpr const char* kLazily = "PRAGMA synchronous = NORMAL";
 
-constexpr const char* kSchema = R"sql(
-  CREATE TABLE runs (
-    log_file TEXT PRIMARY KEY, start_utime INTEGER NOT NULL, end_utime INTEGER,
-    events INTEGER NOT NULL DEFAULT 0, recovered TEXT NOT NULL DEFAULT '', continues TEXT NOT NULL DEFAULT '',
-    log_deleted_utime INTEGER, robot TEXT NOT NULL DEFAULT '');
-  CREATE TABLE decisions (
-    log_file TEXT NOT NULL, event_number INTEGER NOT NULL,
-    utime INTEGER NOT NULL, candidate_utime INTEGER NOT NULL, sequence INTEGER NOT NULL,
-    source TEXT NOT NULL, plan_id INTEGER NOT NULL, outcome TEXT NOT NULL, cause TEXT NOT NULL,
-    step INTEGER, coordinate INTEGER, obstacle INTEGER, first_observation INTEGER, second_observation INTEGER,
-    margin REAL, threshold REAL, elapsed_us REAL, latency_us REAL, message TEXT NOT NULL,
-    plan_digest TEXT NOT NULL, config_digest TEXT NOT NULL, model_digest TEXT NOT NULL,
-    declaration_digest TEXT NOT NULL, observations_digest TEXT NOT NULL, obstacles_digest TEXT NOT NULL,
-    event_digest TEXT NOT NULL, UNIQUE (log_file, event_number));
-  CREATE TABLE execution_events (
-    log_file TEXT NOT NULL, event_number INTEGER NOT NULL,
-    utime INTEGER NOT NULL, sequence INTEGER NOT NULL, plan_id INTEGER, kind TEXT NOT NULL,
-    step INTEGER, coordinate INTEGER, state TEXT NOT NULL, value REAL, message TEXT NOT NULL,
-    event_digest TEXT NOT NULL, UNIQUE (log_file, event_number));
-  CREATE TABLE gaps (
-    log_file TEXT NOT NULL, event_number INTEGER, channel TEXT NOT NULL, source TEXT NOT NULL,
-    expected INTEGER, got INTEGER, lost INTEGER NOT NULL, utime INTEGER NOT NULL, reason TEXT NOT NULL,
-    event_digest TEXT NOT NULL, UNIQUE (log_file, event_number, reason));
-)sql";
-
-// A column that is NULL where the number is -1.
-template <class Number>
-struct OrNull {
-  Number& number;
-};
-template <class Number>
-OrNull(Number&) -> OrNull<Number>;
+constexpr Dialect kDialect{.runs = "runs",
+                           .run_key = "log_file",
+                           .robot = "",
+                           .key = "log_file, event_number",
+                           .gap_key = "log_file, event_number, reason",
+                           .unique = "UNIQUE",
+                           .partitioned = ""};
 
 // Why the last call failed.
 std::string WhySqlRefuses(sqlite3* handle) {
@@ -73,36 +49,6 @@ std::string WhySqlRefuses(sqlite3* handle) {
     case SQLITE_CONSTRAINT: return "it refuses a row";
     default: return fmt::format("its tables are not those of a decision database (SQLite's error {})", code);
   }
-}
-
-// The columns of a row, in the order of its table or query.
-auto ColumnsOf(auto& row) {
-  using Row = std::remove_const_t<std::remove_reference_t<decltype(row)>>;
-  if constexpr (std::is_same_v<Row, DecisionRow>)
-    return std::tuple_cat(std::tie(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime,
-                                   row.sequence, row.source, row.plan_id, row.outcome, row.cause),
-                          std::tuple(OrNull{row.step}, OrNull{row.coordinate}, OrNull{row.obstacle},
-                                     OrNull{row.first_observation}, OrNull{row.second_observation}),
-                          std::tie(row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
-                                   row.plan_digest, row.grounds, row.event.digest));
-  else if constexpr (std::is_same_v<Row, EventRow>)
-    return std::tuple_cat(std::tie(row.event.log_file, row.event.event_number, row.utime, row.sequence),
-                          std::tuple(OrNull{row.plan_id}), std::tie(row.kind),
-                          std::tuple(OrNull{row.step}, OrNull{row.coordinate}),
-                          std::tie(row.state, row.value, row.message, row.event.digest));
-  else if constexpr (std::is_same_v<Row, GapRow>)
-    return std::tuple_cat(std::tie(row.event.log_file), std::tuple(OrNull{row.event.event_number}),
-                          std::tie(row.channel, row.source), std::tuple(OrNull{row.expected}, OrNull{row.got}),
-                          std::tie(row.lost, row.utime, row.reason, row.event.digest));
-  else if constexpr (std::is_same_v<Row, RunRow>)
-    return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.recovered, row.continues,
-                    row.log_deleted_utime, row.robot);
-  else if constexpr (std::is_same_v<Row, LogReference>)
-    return std::tie(row.log_file, row.event_number, row.digest);
-  else if constexpr (std::is_same_v<Row, std::pair<std::string, std::int64_t>>)
-    return std::tie(row.first, row.second);
-  else
-    return std::tie(row);
 }
 
 }  // namespace
@@ -222,12 +168,12 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     Execute("PRAGMA journal_mode = WAL");
     Execute(kLazily);
     insert_decision_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO decisions VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
       ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     insert_event_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO execution_events VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     insert_gap_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO gaps VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
     set_events_ = std::make_unique<Statement>(handle, "UPDATE runs SET events = ? WHERE log_file = ?");
     static_cast<void>(FindDisplaced());
   } catch (const DatabaseError& error) {
@@ -245,18 +191,21 @@ void Database::Execute(const char* sql) {
 void Database::MakeOrCheck() {
   Execute("BEGIN IMMEDIATE");
   const auto number = [this](const char* sql) { return Select<std::int64_t>(sql).at(0); };
-  if (number("SELECT count(*) FROM sqlite_master") == 0) {
-    Execute(kSchema);
+  const bool is_new = number("SELECT count(*) FROM sqlite_master") == 0;
+  if (is_new)
     Execute(fmt::format("PRAGMA application_id = {}", kApplicationId).c_str());
-    Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
-  }
-  if (number("PRAGMA application_id") != kApplicationId)
+  else if (number("PRAGMA application_id") != kApplicationId)
     throw DatabaseError("not a decision database: move it away or use another directory");
-  if (const std::int64_t version = number("PRAGMA user_version"); version != kSchemaVersion)
+  const std::int64_t version = is_new ? 0 : number("PRAGMA user_version");
+  if (!is_new && (version < kMigrations[0].version || version > kSchemaVersion))
     throw DatabaseError(
         fmt::format("schema version {}, this program knows version {}: use the program that made it, or "
                     "another directory",
                     version, kSchemaVersion));
+  if (version < kSchemaVersion) {
+    Execute(MigrationSql(static_cast<int>(version), kDialect).c_str());
+    Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
+  }
   Execute("COMMIT");
 }
 
@@ -387,6 +336,31 @@ Rows Database::Read(const std::string& log_file) {
           Select<EventRow>("SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
                            log_file),
           Select<GapRow>("SELECT * FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid", log_file)};
+}
+
+RowCounts Database::Count(const std::string& log_file) {
+  const auto count = [&](const char* table) {
+    return Select<std::int64_t>(fmt::format("SELECT count(*) FROM {} WHERE log_file = ?", table).c_str(), log_file)
+        .at(0);
+  };
+  return {count("decisions"), count("execution_events"), count("gaps")};
+}
+
+Rows Database::ReadNext(RowMarks& marks, int most) {
+  Rows rows;
+  const auto read = [&]<class Row>(const char* table, std::vector<Row>& to, std::int64_t& mark) {
+    const std::string where = fmt::format("FROM {} WHERE rowid > ?1 ORDER BY rowid LIMIT ?2", table);
+    const auto last = Select<std::optional<std::int64_t>>(
+        fmt::format("SELECT max(rowid) FROM (SELECT rowid {})", where).c_str(), mark, most);
+    if (!last.at(0)) return;
+    to = Select<Row>(fmt::format("SELECT * FROM {} WHERE rowid > ? AND rowid <= ? ORDER BY rowid", table).c_str(), mark,
+                     *last[0]);
+    mark = *last[0];
+  };
+  read("decisions", rows.decisions, marks.decisions);
+  read("execution_events", rows.events, marks.events);
+  read("gaps", rows.gaps, marks.gaps);
+  return rows;
 }
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** The decision database: SQLite, one file for all runs of a directory. Only its source file sees SQL.
+/** The decision database: SQLite, one file for all runs of a directory. Only its source file and schema.h see SQL.
 
 Tables: `decisions`, `execution_events` and `gaps` as in rows.h, and `runs` with one row for each log file. The journal
 is a write-ahead log, so after a kill or a power failure each transaction is there either whole or not at all. When a
@@ -40,9 +40,14 @@ struct RunRow {
   std::string robot;                              ///< The name in the logger's keys; empty without keys.
 };
 
+/** How far the rows of a database have been read. */
+struct RowMarks {
+  std::int64_t decisions = 0, events = 0, gaps = 0;
+};
+
 class Database final {
  public:
-  static constexpr int kSchemaVersion = 4;  ///< PRAGMA user_version: another one after every change of the tables.
+  static constexpr int kSchemaVersion = 5;  ///< PRAGMA user_version: another one after every change of the tables.
 
   /** Creates the file, or opens it.
   @throws DatabaseError if it cannot be opened, belongs to another program or has another schema. */
@@ -67,6 +72,10 @@ class Database final {
 
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
+
+  /** The next rows of all runs in the order in which they were written, at most `most` of each table, and moves the
+  marks behind them. Another program may be writing. @throws DatabaseError. */
+  [[nodiscard]] Rows ReadNext(RowMarks& marks, int most);
 
   /** The events from which rows of one log file were made, by number. An event appears twice if two of its rows have
   different digests. @throws DatabaseError. */

@@ -101,7 +101,7 @@ std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std
 
 void Interpreter::Observe(const LogEvent& event, Rows& rows) {
   if (!authenticator_.IsAuthentic(event)) return;
-  const auto reference = [&] { return LogReference{log_file_, event.number, ToHex(DigestOf(event))}; };
+  const auto reference = [&] { return LogReference{log_file_, event.number, ToHex(DigestOf(event)), event.utime}; };
   if (std::optional<GapRow> gap = CheckSequence(event)) {
     gap->event = reference();
     rows.gaps.push_back(std::move(*gap));

@@ -12,8 +12,13 @@
 namespace forereach {
 namespace {
 
-Cells CellsOfRow(const DecisionRow& row) { return CellsOf("", row, nullptr); }
-Cells CellsOfRow(const auto& row) { return CellsOf("", row); }
+Cells ExportedCells(const DecisionRow& row) { return CellsOf("", row, nullptr); }
+Cells ExportedCells(const auto& row) { return CellsOf("", row); }
+Cells CellsOfRow(const auto& row) {
+  Cells cells = ExportedCells(row);
+  cells.emplace_back("event_utime", row.event.utime);
+  return cells;
+}
 
 std::string DescribeCell(const Cells::value_type& cell) {
   std::string text = CsvLine(Cells{cell});

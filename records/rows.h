@@ -19,7 +19,8 @@ inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 struct LogReference {
   std::string log_file;  ///< File name without directory.
   std::int64_t event_number = -1;
-  std::string digest;  ///< DigestOf the event, in hexadecimal; empty without an event.
+  std::string digest;      ///< DigestOf the event, in hexadecimal; empty without an event.
+  std::int64_t utime = 0;  ///< The event's own time in the log; without an event that of the row.
 };
 
 /** A decision_t with names in place of codes, and digests in hexadecimal. */
@@ -72,6 +73,12 @@ struct Rows {
 
   [[nodiscard]] std::size_t size() const { return decisions.size() + events.size() + gaps.size(); }
   [[nodiscard]] bool empty() const { return size() == 0; }
+};
+
+/** The numbers of rows of one log file. */
+struct RowCounts {
+  std::int64_t decisions = 0, events = 0, gaps = 0;
+  bool operator==(const RowCounts&) const = default;
 };
 
 }  // namespace forereach

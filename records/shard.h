@@ -4,6 +4,7 @@ that it knows what every case rests on, and judges its own cases. */
 
 #include <cstdint>
 #include <map>
+#include <string>
 #include <utility>
 
 namespace forereach {
@@ -12,6 +13,11 @@ namespace forereach {
 struct Shard {
   int index = 0, count = 1;
 };
+
+inline constexpr int kMostShards = 100'000;
+
+/** The shard I/N that a command line names, I from 1; all cases for an empty text. @throws ConfigError. */
+[[nodiscard]] Shard ShardOf(const std::string& text);
 
 /** What one shard, or all of them together, found in a run. A Result is added up with +=. */
 template <class Result>

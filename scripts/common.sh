@@ -93,6 +93,6 @@ build() {
 }
 
 # For a build of the programs alone.
-programs_only=(-DFOREREACH_TESTS=OFF -DFOREREACH_PYTHON=OFF)
+programs_only=(-DFOREREACH_TESTS=OFF -DFOREREACH_PYTHON=OFF -DFOREREACH_FLEET=OFF)
 
 bus_is_ready() { "$root/scripts/ready-bus" --check; }

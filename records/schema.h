@@ -1,0 +1,115 @@
+/** The tables of decisions, written once for both engines: SQLite (records/database.h) and PostgreSQL (fleet/store.h).
+ */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "records/database.h"
+#include "records/rows.h"
+
+namespace forereach {
+
+/** What brings the tables from the version before to this one. */
+struct Migration {
+  int version;
+  const char* sql;  ///< With the names of Dialect in braces.
+};
+
+/** Both engines take these types: eight bytes each, in SQLite by the words INT and DOUB in them. */
+inline constexpr Migration kMigrations[] = {{Database::kSchemaVersion, R"sql(
+  CREATE TABLE {runs} (
+    log_file TEXT NOT NULL, start_utime BIGINT NOT NULL, end_utime BIGINT,
+    events BIGINT NOT NULL DEFAULT 0, recovered TEXT NOT NULL DEFAULT '', continues TEXT NOT NULL DEFAULT '',
+    log_deleted_utime BIGINT, robot TEXT NOT NULL DEFAULT '', {unique} ({run_key}));
+  CREATE TABLE decisions ({robot}
+    log_file TEXT NOT NULL, event_number BIGINT NOT NULL, event_utime BIGINT NOT NULL,
+    utime BIGINT NOT NULL, candidate_utime BIGINT NOT NULL, sequence BIGINT NOT NULL,
+    source TEXT NOT NULL, plan_id BIGINT NOT NULL, outcome TEXT NOT NULL, cause TEXT NOT NULL,
+    step BIGINT, coordinate BIGINT, obstacle BIGINT, first_observation BIGINT, second_observation BIGINT,
+    margin DOUBLE PRECISION, threshold DOUBLE PRECISION, elapsed_us DOUBLE PRECISION, latency_us DOUBLE PRECISION,
+    message TEXT NOT NULL,
+    plan_digest TEXT NOT NULL, config_digest TEXT NOT NULL, model_digest TEXT NOT NULL,
+    declaration_digest TEXT NOT NULL, observations_digest TEXT NOT NULL, obstacles_digest TEXT NOT NULL,
+    event_digest TEXT NOT NULL, {unique} ({key})){partitioned};
+  CREATE TABLE execution_events ({robot}
+    log_file TEXT NOT NULL, event_number BIGINT NOT NULL, event_utime BIGINT NOT NULL,
+    utime BIGINT NOT NULL, sequence BIGINT NOT NULL, plan_id BIGINT, kind TEXT NOT NULL,
+    step BIGINT, coordinate BIGINT, state TEXT NOT NULL, value DOUBLE PRECISION, message TEXT NOT NULL,
+    event_digest TEXT NOT NULL, {unique} ({key})){partitioned};
+  CREATE TABLE gaps ({robot}
+    log_file TEXT NOT NULL, event_number BIGINT, event_utime BIGINT NOT NULL,
+    channel TEXT NOT NULL, source TEXT NOT NULL,
+    expected BIGINT, got BIGINT, lost BIGINT NOT NULL, utime BIGINT NOT NULL, reason TEXT NOT NULL,
+    event_digest TEXT NOT NULL, {unique} ({gap_key})){partitioned};
+)sql"}};
+
+/** In what the engines differ. SQLite's database is one robot's, and its rows change with it; in PostgreSQL several
+robots add rows, and none changes. */
+struct Dialect {
+  const char* runs;
+  const char* run_key;
+  const char* robot;  ///< The column that tells whose row it is.
+  const char* key;
+  const char* gap_key;
+  const char* unique;
+  const char* partitioned;
+};
+
+/** The statements that bring tables of `version` to the newest, which 0 has none of. Empty if they are that. */
+inline std::string MigrationSql(int version, const Dialect& dialect) {
+  std::string sql;
+  for (const Migration& each : kMigrations)
+    if (each.version > version)
+      sql += fmt::format(fmt::runtime(each.sql), fmt::arg("runs", dialect.runs), fmt::arg("run_key", dialect.run_key),
+                         fmt::arg("robot", dialect.robot), fmt::arg("key", dialect.key),
+                         fmt::arg("gap_key", dialect.gap_key), fmt::arg("unique", dialect.unique),
+                         fmt::arg("partitioned", dialect.partitioned));
+  return sql;
+}
+
+/** A column that is NULL where the number is -1. */
+template <class Number>
+struct OrNull {
+  Number& number;
+};
+template <class Number>
+OrNull(Number&) -> OrNull<Number>;
+
+/** The columns of a row, in the order of its table or query. */
+auto ColumnsOf(auto& row) {
+  using Row = std::remove_const_t<std::remove_reference_t<decltype(row)>>;
+  if constexpr (std::is_same_v<Row, DecisionRow>)
+    return std::tuple_cat(std::tie(row.event.log_file, row.event.event_number, row.event.utime, row.utime,
+                                   row.candidate_utime, row.sequence, row.source, row.plan_id, row.outcome, row.cause),
+                          std::tuple(OrNull{row.step}, OrNull{row.coordinate}, OrNull{row.obstacle},
+                                     OrNull{row.first_observation}, OrNull{row.second_observation}),
+                          std::tie(row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
+                                   row.plan_digest, row.grounds, row.event.digest));
+  else if constexpr (std::is_same_v<Row, EventRow>)
+    return std::tuple_cat(
+        std::tie(row.event.log_file, row.event.event_number, row.event.utime, row.utime, row.sequence),
+        std::tuple(OrNull{row.plan_id}), std::tie(row.kind), std::tuple(OrNull{row.step}, OrNull{row.coordinate}),
+        std::tie(row.state, row.value, row.message, row.event.digest));
+  else if constexpr (std::is_same_v<Row, GapRow>)
+    return std::tuple_cat(std::tie(row.event.log_file), std::tuple(OrNull{row.event.event_number}),
+                          std::tie(row.event.utime, row.channel, row.source),
+                          std::tuple(OrNull{row.expected}, OrNull{row.got}),
+                          std::tie(row.lost, row.utime, row.reason, row.event.digest));
+  else if constexpr (std::is_same_v<Row, RunRow>)
+    return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.recovered, row.continues,
+                    row.log_deleted_utime, row.robot);
+  else if constexpr (std::is_same_v<Row, LogReference>)
+    return std::tie(row.log_file, row.event_number, row.digest);
+  else if constexpr (std::is_same_v<Row, std::pair<std::string, std::int64_t>>)
+    return std::tie(row.first, row.second);
+  else
+    return std::tie(row);
+}
+
+}  // namespace forereach

@@ -1,0 +1,85 @@
+#include "fleet/report.h"
+
+#include "tests/cli/program.h"
+#include "tests/fleet/postgres.h"
+#include "tests/test.h"
+
+namespace forereach::report_test {
+
+constexpr std::int64_t kDay = 86'400'000'000, kFirst = 1'767'225'600'000'000;  // 2026-01-01
+
+class FleetReportTest : public PostgresTest {
+ protected:
+  // Decisions of a robot on one day, of which so many are certified and falsified.
+  void Add(const std::string& robot, const std::string& log, int day, int count, int certified, int falsified,
+           const std::string& declaration) {
+    Rows rows;
+    for (int i = 0; i < count; ++i) {
+      DecisionRow& row = rows.decisions.emplace_back();
+      row.event = {log, i, robot + log + std::to_string(i), kFirst + day * kDay + i};
+      row.outcome = i < certified ? "certified" : i < certified + falsified ? "abstain_falsified" : "abstain_safety";
+      row.cause = i < certified ? "none" : i < certified + falsified ? "pair" : "obstacle";
+      row.grounds[2] = declaration + std::string(52, '0');
+    }
+    EventRow& event = rows.events.emplace_back();
+    event.event = {log, count, robot + log + "w", kFirst + day * kDay + count};
+    event.kind = "withdrawn";
+    Store store(server_->Address());
+    static_cast<void>(store.Write(robot, rows));
+  }
+  void AddFleet() {
+    Add("r1", "a.lcmlog", 0, 10, 9, 0, "aaaaaaaaaaaa");
+    Add("r1", "b.lcmlog", 1, 10, 5, 2, "bbbbbbbbbbbb");
+    Add("r2", "a.lcmlog", 1, 20, 20, 0, "aaaaaaaaaaaa");
+    Add("<b>r3</b>", "x\"&.lcmlog", 1, 4, 1, 0, "bbbbbbbbbbbb");
+  }
+  std::map<std::string, std::vector<std::vector<std::string>>> Tables() {
+    Store store(server_->Address());
+    std::map<std::string, std::vector<std::vector<std::string>>> tables;
+    for (FleetTable& table : ReadFleet(store)) tables[table.title] = std::move(table.rows);
+    return tables;
+  }
+};
+
+using Row = std::vector<std::string>;
+
+TEST_F(FleetReportTest, CountsEachRobotCauseDeclarationAndDay) {
+  AddFleet();
+  const auto tables = Tables();
+  EXPECT_THAT(tables.at("Robots"), ElementsAre(Row{"<b>r3</b>", "4", "25.0", "0", "1", "1", "x\"&.lcmlog"},
+                                               Row{"r1", "20", "70.0", "2", "2", "2", "b.lcmlog"},
+                                               Row{"r2", "20", "100.0", "0", "1", "1", "a.lcmlog"}));
+  EXPECT_THAT(tables.at("Causes"),
+              ElementsAre(Row{"certified", "none", "35", "79.5", "3", "r2", "a.lcmlog", "0"},
+                          Row{"abstain_safety", "obstacle", "7", "15.9", "2", "<b>r3</b>", "x\"&.lcmlog", "1"},
+                          Row{"abstain_falsified", "pair", "2", "4.5", "1", "r1", "b.lcmlog", "5"}));
+  EXPECT_THAT(tables.at("Contradictions"), ElementsAre(Row{"bbbbbbbbbbbb", "2", "r1", "b.lcmlog", "5"}));
+  EXPECT_EQ(tables.at("Withdrawals").size(), 4u);
+  EXPECT_THAT(tables.at("Declarations"),
+              ElementsAre(Row{"bbbbbbbbbbbb", "2", "2", "14", "42.9", "2", "2026-01-02 00:00", "<b>r3</b>"},
+                          Row{"aaaaaaaaaaaa", "1", "2", "30", "96.7", "0", "2026-01-02 00:00", "r1"}));
+  EXPECT_THAT(tables.at("Days"),
+              ElementsAre(Row{"2026-01-02", "3", "34", "76.5", "2"}, Row{"2026-01-01", "1", "10", "90.0", "0"}));
+  EXPECT_THAT(tables.at("Runs").front(), (Row{"r1", "b.lcmlog", "10", "50.0", "2"}));
+}
+
+TEST_F(FleetReportTest, OfAnEmptyStoreHasNoRows) {
+  for (const auto& [title, rows] : Tables()) EXPECT_TRUE(rows.empty()) << title;
+}
+
+TEST_F(FleetReportTest, IsATextADocumentOrAPage) {
+  AddFleet();
+  const ScratchDirectory scratch;
+  const std::string database = "report --database '" + server_->Address() + "'";
+  EXPECT_THAT(Forereach(database + " 2>&1"), Exits(0, "Robots\n  robot ", "r1        20        70.0"));
+  const Output json = Forereach(database + " --json");
+  EXPECT_EQ(nlohmann::json::parse(json.text).at("Robots").at("rows").at(1).at(2), "70.0");
+  const std::string page = scratch / "fleet.html";
+  EXPECT_THAT(Forereach(database + " --out " + page + " --runs ../pages 2>&1"), Exits(0, "3 robots"));
+  EXPECT_THAT(Read(page), AllOf(HasSubstr("<td><a href=\"../pages/r1/b.lcmlog.html\">b.lcmlog</a></td>"),
+                                HasSubstr("&lt;b&gt;r3&lt;/b&gt;"), Not(HasSubstr("<b>r3")),
+                                HasSubstr("pages/%3Cb%3Er3%3C%2Fb%3E/x%22%26.lcmlog.html")));
+  EXPECT_THAT(Forereach(database + " --out " + page + " 2>&1"), Exits(2, page));
+}
+
+}  // namespace forereach::report_test
