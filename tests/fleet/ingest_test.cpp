@@ -7,6 +7,7 @@
 #include "tests/fleet/postgres.h"
 #include "tests/fleet/row_texts.h"
 #include "tests/keys.h"
+#include "tests/process/process_fixture.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/test.h"
@@ -185,6 +186,28 @@ TEST_F(IngestTest, LosesAndDoublesNoRowWhereLoggerAndSenderAreKilled) {
     if (file.path().extension() == ".lcmlog")
       for (const LogEvent& event : ReadLog(file.path().string()).events) decisions += event.channel == "PLAN_DECISION";
   EXPECT_EQ(rows.decisions.size(), decisions);
+}
+
+TEST_F(IngestTest, BesideTheLoggerSendsItsRowsToTheLast) {
+  const std::string url = PrivateBusUrl();
+  ChildProcess logger({FOREREACH_LOGGER, "--config", scratch_.Write("task.yaml", PatientTask()), "--lcm-url", url,
+                       "--directory", directory_, "--database", server_->Address(), "--robot", "r1"});
+  ASSERT_TRUE(logger.WaitForLog("recording to")) << logger.error();
+  BusProbe probe(url, {"LOGGER_STATUS"});
+  for (int i = 0; i < 20; ++i)
+    probe.bus().Publish("PLAN_DECISION", MakeDecision(MakeCandidate(i, i), i, decision_t::CERTIFIED, 0));
+  EXPECT_TRUE(probe.WaitUntil([&] { return RowsOfDirectory().decisions.size() == 20; }));
+  EXPECT_EQ(logger.Terminate(), 0) << logger.error();
+  Store store(server_->Address());
+  const auto has_ended = [&] {
+    const std::vector<RunRow> runs = store.Runs("r1");
+    return !runs.empty() && runs[0].end_utime.has_value();
+  };
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (!has_ended() && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_TRUE(has_ended());
+  EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), RowsOfDirectory()), "");
 }
 
 TEST_F(IngestTest, KeepsTheRowsInTheDirectoryWhileTheServerIsAway) {
