@@ -75,6 +75,7 @@ class Torturer final {
     const auto [honest, is_judged] = AskHonestly();
     report_.alive =
         report_.honest.empty() ? HearsHeartbeat() : !honest.empty() && is_judged == report_.honest_is_judged;
+    CountAnswers();
     return report_;
   }
 
@@ -90,10 +91,10 @@ class Torturer final {
         decision->outcome == decision_t::CERTIFIED || decision->outcome == decision_t::ABSTAIN_DOMAIN ||
         decision->outcome == decision_t::ABSTAIN_SAFETY || decision->outcome == decision_t::ABSTAIN_FALSIFIED ||
         decision->cause == decision_t::CAUSE_SHADOW;
-    Answer& answer = answers_[GetDigest(decision->plan_digest)];
-    ++(is_judged ? answer.judged : answer.refused);
-    answer.text = std::string(OutcomeName(decision->outcome)) + ", " + std::string(CauseName(decision->cause));
-    if (answers_.size() > 65'536) answers_.erase(answers_.begin());
+    const auto asked = asked_.find(GetDigest(decision->plan_digest));
+    if (asked == asked_.end()) return;
+    ++(is_judged ? asked->second.judged : asked->second.refused);
+    asked->second.text = std::string(OutcomeName(decision->outcome)) + ", " + std::string(CauseName(decision->cause));
   }
 
   // What a guard does only if it believes a message of this program.
@@ -162,10 +163,10 @@ class Torturer final {
     TortureRow unused;
     row_ = &unused;
     const auto bytes = Encode(Honest());
-    const Digest digest = DigestOf(bytes);
+    const Asked& asked = asked_[DigestOf(bytes)];
     Send(config_.bus.candidate, bytes);
-    Listen(options_.patience_s, [&] { return answers_.contains(digest); });
-    return {answers_[digest].text, answers_[digest].judged > 0};
+    Listen(options_.patience_s, [&] { return !asked.text.empty(); });
+    return {asked.text, asked.judged > 0};
   }
 
   bool HearsHeartbeat() {
@@ -174,58 +175,61 @@ class Torturer final {
     return status_.has_value();
   }
 
-  // Counts the answers to candidates of which so many of each may be judged.
-  void CountAnswers(TortureRow& row, const std::map<Digest, int>& may_be_judged) {
-    Listen(kAnswersWithinS);
-    for (const auto& [digest, most] : may_be_judged) {
-      const auto found = answers_.find(digest);
-      if (found == answers_.end()) continue;
-      row.refused += found->second.refused;
-      if (found->second.judged <= most) continue;
-      row.through += found->second.judged - most;
-      row.remark = "judged: " + found->second.text;
+  // Notes a candidate of this attack, of which no more copies than `may_be_judged` may be judged.
+  void Expect(Bytes candidate, int may_be_judged) {
+    Asked& asked = asked_[DigestOf(candidate)];
+    asked.attack = report_.rows.size();
+    asked.may_be_judged = may_be_judged;
+  }
+
+  // A slow gate may have answered after the attack.
+  void CountAnswers() {
+    for (const auto& [digest, asked] : asked_) {
+      if (asked.attack == 0) continue;
+      TortureRow& row = report_.rows[asked.attack - 1];
+      row.refused += asked.refused;
+      if (asked.judged <= asked.may_be_judged) continue;
+      row.through += asked.judged - asked.may_be_judged;
+      row.remark = "judged: " + asked.text;
     }
   }
 
   void SendFlawed(const CandidateFlaw& flaw) {
-    TortureRow& row = Begin(std::string("to the gate: ") + flaw.name);
-    std::map<Digest, int> sent;
+    Begin(std::string("to the gate: ") + flaw.name);
     const std::size_t count = flaw.make(Honest(), WallClockUs()).size();
     for (std::size_t i = 0; i < count; ++i) {
       const RawMessage message = flaw.make(Honest(), WallClockUs())[i];  // each with a plan_id of its own
+      Expect(message, 0);
       Send(config_.bus.candidate, message);
-      sent[DigestOf(message)] = 0;
       Listen(0.002);
     }
-    CountAnswers(row, sent);
+    Listen(kAnswersWithinS);
   }
 
   void SendTwice() {
-    TortureRow& row = Begin("to the gate: the same candidate twice");
-    std::map<Digest, int> sent;
+    Begin("to the gate: the same candidate twice");
     for (int i = 0; i < 5; ++i) {
       const auto message = Encode(Honest());
-      sent[DigestOf(message)] = 1;
+      Expect(message, 1);
       for (int j = 0; j < 2; ++j) Send(config_.bus.candidate, message);
       Listen(0.02);
     }
-    CountAnswers(row, sent);
+    Listen(kAnswersWithinS);
   }
 
   void JumpClock() {
-    TortureRow& row = Begin("to the gate: a clock that jumps by an hour");
-    std::map<Digest, int> sent;
+    Begin("to the gate: a clock that jumps by an hour");
     for (int i = 0; i < 12; ++i) {
       const std::int64_t jump = i % 3 == 0 ? 0 : i % 3 == 1 ? kJumpUs : -kJumpUs;
       candidate_plan_t candidate = Honest();
       candidate.utime += jump;
       candidate.start_utime += jump;
       const auto message = Encode(candidate);
+      Expect(message, jump == 0 ? 1 : 0);
       Send(config_.bus.candidate, message, candidate.utime);
-      sent[DigestOf(message)] = jump == 0 ? 1 : 0;
       Listen(0.02);
     }
-    CountAnswers(row, sent);
+    Listen(kAnswersWithinS);
   }
 
   // Each is a candidate like all: what counts is that the gate is there afterwards.
@@ -281,11 +285,10 @@ class Torturer final {
   }
 
   void SendAsStranger() {
-    TortureRow& row = Begin("to the gate: without a signature, signed an hour ago or ahead, again");
-    std::map<Digest, int> sent;
+    Begin("to the gate: without a signature, signed an hour ago or ahead, again, altered");
     for (const std::int64_t when : {std::int64_t{0}, -kJumpUs, kJumpUs}) {
       const auto message = Encode(Honest());
-      sent[DigestOf(message)] = 0;
+      Expect(message, 0);
       if (when == 0)
         SendRaw(config_.bus.candidate, message);
       else
@@ -294,13 +297,12 @@ class Torturer final {
     }
     const auto message = Encode(Honest());
     auto signed_message = signer_->Sign(Role::kPlanner, config_.bus.candidate, message, WallClockUs());
-    sent[DigestOf(message)] = 1;
+    Expect(message, 1);
     for (int i = 0; i < 2; ++i) SendRaw(config_.bus.candidate, signed_message);
-    CountAnswers(row, sent);
-    // Its copy is refused by its counter, unread: no answer comes. Altered it is no message of anybody.
     signed_message[signed_message.size() / 3] ^= 1;
+    Expect(WithoutSignature(signed_message), 0);
     SendRaw(config_.bus.candidate, signed_message);
-    CountAnswers(row, {{DigestOf(WithoutSignature(signed_message)), 0}});
+    Listen(kAnswersWithinS);
   }
 
   // Every channel that is not the planner's: what would do harm, unsigned and signed with the planner's key; and what
@@ -338,9 +340,10 @@ class Torturer final {
     row.remark = what;
   }
 
-  struct Answer {
-    int judged = 0, refused = 0;
-    std::string text;
+  struct Asked {
+    std::size_t attack = 0;  // counted from 1; 0: an honest one
+    int may_be_judged = 0, judged = 0, refused = 0;
+    std::string text;  // of the last answer
   };
 
   const Config& config_;
@@ -351,7 +354,7 @@ class Torturer final {
   TortureRow* row_ = nullptr;  // under way
   bool is_recording_ = true, attacks_guard_ = false;
   std::int64_t sequence_ = 0, last_plan_id_ = 0, refused_by_guard_ = 0;
-  std::map<Digest, Answer> answers_;
+  std::map<Digest, Asked> asked_;
   std::map<std::string, RawMessage> heard_;
   std::optional<certifier_status_t> status_;
   std::optional<robot_state_t> state_;

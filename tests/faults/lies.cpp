@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <set>
 #include <thread>
 
 #include "bus/process.h"
@@ -81,6 +82,7 @@ class Lied final : Kind {
     Rig rig(DemoTask());
     Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)", options_.others);
     std::int64_t id = 1;
+    std::set<RawMessage> sent;
     Tries(
         row, rig,
         [&](int) {
@@ -89,8 +91,9 @@ class Lied final : Kind {
             SetText(candidate.source, "nonsense");
             const CandidateFlaw& flaw = CandidateFlaws()[static_cast<std::size_t>(j) % CandidateFlaws().size()];
             const auto messages = flaw.make(candidate, WallClockUs());
-            rig.bus().Publish(rig.config().bus.candidate,
-                              Bytes(messages[static_cast<std::size_t>(random_()) % messages.size()]));
+            const RawMessage& message = messages[static_cast<std::size_t>(random_()) % messages.size()];
+            // The same bytes twice are two candidates with one digest, which the witness cannot tell apart.
+            if (sent.insert(message).second) rig.bus().Publish(rig.config().bus.candidate, Bytes(message));
             if (j % 10 == 0) rig.Listen(milliseconds(5));
           }
         },
