@@ -34,7 +34,7 @@ struct Judgement {
 Judgement JudgeBy(const Certifier& certifier, const Case& judged, Tube& tube) {
   certifier.Require(judged.plan(), judged.initial_set, judged.obstacles);
   const Decision decision = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
-  return {decision, Explain(decision, *judged.problem, judged.plan(), tube)};
+  return {decision, Explain(decision, *judged.problem, judged.obstacles, judged.plan(), tube)};
 }
 
 // A change that no certifier accepts turns nothing.
@@ -271,9 +271,9 @@ class Adviser {
     for (const GivingWay& way : *ways) {
       const double distance = way.shift.norm();
       farthest = std::max(farthest, distance);
-      what +=
-          fmt::format("{}obstacle {} by {} m, to the side of {} (first touched at step {})", what.empty() ? "" : ", ",
-                      way.obstacle, RoundedUp(distance, 4), Text(way.shift / distance), way.step);
+      what += fmt::format("{}{} by {} m, to the side of {} (first touched at step {})", what.empty() ? "" : ", ",
+                          NameOf(case_.obstacles, way.obstacle), RoundedUp(distance, 4), Text(way.shift / distance),
+                          way.step);
     }
     Add({.change = Change::kObstacles,
          .what = "if it passed farther away, or these stood farther away: " + what,

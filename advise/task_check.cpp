@@ -92,6 +92,10 @@ class Examination final {
   void Remark(const std::string& key, std::string what, std::string advice) {
     Add(key, std::move(what), std::move(advice), true);
   }
+  [[nodiscard]] std::string ObstacleText(std::size_t i) const {
+    const std::string& name = config_.obstacles[i].name();
+    return fmt::format("task.obstacles[{}]", i) + (name.empty() ? "" : " (" + name + ")");
+  }
 
   [[nodiscard]] const Box& BoxOf(std::size_t l) const {
     return l < ToSize(model_.num_states()) ? problem_.domain.state : problem_.domain.input;
@@ -399,7 +403,7 @@ class Examination final {
                  "record steps that vary it, or leave a column out on which the residual does not depend");
     Tube tube;
     const Decision decision = certifier->Certify(plan, initial_set, {}, tube);
-    result_.tube = Explain(decision, certifier->problem(), plan, tube);
+    result_.tube = Explain(decision, certifier->problem(), {}, plan, tube);
     for (int t = 0; t <= tube.length(); ++t) {
       const Zonotope& slice = tube.slice(t);
       std::vector<double>& widths = result_.half_widths.emplace_back();
@@ -553,7 +557,7 @@ class Examination final {
     const Decision decision = certifier.Certify(plan, initial_set, {}, tube);
     if (decision.cause == Cause::kLimit)
       Add(fmt::format("task.limits[{}]", decision.coordinate),
-          "the tube of " + PlanName() + ": " + Explain(decision, *problem, plan, tube),
+          "the tube of " + PlanName() + ": " + Explain(decision, *problem, {}, plan, tube),
           "change the start or the plan, raise the bound, or make the tube narrower",
           decision.step >= StepsThatCount());
   }
@@ -566,8 +570,9 @@ class Examination final {
       const std::string key = fmt::format("task.obstacles[{}]", i);
       if (decision.outcome == Outcome::kSafety && decision.step == 0)
         Add(key,
-            "the robot may touch it at the start: the proven distance is " + Down(decision.margin) + " m, and " +
-                Up(decision.threshold) + " m are needed",
+            "the robot may touch " + (obstacle.name().empty() ? "it" : obstacle.name()) +
+                " at the start: the proven distance is " + Down(decision.margin) + " m, and " + Up(decision.threshold) +
+                " m are needed",
             "move task.initial_set or the obstacle, or make them smaller");
     }
   }
@@ -628,7 +633,7 @@ class Examination final {
       const Obstacle& obstacle = config_.obstacles[i];
       const auto touches = [&](const BodyPart& part) { return !(ApproximateDistance(obstacle, part) > 0); };
       if (!obstacle.motion() && std::ranges::any_of(parts, touches))
-        Add("robot.start", fmt::format("the robot touches task.obstacles[{}] there", i),
+        Add("robot.start", "the robot touches " + ObstacleText(i) + " there",
             "begin where the robot is clear, or move the obstacle");
     }
   }
@@ -716,7 +721,7 @@ class Examination final {
     for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
       if (!config_.obstacles[i].motion() &&
           -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
-        Add("planner.goal", fmt::format("task.obstacles[{}] covers the goal", i), "move one of them");
+        Add("planner.goal", ObstacleText(i) + " covers the goal", "move one of them");
   }
 
   // The longest way of a point of the body in one nominal step, of those tried; a lower bound.
@@ -768,9 +773,9 @@ class Examination final {
       const double thickness = LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
       if (step <= thickness + body) continue;
       Add("task.between",
-          fmt::format("the robot moves by up to {} m in one step of {} s, and task.obstacles[{}] is {} m thick: with "
+          fmt::format("the robot moves by up to {} m in one step of {} s, and {} is {} m thick: with "
                       "certificates at the samples only it may pass through between two of them",
-                      Up(step), ToText(config_.period), i, Down(thickness)),
+                      Up(step), ToText(config_.period), ObstacleText(i), Down(thickness)),
           "declare bounds on the motion between samples, `between: {acceleration: [...]}`; or a smaller step or speed");
       return;
     }

@@ -149,7 +149,7 @@ std::vector<World> Worlds() {
   using Eigen::Vector3d;
   const Body disc{2, {{{Vector3d(1.4, 0, 0)}, 0.9}}};
   const Body rectangle{2, {{{{-0.6, -0.6, 0}, {2.4, -0.6, 0}, {2.4, 0.6, 0}, {-0.6, 0.6, 0}}, 0}}};
-  const Between between{Eigen::Vector2d(4, 4), 0.8, 1.5, 0.1};
+  const Between between{Eigen::Vector2d(4, 4), 2.5, 1.5, 0.1};
   return {{"point", {}, {}},
           {"disc_at_frame", {2, {{{Vector3d::Zero()}, 0.9}}}, {}},
           {"disc", disc, {}},

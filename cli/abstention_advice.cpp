@@ -46,7 +46,8 @@ AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTa
     Tube tube;
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
-      advice.missing = "judged again by what is recorded: " + Explain(again, *judged.problem, judged.plan(), tube);
+      advice.missing =
+          "judged again by what is recorded: " + Explain(again, *judged.problem, judged.obstacles, judged.plan(), tube);
     return advice;
   } catch (const std::invalid_argument& error) {
     return {{}, {}, std::string("it cannot be judged again: ") + error.what()};

@@ -36,8 +36,9 @@ void PrintLimits(const Plan& plan, const Tube& tube, const Certifier& certifier)
   }
 }
 
-void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& tube, const Certifier& certifier) {
-  std::cout << Explain(result.decision, certifier.problem(), plan, tube) << "\n";
+void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& tube, const Certifier& certifier,
+                    const Config& config) {
+  std::cout << Explain(result.decision, certifier.problem(), config.obstacles, plan, tube) << "\n";
   const auto& names = certifier.problem().model->state_names();
   if (result.decision.outcome == Outcome::kFalsified && result.decision.step < 0) {
     std::cout << "  no tube";
@@ -65,7 +66,7 @@ Picture PictureOf(const Decision& decision, const Plan& plan, const Tube& tube, 
                   const Config& config) {
   const Problem& problem = certifier.problem();
   Picture picture;
-  picture.title = Explain(decision, problem, plan, tube);
+  picture.title = Explain(decision, problem, config.obstacles, plan, tube);
   picture.obstacles = config.obstacles;
   const Eigen::VectorXd start = (config.initial_set.lower() + config.initial_set.upper()) / 2;
   picture.bodies = BodyAt(problem, start);
@@ -116,7 +117,7 @@ int Certify(const CertifyArguments& options) {
   if (options.json)
     std::cout << JsonText(ToJson(result, tube, certifier, config)) << std::endl;
   else
-    PrintForPeople(result, plan, tube, certifier);
+    PrintForPeople(result, plan, tube, certifier, config);
   return result.decision.outcome == Outcome::kCertified ? 0 : 1;
 }
 

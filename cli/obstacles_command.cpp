@@ -33,7 +33,7 @@ class ObstaclesNode final : public Node {
 
   void Tick(std::int64_t now_us) override {
     if (!begin_us_) begin_us_ = now_us;
-    sender_.Set(SeenBy(now_us, BegunAt(*begin_us_, obstacles_)));
+    if (obstacles_) sender_.Set(*begin_us_, *std::exchange(obstacles_, std::nullopt));
     if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channels_.obstacles, *message) && !warned_) {
       warned_ = true;
       logging::Warn("the bus refused a message; receivers see a gap");
@@ -55,8 +55,8 @@ class ObstaclesNode final : public Node {
   const std::string path_;
   const BusOptions channels_;
   Bus& bus_;
-  std::vector<Obstacle> obstacles_;  // of the file
-  ObstacleSender sender_;
+  std::optional<std::vector<Obstacle>> obstacles_;  // of the file, if it was read since the last tick
+  ObstaclesOfFile sender_;
   std::optional<std::int64_t> begin_us_;  // of their motions
   bool warned_ = false;
 };

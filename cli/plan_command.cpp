@@ -53,7 +53,7 @@ int ReportFailure(const PlanArguments& options, const Config& config, const Cert
               << (findings.empty() ? "; a smaller planner.clearance or a larger planner.time_limit_ms may help" : "");
   else
     std::cerr << plan.candidates << (plan.candidates == 1 ? " candidate was" : " candidates were")
-              << " not certified, the last: " << Explain(plan.decision, *config.problem);
+              << " not certified, the last: " << Explain(plan.decision, *config.problem, config.obstacles);
   std::cerr << "; " << options.out << " is not written" << PrintableLines(findings) << std::endl;
   return 1;
 }
@@ -71,7 +71,7 @@ int MakePlan(const PlanArguments& options) {
   const double away = (plan.end - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
   std::cout << options.out << ": " << plan.controls.cols() << " steps, the last "
             << plan.controls.cols() - plan.progress_steps << " brake to a stop at about " << PositionText(plan.end)
-            << "\n  " << Explain(plan.decision, *config.problem) << "\n";
+            << "\n  " << Explain(plan.decision, *config.problem, config.obstacles) << "\n";
   if (!plan.reaches_goal)
     std::cout << "  The goal is " << away
               << " m further. This is as far as a single plan was certified; `forereach run "

@@ -149,7 +149,11 @@ void DrawObstacles(const std::vector<Obstacle>& obstacles, const std::vector<dou
                    const Eigen::AlignedBox2d& frame, int deciding, bool has_names, Svg& svg) {
   for (std::size_t k = 0; k < obstacles.size(); ++k) {
     svg.Open(static_cast<int>(k) == deciding ? "class=\"obstacle binding\"" : "class=\"obstacle\"");
-    DrawObstacle(obstacles[k], times_us, frame, has_names ? std::to_string(k) : "", svg);
+    DrawObstacle(obstacles[k], times_us, frame,
+                 !has_names                    ? ""
+                 : obstacles[k].name().empty() ? std::to_string(k)
+                                               : obstacles[k].name(),
+                 svg);
     svg.Close();
   }
 }

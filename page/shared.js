@@ -209,7 +209,7 @@ const fillLegend = (entries) => byId('legend').replaceChildren(...entries.map(([
 const showLegend = (color, detail) => fillLegend([[color, 'tube'],
   ...(detail.executed ? [[EXECUTED, 'executed slices'], [INK, 'measured states']] : []),
   ...(detail.has_body ? [[INK, 'the body, at the center of its slice']] : []),
-  ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']]);
+  ['#6b7280', 'obstacles, by their names or numbers'], [WRONG, 'binding step and obstacle']]);
 
 return {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf,
   timeText, clockText, listed, tell, drawPart, drawChart, axis, legend, fillTable, fillList, fillCards, view, wholeOf, showView, startView, drawTube,

@@ -81,7 +81,8 @@ Judgements JudgingTask::Certify(std::vector<Eigen::MatrixXd> plans, std::vector<
                                       try {
                                         all[i]->decision = decision;
                                         all[i]->num_learned = learned_.size();
-                                        all[i]->message = Explain(decision, *config_.problem, views[i], tube);
+                                        all[i]->message =
+                                            Explain(decision, *config_.problem, config_.obstacles, views[i], tube);
                                         all[i]->tube = NumbersOf(decision, tube, model().num_states());
                                       } catch (...) {
                                         const std::lock_guard guard(failing);

@@ -321,17 +321,18 @@ class CertificateReader final : public TimelineUser {
   static void CompareMessage(const decision_t& decision, const Problem& problem, int steps, double clearance,
                              RecordedCertificate& certificate) {
     const std::string found = GetText(decision.message);
-    const auto is = [&](const std::string& sentence) {
+    const auto sentence = [&](int t, int part) {
+      return ExplainCertificate(problem, {t, decision.obstacle, part, clearance}, certificate.certificate.obstacles);
+    };
+    const auto is = [&](const std::string& expected) {
       const auto fits = [&](const std::string& text) { return found == text.substr(0, sizeof decision.message - 1); };
-      return fits(sentence) || fits(sentence + kCapped);
+      return fits(expected) || fits(expected + kCapped);
     };
     for (int t = 0; t <= steps; ++t)
       for (int part = -1; part < static_cast<int>(problem.body.parts.size()); ++part)
-        if (is(ExplainCertificate(problem, {t, decision.obstacle, part, clearance}))) return;
+        if (is(sentence(t, part))) return;
     certificate.Compare(kAltered + std::string("its decision's message"),
-                        ExplainCertificate(problem, {0, decision.obstacle, -1, clearance}) +
-                            (decision.obstacle < 0 ? "" : ", or another step"),
-                        found);
+                        sentence(0, -1) + (decision.obstacle < 0 ? "" : ", or another step"), found);
   }
 
   const std::vector<DecisionRow>* const rows_;

@@ -191,7 +191,8 @@ class Reading {
         record_.Compare(kAltered + margin.name() + " less the distance to be kept", JsonText(nlohmann::json(clearance)),
                         JsonText(nlohmann::json(claimed)));
     }
-    const std::string sentence = ExplainCertificate(*config_.problem, {step, obstacle, part, clearance});
+    const std::string sentence =
+        ExplainCertificate(*config_.problem, {step, obstacle, part, clearance}, config_.obstacles);
     Compare(document_["message"], sentence + (document_["capped"].Bool() ? kCapped : ""));
   }
 

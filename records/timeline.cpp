@@ -155,7 +155,7 @@ void Timeline::Follow(ObstaclesInForce obstacles) {
   transition_sender_.Follow(Microseconds(now_->gate.robot_timeout_ms));
   logged_obstacles_ = std::move(obstacles);
   obstacles_digest_ = logged_obstacles_.digest();
-  obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
+  obstacles_ = all_logged_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
   learned_begin_ = LearnedUnder(*now_)->size();
 }
@@ -172,10 +172,13 @@ void Timeline::FollowReload(const Config& task) {
 
 void Timeline::TakeObstacles(const LogEvent& event) {
   const Digest before = logged_obstacles_.digest();
+  const bool was_partial = logged_obstacles_.is_partial();
   if (!logged_obstacles_.Update(event.message(), event.utime, event.sender()).empty()) return;
-  if (logged_obstacles_.digest() == before) return;  // one set is sent again and again
+  const Digest after = logged_obstacles_.digest();
+  if (after != before) all_logged_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
+  if (after == before && !was_partial && !logged_obstacles_.is_partial()) return;  // one set is sent again and again
   obstacles_ahead_.push_back(
-      {place_, event.utime, event.sender(), {event.message().begin(), event.message().end()}, logged_obstacles_});
+      {place_, event.utime, event.sender(), {event.message().begin(), event.message().end()}, after, all_logged_});
 }
 
 void Timeline::TakeTransition(const LogEvent& event) {
@@ -199,8 +202,8 @@ std::shared_ptr<std::vector<ExecutedTransition>>& Timeline::LearnedUnder(const C
 void Timeline::TakeNextObstacles() {
   const ObstaclesChange change = std::move(obstacles_ahead_.front());
   obstacles_ahead_.pop_front();
-  obstacles_digest_ = change.after.digest();
-  obstacles_ = std::make_shared<const std::vector<Obstacle>>(change.after.all());
+  obstacles_digest_ = change.after;
+  obstacles_ = change.obstacles;
   Tell(&TimelineUser::OnObstacles, change.bytes, change.utime, change.sender);
 }
 
@@ -222,8 +225,8 @@ Basis Timeline::Current() {
 }
 
 Basis Timeline::Advance(const Grounds& named, std::int64_t candidate_place) {
-  for (auto left = CountTaken(obstacles_ahead_, obstacles_digest_, named.obstacles, candidate_place,
-                              [](const ObstaclesChange& change) { return change.after.digest(); });
+  for (auto left =
+           CountTaken(obstacles_ahead_, obstacles_digest_, named.obstacles, candidate_place, &ObstaclesChange::after);
        left > 0; --left)
     TakeNextObstacles();
   for (auto left = CountTaken(transitions_ahead_, observations_digest_, named.observations, candidate_place,

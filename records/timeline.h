@@ -105,7 +105,7 @@ class TimelineUser {
   virtual void OnEvent(const LogEvent&) {}  ///< Every authentic message, before the calls that it causes.
   virtual void OnStart(const Config&) {}    ///< The process starts under this task.
   virtual void OnReload(const Config&) {}   ///< The process continues under this task.
-  /** A different set is in force. */
+  /** A message after which a different set is in force, or a part of a set that is not complete. */
   virtual void OnObstacles(Bytes /*message*/, std::int64_t /*utime*/, SenderId) {}
   virtual void OnTransition(const ExecutedTransition&, Bytes /*message*/) {}  ///< A transition is learned.
   virtual void OnDecision(const RecordedDecision&) {}
@@ -169,7 +169,8 @@ class Timeline final {
     std::int64_t place, utime;
     SenderId sender;
     std::vector<std::uint8_t> bytes;
-    ObstaclesInForce after;
+    Digest after;  // of what is in force
+    std::shared_ptr<const std::vector<Obstacle>> obstacles;
   };
   struct Transition {
     std::int64_t place;
@@ -231,6 +232,7 @@ class Timeline final {
   Digest obstacles_digest_{}, observations_digest_{};
   std::size_t learned_begin_ = 0;
   ObstaclesInForce logged_obstacles_;
+  std::shared_ptr<const std::vector<Obstacle>> all_logged_;  // of these
   SoleSender transition_sender_;
   Digest logged_observations_{};
   std::deque<ObstaclesChange> obstacles_ahead_;

@@ -49,7 +49,7 @@ Lockstep::Lockstep(Config config, const Config& world, std::int64_t now_us, Plan
   RequireStanding(config_);
   if (config_.gate.obstacles != ObstaclesSource::kBus) return;
   RequireSendable(world);
-  perceived_ = BegunAt(now_us_, world.obstacles);
+  perception_.Set(now_us_, world.obstacles);
 }
 
 void Lockstep::Run(Node* last) {
@@ -76,7 +76,6 @@ void Lockstep::Stop() {
 
 // Sends the obstacles as a perception would, since this bus has no other sender of them.
 void Lockstep::Perceive() {
-  if (config_.gate.obstacles == ObstaclesSource::kBus) perception_.Set(SeenBy(now_us_, perceived_));
   if (const auto seen = perception_.Due(now_us_)) static_cast<void>(bus_->Publish(config_.bus.obstacles, *seen));
 }
 

@@ -45,8 +45,7 @@ class Lockstep final {
   CertifierNode certifier_;
   PlannerNode planner_;
   RobotSimNode robot_;
-  ObstacleSender perception_;
-  std::vector<Obstacle> perceived_;
+  ObstaclesOfFile perception_;
 };
 
 }  // namespace forereach

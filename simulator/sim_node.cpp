@@ -241,9 +241,9 @@ std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) cons
 void RobotSimNode::ReportContacts(std::int64_t utime, bool moved) {
   for (const Contact& contact : Contacts(utime, moved)) {
     ++contacts_;
-    std::string text = fmt::format("inside obstacle {}", contact.obstacle);
+    std::string text = "inside " + NameOf(obstacles_.all(), contact.obstacle);
     if (config_.problem->body != Body())
-      text = fmt::format("part {} meets obstacle {}", contact.part, contact.obstacle);
+      text = fmt::format("part {} meets {}", contact.part, NameOf(obstacles_.all(), contact.obstacle));
     if (config_.problem->between) text += ", " + ToText(contact.at) + " of a step after the last sample";
     supervisor_.Report(utime, execution_event_t::CONTACT, contact.clearance, text);
   }

@@ -113,6 +113,10 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
     for (const Eigen::VectorXd& point : obstacle.points()) bytes.Numbers(point);
     bytes.Number(obstacle.radius());
     bytes.Number(obstacle.offset());
+    if (!obstacle.name().empty()) {
+      bytes.Text("named");
+      bytes.Text(obstacle.name());
+    }
     if (!obstacle.motion()) continue;
     const ObstacleMotion& motion = *obstacle.motion();
     bytes.Text("motion");

@@ -47,7 +47,7 @@ class CanonicalBytes final {
 /** Of the coordinates' names and the transitions in their order, which a decision's witness refers to. */
 [[nodiscard]] Digest ObservationsDigest(const NominalModel& model, const Transitions& transitions);
 
-/** Of the obstacles in their order, which a decision's witness refers to. */
+/** Of the obstacles with their names, which a decision's sentence has, in their order, which its witness refers to. */
 [[nodiscard]] Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles);
 
 /** Of a task with these, before anything is heard or learned. `config` is its TaskDigest. */

@@ -1,4 +1,5 @@
-/** How many obstacles a task file may have. A message has at most kMaxObstacles (numerics/limits.h). */
+/** How many obstacles a task file may have, and a set on the bus. A message has at most kMaxObstacles
+(numerics/limits.h). */
 #pragma once
 
 namespace forereach {

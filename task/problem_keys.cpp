@@ -467,10 +467,15 @@ void ReadMotion(const Field& at, TaskDraft& draft) {
 }
 
 void ReadObstacle(const Field& at, TaskDraft& draft) {
-  const bool moves = at.Has("motion");
-  if (const std::size_t kinds = at.Keys().size() - (moves ? 1 : 0); kinds != 1)
+  const bool moves = at.Has("motion"), is_named = at.Has("name");
+  if (const std::size_t kinds = at.Keys().size() - (moves ? 1 : 0) - (is_named ? 1 : 0); kinds != 1)
     at.Fail(fmt::format("has {} keys of a shape, has to have one of circle, box, polygon, half_plane", kinds));
   if (moves) ReadMotion(at["motion"], draft);
+  if (!is_named) return;
+  const std::string name = at["name"].Text();
+  if (const std::string why = WhyNoName(name); !why.empty()) at.Fail("name", why);
+  Obstacle& obstacle = draft.config.obstacles.back();
+  obstacle = obstacle.Named(name);
 }
 
 // A limit has at least one of both bounds.
@@ -593,7 +598,12 @@ std::vector<Key> ObstacleKeys() {
   return {
       Required(List("task.obstacles", Between(0, kMostObstacles),
                     "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
-      Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves.", ReadObstacle),
+      Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves; a name.", ReadObstacle),
+      Text(
+          "task.obstacles[].name",
+          fmt::format("For messages, instead of its number: a letter, then letters, digits and any of `_-.:/`, at most "
+                      "{} in all. Pieces of one thing may share it.",
+                      kMaxObstacleName)),
       ObstacleKind("circle", "A disc; for two safety coordinates.", ReadCircle),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
       Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),

@@ -249,23 +249,23 @@ class SliceCheck {
           SweepsOf(problem_, problem_.body.parts[p], *frame_, next ? &*next : nullptr, &functions_.places[p]));
     frame_ = std::move(next);
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
+      const std::string name = NameOf(certificate_.obstacles, static_cast<int>(o));
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
       if (!recorded_.clearance.empty() && !(claimed > 0))
         claims_.Judge(Answer::kNo, claimed, 0.0, 1.0, "above",
-                      [&] { return "the record claims to be clear of obstacle " + std::to_string(o); });
+                      [&] { return "the record claims to be clear of " + name; });
       const Obstacle& obstacle = certificate_.obstacles[o];
       const Passage passage = PassageOf(obstacle, certificate_.schedule, t_, is_swept ? t_ + 1 : t_);
       if (!passage.is_there) continue;
       for (std::size_t p = 0; p < sweeps.size() && !failure_; ++p) {
         Real best;
         const Answer answer = IsClearOfAny(sweeps[p], obstacle, claimed, best, passage);
-        claims_.Judge(answer, best, claimed, abs(best) + Real(obstacle.radius()), claimed > 0 ? "at least" : "above",
-                      [&] {
-                        return std::string(is_swept ? "the motion to the next sample" : "the slice") +
-                               " keeps clear of obstacle " + std::to_string(o) +
-                               (sweeps.size() > 1 ? " with part " + std::to_string(p) : "") +
-                               (claimed > 0 ? " by what is recorded" : "");
-                      });
+        claims_.Judge(
+            answer, best, claimed, abs(best) + Real(obstacle.radius()), claimed > 0 ? "at least" : "above", [&] {
+              return std::string(is_swept ? "the motion to the next sample" : "the slice") + " keeps clear of " + name +
+                     (sweeps.size() > 1 ? " with part " + std::to_string(p) : "") +
+                     (claimed > 0 ? " by what is recorded" : "");
+            });
       }
     }
   }

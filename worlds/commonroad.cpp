@@ -252,7 +252,7 @@ class ObstacleReader {
       const double radius = AddUp(part.radius, part.error);
       if (part.points.size() == 1) {
         const PlanePoint& center = part.points.front();
-        world_.pieces.push_back({name, Obstacle::Circle(Eigen::Vector2d(center.x, center.y), radius), {}});
+        world_.Add(name, Obstacle::Circle(Eigen::Vector2d(center.x, center.y), radius));
       } else {
         world_.Add(name, Grown(part.points, radius));
       }

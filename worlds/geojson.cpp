@@ -115,6 +115,10 @@ class Drawing {
       const JsonField geometry = at["geometry"];
       const bool has_properties = at.json().contains("properties") && at.json()["properties"].is_object();
       const JsonField own = has_properties ? at["properties"] : at;
+      const Json id = at.json().value("id", Json());
+      feature_ = id.is_string() || id.is_number_integer()
+                     ? "feature " + (id.is_string() ? id.get<std::string>() : id.dump())
+                     : std::string();
       if (!geometry.json().is_null()) TakeObject(geometry, has_properties ? &own : nullptr, depth);
     } else if (type == "GeometryCollection") {
       const JsonField geometries = at["geometries"];
@@ -126,7 +130,7 @@ class Drawing {
   }
 
   void TakeGeometry(const std::string& type, const JsonField& at, Style style) {
-    if (style.name.empty()) style.name = at.name().empty() ? type : at.name();
+    if (style.name.empty()) style.name = !feature_.empty() ? feature_ : at.name().empty() ? type : at.name();
     const JsonField coordinates = at["coordinates"];
     const auto each = [&](const auto& take) {
       for (std::size_t i = 0; i < coordinates.Count(); ++i) take(coordinates[i], style);
@@ -251,7 +255,7 @@ class Drawing {
     const PlanePoint point = PointAt(at);
     if (!style.radius) at.Fail("has no radius; give --point-radius, or its feature the property radius");
     const double radius = AddUp(*style.radius, BendOf({point}));
-    world_.pieces.push_back({style.name, Obstacle::Circle(Eigen::Vector2d(point.x, point.y), radius), {}});
+    world_.Add(style.name, Obstacle::Circle(Eigen::Vector2d(point.x, point.y), radius));
   }
 
   // All that is not in an area to stay in: a frame around them, with each of them as a hole, and what is beyond it.
@@ -277,6 +281,7 @@ class Drawing {
   const std::string& path_;
   const GeoJsonOptions& options_;
   std::optional<TangentPlane> plane_;
+  std::string feature_;  // by its id, if it has one
   World world_;
   std::vector<Ring> stay_in_;
   double stay_in_bend_ = 0, largest_bend_ = 0;

@@ -66,6 +66,7 @@ std::string ListText(const World& world, const std::string& indent) {
   std::string text = indent + "obstacles:\n";
   for (const auto& [name, obstacle, window] : world.pieces) {
     text += fmt::format("{}  - {}  # {}\n", indent, ShapeText(obstacle), Printable(name));
+    if (!obstacle.name().empty()) text += fmt::format("{}    name: {}\n", indent, obstacle.name());
     if (window)
       text += fmt::format("{}    motion: {{velocity: [0, 0], from: {}, until: {}}}\n", indent,
                           ToText(window->from + 0.0), ToText(window->until + 0.0));  // no -0
@@ -96,20 +97,36 @@ Sides SidesBeyond(const Obstacle& obstacle, const Box& region) {
 
 }  // namespace
 
+std::string ObstacleName(std::string_view text) {
+  const auto is_letter = [](char c) { return WhyNoName({&c, 1}).empty(); };
+  std::string name;
+  if (!text.empty() && '0' <= text.front() && text.front() <= '9') return name;
+  for (const char c : text.substr(0, text.find(','))) {
+    if (name.size() == kMaxObstacleName) break;
+    if (name.empty() && !is_letter(c)) continue;
+    name += WhyNoName(std::string{'a', c}).empty() ? c : '_';
+  }
+  return name;
+}
+
+void World::Add(const std::string& name, const Obstacle& obstacle, std::optional<Window> window) {
+  pieces.push_back({name, obstacle.Named(ObstacleName(name)), window});
+}
+
 void World::Add(const std::string& name, const std::vector<PlanePoint>& points, std::optional<Window> window) {
   const Ring hull = ConvexHull(points);
   for (std::size_t begin = 1; begin == 1 || begin + 1 < hull.size(); begin += kMaxObstaclePoints - 2) {
     Ring part{hull.front()};  // a fan from the first corner
     for (std::size_t i = begin; i < std::min<std::size_t>(hull.size(), begin + kMaxObstaclePoints - 1); ++i)
       part.push_back(hull[i]);
-    pieces.push_back({name, ToObstacle(part), window});
+    Add(name, ToObstacle(part), window);
   }
 }
 
 void World::AddBeyond(int axis, int sign, double at, const std::string& name) {
   Eigen::Vector2d normal = Eigen::Vector2d::Zero();
   normal[axis] = sign;
-  pieces.push_back({name, Obstacle::HalfSpace(normal, sign * at), {}});
+  Add(name, Obstacle::HalfSpace(normal, sign * at));
 }
 
 World Cropped(World world, const Box& region) {

@@ -279,12 +279,13 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   decision.second_observation = verdict.second_observation;
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
-  SetText(decision.message, Explain(verdict, certifier_.problem(), plan, tube_));
+  const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, tube_);
+  SetText(decision.message, sentence);
   if (verdict.outcome != Outcome::kCertified) return;
   if (!options_.shadow) return Attest(candidate, decision, answer.certified.emplace());
   decision.outcome = decision_t::REJECTED;
   decision.cause = decision_t::CAUSE_SHADOW;
-  SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem(), plan, tube_));
+  SetText(decision.message, "rejected: shadow mode; else: " + sentence);
 }
 
 Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& upheld, int first_step) noexcept {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "forereach/numerics/size.h"
+#include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
 
 namespace forereach {
@@ -86,13 +87,13 @@ class Track final {
   bool ends_;
 };
 
-std::map<std::int64_t, Track> TracksOf(const obstacles_t& message) {
+std::map<std::int64_t, Track> TracksOf(std::span<const obstacle_t> all, std::int64_t stamp) {
   std::map<std::int64_t, std::vector<const obstacle_t*>> pieces;
-  for (int i = 0; i < message.num_obstacles; ++i) pieces[message.obstacle[i].track].push_back(&message.obstacle[i]);
+  for (const obstacle_t& piece : all) pieces[piece.track].push_back(&piece);
   std::map<std::int64_t, Track> tracks;
   for (auto& [number, of_track] : pieces) {
     const Track& track = tracks.emplace(number, Track(number, std::move(of_track))).first->second;
-    track.RequireCover(message.utime);
+    track.RequireCover(stamp);
   }
   return tracks;
 }
@@ -111,10 +112,11 @@ ObstacleMotion MotionOf(const obstacle_t& piece, const Track& track) {
 }
 
 Obstacle FromMessage(const obstacle_t& piece, std::int64_t stamp, const std::map<std::int64_t, Track>& tracks) {
-  const Obstacle shape = FromMessage(piece.shape);
-  if (const std::string why = WhyNotFresh(piece.utime, stamp, kFarthestStampUs, kFarthestStampUs); !why.empty())
-    throw std::invalid_argument(why + ", from its message");
+  const Obstacle shape = FromMessage(piece.shape).Named(GetText(piece.name));
   const ObstacleMotion motion = MotionOf(piece, tracks.at(piece.track));
+  const bool stands = motion.velocity.isZero(0) && motion.growth == 0 && motion.growth_rate == 0;
+  const std::string why = stands ? "" : WhyNotFresh(piece.utime, stamp, kFarthestStampUs, kFarthestStampUs);
+  if (!why.empty()) throw std::invalid_argument(why + ", from its message");
   ObstacleMotion standing;
   standing.stamp_us = motion.stamp_us;
   return motion == standing ? shape : shape.Moving(motion);
@@ -129,12 +131,12 @@ void RequireWindow(const obstacle_t& piece) {
                                             At(piece.from_utime), At(piece.until_utime)));
 }
 
-// Calls of(i) for each obstacle of a message. @throws std::invalid_argument with the number that was refused.
+// Calls of(piece) for each. @throws std::invalid_argument with the number that was refused.
 template <class Of>
-void ForEach(const obstacles_t& message, Of of) {
-  for (int i = 0; i < message.num_obstacles; ++i) {
+void ForEach(std::span<const obstacle_t> pieces, Of of) {
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
     try {
-      of(i);
+      of(pieces[i]);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(fmt::format("obstacle {}: {}", i, error.what()));
     }
@@ -164,15 +166,18 @@ obstacle_shape_t ShapeOf(const Obstacle& from) {
 
 }  // namespace
 
+std::vector<Obstacle> FromMessage(std::span<const obstacle_t> pieces, std::int64_t stamp, int dim) {
+  ForEach(pieces, RequireWindow);
+  const std::map<std::int64_t, Track> tracks = TracksOf(pieces, stamp);
+  std::vector<Obstacle> obstacles;
+  ForEach(pieces,
+          [&](const obstacle_t& piece) { obstacles.push_back(OfDimension(dim, FromMessage(piece, stamp, tracks))); });
+  return obstacles;
+}
+
 std::vector<Obstacle> FromMessage(const obstacles_t& message, int dim) {
   RequireCount(message.num_obstacles);
-  ForEach(message, [&](int i) { RequireWindow(message.obstacle[i]); });
-  const std::map<std::int64_t, Track> tracks = TracksOf(message);
-  std::vector<Obstacle> obstacles;
-  ForEach(message, [&](int i) {
-    obstacles.push_back(OfDimension(dim, FromMessage(message.obstacle[i], message.utime, tracks)));
-  });
-  return obstacles;
+  return FromMessage(std::span(message.obstacle, ToSize(message.num_obstacles)), message.utime, dim);
 }
 
 bool Continues(const Obstacle& obstacle, const Obstacle& before) {
@@ -180,18 +185,17 @@ bool Continues(const Obstacle& obstacle, const Obstacle& before) {
          obstacle.motion()->from_us == before.motion()->until_us;
 }
 
-obstacles_t ToMessage(const std::vector<Obstacle>& obstacles, std::int64_t utime,
-                      std::span<const std::int64_t> tracks) {
-  obstacles_t message{};
-  message.utime = utime;
-  message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
+std::vector<obstacle_t> ToPieces(const std::vector<Obstacle>& obstacles, std::int64_t utime,
+                                 std::span<const std::int64_t> tracks) {
+  std::vector<obstacle_t> pieces(obstacles.size());
+  std::map<std::int64_t, std::int64_t> ends;  // of the tracks
   std::int64_t track = -1;
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
     ObstacleMotion motion;
     motion.stamp_us = utime;
     motion = obstacles[i].motion().value_or(motion);
     if (i == 0 || !Continues(obstacles[i], obstacles[i - 1])) track = static_cast<std::int64_t>(i);
-    obstacle_t& to = message.obstacle[i];
+    obstacle_t& to = pieces[i];
     to.shape = ShapeOf(obstacles[i]);
     to.track = tracks.empty() ? track : tracks[i];
     to.utime = motion.stamp_us;
@@ -201,14 +205,21 @@ obstacles_t ToMessage(const std::vector<Obstacle>& obstacles, std::int64_t utime
     to.uncertainty = motion.uncertainty;
     to.growth = motion.growth;
     to.growth_rate = motion.growth_rate;
+    SetText(to.name, obstacles[i].name());
+    std::int64_t& end = ends.try_emplace(to.track, to.until_utime).first->second;
+    end = std::max(end, to.until_utime);
   }
-  for (int i = 0; i < message.num_obstacles; ++i) {
-    obstacle_t& piece = message.obstacle[i];
-    const bool goes_on = std::ranges::any_of(std::span(message.obstacle, obstacles.size()), [&](const auto& other) {
-      return other.track == piece.track && other.until_utime > piece.until_utime;
-    });
-    piece.gone = !goes_on && piece.until_utime != ObstacleMotion::kAlways;
-  }
+  for (obstacle_t& piece : pieces)
+    piece.gone = piece.until_utime == ends.at(piece.track) && piece.until_utime != ObstacleMotion::kAlways;
+  return pieces;
+}
+
+obstacles_t ToMessage(const std::vector<Obstacle>& obstacles, std::int64_t utime,
+                      std::span<const std::int64_t> tracks) {
+  obstacles_t message{};
+  message.utime = utime;
+  message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
+  std::ranges::copy(ToPieces(obstacles, utime, tracks), message.obstacle);
   return message;
 }
 

@@ -14,25 +14,30 @@ namespace forereach {
 further away is not of the clock that stamped the message. */
 inline constexpr std::int64_t kFarthestStampUs = 86'400'000'000;
 
-/** The obstacles of a message, in its order. The windows of a track's pieces have to cover all times from the message's
-stamp until the track is gone:
-- The first window begins no later than the message's stamp. It is taken to have no beginning, because an obstacle does
+/** The obstacles of a set, in its order. The windows of a track's pieces have to cover all times from `stamp`, the
+message's, until the track is gone:
+- The first window begins no later than the stamp. It is taken to have no beginning, because an obstacle does
   not appear from nowhere.
 - Each later window begins no later than the latest end of those before it.
 - A piece that is `gone` ends last. Without such a piece, the windows that end last are taken to have no end.
 A piece that neither moves nor grows and has neither beginning nor end is an obstacle without a motion.
 @throws std::invalid_argument with the obstacle's index and its error if an obstacle is invalid or its dimension is not
 `dim`; if a track breaks these rules, with the track and the times; if a window is empty, `gone` is neither 0 nor 1, or
-a stamp is further than kFarthestStampUs from the message's; and as Obstacle::Moving. */
+a piece that moves or grows is stamped further than kFarthestStampUs from `stamp`; and as Obstacle::Moving and Named. */
+[[nodiscard]] std::vector<Obstacle> FromMessage(std::span<const obstacle_t> pieces, std::int64_t stamp, int dim);
+/** Those of a message. @throws std::invalid_argument also if it has more than kMaxObstacles. */
 [[nodiscard]] std::vector<Obstacle> FromMessage(const obstacles_t& message, int dim);
 
 /** Whether the window of an obstacle begins where that of the one before it ends. */
 [[nodiscard]] bool Continues(const Obstacle& obstacle, const Obstacle& before);
 
-/** The message of obstacles, with the stamp `utime` of the message and of those that stand.
+/** Obstacles as in messages; those that stand have the stamp `utime`.
 @param tracks one for each obstacle. If empty, an obstacle that Continues the one before it is of its track, and
-every other is a track of its own. The last piece of a track with an end is `gone` there.
-@pre at most kMaxObstacles. */
+every other is a track of its own. The last piece of a track with an end is `gone` there. */
+[[nodiscard]] std::vector<obstacle_t> ToPieces(const std::vector<Obstacle>& obstacles, std::int64_t utime,
+                                               std::span<const std::int64_t> tracks = {});
+
+/** The message that has all of them, with this stamp. @pre at most kMaxObstacles. */
 [[nodiscard]] obstacles_t ToMessage(const std::vector<Obstacle>& obstacles, std::int64_t utime,
                                     std::span<const std::int64_t> tracks = {});
 

@@ -11,13 +11,14 @@
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/limits.h"
 #include "task/canonical.h"
+#include "task/most_obstacles.h"
 
 namespace forereach {
 namespace {
 
 void RequireRoom(std::size_t count) {
-  if (count > kMaxObstacles)
-    throw std::invalid_argument(fmt::format("{} obstacles, at most {} fit into a message", count, kMaxObstacles));
+  if (count > kMostObstacles)
+    throw std::invalid_argument(fmt::format("{} obstacles, at most {} can be sent", count, kMostObstacles));
 }
 
 }  // namespace
@@ -36,16 +37,82 @@ void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vect
     throw std::invalid_argument(fmt::format("{} tracks of {} obstacles", tracks.size(), obstacles.size()));
   const Digest digest = ObstaclesDigest(obstacles);
   if (content_ && digest == content_->digest && tracks == content_->tracks) return;
-  content_ = {obstacles, tracks, digest};
+  std::vector<ObstaclePart> before;
+  if (content_ && content_->obstacles.size() == obstacles.size()) before = std::move(content_->parts);
+  content_ = {obstacles, tracks, digest, {}};
+  if (obstacles.size() > kMaxObstacles) {
+    const std::vector<obstacle_t> all = ToPieces(obstacles, 0, tracks);  // no stamp, so what stands stays the same
+    std::vector<Digest> digests;
+    for (std::size_t i = 0; i < all.size(); i += kMaxObstacles)
+      digests.push_back(
+          content_->parts.emplace_back(std::span(all).subspan(i, std::min<std::size_t>(kMaxObstacles, all.size() - i)))
+              .digest);
+    content_->set_digest = SetDigestOf(digests);
+  }
+  FindChanged(before);
   last_us_.reset();
 }
 
+// What still waits goes first: no part waits for ever behind one that changes again and again.
+void ObstacleSender::FindChanged(const std::vector<ObstaclePart>& before) {
+  const auto& parts = content_->parts;
+  if (before.size() != parts.size()) changed_ = again_ = {};
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if ((before.size() != parts.size() || parts[i].digest != before[i].digest) &&
+        std::ranges::find(changed_, i) == changed_.end())
+      changed_.push_back(i);
+}
+
+std::size_t ObstacleSender::NextPart() {
+  if (changed_.empty() && again_.empty()) return next_part_++ % content_->parts.size();
+  std::deque<std::size_t>& from = changed_.empty() ? again_ : changed_;
+  const std::size_t part = from.front();
+  from.pop_front();
+  if (&from == &changed_) again_.push_back(part);
+  return part;
+}
+
+std::int64_t ObstacleSender::Interval() const {
+  if (content_->parts.empty()) return period_us_;
+  const std::int64_t each = std::max<std::int64_t>(period_us_ / kPartsEachPeriod, 1);
+  return changed_.empty() && again_.empty() ? each : std::min(kBurstUs, each);
+}
+
 std::optional<obstacles_t> ObstacleSender::Due(std::int64_t now_us) {
-  if (!content_ || (last_us_ && *last_us_ <= now_us && now_us < *last_us_ + period_us_)) return std::nullopt;
+  if (!content_ || (last_us_ && *last_us_ <= now_us && now_us < *last_us_ + Interval())) return std::nullopt;
   last_us_ = now_us;
-  obstacles_t due = ToMessage(content_->obstacles, now_us, content_->tracks);
+  obstacles_t due{};
+  if (content_->parts.empty()) {
+    due = ToMessage(content_->obstacles, now_us, content_->tracks);
+  } else {
+    const std::size_t i = NextPart();
+    const std::vector<obstacle_t>& part = content_->parts[i].obstacles;
+    due.utime = now_us;
+    due.set_size = static_cast<std::int16_t>(content_->obstacles.size());
+    due.first = static_cast<std::int16_t>(i * kMaxObstacles);
+    due.num_obstacles = static_cast<std::int16_t>(part.size());
+    SetDigest(due.set_digest, content_->set_digest);
+    std::ranges::copy(part, due.obstacle);
+  }
   due.sequence = sequence_++;
   return due;
+}
+
+void ObstaclesOfFile::Set(std::int64_t begin_us, const std::vector<Obstacle>& obstacles) {
+  obstacles_ = BegunAt(begin_us, obstacles);
+  same_until_us_ = same_from_us_;
+}
+
+std::optional<obstacles_t> ObstaclesOfFile::Due(std::int64_t now_us) {
+  if (obstacles_ && !(same_from_us_ <= now_us && now_us < same_until_us_)) {
+    sender_.Set(SeenBy(now_us, *obstacles_));
+    same_from_us_ = now_us;
+    same_until_us_ = ObstacleMotion::kAlways;
+    for (const Obstacle& obstacle : *obstacles_)
+      if (obstacle.motion() && obstacle.motion()->from_us > now_us)
+        same_until_us_ = std::min(same_until_us_, obstacle.motion()->from_us);
+  }
+  return sender_.Due(now_us);
 }
 
 std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles) {
@@ -82,7 +149,8 @@ void RequireSendable(const Config& config) try {
   for (const std::int64_t time_us : changes) {
     const std::vector<Obstacle> seen = SeenBy(time_us, config.obstacles);
     RequireRoom(seen.size());
-    static_cast<void>(FromMessage(ToMessage(seen, time_us), static_cast<int>(config.problem->projection.rows())));
+    static_cast<void>(
+        FromMessage(ToPieces(seen, time_us), time_us, static_cast<int>(config.problem->projection.rows())));
   }
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": task.obstacles: " + error.what());

@@ -30,6 +30,8 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId 
     case SoleSender::Place::kOther: return state_.sender.WhyTwo(now_us);
     case SoleSender::Place::kTakesOver:
       state_.order = {};
+      state_.set = {};
+      state_.known_utime.reset();
       state_.next.reset();
       state_.unconfirmed = 0;
       break;
@@ -49,18 +51,31 @@ std::string ObstaclesInForce::Take(const obstacles_t& message, std::int64_t now_
   NoteOrder(position.sequence, now_us);
   if (const std::string fault = CheckStamp(position.utime, now_us, options_).fault; !fault.empty()) return Doubt(fault);
   try {
-    std::vector<Obstacle> heard = FromMessage(message, dim_);
-    RequireClock(heard);
-    state_.heard = std::move(heard);
+    TakeSet(message);
   } catch (const std::invalid_argument& error) {
     return Doubt(error.what());
   }
   state_.order.Take(position, horizon);
+  if (is_partial()) return {};
+  state_.known_utime = position.utime;
   state_.arrival = Arrival{position.utime, now_us};
   state_.doubt.clear();
+  return {};
+}
+
+// @throws std::invalid_argument if it is no set, or one that cannot be in force.
+void ObstaclesInForce::TakeSet(const obstacles_t& message) {
+  if (state_.set.Take(message) != ObstacleSet::Known::kNew) return;
+  try {
+    std::vector<Obstacle> heard = FromMessage(state_.set.obstacles(), message.utime, dim_);
+    RequireClock(heard);
+    state_.heard = std::move(heard);
+  } catch (const std::invalid_argument&) {
+    state_.set.Refuse();
+    throw;
+  }
   const Digest digest = ObstaclesDigest(state_.heard);
   if (digest != std::exchange(state_.heard_digest, digest)) Put();
-  return {};
 }
 
 // When a plan meets what moves is known only up to the error of the robot's clock.
@@ -80,7 +95,7 @@ void ObstaclesInForce::NoteOrder(std::int64_t sequence, std::int64_t now_us) {
   state_.next = sequence == INT64_MAX ? sequence : sequence + 1;
   if (sequence == 0) {
     // While the last message is fresh, this may be a second sender, which knows only a part of the obstacles.
-    state_.unconfirmed = last && FreshnessOfLast(now_us) == Freshness::kFresh ? 1 : 0;
+    state_.unconfirmed = last && FreshnessAt(last->utime, now_us) == Freshness::kFresh ? 1 : 0;
   } else if (sequence == next || follows_the_last_taken) {
     state_.unconfirmed = std::max(state_.unconfirmed - 1, 0);
   } else {
@@ -98,33 +113,29 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   if (options_.obstacles != ObstaclesSource::kBus) return {};
   if (std::string two = state_.sender.WhyTwo(now_us); !two.empty()) return two;
   if (!state_.doubt.empty()) return "the last message was refused: " + state_.doubt;
-  const auto& last = state_.order.newest();
-  if (!last) return "none has been heard yet";
+  const std::string partial = state_.set.WhyPartial();
+  if (!state_.known_utime) return partial.empty() ? "none has been heard yet" : partial;
   if (state_.unconfirmed > 0)
-    return fmt::format("sequence {} came out of order: messages were lost, or there are two senders", last->sequence);
+    return fmt::format("sequence {} came out of order: messages were lost, or there are two senders",
+                       state_.order.newest()->sequence);
   if (clocks_ && state_.arrival)
     if (const std::string why = WhyOff(*state_.arrival, *clocks_); !why.empty())
       return "their sender's clock is " + why;
-  switch (FreshnessOfLast(now_us)) {
+  switch (FreshnessAt(*state_.known_utime, now_us)) {
     case Freshness::kStale:
-      return "the last message is " + Milliseconds(now_us, last->utime) + " old, at most " +
-             ToText(options_.obstacles_timeout_ms) + " ms are allowed";
+      return (partial.empty() ? "the last message is " : partial + "; the last complete one is ") +
+             Milliseconds(now_us, *state_.known_utime) + " old, at most " + ToText(options_.obstacles_timeout_ms) +
+             " ms are allowed";
     case Freshness::kFuture:
-      return "the last message is stamped " + Milliseconds(last->utime, now_us) + " ahead: the clock was set back";
+      return "the last message is stamped " + Milliseconds(*state_.known_utime, now_us) +
+             " ahead: the clock was set back";
     case Freshness::kFresh: break;
   }
   return state_.sender.WhyNotAlone(now_us);
 }
 
-// The freshness of the last message. @pre there is one.
-Freshness ObstaclesInForce::FreshnessOfLast(std::int64_t now_us) const {
-  return FreshnessOf(state_.order.newest()->utime, now_us, Microseconds(options_.obstacles_timeout_ms),
-                     Microseconds(options_.max_ahead_ms));
-}
-
-std::optional<std::int64_t> ObstaclesInForce::stamp() const {
-  const auto& last = state_.order.newest();
-  return last ? std::optional(last->utime) : std::nullopt;
+Freshness ObstaclesInForce::FreshnessAt(std::int64_t utime, std::int64_t now_us) const {
+  return FreshnessOf(utime, now_us, Microseconds(options_.obstacles_timeout_ms), Microseconds(options_.max_ahead_ms));
 }
 
 void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {

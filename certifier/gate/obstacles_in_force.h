@@ -1,9 +1,10 @@
 /** The obstacles in force, and whether they are known to be complete. They depend on gate.obstacles of the task:
 
-`bus`: the obstacles of the task file and those of the last OBSTACLES message, an obstacles_t. The messages
-are one stream, of one sender (lcmtypes/sole_sender.h). An obstacle may move only if the task has
-gate.max_clock_error_ms; otherwise a message with it is refused. No message removes an obstacle of the file. The
-obstacles are known from the first usable message on, until one of these events:
+`bus`: the obstacles of the task file and those of the last complete set on OBSTACLES, which one obstacles_t has or
+several have in parts (obstacle_set.h). The messages are one stream, of one sender (lcmtypes/sole_sender.h). An obstacle
+may move only if the task has gate.max_clock_error_ms; otherwise its set is refused. No message removes an obstacle of
+the file. A message that leaves its set incomplete counts as silence: it changes nothing that is known, and the last
+message is the last one whose set was complete. The obstacles are known from then on, until one of these events:
 - The last message's stamp is older than gate.obstacles_timeout_ms.
 - Signed: two senders are heard, or the sender has not been heard for gate.obstacles_timeout_ms alone. The messages of a
 second sender are refused until the first one has been silent for that time.
@@ -27,6 +28,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include <string>
 #include <vector>
 
+#include "certifier/gate/obstacle_set.h"
 #include "certifier/gate/stream_clock.h"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/safety/obstacle_index.h"
@@ -60,7 +62,9 @@ class ObstaclesInForce final {
   /** The digest of all(), as ObstaclesDigest computes it. */
   [[nodiscard]] const Digest& digest() const { return digest_; }
   /** The stamp of the message in force; nothing if none was received. */
-  [[nodiscard]] std::optional<std::int64_t> stamp() const;
+  [[nodiscard]] std::optional<std::int64_t> stamp() const { return state_.known_utime; }
+  /** Whether the last message taken has left its set incomplete. */
+  [[nodiscard]] bool is_partial() const { return !state_.set.WhyPartial().empty(); }
   /** Stamp and arrival of the message in force; nothing if none was received. */
   [[nodiscard]] const std::optional<Arrival>& arrival() const { return state_.arrival; }
   /** The number of lost messages, from gaps in the sequence. */
@@ -69,13 +73,15 @@ class ObstaclesInForce final {
  private:
   struct State {
     SoleSender sender;
-    StreamOrder order;                 // of the messages taken
-    std::vector<Obstacle> heard;       // from the last of them
-    Digest heard_digest{};             // of these
-    std::optional<Arrival> arrival;    // of the last of them
-    std::optional<std::int64_t> next;  // the sequence after the last one seen, including refused messages
-    std::string doubt;                 // why the last message was refused
-    int unconfirmed = 0;               // number of messages in order that are still needed
+    StreamOrder order;                        // of the messages taken
+    ObstacleSet set;                          // that they have whole or in parts
+    std::vector<Obstacle> heard;              // of the last complete set
+    Digest heard_digest{};                    // of these
+    std::optional<std::int64_t> known_utime;  // of the last message whose set was complete
+    std::optional<Arrival> arrival;           // of that message
+    std::optional<std::int64_t> next;         // the sequence after the last one seen, including refused messages
+    std::string doubt;                        // why the last message was refused
+    int unconfirmed = 0;                      // number of messages in order that are still needed
     std::int64_t lost = 0;
   };
 
@@ -83,7 +89,8 @@ class ObstaclesInForce final {
   [[nodiscard]] std::string Take(const obstacles_t& message, std::int64_t now_us);
   void RequireClock(const std::vector<Obstacle>& obstacles) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
-  [[nodiscard]] Freshness FreshnessOfLast(std::int64_t now_us) const;
+  void TakeSet(const obstacles_t& message);
+  [[nodiscard]] Freshness FreshnessAt(std::int64_t utime, std::int64_t now_us) const;
   // Sets all_ to the task's obstacles, which are its first, and the received ones.
   void Put();
 

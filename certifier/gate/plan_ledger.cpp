@@ -42,7 +42,7 @@ Grounds GroundsForStranger(const Gate& gate, bool is_falsified) {
   return grounds;
 }
 
-withdrawal_t Judged(const Standing& standing, const Problem& problem) {
+withdrawal_t Judged(const Standing& standing, const Gate& gate) {
   const Decision& verdict = standing.verdict;
   if (verdict.outcome == Outcome::kNone) return Unjudged(withdrawal_t::NOT_JUDGED, "it cannot be judged again");
   withdrawal_t message{};
@@ -52,8 +52,8 @@ withdrawal_t Judged(const Standing& standing, const Problem& problem) {
   message.obstacle = static_cast<std::int16_t>(verdict.obstacle);
   message.margin = verdict.margin;
   message.threshold = verdict.threshold;
-  SetText(message.message,
-          "the first " + std::to_string(standing.steps) + " controls stand; now " + Explain(verdict, problem));
+  SetText(message.message, "the first " + std::to_string(standing.steps) + " controls stand; now " +
+                               Explain(verdict, gate.certifier().problem(), gate.obstacles()));
   return message;
 }
 
@@ -392,7 +392,7 @@ void PlanLedger::Judge(Record& record, Gate& gate) {
   const Standing standing = gate.JudgeAgain(force.judged->plan, UpheldBy(*force.judged), force.first_step);
   if (standing.verdict.outcome == Outcome::kCertified) return;
   if (force.is_withdrawn && standing.steps >= force.standing_steps) return;
-  Withdraw(record, gate.grounds(), Judged(standing, gate.certifier().problem()));
+  Withdraw(record, gate.grounds(), Judged(standing, gate));
 }
 
 void PlanLedger::Withdraw(Record& record, const Grounds& grounds, const withdrawal_t& withdrawal) {

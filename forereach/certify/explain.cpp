@@ -78,17 +78,17 @@ std::string ExplainLimit(const Decision& decision, const Problem& problem) {
          (below ? ", below its limit " : ", above its limit ") + limit;
 }
 
-std::string ExplainSafety(const Decision& decision, const Problem& problem) {
+std::string ExplainSafety(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles) {
   if (decision.cause == Cause::kLimit) return ExplainLimit(decision, problem);
   const double clearance = SubDown(decision.margin, decision.threshold);
   if (decision.outcome == Outcome::kCertified)
-    return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance});
+    return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance}, obstacles);
   const std::string who = NamesPart(problem, decision.part) ? "part " + std::to_string(decision.part) : "the robot";
-  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " may touch obstacle " +
-         std::to_string(decision.obstacle) + " (by " + RoundedUp(-clearance) + " m)";
+  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " may touch " +
+         NameOf(obstacles, decision.obstacle) + " (by " + RoundedUp(-clearance) + " m)";
 }
 
-std::string Sentence(const Decision& decision, const Problem& problem) {
+std::string Sentence(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles) {
   const NominalModel& model = *problem.model;
   switch (decision.outcome) {
     case Outcome::kFalsified: return ExplainFalsified(decision, problem);
@@ -107,7 +107,7 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:
-    case Outcome::kCertified: return ExplainSafety(decision, problem);
+    case Outcome::kCertified: return ExplainSafety(decision, problem, obstacles);
     case Outcome::kNone: break;
   }
   return "no decision";
@@ -134,7 +134,8 @@ std::string ExplainUnbounded(const Decision& decision, const NominalModel& model
 
 }  // namespace
 
-std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest) {
+std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest,
+                               std::span<const Obstacle> obstacles) {
   const double error = problem.timing.error;
   const std::string steps =
       error > 0 ? "; steps up to " + RoundedDown(error) + " s off their times" : "; steps on time";
@@ -144,18 +145,19 @@ std::string ExplainCertificate(const Problem& problem, const ClosestApproach& cl
   return std::string(problem.between ? "certified: the robot stays clear at all times"
                                      : "certified at its sample instants only: the robot stays clear") +
          (problem.declaration.IsDisturbed() ? " under the declared disturbance" : "") + ", closest " +
-         TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) + " m from obstacle " +
-         std::to_string(closest.obstacle) + limits;
+         TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) + " m from " +
+         NameOf(obstacles, closest.obstacle) + limits;
 }
 
 const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }
 
-std::string Explain(const Decision& decision, const Problem& problem) {
-  return Sentence(decision, problem) + (decision.capped ? kCapped : "");
+std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles) {
+  return Sentence(decision, problem, obstacles) + (decision.capped ? kCapped : "");
 }
 
-std::string Explain(const Decision& decision, const Problem& problem, const Plan& plan, const Tube& tube) {
-  return Sentence(decision, problem) + ExplainUnbounded(decision, *problem.model, plan, tube) +
+std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles,
+                    const Plan& plan, const Tube& tube) {
+  return Sentence(decision, problem, obstacles) + ExplainUnbounded(decision, *problem.model, plan, tube) +
          (decision.capped ? kCapped : "");
 }
 

@@ -1,10 +1,12 @@
 /** Decisions as sentences. */
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "forereach/certify/decision.h"
 #include "forereach/certify/problem.h"
+#include "forereach/safety/obstacle.h"
 
 namespace forereach {
 
@@ -12,11 +14,14 @@ struct Plan;
 class Tube;
 
 /** One sentence with outcome, step, cause and witness by name, with values, bounds and units. Numbers have six digits
-and are rounded so that the sentence stays true: a clearance down, a depth up. */
-[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem);
+and are rounded so that the sentence stays true: a clearance down, a depth up.
+@param obstacles those of the call, for their names (NameOf). */
+[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem,
+                                  std::span<const Obstacle> obstacles = {});
 /** The same, where the plan and its tube are at hand. If the next state has no finite enclosure, it also names the
 operation of the model's text that meets its kink or pole (dynamics/unbounded.h). Not for the certify step. */
-[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem, const Plan& plan, const Tube& tube);
+[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles,
+                                  const Plan& plan, const Tube& tube);
 
 /** The closest approach of a certified plan, as Decision has it. */
 struct ClosestApproach {
@@ -29,7 +34,8 @@ struct ClosestApproach {
 /** The sentence for a certificate, without kCapped. It says when the certificate holds: at all times with
 Problem::between, otherwise at the sample instants only; that it allows for a disturbance, if one is declared; and that
 the limits hold at the sample instants, if there are any. */
-[[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest);
+[[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest,
+                                             std::span<const Obstacle> obstacles);
 
 /** "all_times" or "samples": when a decision of the problem holds. */
 [[nodiscard]] const char* HoldsName(const Problem& problem);

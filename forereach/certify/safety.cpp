@@ -185,6 +185,8 @@ class SafetyTest::Unit {
 
   // Of the frame, at all samples of the unit. @pre EncloseHulls.
   [[nodiscard]] const Hull& hull() const noexcept { return hull_; }
+  // Likewise, at its first one.
+  [[nodiscard]] const Hull& first_hull() const noexcept { return first_ == last_ ? hull_ : hulls_[0]; }
 
   // By the interval hulls of the frame and a ball around the body: sound, not tight. @pre EncloseHulls.
   [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
@@ -219,13 +221,30 @@ class SafetyTest::Unit {
   [[nodiscard]] PartSeparation ByDirections(const PartSeparation& by_hulls, const Obstacle& obstacle,
                                             const Encounter& meeting) noexcept {
     if (placement().is_at_frame()) return by_hulls;
+    return Better(ByDirections(obstacle, meeting), by_hulls, placement().parts().size());
+  }
+  // Without hulls, and wherever the body is.
+  [[nodiscard]] PartSeparation ByDirections(const Obstacle& obstacle, const Encounter& meeting) noexcept {
     const auto separate = [&](std::size_t i, double added) {
       const Eigen::Vector3d d = Towards(obstacle, placement().parts()[i], meeting);
       double support = -kInfinity;
       for (int t = first_; t <= last_; ++t) support = Larger(support, Support(t, placement().parts()[i], d, meeting));
       return Separation{DistanceLower(obstacle, d, support), AddUp(obstacle.radius(), added)};
     };
-    return Better(ClosestPart(meeting, separate), by_hulls, placement().parts().size());
+    return ClosestPart(meeting, separate);
+  }
+
+  // The same of what stands, by a direction that is given; the least of all parts.
+  [[nodiscard]] double ClearanceAlong(const Eigen::Vector3d& d, const Obstacle& obstacle) noexcept {
+    if (d.isZero(0)) return -kInfinity;
+    double least = kInfinity;
+    for (const Placement::Part& part : placement().parts()) {
+      double support = -kInfinity;
+      for (int t = first_; t <= last_; ++t)
+        support = Larger(support, placement().SupportUpper(SampleAt(t), part, d, test_.instructions_));
+      least = std::min(least, SubDown(DistanceLower(obstacle, d, support), AddUp(obstacle.radius(), part.radius)));
+    }
+    return least;
   }
 
   // The better of the bound by hulls and that of the best directions.
@@ -395,6 +414,8 @@ class SafetyTest::Judgement {
         obstacles_(obstacles),
         first_(first),
         units_(test.NumUnits(tube)),
+        tube_(tube),
+        schedule_(schedule),
         touched_(units_),
         unit_(test, schedule, tube, tube.places_) {}
 
@@ -428,59 +449,189 @@ class SafetyTest::Judgement {
       unit_.Enter(t);
       unit_.EncloseHulls();
       hulls_[ToSize(t - first_)] = unit_.hull();
-      if (!is_at_frame()) EncloseBody(t);
-      if (touched_ == units_)
-        for (const int o : index.everywhere()) See(t, o);
+      poses_[ToSize(t - first_)].frame = unit_.first_hull();
     }
-    SeeNear(index, first_, std::min(touched_ + 1, units_));
+    if (has_boxes()) EncloseBodies();
+    SeeNear(index, first_, units_);
+    if (!index.everywhere().empty()) SeeEverywhere(index);
   }
 
-  // Those that hulls do not prove apart, in the order of time: a unit's places are then made once. If there are too
-  // many, fewer units at once.
-  void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
-    struct Open {
-      int t, o;
+  // What moves or has no end: first what is nearest to the whole tube, then what is nearer than that turns out to be.
+  void SeeEverywhere(const ObstacleIndex& index) noexcept {
+    const auto all = index.everywhere();
+    Hull tube = hulls_[0];
+    for (int t = first_ + 1; t < units_; ++t) tube = Join(tube, hulls_[ToSize(t - first_)], test_.placement_.dim());
+    const std::size_t count = std::min(all.size(), bounds_.size());
+    for (std::size_t i = 0; i < count; ++i) bounds_[i] = ClearanceOfAll(tube, obstacle(all[i]));
+    const auto see = [&](const auto& is_near) {
+      for (int t = first_; t <= std::min(touched_, units_ - 1); ++t) {
+        unit_.Enter(t);
+        unit_.EncloseHulls();
+        for (std::size_t i = 0; i < all.size(); ++i)
+          if (is_near(i)) See(t, all[i]);
+      }
     };
-    std::array<Open, 256> open;
+    const auto known = std::span(bounds_).first(count);
+    const std::size_t nearest = ToSize(std::ranges::min_element(known) - known.begin());
+    if (known[nearest] == kInfinity && all.size() == count) return;  // none is there
+    see([&](std::size_t i) { return i == nearest; });
+    ConsiderLeast();
+    const double far = WithTolerance(index, closest_.clearance);
+    see([&](std::size_t i) { return i != nearest && !IsFurther(i, far); });
+  }
+  // Of those that move or have no end, the i-th: in every unit.
+  [[nodiscard]] bool IsFurther(std::size_t i, double distance) const noexcept {
+    return i < bounds_.size() && bounds_[i] > distance;
+  }
+
+  // A lower bound on the clearance of an obstacle in all units; infinite if it is nowhere in that time.
+  [[nodiscard]] double ClearanceOfAll(const Hull& tube, const Obstacle& other) const noexcept {
+    const double reach = test_.placement_.reach();
+    if (!other.motion()) return SeparateHulls(tube, other, reach).clearance();
+    const Encounter meeting = Meet(*other.motion(), schedule_, first_, units_ - 1 + span());
+    if (!meeting.is_there) return kInfinity;
+    const int p = test_.placement_.dim();
+    const Hull seen = Join(Shifted(tube, meeting.shift[0], p), Shifted(tube, meeting.shift[1], p), p);
+    return SeparateHulls(seen, other, AddUp(meeting.growth, reach)).clearance();
+  }
+
+  void EncloseBodies() noexcept {
+    const Placement& placement = test_.placement_;
+    Hull after{};
+    for (int t = units_ - 1 + span(); t >= first_; --t) {
+      const std::size_t i = ToSize(t - first_);
+      poses_[i] = placement.PoseOver(tube_.slice(t), tube_.half_width(t));
+      const Hull body = placement.EncloseBody(poses_[i]);
+      if (t < units_) bodies_[i] = span() == 0 ? body : Join(body, after, placement.dim());
+      after = body;
+    }
+  }
+
+  struct Near {
+    int t, o;
+    double gap;                       // a lower bound on the distance, about
+    std::array<double, 2> towards{};  // a direction that shows it; zero: none
+  };
+
+  // All pairs that may touch or be the closest, those that may touch in the order of time. If there are too many, fewer
+  // units at once.
+  void SeeNear(const ObstacleIndex& index, int from, int to) noexcept {
+    std::array<Near, 384> near;
     std::size_t count = 0;
     bool has_room = true;
     ForEachNear(
-        index, from, to, [] { return 0.0; },
-        [&](int t, int o, const Separation& by_hulls) {
-          if (by_hulls.IsProven()) return;
-          if (count < open.size())
-            open[count++] = {t, o};
+        index, from, to, [&] { return farthest(); },
+        [&](int t, int o) {
+          if (!has_room) return;
+          Near pair{t, o, Gap(t, o)};
+          if (pair.gap > WithTolerance(index, farthest())) return;
+          if (pair.gap < farthest_ / 2) farthest_ = std::min(farthest_, DistanceUpper(t, o));
+          if (count < near.size())
+            near[count++] = pair;
           else if (to - from > 1)
             has_room = false;
           else
-            Settle(t, o, by_hulls);
+            Refine(pair), SettleNear(index, pair), ConsiderNear(index, pair);
         });
     if (!has_room) {
       const int middle = (from + to) / 2;
       SeeNear(index, from, middle);
       return touched_ == units_ ? SeeNear(index, middle, to) : void();
     }
-    const auto found = std::span(open).first(count);
-    std::ranges::sort(found, [](const Open& a, const Open& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
-    for (const Open& pair : found) Settle(pair.t, pair.o, ByHulls(pair.t, pair.o));
+    const double farthest_of_all = WithTolerance(index, farthest());
+    auto found = std::span(near).first(count);
+    found = found.first(
+        ToSize(std::remove_if(found.begin(), found.end(), [&](const Near& a) { return a.gap > farthest_of_all; }) -
+               found.begin()));
+    std::ranges::sort(found, [](const Near& a, const Near& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
+    for (Near& pair : found)
+      if (pair.gap <= WithTolerance(index, 0)) {
+        Refine(pair);
+        SettleNear(index, pair);
+      }
+    if (touched_ < units_ || found.empty()) return;
+    // The nearest first: they leave few of the others.
+    std::ranges::sort(found, {}, &Near::gap);
+    for (Near& pair : found) ConsiderNear(index, pair);
   }
 
-  // Calls visit(t, o, the bound by hulls). By boxes around the body, unless all of it is at the frame; then what
-  // is left out is further by more than a search for the best direction may lose.
+  // What is further is not the closest. Where places of the body are not known before they are enclosed, not yet.
+  [[nodiscard]] double farthest() const noexcept {
+    return test_.placement_.has_expressions() ? 0 : std::min(closest_.clearance, farthest_);
+  }
+  // How many samples a unit has besides its first one.
+  [[nodiscard]] int span() const { return test_.placement_.sweeps() ? 1 : 0; }
+  // Whether boxes around the body are searched; otherwise hulls of its places, with its reach.
+  [[nodiscard]] bool has_boxes() const { return !is_at_frame() && !test_.placement_.has_expressions(); }
+
+  // More than a search for the best direction may lose of a distance.
+  [[nodiscard]] double WithTolerance(const ObstacleIndex& index, double distance) const noexcept {
+    constexpr double kSearchTolerance = 1e-5;
+    constexpr double kRounding = 0x1p-40;
+    return std::max(distance, 0.0) * (1 + kSearchTolerance) +
+           kSearchTolerance * (index.size() + test_.placement_.reach()) + kRounding * tree_.size();
+  }
+
+  // Calls visit(t, o). Unless all of the body is at the frame, what is left out is further by more than a search may
+  // lose.
   template <class Within, class Visit>
   void ForEachNear(const ObstacleIndex& index, int from, int to, const Within& within, const Visit& visit) noexcept {
-    constexpr double kSearchTolerance = 1e-5;
-    const double reach = test_.placement_.reach();
-    if (tree_from_ != from || tree_to_ != to)
-      tree_.Build(std::span(is_at_frame() ? hulls_ : bodies_).subspan(ToSize(from - first_), ToSize(to - from)),
-                  test_.placement_.dim());
-    tree_from_ = from;
-    tree_to_ = to;
-    const auto see = [&](int i, int o) { visit(from + i, o, ByHulls(from + i, o)); };
+    tree_.Build(std::span(has_boxes() ? bodies_ : hulls_).subspan(ToSize(from - first_), ToSize(to - from)),
+                test_.placement_.dim());
+    const double reach = has_boxes() ? 0 : test_.placement_.reach();
+    const auto see = [&](int i, int o) { visit(from + i, o); };
     if (is_at_frame()) return index.ForEachNear(tree_, reach, within, see);
-    const double least = kSearchTolerance * (index.size() + reach);
     index.ForEachNear(
-        tree_, 0, [&] { return within() * (1 + kSearchTolerance) + least; }, see);
+        tree_, reach, [&] { return WithTolerance(index, within()); }, see);
+  }
+
+  // Between the box around the body, or around its places widened by its reach, and that around the obstacle.
+  [[nodiscard]] double Gap(int t, int o) const noexcept {
+    const Hull& hull = (has_boxes() ? bodies_ : hulls_)[ToSize(t - first_)];
+    double square = 0;
+    for (int k = 0; k < test_.placement_.dim(); ++k) {
+      const double center = hull.center[ToSize(k)];
+      const double gap =
+          std::max(obstacle(o).lower()[k] - center, center - obstacle(o).upper()[k]) - hull.half_width[ToSize(k)];
+      if (gap > 0) square += gap * gap;
+    }
+    return std::sqrt(square) - obstacle(o).radius() - (has_boxes() ? 0 : test_.placement_.reach());
+  }
+
+  // The distance of some point of the body in the middle of a slice from some point of the obstacle, from above.
+  [[nodiscard]] double DistanceUpper(int t, int o) const noexcept {
+    const Placement& placement = test_.placement_;
+    const auto distance = [&](const std::array<double, kMaxSafetyDim>& y) {
+      const bool is_box = obstacle(o).kind() == Obstacle::Kind::kBox;
+      double square = 0;
+      for (int k = 0; k < placement.dim(); ++k) {
+        const double a = y[ToSize(k)], &lower = obstacle(o).lower()[k], &upper = obstacle(o).upper()[k];
+        const double away = is_box ? std::max({lower - a, a - upper, 0.0}) : obstacle(o).hull().front()[k] - a;
+        square += away * away;
+      }
+      return std::sqrt(square);
+    };
+    double least = kInfinity;
+    if (!has_boxes()) {
+      if (is_at_frame()) least = distance(poses_[ToSize(t - first_)].frame.center) - placement.parts().front().radius;
+    } else {
+      for (const Placement::Part& part : placement.parts())
+        for (int i = part.first; i < part.first + part.count; ++i)
+          least = std::min(least, distance(placement.Middle(poses_[ToSize(t - first_)], i)) - part.radius);
+    }
+    constexpr double kRounding = 1e-12;
+    return least - obstacle(o).radius() + kRounding * (tree_.size() + std::abs(least) + placement.reach());
+  }
+
+  // As Settle, of a pair that may touch. What is proven here may be the closest.
+  void SettleNear(const ObstacleIndex& index, const Near& pair) noexcept {
+    const auto& [t, o, gap, towards] = pair;
+    if (gap > WithTolerance(index, 0) || std::tie(touched_, touched_obstacle_) < std::tie(t, o)) return;
+    const Separation by_hulls = ByHulls(t, o);
+    if (by_hulls.IsProven()) return;
+    unit_.Enter(t);
+    const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), {});
+    if (!direct.separation.IsProven() && !ByBox(t, o).IsProven()) Search(direct, t, o);
   }
 
   // Of what stands, with an index.
@@ -507,7 +658,12 @@ class SafetyTest::Judgement {
     const Encounter& meeting = unit_.MeetIn(obstacle(o));
     const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), meeting);
     if (direct.separation.IsProven()) return nearest_.Add(direct.separation, direct.part, t, o, true);
-    const PartSeparation best = unit_.Best(direct, obstacle(o), meeting);
+    Search(direct, t, o);
+  }
+
+  // What no cheap bound proves.
+  void Search(const PartSeparation& direct, int t, int o) noexcept {
+    const PartSeparation best = unit_.Best(direct, obstacle(o), unit_.MeetIn(obstacle(o)));
     if (best.separation.IsProven()) return closest_.Consider(best, t, o);
     touched_ = t;
     touched_obstacle_ = o;
@@ -518,13 +674,13 @@ class SafetyTest::Judgement {
   [[nodiscard]] Separation ByBox(int t, int o) noexcept {
     if (is_at_frame() || obstacle(o).motion()) return {};
     EncloseBody(t);
-    return SeparateHulls(bodies_[ToSize(t - first_)], obstacle(o));
+    return SeparateHulls(tight_bodies_[ToSize(t - first_)], obstacle(o));
   }
   void EncloseBody(int t) noexcept {
     const std::size_t i = ToSize(t - first_);
     if (std::exchange(has_body_[i], true)) return;
     unit_.Enter(t);
-    bodies_[i] = unit_.EncloseBody();
+    tight_bodies_[i] = unit_.EncloseBody();
   }
 
   [[nodiscard]] bool IsCloser(const Pair& pair) const noexcept {
@@ -545,28 +701,153 @@ class SafetyTest::Judgement {
     if (IsCloser(pair) && !pair.is_direct) Direct(pair);
     if (IsCloser(pair) && pair.IsProven()) Consider(pair);
   }
+  // Of what stands, with an index: in the order of their cost.
+  void ConsiderNear(const ObstacleIndex& index, Near& pair) noexcept {
+    const auto& [t, o, gap, towards] = pair;
+    const double far = WithTolerance(index, closest_.clearance);
+    if (gap > far) return;
+    if (gap > WithTolerance(index, 0)) Refine(pair);
+    if (gap > far) return;
+    const Separation by_hulls = ByHulls(t, o);
+    unit_.Enter(t);
+    if (is_at_frame()) {
+      if (by_hulls.IsProven() && closest_.Yields(by_hulls.clearance(), t, o) &&
+          !(unit_.ByDirections(obstacle(o), {}).separation.clearance() > far))
+        Consider({{by_hulls, -1}, {}, by_hulls.clearance(), t, o, true});
+      return;
+    }
+    if (unit_.ClearanceAlong({towards[0], towards[1], 0}, obstacle(o)) > far) return;
+    const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), {});
+    const Separation boxed = by_hulls.IsProven() ? Separation{} : ByBox(t, o);
+    const double clearance = std::max(direct.separation.clearance(), boxed.clearance());
+    if (clearance > far) return;
+    if (direct.separation.IsProven() || boxed.IsProven()) return Consider({direct, boxed, clearance, t, o, true});
+    if (gap > WithTolerance(index, 0)) Search(direct, t, o);  // otherwise SettleNear has searched
+  }
+
+  // The points of a body's parts in the plane, in the middles of a unit's slices, with what is around them.
+  struct Outline {
+    static constexpr std::size_t kMost = std::size_t{2} * kMaxBodyPoints;
+    int t = -1;
+    std::array<double, kMost> x, y, around;
+    std::array<std::array<double, 2>, 2> width;  // of the frame, at each sample
+  };
+
+  void SketchBody(int t) noexcept {
+    if (std::exchange(outline_.t, t) == t) return;
+    const Placement& placement = test_.placement_;
+    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
+      const Placement::Pose& pose = poses_[ToSize(t - first_) + s];
+      outline_.width[s] = {pose.frame.half_width[0], pose.frame.half_width[1]};
+      for (const Placement::Part& part : placement.parts())
+        for (int i = part.first; i < part.first + part.count; ++i) {
+          const std::size_t j = s * kMaxBodyPoints + ToSize(i);
+          const auto middle = placement.Middle(pose, i);
+          outline_.x[j] = middle[0];
+          outline_.y[j] = middle[1];
+          outline_.around[j] = placement.Around(pose, i) + part.radius;
+        }
+    }
+  }
+
+  // Raises the pair's gap to a lower bound on the distance from the body, up to rounding: by its outline, in the plane.
+  void Refine(Near& pair) noexcept {
+    if (!has_boxes() || test_.placement_.dim() != 2) return;
+    SketchBody(pair.t);
+    Along least;
+    least.gap = kInfinity;
+    for (const Placement::Part& part : test_.placement_.parts())
+      if (const Along along = GapAround(obstacle(pair.o), part); along.gap < least.gap) least = along;
+    pair.gap = std::max(pair.gap, least.gap - obstacle(pair.o).radius());
+    pair.towards = least.towards;
+  }
+  // A bound by one direction.
+  struct Along {
+    double gap = -kInfinity;
+    std::array<double, 2> towards{};
+  };
+  // From the nearest point to the box around the core, and across the sides of the body.
+  [[nodiscard]] Along GapAround(const Obstacle& other, const Placement::Part& part) const noexcept {
+    const Eigen::Vector3d &lower = other.lower(), &upper = other.upper();
+    const auto &x = outline_.x, &y = outline_.y;
+    Along best;
+    const auto consider = [&](double to_x, double to_y) {
+      if (const double gap = GapAlong(other, part, to_x, to_y); gap > best.gap) best = {gap, {to_x, to_y}};
+    };
+    double nearest = kInfinity, towards_x = 0, towards_y = 0;
+    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
+      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
+      for (std::size_t j = first; j < end; ++j) {
+        const double to_x = std::max(lower[0] - x[j], 0.0) + std::min(upper[0] - x[j], 0.0),
+                     to_y = std::max(lower[1] - y[j], 0.0) + std::min(upper[1] - y[j], 0.0);
+        if (const double square = to_x * to_x + to_y * to_y; square < nearest) {
+          nearest = square;
+          towards_x = to_x;
+          towards_y = to_y;
+        }
+      }
+    }
+    consider(towards_x, towards_y);
+    if (part.count == 1) return best;
+    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
+      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
+      for (std::size_t j = first; j < end; ++j) {
+        const std::size_t next = j + 1 < end ? j + 1 : first;
+        const double across_x = y[next] - y[j], across_y = x[j] - x[next];
+        const double middle = across_x * (lower[0] + upper[0] - 2 * x[j]) + across_y * (lower[1] + upper[1] - 2 * y[j]);
+        const double extent = std::abs(across_x) * (upper[0] - lower[0]) + std::abs(across_y) * (upper[1] - lower[1]);
+        if (std::abs(middle) > extent)  // all of the box is on one side
+          consider(middle > 0 ? across_x : -across_x, middle > 0 ? across_y : -across_y);
+      }
+    }
+    return best;
+  }
+  [[nodiscard]] double GapAlong(const Obstacle& other, const Placement::Part& part, double x, double y) const noexcept {
+    double core = kInfinity, farthest = -kInfinity;
+    if (other.kind() == Obstacle::Kind::kBox)
+      core =
+          std::min(x * other.lower()[0], x * other.upper()[0]) + std::min(y * other.lower()[1], y * other.upper()[1]);
+    else
+      for (const Eigen::Vector3d& point : other.hull()) core = std::min(core, x * point[0] + y * point[1]);
+    const double length = std::sqrt(x * x + y * y);
+    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
+      const double width = std::abs(x) * outline_.width[s][0] + std::abs(y) * outline_.width[s][1];
+      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
+      for (std::size_t j = first; j < end; ++j)
+        farthest = std::max(farthest, x * outline_.x[j] + y * outline_.y[j] + length * outline_.around[j] + width);
+    }
+    const double gap = (core - farthest) / length;
+    return length > 0x1p-300 && gap < kInfinity ? gap : -kInfinity;  // so of a direction that is none
+  }
+
   void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
     const Separation boxed = by_hulls.IsProven() ? Separation{} : ByBox(t, o);
     Pair pair{{by_hulls, -1}, boxed, std::max(by_hulls.clearance(), boxed.clearance()), t, o, is_at_frame()};
     ConsiderIfCloser(pair);
   }
 
-  void FindClosest() noexcept {
+  // Of those that are proven apart. Null if there are none.
+  Pair* ConsiderLeast() noexcept {
     Pair* least = nearest_.Least();
     for (; least != nullptr && IsCloser(*least) && !least->is_direct; least = nearest_.Least()) Direct(*least);
     if (least != nullptr && IsCloser(*least)) Consider(*least);
+    return least;
+  }
+
+  void FindClosest() noexcept {
+    const Pair* const least = ConsiderLeast();
     const ObstacleIndex* const index = obstacles_.index();
-    const bool has_all = nearest_.left_out() > closest_.clearance;
-    if (has_all)
+    if (nearest_.left_out() > closest_.clearance)
       for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
     else if (index == nullptr || !index->everywhere().empty())
       LookAgain();
-    if (index == nullptr) return;
-    ForEachNear(
-        *index, first_, units_, [&] { return closest_.clearance; },
-        [&](int t, int o, const Separation& by_hulls) {
-          if (by_hulls.IsProven() || !has_all || ByBox(t, o).IsProven()) ConsiderIfCloser(by_hulls, t, o);
-        });
+    if (index != nullptr && test_.placement_.has_expressions())
+      ForEachNear(
+          *index, first_, units_, [&] { return closest_.clearance; },
+          [&](int t, int o) {
+            Near pair{t, o, 0};
+            ConsiderNear(*index, pair);
+          });
   }
 
   // At those for which there was no room.
@@ -578,26 +859,34 @@ class SafetyTest::Judgement {
     for (int t = first_; t < units_; ++t) {
       unit_.Enter(t);
       unit_.EncloseHulls();
-      if (obstacles_.index() != nullptr)
-        for (const int o : obstacles_.index()->everywhere()) look(t, o);
-      else
-        for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) look(t, o);
+      if (const ObstacleIndex* const index = obstacles_.index()) {
+        for (std::size_t i = 0; i < index->everywhere().size(); ++i)
+          if (!IsFurther(i, WithTolerance(*index, closest_.clearance))) look(t, index->everywhere()[i]);
+        continue;
+      }
+      for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) look(t, o);
     }
   }
 
   const SafetyTest& test_;
   const ObstacleView& obstacles_;
   const int first_, units_;
+  const Tube& tube_;
+  const Schedule& schedule_;
   int touched_, touched_obstacle_ = -1;  // the first unit and obstacle that are not proven apart; units_: none
   PartSeparation touch_;                 // there
   Closest closest_;
   Nearest nearest_;
   Unit unit_;
-  std::array<Hull, HullTree::kMost> hulls_;   // of the units from the first on, with an index
-  std::array<Hull, HullTree::kMost> bodies_;  // around the whole body in these units, where has_body_
+  std::array<Hull, HullTree::kMost> hulls_;         // of the units from the first on, with an index
+  std::array<Hull, HullTree::kMost> bodies_;        // around the whole body in these units, if has_boxes
+  std::array<Hull, HullTree::kMost> tight_bodies_;  // likewise, where has_body_
   std::array<bool, HullTree::kMost> has_body_{};
-  HullTree tree_;  // over those of the units tree_from_ .. tree_to_ - 1
-  int tree_from_ = -1, tree_to_ = -1;
+  std::array<Placement::Pose, HullTree::kMost> poses_;  // at the samples; without boxes only the frame's hulls
+  std::array<double, 4096> bounds_;  // ClearanceOfAll, of the first that move or have no end; others are seen always
+  Outline outline_;
+  double farthest_ = kInfinity;  // of the closest pair
+  HullTree tree_;
 };
 
 Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,

@@ -95,7 +95,8 @@ Obstacle Shifted(const Obstacle& obstacle, const Eigen::VectorXd& by) {
     }
     return Obstacle::HalfSpace(points[0], obstacle.offset() + points[0].dot(by));
   };
-  return obstacle.motion() ? make().Moving(*obstacle.motion()) : make();
+  const Obstacle shifted = make().Named(obstacle.name());
+  return obstacle.motion() ? shifted.Moving(*obstacle.motion()) : shifted;
 }
 
 std::vector<Obstacle> Shifted(std::span<const Obstacle> obstacles, const std::vector<GivingWay>& ways) {

@@ -21,22 +21,21 @@ void HullTree::Build(std::span<const Hull> hulls, int dim) noexcept {
 int HullTree::Build(std::span<const Hull> hulls, int dim, int first, int count) noexcept {
   const int number = num_nodes_++;
   Node& node = nodes_[ToSize(number)];
-  node = {{}, {}, first, count, -1};
+  node.first = first;
+  node.count = count;
   if (count == 1) {
-    const Hull& hull = hulls[ToSize(first)];
-    for (std::size_t k = 0; k < ToSize(dim); ++k) {
-      node.lower[k] = hull.center[k] - hull.half_width[k];
-      node.upper[k] = hull.center[k] + hull.half_width[k];
-    }
+    const auto& [c, w] = hulls[ToSize(first)];
+    const Lanes center{c[0], dim > 1 ? c[1] : 0, dim > 2 ? c[2] : 0, 0},
+        half_width{w[0], dim > 1 ? w[1] : 0, dim > 2 ? w[2] : 0, 0};
+    StoreLanes(center - half_width, node.lower.data());
+    StoreLanes(center + half_width, node.upper.data());
     return number;
   }
   Build(hulls, dim, first, count / 2);
   node.second = Build(hulls, dim, first + count / 2, count - count / 2);
   const Node &a = nodes_[ToSize(number + 1)], &b = nodes_[ToSize(node.second)];
-  for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
-    node.lower[k] = std::min(a.lower[k], b.lower[k]);
-    node.upper[k] = std::max(a.upper[k], b.upper[k]);
-  }
+  StoreLanes(Min(LoadLanes(a.lower.data()), LoadLanes(b.lower.data())), node.lower.data());
+  StoreLanes(Max(LoadLanes(a.upper.data()), LoadLanes(b.upper.data())), node.upper.data());
   return number;
 }
 
@@ -68,7 +67,8 @@ void BoxTree::Build(std::span<const Bounds> boxes, std::int32_t first, std::int3
       middles.upper[k] = std::max(middles.upper[k], middle(box, k));
     }
   }
-  static_cast<Bounds&>(nodes_[place]) = all;
+  std::ranges::copy(all.lower, nodes_[place].lower.begin());
+  std::ranges::copy(all.upper, nodes_[place].upper.begin());
   if (count <= kLeaf) {
     nodes_[place].first = first;
     nodes_[place].count = count;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "forereach/numerics/directed.h"
+#include "forereach/numerics/lanes.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/separation.h"
 
@@ -24,9 +25,9 @@ class HullTree final {
   static constexpr int kMost = kMaxSteps + 1;
 
   struct Node {
-    std::array<double, kMaxSafetyDim> lower, upper;  // unused coordinates are 0
-    std::int32_t first, count;                       // hulls
-    std::int32_t second;                             // child; the first follows the node
+    std::array<double, kLaneCount> lower, upper;  // unused coordinates are 0
+    std::int32_t first, count;                    // hulls
+    std::int32_t second;                          // child; the first follows the node
   };
 
   /** Replaces the hulls, in plain arithmetic: BoxTree allows for its rounding. @pre 1 to kMost hulls. */
@@ -98,19 +99,18 @@ class BoxTree final {
   // Far above all rounding here and in SeparateHulls, relative to their operands.
   static constexpr double kHair = 0x1p-40;
 
-  struct Node : Bounds {
+  struct Node {
+    std::array<double, kLaneCount> lower{}, upper{};  // unused coordinates are 0
     std::int32_t first = 0;  // of a leaf its first place in order_; otherwise its second child; the first follows it
     std::int32_t count = 0;  // boxes of a leaf; otherwise 0
   };
 
   // What is not a number is no distance, nor is what is too small or too large for its square.
-  [[nodiscard]] static double SquareOfDistance(const HullTree::Node& a, const Node& b) noexcept {
-    double square = 0;
-    for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
-      const double below = b.lower[k] - a.upper[k], above = a.lower[k] - b.upper[k],
-                   gap = below > above ? below : above;
-      square += gap > 0 ? gap * gap : 0;
-    }
+  [[nodiscard]] FOREREACH_INLINE static double SquareOfDistance(const HullTree::Node& a, const Node& b) noexcept {
+    const Lanes below = LoadLanes(b.lower.data()) - LoadLanes(a.upper.data()),
+                above = LoadLanes(a.lower.data()) - LoadLanes(b.upper.data());
+    const Lanes gap = Max(Max(below, above), AllLanes(0));
+    const double square = Sum(gap * gap);
     return square > 0x1p-800 && square < kInfinity ? square : 0;
   }
   template <class Box>

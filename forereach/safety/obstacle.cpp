@@ -6,6 +6,7 @@
 #include <string>
 
 #include "forereach/numerics/require.h"
+#include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 
 namespace forereach {
@@ -43,7 +44,19 @@ double HullDistance(const std::vector<Eigen::Vector2d>& offsets) {
   return best;
 }
 
+bool IsLetter(char c) { return ('a' <= c && c <= 'z') || ('A' <= c && c <= 'Z'); }
+bool IsInNames(char c) {
+  return IsLetter(c) || ('0' <= c && c <= '9') || std::string_view("_-.:/").find(c) != std::string_view::npos;
+}
+
 }  // namespace
+
+std::string WhyNoName(std::string_view text) {
+  if (text.empty() || text.size() > kMaxObstacleName)
+    return "has " + std::to_string(text.size()) + " characters, must have 1 to " + std::to_string(kMaxObstacleName);
+  if (IsLetter(text.front()) && std::ranges::all_of(text, IsInNames)) return {};
+  return "must begin with a letter and have only letters, digits and _-.:/";
+}
 
 void Obstacle::SetHull(std::vector<Eigen::Vector3d> hull) {
   hull_ = std::move(hull);
@@ -123,6 +136,19 @@ Obstacle Obstacle::Moving(const ObstacleMotion& motion) const {
   Obstacle moving = *this;
   moving.motion_ = motion;
   return moving;
+}
+
+Obstacle Obstacle::Named(std::string_view name) const {
+  const std::string why = name.empty() ? std::string() : WhyNoName(name);
+  Require(why.empty(), "name: " + why);
+  Obstacle named = *this;
+  named.name_ = name;
+  return named;
+}
+
+std::string NameOf(std::span<const Obstacle> obstacles, int index) {
+  const bool is_named = 0 <= index && index < std::ssize(obstacles) && !obstacles[ToSize(index)].name().empty();
+  return is_named ? obstacles[ToSize(index)].name() : "obstacle " + std::to_string(index);
 }
 
 double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {

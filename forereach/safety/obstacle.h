@@ -6,6 +6,8 @@ An unsafe set is a core plus a ball. The core is the convex hull of points, or a
 
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "forereach/numerics/directed.h"
@@ -14,6 +16,13 @@ An unsafe set is a core plus a ball. The core is the convex hull of points, or a
 #include "forereach/sets/eigen.h"
 
 namespace forereach {
+
+/** Bytes of an obstacle's name: a message on the bus has room for it. */
+inline constexpr int kMaxObstacleName = 31;
+
+/** What keeps a text from being a name; empty if nothing does. A name begins with a letter; letters, digits and any of
+_-.:/ follow, all of them ASCII. So it cannot break a log line, a page or a terminal, nor pass for a sentence. */
+[[nodiscard]] std::string WhyNoName(std::string_view text);
 
 class Obstacle final {
  public:
@@ -33,12 +42,17 @@ class Obstacle final {
   /** This obstacle, moving: the points and the radius are those at the motion's stamp. A number that is not finite, a
   negative growth or an empty window throws, too. */
   [[nodiscard]] Obstacle Moving(const ObstacleMotion& motion) const;
+  /** This obstacle with a name for people, by which nothing is decided; empty: none. Several obstacles may have the
+  same name, as the pieces of one thing do. Throws if WhyNoName has a reason. */
+  [[nodiscard]] Obstacle Named(std::string_view name) const;
   ///@}
 
   [[nodiscard]] Kind kind() const { return kind_; }
   [[nodiscard]] int dim() const { return dim_; }
   /** Nothing if the obstacle stands. */
   [[nodiscard]] const std::optional<ObstacleMotion>& motion() const { return motion_; }
+  /** Empty if it has none. */
+  [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] double offset() const { return offset_; }
   /** The defining vectors: a circle's center, a box's lower and upper corner, a polygon's vertices in the given order,
@@ -61,9 +75,13 @@ class Obstacle final {
   double radius_ = 0, offset_ = 0;
   std::vector<Eigen::VectorXd> points_;
   std::optional<ObstacleMotion> motion_;
+  std::string name_;
   std::vector<Eigen::Vector3d> hull_;
   Eigen::Vector3d lower_ = Eigen::Vector3d::Constant(-kInfinity), upper_ = Eigen::Vector3d::Constant(kInfinity);
 };
+
+/** How a sentence calls an obstacle: by its name, or "obstacle 6" by its index. @param index may be that of none. */
+[[nodiscard]] std::string NameOf(std::span<const Obstacle> obstacles, int index);
 
 /** The distance in metres from a point y (p entries) to the obstacle, negative inside, in plain arithmetic. A motion is
 ignored. Use it for planning, simulation and display, not for bounds. */

@@ -185,6 +185,43 @@ void Placement::EncloseHull(const Sample& sample, Hull& hull) const noexcept {
   }
 }
 
+// |R(theta) q - R(c) q| <= |q| |theta - c|.
+Placement::Pose Placement::PoseOver(const Zonotope& slice, std::span<const double> half_width) const noexcept {
+  Pose pose;
+  EncloseHull(slice, half_width, pose.frame);
+  const Rotation rotation(heading_, slice, half_width);
+  pose.cosine = rotation.cosine;
+  pose.sine = rotation.sine;
+  pose.turn = rotation.half_width < kInfinity ? rotation.half_width : kInfinity;
+  return pose;
+}
+
+Hull Placement::EncloseBody(const Pose& pose) const noexcept {
+  std::array<double, kMaxSafetyDim> lower, upper;
+  lower.fill(kInfinity);
+  upper.fill(-kInfinity);
+  double size = 0;
+  for (const Part& part : parts_)
+    for (int i = part.first; i < part.first + part.count; ++i) {
+      const auto middle = Middle(pose, i);
+      const double around = Around(pose, i) + part.radius;
+      for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+        lower[k] = std::min(lower[k], middle[k] - around);
+        upper[k] = std::max(upper[k], middle[k] + around);
+      }
+      size = std::max(size, points_[ToSize(i)].size + around);
+    }
+  Hull hull{};
+  for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+    const auto& [center, half_width] = pose.frame;
+    const bool is_known = pose.turn < kInfinity && std::abs(center[k]) < kInfinity;
+    const double slack = RoundingError(kPlaceMargin, std::abs(center[k]) + half_width[k] + size) + kLeastNormal;
+    hull.center[k] = is_known ? 0.5 * (lower[k] + upper[k]) : 0;
+    hull.half_width[k] = is_known ? 0.5 * (upper[k] - lower[k]) + half_width[k] + slack : kInfinity;
+  }
+  return hull;
+}
+
 // A place without a finite second order is the box of the ranges; where a coordinate has none, there may be no place at
 // all, and it is everything. The margin of its slack is above the rounding of sums over the states and of sums over the
 // generators.

@@ -59,6 +59,27 @@ class Placement final {
   Box(X). Cost O(nonzeros of P). @pre no point stands at expressions. */
   void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
 
+  /** Where the body is over one slice, loosely: the box around its frame, and its heading up to `turn` radians. Point i
+  lies in Middle(pose, i) + [-w, w] + {|y| <= Around(pose, i)}, with w the frame's half-widths, up to rounding. */
+  struct Pose {
+    Hull frame;
+    double cosine, sine, turn;  ///< infinite where nothing is known
+  };
+  /** Cost O(nonzeros of P), a sine and a cosine. @pre no point stands at expressions. */
+  [[nodiscard]] Pose PoseOver(const Zonotope& slice, std::span<const double> half_width) const noexcept;
+  [[nodiscard]] std::array<double, kMaxSafetyDim> Middle(const Pose& pose, int i) const noexcept {
+    const Eigen::Vector3d& q = points_[ToSize(i)].place;
+    const auto& c = pose.frame.center;
+    return {c[0] + (pose.cosine * q[0] - pose.sine * q[1]),
+            dim() > 1 ? c[1] + (pose.sine * q[0] + pose.cosine * q[1]) : 0, dim() > 2 ? c[2] + q[2] : 0};
+  }
+  [[nodiscard]] double Around(const Pose& pose, int i) const noexcept {
+    const Point& point = points_[ToSize(i)];
+    return (point.length > 0 ? point.length * pose.turn : 0) + point.turn;
+  }
+  /** A hull that contains all of the body there. Cost O(points). */
+  [[nodiscard]] Hull EncloseBody(const Pose& pose) const noexcept;
+
   /** The linear map and what is left over of every g_i over one slice: what all bounds on places are made of. */
   struct Sample {
     struct Point {

@@ -24,6 +24,18 @@ TEST(ObstacleMessageTest, EveryKindGoesThroughTheBus) {
   EXPECT_EQ(ObstaclesDigest(back), ObstaclesDigest(obstacles));
 }
 
+TEST(ObstacleMessageTest, NamesGoThroughTheBusAndOthersAreRefused) {
+  const std::vector<Obstacle> named{kCircle.Named("oak_2"), kCircle, kCircle.Named(std::string(kMaxObstacleName, 'x'))};
+  obstacles_t message = *Decoded<obstacles_t>(Encode(ToMessage(named, kNow)));
+  for (std::size_t i = 0; i < named.size(); ++i) EXPECT_EQ(FromMessage(message, 2)[i].name(), named[i].name());
+  for (const char* bad : {"6", "a b", "a\x1b[2J", "<b>", "a\n", "\xff"}) {
+    SetText(message.obstacle[1].name, bad);
+    EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(message, 2); }), HasSubstr("obstacle 1: name: "));
+  }
+  std::ranges::fill(message.obstacle[1].name, 'x');  // without an end
+  EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(message, 2); }), HasSubstr("has 32 characters"));
+}
+
 TEST(ObstacleMessageTest, BoxesAndHalfSpacesExistInOneAndThreeDimensions) {
   for (const int dim : {1, 3}) {
     const std::vector<Obstacle> obstacles = {
@@ -167,10 +179,18 @@ TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
     refused("motion: growth ", [bad](auto& piece) { piece.growth = bad; });
     refused("motion: growth_rate", [bad](auto& piece) { piece.growth_rate = bad; });
   }
-  refused("stamped", [](auto& piece) { piece.utime = kNow + kFarthestStampUs + 1; });
-  refused("stamped", [](auto& piece) { piece.utime = kNow - kFarthestStampUs - 1; });
-  for (const std::int64_t stamp : {kMost, kLeast, std::int64_t{0}})
-    refused("stamped", [stamp](auto& piece) { piece.utime = stamp; });
+  const auto at = [](std::int64_t stamp) {
+    return [stamp](auto& piece) {
+      piece.utime = stamp;
+      piece.growth = 1;
+    };
+  };
+  for (const std::int64_t stamp :
+       {kNow + kFarthestStampUs + 1, kNow - kFarthestStampUs - 1, kMost, kLeast, std::int64_t{0}})
+    refused("stamped", at(stamp));
+  obstacle_t stands = Piece(0, kMost);
+  stands.utime = 0;
+  EXPECT_FALSE(Taken({stands})[0].motion()) << "the stamp of what stands says nothing";
   for (const std::int64_t away : {kFarthestStampUs, -kFarthestStampUs}) {
     obstacle_t piece = Piece(0, kMost);
     piece.utime += away;

@@ -4,6 +4,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
+#include "task/most_obstacles.h"
 #include "tests/certifier/small_task.h"
 
 namespace forereach::obstacle_sender_test {
@@ -50,7 +51,7 @@ TEST(ObstacleSenderTest, AClockThatWasSetBackDelaysNothing) {
 TEST(ObstacleSenderTest, RefusesMoreObstaclesThanFitAndAPeriodThatIsNotPositive) {
   ObstacleSender sender(1000);
   sender.Set(std::vector<Obstacle>(64, kOne[0]));
-  EXPECT_THROW(sender.Set(std::vector<Obstacle>(65, kOne[0])), std::invalid_argument);
+  EXPECT_THROW(sender.Set(std::vector<Obstacle>(kMostObstacles + 1, kOne[0])), std::invalid_argument);
   EXPECT_EQ(sender.Due(0)->num_obstacles, 64) << "those before stay";
   for (const std::int64_t period : {0, -1}) EXPECT_THROW(ObstacleSender{period}, std::invalid_argument);
 }
@@ -118,11 +119,12 @@ TEST(ObstacleSenderTest, SendableIsWhatReceiversTakeAtAllTimes) {
   EXPECT_NO_THROW(RequireSendable(config));
   config.obstacles = {Obstacle::AxisBox(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones())};
   EXPECT_THROW(RequireSendable(config), ConfigError);
-  config.obstacles.assign(kMaxObstacles + 1, kOne[0]);  // more than a message has room for
+  config.obstacles.assign(kMostObstacles + 1, kOne[0]);
   EXPECT_THROW(RequireSendable(config), ConfigError);
   config.obstacles.pop_back();
   EXPECT_NO_THROW(RequireSendable(config));
   ObstacleMotion far;
+  far.growth = 1;
   far.from_us = 2 * kFarthestStampUs;  // sent with a stamp that is a day older than its message
   config.obstacles = {kOne[0].Moving(far)};
   EXPECT_THROW(RequireSendable(config), ConfigError);

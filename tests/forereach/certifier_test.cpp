@@ -5,6 +5,7 @@
 #include "tests/test.h"
 
 #include "forereach/certify/explain.h"
+#include "forereach/certify/way_clear.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/oracle/random.h"
@@ -87,6 +88,47 @@ TEST(Certificate, NamesTheClosestObstacleAndStep) {
   // The sentence claims no more than is proven: enclosures round outwards, and so does the text.
   EXPECT_LT(d.margin - d.threshold, 2);
   EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("closest at step 2, 1.99999 m from obstacle 1"));
+}
+
+TEST(Certificate, CallsAnObstacleByItsName) {
+  Judge judge(PointMassInHalves());
+  for (const bool is_hit : {false, true}) {
+    const Obstacle oak = Obstacle::Circle(Vec({2, is_hit ? 1.0 : 3.0}), 1);
+    const std::vector<Obstacle> plain{oak}, named{oak.Named("oak_2")};
+    const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(4), named);
+    const Problem& problem = judge.certifier().problem();
+    EXPECT_THAT(Explain(d, problem, named), HasSubstr(is_hit ? "may touch oak_2 (by" : " m from oak_2"));
+    EXPECT_THAT(Explain(d, problem, plain), HasSubstr(is_hit ? "may touch obstacle 0 (by" : " m from obstacle 0"));
+    EXPECT_EQ(Explain(d, problem), Explain(d, problem, plain)) << "without obstacles there are only numbers";
+  }
+}
+
+TEST(ObstacleNames, CannotBreakALogLineAPageOrATerminal) {
+  const Obstacle any = Obstacle::Circle(Vec({0, 0}), 1);
+  const std::string longest(kMaxObstacleName, 'x');
+  for (const std::string& good : {std::string("a"), std::string("Oak-2"), std::string("row_3/tree:7.b"), longest}) {
+    EXPECT_EQ(WhyNoName(good), "");
+    EXPECT_EQ(any.Named(good).name(), good);
+  }
+  EXPECT_NE(WhyNoName(""), "");
+  EXPECT_EQ(any.Named("oak").Named("").name(), "") << "no name";
+  for (const std::string& bad :
+       {std::string("6"), std::string("_a"), std::string("a b"), std::string("a\nb"), std::string("a\x1b[2J"),
+        std::string("a\0b", 3), std::string("a<b>"), std::string("a&amp"), std::string("a\"b"), std::string("a'b"),
+        std::string("a\xc3\xb6"), std::string("a\x7f"), longest + "x"}) {
+    EXPECT_NE(WhyNoName(bad), "") << bad;
+    EXPECT_THROW((void)any.Named(bad), std::invalid_argument);
+  }
+}
+
+TEST(ObstacleNames, StayWithAnObstacleThatMovesOrIsShifted) {
+  const Obstacle oak = Obstacle::Circle(Vec({0, 0}), 1).Named("oak");
+  EXPECT_EQ(oak.Moving({}).name(), "oak");
+  EXPECT_EQ(Shifted(oak.Moving({}), Vec({1, 0})).name(), "oak");
+  const std::vector<Obstacle> all{oak, Obstacle::HalfSpace(Vec({1, 0}), 1)};
+  EXPECT_EQ(NameOf(all, 0), "oak");
+  EXPECT_EQ(NameOf(all, 1), "obstacle 1");
+  for (const int none : {-1, 2, 32767}) EXPECT_EQ(NameOf(all, none), "obstacle " + std::to_string(none));
 }
 
 TEST(Certificate, WithoutObstaclesHasNoMargin) {
@@ -230,7 +272,7 @@ TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
   EXPECT_EQ(d.cause, Cause::kNoFiniteEnclosure);
   EXPECT_EQ(d.step, 1) << "v is positive at first";
   EXPECT_THAT(
-      Explain(d, *shared, plan, tube),
+      Explain(d, *shared, {}, plan, tube),
       testing::MatchesRegex("abstain D: at step 1 the next v has no finite enclosure: abs at line 1, column 10 of "
                             "the model has a kink or a pole there; its argument, a function of v, may be "
                             "anywhere in .-0[.][0-9]*, 0[.][0-9]*."));
@@ -238,7 +280,7 @@ TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
 
   const Decision good =
       certifier.Certify({controls.data(), 1, 1, 1, {}}, Zonotope::FromBox(Vec({0, 0, 5}), Vec({0, 0, 1})), {}, tube);
-  EXPECT_EQ(Explain(good, *shared, plan, tube), Explain(good, *shared));
+  EXPECT_EQ(Explain(good, *shared, {}, plan, tube), Explain(good, *shared));
 }
 
 // A brake that ends at +-0.25 m/s, with the widths and the last bit of the residual around it.

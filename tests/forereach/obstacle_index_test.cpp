@@ -148,6 +148,37 @@ TEST(ObstacleIndex, ChangesNoDecisionInRandomWorlds) {
   EXPECT_GT(touched, 100);
 }
 
+// Cells beside the tube, as many as leave it free, or moving obstacles only: what is left out first is not what counts.
+TEST(ObstacleIndex, ChangesNoDecisionAmongManyThatAreNearOrMove) {
+  TracedRandom random(3);
+  int certified = 0, moving = 0;
+  while (certified + moving < 60) {
+    const auto problem = AnyWorld(random, random.Coin());
+    Query query = AnyDrive(random, *problem);
+    const Certifier certifier(problem);
+    Tube tube;
+    if (certifier.Certify(query.plan(), query.initial_set, {}, tube).outcome != Outcome::kCertified) continue;
+    const int p = certifier.projection().dim();
+    const bool moves = random.Coin();
+    const double spread = random.Coin() ? 6 : 20, room = random.Coin() ? 0 : 0.2;
+    std::vector<Obstacle> all;
+    for (int i = 0; i < 500; ++i) {
+      const Eigen::VectorXd corner = (random.Vector(p, spread) * 4).array().floor() / 4;
+      Obstacle cell = Obstacle::AxisBox(corner, corner.array() + 0.25);
+      if (moves) cell = cell.Moving(AnyMotion(random, p, query.schedule, tube.length()));
+      const Decision alone = certifier.JudgeSafety(query.plan(), {&cell, 1}, tube);
+      if (alone.outcome == Outcome::kCertified && !(alone.margin - alone.threshold < room)) all.push_back(cell);
+    }
+    const ObstacleIndex index(all);
+    const Decision plain = certifier.JudgeSafety(query.plan(), all, tube);
+    EXPECT_EQ(plain.outcome, Outcome::kCertified);
+    ExpectSame(certifier.JudgeSafety(query.plan(), {all, index}, tube), plain);
+    (moves ? moving : certified) += 1;
+  }
+  EXPECT_GT(certified, 10);
+  EXPECT_GT(moving, 10);
+}
+
 // Many obstacles are as close as the closest: the first of them is named, with an index and without.
 TEST(ObstacleIndex, NamesTheFirstOfThoseAsClose) {
   const Certifier certifier(std::make_shared<Problem>(PointMassInHalves()));

@@ -217,6 +217,42 @@ TEST_F(CertifierObstaclesTest, ARestartedCertifierCertifiesNothingBeforeItHearsO
   EXPECT_EQ(certifier->Terminate(), 0) << certifier->error();
 }
 
+// 4,096 in 64 messages, by the programs: the certifier knows them all, names the one that it may touch, and one that
+// starts late gets them, too.
+TEST_F(CertifierObstaclesTest, AsManyObstaclesAsATaskTakesAreHeardAndStayKnown) {
+  std::string world = Read(world_), cells;
+  for (int i = 0; i < 4095; ++i)
+    cells += fmt::format("    - {{name: cell_{0}, box: {{lower: [{1}, 90], upper: [{1}.5, 90.5]}}}}\n", i, i % 64);
+  const std::string circle = "    - circle: {center: [0, 2], radius: 0.8}\n";
+  world.replace(world.find(circle), circle.size(), cells + circle + "      name: the_last\n");
+  scratch_.Write("world.yaml", world);
+  const auto perception = StartPerception();
+  std::unique_ptr<ChildProcess> certifier;
+  std::int64_t instance = 0;
+  for (int start = 0; start < 2; ++start) {
+    if (certifier) {
+      certifier->Signal(SIGKILL);
+      ASSERT_TRUE(certifier->WaitForEnd(kPatience));
+    }
+    certifier = StartCertifier();
+    certifier_status_t last{};
+    ASSERT_TRUE(probe_.WaitUntil([&] {
+      const auto all = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
+      if (!all.empty()) last = all.back();
+      return last.instance != instance && last.obstacles_known == 1;
+    }));
+    EXPECT_EQ(last.obstacles_in_force, 4096);
+    instance = last.instance;
+    const decision_t decision = Ask();
+    EXPECT_EQ(decision.obstacle, 4095);
+    EXPECT_THAT(GetText(decision.message), testing::HasSubstr(" may touch the_last (by "));
+  }
+  EXPECT_TRUE(probe_.heard("PLAN_CERTIFIED").empty());
+  EXPECT_EQ(perception->Terminate(), 0) << perception->error();
+  EXPECT_EQ(AskUntilNot(decision_t::CAUSE_OBSTACLE), decision_t::CAUSE_NO_OBSTACLES) << "silence";
+  EXPECT_EQ(certifier->Terminate(), 0) << certifier->error();
+}
+
 TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
   const auto perception = StartPerception();
   auto first = StartCertifier();

@@ -7,6 +7,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/obstacle_sender.h"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
@@ -63,6 +64,21 @@ class TimelineTest : public testing::Test {
       EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_), "");
     }
     Append(config_.bus.obstacles, message);
+  }
+
+  // Seventy obstacles, in two parts; of these so many are sent.
+  void SetParts(double x) {
+    std::vector<Obstacle> all;
+    for (int i = 0; i < 70; ++i) all.push_back(Obstacle::Circle(Eigen::Vector2d(x + i % 2, i < 64 ? 90 : x), 1));
+    parts_.Set(all);
+  }
+  void SendParts(int count) {
+    for (; count > 0; --count) {
+      obstacles_t message = *parts_.Due(now_ += 1000);
+      message.sequence = obstacles_++;
+      EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_), "");
+      Append(config_.bus.obstacles, message);
+    }
   }
 
   // One of the task's own transitions is seen again.
@@ -171,6 +187,7 @@ class TimelineTest : public testing::Test {
   ScratchDirectory scratch_;
   const Config config_;
   std::unique_ptr<Gate> gate_;
+  ObstacleSender parts_{1000};
   std::vector<std::string> logs_;
   std::unique_ptr<EventLogWriter> writer_;
   candidate_plan_t candidate_{};
@@ -221,6 +238,32 @@ TEST_F(TimelineTest, ReconstructsGroundsAcrossFilesRestartsAndReloads) {
   NextFile();
   Certify();
   Reload(1, 2);
+  Certify();
+  ExpectAllAgree();
+}
+
+// By the parts of a set, too: where it changes, where it is complete, and where it never is.
+TEST_F(TimelineTest, ReconstructsSetsOfObstaclesInParts) {
+  Restart();
+  SetParts(80);
+  SendParts(1);
+  Certify();
+  SendParts(1);
+  Certify();
+  SetParts(60);
+  SendParts(1);
+  Certify();
+  NextFile();
+  SendParts(1);
+  Certify();
+  SetParts(70);
+  SendParts(1);
+  Reload(1, 2);
+  Certify();
+  SendParts(4);
+  Certify();
+  Obstacles(80);
+  SendParts(1);
   Certify();
   ExpectAllAgree();
 }

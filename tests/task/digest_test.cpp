@@ -134,6 +134,12 @@ TEST(ObstaclesDigest, TellsObstaclesApart) {
   const std::vector<std::vector<Obstacle>> different{{},
                                                      {circle},
                                                      {circle, circle},
+                                                     {circle.Named("oak")},
+                                                     {circle.Named("oak_2")},
+                                                     {circle.Named("oak"), circle},
+                                                     {circle, circle.Named("oak")},
+                                                     {circle.Named("oak").Moving({})},
+                                                     {circle.Moving({})},
                                                      {circle, box},
                                                      {box, circle},
                                                      {Obstacle::Circle(Vector2d(1, 2), 1)},
@@ -156,6 +162,8 @@ TEST(ObstaclesDigest, DoesNotDependOnHowTheyAreWritten) {
     return files.Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]", list)).grounds.obstacles;
   };
   EXPECT_EQ(with("\n    - circle:\n        radius: 8e-1\n        center: [3.0, +2]"), digest);
+  EXPECT_EQ(with("[{name: oak_2, circle: {center: [3, 2], radius: 0.8}}]"),
+            ObstaclesDigest({Obstacle::Circle(Vector2d(3, 2), 0.8).Named("oak_2")}));
 }
 
 // The byte string is a contract with every recorded log: a change of it makes them all disagree.

@@ -551,6 +551,12 @@ TEST_F(ErrorTest, AnImpossibleObstacleIsAnError) {
   for (int i = 1; i < 4096; ++i) many += ", {circle: {center: [3, 2], radius: 0.8}}";
   EXPECT_EQ(with(many), "");
   many += ", {circle: {center: [3, 2], radius: 0.8}}";
+  for (const std::string name : {"3rd", "oak 2", "\"a<b>\"", "oooooooooooooooooooooooooooooooo"})
+    EXPECT_THAT(with("{name: " + name + ", circle: {center: [1, 1], radius: 1}}"),
+                StartsWith("task.yaml:18: task.obstacles[0].name: "));
+  EXPECT_EQ(
+      with("{name: oak}"),
+      "task.yaml:18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
   EXPECT_EQ(with(many), "task.yaml:18: task.obstacles: has 4097 entries, which is outside [0, 4096]");
 }
 

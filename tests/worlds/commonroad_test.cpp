@@ -91,6 +91,8 @@ TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {
   EXPECT_TRUE(Contains(world, At(10, 7)) && Contains(world, At(9.0000001, 3.0000001)));
   EXPECT_FALSE(Contains(world, At(12, 5)) || Contains(world, At(10, 7.0001)));
   EXPECT_EQ(world.pieces[0].name, "staticObstacle 3");
+  EXPECT_EQ(world.pieces[0].obstacle.name(), "staticObstacle_3");
+  EXPECT_THAT(ObstaclesText(world, "any"), HasSubstr("  # staticObstacle 3\n      name: staticObstacle_3\n"));
 }
 
 TEST_F(CommonRoadTest, IntervalsOfAStateAreCovered) {

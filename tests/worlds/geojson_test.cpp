@@ -34,6 +34,10 @@ TEST_F(GeoJsonTest, AnAreaToKeepOutOfIsExact) {
   EXPECT_TRUE(Contains(world, At(1, 1)) && Contains(world, At(7, 7)) && Contains(world, At(8, 8)));
   EXPECT_FALSE(Contains(world, At(1, 3)) || Contains(world, At(6.8, 1.1)) || Contains(world, At(8.0000000001, 7)));
   EXPECT_EQ(world.pieces.front().name, "features[0].geometry");
+  const World by_id =
+      Drawing(std::string(R"({"type": "Feature", "id": 42, "properties": {}, "geometry": )") + kArea + "}");
+  EXPECT_EQ(by_id.pieces.front().obstacle.name(), "feature_42");
+  EXPECT_EQ(Drawing(Feature(kArea, R"({"name": "big oak <3>"})")).pieces.front().obstacle.name(), "big_oak__3_");
 }
 
 TEST_F(GeoJsonTest, OutsideOfAnAreaToStayInIsOccupied) {

@@ -156,6 +156,7 @@ TEST(World, CutsLongHullsExactly) {
   for (int i = 0; i < 50; ++i) points.push_back({1.0 * i, i * i / 8.0});
   World world;
   world.Add("arc", points);
+  EXPECT_EQ(world.pieces.back().obstacle.name(), "arc");
   EXPECT_EQ(world.pieces.size(), 4u);
   Rational sum = 0;
   for (const World::Piece& piece : world.pieces) sum += TwiceArea(CornersOf(piece.obstacle));
