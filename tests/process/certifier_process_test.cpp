@@ -3,6 +3,8 @@
 
 #include <sched.h>
 
+#include <fmt/format.h>
+
 #include "tests/test.h"
 
 #include "certifier/gate/obstacle_message.h"
