@@ -3,6 +3,7 @@
 #include <ctime>
 #include <iterator>
 #include <memory>
+#include <utility>
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -33,26 +34,35 @@ spdlog::level::level_enum LevelOf(logging::Level level) {
   return spdlog::level::err;
 }
 
-}  // namespace
-
-void SetUpLog(const std::string& name) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+std::shared_ptr<spdlog::logger> MakeLog(const std::string& name) {
   auto formatter = std::make_unique<spdlog::pattern_formatter>();
   formatter->add_flag<PrintableMessage>('*').set_pattern("%H:%M:%S.%e %n %^%l%$: %*");
-  spdlog::set_formatter(std::move(formatter));
+  auto log = std::make_shared<spdlog::logger>(name, std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+  log->set_formatter(std::move(formatter));
+  return log;
 }
+
+// Not spdlog's own: that is the user's, in whose program a client is.
+std::shared_ptr<spdlog::logger>& Log() {
+  static std::shared_ptr<spdlog::logger> log = MakeLog("forereach");
+  return log;
+}
+
+}  // namespace
+
+void SetUpLog(const std::string& name) { Log() = MakeLog(name); }
 
 namespace logging {
 
-void Silence() { spdlog::set_level(spdlog::level::off); }
+void Silence() { Log()->set_level(spdlog::level::off); }
 
-void Flush() { spdlog::default_logger()->flush(); }
+void Flush() { Log()->flush(); }
 
 void Write(Level level, fmt::string_view format, fmt::format_args values) {
-  if (!spdlog::should_log(LevelOf(level))) return;
+  if (!Log()->should_log(LevelOf(level))) return;
   fmt::memory_buffer line;
   fmt::vformat_to(std::back_inserter(line), format, values);
-  spdlog::log(LevelOf(level), spdlog::string_view_t(line.data(), line.size()));
+  Log()->log(LevelOf(level), spdlog::string_view_t(line.data(), line.size()));
 }
 
 }  // namespace logging

@@ -8,8 +8,8 @@
 
 namespace forereach {
 
-/** Starts the log under this name. Control characters in a line are escaped, because a line may contain text from the
-network. */
+/** Gives the log this name, before any line is written; otherwise it is "forereach". Control characters in a line are
+escaped, because a line may contain text from the network. */
 void SetUpLog(const std::string& name);
 
 namespace logging {

@@ -4,7 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "bus/log.h"
 #include "bus/process.h"
 
 namespace forereach {
@@ -20,7 +19,6 @@ int RunCommands(std::vector<Command> commands, int argc, char** argv) {
       .commands = std::move(commands),
       .chosen = &chosen};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
-  SetUpLog("forereach");
   return Guarded("forereach", std::ranges::find(program.commands, chosen, &Command::name)->run);
 }
 

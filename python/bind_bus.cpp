@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <iterator>
+
 #include <pybind11/stl.h>
 
 #include "certifier/gate/repair.h"
@@ -50,6 +53,22 @@ class PlannerBus final {
       all.append(py::dict("plan_id"_a = withdrawal.plan_id, "valid_steps"_a = withdrawal.valid_steps,
                           "cause"_a = std::string(WithdrawalName(withdrawal.cause)), "utime"_a = withdrawal.utime,
                           "message"_a = GetText(withdrawal.message)));
+    return all;
+  }
+
+  py::list Advice(double timeout) {
+    using namespace py::literals;
+    py::list all;
+    for (const advice_t& advice : client_.Advice(timeout)) {
+      py::list changes;
+      const int count = std::clamp<int>(advice.num_changes, 0, static_cast<int>(std::size(advice.change)));
+      for (const advice_change_t& change : std::span(advice.change, static_cast<std::size_t>(count)))
+        changes.append(py::dict("kind"_a = std::string(AdviceName(change.kind)), "step"_a = IndexOrNone(change.step),
+                                "index"_a = change.index, "value"_a = change.value, "clearance"_a = change.clearance,
+                                "verified"_a = change.verified != 0,
+                                "direction"_a = ArrayOf({change.direction, change.direction + 3}, {3})));
+      all.append(py::dict("plan_id"_a = advice.plan_id, "changes"_a = changes));
+    }
     return all;
   }
 
@@ -122,6 +141,12 @@ One decision comes: on the first that is certified, otherwise on the first of th
            R"(What the certifier withdrew of this source's plans since the last call. Waits up to `timeout` s for one.
 
 valid_steps: the controls before it stand. It is repeated until the robot has answered.)")
+      .def(
+          "advice", &PlannerBus::Advice, py::arg("timeout") = 0.0,
+          R"(With gate.advice: how refused plans of this source would have to give way, since the last call. Waits up to `timeout` s.
+
+changes: by the step at which each is needed; kind, step, index, value, clearance, direction as in advice_change_t of
+docs/bus.md.)")
       .def("repairs", &PlannerBus::Repairs, py::arg("timeout") = 0.0,
            R"(The plans that the certifier found near refused ones since the last call. Waits up to `timeout` s for one.
 

@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <typeinfo>
 
-#include "bus/log.h"
 #include "lcmtypes/bad_input.h"
 #include "python/bindings.h"
 
@@ -32,7 +31,6 @@ void TranslateErrors(py::module_& module) {
 
 PYBIND11_MODULE(_forereach, module) {
   module.doc() = "ForeReach: certifies planned control sequences before a robot executes them.";
-  SetUpLog("forereach");
   TranslateErrors(module);
   BindTask(module);
   BindLog(module);

@@ -9,6 +9,7 @@
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/course.h"
+#include "tests/records/logs.h"
 #include "tests/tries.h"
 
 namespace forereach::page_test {
@@ -318,11 +319,34 @@ TEST(WriteTest, TextsOfARunCannotOpenATag) {
   const std::string plain = PageHtml(run);
   const auto tags = [](const std::string& html) { return std::ranges::count(html, '<'); };
   for (DecisionRow& row : run.decisions) row.source = row.cause = "</script><!--<b>";
-  run.name = run.notes.emplace_back("<script>");
+  run.name = run.shadow = run.notes.emplace_back("<script>");
   run.faults.push_back({1, 1, "<i>", "<i>"});
   const std::string html = PageHtml(run);
   EXPECT_EQ(tags(html), tags(plain));
   EXPECT_THAT(html, Not(HasSubstr("</script><!--")));
+}
+
+// The course once more, as if its gate had been a shadow, and the robot had driven the same plans without it.
+TEST(GatherTest, APageOfAShadowSaysSoAndWhatHappened) {
+  const ScratchDirectory directory;
+  const std::string log = directory / "shadow.lcmlog";
+  CopyLog(kLog, log, [](LogEvent& event) {
+    if (auto decision = Decoded<decision_t>(event.data); decision && decision->outcome == decision_t::CERTIFIED) {
+      decision->outcome = decision_t::REJECTED;
+      decision->cause = decision_t::CAUSE_SHADOW;
+      event.data = Encode(*decision);
+    }
+    return event.channel != "PLAN_CERTIFIED";
+  });
+  const std::string shadow = GatherPage({log}, kTask, {}, {0, 0, 0}).shadow;
+  EXPECT_THAT(shadow, testing::StartsWith("Shadow mode: the gate certified nothing, and the robot did not obey it. It "
+                                          "would have certified " +
+                                          std::to_string(kCourseCertified) + " plans"));
+  EXPECT_THAT(shadow, testing::ContainsRegex("the robot drove [1-9][0-9]*, left a slice of 0 and had 0 contacts"));
+  EXPECT_EQ(GatherPage({kLog}, kTask, {}, {0, 0, 0}).shadow, "");
+  const Output printed = Forereach("report '" + log + "' --config '" + kTask + "'");
+  EXPECT_THAT(printed.text, testing::StartsWith("SHADOW"));
+  EXPECT_THAT(printed.text, testing::ContainsRegex("driven [1-9][0-9]*: 0 left a slice \\(0 of [1-9][0-9]* states\\)"));
 }
 
 TEST(WriteTest, ALogNamedLikeAKeyIsWritten) {

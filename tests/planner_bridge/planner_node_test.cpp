@@ -536,7 +536,7 @@ TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
   config_.planner.candidates = 1;
   Start(config_);
   const auto lose = [&](int rounds) {
-    testing::internal::CaptureStdout();  // the log's, where it is not set up
+    testing::internal::CaptureStderr();
     for (int i = 0; i < rounds; ++i) {
       now_ += kPeriod;
       Tell(Standing());
@@ -544,7 +544,7 @@ TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
       Run(3);
     }
     logging::Flush();
-    return testing::internal::GetCapturedStdout();
+    return testing::internal::GetCapturedStderr();
   };
   EXPECT_THAT(lose(PlannerNode::kLostRounds - 1), Not(HasSubstr("without a certificate")));
   EXPECT_THAT(lose(1),

@@ -171,7 +171,7 @@ class Ends(BusTest):
         self.assertGreater(plans[0], plan)
         answer = buses[0].decisions(timeout=60)
         self.assertEqual([(each["plan_id"], each["outcome"]) for each in answer], [(plans[0], "rejected")])
-        self.assertEqual((buses[1].decisions(), buses[1].withdrawals()), ([], []))
+        self.assertEqual((buses[1].decisions(), buses[1].withdrawals(), buses[1].advice()), ([], [], []))
 
     def test_of_a_planner_get_a_plan_near_a_refused_one_which_is_certified(self):
         self.start_certifier()
@@ -200,6 +200,29 @@ class Ends(BusTest):
         self.assertTrue(0 < repair["nearness"] < 0.75)
         self.assertTrue(soon(lambda: decide(repair["U"], False))["certified"])
         self.assertEqual(bus.repairs(), [])
+
+    def test_of_a_planner_hear_how_a_refused_plan_would_have_to_give_way(self):
+        path = self.scratch / "rover.yaml"
+        path.write_text(Path(TASK).read_text().replace("gate: {", "gate: {advice: send, "))
+        (self.scratch / "rover.csv").write_text(Path("examples/python/rover.csv").read_text())
+        self.start_certifier(str(path))
+        self.start(sys.executable, "-B", "-c", Path("examples/python/own_robot.py").read_text().replace(
+            'Path(__file__).parent / "rover.yaml"', repr(str(path))), URL, self.keys)
+        task = fr.Task.load(str(path))
+        bus = fr.Bus(task, key=self.keys, url=URL)
+        push = 3 * np.array([0.9, 0.5]) / np.hypot(0.9, 0.5)
+        U = np.concatenate([np.tile(push, (10, 1)), np.tile(-push, (10, 1))])  # ends at the first obstacle
+        for _ in range(400):
+            state = bus.robot_state(timeout=30)
+            plan = bus.propose(U, (state["state"], np.array([0.02, 0.02, 0.01, 0.01])), state["utime"] + 300_000, 10)
+            if any(each["outcome"] == "abstain_safety" for each in bus.decisions(timeout=5)):
+                break
+        advice = bus.advice(timeout=10)[0]
+        self.assertEqual(advice["plan_id"], plan)
+        change = advice["changes"][0]
+        self.assertEqual((change["kind"], change["index"]), ("obstacle", 0))
+        self.assertGreater(change["value"], 0)
+        self.assertAlmostEqual(float(np.linalg.norm(change["direction"])), 1)
 
     def test_take_the_keys_of_their_role_alone(self):
         task = fr.Task.load(TASK)

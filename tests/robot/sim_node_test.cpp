@@ -465,10 +465,10 @@ TEST(RobotSim, SaysOnceAndWithTheKeyThatManyPlansAreRefusedAtTheirStart) {
   const Config config = PointMassTask();
   RunningRig rig(config);
   const auto said = [&](int first, int last) {
-    testing::internal::CaptureStdout();  // the log's, where it is not set up
+    testing::internal::CaptureStderr();
     for (int k = first; k <= last; ++k) rig.Send(Plan(config, k, k, {5, 0, 0, 0})), rig.RunTo(k);
     logging::Flush();
-    return testing::internal::GetCapturedStdout();
+    return testing::internal::GetCapturedStderr();
   };
   EXPECT_THAT(said(1, 9), Not(HasSubstr("refused at their start"))) << "a few may be";
   EXPECT_THAT(said(10, 10), AllOf(HasSubstr("10 plans were refused at their start and 0 began"),
@@ -479,7 +479,7 @@ TEST(RobotSim, SaysOnceAndWithTheKeyThatManyPlansAreRefusedAtTheirStart) {
 TEST(RobotSim, AFewRefusedStartsAmongManyAreNoNews) {
   const Config config = PointMassTask();
   RunningRig rig(config);
-  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
   for (int k = 1; k <= 60; ++k) {
     std::vector<double> z = rig.StateAt(k - 1), next = z;
     z.insert(z.end(), {1.0, 0.0});
@@ -489,7 +489,7 @@ TEST(RobotSim, AFewRefusedStartsAmongManyAreNoNews) {
     rig.RunTo(k);
   }
   logging::Flush();
-  EXPECT_THAT(testing::internal::GetCapturedStdout(), Not(HasSubstr("refused at their start")));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), Not(HasSubstr("refused at their start")));
   EXPECT_EQ(rig.Summary()["plans_refused"]["outside_initial_set"], 12);
   EXPECT_EQ(rig.Summary()["plans_started"], 48);
 }
