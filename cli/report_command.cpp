@@ -61,10 +61,10 @@ void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr
     }
 }
 
-PageRun GatherRuns(const ReportArguments& options) {
+// @param bounds of the drawings; without any, there is no advice either.
+PageRun GatherRuns(const ReportArguments& options, const std::vector<std::string>& inputs, const DetailBounds& bounds) {
   const ReportOptions& report = options.report;
-  const DetailBounds bounds;
-  NamedRuns named = RunsNamedBy(report.logs, options.jobs);
+  NamedRuns named = RunsNamedBy(inputs, options.jobs);
   const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
   std::vector<std::unique_ptr<PageRead>> of_named(named.runs.size()), passes;
   std::atomic<std::size_t> cases = 0;
@@ -75,7 +75,7 @@ PageRun GatherRuns(const ReportArguments& options) {
     if ((cases += read->pass.cases.entries().size()) > kMostCases) read.reset();  // read again if it is drawn
     return of_run;
   });
-  PageRun page = EmptyPage(report.logs);
+  PageRun page = EmptyPage(inputs);
   NamedRuns read{{}, {}, named.is_many};
   for (std::size_t k = 0; k < rows.size(); ++k) {
     if (!rows[k]) continue;
@@ -85,6 +85,7 @@ PageRun GatherRuns(const ReportArguments& options) {
   }
   AddMissing(page, named);
   std::size_t bytes = bounds.bytes;
+  if (bytes == 0) return page;
   const auto chosen = ChooseDetails(page, bounds), advised = ChooseAdvised(page, kMostAdvised);
   const RunLogs* const first = read.runs.data();
   auto drawn = ForEachRun<PageRun>(read, options.jobs, "drawn", [&](const RunLogs& run, RunWork& work) {
@@ -106,9 +107,9 @@ PageRun GatherRuns(const ReportArguments& options) {
 int WritePage(const ReportArguments& options) {
   RequireNewFile(options.out, options.force);  // before the logs are read
   const ReportOptions& report = options.report;
-  const PageRun run = GatherRuns(options);
+  const PageRun run = GatherRuns(options, report.logs, {});
   std::optional<PageRun> before;
-  if (!options.before.empty()) before = GatherPage({options.before}, report.config, report.key, {0, 0, 0});
+  if (!options.before.empty()) before = GatherRuns(options, {options.before}, {0, 0, 0});
   WriteNewFile(options.out, PageHtml(run, before ? &*before : nullptr), options.force);
   std::cout << options.out << ": " << run.decisions.size() << " decisions, " << run.details.size()
             << " with their tube or why there is none";

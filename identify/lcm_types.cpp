@@ -319,7 +319,9 @@ std::optional<std::vector<double>> LcmTypes::Read(const std::string& type, const
     for (std::size_t begin = 0; begin <= place.size();) {
       const std::size_t end = std::min(place.find('.', begin), place.size());
       member_name = place.substr(begin, std::min(place.find('[', begin), end) - begin);
-      const std::vector<Member>& members = structs_.at(user).members;
+      const auto known = structs_.find(user);
+      if (known == structs_.end()) throw ConfigError(fmt::format("type {} is not defined", user));
+      const std::vector<Member>& members = known->second.members;
       const auto member = std::ranges::find(members, member_name, &Member::name);
       const bool is_last = end == place.size();
       if (member == members.end() || member->type == "string" || is_last != (PrimitiveOf(member->type) != nullptr))

@@ -1,7 +1,6 @@
 #include "identify/log_table.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -16,6 +15,7 @@
 #include "forereach/numerics/text.h"
 #include "identify/wanted_column.h"
 #include "task/config_error.h"
+#include "task/date.h"
 #include "task/line_reader.h"
 #include "task/number.h"
 
@@ -37,66 +37,6 @@ Parsed<double> ParseLogged(std::string_view field) {
   while (first + zeros + 1 < digits.size() && digits[first + zeros] == '0' && IsDigit(digits[first + zeros + 1]))
     ++zeros;
   return ParseNumber(digits.erase(first, zeros));
-}
-
-// Two or more digits at the front, taken off the text; -1 if there are none.
-int TakeDigits(std::string_view& text, std::size_t count) {
-  int value = 0;
-  if (text.size() < count) return -1;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!IsDigit(text[i])) return -1;
-    value = 10 * value + (text[i] - '0');
-  }
-  text.remove_prefix(count);
-  return value;
-}
-
-bool Take(std::string_view& text, char c) {
-  if (!text.starts_with(c)) return false;
-  text.remove_prefix(1);
-  return true;
-}
-
-// The seconds east of UTC of "Z", "+01:00", "-0130" or nothing.
-std::optional<int> ZoneOf(std::string_view text) {
-  if (text.empty() || text == "Z" || text == "z") return 0;
-  const int sign = text[0] == '-' ? -1 : 1;
-  if (!Take(text, '+') && !Take(text, '-')) return std::nullopt;
-  const int hours = TakeDigits(text, 2);
-  static_cast<void>(Take(text, ':'));
-  const int minutes = text.empty() ? 0 : TakeDigits(text, 2);
-  if (hours < 0 || hours > 23 || minutes < 0 || minutes > 59 || !text.empty()) return std::nullopt;
-  return sign * (3600 * hours + 60 * minutes);
-}
-
-// The seconds since 1970 of a date with a time, NaN if it is none.
-double SecondsOfDate(std::string_view text) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  const int year = TakeDigits(text, 4);
-  if (year < 0 || !Take(text, '-')) return kNone;
-  const int month = TakeDigits(text, 2);
-  if (month < 0 || !Take(text, '-')) return kNone;
-  const int day = TakeDigits(text, 2);
-  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-                                         std::chrono::day(static_cast<unsigned>(day))};
-  if (day < 0 || !date.ok() || !(Take(text, 'T') || Take(text, 't') || Take(text, ' '))) return kNone;
-  const int hour = TakeDigits(text, 2);
-  if (hour < 0 || hour > 23 || !Take(text, ':')) return kNone;
-  const int minute = TakeDigits(text, 2);
-  if (minute < 0 || minute > 59 || !Take(text, ':')) return kNone;
-  const int second = TakeDigits(text, 2);
-  if (second < 0 || second > 60) return kNone;
-  double fraction = 0;
-  if (Take(text, '.') || Take(text, ',')) {
-    const std::size_t digits = std::min(text.find_first_not_of("0123456789"), text.size());
-    if (digits == 0) return kNone;
-    fraction = ParseNumber("0." + std::string(text.substr(0, digits))).value;
-    text.remove_prefix(digits);
-  }
-  const std::optional<int> zone = ZoneOf(text);
-  if (!zone) return kNone;
-  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-  return static_cast<double>(days * 86'400LL + hour * 3600 + minute * 60 + second - *zone) + fraction;
 }
 
 bool IsNumber(std::string_view field) { return ParseLogged(field).problem.empty(); }
@@ -281,7 +221,7 @@ class Reader {
   }
 
   [[nodiscard]] bool IsValue(const std::string& field) const {
-    return IsNumber(field) || (format_.decimal_comma && HasDecimalComma(field)) || !std::isnan(SecondsOfDate(field));
+    return IsNumber(field) || (format_.decimal_comma && HasDecimalComma(field)) || SecondsOfDate(field).has_value();
   }
 
   // A number or a date; NaN for anything else.
@@ -290,9 +230,10 @@ class Reader {
       if (const std::size_t at = field.find(','); at != std::string::npos) field[at] = '.';
     const auto [value, problem] = ParseLogged(field);
     if (problem.empty()) return value;
-    const double seconds = SecondsOfDate(field);
-    if (!std::isnan(seconds)) table_.dates.Add(first_line_, field.substr(0, kShown));
-    return seconds;
+    const auto seconds = SecondsOfDate(field);
+    if (!seconds) return std::numeric_limits<double>::quiet_NaN();
+    table_.dates.Add(first_line_, field.substr(0, kShown));
+    return static_cast<double>(*seconds);
   }
 
   void TakeHeader(const std::vector<std::string>& names) {

@@ -14,7 +14,6 @@
 
 #include "forereach/certify/explain.h"
 #include "forereach/fault_t.hpp"
-#include "forereach/numerics/parallel.h"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
 #include "page/detail.h"
@@ -354,28 +353,6 @@ PageRun EmptyPage(const std::vector<std::string>& inputs) {
   const bool is_log = kind != FileKind::kDirectory && kind != FileKind::kDatabase;
   const std::string name = is_log ? FileName(inputs[0]) : inputs[0];
   page.name = inputs.size() == 1 ? name : fmt::format("{} and {} more", name, inputs.size() - 1);
-  return page;
-}
-
-PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
-                   const DetailBounds& bounds) {
-  const unsigned threads = AllCores();
-  NamedRuns named = RunsNamedBy(inputs, threads);
-  const PageTasks tasks{config, key, RunTasks(config, key, named.is_many)};
-  PageRun page = EmptyPage(inputs);
-  std::deque<PagePass> passes;
-  for (const RunLogs& run : named.runs) try {
-      AddRows(page, GatherRows(run, tasks, passes.emplace_back(bounds)));
-    } catch (const BadInput& error) {
-      passes.pop_back();
-      if (!named.is_many) throw;
-      named.missing.emplace_back(error.what());
-    }
-  AddMissing(page, named);
-  std::size_t bytes = bounds.bytes;
-  const auto chosen = ChooseDetails(page, bounds);
-  for (std::size_t k = 0; k < chosen.size(); ++k)
-    AddDetails(page, GatherDetails(passes[k], page, chosen[k], bytes, threads), bytes);
   return page;
 }
 

@@ -97,13 +97,6 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes);
 /** Names the event of a decision as a Timeline does that names files. */
 [[nodiscard]] std::string EventName(const LogReference& event);
 
-/** All of it for the runs that `inputs` name (RunsNamedBy), one after the other. Tubes are of candidates that this
-program decides again as the record has it.
-@param bounds of the drawings; zeros for none.
-@throws BadInput if nothing can be read, or for logs without their task. */
-[[nodiscard]] PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
-                                 const DetailBounds& bounds);
-
 /** Notes what could not be read. */
 void AddMissing(PageRun& page, const NamedRuns& named);
 

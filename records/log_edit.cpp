@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "records/event_record.h"
 #include "records/log_survey.h"
 #include "records/output_file.h"
+#include "task/date.h"
 
 namespace forereach {
 namespace {
@@ -25,36 +25,6 @@ std::optional<Number> Parse(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return number;
-}
-
-std::optional<std::int64_t> ParseDate(std::string_view text) {
-  if (text.ends_with('Z')) text.remove_suffix(1);
-  constexpr std::string_view form = "0000-00-00T00:00:00";
-  if (text.size() < form.size()) return std::nullopt;
-  for (std::size_t i = 0; i < form.size(); ++i)
-    if (form[i] == '0' ? text[i] < '0' || text[i] > '9' : text[i] != form[i]) return std::nullopt;
-  const auto part = [&](std::size_t from, std::size_t length) { return *Parse<int>(text.substr(from, length)); };
-  std::tm date{};
-  date.tm_year = part(0, 4) - 1900;
-  date.tm_mon = part(5, 2) - 1;
-  date.tm_mday = part(8, 2);
-  date.tm_hour = part(11, 2);
-  date.tm_min = part(14, 2);
-  date.tm_sec = part(17, 2);
-  const std::tm given = date;
-  const std::time_t seconds = ::timegm(&date);
-  // timegm makes the first of March of the thirtieth of February.
-  if (date.tm_mon != given.tm_mon || date.tm_mday != given.tm_mday || date.tm_hour != given.tm_hour ||
-      date.tm_min != given.tm_min || date.tm_sec != given.tm_sec || seconds < 0)
-    return std::nullopt;
-  double fraction = 0;
-  if (text.size() > form.size()) {
-    const auto parsed =
-        text[form.size()] == '.' ? Parse<double>("0" + std::string(text.substr(form.size()))) : std::nullopt;
-    if (!parsed || !(*parsed >= 0 && *parsed < 1)) return std::nullopt;
-    fraction = *parsed;
-  }
-  return static_cast<std::int64_t>(seconds) * 1'000'000 + std::llround(fraction * 1e6);
 }
 
 // A log that is being read: the next event, and what was damaged before it.
@@ -168,8 +138,8 @@ std::int64_t ParseLogTime(const std::string& text, std::int64_t first_utime) {
       return first_utime + std::min(std::llround(*seconds * 1e6), INT64_MAX - std::max<long long>(first_utime, 0));
   } else if (const auto utime = Parse<std::int64_t>(text); utime && *utime >= 0) {
     return *utime;
-  } else if (const auto date = ParseDate(text)) {
-    return *date;
+  } else if (const auto seconds = SecondsOfDate(text); seconds && *seconds >= 0) {
+    return std::llround(*seconds * 1e6L);
   }
   throw LogError(text +
                  ": is no time; write microseconds since the Unix epoch, a time in UTC as 2026-01-01T12:00:00, or "

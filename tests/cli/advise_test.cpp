@@ -85,7 +85,7 @@ TEST_F(AdviseTest, ASmallerDisturbanceAloneMayBeEnough) {
                                            ", disturbance: [0.1, 0, 0, 0]");
   EXPECT_THAT(
       text, AllOf(HasSubstr("  it would be certified\n    move: if it passed farther away"),
-                  HasSubstr("\n    declaration: if disturbance were declared 0.2"), HasSubstr("\n  disturbance: 1\n")));
+                  HasSubstr("\n    declaration: if disturbance were declared 0.1"), HasSubstr("\n  disturbance: 1\n")));
 }
 
 TEST_F(AdviseTest, NamesWhatMakesTheDataConsistent) {

@@ -121,9 +121,11 @@ TEST_F(LogTest, TimesMayBeOfSeveralKinds) {
   EXPECT_EQ(ParseLogTime("+1.5", 5), 1500005);
   EXPECT_EQ(ParseLogTime("2026-01-01T12:00:00", 0), 1767268800000000);
   EXPECT_EQ(ParseLogTime("2026-01-01T12:00:00.25Z", 0), 1767268800250000);
+  EXPECT_EQ(ParseLogTime("9999-12-31 23:59:59,999999+00:30", 0), 253402298999999999);
   EXPECT_EQ(ParseLogTime("+1000000000", INT64_MAX - 1), INT64_MAX);
-  for (const char* text : {"", "+", "-1", "+-1", "+nan", "+inf", "1e3x", "2026-02-30T12:00:00", "2026-01-01", "noon",
-                           "2026-01-01T24:00:00", "2026-01-01T12:00:00.5.5", "99999999999999999999"})
+  for (const char* text :
+       {"", "+", "-1", "+-1", "+nan", "+inf", "1e3x", "2026-02-30T12:00:00", "2026-01-01", "noon",
+        "1969-12-31T23:59:59Z", "2026-01-01T24:00:00", "2026-01-01T12:00:00.5.5", "99999999999999999999"})
     EXPECT_THROW(static_cast<void>(ParseLogTime(text, 0)), LogError) << text;
   const std::string a = Small("a", 1'000'000, "A");
   EXPECT_THAT(Log("list '" + a + "' --from +1 --to +2").text, HasSubstr("log: 1 of 3 events"));

@@ -1,5 +1,6 @@
 #include "tests/test.h"
 
+#include "forereach/numerics/parallel.h"
 #include "page/columns.h"
 #include "page/detail.h"
 #include "page/gather.h"
@@ -16,6 +17,29 @@ namespace forereach::page_test {
 
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kTask = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+// As `forereach report --out` gathers a page, run by run.
+PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
+                   const DetailBounds& bounds) {
+  const unsigned threads = AllCores();
+  NamedRuns named = RunsNamedBy(inputs, threads);
+  const PageTasks tasks{config, key, RunTasks(config, key, named.is_many)};
+  PageRun page = EmptyPage(inputs);
+  std::deque<PagePass> passes;
+  for (const RunLogs& run : named.runs) try {
+      AddRows(page, GatherRows(run, tasks, passes.emplace_back(bounds)));
+    } catch (const BadInput& error) {
+      passes.pop_back();
+      if (!named.is_many) throw;
+      named.missing.emplace_back(error.what());
+    }
+  AddMissing(page, named);
+  std::size_t bytes = bounds.bytes;
+  const auto chosen = ChooseDetails(page, bounds);
+  for (std::size_t k = 0; k < chosen.size(); ++k)
+    AddDetails(page, GatherDetails(passes[k], page, chosen[k], bytes, threads), bytes);
+  return page;
+}
 
 TEST(ColumnsTest, Base64IsThatOfTheStandard) {
   EXPECT_EQ(Base64(""), "");
