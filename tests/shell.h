@@ -25,7 +25,7 @@ struct Output {
 /** Matches an Output with this code, whose text has each of these words or matches each. */
 template <class... Word>
 auto Exits(int code, const Word&... words) {
-  const auto matching = []<class Each>(const Each& word) {
+  [[maybe_unused]] const auto matching = []<class Each>(const Each& word) {
     if constexpr (std::is_convertible_v<Each, std::string>)
       return testing::HasSubstr(std::string(word));
     else

@@ -170,7 +170,7 @@ TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
   Append("PLAN_CANDIDATE", Drive(0, true));
   Append("CH\xff\xfe", MakeEvent(0, 0));
   std::ostringstream out;
-  Report({{scratch_ / "log"}, FOREREACH_SOURCE_DIR "/tests/data/course.yaml", "", true}, out);
+  (void)Report({{scratch_ / "log"}, FOREREACH_SOURCE_DIR "/tests/data/course.yaml", "", true}, out);
   EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 2u);
 }
 

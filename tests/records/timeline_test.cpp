@@ -347,7 +347,7 @@ TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
     options.config = kConfig;
     options.json = true;
     options.key = by;
-    Report(options, out);
+    EXPECT_TRUE(Report(options, out));
     return nlohmann::json::parse(out.str());
   };
   const nlohmann::json recorded = report(kLog, {}), judged = report(log, {key}), believed = report(log, {"", true});

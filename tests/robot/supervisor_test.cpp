@@ -502,7 +502,7 @@ TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
     EXPECT_EQ(events_.back().kind, kAccepted);
     withdrawal_t withdrawal{.plan_id = 8};
     supervisor.OnWithdrawn(say(ahead, "PLAN_WITHDRAWN", Encode(withdrawal)), At(0) - 1000);
-    EXPECT_EQ(events_.back().kind, stop_counts ? execution_event_t::WITHDRAWN : kRefused);
+    EXPECT_EQ(events_.back().kind, stop_counts ? +execution_event_t::WITHDRAWN : +kRefused);
     if (!stop_counts) {
       EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
     }

@@ -292,23 +292,23 @@ TEST(BetweenSamples, ATurningBodyLeavesTheChordOfItsPoints) {
   ExpectConfirmed(With(AtAllTimes(Curving(0, 0, 2, 4)), Obstacle::HalfSpace(Eigen::Vector2d(0, 1), kTiny * 2)));
 }
 
-// The heading goes from 0 to 4 in half a second, within recorded hulls that leave it 4 - 2 kHair. They are given by
+// The heading goes from 0 to 4 in half a second, within recorded hulls that leave it 4 - 2 kBit. They are given by
 // their ends, as on the bus, or by their middles, as in a decision.
 TEST(BetweenSamples, ATurnThatNoMotionMakesIsRefuted) {
-  constexpr double kHair = 0x1p-30;
+  constexpr double kBit = 0x1p-30;
   const Body body = Corner(0, 0.5, 0);
   for (const bool by_ends : {true, false}) {
     Certificate certificate = Driving();
     for (const double heading : {0.0, 4.0}) {
-      const Eigen::Vector4d middle(heading, 0, 8, 0), half_width = Eigen::Vector4d::Constant(kHair);
+      const Eigen::Vector4d middle(heading, 0, 8, 0), half_width = Eigen::Vector4d::Constant(kBit);
       RecordedSlice& slice = certificate.slices.emplace_back();
       if (by_ends)
         slice.lower = middle - half_width, slice.upper = middle + half_width;
       else
         slice.center = middle, slice.half_width = half_width;
     }
-    ExpectConfirmed(Judge(AtAllTimes(Curving(0, 0, 8 - 4 * kHair), body), certificate));
-    ExpectRefuted(Judge(AtAllTimes(Curving(0, 0, 8 - 5 * kHair), body), certificate), 0,
+    ExpectConfirmed(Judge(AtAllTimes(Curving(0, 0, 8 - 4 * kBit), body), certificate));
+    ExpectRefuted(Judge(AtAllTimes(Curving(0, 0, 8 - 5 * kBit), body), certificate), 0,
                   "the least change of px from the slice to the next");
   }
 }
@@ -325,11 +325,11 @@ TEST(BetweenSamples, DataThatTurnFasterThanDeclaredAreRefuted) {
     certificate.schedule.step_us = 500'000;
     return Judge(problem, certificate);
   };
-  constexpr double kHair = 0x1p-30;
+  constexpr double kBit = 0x1p-30;
   ExpectConfirmed(with(2));
-  ExpectRefuted(with(2 - kHair), -1, "no known transition changes py faster than is declared");
+  ExpectRefuted(with(2 - kBit), -1, "no known transition changes py faster than is declared");
   ExpectConfirmed(with(3, 2));
-  ExpectRefuted(with(3, 2 - kHair), -1, "no known transition changes py faster");
+  ExpectRefuted(with(3, 2 - kBit), -1, "no known transition changes py faster");
 }
 
 TEST(BetweenSamples, ARecordedClearanceIsThatOfTheMotionAfterTheSample) {
