@@ -1,6 +1,7 @@
 // forereach-certifier as a process, fed good and bad messages over a real bus.
 #include <csignal>
 
+#include <fmt/format.h>
 #include <sched.h>
 
 #include <fmt/format.h>
