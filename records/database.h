@@ -73,9 +73,7 @@ class Database final {
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
 
-  /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
-  [[nodiscard]] Rows Read(const std::string& log_file = "");
-
+  /** How many rows of one log file there are. @throws DatabaseError. */
   [[nodiscard]] RowCounts Count(const std::string& log_file);
 
   /** The next rows of all runs in the order in which they were written, at most `most` of each table, and moves the
