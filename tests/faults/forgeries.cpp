@@ -4,21 +4,14 @@
 #include <utility>
 
 #include "bus/authentic.h"
-#include "forereach/advice_t.hpp"
-#include "forereach/command_t.hpp"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/seal.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 
 namespace forereach {
 namespace {
-
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
 
 using Sent = std::vector<std::uint8_t>;
 constexpr std::int64_t kForgedSequence = std::int64_t{1} << 40;
@@ -63,8 +56,7 @@ class Forged final : Kind {
     Rig rig(DemoTask());
     Row& row = Begin(
         "On each signed channel: unsigned, forged, replayed, signed by each other role, by another robot, for another "
-        "bus",
-        options_.others);
+        "bus");
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
     Ear ear(rig);
@@ -72,42 +64,39 @@ class Forged final : Kind {
         other_bus(rig.keys(), "another bus");
     std::int64_t sent = 0;
     std::set<std::string> tried;
-    Tries(
-        row, rig,
-        [&](int) {
-          rig.Listen(milliseconds(700));
-          const auto before = rig.witness().status().value_or(certifier_status_t{});
-          static_cast<void>(ear.TakeObeyed());
-          const auto recorded = ear.heard();
-          for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
-            const Role speaker = speakers.at(channel);
-            tried.insert(channel);
-            const auto send = [&, channel = channel](const Sent& bytes) {
-              rig.open_bus().Publish(channel, Bytes(bytes)), ++sent;
-            };
-            send(message);
-            for (const Role role : kAllRoles)
-              if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
-            send(other_robot.Sign(speaker, channel, message, WallClockUs()));
-            send(other_bus.Sign(speaker, channel, message, WallClockUs()));
-            if (!recorded.contains(channel)) continue;
-            Sent altered = recorded.at(channel);
-            send(altered);  // once more
-            altered[altered.size() / 2] ^= 1;
-            send(altered);
-          }
-          rig.Listen(kHeartbeat);
-          const auto& now = rig.witness().status();
-          const auto refuses_all = [&] {
-            return now && now->refused_unsigned > before.refused_unsigned &&
-                   now->refused_forged > before.refused_forged && now->refused_replayed > before.refused_replayed;
-          };
-          Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
-          DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
-          Demand(row, now && now->messages_refused == before.messages_refused,
-                 "the certifier looked into a message that nobody may send");
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      rig.Listen(milliseconds(700));
+      const auto before = rig.witness().status().value_or(certifier_status_t{});
+      static_cast<void>(ear.TakeObeyed());
+      const auto recorded = ear.heard();
+      for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
+        const Role speaker = speakers.at(channel);
+        tried.insert(channel);
+        const auto send = [&, channel = channel](const Sent& bytes) {
+          rig.open_bus().Publish(channel, Bytes(bytes)), ++sent;
+        };
+        send(message);
+        for (const Role role : kAllRoles)
+          if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
+        send(other_robot.Sign(speaker, channel, message, WallClockUs()));
+        send(other_bus.Sign(speaker, channel, message, WallClockUs()));
+        if (!recorded.contains(channel)) continue;
+        Sent altered = recorded.at(channel);
+        send(altered);  // once more
+        altered[altered.size() / 2] ^= 1;
+        send(altered);
+      }
+      rig.Listen(kHeartbeat);
+      const auto& now = rig.witness().status();
+      const auto refuses_all = [&] {
+        return now && now->refused_unsigned > before.refused_unsigned && now->refused_forged > before.refused_forged &&
+               now->refused_replayed > before.refused_replayed;
+      };
+      Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
+      DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
+      Demand(row, now && now->messages_refused == before.messages_refused,
+             "the certifier looked into a message that nobody may send");
+    });
     Demand(row, tried.size() == speakers.size(), "only " + std::to_string(tried.size()) + " channels were tried");
     Remark(row, std::to_string(sent) + " sent on " + std::to_string(tried.size()) + " channels");
     if (rig.witness().status()) {
@@ -125,50 +114,46 @@ class Forged final : Kind {
     Rig rig(DemoTask());
     Row& row = Begin(
         "On each signed channel: signed by its speaker before the start of certifier and robot, or while a clock was "
-        "ahead",
-        options_.others);
+        "ahead");
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
     Ear ear(rig);
     std::int64_t sent = 0, refused = 0;
     const std::int64_t rig_began = WallClockUs();
-    Tries(
-        row, rig,
-        [&](int) {
-          rig.Listen(milliseconds(700));
-          const std::map<std::string, Sent> recorded = ear.heard();
-          auto harmful = HarmfulOf(rig, recorded);
-          transition_t contradiction =
-              recorded.contains(channels.transition)
-                  ? Decoded<transition_t>(WithoutSignature(recorded.at(channels.transition))).value_or(transition_t{})
-                  : transition_t{};
-          contradiction.next_state[0] += 1;
-          harmful[channels.transition] = Encode(contradiction);
-          for (const Rig::Role role : {Rig::kCertifier, Rig::kRobot}) rig.End(role), rig.Start(role);
-          rig.witness().Forget();
-          const auto begun = [&] { return rig.witness().status().has_value(); };
-          Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
-          rig.Listen(kHeartbeat);
-          const auto before = rig.witness().status().value_or(certifier_status_t{});
-          static_cast<void>(ear.TakeObeyed());
-          const std::int64_t now = WallClockUs();
-          constexpr std::int64_t kHourUs = 3'600'000'000;
-          for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
-          for (const auto& [channel, message] : harmful)
-            for (const std::int64_t when :
-                 {now - kHourUs, rig_began - 5'000'000, now + kStopsAheadUs + 30'000'000, now + kHourUs})
-              rig.open_bus().Publish(
-                  channel,
-                  Bytes(Signer(rig.keys(), channels.bus_name()).Sign(speakers.at(channel), channel, message, when))),
-                  ++sent;
-          rig.Listen(kHeartbeat);
-          const auto& status = rig.witness().status();
-          const auto refuses = [&] { return status && status->refused_replayed > before.refused_replayed; };
-          Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
-          DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
-          if (status) refused += status->refused_replayed - before.refused_replayed;
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      rig.Listen(milliseconds(700));
+      const std::map<std::string, Sent> recorded = ear.heard();
+      auto harmful = HarmfulOf(rig, recorded);
+      transition_t contradiction =
+          recorded.contains(channels.transition)
+              ? Decoded<transition_t>(WithoutSignature(recorded.at(channels.transition))).value_or(transition_t{})
+              : transition_t{};
+      contradiction.next_state[0] += 1;
+      harmful[channels.transition] = Encode(contradiction);
+      for (const Rig::Role role : {Rig::kCertifier, Rig::kRobot}) rig.End(role), rig.Start(role);
+      rig.witness().Forget();
+      const auto begun = [&] { return rig.witness().status().has_value(); };
+      Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
+      rig.Listen(kHeartbeat);
+      const auto before = rig.witness().status().value_or(certifier_status_t{});
+      static_cast<void>(ear.TakeObeyed());
+      const std::int64_t now = WallClockUs();
+      constexpr std::int64_t kHourUs = 3'600'000'000;
+      for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
+      for (const auto& [channel, message] : harmful)
+        for (const std::int64_t when :
+             {now - kHourUs, rig_began - 5'000'000, now + kStopsAheadUs + 30'000'000, now + kHourUs})
+          rig.open_bus().Publish(
+              channel,
+              Bytes(Signer(rig.keys(), channels.bus_name()).Sign(speakers.at(channel), channel, message, when))),
+              ++sent;
+      rig.Listen(kHeartbeat);
+      const auto& status = rig.witness().status();
+      const auto refuses = [&] { return status && status->refused_replayed > before.refused_replayed; };
+      Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
+      DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
+      if (status) refused += status->refused_replayed - before.refused_replayed;
+    });
     Remark(row, std::to_string(sent) + " sent, " + std::to_string(refused) +
                     " times the certifier refused one, on the channels that it hears");
   }
@@ -181,43 +166,38 @@ class Forged final : Kind {
                      options_.others);
     auto ear = std::make_unique<Ear>(rig);
     std::int64_t sent = 0, refused = 0, counted = 0;
-    Tries(
-        row, rig,
-        [&](int i) {
-          const Role role = kAllRoles[static_cast<std::size_t>(i) % kAllRoles.size()];
-          rig.Listen(milliseconds(700));
-          const auto recorded = ear->heard();
-          const KeyRing old_keys = rig.keys();
-          rig.MakeKeyAgain(role);
-          ear = std::make_unique<Ear>(rig);
-          const std::string why = rig.Heal();
-          Demand(row, why.empty(),
-                 "it does not go on with a new key of the " + std::string(RoleName(role)) + ": " + why);
-          const auto before = rig.witness().status().value_or(certifier_status_t{});
-          static_cast<void>(ear->TakeObeyed());
+    Tries(row, rig, [&](int i) {
+      const Role role = kAllRoles[static_cast<std::size_t>(i) % kAllRoles.size()];
+      rig.Listen(milliseconds(700));
+      const auto recorded = ear->heard();
+      const KeyRing old_keys = rig.keys();
+      rig.MakeKeyAgain(role);
+      ear = std::make_unique<Ear>(rig);
+      const std::string why = rig.Heal();
+      Demand(row, why.empty(), "it does not go on with a new key of the " + std::string(RoleName(role)) + ": " + why);
+      const auto before = rig.witness().status().value_or(certifier_status_t{});
+      static_cast<void>(ear->TakeObeyed());
 
-          const BusOptions& channels = rig.config().bus;
-          const Speakers speakers = channels.speakers();
-          Signer old_signer(old_keys, channels.bus_name());
-          for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
-          for (const auto& [channel, message] : HarmfulOf(rig, recorded))
-            if (speakers.at(channel) == role)
-              rig.open_bus().Publish(channel, Bytes(old_signer.Sign(role, channel, message, WallClockUs()))), ++sent;
-          rig.Listen(kHeartbeat);
-          const auto& now = rig.witness().status();
-          const auto refuses = [&] {
-            return now &&
-                   now->refused_replayed + now->refused_forged > before.refused_replayed + before.refused_forged &&
-                   (!IsHeardByCertifier(role) || now->refused_forged > before.refused_forged);
-          };
-          Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
-          DemandNothingBelieved(row, rig, before, ear->TakeObeyed());
-          Demand(row, now && now->messages_refused == before.messages_refused,
-                 "the certifier looked into a message of the old key");
-          if (now) refused += now->refused_forged - before.refused_forged;
-          if (role != Role::kOperator) counted += DemandReloads(row, rig, old_signer);
-        },
-        options_.others);
+      const BusOptions& channels = rig.config().bus;
+      const Speakers speakers = channels.speakers();
+      Signer old_signer(old_keys, channels.bus_name());
+      for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
+      for (const auto& [channel, message] : HarmfulOf(rig, recorded))
+        if (speakers.at(channel) == role)
+          rig.open_bus().Publish(channel, Bytes(old_signer.Sign(role, channel, message, WallClockUs()))), ++sent;
+      rig.Listen(kHeartbeat);
+      const auto& now = rig.witness().status();
+      const auto refuses = [&] {
+        return now && now->refused_replayed + now->refused_forged > before.refused_replayed + before.refused_forged &&
+               (!IsHeardByCertifier(role) || now->refused_forged > before.refused_forged);
+      };
+      Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
+      DemandNothingBelieved(row, rig, before, ear->TakeObeyed());
+      Demand(row, now && now->messages_refused == before.messages_refused,
+             "the certifier looked into a message of the old key");
+      if (now) refused += now->refused_forged - before.refused_forged;
+      if (role != Role::kOperator) counted += DemandReloads(row, rig, old_signer);
+    });
     Remark(row, std::to_string(sent) + " sent, " + std::to_string(refused) +
                     " times the certifier refused one of the old key; " + std::to_string(counted) +
                     " commands of a role that kept its key were obeyed");
@@ -232,9 +212,7 @@ class Forged final : Kind {
   static bool DemandReloads(Row& row, Rig& rig, Signer& signer) {
     const std::string& channel = rig.config().bus.command;
     const std::int64_t before = rig.witness().status() ? rig.witness().status()->version : 0;
-    command_t command{};
-    command.utime = WallClockUs();
-    command.kind = command_t::RELOAD;
+    const command_t command{.utime = WallClockUs(), .kind = command_t::RELOAD};
     rig.open_bus().Publish(channel, Bytes(signer.Sign(Role::kOperator, channel, Encode(command), WallClockUs())));
     const auto reloads = [&] { return rig.witness().status() && rig.witness().status()->version > before; };
     const bool obeyed = rig.ListenUntil(reloads, kSaysSoon);
@@ -262,29 +240,17 @@ class Forged final : Kind {
       const Bytes message = WithoutSignature(raw);
       harmful[channel].assign(message.begin(), message.end());
     }
-    command_t command{};
-    command.utime = WallClockUs();
-    command.kind = command_t::RELOAD;
-    harmful[channels.command] = Encode(command);
-    fault_t fault{};
-    fault.utime = WallClockUs();
-    fault.cause = fault_t::SLICE_LEFT;
-    harmful[channels.fault] = Encode(fault);
-    withdrawal_t withdrawal{};
-    withdrawal.sequence = kForgedSequence;
-    withdrawal.expires_utime = INT64_MAX;
+    const std::int64_t now = WallClockUs();
+    harmful[channels.command] = Encode(command_t{.utime = now, .kind = command_t::RELOAD});
+    harmful[channels.fault] = Encode(fault_t{.utime = now, .cause = fault_t::SLICE_LEFT});
+    withdrawal_t withdrawal{.sequence = kForgedSequence, .expires_utime = INT64_MAX};
     if (const certified_plan_t* certified = rig.witness().last_certified())
       withdrawal.plan_id = certified->plan.plan_id;
     harmful[channels.withdrawn] = Encode(withdrawal);
-    advice_t advice{};  // the task asks for none
-    advice.sequence = kForgedSequence;
-    advice.num_changes = 1;
-    advice.changed = 1;
+    advice_t advice{.sequence = kForgedSequence};  // the task asks for none
+    advice.num_changes = advice.changed = 1;
     harmful[channels.advice] = Encode(advice);
-    obstacles_t nothing_there{};
-    nothing_there.utime = WallClockUs();
-    nothing_there.sequence = kForgedSequence;
-    harmful[channels.obstacles] = Encode(nothing_there);
+    harmful[channels.obstacles] = Encode(obstacles_t{.utime = now, .sequence = kForgedSequence});
     if (const certified_plan_t* certified = rig.witness().last_certified())
       harmful[channels.certified] = Encode(Widened(*certified));
     return harmful;
@@ -308,8 +274,7 @@ class Forged final : Kind {
   void StolenKeys() {
     Rig rig(DemoTask());
     Row& row = Begin(
-        "Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger",
-        options_.others);
+        "Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger");
     std::set<std::int64_t> forged, obeyed;
     rig.Hear(rig.config().bus.event, [&](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);
@@ -317,25 +282,22 @@ class Forged final : Kind {
         obeyed.insert(event->plan_id);
     });
     Signer thief(rig.keys(), rig.config().bus.bus_name());
-    Tries(
-        row, rig,
-        [&](int i) {
-          const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
-          for (int j = 0; j < 20; ++j) {
-            certified_plan_t certified = Widened(*rig.witness().last_certified());
-            certified.plan.plan_id += j;
-            certified.plan.start_utime += 40'000 * j;
-            SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
-            SetDigest(certified.certificate_digest, CertificateDigest(certified));
-            forged.insert(certified.plan.plan_id);
-            const std::string& channel = rig.config().bus.certified;
-            rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
-            rig.Listen(milliseconds(20));
-          }
-          rig.Listen(milliseconds(500));
-          Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
-        },
-        options_.others);
+    Tries(row, rig, [&](int i) {
+      const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
+      for (int j = 0; j < 20; ++j) {
+        certified_plan_t certified = Widened(*rig.witness().last_certified());
+        certified.plan.plan_id += j;
+        certified.plan.start_utime += 40'000 * j;
+        SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
+        SetDigest(certified.certificate_digest, CertificateDigest(certified));
+        forged.insert(certified.plan.plan_id);
+        const std::string& channel = rig.config().bus.certified;
+        rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
+        rig.Listen(milliseconds(20));
+      }
+      rig.Listen(milliseconds(500));
+      Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
+    });
     Remark(row, std::to_string(forged.size()) + " forged, " + std::to_string(obeyed.size()) + " executed");
   }
 };

@@ -258,23 +258,19 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
         AffineTruth parameters;
         for (std::size_t i = 0; i < truth.size(); ++i)
           parameters.push_back(AdmissibleParameters(random, *problem, affine.rows[i], truth[i]));
+        const auto residual = [&](const std::vector<Real>& z, int k) {
+          const auto row = std::ranges::find(affine.rows, k) - affine.rows.begin();
+          return row < std::ssize(affine.rows)
+                     ? AffineValue(parameters[static_cast<std::size_t>(row)], affine.columns, z)
+                     : others(z, k);
+        };
         std::vector<Real> x = PointOf(random, query.initial_set);
         Real offset;
         for (int t = 0; t < tube.length(); ++t) {
-          std::vector<Real> z = x, most;
+          std::vector<Real> z = x;
           for (const double u : query.plan().input(t)) z.emplace_back(u);
-          std::vector<Real> unexpected = AnyDisturbance(random, *problem, z);
-          for (std::size_t k = 0; k < x.size(); ++k) {
-            const auto row = std::ranges::find(affine.rows, static_cast<int>(k)) - affine.rows.begin();
-            const bool is_affine = row < std::ssize(affine.rows);
-            const Real r = is_affine ? AffineValue(parameters[static_cast<std::size_t>(row)], affine.columns, z)
-                                     : others(z, static_cast<int>(k));
-            unexpected[k] += r;
-            most.push_back(abs(r) + DisturbanceAt(*problem, z, static_cast<Eigen::Index>(k)));
-          }
-          const Real before = offset;
-          offset = AnyOffset(random, *problem);
-          x = LongerSuccessor(random, *problem, z, unexpected, most, offset - before);
+          const Real before = std::exchange(offset, AnyOffset(random, *problem));
+          x = Rolled(random, *problem, residual, z, offset - before);
           ++slices;
           ASSERT_TRUE(IsNotOutside(random, tube.slice(t + 1), x)) << "slice " << t + 1;
         }

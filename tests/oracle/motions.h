@@ -41,16 +41,10 @@ struct Tally {
        recorded = 0;  // of the certified: with steps off their times, with errors of records
 
   void Add(const Tally& other) {
-    problems += other.problems;
-    plans += other.plans;
-    certified += other.certified;
-    withdrawn += other.withdrawn;
-    motions += other.motions;
-    moments += other.moments;
-    decided_exactly += other.decided_exactly;
-    inadmissible += other.inadmissible;
-    shifted += other.shifted;
-    recorded += other.recorded;
+    for (long Tally::*const each :
+         {&Tally::problems, &Tally::plans, &Tally::certified, &Tally::withdrawn, &Tally::motions, &Tally::moments,
+          &Tally::decided_exactly, &Tally::inadmissible, &Tally::shifted, &Tally::recorded})
+      this->*each += other.*each;
   }
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
@@ -335,12 +329,7 @@ class MotionTrial {
     if (told.motion && untold_ == Untold::kVelocity) told.motion->velocity.setZero();
     if (told.motion && untold_ == Untold::kGrowth)
       told.motion->uncertainty = told.motion->growth = told.motion->growth_rate = 0;
-    const auto accepted = [&](double away) {
-      const std::vector<Obstacle> alone{told.At(away)};
-      const Decision decision = certifier.safety().Judge(alone, told_schedule, tube_, first);
-      return decision.outcome == Outcome::kCertified || decision.step - (problem.between ? 0 : 1) >= kept;
-    };
-    const std::optional<double> away = JustAccepted(accepted);
+    const std::optional<double> away = JustAccepted(certifier, told, told_schedule, tube_, first, kept);
     if (!away) return std::nullopt;
     return Neighbour{approach->At(*away), told.At(*away)};
   }
@@ -353,16 +342,10 @@ class MotionTrial {
     std::vector<Real> x = PointOf(random_, query.initial_set);
     Real offset;
     for (int t = 0; t < standing; ++t) {
-      std::vector<Real> z = x, most;
+      std::vector<Real> z = x;
       for (const double u : query.plan().input(t)) z.emplace_back(u);
-      std::vector<Real> unexpected = AnyDisturbance(winds_, problem, z);
-      for (std::size_t k = 0; k < unexpected.size(); ++k) {
-        const Real r = residual(z, static_cast<int>(k));
-        unexpected[k] += r;
-        most.push_back(abs(r) + DisturbanceAt(problem, z, static_cast<Eigen::Index>(k)));
-      }
       const Real before = std::exchange(offset, NextOffset(problem, offset));
-      const std::vector<Real> next = LongerSuccessor(winds_, problem, z, unexpected, most, offset - before);
+      const std::vector<Real> next = Rolled(winds_, problem, residual, z, offset - before);
       RequireInSlice(next, t + 1);
       const Chord chord = judge.ChordOf(x, next, before, offset);
       if (t >= first && problem.between)
