@@ -37,12 +37,34 @@ library's headers of every day. tests/CMakeLists.txt has them compiled before al
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/fields.h"
 #include "tests/scratch.h"
 
 namespace forereach {
 
-using testing::AllOf, testing::AnyOf, testing::ElementsAre, testing::EndsWith, testing::HasSubstr, testing::IsEmpty,
-    testing::Not, testing::StartsWith, testing::ThrowsMessage;
+using testing::AllOf, testing::AnyOf, testing::Contains, testing::ContainsRegex, testing::Each, testing::ElementsAre,
+    testing::ElementsAreArray, testing::EndsWith, testing::Eq, testing::Ge, testing::Gt, testing::HasSubstr,
+    testing::IsEmpty, testing::Le, testing::Lt, testing::MatchesRegex, testing::Not, testing::SizeIs,
+    testing::StartsWith, testing::ThrowsMessage, testing::UnorderedElementsAre;
+
+/** Random numbers from a seed that nobody chose: what fails says it. */
+class FreshRandom final : public std::mt19937 {
+ public:
+  explicit FreshRandom(unsigned seed = std::random_device{}(), const char* file = __builtin_FILE(),
+                       int line = __builtin_LINE())
+      : std::mt19937(seed), trace_(file, line, "seed " + std::to_string(seed)) {}
+
+ private:
+  testing::ScopedTrace trace_;
+};
+
+/** Matches a JSON object that has these members, each with this value; it may have others. */
+MATCHER_P(HasMembers, members, "") {
+  for (const auto& [name, value] : members.items())
+    if (!arg.contains(name) || arg.at(name) != value) return *result_listener << name << " in " << arg.dump(), false;
+  return true;
+}
+inline auto Holds(nlohmann::json members) { return HasMembers(std::move(members)); }
 
 /** What the Error that `call` throws says; empty if it throws none. */
 template <class Error, class Call>

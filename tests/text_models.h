@@ -1,6 +1,8 @@
 /** Models as text for tests, without a task file. */
 #pragma once
 
+#include <array>
+#include <ostream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,6 +10,10 @@
 #include "forereach/dynamics/model_text.h"
 
 namespace forereach {
+
+inline void PrintTo(ModelText::Integrator integrator, std::ostream* out) {
+  *out << std::array{"none", "euler", "midpoint", "rk4"}[static_cast<std::size_t>(integrator)];
+}
 
 using Lines = std::vector<std::pair<std::string, std::string>>;  ///< Names, each with an expression.
 

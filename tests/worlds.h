@@ -13,6 +13,7 @@ All else is as `Problem` has it by default. A test changes what it is about. It 
 #include <algorithm>
 #include <initializer_list>
 #include <memory>
+#include <ostream>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,8 @@ inline Eigen::VectorXd Vec(std::initializer_list<double> entries) {
   return Eigen::Map<const Eigen::VectorXd>(entries.begin(), static_cast<Eigen::Index>(entries.size()));
 }
 
+inline void PrintTo(Method method, std::ostream* out) { *out << (method == Method::kPaper ? "paper" : "centred"); }
+
 /** Bounds on a disturbance that grow with state and input: an expression for each state. */
 inline std::shared_ptr<const GrowingDisturbance> Growing(const NominalModel& model,
                                                          std::initializer_list<const char*> bounds) {
@@ -37,6 +40,13 @@ inline std::shared_ptr<const GrowingDisturbance> Growing(const NominalModel& mod
 /** {x : |x_k| <= reach_k}. */
 inline Box Within(const Eigen::VectorXd& reach) { return {-reach, reach}; }
 inline Box Within(std::initializer_list<double> reach) { return Within(Vec(reach)); }
+
+/** Gives a task a problem of its own, to be changed. */
+inline Problem& Own(std::shared_ptr<const Problem>& problem) {
+  const auto own = std::make_shared<Problem>(*problem);
+  problem = own;
+  return *own;
+}
 
 inline Problem WorldOf(std::shared_ptr<const NominalModel> model, const Box& state, const Box& input) {
   const int n = model->num_states(), variables = model->num_variables();

@@ -2,9 +2,7 @@
 // certifier of its own; every remedy of an answer without a judgement likewise, by a gate of its own.
 #include "advise/advice.h"
 
-#include <algorithm>
-#include <map>
-#include <string>
+#include "tests/test.h"
 
 #include "advise/gate_advice.h"
 #include "advise/hypotheses.h"
@@ -19,10 +17,6 @@
 #include "tests/tries.h"
 
 namespace forereach::advice_test {
-
-using testing::Contains;
-using testing::HasSubstr;
-using testing::Not;
 
 Case AnyCase(Random& random) {
   const bool bicycle = random.Coin();
@@ -105,10 +99,9 @@ void ExpectOnly(Change change, const Case& before, const Case& after) {
     EXPECT_EQ(after.controls, before.controls.leftCols(after.controls.cols()));
   }
   EXPECT_EQ(after.initial_set.CenterVector(), before.initial_set.CenterVector());
-  if (change != Change::kInitialSet) {
+  if (change != Change::kInitialSet)
     EXPECT_EQ(after.initial_set.GeneratorMatrix(), before.initial_set.GeneratorMatrix());
-  }
-  if (change != Change::kSlopes && change != Change::kLargerSlopes) {
+  if (change != Change::kSlopes && change != Change::kLargerSlopes)
     EXPECT_EQ(is.declaration.lipschitz, was.declaration.lipschitz);
   }
   EXPECT_EQ(is.declaration.noise_bound == was.declaration.noise_bound,
@@ -118,12 +111,9 @@ void ExpectOnly(Change change, const Case& before, const Case& after) {
   EXPECT_EQ(is.transitions.size() - was.transitions.size(), change == Change::kObservation ? 1
                                                             : change == Change::kOutlier   ? -1
                                                                                            : 0);
-  if (change != Change::kDomain) {
-    EXPECT_EQ(is.domain.state.upper(), was.domain.state.upper());
-    EXPECT_EQ(is.domain.state.lower(), was.domain.state.lower());
-  }
-  EXPECT_EQ(is.rest.size(), was.rest.size());
-  EXPECT_EQ(is.limits.size(), was.limits.size());
+  if (change != Change::kDomain)
+    EXPECT_FIELDS(is.domain.state, (upper(), was.domain.state.upper()), (lower(), was.domain.state.lower()));
+  EXPECT_FIELDS(is, (rest.size(), was.rest.size()), (limits.size(), was.limits.size()));
   EXPECT_EQ(after.obstacles.size(), before.obstacles.size());
 }
 
@@ -189,13 +179,10 @@ std::optional<Tried> TryJudged(Random& random) {
       ExpectOnly(advice.change, abstained, after);
       std::string sentence;
       if (Fresh(after, &sentence).outcome == Outcome::kCertified) continue;
-      if (turns) {
-        EXPECT_EQ(advice.then, sentence);
-      }
+      if (turns) EXPECT_EQ(advice.then, sentence);
       turns = false;
     }
-    EXPECT_EQ(advice.turns, turns);
-    EXPECT_FALSE(advice.after.empty());
+    EXPECT_FIELDS(advice, (turns, turns), (after.empty(), false));
   }
   EXPECT_TRUE(std::ranges::is_partitioned(given, &Advice::turns));
   return Tried{std::string(CauseName(static_cast<std::int16_t>(decision.cause))),

@@ -1,10 +1,8 @@
 // One role gets a new key: what then counts, what stays, and what a failure or the end of the process leaves on the
 // disk.
 #include <cerrno>
-#include <csignal>
 
 #include <sys/file.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -14,6 +12,7 @@
 
 #include "bus/authentic.h"
 #include "bus/keys.h"
+#include "tests/file_size_limit.h"
 #include "tests/keys.h"
 
 namespace {
@@ -52,8 +51,7 @@ const std::vector<std::uint8_t> kSaid{1, 2, 3};
 
 std::string WhyRefused(const std::function<void()>& replace) { return Thrown<KeyError>(replace); }
 
-class KeyReplacement : public testing::Test {
- protected:
+struct KeyReplacement : testing::Test {
   ~KeyReplacement() override { last_call = -1; }
   [[nodiscard]] std::string File(const std::string& name) const { return keys_ + "/" + name; }
   [[nodiscard]] std::string Replace(Role role = Role::kPlanner, const std::string& robot = "test") const {
@@ -239,17 +237,8 @@ TEST_F(KeyReplacement, AFailureAtAnyCallSaysWhichKeysAreInPlace) {
 
 TEST_F(KeyReplacement, AFullDiskLeavesTheOldKeysAndNothingElse) {
   const auto before = Files();
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{100, 100};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    ::_exit(Replace().find("cannot be written") == std::string::npos);
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  EXPECT_EQ(status, 0);
+  const FileSizeLimit limit(100);
+  EXPECT_THAT(Replace(), HasSubstr("cannot be written"));
   EXPECT_TRUE(Files() == before);
 }
 

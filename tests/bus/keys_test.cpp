@@ -1,15 +1,12 @@
 // Key files: their readers, their content, and the errors of files that cannot be used.
 #include "bus/keys.h"
 
-#include <csignal>
-
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "tests/test.h"
 
+#include "tests/file_size_limit.h"
 #include "tests/keys.h"
 
 namespace forereach::keys_test {
@@ -24,8 +21,7 @@ unsigned ModeOf(const std::string& path) {
   return status.st_mode & 07777;
 }
 
-class KeyFiles : public testing::Test {
- protected:
+struct KeyFiles : testing::Test {
   [[nodiscard]] std::string File(const std::string& name) const { return keys_ + "/" + name; }
   [[nodiscard]] std::string Problem(const std::string& name = "planner.key", Role role = Role::kPlanner) const {
     return ProblemOf([&] { (void)LoadKeys(File(name), role); });
@@ -51,8 +47,8 @@ TEST_F(KeyFiles, AreForTheirOwnerAloneAndOneForEachRole) {
     EXPECT_TRUE(LoadPublicKeys(keys_).IsSigned(role, {}, signature));
     EXPECT_TRUE(LoadAllKeys(keys_).Holds(role));
   }
-  EXPECT_THAT(Read(File("verify.pub")), testing::Not(HasSubstr("secret")));
-  EXPECT_THAT(Read(File("verify.pub")), testing::Not(HasSubstr("group")));
+  EXPECT_THAT(Read(File("verify.pub")), Not(HasSubstr("secret")));
+  EXPECT_THAT(Read(File("verify.pub")), Not(HasSubstr("group")));
   EXPECT_EQ(LoadPublicKeys(File("verify.pub")).robot(), "test");
 }
 
@@ -87,18 +83,9 @@ TEST_F(KeyFiles, NoUmaskOpensOrClosesThem) {
 }
 
 TEST_F(KeyFiles, AWriteThatFailsLeavesNothingBehind) {
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
   const std::string made = scratch_ / "cut";
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{100, 100};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    ::_exit(ProblemOf([&] { MakeKeys("test", made); }).find("cannot be written") == std::string::npos);
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  EXPECT_EQ(status, 0);
+  const FileSizeLimit limit(100);
+  EXPECT_THAT(ProblemOf([&] { MakeKeys("test", made); }), HasSubstr("cannot be written"));
   EXPECT_FALSE(std::filesystem::exists(made));
 }
 
@@ -178,7 +165,7 @@ TEST_F(KeyFiles, AreReadLineByLine) {
     if (i < 3) continue;
     upper[i].back() = 'G';
     EXPECT_THAT(problem(upper), HasSubstr("64 lower-case hexadecimal digits")) << i;
-    EXPECT_THAT(problem(upper), testing::Not(HasSubstr(lines[i].substr(lines[i].rfind(' ') + 1, 20))))
+    EXPECT_THAT(problem(upper), Not(HasSubstr(lines[i].substr(lines[i].rfind(' ') + 1, 20))))
         << "a secret is not shown";
   }
   auto other = lines;

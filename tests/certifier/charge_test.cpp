@@ -76,8 +76,7 @@ TEST(ChargeTest, IgnoresItsOwnHeartbeats) {
     Charge charge = InState(state, now);
     const auto other = charge.other();
     for (const State its : {State::kListening, State::kInCharge, State::kStandingBy}) charge.Hear(kSelf, its);
-    EXPECT_EQ(charge.state(), state);
-    EXPECT_EQ(charge.other(), other);
+    EXPECT_FIELDS(charge, (state(), state), (other(), other));
   }
 }
 
@@ -192,9 +191,7 @@ TEST(ChargeTest, ExactlyOneIsInChargeAfterAnyLossPauseOrRestart) {
       }
       EXPECT_GT(settled, loss == 0 ? 500'000 : 0) << "round " << round;
     }
-    if (loss == 0) {
-      EXPECT_EQ(together, 0) << "microseconds with two in charge";
-    }
+    if (loss == 0) EXPECT_EQ(together, 0) << "microseconds with two in charge";
   }
 }
 

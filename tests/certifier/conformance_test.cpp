@@ -17,28 +17,24 @@ certified_plan_t Plan(std::int64_t plan_id) {
 }
 
 robot_state_t At(std::int64_t sequence, std::int64_t plan_id, int step, double x, double y) {
-  robot_state_t state{};
-  state.sequence = sequence;
-  state.executing_plan_id = plan_id;
-  state.executing_step = static_cast<std::int16_t>(step);
-  state.mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
-  state.num_states = 2;
+  robot_state_t state{.sequence = sequence,
+                      .executing_plan_id = plan_id,
+                      .executing_step = static_cast<std::int16_t>(step),
+                      .mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING,
+                      .num_states = 2};
   state.state[0] = x;
   state.state[1] = y;
   return state;
 }
 
 transition_t Step(std::int64_t utime, double x, double y) {
-  transition_t transition{};
-  transition.utime = utime;
-  transition.num_states = 2;
+  transition_t transition{.utime = utime, .num_states = 2};
   transition.next_state[0] = x;
   transition.next_state[1] = y;
   return transition;
 }
 
-class ConformanceTest : public testing::Test {
- protected:
+struct ConformanceTest : testing::Test {
   PlanLedger ledger_{{}, 0};
 };
 
@@ -47,10 +43,7 @@ TEST_F(ConformanceTest, TheSliceIsClosed) {
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 1, 1, 2)));
   const auto above = ledger_.FindDeparture(At(10, 7, 1, 1, std::nextafter(2.0, 3.0)));
   ASSERT_TRUE(above);
-  EXPECT_EQ(above->plan_id, 7);
-  EXPECT_EQ(above->step, 1);
-  EXPECT_EQ(above->coordinate, 1);
-  EXPECT_EQ(above->upper, 2);
+  EXPECT_FIELDS(*above, (plan_id, 7), (step, 1), (coordinate, 1), (upper, 2));
   EXPECT_EQ(ledger_.FindDeparture(At(20, 7, 1, std::nextafter(1.0, 0.0), 1))->coordinate, 0);
   EXPECT_TRUE(ledger_.FindDeparture(At(30, 7, 1, std::numeric_limits<double>::quiet_NaN(), 1)));
 }
@@ -63,8 +56,7 @@ TEST_F(ConformanceTest, TheEndOfTheOldPlanIsJudgedWhereAnotherTakesOver) {
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
   const auto departure = ledger_.FindDeparture(At(1, 8, 0, 0.5, 1.5));
   ASSERT_TRUE(departure) << "inside slice 0 of plan 8, not inside slice 1 of plan 7";
-  EXPECT_EQ(departure->plan_id, 7);
-  EXPECT_EQ(departure->step, 1);
+  EXPECT_FIELDS(*departure, (plan_id, 7), (step, 1));
   EXPECT_FALSE(ledger_.FindDeparture(At(5, 8, 0, 0.5, 1.5))) << "with messages missing between, it cannot tell";
 }
 
@@ -92,10 +84,7 @@ TEST_F(ConformanceTest, APlanThatTheRobotSaysItHasStoppedIsNotJudgedWhereAnother
     ledger.Add(Plan(7), 0);
     ledger.Add(next, 0);
     EXPECT_FALSE(ledger.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
-    execution_event_t event{};
-    event.kind = kind;
-    event.plan_id = plan_id;
-    event.step = static_cast<std::int16_t>(step);
+    execution_event_t event{.plan_id = plan_id, .kind = kind, .step = static_cast<std::int16_t>(step)};
     ledger.SeeStop(event, sender);
     EXPECT_EQ(ledger.FindDeparture(At(1, 8, 0, 0.5, 1.5)).has_value(), judged) << kind << " " << plan_id << " " << step;
     EXPECT_TRUE(ledger.FindDeparture(At(2, 8, 1, 0.5, 9))) << "the next plan is judged as any";
@@ -107,9 +96,7 @@ TEST_F(ConformanceTest, AStopHidesNoDepartureThatIsReported) {
   ledger_.Add(Plan(7), 0);
   ledger_.Add(Plan(8), 0);
   EXPECT_FALSE(ledger_.FindDeparture(At(0, 7, 0, 0.5, 0.5)));
-  execution_event_t event{};
-  event.kind = execution_event_t::ERROR_STOP;
-  event.plan_id = 7;
+  execution_event_t event{.plan_id = 7, .kind = execution_event_t::ERROR_STOP};
   ledger_.SeeStop(event, {});
   EXPECT_EQ(ledger_.FindDeparture(Step(0, 100, 100))->plan_id, 7) << "the whole step";
   EXPECT_EQ(ledger_.FindDeparture(At(1, 8, 0, 0.5, 1.5))->plan_id, 8);
@@ -153,10 +140,7 @@ TEST_F(ConformanceTest, ASliceIsLeftByMoreThanTheStateErrorOnly) {
   EXPECT_FALSE(ledger_.FindDeparture(At(10, 7, 1, 2, 0.75)));
   const auto above = ledger_.FindDeparture(At(20, 7, 1, 1, std::nextafter(2.25, 3)));
   ASSERT_TRUE(above);
-  EXPECT_EQ(above->coordinate, 1);
-  EXPECT_EQ(above->value, std::nextafter(2.25, 3));
-  EXPECT_EQ(above->error, 0.25);
-  EXPECT_EQ(above->upper, 2);
+  EXPECT_FIELDS(*above, (coordinate, 1), (value, std::nextafter(2.25, 3)), (error, 0.25), (upper, 2));
   EXPECT_TRUE(ledger_.FindDeparture(At(30, 7, 1, 1, std::nextafter(0.75, 0))));
   EXPECT_EQ(ledger_.FindDeparture(At(40, 7, 1, std::nextafter(2.0, 3.0), 1))->coordinate, 0) << "that one is exact";
 }
@@ -197,8 +181,7 @@ TEST_F(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {
   EXPECT_FALSE(after(1, 0, Step(100, 1, 2)));
   const auto left = after(2, 0, Step(200, 1, std::nextafter(2.0, 3.0)));
   ASSERT_TRUE(left);
-  EXPECT_EQ(left->step, 1);
-  EXPECT_EQ(left->coordinate, 1);
+  EXPECT_FIELDS(*left, (step, 1), (coordinate, 1));
   EXPECT_FALSE(after(3, 0, Step(299, 100, 100))) << "another step's";
   EXPECT_EQ(after(4, 2, Step(400, 100, 100))->step, 3) << "the last slice too";
   EXPECT_FALSE(after(5, 3, Step(500, 100, 100))) << "past the horizon";

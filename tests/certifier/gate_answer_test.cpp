@@ -9,8 +9,7 @@
 
 namespace forereach::gate_answer_test {
 
-class GateAnswerTest : public testing::Test {
- protected:
+struct GateAnswerTest : testing::Test {
   GateAnswer Decide(const candidate_plan_t& candidate) { return gate_.Decide(Encode(candidate), kNow); }
 
   Config config_ = SmallTask();
@@ -19,15 +18,11 @@ class GateAnswerTest : public testing::Test {
 
 TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
   Config config = SmallTask();
-  Problem problem = *config.problem;
-  problem.rest = {{2, 0.1}};
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).rest = {{2, 0.1}};
   Gate gate(config);
   const GateAnswer moving = gate.Decide(Encode(Candidate(1)), kNow);
-  EXPECT_EQ(moving.decision.outcome, decision_t::ABSTAIN_DOMAIN);
-  EXPECT_EQ(moving.decision.cause, decision_t::CAUSE_NO_STOP);
-  EXPECT_EQ(moving.decision.step, 10);
-  EXPECT_EQ(moving.decision.coordinate, 2);
+  EXPECT_FIELDS(moving.decision, (outcome, decision_t::ABSTAIN_DOMAIN), (cause, decision_t::CAUSE_NO_STOP), (step, 10),
+                (coordinate, 2));
   EXPECT_NEAR(moving.decision.margin, 1.05, 1e-9);
   EXPECT_EQ(moving.decision.threshold, 0.1);
   EXPECT_THAT(GetText(moving.decision.message), HasSubstr("at step 10 the plan ends, and vx reaches 1.05"));
@@ -39,17 +34,12 @@ TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
 
 TEST(GateLimit, AbstainsFromAPlanThatMayExceedALimit) {
   Config config = SmallTask();
-  Problem problem = *config.problem;
-  problem.limits = {{.name = "height", .that = {"py", 1, 1}, .at_most = 9},
-                    {.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).limits = {{.name = "height", .that = {"py", 1, 1}, .at_most = 9},
+                                {.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
   Gate gate(config);
   const GateAnswer fast = gate.Decide(Encode(Candidate(1)), kNow);
-  EXPECT_EQ(fast.decision.outcome, decision_t::ABSTAIN_SAFETY);
-  EXPECT_EQ(fast.decision.cause, decision_t::CAUSE_LIMIT);
-  EXPECT_EQ(fast.decision.step, 0);
-  EXPECT_EQ(fast.decision.coordinate, 1);
-  EXPECT_EQ(fast.decision.obstacle, -1);
+  EXPECT_FIELDS(fast.decision, (outcome, decision_t::ABSTAIN_SAFETY), (cause, decision_t::CAUSE_LIMIT), (step, 0),
+                (coordinate, 1), (obstacle, -1));
   EXPECT_GT(fast.decision.margin, 1);
   EXPECT_EQ(fast.decision.threshold, 1);
   EXPECT_THAT(GetText(fast.decision.message), HasSubstr("at step 0 speed squared may reach 1."));
@@ -72,16 +62,12 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
   const candidate_plan_t candidate = Candidate(7);
   const GateAnswer answer = Decide(candidate);
   const decision_t& decision = answer.decision;
-  EXPECT_EQ(decision.outcome, decision_t::CERTIFIED);
-  EXPECT_EQ(decision.cause, decision_t::CAUSE_NONE);
-  EXPECT_EQ(decision.step, -1);
-  EXPECT_EQ(decision.coordinate, -1);
+  EXPECT_FIELDS(decision, (outcome, decision_t::CERTIFIED), (cause, decision_t::CAUSE_NONE), (step, -1),
+                (coordinate, -1));
   EXPECT_EQ(decision.obstacle, 0) << "the closest";
   EXPECT_GT(decision.margin, decision.threshold);
   EXPECT_EQ(decision.threshold, 0.5) << "the circle's radius";
-  EXPECT_EQ(decision.utime, kNow);
-  EXPECT_EQ(decision.plan_id, 7);
-  EXPECT_EQ(decision.candidate_utime, candidate.utime);
+  EXPECT_FIELDS(decision, (utime, kNow), (plan_id, 7), (candidate_utime, candidate.utime));
   EXPECT_EQ(GetText(decision.source), "test");
   EXPECT_THAT(GetText(decision.message), HasSubstr("certified"));
   EXPECT_EQ(GetDigest(decision.plan_digest), DigestOf(Encode(candidate)));
@@ -89,8 +75,7 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
 
   ASSERT_TRUE(answer.certified);
   const certified_plan_t& certified = *answer.certified;
-  EXPECT_EQ(certified.utime, kNow);
-  EXPECT_EQ(certified.expires_utime, kNow + 2'000'000);
+  EXPECT_FIELDS(certified, (utime, kNow), (expires_utime, kNow + 2'000'000));
   EXPECT_EQ(Encode(certified.plan), Encode(candidate));
   EXPECT_EQ(GetDigest(certified.plan_digest), DigestOf(Encode(candidate)));
   EXPECT_THAT(FindSealFaults(certified), IsEmpty());
@@ -100,9 +85,7 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
 
 TEST_F(GateAnswerTest, ACertifiedPlanSaysWhatItsGuardHasToUphold) {
   for (const auto& [step_error_ms, step_error_us] : {std::pair(kAnyTime, -1), {0.0, 0}, {5.0, 5000}}) {
-    Problem problem = *config_.problem;
-    problem.declaration.state_error = Eigen::Vector4d(0.01, 0, 0.02, 0);
-    config_.problem = std::make_shared<const Problem>(problem);
+    Own(config_.problem).declaration.state_error = Eigen::Vector4d(0.01, 0, 0.02, 0);
     config_.gate.step_error_ms = step_error_ms;
     const GateAnswer answer = Gate(config_).Decide(Encode(Candidate(7)), kNow);
     ASSERT_TRUE(answer.certified);
@@ -127,9 +110,7 @@ TEST_F(GateAnswerTest, ACertificateNamesTheTransitionsOfTheTaskWithoutWhatWasLea
 TEST_F(GateAnswerTest, AbstainsForAnObstacleAndNamesIt) {
   const GateAnswer answer = Decide(Candidate(1, kAccelerationIntoTheCircle));
   const decision_t& decision = answer.decision;
-  EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_SAFETY);
-  EXPECT_EQ(decision.cause, decision_t::CAUSE_OBSTACLE);
-  EXPECT_EQ(decision.obstacle, 0);
+  EXPECT_FIELDS(decision, (outcome, decision_t::ABSTAIN_SAFETY), (cause, decision_t::CAUSE_OBSTACLE), (obstacle, 0));
   EXPECT_GT(decision.step, 0);
   EXPECT_LE(decision.step, 10);
   EXPECT_LE(decision.margin, decision.threshold);
@@ -144,12 +125,10 @@ TEST_F(GateAnswerTest, AControlOutsideTheInputDomainIsAnAbstentionNotARejection)
   candidate.plan_id = 2;
   candidate.control[3][1] = std::nextafter(3.0, 4.0);
   const GateAnswer answer = Decide(candidate);
-  EXPECT_EQ(answer.decision.outcome, decision_t::ABSTAIN_DOMAIN);
-  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_DOMAIN_EXIT);
-  EXPECT_EQ(answer.decision.step, 3);
+  EXPECT_FIELDS(answer.decision, (outcome, decision_t::ABSTAIN_DOMAIN), (cause, decision_t::CAUSE_DOMAIN_EXIT),
+                (step, 3));
   EXPECT_EQ(answer.decision.coordinate, 5) << "inputs follow the four states";
-  EXPECT_EQ(answer.decision.margin, std::nextafter(3.0, 4.0));
-  EXPECT_EQ(answer.decision.threshold, 3);
+  EXPECT_FIELDS(answer.decision, (margin, std::nextafter(3.0, 4.0)), (threshold, 3));
   EXPECT_FALSE(answer.certified);
 }
 
@@ -162,11 +141,8 @@ TEST_F(GateAnswerTest, ContradictingDataGiveFWithThePair) {
   for (const double acceleration :
        {kAccelerationThatCertifies, kAccelerationIntoTheCircle, kAccelerationOutsideDomain}) {
     const GateAnswer answer = gate.Decide(Encode(Candidate(static_cast<int>(acceleration) + 1, acceleration)), kNow);
-    EXPECT_EQ(answer.decision.outcome, decision_t::ABSTAIN_FALSIFIED);
-    EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_PAIRWISE);
-    EXPECT_EQ(answer.decision.first_observation, 0);
-    EXPECT_EQ(answer.decision.second_observation, 1);
-    EXPECT_EQ(answer.decision.coordinate, 2);
+    EXPECT_FIELDS(answer.decision, (outcome, decision_t::ABSTAIN_FALSIFIED), (cause, decision_t::CAUSE_PAIRWISE),
+                  (first_observation, 0), (second_observation, 1), (coordinate, 2));
     EXPECT_NEAR(answer.decision.margin, 0.01, 1e-12);
     EXPECT_FALSE(answer.certified);
   }
@@ -186,18 +162,12 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
     const GateAnswer answer = gate_.Decide(bytes, kNow);
     EXPECT_EQ(answer.decision.sequence, sequence++);
     EXPECT_EQ(GetDigest(answer.decision.plan_digest), DigestOf(Bytes(bytes)));
-    if (answer.certified) {
-      EXPECT_EQ(answer.certified->sequence, certificates++);
-    }
+    if (answer.certified) EXPECT_EQ(answer.certified->sequence, certificates++);
   }
   const certifier_status_t status = gate_.Status(kNow + 5);
-  EXPECT_EQ(status.utime, kNow + 5);
-  EXPECT_EQ(status.candidates, 50);
-  EXPECT_EQ(status.by_outcome[decision_t::CERTIFIED], 10);
-  EXPECT_EQ(status.by_outcome[decision_t::ABSTAIN_FALSIFIED], 0);
-  EXPECT_EQ(status.by_outcome[decision_t::ABSTAIN_DOMAIN], 10);
-  EXPECT_EQ(status.by_outcome[decision_t::ABSTAIN_SAFETY], 10);
-  EXPECT_EQ(status.by_outcome[decision_t::REJECTED], 20);
+  EXPECT_FIELDS(status, (utime, kNow + 5), (candidates, 50), (by_outcome[decision_t::CERTIFIED], 10),
+                (by_outcome[decision_t::ABSTAIN_FALSIFIED], 0), (by_outcome[decision_t::ABSTAIN_DOMAIN], 10),
+                (by_outcome[decision_t::ABSTAIN_SAFETY], 10), (by_outcome[decision_t::REJECTED], 20));
   EXPECT_EQ(certificates, 10);
   ExpectDigestsOf(config_, status);
 }
@@ -211,8 +181,7 @@ TEST_F(GateAnswerTest, AnErrorAfterTheProofLeavesNoCertificate) {
   const GateAnswer answer = gate_.Decide(Encode(Candidate(1)), fails_after_the_proof);
   EXPECT_EQ(calls, 2);
   EXPECT_FALSE(answer.certified);
-  EXPECT_EQ(answer.decision.outcome, decision_t::REJECTED);
-  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_INTERNAL_ERROR);
+  EXPECT_FIELDS(answer.decision, (outcome, decision_t::REJECTED), (cause, decision_t::CAUSE_INTERNAL_ERROR));
   EXPECT_EQ(gate_.Status(kNow).by_outcome[decision_t::CERTIFIED], 0);
 }
 
@@ -228,8 +197,7 @@ TEST_F(GateAnswerTest, RejectsPlanIdsThatWereUsedBeforeAReload) {
   }
   const GateAnswer next = reloaded.Decide(Encode(Candidate(9)), kNow);
   ASSERT_TRUE(next.certified);
-  EXPECT_EQ(next.decision.sequence, 4);
-  EXPECT_EQ(next.certified->sequence, 1);
+  EXPECT_FIELDS(next, (decision.sequence, 4), (certified->sequence, 1));
   EXPECT_EQ(reloaded.Status(kNow).candidates, 5);
 }
 
@@ -290,22 +258,17 @@ TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheSeal) {
   const GateAnswer answer = Decide(Candidate(1));
   ASSERT_TRUE(answer.certified);
   const std::vector<std::uint8_t> good = Encode(*answer.certified);
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  FreshRandom random;
   for (std::size_t i = random() % 7; i < good.size(); i += 7) {
     std::vector<std::uint8_t> bytes = good;
     bytes[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
     const auto tampered = Decoded<certified_plan_t>(bytes);
     ASSERT_EQ(tampered.has_value(), i >= 8) << i;
-    if (tampered) {
-      ASSERT_THAT(FindSealFaults(*tampered), Not(IsEmpty())) << i;
-    }
+    if (tampered) ASSERT_THAT(FindSealFaults(*tampered), Not(IsEmpty())) << i;
   }
 }
 
-class GateAdviceTest : public GateAnswerTest {
- protected:
+struct GateAdviceTest : GateAnswerTest {
   std::optional<advice_t> AdviceOn(Gate& gate, const candidate_plan_t& candidate, const SearchEffort& effort = {}) {
     decision_ = gate.Decide(Encode(candidate), kNow).decision;
     return gate.Advise(candidate, decision_, effort);
@@ -318,8 +281,7 @@ TEST_F(GateAdviceTest, SaysHowFarAPlanHasToGiveWay) {
   const candidate_plan_t candidate = Candidate(1, kAccelerationIntoTheCircle);
   const auto advice = AdviceOn(gate_, candidate);
   ASSERT_TRUE(advice);
-  EXPECT_EQ(advice->plan_id, 1);
-  EXPECT_EQ(advice->candidate_utime, candidate.utime);
+  EXPECT_FIELDS(*advice, (plan_id, 1), (candidate_utime, candidate.utime));
   EXPECT_EQ(GetText(advice->source), "test");
   EXPECT_EQ(GetDigest(advice->plan_digest), DigestOf(Encode(candidate)));
   EXPECT_EQ(GroundsOf(*advice), gate_.grounds());
@@ -348,14 +310,11 @@ TEST_F(GateAdviceTest, SaysWhatLeavesTheDomainAndByHowMuch) {
   const advice_change_t& change = advice->change[0];
   EXPECT_EQ(std::tuple(change.kind, change.index, change.verified, change.step),
             std::tuple(advice_change_t::DOMAIN, 4, 0, 0));
-  EXPECT_EQ(change.value, 1);
-  EXPECT_EQ(change.direction[0], -1);
+  EXPECT_FIELDS(change, (value, 1), (direction[0], -1));
 }
 
 TEST_F(GateAdviceTest, SaysHowMuchMoreRoomALimitNeeds) {
-  Problem problem = *config_.problem;
-  problem.limits = {{.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
-  config_.problem = std::make_shared<const Problem>(problem);
+  Own(config_.problem).limits = {{.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
   Gate gate(config_);
   const auto advice = AdviceOn(gate, Candidate(1));
   ASSERT_TRUE(advice);
@@ -403,7 +362,7 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
   const auto expect_refused = [&](auto change, const char* why) {
     transition_t bad = good;
     change(bad);
-    EXPECT_THAT(gate.Learn(Encode(bad)), testing::HasSubstr(why));
+    EXPECT_THAT(gate.Learn(Encode(bad)), HasSubstr(why));
     EXPECT_EQ(gate.grounds().observations, config.grounds.observations);
   };
   expect_refused([](auto& t) { t.num_states = 5; }, "5 states and 2 inputs, the task has 4 and 2");
@@ -420,9 +379,7 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
 TEST(GateTransitionTest, ATransitionThatItsErrorsMayTakeOutOfTheDomainIsNotLearned) {
   Config config = SmallTask();
   config.gate.learns = true;
-  Problem problem = *config.problem;
-  problem.declaration.state_error = Eigen::Vector4d(0.25, 0, 0, 0);
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).declaration.state_error = Eigen::Vector4d(0.25, 0, 0, 0);
   Gate gate(config);
   transition_t transition{.num_states = 4, .num_inputs = 2};
   const auto at = [&](double px) {
@@ -431,7 +388,7 @@ TEST(GateTransitionTest, ATransitionThatItsErrorsMayTakeOutOfTheDomainIsNotLearn
   };
   EXPECT_EQ(at(19.75), "");
   EXPECT_THAT(at(std::nextafter(19.75, 20)),
-              testing::HasSubstr("within the declared errors of states and inputs it may lie outside"));
+              HasSubstr("within the declared errors of states and inputs it may lie outside"));
 }
 
 TEST(CandidateMessageTest, TheStartIsReadFromTheBytesAsADecoderReadsIt) {

@@ -19,8 +19,7 @@ candidate_batch_t BatchOf(const std::vector<double>& accelerations, std::int64_t
   return batch;
 }
 
-class GateBatchTest : public testing::Test {
- protected:
+struct GateBatchTest : testing::Test {
   GateAnswer Decide(const candidate_batch_t& batch) { return gate_.Decide(Encode(batch), kNow); }
 
   void ExpectRefused(int cause, const std::string& why, const std::function<void(candidate_batch_t&)>& corrupt) {
@@ -86,7 +85,7 @@ TEST_F(GateBatchTest, TheFirstThatIsCertifiedIsAnsweredAsIfItWasSentAlone) {
   const GateAnswer answer = Decide(batch);
   ASSERT_TRUE(answer.certified);
   EXPECT_EQ(answer.decision.plan_id, 3);
-  EXPECT_THAT(GetText(answer.decision.message), testing::StartsWith("candidate 2 of 0..4: certified"));
+  EXPECT_THAT(GetText(answer.decision.message), StartsWith("candidate 2 of 0..4: certified"));
   EXPECT_TRUE(FindSealFaults(*answer.certified).empty());
 
   GateAnswer alone = Gate(SmallTask()).Decide(Encode(Candidate(3)), kNow);
@@ -99,10 +98,9 @@ TEST_F(GateBatchTest, TheFirstThatIsCertifiedIsAnsweredAsIfItWasSentAlone) {
 TEST_F(GateBatchTest, WithoutACertificateTheFirstIsAnsweredAndTheCausesAreCounted) {
   const GateAnswer answer = Decide(BatchOf({kLeaves, kCollides, kCollides}));
   EXPECT_FALSE(answer.certified);
-  EXPECT_EQ(answer.decision.plan_id, 1);
-  EXPECT_EQ(answer.decision.outcome, decision_t::ABSTAIN_DOMAIN);
+  EXPECT_FIELDS(answer.decision, (plan_id, 1), (outcome, decision_t::ABSTAIN_DOMAIN));
   EXPECT_THAT(GetText(answer.decision.message),
-              testing::StartsWith("none of 3 (domain_exit 1, obstacle 2); the first: abstain D"));
+              StartsWith("none of 3 (domain_exit 1, obstacle 2); the first: abstain D"));
 }
 
 TEST_F(GateBatchTest, InShadowModeNothingIsCertified) {
@@ -110,15 +108,13 @@ TEST_F(GateBatchTest, InShadowModeNothingIsCertified) {
   config.gate.shadow = true;
   const GateAnswer answer = Gate(config).Decide(Encode(BatchOf({kCollides, kGood})), kNow);
   EXPECT_FALSE(answer.certified);
-  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_SHADOW);
-  EXPECT_EQ(answer.decision.plan_id, 2);
+  EXPECT_FIELDS(answer.decision, (cause, decision_t::CAUSE_SHADOW), (plan_id, 2));
 }
 
 TEST_F(GateBatchTest, WhatIsRefusedFromOutsideIsRefusedByItsFirst) {
   const GateAnswer answer =
       gate_.Refuse(Encode(BatchOf({kCollides, kGood})), kNow, decision_t::CAUSE_NOT_ARMED, "no robot");
-  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_NOT_ARMED);
-  EXPECT_EQ(answer.decision.plan_id, 1);
+  EXPECT_FIELDS(answer.decision, (cause, decision_t::CAUSE_NOT_ARMED), (plan_id, 1));
   EXPECT_FALSE(answer.certified);
 }
 
@@ -163,8 +159,7 @@ TEST_F(GateBatchTest, BytesOfAnotherLengthAreRefused) {
 TEST_F(GateBatchTest, IsARepetitionIfAnIdOfItWasDecidedOn) {
   const candidate_batch_t batch = BatchOf({kCollides, kGood, kGood});
   ASSERT_TRUE(Decide(batch).certified);
-  EXPECT_EQ(Decide(batch).decision.cause, decision_t::CAUSE_DUPLICATE);
-  EXPECT_EQ(Decide(batch).decision.plan_id, 2);
+  EXPECT_FIELDS(Decide(batch).decision, (cause, decision_t::CAUSE_DUPLICATE), (plan_id, 2));
   EXPECT_EQ(Decide(BatchOf({kGood, kGood}, 1)).decision.cause, decision_t::CAUSE_DUPLICATE);
   EXPECT_EQ(gate_.Decide(Encode(Candidate(2)), kNow).decision.cause, decision_t::CAUSE_DUPLICATE);
   EXPECT_TRUE(Decide(BatchOf({kGood}, 3)).certified) << "what was not decided on is not used";
@@ -175,10 +170,8 @@ TEST_F(GateBatchTest, LooksForACertificateForHalfOfTheBudget) {
   std::int64_t now = kNow;
   const auto clock = [&] { return std::exchange(now, now + 500); };  // a plan in half a millisecond of five
   const GateAnswer answer = gate_.Decide(Encode(BatchOf(accelerations)), clock);
-  EXPECT_EQ(answer.decision.utime, kNow);
-  EXPECT_EQ(answer.decision.outcome, decision_t::ABSTAIN_SAFETY);
-  EXPECT_THAT(GetText(answer.decision.message),
-              testing::StartsWith("none of 9 (not judged 5, obstacle 4); the first: "));
+  EXPECT_FIELDS(answer.decision, (utime, kNow), (outcome, decision_t::ABSTAIN_SAFETY));
+  EXPECT_THAT(GetText(answer.decision.message), StartsWith("none of 9 (not judged 5, obstacle 4); the first: "));
 }
 
 TEST_F(GateBatchTest, ItsStartIsReadWhereItLies) {

@@ -6,6 +6,7 @@
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "tests/certifier/small_task.h"
+#include "tests/messages.h"
 
 namespace forereach::gate_mutation_test {
 
@@ -127,12 +128,9 @@ TEST(GateMutationTest, EveryAnswerIsADecisionAndOnlyWhatIsCertifiableIsCertified
       const bool certified = decision.outcome == decision_t::CERTIFIED;
       ASSERT_EQ(decision.cause == decision_t::CAUSE_NONE, certified);
       ASSERT_EQ(answer.certified.has_value(), certified);
-      if (decision.outcome != decision_t::REJECTED && decision.outcome != decision_t::ABSTAIN_DEADLINE) {
+      if (decision.outcome != decision_t::REJECTED && decision.outcome != decision_t::ABSTAIN_DEADLINE)
         ASSERT_EQ(CertifiesDirectly(certifier, bytes, config.obstacles, tube), certified);
-      }
-      if (certified) {
-        ASSERT_EQ(Encode(answer.certified->plan), bytes);
-      }
+      if (certified) ASSERT_EQ(Encode(answer.certified->plan), bytes);
       ++outcomes[static_cast<std::size_t>(decision.outcome)];
     }
     ASSERT_EQ(gate.Status(kNow).candidates, kBatch);
@@ -153,17 +151,14 @@ TEST(GateMutationTest, ObstacleUpdatesApplyWholeOrNotAtAll) {
     Gate gate(SmallTaskOnTheBus());
     for (int i = 0; i < kBatch; ++i) {
       SCOPED_TRACE("batch " + std::to_string(batch) + ", message " + std::to_string(i));
-      obstacles_t message = ToMessage(obstacles, kNow);
-      message.sequence = i;
+      obstacles_t message = Sighted(obstacles, kNow, i);
       std::vector<std::uint8_t> bytes = Encode(message);
       mutator.Flip(bytes, mutator.Below(4), head);
       const Digest before = GetDigest(gate.Status(kNow).obstacles_digest);
       const bool good = gate.UpdateObstacles(bytes, kNow).empty();
       const Digest after = GetDigest(gate.Status(kNow).obstacles_digest);
       ASSERT_EQ(after, ObstaclesDigest(gate.obstacles()));
-      if (!good) {
-        ASSERT_EQ(after, before);
-      }
+      if (!good) ASSERT_EQ(after, before);
       ++(good ? applied : refused);
       const decision_t decision = gate.Decide(Encode(Candidate(i)), kNow).decision;
       ASSERT_NE(decision.cause, decision_t::CAUSE_INTERNAL_ERROR) << GetText(decision.message);

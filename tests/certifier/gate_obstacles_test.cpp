@@ -4,9 +4,8 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
-#include "certifier/gate/obstacle_message.h"
-#include "forereach/transition_t.hpp"
 #include "tests/certifier/small_task.h"
+#include "tests/messages.h"
 
 namespace forereach::gate_obstacles_test {
 
@@ -17,13 +16,10 @@ const std::vector<Obstacle> kOnTheWay = {Obstacle::Circle(Eigen::Vector2d(0, 15)
                                          Obstacle::AxisBox(Eigen::Vector2d(1, -1), Eigen::Vector2d(2, 1))};
 
 obstacles_t Message(const std::vector<Obstacle>& obstacles, std::int64_t sequence) {
-  obstacles_t message = ToMessage(obstacles, kNow);
-  message.sequence = sequence;
-  return message;
+  return Sighted(obstacles, kNow, sequence);
 }
 
-class GateObstaclesTest : public testing::Test {
- protected:
+struct GateObstaclesTest : testing::Test {
   std::string Update(const obstacles_t& message) { return gate_.UpdateObstacles(Encode(message), kNow); }
   decision_t Decide(double acceleration = kAccelerationThatCertifies) {
     return gate_.Decide(Encode(Candidate(next_plan_id_++, acceleration)), kNow).decision;
@@ -142,10 +138,8 @@ TEST(GateTaskObstaclesTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAll) {
   EXPECT_EQ(gate.grounds().obstacles, SmallTask().grounds.obstacles);
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
   const certifier_status_t status = gate.Status(kNow);
-  EXPECT_EQ(status.obstacles_source, certifier_status_t::OBSTACLES_TASK);
-  EXPECT_EQ(status.obstacles_known, 1);
-  EXPECT_EQ(status.obstacles_in_force, 1);
-  EXPECT_EQ(status.obstacles_age_us, -1);
+  EXPECT_FIELDS(status, (obstacles_source, certifier_status_t::OBSTACLES_TASK), (obstacles_known, 1),
+                (obstacles_in_force, 1), (obstacles_age_us, -1));
 }
 
 TEST(GateTaskObstaclesTest, ATaskThatNamesNoSourceHasThemAllToo) {
@@ -160,14 +154,11 @@ TEST(GateTaskObstaclesTest, ATaskThatNamesNoSourceHasThemAllToo) {
 
 TEST_F(GateObstaclesTest, ObstaclesAreUnknownBeforeTheFirstMessage) {
   EXPECT_EQ(Why(), "none has been heard yet");
-  EXPECT_EQ(gate_.Status(kNow).obstacles_known, 0);
-  EXPECT_EQ(gate_.Status(kNow).obstacles_source, certifier_status_t::OBSTACLES_BUS);
+  EXPECT_FIELDS(gate_.Status(kNow), (obstacles_known, 0), (obstacles_source, certifier_status_t::OBSTACLES_BUS));
   Say(41);
   EXPECT_EQ(Why(), "") << "a certifier may start while somebody sends";
-  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_known, 1);
-  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_age_us, 7);
-  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_utime, kNow);
-  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_in_force, 2);
+  EXPECT_FIELDS(gate_.Status(kNow + 7), (obstacles_known, 1), (obstacles_age_us, 7), (obstacles_utime, kNow),
+                (obstacles_in_force, 2));
 }
 
 TEST_F(GateObstaclesTest, ObstaclesAreKnownUntilTheTimeoutAndNotLonger) {
@@ -241,9 +232,7 @@ TEST_F(GateObstaclesTest, TwoSendersAreNeverKnownTogether) {
         obstacles_t message = Message(is_second ? kOnTheWay : kFarAway, (is_second ? second : first) + i);
         message.utime = kNow + 10 * i + (is_second ? 5 : 0);
         static_cast<void>(gate.UpdateObstacles(Encode(message), kNow + 10 * i + 5));
-        if (i >= 1 || is_second) {
-          EXPECT_NE(gate.WhyObstaclesUnknown(kNow + 10 * i + 5), "") << what << " " << i;
-        }
+        if (i >= 1 || is_second) EXPECT_NE(gate.WhyObstaclesUnknown(kNow + 10 * i + 5), "") << what << " " << i;
       }
     }
   }
@@ -326,8 +315,7 @@ TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
     EXPECT_EQ(gate->WhyObstaclesUnknown(kNow), "");
     EXPECT_NE(gate->WhyObstaclesUnknown(kNow + 1'000'001), "");
     const decision_t decision = gate->Decide(Encode(Candidate(next_plan_id_++)), kNow).decision;
-    EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_SAFETY);
-    EXPECT_EQ(decision.obstacle, 2);
+    EXPECT_FIELDS(decision, (outcome, decision_t::ABSTAIN_SAFETY), (obstacle, 2));
     EXPECT_NE(gate->UpdateObstacles(Encode(Message(kFarAway, 0)), kNow), "") << "as old as the one before";
   }
   EXPECT_EQ(once->UpdateObstacles(Encode(Message(kFarAway, 1)), kNow), "");
@@ -393,9 +381,7 @@ TEST_F(GateObstaclesTest, SixtyFourObstaclesFit) {
 // ---- Obstacles that move.
 
 std::vector<Obstacle> Passing() {
-  ObstacleMotion motion;
-  motion.stamp_us = kNow;
-  motion.velocity = {0, 1, 0};
+  ObstacleMotion motion{.stamp_us = kNow, .velocity = {0, 1, 0}};
   return {Obstacle::Circle(Eigen::Vector2d(8, 0), 0.5).Moving(motion)};
 }
 
@@ -407,9 +393,7 @@ Config SmallTaskWithAClock() {
 
 std::vector<std::uint8_t> MovingMessage(std::int64_t sequence, std::int64_t utime = kNow,
                                         const std::vector<Obstacle>& obstacles = Passing()) {
-  obstacles_t message = ToMessage(obstacles, utime);
-  message.sequence = sequence;
-  return Encode(message);
+  return Encode(Sighted(obstacles, utime, sequence));
 }
 
 TEST(GateMovingTest, WhatMovesAndWhatStandsIsOneStream) {
@@ -442,8 +426,7 @@ TEST(GateMovingTest, RefusesMessagesThatAreStaleFromTheFutureOrMalformed) {
   EXPECT_THAT(gate.WhyObstaclesUnknown(kNow), HasSubstr("the last message was refused"));
   EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
-  obstacles_t nowhere = ToMessage(Passing(), kNow);
-  nowhere.sequence = 1;
+  obstacles_t nowhere = Sighted(Passing(), kNow, 1);
   nowhere.obstacle[0].from_utime = kNow + 1;
   const Digest before = gate.grounds().obstacles;
   EXPECT_THAT(gate.UpdateObstacles(Encode(nowhere), kNow), HasSubstr("track 0 begins at"));
@@ -472,7 +455,7 @@ decision_t DecisionAmong(const std::vector<Obstacle>& obstacles) {
 std::int16_t OutcomeAmong(const std::vector<Obstacle>& obstacles) {
   const decision_t decision = DecisionAmong(obstacles);
   if (decision.outcome == decision_t::ABSTAIN_SAFETY) {
-    EXPECT_THAT(decision.step, testing::AnyOf(4, 5));
+    EXPECT_THAT(decision.step, AnyOf(4, 5));
     EXPECT_EQ(decision.obstacle, static_cast<int>(obstacles.size())) << "the task's own comes first";
   }
   return decision.outcome;
@@ -541,8 +524,7 @@ TEST(GateMovingTest, AScheduleOutOfItsBoundsIsRejected) {
     candidate_plan_t candidate = Candidate(++id);
     candidate.step_us = step;
     const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
-    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
-    EXPECT_EQ(decision.cause, decision_t::CAUSE_WRONG_DIMENSION);
+    EXPECT_FIELDS(decision, (outcome, decision_t::REJECTED), (cause, decision_t::CAUSE_WRONG_DIMENSION));
     EXPECT_THAT(GetText(decision.message), HasSubstr("step_us is " + std::to_string(step) + ", must be 1 to 150000"));
     EXPECT_EQ(without.Decide(Encode(candidate), kNow).decision.outcome, decision_t::CERTIFIED);
   }
@@ -575,8 +557,7 @@ TEST(GateMovingTest, AStepOfAnotherTimeThanTheModelsIsRejected) {
       EXPECT_EQ(decision.outcome, decision_t::CERTIFIED);
       continue;
     }
-    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
-    EXPECT_EQ(decision.cause, decision_t::CAUSE_WRONG_DIMENSION);
+    EXPECT_FIELDS(decision, (outcome, decision_t::REJECTED), (cause, decision_t::CAUSE_WRONG_DIMENSION));
     EXPECT_THAT(GetText(decision.message), HasSubstr("must be 150000, model.dt")) << step_us;
   }
 }

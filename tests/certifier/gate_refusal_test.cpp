@@ -15,8 +15,7 @@ using Shorts = std::initializer_list<std::int16_t>;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
 constexpr std::int64_t kMin = std::numeric_limits<std::int64_t>::min(), kMax = std::numeric_limits<std::int64_t>::max();
 
-class GateRefusalTest : public testing::Test {
- protected:
+struct GateRefusalTest : testing::Test {
   decision_t Decide(const candidate_plan_t& candidate) { return Decide(Encode(candidate)); }
   decision_t Decide(const std::vector<std::uint8_t>& bytes) {
     const GateAnswer answer = gate_.Decide(bytes, kNow);
@@ -87,8 +86,7 @@ TEST_F(GateRefusalTest, AbstainsFromACandidateThatStartsBeforeADecisionCanBeExpe
   candidate_plan_t candidate = Candidate(1);
   candidate.start_utime = kNow + 399'999;
   const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
-  EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_DEADLINE);
-  EXPECT_EQ(decision.cause, decision_t::CAUSE_DEADLINE);
+  EXPECT_FIELDS(decision, (outcome, decision_t::ABSTAIN_DEADLINE), (cause, decision_t::CAUSE_DEADLINE));
   EXPECT_THAT(GetText(decision.message), HasSubstr("it starts in 399.999 ms, a decision may take 400 ms"));
   candidate = Candidate(2);
   candidate.start_utime = kNow + 400'000;
@@ -251,9 +249,7 @@ TEST_F(GateRefusalTest, RejectsAnUnknownFingerprint) {
 
 TEST_F(GateRefusalTest, EmptyBytesLeaveNothingOfACandidateInTheDecision) {
   const decision_t decision = Decide(std::vector<std::uint8_t>{});
-  EXPECT_EQ(decision.cause, decision_t::CAUSE_WRONG_LENGTH);
-  EXPECT_EQ(decision.plan_id, 0);
-  EXPECT_EQ(decision.candidate_utime, 0);
+  EXPECT_FIELDS(decision, (cause, decision_t::CAUSE_WRONG_LENGTH), (plan_id, 0), (candidate_utime, 0));
   EXPECT_EQ(GetText(decision.source), "");
   EXPECT_EQ(decision.utime, kNow);
 }
@@ -262,9 +258,7 @@ TEST_F(GateRefusalTest, WhatCouldBeDecodedIsNamedInTheDecision) {
   candidate_plan_t candidate = Candidate(42);
   candidate.utime = 17;
   const decision_t decision = Decide(candidate);
-  EXPECT_EQ(decision.cause, decision_t::CAUSE_STALE);
-  EXPECT_EQ(decision.plan_id, 42);
-  EXPECT_EQ(decision.candidate_utime, 17);
+  EXPECT_FIELDS(decision, (cause, decision_t::CAUSE_STALE), (plan_id, 42), (candidate_utime, 17));
   EXPECT_EQ(GetText(decision.source), "test");
 }
 
@@ -285,8 +279,7 @@ TEST_F(GateRefusalTest, RejectsACandidateWhenCertifyingThrows) {
   config.obstacles = {Obstacle::HalfSpace(Eigen::VectorXd::Ones(1), 100)};  // not in the safety dimension
   Gate gate(config);
   const GateAnswer answer = gate.Decide(Encode(Candidate(1)), kNow);
-  EXPECT_EQ(answer.decision.outcome, decision_t::REJECTED);
-  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_INTERNAL_ERROR);
+  EXPECT_FIELDS(answer.decision, (outcome, decision_t::REJECTED), (cause, decision_t::CAUSE_INTERNAL_ERROR));
   EXPECT_THAT(GetText(answer.decision.message), HasSubstr("internal error: obstacle 0: dimension 1"));
   EXPECT_FALSE(answer.certified);
 }

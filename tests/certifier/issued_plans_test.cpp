@@ -8,34 +8,25 @@ namespace forereach::issued_plans_test {
 constexpr std::int64_t kStep = 100'000, kLifetime = 2'000'000, kAge = 500'000, kSteady = 5'000'000;
 constexpr std::int64_t kWall = 1'700'000'000'000'000;
 
-class IssuedPlansTest : public testing::Test {
- protected:
+struct IssuedPlansTest : testing::Test {
   static GateOptions Gate() {
-    GateOptions gate;
-    gate.certificate_lifetime_ms = kLifetime / 1e3;
-    gate.max_age_ms = kAge / 1e3;
-    gate.longest_step_ms = kStep / 1e3;
-    return gate;
+    return {.max_age_ms = kAge / 1e3, .certificate_lifetime_ms = kLifetime / 1e3, .longest_step_ms = kStep / 1e3};
   }
   static std::int64_t Life(int steps) { return kLifetime + 2 * kAge + steps * kStep; }
 
   // Certified at kWall, by the clock that nobody sets at kLater.
   static certified_plan_t Plan(std::int64_t plan_id, int steps = 10) {
-    certified_plan_t certified{};
-    certified.utime = kWall;
-    certified.expires_utime = kWall + kLifetime;
+    certified_plan_t certified{.utime = kWall, .expires_utime = kWall + kLifetime};
     certified.plan.plan_id = plan_id;
     certified.plan.num_steps = static_cast<std::int16_t>(steps);
     certified.plan.step_us = kStep;
     return certified;
   }
   static robot_state_t Executing(std::int64_t plan_id, int step, std::int64_t utime = kWall) {
-    robot_state_t state{};
-    state.mode = robot_state_t::EXECUTING;
-    state.executing_plan_id = plan_id;
-    state.executing_step = static_cast<std::int16_t>(step);
-    state.utime = utime;
-    return state;
+    return {.utime = utime,
+            .executing_plan_id = plan_id,
+            .executing_step = static_cast<std::int16_t>(step),
+            .mode = robot_state_t::EXECUTING};
   }
   std::string Judge(const robot_state_t& state, std::int64_t steady) {
     const auto stranger = issued_.FindStranger(state, steady);

@@ -104,11 +104,9 @@ TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
     const std::vector<Obstacle> taken = Taken({piece});
     ASSERT_TRUE(taken[0].motion());
     const ObstacleMotion& motion = *taken[0].motion();
-    EXPECT_EQ(motion.velocity, Eigen::Vector3d(piece.velocity[0], piece.velocity[1], 0));
-    EXPECT_EQ(motion.uncertainty, piece.uncertainty);
-    EXPECT_EQ(motion.growth, piece.growth);
-    EXPECT_EQ(motion.growth_rate, piece.growth_rate);
-    EXPECT_EQ(motion.stamp_us, kNow);
+    EXPECT_FIELDS(motion, (velocity, Eigen::Vector3d(piece.velocity[0], piece.velocity[1], 0)),
+                  (uncertainty, piece.uncertainty), (growth, piece.growth), (growth_rate, piece.growth_rate),
+                  (stamp_us, kNow));
   }
   obstacle_t third = Piece(0, kMost);
   third.velocity[2] = 5;
@@ -148,9 +146,8 @@ TEST(ObstaclesV2Test, OnlyTheLastPieceOfATrackMayBeGone) {
   EXPECT_THAT(WhyRefused({Gone(last), first, last}), HasSubstr("only one of them is gone"));
   EXPECT_EQ(WhyRefused({first, Gone(last), Gone(last)}), "");
   for (const Obstacle& obstacle : Taken({Piece(kNow, kNow + 20), first, last}))
-    if (WindowOf(obstacle).second != kNow + 10) {
+    if (WindowOf(obstacle).second != kNow + 10)
       EXPECT_EQ(WindowOf(obstacle).second, kEnd) << "both that end last go on";
-    }
 }
 
 TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
@@ -242,20 +239,15 @@ TEST(ObstaclesV2Test, PredictionsGoThroughTheBus) {
   EXPECT_EQ(message.obstacle[1].track, message.obstacle[2].track);
   EXPECT_NE(message.obstacle[2].track, message.obstacle[3].track);
   EXPECT_NE(message.obstacle[0].track, message.obstacle[1].track);
-  EXPECT_EQ(message.obstacle[1].gone, 0);
-  EXPECT_EQ(message.obstacle[2].gone, 1);
-  EXPECT_EQ(message.obstacle[3].gone, 1);
+  EXPECT_FIELDS(message, (obstacle[1].gone, 0), (obstacle[2].gone, 1), (obstacle[3].gone, 1));
   EXPECT_EQ(ObstaclesDigest(FromMessage(*Decoded<obstacles_t>(Encode(message)), 2)), ObstaclesDigest(obstacles));
   const std::vector<std::int64_t> tracks{4, 3, 3, 1};
-  EXPECT_EQ(ToMessage(obstacles, kNow, tracks).obstacle[2].track, 3);
-  EXPECT_EQ(ToMessage(obstacles, kNow, tracks).obstacle[1].gone, 0);
+  EXPECT_FIELDS(ToMessage(obstacles, kNow, tracks), (obstacle[2].track, 3), (obstacle[1].gone, 0));
 }
 
 // Whatever is taken, every track is somewhere at all times from the message on, until it is gone.
 TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  FreshRandom random;
   const auto below = [&](int n) { return static_cast<std::int64_t>(random() % static_cast<unsigned>(n)); };
   int taken = 0, refused = 0;
   for (int trial = 0; trial < 20'000; ++trial) {

@@ -20,8 +20,7 @@ TEST(ObstacleSenderTest, SaysNothingBeforeItKnowsAndThenTheWholeSetEachPeriod) {
     const auto message = sender.Due(now);
     EXPECT_EQ(message.has_value(), (now - 10) % 1000 == 0) << now;
     if (!message) continue;
-    EXPECT_EQ(message->sequence, said++);
-    EXPECT_EQ(message->utime, now);
+    EXPECT_FIELDS(*message, (sequence, said++), (utime, now));
     EXPECT_EQ(ObstaclesDigest(FromMessage(*message, 2)), ObstaclesDigest(kOne));
   }
   EXPECT_EQ(said, 11);
@@ -37,8 +36,7 @@ TEST(ObstacleSenderTest, AChangeIsDueAtOnceAndTheSameSetIsNot) {
   const auto none = sender.Due(2);
   ASSERT_TRUE(none);
   EXPECT_EQ(none->num_obstacles, 0) << "nothing of those before is left";
-  EXPECT_EQ(none->obstacle[0].shape.num_points, 0);
-  EXPECT_EQ(none->sequence, 1);
+  EXPECT_FIELDS(*none, (obstacle[0].shape.num_points, 0), (sequence, 1));
 }
 
 TEST(ObstacleSenderTest, AClockThatWasSetBackDelaysNothing) {
@@ -65,10 +63,8 @@ TEST(ObstacleSenderTest, WhatMovesKeepsItsStampAndWhatStandsGetsThatOfTheMessage
   for (const std::int64_t now : {1000, 2000}) {
     const auto message = sender.Due(now);
     ASSERT_TRUE(message);
-    EXPECT_EQ(message->obstacle[0].utime, now);
-    EXPECT_EQ(message->obstacle[1].utime, 500);
-    EXPECT_EQ(message->obstacle[0].track, 7);
-    EXPECT_EQ(message->obstacle[1].track, 9);
+    EXPECT_FIELDS(*message, (obstacle[0].utime, now), (obstacle[1].utime, 500), (obstacle[0].track, 7),
+                  (obstacle[1].track, 9));
     EXPECT_EQ(ObstaclesDigest(FromMessage(*message, 2)), ObstaclesDigest({kOne[0], kOne[0].Moving(motion)}));
   }
   motion.stamp_us = 501;
@@ -82,17 +78,12 @@ TEST(ObstacleSenderTest, WhatMovesKeepsItsStampAndWhatStandsGetsThatOfTheMessage
 }
 
 TEST(ObstacleSenderTest, MotionsOfAFileBeginWithTheSender) {
-  ObstacleMotion motion;
-  motion.from_us = -20;
-  motion.until_us = 30;
+  ObstacleMotion motion{.from_us = -20, .until_us = 30};
   const std::vector<Obstacle> begun = BegunAt(kNow, {kOne[0], kOne[0].Moving(motion), kOne[0].Moving({})});
   EXPECT_FALSE(begun[0].motion());
-  EXPECT_EQ(begun[1].motion()->stamp_us, kNow);
-  EXPECT_EQ(begun[1].motion()->from_us, kNow - 20);
-  EXPECT_EQ(begun[1].motion()->until_us, kNow + 30);
-  EXPECT_EQ(begun[2].motion()->stamp_us, kNow);
-  EXPECT_EQ(begun[2].motion()->from_us, -ObstacleMotion::kAlways);
-  EXPECT_EQ(begun[2].motion()->until_us, ObstacleMotion::kAlways);
+  EXPECT_FIELDS(*begun[1].motion(), (stamp_us, kNow), (from_us, kNow - 20), (until_us, kNow + 30));
+  EXPECT_FIELDS(*begun[2].motion(), (stamp_us, kNow), (from_us, -ObstacleMotion::kAlways),
+                (until_us, ObstacleMotion::kAlways));
 }
 
 // Two pieces of one track that begins at 100, one that began before, and one that stands.
@@ -139,9 +130,7 @@ TEST(ObstacleSenderTest, AtItsPeriodAGateKnowsWhereTwoMessagesInARowAreLost) {
   int said = 0;
   for (std::int64_t now = kNow; now <= kNow + 10'000'000; now += 2000) {
     const auto message = sender.Due(now);
-    if (message && ++said % 5 < 3) {
-      EXPECT_EQ(gate.UpdateObstacles(Encode(*message), now), "");
-    }
+    if (message && ++said % 5 < 3) EXPECT_EQ(gate.UpdateObstacles(Encode(*message), now), "");
     EXPECT_EQ(gate.WhyObstaclesUnknown(now).find(" old, "), std::string::npos) << now - kNow;
   }
 }

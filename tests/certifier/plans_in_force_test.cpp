@@ -5,32 +5,26 @@
 
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
-#include "forereach/transition_t.hpp"
 #include "tests/certifier/small_task.h"
+#include "tests/messages.h"
 
 namespace forereach::plans_in_force_test {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr int kSteps = 10;  // of Candidate
 
-class PlansInForceTest : public testing::Test {
- protected:
-  PlansInForceTest() {
-    EXPECT_EQ(See({}), "");
-    plans_.Judge(gate_, now_);
-  }
+struct PlansInForceTest : testing::Test {
+  PlansInForceTest() { SeeAndJudge({}); }
 
   std::string See(const std::vector<Obstacle>& obstacles) {
-    obstacles_t message = ToMessage(obstacles, now_);
-    message.sequence = sequence_++;
-    return gate_.UpdateObstacles(Encode(message), now_);
+    return gate_.UpdateObstacles(Encode(Sighted(obstacles, now_, sequence_++)), now_);
   }
-  // Unsafe where px >= offset.
-  void SeeWall(double offset) {
-    EXPECT_EQ(See({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset)}), "");
+  void SeeAndJudge(const std::vector<Obstacle>& obstacles) {
+    EXPECT_EQ(See(obstacles), "");
     plans_.Judge(gate_, now_);
   }
+  // Unsafe where px >= offset.
+  void SeeWall(double offset) { SeeAndJudge({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset)}); }
   certified_plan_t Certify(std::int64_t plan_id, const char* source = "test") {
     candidate_plan_t candidate = Candidate(plan_id, kAccelerationThatCertifies, now_);
     SetText(candidate.source, source);
@@ -41,52 +35,52 @@ class PlansInForceTest : public testing::Test {
   }
   // The task with a domain that the plan just leaves at a step.
   Config NarrowerFrom(const certified_plan_t& plan, int step) const {
-    Config narrower = config_;
-    Problem problem = *config_.problem;
-    Eigen::VectorXd upper = problem.domain.state.upper();
-    upper(0) = Reach(plan, step) - 1e-9;
-    problem.domain.state = Box(problem.domain.state.lower(), upper);
-    narrower.problem = std::make_shared<const Problem>(problem);
-    narrower.grounds.config = DigestOf("narrower");
-    return narrower;
+    return Another([&](Config&, Problem& problem) {
+      Eigen::VectorXd upper = problem.domain.state.upper();
+      upper(0) = Reach(plan, step) - 1e-9;
+      problem.domain.state = Box(problem.domain.state.lower(), upper);
+    });
   }
-  robot_state_t State(std::int64_t plan_id, int step) {
-    robot_state_t state{};
-    state.utime = now_;
-    state.sequence = states_++;
-    state.executing_plan_id = plan_id;
-    state.executing_step = static_cast<std::int16_t>(step);
-    state.mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
-    return state;
+  // Another task: this one with a change.
+  template <class Change>
+  Config Another(Change change) const {
+    static int number = 0;
+    Config config = config_;
+    change(config, Own(config.problem));
+    config.grounds.config = DigestOf("task " + std::to_string(++number));
+    return config;
   }
+  // What comes of judging the plans under another task.
+  std::optional<withdrawal_t> DueUnder(const Config& task) {
+    Gate gate(task);
+    gate.Inherit(gate_);
+    plans_.Judge(gate, now_);
+    return Due();
+  }
+  robot_state_t State(std::int64_t plan_id, int step) { return StateOf(now_, states_++, plan_id, step); }
   void SeeRobot(std::int64_t plan_id, int step) { plans_.SeeRobot(State(plan_id, step), now_); }
   void Answer(std::int64_t plan_id, int step, double value) {
-    execution_event_t event{};
-    event.kind = execution_event_t::WITHDRAWN;
-    event.plan_id = plan_id;
-    event.step = static_cast<std::int16_t>(step);
-    event.value = value;
-    plans_.TakeAnswer(event);
+    plans_.TakeAnswer({.plan_id = plan_id,
+                       .kind = execution_event_t::WITHDRAWN,
+                       .step = static_cast<std::int16_t>(step),
+                       .value = value});
   }
-  std::optional<withdrawal_t> Due() {
-    const auto due = plans_.TakeDue(now_, now_);
+  std::optional<withdrawal_t> Due() { return DueOf(plans_); }
+  std::optional<withdrawal_t> DueOf(PlanLedger& plans) const {
+    const auto due = plans.TakeDue(now_, now_);
     return due ? std::optional(due->message) : std::nullopt;
   }
   // The withdrawal of a plan that was certified under one task, as this is read again and is another.
   std::optional<withdrawal_t> WithdrawnByReload(const Config& before, const Config& after) {
     Gate gate(before);
     PlanLedger plans(config_.gate, now_);
-    obstacles_t message = ToMessage({}, now_);
-    message.sequence = sequence_++;
-    EXPECT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
+    EXPECT_EQ(gate.UpdateObstacles(Encode(Sighted({}, now_, sequence_++)), now_), "");
     plans.Judge(gate, now_);
-    const auto certified = gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified;
-    plans.Add(certified.value(), now_);
+    plans.Add(gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified.value(), now_);
     Gate reloaded(after);
     reloaded.Inherit(gate);
     plans.Judge(reloaded, now_);
-    const auto due = plans.TakeDue(now_, now_);
-    return due ? std::optional(due->message) : std::nullopt;
+    return DueOf(plans);
   }
   // The greatest px of slice t of the plan, by its certificate.
   static double Reach(const certified_plan_t& certified, int t) { return certified.slice_upper[t][0]; }
@@ -107,37 +101,29 @@ TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt
       EXPECT_FALSE(just_outside) << "it stays clear of it, so it stands";
     } else {
       ASSERT_TRUE(just_outside);
-      EXPECT_EQ(just_outside->step, t + 1);
-      EXPECT_EQ(just_outside->valid_steps, t);
+      EXPECT_FIELDS(*just_outside, (step, t + 1), (valid_steps, t));
     }
     SeeWall(Reach(plan, t) - 1e-9);
     const auto just_inside = Due();
     ASSERT_TRUE(just_inside);
-    EXPECT_EQ(just_inside->step, t);
-    EXPECT_EQ(just_inside->valid_steps, t - 1);
+    EXPECT_FIELDS(*just_inside, (step, t), (valid_steps, t - 1));
     plans_.StandBy();
-    See({});
-    plans_.Judge(gate_, now_);
+    SeeAndJudge({});
   }
 }
 
 // The motion under control t ends at sample t + 1, so the step that fails is the first control that does not stand.
 TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) {
-  Problem problem = *config_.problem;
-  problem.between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};
-  config_.problem = std::make_shared<const Problem>(problem);
+  Own(config_.problem).between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};
   const double bulge = 8 * 0.15 * 0.15 / 8;
   for (int t = 1; t <= kSteps; ++t) {
     Gate gate(config_);
     PlanLedger plans(config_.gate, now_);
-    obstacles_t message = ToMessage({}, now_);
     const auto see = [&](double wall) {
-      message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)}, now_);
-      message.sequence = sequence_++;
-      EXPECT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
+      const obstacles_t seen = Sighted({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)}, now_, sequence_++);
+      EXPECT_EQ(gate.UpdateObstacles(Encode(seen), now_), "");
       plans.Judge(gate, now_);
-      const auto due = plans.TakeDue(now_, now_);
-      return due ? std::optional(due->message) : std::nullopt;
+      return DueOf(plans);
     };
     see(15);
     const auto certified = gate.Decide(Encode(Candidate(t, kAccelerationThatCertifies, now_)), now_).certified;
@@ -147,8 +133,7 @@ TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) 
     EXPECT_EQ(outside ? outside->valid_steps : kSteps, t);
     const auto inside = see(Reach(*certified, t) + bulge - 1e-9);
     ASSERT_TRUE(inside);
-    EXPECT_EQ(inside->step, t - 1);
-    EXPECT_EQ(inside->valid_steps, t - 1);
+    EXPECT_FIELDS(*inside, (step, t - 1), (valid_steps, t - 1));
   }
 }
 
@@ -156,34 +141,27 @@ TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) 
 TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
   for (const bool is_bounded : {true, false}) {
     const auto with_period = [&](double period) {
-      Config config = config_;
-      Problem problem = *config_.problem;
-      problem.model = MakePointMass(period);
-      if (is_bounded) problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, period};
-      if (!is_bounded) config.gate.max_clock_error_ms = 10;
-      config.gate.longest_step_ms = period * 1e3;
-      config.gate.step_us = std::llround(period * 1e6);
-      config.problem = std::make_shared<const Problem>(problem);
-      config.grounds.config = DigestOf("a period of " + std::to_string(period));
-      return config;
+      return Another([&](Config& config, Problem& problem) {
+        problem.model = MakePointMass(period);
+        if (is_bounded) problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, period};
+        if (!is_bounded) config.gate.max_clock_error_ms = 10;
+        config.gate.longest_step_ms = period * 1e3;
+        config.gate.step_us = std::llround(period * 1e6);
+      });
     };
     const auto due = WithdrawnByReload(with_period(0.15), with_period(0.1));
     ASSERT_TRUE(due);
-    EXPECT_EQ(due->cause, withdrawal_t::NOT_JUDGED);
-    EXPECT_EQ(due->valid_steps, 0);
+    EXPECT_FIELDS(*due, (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
   }
 }
 
 // The guard goes on by the plan, under whatever task the certifier is.
 TEST_F(PlansInForceTest, APlanStandsUnderANewTaskOnlyIfItsGuardUpholdsWhatThatRestsOn) {
   const auto with = [&](double step_error_ms, double error_of_py) {
-    Config config = config_;
-    Problem problem = *config_.problem;
-    problem.declaration.state_error[1] = error_of_py;
-    config.gate.step_error_ms = step_error_ms;
-    config.problem = std::make_shared<const Problem>(problem);
-    config.grounds.config = DigestOf(fmt::format("{} {}", step_error_ms, error_of_py));
-    return config;
+    return Another([&](Config& config, Problem& problem) {
+      problem.declaration.state_error[1] = error_of_py;
+      config.gate.step_error_ms = step_error_ms;
+    });
   };
   struct {
     double before_ms, after_ms, before_m, after_m;
@@ -199,8 +177,7 @@ TEST_F(PlansInForceTest, APlanStandsUnderANewTaskOnlyIfItsGuardUpholdsWhatThatRe
     const auto due = WithdrawnByReload(with(before_ms, before_m), with(after_ms, after_m));
     EXPECT_EQ(due.has_value(), !stands);
     if (!due) continue;
-    EXPECT_EQ(due->cause, withdrawal_t::NOT_JUDGED);
-    EXPECT_EQ(due->valid_steps, 0);
+    EXPECT_FIELDS(*due, (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
   }
 }
 
@@ -209,13 +186,9 @@ TEST_F(PlansInForceTest, AWithdrawalNamesThePlanTheWitnessAndWhatItRestsOn) {
   now_ += 1000;
   SeeWall(Reach(plan, 6) - 1e-9);
   const withdrawal_t message = Due().value();
-  EXPECT_EQ(message.utime, now_);
-  EXPECT_EQ(message.sequence, 0);
-  EXPECT_EQ(message.plan_id, 3);
+  EXPECT_FIELDS(message, (utime, now_), (sequence, 0), (plan_id, 3));
   EXPECT_EQ(GetText(message.source), "test");
-  EXPECT_EQ(message.expires_utime, plan.expires_utime);
-  EXPECT_EQ(message.cause, withdrawal_t::OBSTACLE);
-  EXPECT_EQ(message.first_step, 0);
+  EXPECT_FIELDS(message, (expires_utime, plan.expires_utime), (cause, withdrawal_t::OBSTACLE), (first_step, 0));
   EXPECT_EQ(message.obstacle, 1) << "after that of the task";
   EXPECT_LE(message.margin, message.threshold);
   EXPECT_EQ(GetDigest(message.plan_digest), GetDigest(plan.plan_digest));
@@ -230,16 +203,13 @@ TEST_F(PlansInForceTest, DoesNotJudgeStepsThatArePast) {
   const Obstacle behind = Obstacle::Circle(Eigen::Vector2d(0.15 * 3, 0.03), 0.01);
   Certify(1);
   SeeRobot(1, 6);
-  See({behind});
-  plans_.Judge(gate_, now_);
+  SeeAndJudge({behind});
   EXPECT_FALSE(Due());
   plans_.StandBy();
-  See({});
-  plans_.Judge(gate_, now_);
+  SeeAndJudge({});
   Certify(2);
   SeeRobot(2, 3);
-  See({behind});
-  plans_.Judge(gate_, now_);
+  SeeAndJudge({behind});
   const withdrawal_t message = Due().value();
   EXPECT_EQ(message.first_step, 3);
   EXPECT_EQ(message.step, 3) << "the robot may be there";
@@ -255,8 +225,7 @@ TEST_F(PlansInForceTest, RepeatsAWithdrawalUntilItIsAnswered) {
   EXPECT_FALSE(Due());
   now_ += 1;
   const withdrawal_t second = Due().value();
-  EXPECT_EQ(second.sequence, first.sequence + 1);
-  EXPECT_EQ(second.valid_steps, first.valid_steps);
+  EXPECT_FIELDS(second, (sequence, first.sequence + 1), (valid_steps, first.valid_steps));
   EXPECT_EQ(plans_.withdrawals(), 1);
   now_ += PlanLedger::kRepeatUs;
   Answer(2, 0, 0);                      // another plan's
@@ -307,8 +276,7 @@ TEST_F(PlansInForceTest, NeverRestoresStepsAndWithdrawsAgainWhenFewerStand) {
 
 TEST_F(PlansInForceTest, WithdrawsNothingWhileThePlanStaysValid) {
   const certified_plan_t plan = Certify(1);
-  See({});
-  plans_.Judge(gate_, now_);
+  SeeAndJudge({});
   EXPECT_FALSE(Due());
   SeeWall(Reach(plan, kSteps) + 0.5);
   EXPECT_FALSE(Due()) << "a plan that stays valid gets no message";
@@ -354,9 +322,7 @@ TEST_F(PlansInForceTest, OfManyPendingPlansTheNewestAreJudgedAndTheOthersWithdra
   for (int id = 1; id <= many; ++id) Certify(id);
   SeeWall(15);  // none of them comes near
   const withdrawal_t message = Due().value();
-  EXPECT_EQ(message.plan_id, 1);
-  EXPECT_EQ(message.cause, withdrawal_t::NOT_JUDGED);
-  EXPECT_EQ(message.valid_steps, 0);
+  EXPECT_FIELDS(message, (plan_id, 1), (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
   EXPECT_FALSE(Due());
 }
 
@@ -377,8 +343,7 @@ TEST_F(PlansInForceTest, APlanThatTwoMayExecuteIsJudgedFromTheEarlierStepAndLeav
   SeeRobot(1, 6);
   SeeWall(Reach(plan, 4) - 1e-9);
   const withdrawal_t message = Due().value();
-  EXPECT_EQ(message.first_step, 2);
-  EXPECT_EQ(message.valid_steps, 3);
+  EXPECT_FIELDS(message, (first_step, 2), (valid_steps, 3));
   Answer(1, 0, static_cast<double>(message.sequence));
   SeeRobot(-1, -1);
   SeeRobot(2, 0);
@@ -423,8 +388,7 @@ TEST_F(PlansInForceTest, ThePlanOfTheRobotBeforeLeavesWithItsTimeAndAnothersStat
 
 // ---- Obstacles that are lost.
 
-class LostObstaclesTest : public PlansInForceTest {
- protected:
+struct LostObstaclesTest : PlansInForceTest {
   static constexpr std::int64_t kLostUs = 1'000'000;
 
   LostObstaclesTest() { Lose(kLostUs / 1e3); }
@@ -435,9 +399,10 @@ class LostObstaclesTest : public PlansInForceTest {
   }
   // A wall is seen on the way of the plan, with a stamp that is 2 s old.
   void SeeStaleWall() {
-    obstacles_t message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1)}, now_ - 2'000'000);
-    message.sequence = sequence_++;
-    EXPECT_THAT(gate_.UpdateObstacles(Encode(message), now_), HasSubstr("stamped 2000 ms ago"));
+    EXPECT_THAT(
+        gate_.UpdateObstacles(
+            Encode(Sighted({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1)}, now_ - 2'000'000, sequence_++)), now_),
+        HasSubstr("stamped 2000 ms ago"));
   }
   void Judge() { JudgeBy(gate_); }
   void JudgeBy(Gate& gate) {
@@ -461,11 +426,8 @@ TEST_F(LostObstaclesTest, WhatIsUnderWayIsWithdrawnWholeOnceTheyHaveBeenUnknownF
   Judge();
   for (const certified_plan_t& plan : {executing, pending}) {
     const withdrawal_t message = Due().value();
-    EXPECT_EQ(message.plan_id, plan.plan.plan_id);
-    EXPECT_EQ(message.cause, withdrawal_t::OBSTACLES_LOST);
-    EXPECT_EQ(message.valid_steps, 0);
-    EXPECT_EQ(message.step, -1);
-    EXPECT_EQ(message.obstacle, -1);
+    EXPECT_FIELDS(message, (plan_id, plan.plan.plan_id), (cause, withdrawal_t::OBSTACLES_LOST), (valid_steps, 0),
+                  (step, -1), (obstacle, -1));
     EXPECT_EQ(GetDigest(message.certificate_digest), GetDigest(plan.certificate_digest));
     EXPECT_EQ(GroundsOf(message), gate_.grounds());
     EXPECT_THAT(GetText(message.message),
@@ -524,8 +486,7 @@ TEST_F(LostObstaclesTest, APlanThatIsNotKnownIsWithdrawnToo) {
   now_ += kLostUs;
   JudgeBy(restarted);
   const withdrawal_t stranger = Due().value();
-  EXPECT_EQ(stranger.plan_id, 77);
-  EXPECT_EQ(stranger.cause, withdrawal_t::OBSTACLES_LOST);
+  EXPECT_FIELDS(stranger, (plan_id, 77), (cause, withdrawal_t::OBSTACLES_LOST));
   EXPECT_EQ(GetDigest(stranger.certificate_digest), Digest{});
   Answer(77, 0, static_cast<double>(stranger.sequence));
 }
@@ -563,12 +524,8 @@ TEST_F(LostObstaclesTest, WhoStandsByForgetsSinceWhen) {
 TEST_F(PlansInForceTest, AnObservationThatContradictsNothingWithdrawsNothing) {
   const certified_plan_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
-  transition_t transition{};
-  transition.utime = now_;
-  transition.num_states = 4;
-  transition.num_inputs = 2;
   const Digest before = gate_.grounds().observations;
-  EXPECT_EQ(gate_.Learn(Encode(transition)), "");
+  EXPECT_EQ(gate_.Learn(Encode(AtRest(now_))), "");
   EXPECT_NE(gate_.grounds().observations, before);
   EXPECT_FALSE(gate_.certifier().violation());
   plans_.Judge(gate_, now_);
@@ -579,25 +536,16 @@ TEST_F(PlansInForceTest, AFalsifiedDeclarationWithdrawsEveryStep) {
   config_.gate.learns = true;
   Certify(1);
   SeeRobot(1, 2);
-  transition_t transition{};
-  transition.utime = now_;
-  transition.num_states = 4;
-  transition.num_inputs = 2;
-  transition.next_state[2] = 1;  // from rest, without a control
-  EXPECT_EQ(gate_.Learn(Encode(transition)), "");
+  EXPECT_EQ(gate_.Learn(Encode(AtRest(now_, 1))), "");
   ASSERT_TRUE(gate_.certifier().violation());
   plans_.Judge(gate_, now_);
   const withdrawal_t message = Due().value();
-  EXPECT_EQ(message.cause, withdrawal_t::FALSIFIED);
-  EXPECT_EQ(message.valid_steps, 0);
+  EXPECT_FIELDS(message, (cause, withdrawal_t::FALSIFIED), (valid_steps, 0));
 }
 
 TEST_F(PlansInForceTest, JudgesThePlanUnderATaskThatWasReadAgain) {
   const certified_plan_t plan = Certify(1);
-  Gate gate(NarrowerFrom(plan, 8));
-  gate.Inherit(gate_);
-  plans_.Judge(gate, now_);
-  const withdrawal_t message = Due().value();
+  const withdrawal_t message = DueUnder(NarrowerFrom(plan, 8)).value();
   EXPECT_EQ(message.cause, withdrawal_t::DOMAIN_EXIT);
   EXPECT_EQ(message.step, 8) << "control 8 may begin outside the domain";
   EXPECT_EQ(message.valid_steps, 8);
@@ -608,14 +556,10 @@ TEST_F(PlansInForceTest, JudgesThePlanAgainUnderOtherTransitionsOfTheTask) {
   const certified_plan_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
   EXPECT_FALSE(Due());
-  Problem problem = *config_.problem;
+  Problem& problem = Own(config_.problem);
   problem.transitions.x_next.col(2).array() += 0.01;  // everywhere the same residual
-  config_.problem = std::make_shared<const Problem>(problem);
   config_.grounds = GroundsOf(config_.grounds.config, problem, config_.obstacles);
-  Gate gate(config_);
-  gate.Inherit(gate_);
-  plans_.Judge(gate, now_);
-  const withdrawal_t message = Due().value();
+  const withdrawal_t message = DueUnder(config_).value();
   EXPECT_EQ(message.cause, withdrawal_t::OBSTACLE);
   EXPECT_LT(message.valid_steps, kSteps);
 }
@@ -624,51 +568,30 @@ TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
   const certified_plan_t plan = Certify(1);
   Config narrower = NarrowerFrom(plan, 8);
   narrower.obstacles.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, 4) - 1e-9));
-  Gate gate(narrower);
-  gate.Inherit(gate_);
-  plans_.Judge(gate, now_);
-  const withdrawal_t message = Due().value();
-  EXPECT_EQ(message.cause, withdrawal_t::OBSTACLE);
-  EXPECT_EQ(message.valid_steps, 3);
+  const withdrawal_t message = DueUnder(narrower).value();
+  EXPECT_FIELDS(message, (cause, withdrawal_t::OBSTACLE), (valid_steps, 3));
 }
 
 TEST_F(PlansInForceTest, AnEndThatIsNotAtRestKeepsItsControls) {
   Certify(1);
-  Config resting = config_;
-  Problem problem = *config_.problem;
-  problem.rest = {{2, 0.1}};  // it ends at 1 m/s
-  resting.problem = std::make_shared<const Problem>(problem);
-  resting.grounds.config = DigestOf("resting");
-  Gate gate(resting);
-  gate.Inherit(gate_);
-  plans_.Judge(gate, now_);
-  const withdrawal_t message = Due().value();
-  EXPECT_EQ(message.cause, withdrawal_t::NO_STOP);
-  EXPECT_EQ(message.valid_steps, kSteps);
+  const Config resting = Another([](Config&, Problem& problem) { problem.rest = {{2, 0.1}}; });  // it ends at 1 m/s
+  const withdrawal_t message = DueUnder(resting).value();
+  EXPECT_FIELDS(message, (cause, withdrawal_t::NO_STOP), (valid_steps, kSteps));
 }
 
 // It is exceeded first where the robot has come that far: the control that leads there does not stand.
 TEST_F(PlansInForceTest, ALimitOfANewTaskLeavesTheControlsBeforeIt) {
   const certified_plan_t plan = Certify(1);
   const auto judge = [&](double most) {
-    Config limited = config_;
-    Problem problem = *config_.problem;
-    problem.limits = {{.name = "it", .that = {"px", 1, 1}, .at_most = most}};
-    problem.between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};  // it is exceeded at the sample, not on the way
-    limited.problem = std::make_shared<const Problem>(problem);
-    limited.grounds.config = DigestOf("limited to " + std::to_string(most));
-    Gate gate(limited);
-    gate.Inherit(gate_);
-    plans_.Judge(gate, now_);
-    return Due();
+    return DueUnder(Another([&](Config&, Problem& problem) {
+      problem.limits = {{.name = "it", .that = {"px", 1, 1}, .at_most = most}};
+      problem.between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};  // it is exceeded at the sample, not on the way
+    }));
   };
   EXPECT_FALSE(judge(Reach(plan, kSteps) + 1e-9));
   const withdrawal_t message = judge(Reach(plan, 6) - 1e-9).value();
-  EXPECT_EQ(message.cause, withdrawal_t::LIMIT);
-  EXPECT_EQ(message.step, 6);
-  EXPECT_EQ(message.obstacle, -1);
-  EXPECT_EQ(message.valid_steps, 5);
-  EXPECT_EQ(message.threshold, Reach(plan, 6) - 1e-9);
+  EXPECT_FIELDS(message, (cause, withdrawal_t::LIMIT), (step, 6), (obstacle, -1), (valid_steps, 5),
+                (threshold, Reach(plan, 6) - 1e-9));
 }
 
 TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfterEachChange) {
@@ -678,32 +601,23 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   SeeRobot(77, 4);
   judge();
   EXPECT_FALSE(Due()) << "the obstacles are not known yet";
-  obstacles_t message = ToMessage({}, now_);
-  message.sequence = 1;
-  ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
+  ASSERT_EQ(restarted.UpdateObstacles(Encode(Sighted({}, now_, 1)), now_), "");
   judge();
   const withdrawal_t withdrawal = Due().value();
-  EXPECT_EQ(withdrawal.plan_id, 77);
-  EXPECT_EQ(withdrawal.cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_FIELDS(withdrawal, (plan_id, 77), (cause, withdrawal_t::UNKNOWN_PLAN));
   EXPECT_EQ(GetDigest(withdrawal.certificate_digest), Digest{});
   EXPECT_EQ(GroundsOf(withdrawal), restarted.grounds());
-  transition_t learned{};
-  learned.utime = now_;
-  learned.num_states = 4;
-  learned.num_inputs = 2;
-  EXPECT_EQ(restarted.Learn(Encode(learned)), "");
+  EXPECT_EQ(restarted.Learn(Encode(AtRest(now_))), "");
   Answer(77, 20, 0);  // it stands: the guard found equal grounds
   now_ += PlanLedger::kRepeatUs;
   EXPECT_FALSE(Due());
-  message = ToMessage({Obstacle::Circle(Eigen::Vector2d(9, 9), 1)}, now_);
-  message.sequence = 2;
-  ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
+  const obstacles_t seen = Sighted({Obstacle::Circle(Eigen::Vector2d(9, 9), 1)}, now_, 2);
+  ASSERT_EQ(restarted.UpdateObstacles(Encode(seen), now_), "");
   judge();
   const withdrawal_t changed = Due().value();
   EXPECT_EQ(changed.plan_id, 77);
   EXPECT_EQ(GetDigest(changed.observations_digest), restarted.transitions()) << "without what it has learned";
-  learned.next_state[2] = 1;  // contradicts
-  EXPECT_EQ(restarted.Learn(Encode(learned)), "");
+  EXPECT_EQ(restarted.Learn(Encode(AtRest(now_, 1))), "");
   ASSERT_TRUE(restarted.certifier().violation());
   judge();
   EXPECT_NE(GetDigest(Due()->observations_digest), restarted.transitions()) << "no guard has these";

@@ -1,7 +1,6 @@
 // The nearest plan to a refused one that can be certified.
 #include "tests/test.h"
 
-#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
 #include "certifier/gate/repair.h"
 #include "tests/certifier/small_task.h"
@@ -13,25 +12,21 @@ constexpr int kProgress = 6, kAskedSteps = 10;
 // The small task of a robot that brakes as hard as it has to, and has to be at rest at the end.
 Config BrakingTask() {
   Config config = SmallTask();
-  Problem problem = *config.problem;
-  problem.rest = {{2, 0.1}, {3, 0.1}};
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).rest = {{2, 0.1}, {3, 0.1}};
   config.laws.stop = {{{"-vx/0.15", 1, 1}, {"-vy/0.15", 1, 1}}};
   config.laws.at_rest = {{2, 0.01}, {3, 0.01}};
   config.planner.tail_steps = 40;
   return config;
 }
 
-class RepairTest : public testing::Test {
- protected:
+struct RepairTest : testing::Test {
   void Begin(Config config) {
     config_ = std::move(config);
     gate_.emplace(config_);
   }
   void Change(const std::function<void(Problem&)>& change) {
-    Problem problem = *config_.problem;
+    Problem& problem = Own(config_.problem);
     change(problem);
-    config_.problem = std::make_shared<const Problem>(problem);
     gate_.emplace(config_);
   }
 
@@ -85,8 +80,7 @@ class RepairTest : public testing::Test {
   std::int64_t id_ = 0;
 };
 
-class BrakingRepairTest : public RepairTest {
- protected:
+struct BrakingRepairTest : RepairTest {
   BrakingRepairTest() { Begin(BrakingTask()); }
 };
 
@@ -294,8 +288,7 @@ TEST_F(RepairTest, OnlyPushesAPlanWithoutALawOfBraking) {
   const auto advice = RepairOf(Asking(2));
   ASSERT_EQ(decision_.cause, decision_t::CAUSE_OBSTACLE);
   ASSERT_TRUE(advice);
-  EXPECT_EQ(advice->changed, kPushed);
-  EXPECT_EQ(advice->proposal.num_steps, kProgress + 15);
+  EXPECT_FIELDS(*advice, (changed, kPushed), (proposal.num_steps, kProgress + 15));
   EXPECT_TRUE(Sent(*advice).certified);
 }
 

@@ -10,26 +10,33 @@ outside the input domain. */
 #include <string_view>
 #include <vector>
 
-#include "forereach/candidate_plan_t.hpp"
-#include "lcmtypes/codec.h"
 #include "task/config.h"
+#include "tests/messages.h"
 #include "tests/worlds.h"
 
 namespace forereach {
 
 inline constexpr std::int64_t kNow = 1'700'000'000'000'000;
 
+/** One step of the small task's robot from (x, u), as its model says but for vx, which is off by `error`: that
+contradicts the declaration. */
+inline transition_t Executed(const NominalModel& model, const Eigen::VectorXd& z, double error = 0) {
+  transition_t transition{.num_states = 4, .num_inputs = 2};
+  std::copy_n(z.data(), 4, transition.state);
+  std::copy_n(z.data() + 4, 2, transition.input);
+  model.Evaluate({z.data(), 6}, {transition.next_state, 4});
+  transition.next_state[2] += error;
+  return transition;
+}
+
 inline Config SmallTask() {
   Problem problem = PaperPointMass(5);
   problem.declaration.state_error = Vec({0, 0, 0, 0});
   problem.transitions.z = Eigen::MatrixXd{{0, 0, 1, 0, 0, 0}, {1, 2, -1, 0.5, 0.25, -0.5}};
   problem.transitions.x_next.resize(2, 4);
-  for (int i = 0; i < 2; ++i) {
-    const Eigen::VectorXd z = problem.transitions.z.row(i);
-    Eigen::VectorXd next(4);
-    problem.model->Evaluate({z.data(), 6}, {next.data(), 4});
-    problem.transitions.x_next.row(i) = next;
-  }
+  for (int i = 0; i < 2; ++i)
+    problem.transitions.x_next.row(i) =
+        Eigen::Map<const Eigen::RowVector4d>(Executed(*problem.model, problem.transitions.z.row(i)).next_state);
 
   Config config;
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)};
@@ -53,9 +60,7 @@ inline Config SmallTaskOnTheBus() {
 /** The same with a second observation that a constant residual cannot explain: F. */
 inline Config FalsifiedTask() {
   Config config = SmallTask();
-  Problem problem = *config.problem;
-  problem.transitions.x_next(1, 2) += 0.01;
-  config.problem = std::make_shared<const Problem>(std::move(problem));
+  Own(config.problem).transitions.x_next(1, 2) += 0.01;
   return config;
 }
 
@@ -77,6 +82,11 @@ inline candidate_plan_t Candidate(std::int64_t plan_id, double acceleration = kA
   for (int k = 0; k < 4; ++k) candidate.initial_half_width[k] = 0.05;
   for (int t = 0; t < 10; ++t) candidate.control[t][0] = acceleration;
   return candidate;
+}
+
+/** A step at rest in the origin, or one in which it gets up speed by itself: that contradicts the declaration. */
+inline transition_t AtRest(std::int64_t utime, double speed = 0) {
+  return {.utime = utime, .num_states = 4, .num_inputs = 2, .next_state = {0, 0, speed}};
 }
 
 }  // namespace forereach

@@ -51,9 +51,7 @@ TEST(SourcesTest, AdmitsTheSmallestAndLargestPlanIds) {
 }
 
 TEST(SourcesTest, AgreesWithASetOfIdsInsideTheWindow) {
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  FreshRandom random;
   Sources sources(kForget);
   std::set<std::int64_t> used;
   std::int64_t highest = 0;

@@ -1,9 +1,7 @@
 #include "certifier/gate/watch.h"
 
+#include "tests/messages.h"
 #include "tests/test.h"
-
-#include "forereach/decision_t.hpp"
-#include "forereach/fault_t.hpp"
 
 namespace forereach::watch_test {
 
@@ -18,21 +16,20 @@ TEST(WatchTest, IsArmedIfNothingIsLackingAndSaysAllThatIs) {
     if (second) watch.Set(Watch::Need::kCharge, "another");
     if (unknown) watch.Set(Watch::Need::kObstacles, "unseen");
     if (!unseen) watch.SeeRobot(0);
-    if (fault) {
-      EXPECT_TRUE(watch.Latch({fault_t::CLOCK_JUMP, 1, "jumped"}));
-    }
+    if (fault) EXPECT_TRUE(watch.Latch({fault_t::CLOCK_JUMP, 1, "jumped"}));
     const bool robot_lacks = unseen && needs_robot;
     const auto refusal = watch.WhyNot();
     SCOPED_TRACE(bits);
     EXPECT_EQ(refusal.has_value(), second || robot_lacks || unknown || fault);
     EXPECT_EQ(watch.state(), fault ? Watch::State::kFault : refusal ? Watch::State::kDisarmed : Watch::State::kArmed);
     if (!refusal) continue;
-    EXPECT_EQ(refusal->cause, fault         ? decision_t::CAUSE_FAULT
-                              : second      ? decision_t::CAUSE_SECOND_CERTIFIER
-                              : robot_lacks ? decision_t::CAUSE_NOT_ARMED
-                                            : decision_t::CAUSE_NO_OBSTACLES);
-    EXPECT_EQ(refusal->outcome,
-              refusal->cause == decision_t::CAUSE_NO_OBSTACLES ? decision_t::ABSTAIN_OBSTACLES : decision_t::REJECTED);
+    EXPECT_FIELDS(*refusal,
+                  (cause, fault         ? decision_t::CAUSE_FAULT
+                          : second      ? decision_t::CAUSE_SECOND_CERTIFIER
+                          : robot_lacks ? decision_t::CAUSE_NOT_ARMED
+                                        : decision_t::CAUSE_NO_OBSTACLES),
+                  (outcome, refusal->cause == decision_t::CAUSE_NO_OBSTACLES ? decision_t::ABSTAIN_OBSTACLES
+                                                                             : decision_t::REJECTED));
     if (fault) {
       EXPECT_EQ(refusal->why, "fault: jumped");
       continue;
@@ -89,10 +86,11 @@ TEST(WatchTest, ACertifierThatWasStoppedSaysSoAndNotTheRobotAlone) {
   }
   const auto fault = watch.Advance(1'995'000, 1'995'000);
   ASSERT_TRUE(fault) << "it stays a fault";
-  EXPECT_EQ(fault->cause, fault_t::ROBOT_STATE_LOST);
-  EXPECT_EQ(fault->why,
-            "the robot's state was last heard 1915 ms ago, at most 1000 ms are allowed: this certifier itself did not "
-            "run for 1910 ms");
+  EXPECT_FIELDS(
+      *fault, (cause, fault_t::ROBOT_STATE_LOST),
+      (why,
+       "the robot's state was last heard 1915 ms ago, at most 1000 ms are allowed: this certifier itself did not "
+       "run for 1910 ms"));
 }
 
 TEST(WatchTest, ARobotThatIsSilentWhileTheCertifierRunsIsBlamedAlone) {
@@ -117,9 +115,8 @@ TEST(WatchTest, IsArmedOnlyWhileTheNewestStampsAreInside) {
   EXPECT_FALSE(see(70'000, std::nullopt));
   EXPECT_FALSE(see(-60'000, std::nullopt));
   ASSERT_TRUE(see(70'001, std::nullopt));
-  EXPECT_EQ(watch.WhyNot()->cause, decision_t::CAUSE_NOT_ARMED);
-  EXPECT_EQ(watch.WhyNot()->outcome, decision_t::REJECTED);
-  EXPECT_EQ(watch.state(), Watch::State::kDisarmed);
+  EXPECT_FIELDS(watch, (WhyNot()->cause, decision_t::CAUSE_NOT_ARMED), (WhyNot()->outcome, decision_t::REJECTED),
+                (state(), Watch::State::kDisarmed));
   EXPECT_THAT(watch.WhyNot()->why, HasSubstr("the robot's clock is behind"));
   EXPECT_FALSE(see(0, std::nullopt)) << "the next one decides anew";
   EXPECT_THAT(see(-60'001, std::nullopt)->why, HasSubstr("the robot's clock is ahead"));

@@ -5,9 +5,7 @@
 #include "certifier/gate/gate.h"
 #include "cli/abstention_advice.h"
 #include "forereach/obstacles_t.hpp"
-#include "lcmtypes/names.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 
@@ -15,8 +13,7 @@ namespace forereach::advise_test {
 
 const std::string kCourse = "tests/data/course.lcmlog --config tests/data/course.yaml";
 
-class AdviseTest : public testing::Test {
- protected:
+struct AdviseTest : testing::Test {
   Output AdviseOn(const std::string& task, const std::string& plan, const std::string& options = "") {
     const std::string decision = scratch_ / "decision.json";
     Forereach("certify --json --config config/" + task + " --plan config/plans/" + plan + " > " + decision);
@@ -119,9 +116,9 @@ TEST_F(AdviseTest, FindsAChangeThatCertifiesForEachAbstentionOfACourse) {
 
 // One candidate, answered by a gate at several times.
 TEST_F(AdviseTest, NamesTheOptionWithWhichALateOrEarlyCandidateIsAccepted) {
-  const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  const Config config = LoadConfig(kCourseTask);
   candidate_plan_t candidate{};
-  for (const LogEvent& event : ReadLog(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog").events)
+  for (const LogEvent& event : ReadLog(kCourseLog).events)
     if (event.channel == config.bus.candidate) {
       candidate = *Decoded<candidate_plan_t>(event.data);
       break;
@@ -169,8 +166,7 @@ TEST_F(AdviseTest, ADatabaseAndADirectoryAreReadAsTheirLogs) {
 TEST_F(AdviseTest, ReadsTheRunsOfADirectory) {
   for (const char* robot : {"a", "b"}) {
     std::filesystem::create_directories(scratch_ / ("night/" + std::string(robot)));
-    std::filesystem::copy_file(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog",
-                               scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
+    std::filesystem::copy_file(kCourseLog, scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
   }
   const Output output =
       Forereach("advise '" + (scratch_ / "night") + "' --config tests/data/course.yaml --advice-seconds 0 --json 2>&1");
@@ -178,8 +174,8 @@ TEST_F(AdviseTest, ReadsTheRunsOfADirectory) {
 }
 
 TEST_F(AdviseTest, AfterItsTimeOnlyWhatMissedByLeastIsSearched) {
-  const std::string log = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
-  const RunTasks tasks(FOREREACH_SOURCE_DIR "/tests/data/course.yaml", {}, false);
+  const std::string log = kCourseLog;
+  const RunTasks tasks(kCourseTask, {}, false);
   std::vector<Abstentions> runs(1);
   runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false);
   std::vector<RecordedAbstention>& all = runs[0].all;
@@ -193,15 +189,15 @@ TEST_F(AdviseTest, AfterItsTimeOnlyWhatMissedByLeastIsSearched) {
   const auto advised = AdviseAll(runs, 1, 0);
   for (std::ptrdiff_t i = 0; i < 3; ++i) {
     const AbstentionAdvice& advice = advised[0][static_cast<std::size_t>(i)];
-    EXPECT_EQ(advice.advices.empty(), i != nearest);
-    EXPECT_EQ(advice.missing, i == nearest ? ""
-                                           : "not searched within 0 s: `forereach advise` searches all, or write a "
-                                             "longer --advice-seconds");
+    EXPECT_FIELDS(advice, (advices.empty(), i != nearest),
+                  (missing, i == nearest ? ""
+                                         : "not searched within 0 s: `forereach advise` searches all, or write a "
+                                           "longer --advice-seconds"));
   }
 }
 
 TEST_F(AdviseTest, NamesTheQueueLengthAndTheTimeoutThatSuffice) {
-  Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  Config config = LoadConfig(kCourseTask);
   config.gate.obstacles = ObstaclesSource::kBus;
   config.gate.queue = 4;
   RecordedAbstention abstention;
@@ -227,7 +223,7 @@ TEST_F(AdviseTest, NamesTheQueueLengthAndTheTimeoutThatSuffice) {
 
 // Anyone may have written a log: its numbers need not fit each other.
 TEST_F(AdviseTest, FindsNoAdviceForALogWhoseNumbersContradictEachOther) {
-  const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  const Config config = LoadConfig(kCourseTask);
   const std::string log = scratch_ / "events-20260101-120000-000000.lcmlog";
   EventLogWriter writer(log);
   std::int64_t plan_id = 0;

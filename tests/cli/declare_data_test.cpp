@@ -10,8 +10,7 @@ namespace forereach::declare_data_test {
 
 using Json = nlohmann::json;
 
-class DeclareDataTest : public testing::Test {
- protected:
+struct DeclareDataTest : testing::Test {
   // A point mass in one long drive. The residual of vx is -0.02 |vx|, observed to within 0.001.
   DeclareDataTest() {
     std::mt19937 random(3);
@@ -100,8 +99,7 @@ TEST_F(DeclareDataTest, ItsLinesGoIntoATaskFileThatNoTransitionContradicts) {
   EXPECT_EQ(document["never_varied"], Json({"py", "vy", "ay"}));
   ASSERT_EQ(document["alone"].size(), 24u) << "every entry";
   const Json& lone = document["alone"][2 * 6 + 2];
-  EXPECT_EQ(lone["row"], "vx");
-  EXPECT_EQ(lone["column"], "vx");
+  EXPECT_THAT(lone, Holds({{"row", "vx"}, {"column", "vx"}}));
   EXPECT_EQ(lone["pairs"], 200 * 199 / 2) << "no other column counts with --by vx";
   EXPECT_GT(lone["slope"], 0);
   EXPECT_LE(lone["slope"], 0.0201);
@@ -121,9 +119,8 @@ TEST_F(DeclareDataTest, SaysSoIfNoSlopesAreConsistent) {
 
 TEST_F(DeclareDataTest, WhatSlopesAndNoiseExplainIsNoScatter) {
   const Output output = Declare("--by vx");
-  EXPECT_THAT(output.text, Not(HasSubstr("disturbance:")));
-  EXPECT_THAT(output.text, Not(HasSubstr("knee")));
-  EXPECT_THAT(output.text, HasSubstr("100 of 100 recorded steps of the others lie in their slices"));
+  EXPECT_THAT(output.text, AllOf(Not(HasSubstr("disturbance:")), Not(HasSubstr("knee")),
+                                 HasSubstr("100 of 100 recorded steps of the others lie in their slices")));
   EXPECT_EQ(Json::parse(Declare("--by vx --json").text)["rows"][2]["scatter"], 0);
 }
 
@@ -133,8 +130,7 @@ TEST_F(DeclareDataTest, HoldOutCountsContradictionsOfEachFactorAndDrawsThem) {
   ASSERT_EQ(document["factors"].size(), 7u);
   int last = 101;
   for (const Json& row : document["factors"]) {
-    EXPECT_EQ(row["transitions"], 100);
-    EXPECT_EQ(row["blocks"], 4);
+    EXPECT_THAT(row, Holds({{"transitions", 100}, {"blocks", 4}}));
     EXPECT_LE(row["contradicting"], last);
     EXPECT_GE(row["block_rate_at_most"], row["blocks_contradicting"].get<int>() / 4.0);
     EXPECT_EQ(row["stretches"], 8) << "25 transitions of a block give two stretches of 10";
@@ -200,8 +196,7 @@ TEST_F(DeclareDataTest, BadInputIsExitTwo) {
 
 // x+ = x + 0.1 u, and the robot obeys each command one step late, which is no function of (x, u). The sensor errs by
 // 0.001.
-class LateCommandTest : public testing::Test {
- protected:
+struct LateCommandTest : testing::Test {
   LateCommandTest() {
     std::mt19937 random(5);
     std::ostringstream rows("x,u,x_next\n", std::ios::ate);
@@ -242,9 +237,7 @@ TEST_F(LateCommandTest, ScatterIsADisturbanceAndKeepsTheRobotInItsSlices) {
   const std::string hold_out = Declare("--hold-out --json").text;
   const Json report = Json::parse(hold_out.substr(0, hold_out.rfind('}') + 1));
   for (const Json& factor : report["factors"])
-    if (factor["factor"] >= 1.5) {
-      EXPECT_EQ(factor["states_inside"], factor["states"]) << factor["factor"];
-    }
+    if (factor["factor"] >= 1.5) EXPECT_EQ(factor["states_inside"], factor["states"]) << factor["factor"];
 }
 
 TEST_F(LateCommandTest, ScatterTakenForNoiseLosesTheRobotAndIsSaid) {

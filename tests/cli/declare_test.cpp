@@ -6,7 +6,6 @@
 #include "identify/cover_file.h"
 #include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/task/task_files.h"
 
@@ -15,8 +14,7 @@ namespace forereach::declare_test {
 using Json = nlohmann::json;
 
 // The bicycle's task with another residual section.
-class DeclareTest : public testing::Test {
- protected:
+struct DeclareTest : testing::Test {
   void WriteTask(const std::string& residual) {
     const std::string text = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
     std::ofstream(task_) << Replaced(std::regex_replace(text, std::regex("\nresidual: .*"), "\n" + residual),
@@ -55,7 +53,7 @@ TEST_F(DeclareTest, ADisturbanceLeavesTheCoverAlone) {
   EXPECT_EQ(Check().code, 0);
   EXPECT_THAT(Declare("--between").text, HasSubstr("declaration.disturbance is a bound at the samples."));
   std::ofstream(task_) << task;
-  EXPECT_THAT(Declare("--between").text, testing::Not(HasSubstr("disturbance")));
+  EXPECT_THAT(Declare("--between").text, Not(HasSubstr("disturbance")));
 }
 
 TEST(Declare, ProvesTheMatrixOfTheShippedBicycleTask) {

@@ -2,7 +2,6 @@
 #include "tests/test.h"
 
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/task/task_files.h"
 
 namespace forereach::drive_test {
@@ -28,17 +27,13 @@ TEST_P(Drive, ReachesItsGoal) {
   const Json robot = LineWith(run.text, "steps_executed");
   SCOPED_TRACE(run.text);
   ASSERT_TRUE(robot.is_object());
-  EXPECT_EQ(robot["goal_reached"], true);
-  EXPECT_EQ(robot["contacts"], 0);
-  EXPECT_EQ(robot["limits_exceeded"], 0);
+  EXPECT_THAT(robot, Holds({{"goal_reached", true}, {"contacts", 0}, {"limits_exceeded", 0}}));
   EXPECT_GE(robot["steps_executed"], 20);
-  EXPECT_EQ(robot["steps_inside_slice"], robot["steps_executed"]);
-  EXPECT_EQ(robot["emergency_stops"], 0);
-  EXPECT_EQ(robot["plans_refused"], Json::object());
+  EXPECT_THAT(robot, Holds({{"steps_inside_slice", robot["steps_executed"]},
+                            {"emergency_stops", 0},
+                            {"plans_refused", Json::object()}}));
   // One that cannot stand is never without a plan before the goal.
-  if (Read(FOREREACH_SOURCE_DIR "/" + task).find("hold: []") != std::string::npos) {
-    EXPECT_EQ(robot["stops"], 0);
-  }
+  if (Read(FOREREACH_SOURCE_DIR "/" + task).find("hold: []") != std::string::npos) EXPECT_EQ(robot["stops"], 0);
 }
 
 void CopyDrives(const ScratchDirectory& scratch) {
@@ -71,8 +66,8 @@ TEST(Run, SaysWhatBecameOfThePlansIfTheRobotDoesNotArrive) {
   scratch.Write("drive/unicycle.yaml",
                 Replaced(Read(scratch / "drive/unicycle.yaml"), "time_limit_s: 60", "time_limit_s: 3"));
   EXPECT_THAT(Forereach("run '" + (scratch / "drive/unicycle.yaml") + "' --directory '" + (scratch / "log") + "' 2>&1"),
-              Exits(1, testing::ContainsRegex("did not reach planner.goal: the planner searched [1-9][0-9]* times and "
-                                              "proposed [1-9][0-9]* plans, [1-9][0-9]* were certified")));
+              Exits(1, ContainsRegex("did not reach planner.goal: the planner searched [1-9][0-9]* times and "
+                                     "proposed [1-9][0-9]* plans, [1-9][0-9]* were certified")));
 }
 
 // What keeps the start is said, and not what cannot help.

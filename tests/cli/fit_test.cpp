@@ -2,7 +2,6 @@
 #include "tests/test.h"
 
 #include "forereach/dynamics/model.h"
-#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 
@@ -10,8 +9,7 @@ namespace forereach::fit_test {
 
 using Json = nlohmann::json;
 
-class FitCommandTest : public testing::Test {
- protected:
+struct FitCommandTest : testing::Test {
   // x+ = 0.5 x + 0.25 u, without noise.
   FitCommandTest() {
     scratch_.Write("task.yaml", TaskFor("model:\n"
@@ -45,8 +43,7 @@ TEST_F(FitCommandTest, ItsLineGoesIntoATaskFile) {
 }
 
 // A heading that is wrapped at pi: every tool names the key, and none estimates from a jump of a turn.
-class WrappedHeading : public testing::Test {
- protected:
+struct WrappedHeading : testing::Test {
   // @param jump of the wrapped step in th; its unit.
   void Write(double jump, const std::string& unit, const std::string& angles = "") const {
     scratch_.Write("task.yaml", TaskFor("model:\n"

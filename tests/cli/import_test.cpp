@@ -5,15 +5,13 @@
 
 #include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/task/task_files.h"
 
 namespace forereach::import_test {
 
 using Json = nlohmann::json;
 
-class ImportCommandTest : public testing::Test {
- protected:
+struct ImportCommandTest : testing::Test {
   ImportCommandTest() {
     scratch_.Write("task.yaml", kTask);
     scratch_.Write("log.csv",
@@ -34,8 +32,7 @@ TEST_F(ImportCommandTest, ItsTransitionsAreReadWithTheTask) {
   ASSERT_EQ(transitions.size(), 2);
   EXPECT_DOUBLE_EQ(transitions.z(0, 0), 1);
   EXPECT_DOUBLE_EQ(transitions.x_next(0, 0), 1.155);
-  EXPECT_EQ(transitions.z(0, 4), 0.5);
-  EXPECT_EQ(transitions.x_next(1, 2), 1);
+  EXPECT_FIELDS(transitions, (z(0, 4), 0.5), (x_next(1, 2), 1));
 }
 
 TEST_F(ImportCommandTest, AColumnOfTimeNeedsNoOption) {
@@ -63,15 +60,12 @@ TEST_F(ImportCommandTest, SaysHowFarTheNearestStampsAre) {
 TEST_F(ImportCommandTest, JsonHasEveryCause) {
   scratch_.Write("log.csv", Read(log_) + "450;1\n\n# end\n600;1;0;nan;0;0;0\n750;1;0;0;0;0;0\n900;1;0;0;0;0;9\n");
   const Json document = Json::parse(Import(columns_ + "--json " + log_).text);
-  EXPECT_EQ(document["transitions"], 3);
-  EXPECT_EQ(document["out"], out_);
+  EXPECT_THAT(document, Holds({{"transitions", 3}, {"out", out_}}));
   const Json& log = document["logs"][0];
   EXPECT_EQ(log["dropped"]["row_lost"]["first_line"], 5);
   EXPECT_EQ(log["dropped"]["no_state"]["first"], "vx");
   EXPECT_EQ(log["not_a_number"]["vx"]["count"], 1);
-  EXPECT_EQ(log["blank_lines"], 1);
-  EXPECT_EQ(log["comments"], 1);
-  EXPECT_EQ(log["spacing_s"], 0.15);
+  EXPECT_THAT(log, Holds({{"blank_lines", 1}, {"comments", 1}, {"spacing_s", 0.15}}));
 }
 
 TEST_F(ImportCommandTest, NoTransitionIsExitOneAndNoFile) {
@@ -113,8 +107,7 @@ TEST_F(ImportCommandTest, AnOptionOfAListTakesOneValueAndLeavesTheFiles) {
 
 // ---- what logs of other recorders have in common: a double integrator whose speed goes from 8 m/s up.
 
-class ForeignLogTest : public testing::Test {
- protected:
+struct ForeignLogTest : testing::Test {
   ForeignLogTest() {
     scratch_.Write("task.yaml", Replaced(Replaced(TaskFor("model: {states: {p: m, v: m/s}, inputs: {a: m/s^2}, "
                                                           "parameters: {dt: 0.1}, next: {p: p + dt*v, v: v + dt*a}}\n",
@@ -249,8 +242,7 @@ TEST_F(ForeignLogTest, TheShareThatIsDroppedIsSaidInJsonToo) {
   EXPECT_EQ(few.code, 1);
   const Json document = Json::parse(few.text.substr(0, few.text.rfind('}') + 1));
   EXPECT_TRUE(document["out"].is_null());
-  EXPECT_EQ(document["rows"], 60);
-  EXPECT_EQ(document["rows_used"], 20);
+  EXPECT_THAT(document, Holds({{"rows", 60}, {"rows_used", 20}}));
 }
 
 // 0.1 * 3 is not 0.3: stamps and dt are doubles, and their rounding is no distance.
@@ -278,8 +270,7 @@ TEST_F(ForeignLogTest, ARowOfDecimalCommasBetweenCommasIsNamed) {
 
 // ---- How late commands act: v' = u in steps of 0.15 s, and each command acts one row later.
 
-class LateRowsTest : public ImportCommandTest {
- protected:
+struct LateRowsTest : ImportCommandTest {
   void Record(bool varies) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> any(-1, 1);

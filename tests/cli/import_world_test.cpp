@@ -3,15 +3,13 @@
 
 #include <fmt/format.h>
 
-#include "forereach/numerics/limits.h"
 #include "task/config.h"
 #include "task/most_obstacles.h"
 #include "tests/cli/program.h"
 
 namespace forereach::import_world_test {
 
-class ImportWorldTest : public testing::Test {
- protected:
+struct ImportWorldTest : testing::Test {
   ImportWorldTest() {
     scratch_.Write(
         "map.yaml",

@@ -33,8 +33,7 @@ TEST(StepTimes, AClockIsOffByWhatArrivesBeforeItsStampOrLaterThanTheBusTakes) {
   times.HearStamp(1'000'000, 1'000'400);
   EXPECT_EQ(times.ClockErrorMs(10), 0);
   times.HearStamp(2'000'000, 1'997'950);
-  EXPECT_EQ(times.least_delay_us(), -2'050);
-  EXPECT_EQ(times.ClockErrorMs(10), 4.1);
+  EXPECT_FIELDS(times, (least_delay_us(), -2'050), (ClockErrorMs(10), 4.1));
   times.HearStamp(3'000'000, 3'013'001);
   EXPECT_EQ(times.largest_delay_us(), 13'001);
   EXPECT_EQ(times.ClockErrorMs(10), 6.1) << "3.001 ms, twice, and up to a tenth";
@@ -60,8 +59,7 @@ TEST(StepTimes, TakeNoNonsense) {
   times.HearStep(0, INT64_MAX);
   times.HearStep(0, -1);
   times.HearStamp(INT64_MIN, 0);
-  EXPECT_EQ(times.steps(), 0);
-  EXPECT_EQ(times.stamps(), 0);
+  EXPECT_FIELDS(times, (steps(), 0), (stamps(), 0));
 }
 
 }  // namespace forereach::step_times_test

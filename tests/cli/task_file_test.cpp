@@ -6,7 +6,6 @@
 #include "task/config.h"
 #include "task/task_template.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/task/task_files.h"
 
 namespace forereach::task_file_test {
@@ -16,8 +15,7 @@ using Json = nlohmann::json;
 
 const std::string kSource = FOREREACH_SOURCE_DIR;
 
-class TaskFileTest : public testing::Test {
- protected:
+struct TaskFileTest : testing::Test {
   TaskFileTest() {
     for (const char* directory : {"/models", "/drive"})
       fs::copy(kSource + "/config" + directory, scratch_.path() + directory);
@@ -97,9 +95,7 @@ TEST_F(InitTest, AModelOfTheLibraryComesWithTheLawsThatDriveIt) {
     for (std::size_t i = 0; i < task.laws.definitions.size(); ++i)
       EXPECT_EQ(task.laws.definitions[i].value.text, drive.laws.definitions[i].value.text);
     ASSERT_EQ(task.laws.speed.has_value(), drive.laws.speed.has_value());
-    if (task.laws.speed) {
-      EXPECT_EQ(task.laws.speed->text, drive.laws.speed->text);
-    }
+    if (task.laws.speed) EXPECT_EQ(task.laws.speed->text, drive.laws.speed->text);
     ASSERT_TRUE(task.laws.at_rest && drive.laws.at_rest);
     ASSERT_EQ(task.laws.at_rest->size(), drive.laws.at_rest->size());
     for (std::size_t i = 0; i < task.laws.at_rest->size(); ++i) {
@@ -139,8 +135,7 @@ TEST_F(InitTest, WithoutATaskThatDrivesTheModelTheLawsAreLeftToYou) {
     ASSERT_EQ(Init("--force --model unicycle").code, 0);
     EXPECT_THAT(Read(task_), AllOf(HasSubstr("\n# planner:\n#   goal: ["), HasSubstr("\n#   stop: {a: -v/dt}")));
     const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
-    EXPECT_TRUE(config.laws.stop.empty());
-    EXPECT_EQ(config.problem->rest.size(), 2u);
+    EXPECT_FIELDS(config, (laws.stop.empty(), true), (problem->rest.size(), 2u));
   };
   fs::copy_file(scratch_ / "drive/boat.yaml", scratch_ / "drive/unicycle.yaml", fs::copy_options::overwrite_existing);
   leaves_them();  // a task of another model
@@ -201,14 +196,11 @@ TEST_F(InitTest, TakesStatesAndInputsFromTheHeaderOfTheTransitions) {
   ASSERT_THAT(Init("--dt 0.1 --transitions " + (scratch_ / "log.csv")), Exits(0));
   const Config config = LoadConfig(task_);
   const Problem& problem = *config.problem;
-  EXPECT_EQ(problem.model->state_names(), (std::vector<std::string>{"x", "v"}));
-  EXPECT_EQ(problem.model->input_names(), std::vector<std::string>{"u"});
-  EXPECT_EQ(problem.transitions.size(), 2);
+  EXPECT_FIELDS(problem, (model->state_names(), (std::vector<std::string>{"x", "v"})),
+                (model->input_names(), std::vector<std::string>{"u"}), (transitions.size(), 2));
   EXPECT_EQ(config.period, 0.1);
-  EXPECT_EQ(problem.domain.state.lower(), Eigen::Vector2d(-0.2, -1.2));
-  EXPECT_EQ(problem.domain.state.upper(), Eigen::Vector2d(2.2, 1.2));
-  EXPECT_EQ(problem.domain.input.lower()[0], 4.9);
-  EXPECT_EQ(problem.domain.input.upper()[0], 5.1);
+  EXPECT_FIELDS(problem.domain, (state.lower(), Eigen::Vector2d(-0.2, -1.2)),
+                (state.upper(), Eigen::Vector2d(2.2, 1.2)), (input.lower()[0], 4.9), (input.upper()[0], 5.1));
   EXPECT_THAT(Read(task_), HasSubstr("transitions: log.csv\n"));
 }
 

@@ -10,7 +10,6 @@
 #include "records/log_directory.h"
 #include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 
 namespace forereach::wrong_input_test {
 
@@ -20,8 +19,7 @@ const std::string kSource = FOREREACH_SOURCE_DIR;
 const std::string kCourse = kSource + "/tests/data/course.yaml", kCourseLog = kSource + "/tests/data/course.lcmlog";
 
 /** Two tasks of different digests, whose data lies outside the directory of the task files, and a run of each. */
-class KeptTaskTest : public testing::Test {
- protected:
+struct KeptTaskTest : testing::Test {
   // Once for all tests. Not in SetUpTestSuite(): where that fails, the tests count as skipped, and CTest passes.
   void SetUp() override {
     if (!logs_) Record();

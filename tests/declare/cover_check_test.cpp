@@ -19,8 +19,7 @@ Cover::Node& Largest(Cover& cover) {
       cover.nodes, {}, [](const Cover::Node& node) { return node.argument < 0 && !node.outside ? node.number : 0; });
 }
 
-class Covers : public testing::Test {
- protected:
+struct Covers : testing::Test {
   CoverVerdict Check() const { return CoverChecker(family_.domain, family_.residual).Check(claim_); }
   void ExpectRefuted(const char* text) const {
     const CoverVerdict verdict = Check();

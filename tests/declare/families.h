@@ -49,10 +49,8 @@ inline Family PointMassInBall(double widen = 0) {
 
 /** {|x|, |y| <= half_width, |u| <= 1}. */
 inline Domain Square(double half_width) {
-  Domain domain;
-  domain.state = Box(Eigen::Vector2d::Constant(-half_width), Eigen::Vector2d::Constant(half_width));
-  domain.input = Box(Eigen::VectorXd::Constant(1, -1), Eigen::VectorXd::Constant(1, 1));
-  return domain;
+  return {.state = Box(Eigen::Vector2d::Constant(-half_width), Eigen::Vector2d::Constant(half_width)),
+          .input = Box(Eigen::VectorXd::Constant(1, -1), Eigen::VectorXd::Constant(1, 1))};
 }
 
 /** A residual over the states x and y, the input u and a parameter c. */

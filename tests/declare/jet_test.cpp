@@ -42,17 +42,14 @@ TEST(Jet, AcrossAKinkTheSlopeCoversBothSidesAndTheCurvatureIsUnbounded) {
   const Jet across = abs(Jet::Argument({-1, 2}, 0, true)), beside = abs(Jet::Argument({0, 2}, 0, true));
   EXPECT_EQ(across.slope, Interval(-1, 1));
   EXPECT_FALSE(across.curvature[0].IsFinite());
-  EXPECT_EQ(beside.slope, Interval(1, 1));
-  EXPECT_EQ(beside.curvature[0], Interval(0, 0));
+  EXPECT_FIELDS(beside, (slope, Interval(1, 1)), (curvature[0], Interval(0, 0)));
   const Jet larger = max(Jet::Argument({0, 2}, 0, true), Jet(1.0));
-  EXPECT_EQ(larger.value, Interval(1, 2));
-  EXPECT_EQ(larger.slope, Interval(0, 1));
+  EXPECT_FIELDS(larger, (value, Interval(1, 2)), (slope, Interval(0, 1)));
 }
 
 TEST(Jet, ASmoothGateThatIsOffIsExactlyZero) {
   const Jet off = SmoothGate(Jet::Argument({-3, 0}, 0, true));
-  EXPECT_EQ(off.value, Interval(0, 0));
-  EXPECT_EQ(off.slope, Interval(0, 0));
+  EXPECT_FIELDS(off, (value, Interval(0, 0)), (slope, Interval(0, 0)));
   EXPECT_EQ((off * abs(Jet::Argument({-1, 1}, 0, true))).curvature[0], Interval(0, 0));
 }
 
@@ -62,8 +59,7 @@ TEST(Jet, OfJumpsIsFlatBesideThemAndUnboundedAcross) {
   EXPECT_EQ(step(beside).value, Interval(1, 1));
   EXPECT_EQ(sign(-beside).value, Interval(-1, -1));
   for (const Jet& flat : {step(beside), sign(-beside), kink(beside), cut(across, beside), cut(beside, across)}) {
-    EXPECT_EQ(flat.slope, Interval(0, 0));
-    EXPECT_EQ(flat.curvature[0], Interval(0, 0));
+    EXPECT_FIELDS(flat, (slope, Interval(0, 0)), (curvature[0], Interval(0, 0)));
   }
   EXPECT_EQ(step(across).value, Interval(0, 1));
   EXPECT_EQ(sign(across).value, Interval(-1, 1));
@@ -73,9 +69,7 @@ TEST(Jet, OfJumpsIsFlatBesideThemAndUnboundedAcross) {
 
 TEST(Jet, CurvatureOfTheTangentHasItsDerivatives) {
   const Jet t = TanCurvature(Jet::Argument({1, 2}, 0, true));  // 2 t + 2 t^3
-  EXPECT_EQ(t.value, Interval(4, 20));
-  EXPECT_EQ(t.slope, Interval(8, 26));
-  EXPECT_EQ(t.curvature[0], Interval(12, 24));
+  EXPECT_FIELDS(t, (value, Interval(4, 20)), (slope, Interval(8, 26)), (curvature[0], Interval(12, 24)));
 }
 
 TEST(Jet, SquareIsNotNegative) {

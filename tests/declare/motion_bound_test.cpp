@@ -15,10 +15,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kGap = 1e-5;
 
 Domain DomainOf(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, const Eigen::VectorXd& input) {
-  Domain domain;
-  domain.state = Box(lower, upper);
-  domain.input = Box(-input, input);
-  return domain;
+  return {.state = Box(lower, upper), .input = Box(-input, input)};
 }
 
 Domain BicycleDomain(double v, double a, double delta) {
@@ -41,8 +38,7 @@ TEST(MotionBound, OfAPointMassIsItsLargestControl) {
   const MotionBounds bounds = Bound(*model, domain, 0.15, -1, NoRest(4));
   for (const auto& [bound, supremum] :
        {std::pair{bounds.acceleration.at(0), 2.0}, std::pair{bounds.acceleration.at(1), 0.5}}) {
-    EXPECT_EQ(bound.upper, supremum);
-    EXPECT_EQ(bound.lower, supremum);
+    EXPECT_FIELDS(bound, (upper, supremum), (lower, supremum));
     EXPECT_TRUE(bound.reached);
   }
   EXPECT_EQ(bounds.turn_rate.upper, 0);
@@ -84,8 +80,7 @@ TEST(MotionBound, BoundsAMotionThatBeginsAtRestByItsInputs) {
   const auto model = MakePointMass(0.15);
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, 0, 0), Eigen::Vector4d(9, 9, 0, 0), Eigen::Vector2d(2, 0.5));
   const MotionBounds bounds = Bound(*model, domain, 0.15, -1, NoRest(4));
-  EXPECT_EQ(bounds.acceleration.at(0).upper, 2);
-  EXPECT_EQ(bounds.acceleration.at(1).upper, 0.5);
+  EXPECT_FIELDS(bounds.acceleration, (at(0).upper, 2), (at(1).upper, 0.5));
 }
 
 // The acceleration is a along the heading and v^2 tan(delta) / wheelbase across it, so its largest component in any
@@ -142,9 +137,7 @@ State Sum(const State& z, double h, const State& rate) {
 }
 
 TEST(MotionBound, NoMotionOfTheBicycleExceedsIt) {
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  FreshRandom random;
   const double wheelbase = 2, period = 0.2, v = 6, a = 2, delta = 0.6;
   const Domain domain = BicycleDomain(v, a, delta);
   const MotionBounds free = Bound(*MakeKinematicBicycle(period, wheelbase), domain, period, 2, NoRest(6));
@@ -205,8 +198,8 @@ TEST(MotionBound, ThereIsNoneOverAPoleOfTheTangent) {
     return Bound(*MakeKinematicBicycle(0.1, 2.5), BicycleDomain(12, 3, delta), 0.1, 2, NoRest(6));
   };
   EXPECT_NO_THROW((void)bound(1.4));  // reaches 1.5 in the last step
-  EXPECT_THAT([&] { (void)bound(1.5); }, testing::ThrowsMessage<std::runtime_error>(
-                                             testing::HasSubstr("no finite bound on the motion between two samples")));
+  EXPECT_THAT([&] { (void)bound(1.5); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no finite bound on the motion between two samples")));
 }
 
 // x' = x^2 from x = 1 is infinite after a second.
@@ -270,8 +263,7 @@ TEST(MotionBound, HoldsForAllParameters) {
 
 // The arm of config/models/two_link_arm.yaml. Over its whole domain, natural intervals do not exclude that the
 // determinant of its mass matrix is zero.
-class TwoLinkArm : public testing::Test {
- protected:
+struct TwoLinkArm : testing::Test {
   using Point = std::array<double, 6>;
 
   static std::shared_ptr<const NominalModel> Model() {
@@ -288,10 +280,8 @@ class TwoLinkArm : public testing::Test {
                                    ModelText::Integrator::kRk4));
   }
   static Domain DomainOfTheArm(double q1, double q2) {
-    Domain domain;
-    domain.state = Box(Eigen::Vector4d(-q1, -q2, -1.2, -1.2), Eigen::Vector4d(q1, q2, 1.2, 1.2));
-    domain.input = Box(Eigen::Vector2d(-8, -4), Eigen::Vector2d(8, 4));
-    return domain;
+    return {.state = Box(Eigen::Vector4d(-q1, -q2, -1.2, -1.2), Eigen::Vector4d(q1, q2, 1.2, 1.2)),
+            .input = Box(Eigen::Vector2d(-8, -4), Eigen::Vector2d(8, 4))};
   }
   static Point Rate(const Point& z) {
     const double c = std::cos(z[1]), s = std::sin(z[1]), m11 = 5.0 / 3 + c, m12 = 1.0 / 3 + c / 2;
@@ -415,9 +405,7 @@ TEST(MeanValue, ExpansionBoundsEveryPointOfTheRange) {
 
 // A position and a heading, which may turn by 0.2 rad more than the model says.
 std::shared_ptr<const NominalModel> Turning(std::vector<std::string> angles) {
-  ModelText text;
-  text.name = "turning";
-  text.angles = std::move(angles);
+  ModelText text{.name = "turning", .angles = std::move(angles)};
   for (const char* state : {"s", "theta"}) text.states.push_back({state, ""});
   text.inputs.push_back({"rate", ""});
   text.parameters = {{"dt", 0.5, 0.5}};
@@ -442,8 +430,7 @@ TEST(MeasureMotion, KnowsAnAngleThatIsRecordedWrapped) {
 
 // A point that turns with q on a circle of 1 m: q' = w, w' = u. Its acceleration has the length of w^2 and u together,
 // and some q turns that into any direction.
-class OnACircle : public testing::Test {
- protected:
+struct OnACircle : testing::Test {
   static std::shared_ptr<const NominalModel> Model() {
     return MakeTextModel(
         TextModel({{"q", "w"}, {"w", "u"}}, {"u"}, {{"dt", 0.01, 0.01}}, {}, ModelText::Integrator::kRk4));
@@ -469,9 +456,7 @@ TEST_F(OnACircle, TheAccelerationOfAPlaceIsBounded) {
 }
 
 TEST_F(OnACircle, TheAccelerationOfAPlaceIsMeasured) {
-  Transitions transitions;
-  transitions.z = Eigen::MatrixXd{{0, 1, 0}, {0.5, 2, 0}};
-  transitions.x_next = Eigen::MatrixXd{{0.5, 2}, {1.5, 2}};
+  Transitions transitions{.z = Eigen::MatrixXd{{0, 1, 0}, {0.5, 2, 0}}, .x_next = Eigen::MatrixXd{{0.5, 2}, {1.5, 2}}};
   const MeasuredMotion measured = MeasureMotion(*Model(), transitions, none_, body_, 0.5);
   EXPECT_EQ(measured.triples, 1);
   EXPECT_NEAR(measured.acceleration[0], std::abs(std::cos(1.5) - 2 * std::cos(0.5) + 1) / 0.25, 1e-12);
@@ -485,10 +470,8 @@ TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
   transitions.x_next = Eigen::MatrixXd{{1, 0.5}, {5, 0.25}, {14, 0}, {8, 3}};
   const Eigen::MatrixXd projection{{1, 0}};
   const MeasuredMotion measured = MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5);
-  EXPECT_EQ(measured.triples, 2);
-  EXPECT_EQ(measured.acceleration[0], (14 - 2 * 5 + 1) / 0.25);
-  EXPECT_EQ(measured.turn_rate, 1);
-  EXPECT_EQ(measured.turn_acceleration, 0.75 / 0.25);
+  EXPECT_FIELDS(measured, (triples, 2), (acceleration[0], (14 - 2 * 5 + 1) / 0.25), (turn_rate, 1),
+                (turn_acceleration, 0.75 / 0.25));
   EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, Body(), 0.5).turn_rate, 0);
   transitions.z(1, 0) = std::nextafter(1.0, 2.0);
   EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).triples, 1);

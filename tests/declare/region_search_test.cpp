@@ -9,8 +9,7 @@
 namespace forereach::region_search_test {
 
 // r_x = max(0, x y - 1) is constant up to a hyperbola; r_y has the same slope everywhere.
-class FindRegionsTest : public testing::Test {
- protected:
+struct FindRegionsTest : testing::Test {
   std::vector<Region> Find(std::size_t cells) const {
     RegionSearchOptions options;
     options.most_cells = cells;
@@ -81,9 +80,8 @@ TEST(PartIn, IsTheDomainWithinTheRegion) {
   Region region{{{0, {-1, 5}}, {2, {0, 0.5}}}, {}};
   const auto part = PartIn(Square(2), region);
   ASSERT_TRUE(part);
-  EXPECT_EQ(part->state.lower(), Eigen::Vector2d(-1, -2));
-  EXPECT_EQ(part->state.upper(), Eigen::Vector2d(2, 2));
-  EXPECT_EQ(part->input.upper()[0], 0.5);
+  EXPECT_FIELDS(*part, (state.lower(), Eigen::Vector2d(-1, -2)), (state.upper(), Eigen::Vector2d(2, 2)),
+                (input.upper()[0], 0.5));
   region.box[0].range = {3, 4};
   EXPECT_FALSE(PartIn(Square(2), region));
 }

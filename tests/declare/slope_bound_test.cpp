@@ -101,8 +101,7 @@ TEST(SlopeBound, IsInfiniteWhereAnUndefinedTermIsMultipliedByZero) {
 
 TEST(SlopeBound, OfAPoleAmongTheParametersNamesABoxAndEnds) {
   const SlopeBound bound = Pole(Square(2), {1, 5}).Bound(0, 0);
-  EXPECT_EQ(bound.upper, kInfinity);
-  EXPECT_FALSE(bound.unbounded.empty());
+  EXPECT_FIELDS(bound, (upper, kInfinity), (unbounded.empty(), false));
 }
 
 TEST(SlopeBound, BesideAPoleIsFinite) {
@@ -214,9 +213,7 @@ void ExpectTheSameBounds(const Family& family) {
       const SlopeBoundOptions options{1e-3, 500};
       const SlopeBound text = family.Bound(row, column, options),
                        same = BoundSlope(compiled, family.domain, family.parameters, row, column, options);
-      EXPECT_EQ(text.upper, same.upper);
-      EXPECT_EQ(text.lower, same.lower);
-      EXPECT_EQ(text.boxes, same.boxes);
+      EXPECT_FIELDS(text, (upper, same.upper), (lower, same.lower), (boxes, same.boxes));
     }
 }
 

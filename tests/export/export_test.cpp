@@ -1,8 +1,6 @@
 // `forereach export`: each format read back by a reader that shares nothing with its writer.
 #include "tests/test.h"
 
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "records/database.h"
 #include "records/event_log.h"
 #include "records/export.h"
@@ -11,9 +9,8 @@
 #include "records/message_json.h"
 #include "records/npz.h"
 #include "records/output_file.h"
-#include "task/config.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
@@ -22,9 +19,6 @@
 namespace forereach::export_test {
 
 using nlohmann::json;
-
-const std::string kCourse = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
-const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
 // RFC 4180.
 std::vector<std::vector<std::string>> ParseCsv(const std::string& text) {
@@ -60,12 +54,11 @@ std::set<std::string> FilesIn(const std::string& directory) {
   return files;
 }
 
-class ExportTest : public testing::Test {
- protected:
-  Output ExportTo(const std::string& format, const std::string& out, const std::string& input = kCourse,
+struct ExportTest : testing::Test {
+  Output ExportTo(const std::string& format, const std::string& out, const std::string& input = kCourseLog,
                   const std::string& options = "") const {
     return Forereach("export '" + input + "' --format " + format + " -o '" + (scratch_ / out) + "' --config '" +
-                     kConfig + "' " + options + " 2>&1");
+                     kCourseTask + "' " + options + " 2>&1");
   }
   json ReadBack(const std::string& reader, const std::string& file) const {
     const Output output =
@@ -120,18 +113,10 @@ TEST_F(ExportTest, LinesSayWhatTheTablesSay) {
     for (std::size_t i = 0; i < table[0].size(); ++i) {
       const json& value = line.at(table[0][i]);
       const std::string& cell = table[row][i];
-      if (value.is_null()) {
-        EXPECT_EQ(cell, "") << table[0][i];
-      }
-      if (value.is_string()) {
-        EXPECT_EQ(cell, value.get<std::string>());
-      }
-      if (value.is_number()) {
-        EXPECT_EQ(std::stod(cell), value.get<double>()) << table[0][i];
-      }
-      if (value.is_array()) {
-        EXPECT_EQ(std::ranges::count(cell, ' ') + 1, std::ssize(value)) << table[0][i];
-      }
+      if (value.is_null()) EXPECT_EQ(cell, "") << table[0][i];
+      if (value.is_string()) EXPECT_EQ(cell, value.get<std::string>());
+      if (value.is_number()) EXPECT_EQ(std::stod(cell), value.get<double>()) << table[0][i];
+      if (value.is_array()) EXPECT_EQ(std::ranges::count(cell, ' ') + 1, std::ssize(value)) << table[0][i];
     }
     EXPECT_EQ(line["controls"].size(), line["num_steps"]);
     EXPECT_EQ(line["controls"][0].size(), line["num_inputs"]);
@@ -161,7 +146,7 @@ TEST_F(ExportTest, TubesAreThoseOfTheCertifiedPlans) {
   EXPECT_THAT(ExportTo("npz", "tubes.npz"), Exits(0));
   const json arrays = ReadBack("read_npz", "tubes.npz");
   std::vector<certified_plan_t> plans;
-  for (const LogEvent& event : ReadLog(kCourse).events)
+  for (const LogEvent& event : ReadLog(kCourseLog).events)
     if (const auto certified = Decoded<certified_plan_t>(event.message())) plans.push_back(*certified);
   ASSERT_EQ(plans.size(), std::size_t{kCourseCertified});
   EXPECT_EQ(arrays["plan_id"]["shape"], json({kCourseCertified}));
@@ -202,7 +187,7 @@ TEST_F(ExportTest, AnMcapFileHasEveryMessage) {
   EXPECT_THAT(ExportTo("mcap", "run.mcap"), Exits(0));
   const json found = ReadBack("read_mcap", "run.mcap");
   std::map<std::string, std::int64_t> counts;
-  const auto events = ReadLog(kCourse).events;
+  const auto events = ReadLog(kCourseLog).events;
   std::int64_t known = 0;
   for (const LogEvent& event : events)
     if (Summarize(event.message())) {
@@ -234,13 +219,12 @@ TEST_F(ExportTest, AnMcapFileIsReadByItsOwnLibrary) {
   if (!HasMcapCore()) GTEST_SKIP() << "scripts/test installs npm's @mcap/core, and could not";
   ASSERT_EQ(ExportTo("mcap", "run.mcap").code, 0);
   const json found = ReadByMcapCore("run.mcap"), same = ReadBack("read_mcap", "run.mcap");
-  EXPECT_EQ(found["library"], "forereach");
-  EXPECT_EQ(found["messages"], same["messages"]);
+  EXPECT_THAT(found, Holds({{"library", "forereach"}, {"messages", same["messages"]}}));
   ASSERT_EQ(found["channels"].size(), same["channels"].size());
   for (const auto& [topic, channel] : found["channels"].items()) {
     EXPECT_EQ(channel["type"], same["channels"][topic]["type"]);
     EXPECT_EQ(channel["count"], same["channels"][topic]["count"]);
-    EXPECT_THAT(channel["robot"], testing::EndsWith("tests/data"));
+    EXPECT_THAT(channel["robot"], EndsWith("tests/data"));
     EXPECT_EQ(InDoubles(found["first"][topic]["json"]), InDoubles(same["first"][topic]["json"]));
     EXPECT_EQ(found["first"][topic]["log"], std::to_string(same["first"][topic]["log"].get<std::int64_t>()));
   }
@@ -296,16 +280,14 @@ TEST_F(ExportTest, TextsAreQuotedAndAreNoFormulas) {
   const auto cells = ParseCsv(CsvHeader(CellsOf("-robot", row, nullptr)) + CsvLine(CellsOf("-robot", row, nullptr)));
   ASSERT_EQ(cells.size(), 2u);
   ASSERT_EQ(cells[0].size(), cells[1].size());
-  std::map<std::string, std::string> of;
+  nlohmann::json of;
   for (std::size_t i = 0; i < cells[0].size(); ++i) of[cells[0][i]] = cells[1][i];
-  EXPECT_EQ(of["source"], "'=HYPERLINK(\"http://x\",\"y\")");
-  EXPECT_EQ(of["message"], "first, \"second\"");
+  EXPECT_THAT(of, Holds({{"source", "'=HYPERLINK(\"http://x\",\"y\")"}, {"message", "first, \"second\""}}));
   EXPECT_EQ(of["margin"], "") << "infinite";
   EXPECT_EQ(of["threshold"], "-1.5") << "a number is no formula";
   EXPECT_EQ(of["elapsed_us"], "") << "not a number";
   EXPECT_EQ(of["step"], "") << "does not apply";
-  EXPECT_EQ(of["log_file"], "'@a\\x0ab");
-  EXPECT_EQ(of["robot"], "'-robot");
+  EXPECT_THAT(of, Holds({{"log_file", "'@a\\x0ab"}, {"robot", "'-robot"}}));
   const json line = json::parse(JsonLine("decision", CellsOf("a", row, nullptr)));
   EXPECT_EQ(line["source"], row.source);
   EXPECT_TRUE(line["margin"].is_null());
@@ -357,7 +339,7 @@ TEST_F(ExportTest, AHostileLogIsExported) {
 }
 
 TEST_F(ExportTest, DamageIsSaidAndTheRestIsExported) {
-  auto bytes = ReadBytes(kCourse);
+  auto bytes = ReadBytes(kCourseLog);
   std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(RecordFrom(bytes, bytes.size() / 2)), 100, std::uint8_t{0});
   WriteBytes(scratch_ / "damaged.lcmlog", bytes);
   EXPECT_THAT(ExportTo("jsonl", "run.jsonl", scratch_ / "damaged.lcmlog"), Exits(1, "damaged in 1 places"));
@@ -369,7 +351,7 @@ TEST_F(ExportTest, AnyLogIsExportedOrRefused) {
   const std::uint64_t seed = 20261124;
   std::mt19937_64 random(seed);
   SCOPED_TRACE(seed);
-  const auto whole = ReadBytes(kCourse);
+  const auto whole = ReadBytes(kCourseLog);
   for (int i = 0; i < Tries(8); ++i) {
     auto bytes = whole;
     for (int k = 0; k < 3000; ++k) bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
@@ -380,7 +362,7 @@ TEST_F(ExportTest, AnyLogIsExportedOrRefused) {
          {ExportFormat::kCsv, ExportFormat::kJsonLines, ExportFormat::kNpz, ExportFormat::kMcap}) {
       std::vector<std::string> files;
       for (const std::string& name : ExportFiles(format)) files.push_back(scratch_ / ("any." + name));
-      const ExportResult result = ExportRun(run, {.format = format, .config = kConfig, .key = {}}, files);
+      const ExportResult result = ExportRun(run, {.format = format, .config = kCourseTask, .key = {}}, files);
       EXPECT_GT(result.damage.places + result.left_out + result.decisions, 0);
     }
     for (const json& line : ParseLines(Read(scratch_ / "any.jsonl"))) EXPECT_EQ(line["robot"], "r");
@@ -421,21 +403,21 @@ TEST_F(ExportTest, AFileThatExistsIsNotChanged) {
 TEST_F(ExportTest, RefusesWhatItCannotExportAndSaysWhy) {
   EXPECT_EQ(Forereach("export README.md --format csv -o '" + (scratch_ / "x") + "' 2>&1").code, 2);
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "x/decisions.csv"));
-  EXPECT_EQ(Forereach("export '" + kCourse + "' --format xlsx -o '" + (scratch_ / "x.xlsx") + "' 2>&1").code, 2);
+  EXPECT_EQ(Forereach("export '" + kCourseLog + "' --format xlsx -o '" + (scratch_ / "x.xlsx") + "' 2>&1").code, 2);
   EXPECT_THAT(Forereach("export '" + scratch_.path() + "' --format csv -o '" + (scratch_ / "y") + "' 2>&1").text,
               HasSubstr("neither a decision database nor event logs"));
 }
 
 TEST_F(ExportTest, AFullDiskIsAnErrorAndLeavesNothing) {
-  EXPECT_THAT(Forereach("export '" + kCourse + "' --format jsonl -o /dev/full 2>&1"), Exits(2)) << "it exists";
-  EXPECT_THAT(Shell("ulimit -f 8; trap '' XFSZ; '" FOREREACH_PROGRAM "' export '" + kCourse + "' --config '" + kConfig +
-                    "' --format mcap -o '" + (scratch_ / "big.mcap") + "' 2>&1"),
+  EXPECT_THAT(Forereach("export '" + kCourseLog + "' --format jsonl -o /dev/full 2>&1"), Exits(2)) << "it exists";
+  EXPECT_THAT(Shell("ulimit -f 8; trap '' XFSZ; '" FOREREACH_PROGRAM "' export '" + kCourseLog + "' --config '" +
+                    kCourseTask + "' --format mcap -o '" + (scratch_ / "big.mcap") + "' 2>&1"),
               Exits(2, "cannot be written"));
   EXPECT_TRUE(FilesIn(scratch_.path()).empty()) << "neither the file nor what was begun";
 }
 
 TEST_F(ExportTest, OnlyAuthenticMessagesCount) {
-  const auto [key, log] = SignedLog(scratch_, kCourse);
+  const auto [key, log] = SignedLog(scratch_, kCourseLog);
   EXPECT_THAT(ExportTo("jsonl", "run.jsonl", log, "--key '" + key + "'"),
               Exits(0, std::to_string(kCourseDecisions) + " decisions", "not authentic and passed over: 5"));
 }
@@ -444,7 +426,7 @@ TEST_F(ExportTest, OnlyAuthenticMessagesCount) {
 TEST_F(ExportTest, ADirectoryIsExportedByItsDatabase) {
   const std::string directory = scratch_ / "log";
   std::filesystem::create_directory(directory);
-  std::filesystem::copy_file(kCourse, directory + "/events-1.lcmlog");
+  std::filesystem::copy_file(kCourseLog, directory + "/events-1.lcmlog");
   {
     Database database(directory + "/decisions.sqlite");
     database.BeginRun("events-0.lcmlog", 1);
@@ -466,12 +448,11 @@ TEST_F(ExportTest, ADirectoryIsExportedByItsDatabase) {
 }
 
 // Two robots, of which one has a log that is damaged and one that is none.
-class ManyRunsTest : public ExportTest {
- protected:
+struct ManyRunsTest : ExportTest {
   ManyRunsTest() {
     for (const char* robot : {"night/a", "night/b/log"}) {
       std::filesystem::create_directories(scratch_ / robot);
-      std::filesystem::copy_file(kCourse, scratch_ / (std::string(robot) + "/one.lcmlog"));
+      std::filesystem::copy_file(kCourseLog, scratch_ / (std::string(robot) + "/one.lcmlog"));
     }
     scratch_.Write("night/b/log/two.lcmlog", "no log");
     std::filesystem::create_symlink("one.lcmlog", scratch_ / "night/a/latest.lcmlog");
@@ -511,7 +492,7 @@ TEST_F(ManyRunsTest, RowsHaveTheRobotAndRunsAFileEach) {
 }
 
 TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {
-  const std::string command = "'" FOREREACH_PROGRAM "' export '" + (scratch_ / "night") + "' --config '" + kConfig +
+  const std::string command = "'" FOREREACH_PROGRAM "' export '" + (scratch_ / "night") + "' --config '" + kCourseTask +
                               "' --format csv -o '" + (scratch_ / "tables") + "'";
   for (const char* after : {"0.01", "0.03", "0.06", "0.1", "0.2"}) {
     static_cast<void>(Shell(std::string("timeout -s KILL ") + after + " " + command + " 2>&1"));

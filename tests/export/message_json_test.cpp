@@ -5,19 +5,7 @@
 
 #include "tests/test.h"
 
-#include "forereach/advice_t.hpp"
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/fault_t.hpp"
-#include "forereach/logger_status_t.hpp"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/robot_state_t.hpp"
-#include "forereach/transition_t.hpp"
-#include "forereach/withdrawal_t.hpp"
-#include "tests/cli/program.h"
+#include "tests/messages.h"
 #include "tests/paths.h"
 #include "tests/tries.h"
 
@@ -77,8 +65,7 @@ TEST(MessageJson, CountsOfAMessageAreBounded) {
   EXPECT_EQ(object["plan"]["control"].size(), 128u);
   certified.plan.num_states = certified.plan.num_inputs = certified.plan.num_steps = -32768;
   EXPECT_EQ(json::parse(ToJsonMessage(Encode(certified))->json)["slice_lower"].size(), 0u);
-  obstacles_t obstacles{.num_obstacles = 32767};
-  EXPECT_EQ(json::parse(ToJsonMessage(Encode(obstacles))->json)["obstacle"].size(), 64u);
+  EXPECT_EQ(json::parse(ToJsonMessage(Encode(obstacles_t{.num_obstacles = 32767}))->json)["obstacle"].size(), 64u);
 }
 
 TEST(MessageJson, NumbersThatAreNotFiniteAreLeftOut) {
@@ -87,8 +74,7 @@ TEST(MessageJson, NumbersThatAreNotFiniteAreLeftOut) {
   const json object = json::parse(ToJsonMessage(Encode(decision))->json);
   EXPECT_FALSE(object.contains("margin"));
   EXPECT_FALSE(object.contains("threshold"));
-  EXPECT_EQ(object["outcome"], 1);
-  EXPECT_EQ(object["outcome_name"], "certified");
+  EXPECT_THAT(object, Holds({{"outcome", 1}, {"outcome_name", "certified"}}));
 }
 
 TEST(MessageJson, AnAdviceIsOfTheCandidateThatItIsAbout) {
@@ -96,9 +82,7 @@ TEST(MessageJson, AnAdviceIsOfTheCandidateThatItIsAbout) {
   advice.plan_digest[31] = 9;
   const auto summary = Summarize(Encode(advice));
   ASSERT_TRUE(summary && summary->is_of_plan);
-  EXPECT_EQ(summary->plan_id, 7);
-  EXPECT_EQ(summary->what, "abstain_safety");
-  EXPECT_EQ(summary->plan, GetDigest(advice.plan_digest));
+  EXPECT_FIELDS(*summary, (plan_id, 7), (what, "abstain_safety"), (plan, GetDigest(advice.plan_digest)));
 }
 
 TEST(MessageJson, RefusesBytesThatAreNoWholeMessage) {

@@ -1,19 +1,13 @@
 // Clocks that jump, clocks that are off, stamps that are old, and a certifier that does not run for a while.
 #include <cmath>
 
-#include "forereach/command_t.hpp"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 
 namespace forereach {
 namespace {
-
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
 
 constexpr std::chrono::seconds kAnewIfBackBy{-5};  // a shorter jump back is waited out
 
@@ -43,37 +37,30 @@ class Clocked final : Kind {
   // For a second one process is at odds with the others.
   void OneClock(Rig::Role role) {
     Rig rig(DemoTask(), {.settable_clocks = true});
-    Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back",
-                     options_.others);
-    Tries(
-        row, rig,
-        [&](int) {
-          rig.SetClock(role, Jump());
-          rig.Listen(milliseconds(1000));
-          rig.SetClock(role, microseconds(0));
-          rig.Listen(milliseconds(200));
-          if (role == Rig::kCertifier) DemandLatched(row, rig, fault_t::CLOCK_JUMP);
-        },
-        options_.others);
+    Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back");
+    Tries(row, rig, [&](int) {
+      rig.SetClock(role, Jump());
+      rig.Listen(milliseconds(1000));
+      rig.SetClock(role, microseconds(0));
+      rig.Listen(milliseconds(200));
+      if (role == Rig::kCertifier) DemandLatched(row, rig, fault_t::CLOCK_JUMP);
+    });
   }
 
   // As when the machine's clock is set. Whoever begins after it went back signs with times that were used before it
   // did, so all begin anew.
   void AllClocks() {
     Rig rig(DemoTask(), {.settable_clocks = true});
-    Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay", options_.others);
+    Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay");
     microseconds offset(0);
     int anew = 0;
-    Tries(
-        row, rig,
-        [&](int) {
-          const microseconds jump = Jump();
-          rig.SetClocks(offset += jump);
-          rig.Listen(milliseconds(1000));
-          DemandLatched(row, rig, fault_t::CLOCK_JUMP);
-          if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      const microseconds jump = Jump();
+      rig.SetClocks(offset += jump);
+      rig.Listen(milliseconds(1000));
+      DemandLatched(row, rig, fault_t::CLOCK_JUMP);
+      if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
+    });
     Remark(row, std::to_string(anew) + " times back by more than 5 s: all started again");
   }
 
@@ -82,34 +69,31 @@ class Clocked final : Kind {
     std::vector<Obstacle> seen = WithADriftingOne();
     Rig rig(DemoTaskOnTheBus(200), {.settable_clocks = true, .seen = seen});
     rig.witness().SetWorld({ObstaclesDigest(seen)});
-    Row& row = Begin(std::string("The clock of the robot is 0.4 s ") + how + " from its start", options_.others);
+    Row& row = Begin(std::string("The clock of the robot is 0.4 s ") + how + " from its start");
     const auto start_with = [&](microseconds clock) {
       rig.End(Rig::kRobot);
       rig.SetClock(Rig::kRobot, clock);
       rig.Start(Rig::kRobot);
     };
-    Tries(
-        row, rig,
-        [&](int) {
-          start_with(offset);
-          rig.witness().Forget();
-          const auto says_so = [&] {
-            // One that takes long to start is lost, which a person has to clear.
-            if (rig.witness().fault()) rig.witness().ForgetFault(), rig.Command(command_t::RESET);
-            return Says(rig, std::string("the robot's clock is ") + how);
-          };
-          Demand(row, rig.ListenUntil(says_so, kStarts), "the heartbeat does not say that the robot's clock is off");
-          const std::int64_t before = rig.witness().certificates();
-          for (int j = 0; j < 3; ++j) {
-            const auto cause = CauseOfACandidate(rig);
-            Demand(row, cause == decision_t::CAUSE_NOT_ARMED || cause == decision_t::CAUSE_FAULT,
-                   "a candidate was answered " + std::string(cause ? CauseName(*cause) : "nothing"));
-          }
-          rig.Listen(kHeartbeat);
-          Demand(row, rig.witness().certificates() == before, "it certified on states of a clock that is off");
-          start_with(microseconds(0));
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      start_with(offset);
+      rig.witness().Forget();
+      const auto says_so = [&] {
+        // One that takes long to start is lost, which a person has to clear.
+        if (rig.witness().fault()) rig.witness().ForgetFault(), rig.Command(command_t::RESET);
+        return Says(rig, std::string("the robot's clock is ") + how);
+      };
+      Demand(row, rig.ListenUntil(says_so, kStarts), "the heartbeat does not say that the robot's clock is off");
+      const std::int64_t before = rig.witness().certificates();
+      for (int j = 0; j < 3; ++j) {
+        const auto cause = CauseOfACandidate(rig);
+        Demand(row, cause == decision_t::CAUSE_NOT_ARMED || cause == decision_t::CAUSE_FAULT,
+               "a candidate was answered " + std::string(cause ? CauseName(*cause) : "nothing"));
+      }
+      rig.Listen(kHeartbeat);
+      Demand(row, rig.witness().certificates() == before, "it certified on states of a clock that is off");
+      start_with(microseconds(0));
+    });
   }
 
   // The robot drives. From then on all that comes is a wall across its way, with stamps that are 2 s old.
@@ -125,21 +109,18 @@ class Clocked final : Kind {
       const auto event = Decoded<execution_event_t>(r.bytes);
       stops += event && event->kind == execution_event_t::EMERGENCY_STOP;
     });
-    Row& row = Begin("A wall with stamps 2 s old while a plan is under way (signed)", options_.others);
+    Row& row = Begin("A wall with stamps 2 s old while a plan is under way (signed)");
     std::int64_t all_stops = 0;
-    Tries(
-        row, rig,
-        [&](int) {
-          withdrawn = stops = 0;
-          // A plan of a robot that has just begun to drive may end before the obstacles are lost.
-          for (int walls = 0; walls < 5 && stops == 0; ++walls) {
-            if (walls > 0) rig.Listen(milliseconds(1000 + Below(1000)));
-            SendStaleWall(row, rig, seen, [&] { return stops > 0; });
-          }
-          Demand(row, withdrawn > 0 && stops > 0, "no plan was withdrawn, or the robot did not stop");
-          all_stops += stops;
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      withdrawn = stops = 0;
+      // A plan of a robot that has just begun to drive may end before the obstacles are lost.
+      for (int walls = 0; walls < 5 && stops == 0; ++walls) {
+        if (walls > 0) rig.Listen(milliseconds(1000 + Below(1000)));
+        SendStaleWall(row, rig, seen, [&] { return stops > 0; });
+      }
+      Demand(row, withdrawn > 0 && stops > 0, "no plan was withdrawn, or the robot did not stop");
+      all_stops += stops;
+    });
     Remark(row, std::to_string(all_stops) + " emergency stops");
   }
 
@@ -166,25 +147,22 @@ class Clocked final : Kind {
   void StoppedCertifier() {
     const std::vector<Obstacle> seen = OfTheCourse();
     Rig rig(DemoTaskOnTheBus(), {.seen = seen});
-    Row& row = Begin("The certifier is stopped for 2 s", options_.others);
+    Row& row = Begin("The certifier is stopped for 2 s");
     int faults = 0, explained = 0;
-    Tries(
-        row, rig,
-        [&](int) {
-          rig.witness().ForgetFault();
-          rig.Signal(Rig::kCertifier, SIGSTOP);
-          rig.Listen(milliseconds(2000));
-          rig.Signal(Rig::kCertifier, SIGCONT);
-          rig.Listen(kHeartbeat);
-          const auto& fault = rig.witness().fault();
-          if (!fault) return;
-          ++faults;
-          DemandLatched(row, rig, fault_t::ROBOT_STATE_LOST);
-          const bool says_so = GetText(fault->message).find("this certifier itself did not run") != std::string::npos;
-          Demand(row, says_so, "it blames the robot: " + GetText(fault->message));
-          explained += says_so;
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      rig.witness().ForgetFault();
+      rig.Signal(Rig::kCertifier, SIGSTOP);
+      rig.Listen(milliseconds(2000));
+      rig.Signal(Rig::kCertifier, SIGCONT);
+      rig.Listen(kHeartbeat);
+      const auto& fault = rig.witness().fault();
+      if (!fault) return;
+      ++faults;
+      DemandLatched(row, rig, fault_t::ROBOT_STATE_LOST);
+      const bool says_so = GetText(fault->message).find("this certifier itself did not run") != std::string::npos;
+      Demand(row, says_so, "it blames the robot: " + GetText(fault->message));
+      explained += says_so;
+    });
     Remark(row, std::to_string(faults) + " faults latched, " + std::to_string(explained) +
                     " of them say that the certifier did not run");
   }

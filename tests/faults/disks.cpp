@@ -6,16 +6,11 @@
 
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
-#include "tests/paths.h"
 
 namespace forereach {
 namespace {
 
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
-
-class Filled final : Kind {
- public:
+struct Filled final : Kind {
   using Kind::Kind;
 
   // The same for the certifier's state.
@@ -48,43 +43,33 @@ class Filled final : Kind {
         rig.Listen(milliseconds(1000));
         Demand(row, rig.witness().certificates() == certificates, why + ", and the certifier certified");
       };
-      Row& at_start = Begin("The certifier's state on a disk that is full at its start", options_.others);
-      Tries(
-          at_start, rig,
-          [&](int) {
-            rig.End(Rig::kCertifier);
-            std::filesystem::remove(latch);
-            fill();
-            demand_not_armed(at_start, "no fault could be written");
-            std::filesystem::remove(filler);
-          },
-          options_.others);
+      Row& at_start = Begin("The certifier's state on a disk that is full at its start");
+      Tries(at_start, rig, [&](int) {
+        rig.End(Rig::kCertifier);
+        std::filesystem::remove(latch);
+        fill();
+        demand_not_armed(at_start, "no fault could be written");
+        std::filesystem::remove(filler);
+      });
 
-      Row& later =
-          Begin("The certifier's state on a disk that is full when a fault is latched, then SIGKILL", options_.others);
+      Row& later = Begin("The certifier's state on a disk that is full when a fault is latched, then SIGKILL");
       std::int64_t sequence = Witness::kFirstLie;
-      Tries(
-          later, rig,
-          [&](int) {
-            fill();
-            const std::optional<fault_t> fault = Provoke(later, rig, sequence++);
-            rig.End(Rig::kCertifier, SIGKILL);
-            rig.Start(Rig::kCertifier);
-            if (fault) DemandStillLatched(later, rig, *fault);
-            std::filesystem::remove(filler);
-          },
-          options_.others);
+      Tries(later, rig, [&](int) {
+        fill();
+        const std::optional<fault_t> fault = Provoke(later, rig, sequence++);
+        rig.End(Rig::kCertifier, SIGKILL);
+        rig.Start(Rig::kCertifier);
+        if (fault) DemandStillLatched(later, rig, *fault);
+        std::filesystem::remove(filler);
+      });
 
-      Row& read_only = Begin("The certifier's state read-only at its start", options_.others);
-      Tries(
-          read_only, rig,
-          [&](int) {
-            rig.End(Rig::kCertifier);
-            remount(read_only, MS_RDONLY);
-            demand_not_armed(read_only, "the disk was read-only");
-            remount(read_only, 0);
-          },
-          options_.others);
+      Row& read_only = Begin("The certifier's state read-only at its start");
+      Tries(read_only, rig, [&](int) {
+        rig.End(Rig::kCertifier);
+        remount(read_only, MS_RDONLY);
+        demand_not_armed(read_only, "the disk was read-only");
+        remount(read_only, 0);
+      });
     }
     ::umount(directory.c_str());
   }
@@ -100,41 +85,34 @@ class Filled final : Kind {
       Rig rig(DemoTask("logger: {min_free_mb: 1}\n"));
       rig.SetDirectory(directory);
       rig.End(Rig::kLogger);  // it is started again there
-      Row& full = Begin("Full disk", options_.others);
-      Tries(
-          full, rig,
-          [&](int) {
-            const std::string filler = directory + "/filler";  // as much as there is room for
-            std::ofstream(filler) << std::string(32 << 20, 'x');
-            rig.Listen(milliseconds(700));
-            const auto says_so = [&] {
-              const auto& logger = rig.witness().logger_status();
-              return logger && logger->state == logger_status_t::ERROR;
-            };
-            Demand(full, rig.ListenUntil(says_so, kSaysSoon),
-                   "the disk was full, and the logger's state was not ERROR");
-            std::filesystem::remove(filler);
-          },
-          options_.others);
+      Row& full = Begin("Full disk");
+      Tries(full, rig, [&](int) {
+        const std::string filler = directory + "/filler";  // as much as there is room for
+        std::ofstream(filler) << std::string(32 << 20, 'x');
+        rig.Listen(milliseconds(700));
+        const auto says_so = [&] {
+          const auto& logger = rig.witness().logger_status();
+          return logger && logger->state == logger_status_t::ERROR;
+        };
+        Demand(full, rig.ListenUntil(says_so, kSaysSoon), "the disk was full, and the logger's state was not ERROR");
+        std::filesystem::remove(filler);
+      });
 
       // While a file is open to be written the kernel refuses it, so it is done before the logger starts.
-      Row& read_only = Begin("Log directory read-only at the logger's start", options_.others);
+      Row& read_only = Begin("Log directory read-only at the logger's start");
       const auto remount = [&](unsigned long how) {
         Demand(read_only, ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | how, kSize) == 0, "no remount");
       };
-      Tries(
-          read_only, rig,
-          [&](int) {
-            rig.End(Rig::kLogger);
-            remount(MS_RDONLY);
-            ChildProcess logger({FOREREACH_LOGGER, "--config", rig.task_path(), "--lcm-url", rig.url(Rig::kLogger),
-                                 "--directory", directory});
-            const bool says_why = logger.WaitForExit(std::chrono::seconds(10)) == 2 &&
-                                  logger.error().find(directory) != std::string::npos;
-            Demand(read_only, says_why, "the logger did not end with the reason: " + logger.error());
-            remount(0);
-          },
-          options_.others);
+      Tries(read_only, rig, [&](int) {
+        rig.End(Rig::kLogger);
+        remount(MS_RDONLY);
+        ChildProcess logger({FOREREACH_LOGGER, "--config", rig.task_path(), "--lcm-url", rig.url(Rig::kLogger),
+                             "--directory", directory});
+        const bool says_why =
+            logger.WaitForExit(std::chrono::seconds(10)) == 2 && logger.error().find(directory) != std::string::npos;
+        Demand(read_only, says_why, "the logger did not end with the reason: " + logger.error());
+        remount(0);
+      });
     }
     ::umount(directory.c_str());
   }
@@ -156,27 +134,24 @@ class Filled final : Kind {
       const auto& take_away = kind.second;
       const bool is_database = &take_away == &kinds.back().second;
       Rig rig(DemoTask(), {.takes_logs_away = true});
-      Row& row = Begin(fault, options_.others);
+      Row& row = Begin(fault);
       std::int64_t gone = 0;
       const auto& logger = rig.witness().logger_status();
-      Tries(
-          row, rig,
-          [&](int) {
-            rig.Listen(kHeartbeat);
-            const logger_status_t before = *logger;
-            take_away(rig.directory());
-            const auto goes_on = [&] {
-              return logger->events_written > before.events_written + 50 && logger->state != logger_status_t::ERROR &&
-                     (is_database ? logger->state == logger_status_t::STALE : logger->events_lost > before.events_lost);
-            };
-            Demand(row, rig.ListenUntil(goes_on, kSaysSoon),
-                   "it does not record again, or does not say what is lost: " + GetText(logger->message));
-            Demand(row, is_database || logger->events_lost - before.events_lost >= before.events_written - gone,
-                   "it counts less as lost than it had confirmed");
-            gone += logger->events_lost - before.events_lost;
-            if (is_database) rig.End(Rig::kLogger), gone = 0;  // the next one makes the rows again
-          },
-          options_.others);
+      Tries(row, rig, [&](int) {
+        rig.Listen(kHeartbeat);
+        const logger_status_t before = *logger;
+        take_away(rig.directory());
+        const auto goes_on = [&] {
+          return logger->events_written > before.events_written + 50 && logger->state != logger_status_t::ERROR &&
+                 (is_database ? logger->state == logger_status_t::STALE : logger->events_lost > before.events_lost);
+        };
+        Demand(row, rig.ListenUntil(goes_on, kSaysSoon),
+               "it does not record again, or does not say what is lost: " + GetText(logger->message));
+        Demand(row, is_database || logger->events_lost - before.events_lost >= before.events_written - gone,
+               "it counts less as lost than it had confirmed");
+        gone += logger->events_lost - before.events_lost;
+        if (is_database) rig.End(Rig::kLogger), gone = 0;  // the next one makes the rows again
+      });
       Remark(row, is_database ? "the next start makes the rows again"
                               : "lost are the events that were deleted, and counted");
       if (!is_database) row.lost_by_logger.reset();

@@ -7,8 +7,6 @@
 #include <thread>
 #include <vector>
 
-#include "lcmtypes/codec.h"
-
 namespace forereach {
 
 class ForgedFlood final {

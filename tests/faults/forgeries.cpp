@@ -59,8 +59,7 @@ class Forged final : Kind {
     Rig rig(DemoTask());
     Row& row = Begin(
         "On each signed channel: unsigned, forged, replayed, signed by each other role, by another robot, for another "
-        "bus",
-        options_.others);
+        "bus");
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
     Ear ear(rig);
@@ -68,42 +67,39 @@ class Forged final : Kind {
         other_bus(rig.keys(), "another bus");
     std::int64_t sent = 0;
     std::set<std::string> tried;
-    Tries(
-        row, rig,
-        [&](int) {
-          rig.Listen(milliseconds(700));
-          const auto before = rig.witness().status().value_or(certifier_status_t{});
-          static_cast<void>(ear.TakeObeyed());
-          const auto recorded = ear.heard();
-          for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
-            const Role speaker = speakers.at(channel);
-            tried.insert(channel);
-            const auto send = [&, channel = channel](const Sent& bytes) {
-              rig.open_bus().Publish(channel, Bytes(bytes)), ++sent;
-            };
-            send(message);
-            for (const Role role : kAllRoles)
-              if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
-            send(other_robot.Sign(speaker, channel, message, WallClockUs()));
-            send(other_bus.Sign(speaker, channel, message, WallClockUs()));
-            if (!recorded.contains(channel)) continue;
-            Sent altered = recorded.at(channel);
-            send(altered);  // once more
-            altered[altered.size() / 2] ^= 1;
-            send(altered);
-          }
-          rig.Listen(kHeartbeat);
-          const auto& now = rig.witness().status();
-          const auto refuses_all = [&] {
-            return now && now->refused_unsigned > before.refused_unsigned &&
-                   now->refused_forged > before.refused_forged && now->refused_replayed > before.refused_replayed;
-          };
-          Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
-          DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
-          Demand(row, now && now->messages_refused == before.messages_refused,
-                 "the certifier looked into a message that nobody may send");
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      rig.Listen(milliseconds(700));
+      const auto before = rig.witness().status().value_or(certifier_status_t{});
+      static_cast<void>(ear.TakeObeyed());
+      const auto recorded = ear.heard();
+      for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
+        const Role speaker = speakers.at(channel);
+        tried.insert(channel);
+        const auto send = [&, channel = channel](const Sent& bytes) {
+          rig.open_bus().Publish(channel, Bytes(bytes)), ++sent;
+        };
+        send(message);
+        for (const Role role : kAllRoles)
+          if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
+        send(other_robot.Sign(speaker, channel, message, WallClockUs()));
+        send(other_bus.Sign(speaker, channel, message, WallClockUs()));
+        if (!recorded.contains(channel)) continue;
+        Sent altered = recorded.at(channel);
+        send(altered);  // once more
+        altered[altered.size() / 2] ^= 1;
+        send(altered);
+      }
+      rig.Listen(kHeartbeat);
+      const auto& now = rig.witness().status();
+      const auto refuses_all = [&] {
+        return now && now->refused_unsigned > before.refused_unsigned && now->refused_forged > before.refused_forged &&
+               now->refused_replayed > before.refused_replayed;
+      };
+      Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
+      DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
+      Demand(row, now && now->messages_refused == before.messages_refused,
+             "the certifier looked into a message that nobody may send");
+    });
     Demand(row, tried.size() == speakers.size(), "only " + std::to_string(tried.size()) + " channels were tried");
     Remark(row, std::to_string(sent) + " sent on " + std::to_string(tried.size()) + " channels");
     if (rig.witness().status()) {
@@ -121,50 +117,46 @@ class Forged final : Kind {
     Rig rig(DemoTask());
     Row& row = Begin(
         "On each signed channel: signed by its speaker before the start of certifier and robot, or while a clock was "
-        "ahead",
-        options_.others);
+        "ahead");
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
     Ear ear(rig);
     std::int64_t sent = 0, refused = 0;
     const std::int64_t rig_began = WallClockUs();
-    Tries(
-        row, rig,
-        [&](int) {
-          rig.Listen(milliseconds(700));
-          const std::map<std::string, Sent> recorded = ear.heard();
-          auto harmful = HarmfulOf(rig, recorded);
-          transition_t contradiction =
-              recorded.contains(channels.transition)
-                  ? Decoded<transition_t>(WithoutSignature(recorded.at(channels.transition))).value_or(transition_t{})
-                  : transition_t{};
-          contradiction.next_state[0] += 1;
-          harmful[channels.transition] = Encode(contradiction);
-          for (const Rig::Role role : {Rig::kCertifier, Rig::kRobot}) rig.End(role), rig.Start(role);
-          rig.witness().Forget();
-          const auto begun = [&] { return rig.witness().status().has_value(); };
-          Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
-          rig.Listen(kHeartbeat);
-          const auto before = rig.witness().status().value_or(certifier_status_t{});
-          static_cast<void>(ear.TakeObeyed());
-          const std::int64_t now = WallClockUs();
-          constexpr std::int64_t kHourUs = 3'600'000'000;
-          for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
-          for (const auto& [channel, message] : harmful)
-            for (const std::int64_t when :
-                 {now - kHourUs, rig_began - 5'000'000, now + kStopsAheadUs + 30'000'000, now + kHourUs})
-              rig.open_bus().Publish(
-                  channel,
-                  Bytes(Signer(rig.keys(), channels.bus_name()).Sign(speakers.at(channel), channel, message, when))),
-                  ++sent;
-          rig.Listen(kHeartbeat);
-          const auto& status = rig.witness().status();
-          const auto refuses = [&] { return status && status->refused_replayed > before.refused_replayed; };
-          Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
-          DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
-          if (status) refused += status->refused_replayed - before.refused_replayed;
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      rig.Listen(milliseconds(700));
+      const std::map<std::string, Sent> recorded = ear.heard();
+      auto harmful = HarmfulOf(rig, recorded);
+      transition_t contradiction =
+          recorded.contains(channels.transition)
+              ? Decoded<transition_t>(WithoutSignature(recorded.at(channels.transition))).value_or(transition_t{})
+              : transition_t{};
+      contradiction.next_state[0] += 1;
+      harmful[channels.transition] = Encode(contradiction);
+      for (const Rig::Role role : {Rig::kCertifier, Rig::kRobot}) rig.End(role), rig.Start(role);
+      rig.witness().Forget();
+      const auto begun = [&] { return rig.witness().status().has_value(); };
+      Demand(row, rig.ListenUntil(begun, kStarts), "the certifier did not start");
+      rig.Listen(kHeartbeat);
+      const auto before = rig.witness().status().value_or(certifier_status_t{});
+      static_cast<void>(ear.TakeObeyed());
+      const std::int64_t now = WallClockUs();
+      constexpr std::int64_t kHourUs = 3'600'000'000;
+      for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
+      for (const auto& [channel, message] : harmful)
+        for (const std::int64_t when :
+             {now - kHourUs, rig_began - 5'000'000, now + kStopsAheadUs + 30'000'000, now + kHourUs})
+          rig.open_bus().Publish(
+              channel,
+              Bytes(Signer(rig.keys(), channels.bus_name()).Sign(speakers.at(channel), channel, message, when))),
+              ++sent;
+      rig.Listen(kHeartbeat);
+      const auto& status = rig.witness().status();
+      const auto refuses = [&] { return status && status->refused_replayed > before.refused_replayed; };
+      Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
+      DemandNothingBelieved(row, rig, before, ear.TakeObeyed());
+      if (status) refused += status->refused_replayed - before.refused_replayed;
+    });
     Remark(row, std::to_string(sent) + " sent, " + std::to_string(refused) +
                     " times the certifier refused one, on the channels that it hears");
   }
@@ -177,43 +169,38 @@ class Forged final : Kind {
                      options_.others);
     auto ear = std::make_unique<Ear>(rig);
     std::int64_t sent = 0, refused = 0, counted = 0;
-    Tries(
-        row, rig,
-        [&](int i) {
-          const Role role = kAllRoles[static_cast<std::size_t>(i) % kAllRoles.size()];
-          rig.Listen(milliseconds(700));
-          const auto recorded = ear->heard();
-          const KeyRing old_keys = rig.keys();
-          rig.MakeKeyAgain(role);
-          ear = std::make_unique<Ear>(rig);
-          const std::string why = rig.Heal();
-          Demand(row, why.empty(),
-                 "it does not go on with a new key of the " + std::string(RoleName(role)) + ": " + why);
-          const auto before = rig.witness().status().value_or(certifier_status_t{});
-          static_cast<void>(ear->TakeObeyed());
+    Tries(row, rig, [&](int i) {
+      const Role role = kAllRoles[static_cast<std::size_t>(i) % kAllRoles.size()];
+      rig.Listen(milliseconds(700));
+      const auto recorded = ear->heard();
+      const KeyRing old_keys = rig.keys();
+      rig.MakeKeyAgain(role);
+      ear = std::make_unique<Ear>(rig);
+      const std::string why = rig.Heal();
+      Demand(row, why.empty(), "it does not go on with a new key of the " + std::string(RoleName(role)) + ": " + why);
+      const auto before = rig.witness().status().value_or(certifier_status_t{});
+      static_cast<void>(ear->TakeObeyed());
 
-          const BusOptions& channels = rig.config().bus;
-          const Speakers speakers = channels.speakers();
-          Signer old_signer(old_keys, channels.bus_name());
-          for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
-          for (const auto& [channel, message] : HarmfulOf(rig, recorded))
-            if (speakers.at(channel) == role)
-              rig.open_bus().Publish(channel, Bytes(old_signer.Sign(role, channel, message, WallClockUs()))), ++sent;
-          rig.Listen(kHeartbeat);
-          const auto& now = rig.witness().status();
-          const auto refuses = [&] {
-            return now &&
-                   now->refused_replayed + now->refused_forged > before.refused_replayed + before.refused_forged &&
-                   (!IsHeardByCertifier(role) || now->refused_forged > before.refused_forged);
-          };
-          Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
-          DemandNothingBelieved(row, rig, before, ear->TakeObeyed());
-          Demand(row, now && now->messages_refused == before.messages_refused,
-                 "the certifier looked into a message of the old key");
-          if (now) refused += now->refused_forged - before.refused_forged;
-          if (role != Role::kOperator) counted += DemandReloads(row, rig, old_signer);
-        },
-        options_.others);
+      const BusOptions& channels = rig.config().bus;
+      const Speakers speakers = channels.speakers();
+      Signer old_signer(old_keys, channels.bus_name());
+      for (const auto& [channel, raw] : recorded) rig.open_bus().Publish(channel, Bytes(raw)), ++sent;
+      for (const auto& [channel, message] : HarmfulOf(rig, recorded))
+        if (speakers.at(channel) == role)
+          rig.open_bus().Publish(channel, Bytes(old_signer.Sign(role, channel, message, WallClockUs()))), ++sent;
+      rig.Listen(kHeartbeat);
+      const auto& now = rig.witness().status();
+      const auto refuses = [&] {
+        return now && now->refused_replayed + now->refused_forged > before.refused_replayed + before.refused_forged &&
+               (!IsHeardByCertifier(role) || now->refused_forged > before.refused_forged);
+      };
+      Demand(row, rig.ListenUntil(refuses, kSaysSoon), "it refused none");
+      DemandNothingBelieved(row, rig, before, ear->TakeObeyed());
+      Demand(row, now && now->messages_refused == before.messages_refused,
+             "the certifier looked into a message of the old key");
+      if (now) refused += now->refused_forged - before.refused_forged;
+      if (role != Role::kOperator) counted += DemandReloads(row, rig, old_signer);
+    });
     Remark(row, std::to_string(sent) + " sent, " + std::to_string(refused) +
                     " times the certifier refused one of the old key; " + std::to_string(counted) +
                     " commands of a role that kept its key were obeyed");
@@ -228,9 +215,7 @@ class Forged final : Kind {
   static bool DemandReloads(Row& row, Rig& rig, Signer& signer) {
     const std::string& channel = rig.config().bus.command;
     const std::int64_t before = rig.witness().status() ? rig.witness().status()->version : 0;
-    command_t command{};
-    command.utime = WallClockUs();
-    command.kind = command_t::RELOAD;
+    const command_t command{.utime = WallClockUs(), .kind = command_t::RELOAD};
     rig.open_bus().Publish(channel, Bytes(signer.Sign(Role::kOperator, channel, Encode(command), WallClockUs())));
     const auto reloads = [&] { return rig.witness().status() && rig.witness().status()->version > before; };
     const bool obeyed = rig.ListenUntil(reloads, kSaysSoon);
@@ -258,8 +243,7 @@ class Forged final : Kind {
   void StolenKeys() {
     Rig rig(DemoTask());
     Row& row = Begin(
-        "Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger",
-        options_.others);
+        "Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger");
     std::set<std::int64_t> forged, obeyed;
     rig.Hear(rig.config().bus.event, [&](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);

@@ -5,19 +5,17 @@
 #include <limits>
 
 #include "bus/process.h"
-#include "certifier/gate/candidate_message.h"
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
+#include "tests/messages.h"
 
 namespace forereach {
 
-using std::chrono::milliseconds;
-
-Row& Kind::Begin(const std::string& fault, int tries) {
+Row& Kind::Begin(const std::string& fault, std::optional<int> tries) {
   std::cerr << fault << "\n";
-  rows_.emplace_back().fault = fault;
-  progress_ = std::make_unique<Progress>("tries", static_cast<std::size_t>(tries));
-  return rows_.back();
+  Row& row = rows_.emplace_back(Row{.fault = fault, .wanted = tries.value_or(options_.others)});
+  progress_ = std::make_unique<Progress>("tries", static_cast<std::size_t>(row.wanted));
+  return row;
 }
 
 void Kind::NotTried(const std::string& fault, const std::string& why) {
@@ -36,18 +34,16 @@ void Kind::DemandNothingForbidden(Row& row, Rig& rig) {
   for (const std::string& ending : rig.TakeBadEndings()) Demand(row, false, ending);
 }
 
-void Kind::Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt, int tries, bool bus_loses) {
+void Kind::Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt) {
   if (HealAtFirst(row, rig))
-    for (int i = 0; i < tries; ++i)
-      Try(
-          row, rig, [&] { hurt(i); }, bus_loses);
+    for (int i = 0; i < row.wanted; ++i) Try(row, rig, [&] { hurt(i); });
   rig.EndAll();
   CountLost(row, rig);
   DemandNothingForbidden(row, rig);
   for (const std::string& amiss : rig.CheckRecords()) Demand(row, false, amiss);
 }
 
-void Kind::Try(Row& row, Rig& rig, const std::function<void()>& hurt, bool bus_loses) {
+void Kind::Try(Row& row, Rig& rig, const std::function<void()>& hurt) {
   ++row.tries;
   const std::int64_t before = rig.witness().unheard();
   hurt();
@@ -55,7 +51,8 @@ void Kind::Try(Row& row, Rig& rig, const std::function<void()>& hurt, bool bus_l
   const std::string why = rig.Heal();
   DemandNothingForbidden(row, rig);
   const std::int64_t unheard = rig.witness().unheard() - before;
-  Demand(row, bus_loses || unheard <= 0, std::to_string(unheard) + " candidates counted, their decisions not heard");
+  Demand(row, row.bus_loses || unheard <= 0,
+         std::to_string(unheard) + " candidates counted, their decisions not heard");
   CountLost(row, rig);
   if (why.empty())
     ++row.recovered;
@@ -77,18 +74,14 @@ bool Kind::HealAtFirst(Row& row, Rig& rig) {
 void Kind::ObstacleTries(const std::string& fault, const std::function<void(Row&, Rig&, int)>& hurt) {
   Rig rig(DemoTaskOnTheBus(), {.seen = OfTheCourse()});
   rig.witness().SetWorld({ObstaclesDigest(OfTheCourse())});
-  Row& row = Begin(fault, options_.others);
+  Row& row = Begin(fault);
   told_unknown_ = 0;
-  Tries(
-      row, rig, [&](int i) { hurt(row, rig, i); }, options_.others);
+  Tries(row, rig, [&](int i) { hurt(row, rig, i); });
   if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates answered no_obstacles");
 }
 
 robot_state_t Kind::State(const Rig& rig) const {
-  robot_state_t state{};
-  state.utime = WallClockUs();
-  state.mode = robot_state_t::STANDING;
-  state.executing_plan_id = state.executing_step = -1;
+  robot_state_t state = StateOf(WallClockUs());
   state.num_states = static_cast<std::int16_t>(rig.config().problem->model->num_states());
   return state;
 }

@@ -17,12 +17,16 @@ table. Each family of kinds is a file with a class of its own, which knows nothi
 
 namespace forereach {
 
-inline constexpr std::chrono::seconds kSaysSoon{3};          // some heartbeats
-inline constexpr std::chrono::milliseconds kHeartbeat{600};  // at least one
-inline constexpr std::chrono::seconds kStarts{10};           // a process that was started has spoken
+using std::chrono::microseconds, std::chrono::milliseconds;
+
+inline constexpr std::chrono::seconds kSaysSoon{3};  // some heartbeats
+inline constexpr milliseconds kHeartbeat{600};       // at least one
+inline constexpr std::chrono::seconds kStarts{10};   // a process that was started has spoken
 
 struct Row {
   std::string fault;
+  int wanted = 0;                              // tries
+  bool bus_loses = false;                      // messages, so decisions too
   int tries = 0;                               // 0: it cannot be tried here, the remark says why
   std::size_t forbidden = 0;                   // what may never happen, and did
   std::optional<std::int64_t> lost_by_logger;  // Rig::TakeLost; nothing: no logger ran
@@ -68,7 +72,8 @@ class Kind {
  protected:
   [[nodiscard]] int Below(int bound) { return static_cast<int>(random_() % static_cast<unsigned>(bound)); }
 
-  Row& Begin(const std::string& fault, int tries);
+  /** @param tries so many, or Campaign::others. */
+  Row& Begin(const std::string& fault, std::optional<int> tries = {});
   void NotTried(const std::string& fault, const std::string& why);
   static void Remark(Row& row, const std::string& text) { row.remark += (row.remark.empty() ? "" : "; ") + text; }
 
@@ -78,9 +83,8 @@ class Kind {
   static void DemandNothingForbidden(Row& row, Rig& rig);
   static void CountLost(Row& row, Rig& rig) { row.lost_by_logger = row.lost_by_logger.value_or(0) + rig.TakeLost(); }
 
-  /** So many tries with a system that is healthy at first. `hurt` does something to it; then it has to heal. Where the
-  bus loses messages it may lose decisions. */
-  void Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt, int tries, bool bus_loses = false);
+  /** The row's tries with a system that is healthy at first. `hurt` does something to it; then it has to heal. */
+  void Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt);
   /** With a rig whose obstacles are on the bus alone: any certificate under others, or none, is forbidden. */
   void ObstacleTries(const std::string& fault, const std::function<void(Row&, Rig&, int)>& hurt);
 
@@ -113,7 +117,7 @@ class Kind {
 
  private:
   [[nodiscard]] static bool HealAtFirst(Row& row, Rig& rig);
-  void Try(Row& row, Rig& rig, const std::function<void()>& hurt, bool bus_loses);
+  void Try(Row& row, Rig& rig, const std::function<void()>& hurt);
 
   std::int64_t next_own_id_ = 1;
 };

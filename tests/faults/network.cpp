@@ -14,14 +14,10 @@
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
 #include "tests/faults/relay.h"
-#include "tests/paths.h"
 #include "tests/process/raw_datagrams.h"
 
 namespace forereach {
 namespace {
-
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
 
 using Heard = std::vector<std::pair<std::string, std::vector<std::uint8_t>>>;  // channel, bytes
 constexpr std::size_t kMostHeard = 2000;  // messages that are kept to be sent again
@@ -92,17 +88,14 @@ class Networked final : Kind {
         const std::lock_guard lock(mutex);
         relay.SetWeather(now);
       };
-      Row& row = Begin("Datagrams: " + name, options_.others);
-      Tries(
-          row, rig,
-          [&, now = weather](int) {
-            set(now);
-            rig.Listen(milliseconds(1000));
-            set({});
-            rig.Listen(
-                milliseconds(100));  // no altered message is still on its way when the heartbeats are believed again
-          },
-          options_.others, true);
+      Row& row = Begin("Datagrams: " + name);
+      row.bus_loses = true;
+      Tries(row, rig, [&, now = weather](int) {
+        set(now);
+        rig.Listen(milliseconds(1000));
+        set({});
+        rig.Listen(milliseconds(100));  // no altered message is still on its way when the heartbeats are believed again
+      });
       stop = true;
       passing.join();
       Remark(row, std::to_string(relay.spoiled()) + " messages spoiled");
@@ -142,7 +135,7 @@ class Networked final : Kind {
   // A stranger's, whatever their content: they do no more than any noise.
   void Throw(const std::string& what, const std::function<void(Rig&, const RawSender&, const Heard&)>& send) {
     Rig rig(DemoTask());
-    Row& row = Begin("Raw datagrams: " + what, options_.others);
+    Row& row = Begin("Raw datagrams: " + what);
     const BusOptions& channels = rig.config().bus;
     const RawSender sender(rig.url(Rig::kCertifier));
     Heard heard;
@@ -151,25 +144,23 @@ class Networked final : Kind {
         heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     double most_grown = 0;
-    Tries(
-        row, rig,
-        [&](int) {
-          heard.clear();
-          rig.Listen(milliseconds(300));
-          std::array<double, Rig::kRoles> before{};
-          for (int role = 0; role < Rig::kRoles; ++role)
-            before[static_cast<std::size_t>(role)] = rig.Resident(Rig::Role(role));
-          send(rig, sender, Heard(heard));
-          rig.Listen(kHeartbeat);
-          for (int role = 0; role < Rig::kRoles; ++role) {
-            const double grown = rig.Resident(Rig::Role(role)) - before[static_cast<std::size_t>(role)];
-            most_grown = std::max(most_grown, grown);
-            Demand(row, grown < kMayGrowBy,
-                   std::string("the ") + Rig::kNames[static_cast<std::size_t>(role)] + " grew by " +
-                       std::to_string(std::lround(grown / (1 << 20))) + " MB");
-          }
-        },
-        options_.others, true);
+    row.bus_loses = true;
+    Tries(row, rig, [&](int) {
+      heard.clear();
+      rig.Listen(milliseconds(300));
+      std::array<double, Rig::kRoles> before{};
+      for (int role = 0; role < Rig::kRoles; ++role)
+        before[static_cast<std::size_t>(role)] = rig.Resident(Rig::Role(role));
+      send(rig, sender, Heard(heard));
+      rig.Listen(kHeartbeat);
+      for (int role = 0; role < Rig::kRoles; ++role) {
+        const double grown = rig.Resident(Rig::Role(role)) - before[static_cast<std::size_t>(role)];
+        most_grown = std::max(most_grown, grown);
+        Demand(row, grown < kMayGrowBy,
+               std::string("the ") + Rig::kNames[static_cast<std::size_t>(role)] + " grew by " +
+                   std::to_string(std::lround(grown / (1 << 20))) + " MB");
+      }
+    });
     if (const auto megabytes = std::lround(std::ceil(most_grown / (1 << 20))); megabytes > 1)
       Remark(row, "a process grew by " + std::to_string(megabytes) + " MB in a try");
   }
@@ -202,19 +193,17 @@ class Networked final : Kind {
     const OwnNetwork network;
     if (!network.works()) return NotTried(fault, OwnNetwork::kNeeds);
     Rig rig(DemoTask());
-    Row& row = Begin(fault, options_.others);
+    Row& row = Begin(fault);
     const auto not_sent = [&] { return rig.witness().status() ? rig.witness().status()->messages_not_sent : 0; };
-    Tries(
-        row, rig,
-        [&](int) {
-          const std::int64_t before = not_sent();
-          Demand(row, network.SetRoute(false), "the route stays");
-          rig.Listen(milliseconds(1000));
-          Demand(row, network.SetRoute(true), "the route does not come back");
-          const bool counted = rig.ListenUntil([&] { return not_sent() > before; }, kSaysSoon);
-          Demand(row, counted, "the certifier counts no message that the bus refused");
-        },
-        options_.others, true);
+    row.bus_loses = true;
+    Tries(row, rig, [&](int) {
+      const std::int64_t before = not_sent();
+      Demand(row, network.SetRoute(false), "the route stays");
+      rig.Listen(milliseconds(1000));
+      Demand(row, network.SetRoute(true), "the route does not come back");
+      const bool counted = rig.ListenUntil([&] { return not_sent() > before; }, kSaysSoon);
+      Demand(row, counted, "the certifier counts no message that the bus refused");
+    });
   }
 };
 

@@ -2,17 +2,12 @@
 #include <limits>
 #include <map>
 
-#include "forereach/obstacles_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 
 namespace forereach {
 namespace {
-
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
 
 class Obstructed final : Kind {
  public:
@@ -125,10 +120,9 @@ class Obstructed final : Kind {
     std::vector<Obstacle> seen = WithADriftingOne();
     Rig rig(DemoTaskOnTheBus(400), {.seen = seen});
     rig.witness().SetWorld({ObstaclesDigest(seen)});
-    Row& row = Begin(fault, options_.others);
+    Row& row = Begin(fault);
     told_unknown_ = 0;
-    Tries(
-        row, rig, [&](int i) { hurt(row, rig, i, seen); }, options_.others);
+    Tries(row, rig, [&](int i) { hurt(row, rig, i, seen); });
     if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates answered no_obstacles");
   }
 
@@ -170,30 +164,27 @@ class Obstructed final : Kind {
       ++stops;
       short_stops += event->value < 0 || event->step + event->value > standing[event->plan_id];
     });
-    Row& row = Begin("A wall appears across the way of the robot, and goes", options_.others);
-    Tries(
-        row, rig,
-        [&](int) {
-          // A robot that has just begun to drive may end its plan before the wall.
-          const std::int64_t before = withdrawn;
-          for (int walls = 0; walls < 5 && withdrawn == before; ++walls) {
-            rig.Listen(milliseconds(1500));
-            const certified_plan_t* plan = rig.witness().last_certified();
-            std::vector<Obstacle> walled = seen;
-            const double ahead = (plan ? plan->plan.initial_center[0] : 0) + 2 + Below(6);
-            walled.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), ahead));
-            rig.witness().SetWorld({ObstaclesDigest(seen), ObstaclesDigest(walled)});
-            rig.perception().See(walled);
-            rig.Listen(milliseconds(1000));
-            rig.witness().SetWorld({ObstaclesDigest(walled)});
-            rig.Listen(milliseconds(500));
-            rig.witness().SetWorld({ObstaclesDigest(seen), ObstaclesDigest(walled)});
-            rig.perception().See(seen);
-            rig.Listen(milliseconds(500));
-            rig.witness().SetWorld({ObstaclesDigest(seen)});
-          }
-        },
-        options_.others);
+    Row& row = Begin("A wall appears across the way of the robot, and goes");
+    Tries(row, rig, [&](int) {
+      // A robot that has just begun to drive may end its plan before the wall.
+      const std::int64_t before = withdrawn;
+      for (int walls = 0; walls < 5 && withdrawn == before; ++walls) {
+        rig.Listen(milliseconds(1500));
+        const certified_plan_t* plan = rig.witness().last_certified();
+        std::vector<Obstacle> walled = seen;
+        const double ahead = (plan ? plan->plan.initial_center[0] : 0) + 2 + Below(6);
+        walled.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), ahead));
+        rig.witness().SetWorld({ObstaclesDigest(seen), ObstaclesDigest(walled)});
+        rig.perception().See(walled);
+        rig.Listen(milliseconds(1000));
+        rig.witness().SetWorld({ObstaclesDigest(walled)});
+        rig.Listen(milliseconds(500));
+        rig.witness().SetWorld({ObstaclesDigest(seen), ObstaclesDigest(walled)});
+        rig.perception().See(seen);
+        rig.Listen(milliseconds(500));
+        rig.witness().SetWorld({ObstaclesDigest(seen)});
+      }
+    });
     Demand(row, withdrawn > 0, "no plan was withdrawn");
     Remark(row, std::to_string(withdrawn) + " plans withdrawn, " + std::to_string(stops) + " emergency stops, " +
                     std::to_string(short_stops) + " of them by a wall nearer than the brakes can stop");

@@ -8,13 +8,9 @@
 #include "forereach/command_t.hpp"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
-#include "tests/paths.h"
 
 namespace forereach {
 namespace {
-
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
 
 class Hurt final : Kind {
  public:
@@ -26,46 +22,40 @@ class Hurt final : Kind {
 
   void LatchedKills() {
     Rig rig(DemoTask());
-    Row& row = Begin("SIGKILL of a certifier with a latched fault", options_.others);
+    Row& row = Begin("SIGKILL of a certifier with a latched fault");
     std::int64_t sequence = Witness::kFirstLie;
-    Tries(
-        row, rig,
-        [&](int) {
-          const std::optional<fault_t> fault = Provoke(row, rig, sequence++);
-          rig.Listen(milliseconds(Below(30)));  // perhaps before it is on the disk
-          rig.End(Rig::kCertifier, SIGKILL);
-          rig.Start(Rig::kCertifier);
-          if (fault) DemandStillLatched(row, rig, *fault);
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      const std::optional<fault_t> fault = Provoke(row, rig, sequence++);
+      rig.Listen(milliseconds(Below(30)));  // perhaps before it is on the disk
+      rig.End(Rig::kCertifier, SIGKILL);
+      rig.Start(Rig::kCertifier);
+      if (fault) DemandStillLatched(row, rig, *fault);
+    });
   }
 
   void Reloads() {
     Rig rig(DemoTask());
-    Row& row = Begin("Reload of a bad task file", options_.others);
+    Row& row = Begin("Reload of a bad task file");
     const std::string path = rig.task_path(), good = rig.task();
-    Tries(
-        row, rig,
-        [&](int i) {
-          const certifier_status_t before = *rig.witness().status();
-          const auto& now = rig.witness().status();
-          std::ofstream(path) << Spoilt(good, i / 2);
-          if (i % 2 == 0)
-            rig.Signal(Rig::kCertifier, SIGHUP);
-          else
-            rig.Command(command_t::RELOAD);
-          DemandRefusedAndCertifying(row, rig, before);
-          rig.Listen(kHeartbeat);
-          Demand(row, now->failed_reloads == before.failed_reloads + 1, "it was not refused once");
-          Demand(row, GetText(now->message).starts_with("the last reload failed"), "the heartbeat does not say so");
-          Demand(row, now->version == before.version, "it raised the version");
-          const Digest digest = GetDigest(rig.witness().last_certified()->config_digest);
-          Demand(row, digest == GetDigest(before.config_digest), "plans were certified under another task");
+    Tries(row, rig, [&](int i) {
+      const certifier_status_t before = *rig.witness().status();
+      const auto& now = rig.witness().status();
+      std::ofstream(path) << Spoilt(good, i / 2);
+      if (i % 2 == 0)
+        rig.Signal(Rig::kCertifier, SIGHUP);
+      else
+        rig.Command(command_t::RELOAD);
+      DemandRefusedAndCertifying(row, rig, before);
+      rig.Listen(kHeartbeat);
+      Demand(row, now->failed_reloads == before.failed_reloads + 1, "it was not refused once");
+      Demand(row, GetText(now->message).starts_with("the last reload failed"), "the heartbeat does not say so");
+      Demand(row, now->version == before.version, "it raised the version");
+      const Digest digest = GetDigest(rig.witness().last_certified()->config_digest);
+      Demand(row, digest == GetDigest(before.config_digest), "plans were certified under another task");
 
-          std::ofstream(path) << good;
-          DemandTaken(row, rig, before);
-        },
-        options_.others);
+      std::ofstream(path) << good;
+      DemandTaken(row, rig, before);
+    });
     ReloadOfNoFile(rig);
   }
 
@@ -73,17 +63,14 @@ class Hurt final : Kind {
   void Signals(const std::string& fault, int signal, int tries) {
     Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
-    Tries(
-        row, rig,
-        [&](int i) {
-          const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
-          rig.Listen(milliseconds(Below(120)));
-          if (signal == SIGKILL) return rig.End(role, SIGKILL);
-          rig.Signal(role, signal);
-          rig.Listen(milliseconds(Below(2000)));
-          rig.Signal(role, SIGCONT);
-        },
-        tries);
+    Tries(row, rig, [&](int i) {
+      const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
+      rig.Listen(milliseconds(Below(120)));
+      if (signal == SIGKILL) return rig.End(role, SIGKILL);
+      rig.Signal(role, signal);
+      rig.Listen(milliseconds(Below(2000)));
+      rig.Signal(role, SIGCONT);
+    });
   }
 
   // A reload that has been asked for is refused, and the certifier goes on. @param before its heartbeat then.
@@ -105,14 +92,11 @@ class Hurt final : Kind {
   // Certainly bad, each way in turn.
   std::string Spoilt(const std::string& task, int way) {
     const auto cut_before = [&](std::size_t end) { return task.substr(0, Below(static_cast<int>(end))); };
-    const auto with = [&task](const std::string& good, const std::string& bad) {
-      return std::string(task).replace(task.find(good), good.size(), bad);
-    };
     switch (way % 4) {
       case 0: return cut_before(task.find("\ntask:"));  // which is required
       case 1: return cut_before(task.size()) + "\nno_such_key: 1\n";
-      case 2: return with("dt: 0.1", "dt: .nan");
-      default: return with("\ntransitions: ", "\ntransitions: /there_is_none");
+      case 2: return Replaced(task, "dt: 0.1, ", "dt: .nan, ");
+      default: return Replaced(task, "\ntransitions: ", "\ntransitions: /there_is_none");
     }
   }
 
@@ -130,26 +114,23 @@ class Hurt final : Kind {
   }
 
   void ReloadOfNoFile(Rig& rig) {
-    Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file", options_.others);
+    Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file");
     const std::string path = rig.task_path(), good = rig.task();
-    Tries(
-        row, rig,
-        [&](int i) {
-          const certifier_status_t before = *rig.witness().status();
-          const auto& now = rig.witness().status();
-          PutNoFile(path, i);
-          rig.Signal(Rig::kRobot, SIGHUP);
-          rig.Command(command_t::RELOAD);
-          DemandRefusedAndCertifying(row, rig, before);
-          Demand(row, now->version == before.version, "it raised the version");
-          const bool ends = i / 4 % 2 == 1;
-          if (ends) rig.End(Rig::kCertifier);  // that it ends in time is looked at after each try
-          std::filesystem::remove_all(path);
-          std::ofstream(path) << good;
-          if (ends) return;
-          DemandTaken(row, rig, before);
-        },
-        options_.others);
+    Tries(row, rig, [&](int i) {
+      const certifier_status_t before = *rig.witness().status();
+      const auto& now = rig.witness().status();
+      PutNoFile(path, i);
+      rig.Signal(Rig::kRobot, SIGHUP);
+      rig.Command(command_t::RELOAD);
+      DemandRefusedAndCertifying(row, rig, before);
+      Demand(row, now->version == before.version, "it raised the version");
+      const bool ends = i / 4 % 2 == 1;
+      if (ends) rig.End(Rig::kCertifier);  // that it ends in time is looked at after each try
+      std::filesystem::remove_all(path);
+      std::ofstream(path) << good;
+      if (ends) return;
+      DemandTaken(row, rig, before);
+    });
   }
 };
 

@@ -15,7 +15,6 @@
 #include "tests/faults/load.h"
 #include "tests/faults/report.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -14,7 +14,6 @@
 #include "records/check.h"
 #include "records/event_log.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
 
 namespace forereach {
 namespace {
@@ -218,9 +217,7 @@ bool Rig::ListenUntil(const std::function<bool()>& done, std::chrono::millisecon
 }
 
 void Rig::Command(std::int16_t kind) {
-  command_t command{};
-  command.utime = NowUs();
-  command.kind = kind;
+  command_t command{.utime = NowUs(), .kind = kind};
   SetText(command.source, "campaign");
   signed_->Publish(config_.bus.command, command);
 }

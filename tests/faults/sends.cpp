@@ -66,9 +66,7 @@ class Supervising final {
 
 Config StepsWithinJitter(Config config) {
   config.gate.step_error_ms = kJitterUs * 1e-3;
-  Problem problem = *config.problem;
-  problem.timing.error = StepErrorSeconds(config);
-  config.problem = std::make_shared<const Problem>(std::move(problem));
+  Own(config.problem).timing.error = StepErrorSeconds(config);
   return config;
 }
 
@@ -198,9 +196,7 @@ class ThrowingRobot final : private Supervisor::Robot {
   }
 
   void Reset(std::int64_t now_us) {
-    command_t command{};
-    command.utime = now_us;
-    command.kind = command_t::RESET;
+    command_t command{.utime = now_us, .kind = command_t::RESET};
     const auto message = signer_.Sign(Role::kOperator, "COMMAND", Encode(command), now_us);
     const Supervising now(true);
     (void)supervisor_.OnCommand(message, now_us);
@@ -223,12 +219,11 @@ class ThrowingRobot final : private Supervisor::Robot {
   Supervisor supervisor_;
 };
 
-class Thrown final : Kind {
- public:
+struct Thrown final : Kind {
   using Kind::Kind;
 
   void AtRandomCalls() {
-    Row& row = Begin("A robot whose Send, clock or allocator throws at random calls", options_.others);
+    Row& row = Begin("A robot whose Send, clock or allocator throws at random calls");
     std::array<std::int64_t, kSites> struck{};
     std::int64_t controls = 0, refused = 0;
     for (int i = 0; i < options_.others; ++i) {

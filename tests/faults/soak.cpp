@@ -6,13 +6,11 @@
 #include <sstream>
 
 #include <unistd.h>
-#include "forereach/decision_t.hpp"
-#include "forereach/logger_status_t.hpp"
 #include "records/database.h"
 #include "tests/faults/load.h"
 #include "tests/faults/report.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

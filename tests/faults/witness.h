@@ -20,7 +20,6 @@
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
-#include "task/config.h"
 
 namespace forereach {
 

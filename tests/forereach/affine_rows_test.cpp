@@ -32,8 +32,7 @@ Problem DraggedPointMass(int steps, double noise) {
 
 std::shared_ptr<const Problem> Shared(Problem problem) { return std::make_shared<const Problem>(std::move(problem)); }
 
-class AffineResidual : public testing::Test {
- protected:
+struct AffineResidual : testing::Test {
   Decision Certify(const Certifier& certifier) {
     return certifier.Certify({controls_.data(), 2, 16, 2}, start_, {}, tube_);
   }
@@ -91,9 +90,7 @@ TEST_F(AffineResidual, HasNoBoundWhereTheDataVaryTogether) {
   EXPECT_THAT(certifier.Unexcited(), AnyOf(HasSubstr("0.5 vx - ax is the same in all observations"),
                                            HasSubstr("-0.5 vx + ax is the same in all observations")));
   const Decision decision = Certify(certifier);
-  EXPECT_EQ(decision.outcome, Outcome::kDomain);
-  EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
-  EXPECT_EQ(decision.step, 0);
+  EXPECT_FIELDS(decision, (outcome, Outcome::kDomain), (cause, Cause::kNoFiniteEnclosure), (step, 0));
 }
 
 TEST_F(AffineResidual, IsFalsifiedByAFewObservationsThatAreNamed) {
@@ -136,8 +133,7 @@ TEST_F(AffineResidual, IsNarrowedAndContradictedByWhatIsLearned) {
   ASSERT_EQ(certifier.Learn({z.data(), 6}, {next.data(), 4}), Learned::kAdded);
   ASSERT_TRUE(certifier.violation());
   const Transitions rows = certifier.Contradiction();
-  EXPECT_EQ(rows.size(), 6);
-  EXPECT_EQ(rows.x_next(5, 2), next[2]);
+  EXPECT_FIELDS(rows, (size(), 6), (x_next(5, 2), next[2]));
   EXPECT_GT(rows.num_learned, 0);
 }
 

@@ -55,8 +55,7 @@ Problem BicycleProblem() {
   return problem;
 }
 
-class Allocation : public testing::Test {
- protected:
+struct Allocation : testing::Test {
   void SetUp() override {
     if (FOREREACH_SANITIZED) GTEST_SKIP() << "the sanitizers own malloc";
   }

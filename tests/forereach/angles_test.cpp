@@ -5,7 +5,6 @@
 
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
-#include "forereach/numerics/size.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 

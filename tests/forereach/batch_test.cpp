@@ -29,8 +29,7 @@ std::vector<double> Hulls(const Tube& tube) {
   return ends;
 }
 
-class BatchTest : public testing::Test {
- protected:
+struct BatchTest : testing::Test {
   static constexpr int kPlans = 300;
 
   BatchTest() {
@@ -97,8 +96,6 @@ TEST_F(BatchTest, NoPlansNoDecisions) {
 }
 
 TEST_F(BatchTest, SaysWhatDoesNotFit) {
-  using testing::HasSubstr;
-  using testing::ThrowsMessage;
   const std::span two(initial_sets_.data(), 2);
   EXPECT_THAT([&] { (void)CertifyAll(certifier_, plans_, two, obstacles_); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("2 initial sets, must be 1 or 300")));
@@ -212,8 +209,7 @@ TEST(SharedControls, ChangeNoBitOfADecisionOrATube) {
 }
 
 // No residual; counts the steps that are propagated.
-class CountingEnclosure final : public ResidualEnclosure {
- public:
+struct CountingEnclosure final : ResidualEnclosure {
   void Enclose(const QuerySet&, ResidualBounds& bounds) const noexcept override {
     bounds.lower.fill(0);
     bounds.upper.fill(0);
@@ -224,8 +220,7 @@ class CountingEnclosure final : public ResidualEnclosure {
 };
 
 // A point mass that drives along x, among nothing.
-class SharingTest : public testing::Test {
- protected:
+struct SharingTest : testing::Test {
   // Plans of 4 steps by their accelerations along x.
   void Plans(const std::vector<std::array<double, 4>>& accelerations) {
     for (const auto& each : accelerations) {

@@ -14,8 +14,6 @@
 
 namespace forereach::certifier_test {
 
-using testing::Eq;
-
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kPx = 0, kVx = 2, kVy = 3, kAx = 4;
 constexpr int kTheta = 2, kV = 3, kDelta = 5, kJerk = 6;
@@ -75,16 +73,11 @@ TEST(Certificate, NamesTheClosestObstacleAndStep) {
   const std::vector<Obstacle> obstacles{Obstacle::Circle(Vec({0, 9}), 1), Obstacle::Circle(Vec({2, 3}), 1),
                                         Obstacle::HalfSpace(Vec({1, 0}), 50)};
   const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(4), obstacles);  // 1 m a step along x
-  EXPECT_EQ(d.outcome, Outcome::kCertified);
-  EXPECT_EQ(d.cause, Cause::kNone);
-  EXPECT_EQ(d.step, -1);
-  EXPECT_EQ(d.obstacle, 1);
-  EXPECT_EQ(d.closest_step, 2);
+  EXPECT_FIELDS(d, (outcome, Outcome::kCertified), (cause, Cause::kNone), (step, -1), (obstacle, 1), (closest_step, 2));
   EXPECT_NEAR(d.margin, 3, 1e-12);
   EXPECT_EQ(d.threshold, 1);
   ExpectNoWitness(d, false, false, true);
-  EXPECT_EQ(judge.tube().length(), 4);
-  EXPECT_EQ(judge.certifier().problem().zonotope_order, 5);
+  EXPECT_FIELDS(judge, (tube().length(), 4), (certifier().problem().zonotope_order, 5));
   // The sentence claims no more than is proven: enclosures round outwards, and so does the text.
   EXPECT_LT(d.margin - d.threshold, 2);
   EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("closest at step 2, 1.99999 m from obstacle 1"));
@@ -134,9 +127,7 @@ TEST(ObstacleNames, StayWithAnObstacleThatMovesOrIsShifted) {
 TEST(Certificate, WithoutObstaclesHasNoMargin) {
   Judge judge(PointMassInHalves());
   const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {});
-  EXPECT_EQ(d.outcome, Outcome::kCertified);
-  EXPECT_EQ(d.obstacle, -1);
-  EXPECT_EQ(d.margin, kInfinity);
+  EXPECT_FIELDS(d, (outcome, Outcome::kCertified), (obstacle, -1), (margin, kInfinity));
 }
 
 TEST(AbstainSafety, NamesTheStepAtTheStartTheMiddleAndTheEnd) {
@@ -144,12 +135,9 @@ TEST(AbstainSafety, NamesTheStepAtTheStartTheMiddleAndTheEnd) {
     Judge judge(PointMassInHalves());
     const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(6),
                              {Obstacle::Circle(Vec({0, 50}), 1), Obstacle::Circle(Vec({1.0 * step, 1}), 1.25)});
-    EXPECT_EQ(d.outcome, Outcome::kSafety);
-    EXPECT_EQ(d.cause, Cause::kObstacle);
+    EXPECT_FIELDS(d, (outcome, Outcome::kSafety), (cause, Cause::kObstacle));
     // Within 0.75 m along x the circle is met; one step is 1 m.
-    EXPECT_EQ(d.step, step);
-    EXPECT_EQ(d.obstacle, 1);
-    EXPECT_EQ(d.threshold, 1.25);
+    EXPECT_FIELDS(d, (step, step), (obstacle, 1), (threshold, 1.25));
     EXPECT_NEAR(d.margin, 1, 1e-12);
     ExpectNoWitness(d, false, false, true);
     EXPECT_EQ(judge.tube().length(), 6) << "safety is judged after the horizon";
@@ -163,8 +151,7 @@ TEST(AbstainSafety, AbstainsWhereTheStartTouchesAnObstacle) {
   const auto at = [&](double left) {
     return judge(start, Coast(1), {Obstacle::AxisBox(Vec({-9, left}), Vec({9, 9}))});
   };
-  EXPECT_EQ(at(1).outcome, Outcome::kSafety);
-  EXPECT_EQ(at(1).step, 0);
+  EXPECT_FIELDS(at(1), (outcome, Outcome::kSafety), (step, 0));
   EXPECT_EQ(at(1 + 1e-12).outcome, Outcome::kCertified);
   EXPECT_EQ(judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {Obstacle::Circle(Vec({0, 1}), 1)}).outcome, Outcome::kSafety);
 }
@@ -176,16 +163,10 @@ TEST(AbstainDomain, NamesTheBoundOfEveryKind) {
   problem.domain.balls.push_back({{kVx, kVy}, Vec({0, 0}), 5});
   Judge judge(problem);
   const auto expect = [&](const Decision& d, int step, Kind kind, int index, double value, double bound) {
-    EXPECT_EQ(d.outcome, Outcome::kDomain);
-    EXPECT_EQ(d.cause, Cause::kDomainExit);
-    EXPECT_EQ(d.step, step);
-    EXPECT_EQ(d.exit.kind, kind);
-    EXPECT_EQ(d.exit.index, index);
-    EXPECT_EQ(d.coordinate, index);
+    EXPECT_FIELDS(d, (outcome, Outcome::kDomain), (cause, Cause::kDomainExit), (step, step), (exit.kind, kind),
+                  (exit.index, index), (coordinate, index));
     EXPECT_NEAR(d.exit.value, value, 1e-12);
-    EXPECT_EQ(d.exit.bound, bound);
-    EXPECT_EQ(d.margin, d.exit.value);
-    EXPECT_EQ(d.threshold, bound);
+    EXPECT_FIELDS(d, (exit.bound, bound), (margin, d.exit.value), (threshold, bound));
     ExpectNoWitness(d, true, false, false);
     EXPECT_EQ(judge.tube().length(), step);
     EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("abstain D: at step " + std::to_string(step)));
@@ -228,34 +209,28 @@ TEST(AbstainDomain, TheLastSliceMayLieOutside) {
   Judge judge(PointMassInHalves());
   EXPECT_EQ(judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(1), {}).outcome, Outcome::kCertified);
   const Decision d = judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(2), {});
-  EXPECT_EQ(d.outcome, Outcome::kDomain);
-  EXPECT_EQ(d.step, 1);
+  EXPECT_FIELDS(d, (outcome, Outcome::kDomain), (step, 1));
 }
 
 TEST(AbstainDomain, ComesBeforeSafety) {
   Judge judge(PointMassInHalves());
   const Decision d = judge(PointSet(Vec({98, 0, 3.5, 0})), Coast(3), {Obstacle::Circle(Vec({98, 0}), 1)});
   EXPECT_EQ(d.outcome, Outcome::kDomain) << "although the obstacle is touched at step 0";
-  EXPECT_EQ(d.step, 2);
-  EXPECT_EQ(d.obstacle, -1);
+  EXPECT_FIELDS(d, (step, 2), (obstacle, -1));
 }
 
 TEST(AbstainDomain, NamesThePoleOfTheSteeringAsItsCause) {
   Judge judge(BicycleProblem());
   const Decision d = judge(Zonotope::FromBox(Vec({0, 0, 0, 5, 0, 1.5}), Vec({0, 0, 0, 0, 0, 0.1})), Coast(2), {});
-  EXPECT_EQ(d.outcome, Outcome::kDomain);
-  EXPECT_EQ(d.cause, Cause::kNoFiniteEnclosure);
-  EXPECT_EQ(d.step, 0);
-  EXPECT_EQ(d.coordinate, kTheta);
-  EXPECT_EQ(d.exit.kind, DomainExit::Kind::kNone);
+  EXPECT_FIELDS(d, (outcome, Outcome::kDomain), (cause, Cause::kNoFiniteEnclosure), (step, 0), (coordinate, kTheta),
+                (exit.kind, DomainExit::Kind::kNone));
   ExpectNoWitness(d, true, false, false);
   EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("theta has no finite enclosure"));
 
   Eigen::MatrixXd turn = Coast(3);
   turn.row(1).setConstant(2);  // 0.2 rad a step, from 1.2 over the pole at 1.57
   const Decision later = judge(Zonotope::FromBox(Vec({0, 0, 0, 0.5, 0, 1.2}), Vec({0, 0, 0, 0, 0, 0.1})), turn, {});
-  EXPECT_EQ(later.cause, Cause::kNoFiniteEnclosure);
-  EXPECT_EQ(later.step, 2);
+  EXPECT_FIELDS(later, (cause, Cause::kNoFiniteEnclosure), (step, 2));
 }
 
 TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
@@ -284,8 +259,7 @@ TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
 }
 
 // A brake that ends at +-0.25 m/s, with the widths and the last bit of the residual around it.
-class NoStop : public testing::TestWithParam<double> {
- protected:
+struct NoStop : testing::TestWithParam<double> {
   Decision Brake(double tolerance, const std::vector<Obstacle>& obstacles = {}) {
     Problem problem = PointMassInHalves();
     problem.rest = {{kVy, 1}, {kVx, tolerance}};
@@ -309,12 +283,9 @@ TEST_P(NoStop, TheBoundIsClosedToTheLastBit) {
   const double reached = Reached();
   EXPECT_EQ(Brake(reached).outcome, Outcome::kCertified);
   const Decision d = Brake(NextDown(reached));
-  EXPECT_EQ(d.outcome, Outcome::kDomain);
-  EXPECT_EQ(d.cause, Cause::kNoStop);
+  EXPECT_FIELDS(d, (outcome, Outcome::kDomain), (cause, Cause::kNoStop));
   EXPECT_EQ(d.step, 1) << "T";
-  EXPECT_EQ(d.coordinate, kVx);
-  EXPECT_EQ(d.margin, GetParam() * reached);
-  EXPECT_EQ(d.threshold, GetParam() * NextDown(reached));
+  EXPECT_FIELDS(d, (coordinate, kVx), (margin, GetParam() * reached), (threshold, GetParam() * NextDown(reached)));
   ExpectNoWitness(d, true, false, false);
   EXPECT_EQ(judge_->tube().length(), 1);
   EXPECT_THAT(Explain(d, judge_->certifier().problem()),
@@ -326,8 +297,7 @@ TEST_P(NoStop, ComesBeforeSafety) {
   const std::vector<Obstacle> touched{Obstacle::Circle(Vec({0, 0}), 1)};
   EXPECT_EQ(Brake(3, touched).outcome, Outcome::kSafety);
   const Decision d = Brake(0.1, touched);
-  EXPECT_EQ(d.cause, Cause::kNoStop);
-  EXPECT_EQ(d.obstacle, -1);
+  EXPECT_FIELDS(d, (cause, Cause::kNoStop), (obstacle, -1));
 }
 
 INSTANTIATE_TEST_SUITE_P(BothDirections, NoStop, testing::Values(1.0, -1.0));
@@ -340,15 +310,10 @@ TEST(AbstainFalsified, NamesThePairBeforeAnythingElse) {
   problem.transitions.x_next(2, kVy) += 0.5;
   Judge judge(problem);
   const Decision d = judge(PointSet(Vec({1e6, 0, 0, 0})), Coast(2), {Obstacle::Circle(Vec({1e6, 0}), 1)});
-  EXPECT_EQ(d.outcome, Outcome::kFalsified);
-  EXPECT_EQ(d.cause, Cause::kPairwise);
-  EXPECT_EQ(d.step, -1);
-  EXPECT_EQ(d.coordinate, kVy);
-  EXPECT_EQ(d.first_observation, 1);
-  EXPECT_EQ(d.second_observation, 2);
+  EXPECT_FIELDS(d, (outcome, Outcome::kFalsified), (cause, Cause::kPairwise), (step, -1), (coordinate, kVy),
+                (first_observation, 1), (second_observation, 2));
   EXPECT_NEAR(d.margin, 0.375, 1e-12);
-  EXPECT_EQ(d.threshold, 0.25);
-  EXPECT_EQ(d.obstacle, -1);
+  EXPECT_FIELDS(d, (threshold, 0.25), (obstacle, -1));
   EXPECT_EQ(judge.tube().length(), 0);
   ASSERT_TRUE(judge.certifier().violation());
   EXPECT_EQ(judge.certifier().violation()->first, 1);
@@ -419,8 +384,7 @@ TEST(Certifier, WhereAGrowingDisturbanceHasNoBoundThereIsNoSuccessor) {
   Judge judge(problem);
   EXPECT_EQ(judge(PointSet(Vec({0, 0, 1, 0})), Coast(1), {}).outcome, Outcome::kCertified);
   const Decision decision = judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {});
-  EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
-  EXPECT_EQ(decision.coordinate, kVx);
+  EXPECT_FIELDS(decision, (cause, Cause::kNoFiniteEnclosure), (coordinate, kVx));
   problem.transitions.z(0, kVx) = 2;
   EXPECT_THROW(Judge{problem}, std::invalid_argument) << "such a transition says nothing";
 }
@@ -567,8 +531,7 @@ TEST(ReferenceTube, CentredIsWithinTwoPercentOfTheSampledInnerHull) {
 }
 
 // A task with a residual, whose slices reach the largest order.
-class Reproducible : public testing::TestWithParam<Method> {
- protected:
+struct Reproducible : testing::TestWithParam<Method> {
   Reproducible() {
     Problem problem = BicycleProblem();
     problem.method = GetParam();
@@ -583,9 +546,7 @@ class Reproducible : public testing::TestWithParam<Method> {
   }
 
   static void ExpectSame(const Decision& a, const Tube& tube_a, const Decision& b, const Tube& tube_b) {
-    EXPECT_EQ(a.outcome, b.outcome);
-    EXPECT_EQ(a.margin, b.margin);
-    EXPECT_EQ(a.closest_step, b.closest_step);
+    EXPECT_FIELDS(a, (outcome, b.outcome), (margin, b.margin), (closest_step, b.closest_step));
     ASSERT_EQ(tube_a.length(), 12);
     ASSERT_EQ(tube_b.length(), 12);
     for (int t = 0; t <= 12; ++t) {
@@ -760,8 +721,7 @@ TEST(Certifier, SpatialAndLinearProjectionsAreJudged) {
   const auto wall = [](double x) { return Obstacle::HalfSpace(Eigen::VectorXd::Ones(1), x); };
   EXPECT_EQ(line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3.5)}).outcome, Outcome::kCertified);
   const Decision d = line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3)});
-  EXPECT_EQ(d.outcome, Outcome::kSafety);
-  EXPECT_EQ(d.step, 3);
+  EXPECT_FIELDS(d, (outcome, Outcome::kSafety), (step, 3));
 }
 
 TEST(Decision, ADefaultDecisionIsNoCertificate) {

@@ -146,14 +146,13 @@ TEST(PartDistance, LiesBetweenTheGapsAndTheDistancesOfPoints) {
 }
 
 TEST(PartDistance, AtATimeIsThatOfTheObstacleThereWithItsGrowth) {
-  ObstacleMotion motion;
-  motion.stamp_us = 1'000'000;
-  motion.velocity = {2, 0, 0};
-  motion.uncertainty = 0.1;
-  motion.growth = 0.2;
-  motion.growth_rate = 0.4;
-  motion.from_us = 0;
-  motion.until_us = 4'000'000;
+  ObstacleMotion motion{.stamp_us = 1'000'000,
+                        .velocity = {2, 0, 0},
+                        .uncertainty = 0.1,
+                        .growth = 0.2,
+                        .growth_rate = 0.4,
+                        .from_us = 0,
+                        .until_us = 4'000'000};
   const Obstacle obstacle = Obstacle::Circle(Vector2d(-9, 0), 1).Moving(motion);
   // 2 s later it is at x = -5, with 0.1 + 0.4 + 0.8 m more.
   EXPECT_DOUBLE_EQ(ApproximateDistance(obstacle, Square(0, 0, 1), 3'000'000), 4 - 1 - 1.3);
@@ -169,9 +168,7 @@ TEST(PartDistance, OfASweepIsTheLeastOnTheWay) {
   EXPECT_DOUBLE_EQ(ApproximateDistance(post, from, to, schedule, 0, 1), 1);
   EXPECT_GT(ApproximateDistance(post, from, from, schedule, 0, 0), 1.5) << "a sample alone";
   // An obstacle that drives along beside the robot stays where it is, seen from the robot.
-  ObstacleMotion motion;
-  motion.velocity = {40, 0, 0};
-  motion.until_us = 500'000;
+  ObstacleMotion motion{.velocity = {40, 0, 0}, .until_us = 500'000};
   const Obstacle beside = Obstacle::Circle(Vector2d(0, 2), 0.5).Moving(motion);
   EXPECT_NEAR(ApproximateDistance(beside, from, to, schedule, 0, 1), 1 - 40 * 0.01, 1e-12) << "less the clock's error";
   EXPECT_EQ(ApproximateDistance(beside, from, to, schedule, 6, 7), kInfinity);

@@ -17,13 +17,12 @@ namespace forereach::compiled_models_test {
 
 // Every operation that a nominal model may have, names that are words of C++, and a definition that nothing uses.
 ModelText EveryOperation() {
-  ModelText text;
-  text.name = "every_operation";
-  text.file = "robot.yaml";
-  text.states = {{"x", "m"}, {"double", "m"}, {"_a__b", "rad"}};
-  text.inputs = {{"next", "m/s"}, {"T", "1"}};
-  text.parameters = {{"k", 1.5, 1.5}, {"dt", 0.1, 0.1}};
-  text.definitions = {{"z", {"k*x - 2/(double + 10)"}}, {"half", {"0.5"}}, {"unused", {"x"}}};
+  ModelText text{.name = "every_operation",
+                 .file = "robot.yaml",
+                 .states = {{"x", "m"}, {"double", "m"}, {"_a__b", "rad"}},
+                 .inputs = {{"next", "m/s"}, {"T", "1"}},
+                 .parameters = {{"k", 1.5, 1.5}, {"dt", 0.1, 0.1}},
+                 .definitions = {{"z", {"k*x - 2/(double + 10)"}}, {"half", {"0.5"}}, {"unused", {"x"}}}};
   text.equations = {{"x + dt*(sin(_a__b)*z + cos(x)^2 - tan(0.1*_a__b))/x^T + asin(0.1*sin(x)) - -acos(0.1*cos(x))"},
                     {"sqrt(4 + x^4) + exp(-x^2) - log(5 + double^2) + atan(z)*tanh(x) + hypot(x, 3 + double^2)"},
                     {"atan2(2 + x^2, next) + abs(x - 20) + min(x, 30)*max(T, z) + x^-3 + (x + 9)^half + pi*x^0 + x^1"}};
@@ -48,8 +47,7 @@ TEST(EquationsHeader, HostileUnitsAndOriginsCannotEndAComment) {
   const std::string header = EquationsHeader(text, "robot", "robot.yaml */\rint x; /*/");
   EXPECT_EQ(header.find("*/"), header.find(". */\n#pragma once") + 2);
   EXPECT_EQ(header.find("/*", 2), header.find("/** The values of the parameters"));
-  EXPECT_THAT(header, Not(HasSubstr("\n#error")));
-  EXPECT_THAT(header, Not(HasSubstr("\r")));
+  EXPECT_THAT(header, AllOf(Not(HasSubstr("\n#error")), Not(HasSubstr("\r"))));
 }
 
 // Whole numbers too large for an integer of C++, and zero with a sign.
@@ -141,8 +139,7 @@ TEST(UseCompiledTest, DecisionsHaveTheSameBits) {
   for (const ModelText& each : {EveryOperation(), other}) {
     const auto interpreted = MakeTextModel(each), compiled = CompiledFor(interpreted);
     ASSERT_NE(compiled, interpreted);
-    EXPECT_EQ(compiled->description(), interpreted->description());
-    EXPECT_EQ(compiled->angles(), interpreted->angles());
+    EXPECT_FIELDS(*compiled, (description(), interpreted->description()), (angles(), interpreted->angles()));
     std::vector<Tube> tubes(2);
     std::vector<Decision> decisions;
     for (const auto& model : {interpreted, compiled}) {
@@ -162,8 +159,7 @@ TEST(UseCompiledTest, DecisionsHaveTheSameBits) {
       const auto initial_set = Zonotope::FromBox(Eigen::Vector3d(2, 0, 0), Eigen::Vector3d::Constant(1e-3));
       decisions.push_back(certifier.Certify(plan, initial_set, {}, tubes[decisions.size()]));
     }
-    EXPECT_EQ(decisions[0].outcome, decisions[1].outcome);
-    EXPECT_EQ(decisions[0].step, decisions[1].step);
+    EXPECT_FIELDS(decisions[0], (outcome, decisions[1].outcome), (step, decisions[1].step));
     ASSERT_EQ(tubes[0].length(), tubes[1].length());
     ASSERT_GE(tubes[0].length(), 1) << static_cast<int>(decisions[0].cause);
     for (int t = 0; t <= tubes[0].length(); ++t)

@@ -108,8 +108,8 @@ TEST(Expression, OperandsComeBeforeOperatorsInTheOrderOfTheText) {
   using Kind = Expression::Kind;
   std::vector<Kind> kinds;
   for (const auto& node : e.nodes) kinds.push_back(node.kind);
-  EXPECT_THAT(kinds, testing::ElementsAre(Kind::kName, Kind::kName, Kind::kName, Kind::kName, Kind::kCall,
-                                          Kind::kMultiply, Kind::kMultiply, Kind::kAdd));
+  EXPECT_THAT(kinds, ElementsAre(Kind::kName, Kind::kName, Kind::kName, Kind::kName, Kind::kCall, Kind::kMultiply,
+                                 Kind::kMultiply, Kind::kAdd));
   EXPECT_EQ(e.nodes[4].column, 11);                               // cos
   EXPECT_EQ(e.nodes[7].column, 3);                                // +
   EXPECT_EQ(ParseExpression({"v^-2"}, kNames).nodes.size(), 2u);  // the exponent is no operand
@@ -170,7 +170,7 @@ TEST(Expression, AnUnknownNameComesWithThoseThatAreKnown) {
     static_cast<void>(ParseExpression({"thetta"}, kNames));
     FAIL();
   } catch (const ExpressionError& error) {
-    EXPECT_THAT(error.known(), testing::ElementsAre("x", "y", "theta", "v", "dt", "pi"));
+    EXPECT_THAT(error.known(), ElementsAre("x", "y", "theta", "v", "dt", "pi"));
   }
   try {
     static_cast<void>(ParseExpression({"cosh(x)"}, kNames));
@@ -200,7 +200,7 @@ TEST(Expression, DepthIsBounded) {
       return Repeated(o, levels) + "x" + Repeated(c, levels);
     };
     EXPECT_EQ(ErrorOf(nested(200)), "") << open;
-    EXPECT_THAT(ErrorOf(nested(201)), testing::EndsWith("is nested deeper than 200 levels")) << open;
+    EXPECT_THAT(ErrorOf(nested(201)), EndsWith("is nested deeper than 200 levels")) << open;
   }
   EXPECT_EQ(ErrorOf(Repeated("x + y*(", 199) + "v" + Repeated(")", 199)), "");
   EXPECT_EQ(ErrorOf(Repeated("-x*(x^y) + ", 1000) + "v"), "");  // one after the other

@@ -35,8 +35,7 @@ std::shared_ptr<const Problem> PointMassProblem(double step_error) {
   return problem;
 }
 
-class GivenEnclosure : public testing::Test {
- protected:
+struct GivenEnclosure : testing::Test {
   Decision Certify(const ResidualEnclosure& residual, double step_error = 0) {
     const Certifier certifier(PointMassProblem(step_error), residual);
     EXPECT_EQ(certifier.num_observations(), 0u);
@@ -74,15 +73,12 @@ TEST_F(GivenEnclosure, AStepOffItsTimeHasMoreOfWhatASlopeBounds) {
 
 TEST_F(GivenEnclosure, InvertedBoundsProveThatNoResidualIsAdmissible) {
   const Decision decision = Certify(Velocities(0, -1));
-  EXPECT_EQ(decision.outcome, Outcome::kFalsified);
-  EXPECT_EQ(decision.step, 0);
-  EXPECT_EQ(decision.coordinate, 2);
+  EXPECT_FIELDS(decision, (outcome, Outcome::kFalsified), (step, 0), (coordinate, 2));
 }
 
 TEST_F(GivenEnclosure, ASlopeThatIsNotFiniteIsNoBound) {
   const Decision decision = Certify(Velocities(std::numeric_limits<double>::quiet_NaN(), 0));
-  EXPECT_EQ(decision.outcome, Outcome::kDomain);
-  EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
+  EXPECT_FIELDS(decision, (outcome, Outcome::kDomain), (cause, Cause::kNoFiniteEnclosure));
 }
 
 }  // namespace forereach::given_enclosure_test

@@ -12,8 +12,7 @@ namespace forereach::learn_test {
 constexpr int kBase = 5, kLearned = 400;
 
 // A residual of theta that rises with v, inside what is declared; the domain has a ball besides its box.
-class LearnTest : public testing::Test {
- protected:
+struct LearnTest : testing::Test {
   LearnTest() {
     problem_.domain.balls.push_back({{3, 5}, Eigen::Vector2d(10, 0), 9});
     problem_.declaration.lipschitz(2, 3) = 0.02;
@@ -51,9 +50,7 @@ class LearnTest : public testing::Test {
     return certifier.Certify({controls.data(), 2, 12, 2}, initial_set, {}, tube);
   }
 
-  const unsigned seed_ = std::random_device{}();
-  const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
-  std::mt19937 random_{seed_};
+  FreshRandom random_;
   Problem problem_ = WorldOf(MakeKinematicBicycle(0.1, 2.5),
                              Box(Vec({-40, -40, -3, 0, -3, -0.4}), Vec({40, 40, 3, 20, 3, 0.4})), Within({20, 2}));
 };
@@ -107,9 +104,8 @@ TEST_F(LearnTest, AnswersAsACertifierThatHadAllDataFromTheStart) {
   for (int k = 0; k < 6; ++k) {
     const double learned = tube.slice(tube.length()).HalfWidthUpper(k);
     EXPECT_NEAR(learned, tube_of_all.slice(tube.length()).HalfWidthUpper(k), 1e-9);
-    if (before.outcome == Outcome::kCertified) {
+    if (before.outcome == Outcome::kCertified)
       EXPECT_LE(learned, tube_before.slice(tube.length()).HalfWidthUpper(k) + 1e-12) << "data only narrow";
-    }
   }
 }
 
@@ -228,11 +224,9 @@ TEST_F(LearnTest, AContradictionIsTheTransitionsAsTheyWereRecordedHoweverFewAreK
   ASSERT_TRUE(certifier.violation());
   const Transitions rows = certifier.Contradiction();
   ASSERT_EQ(rows.size(), 2);
-  EXPECT_EQ(rows.x_next.row(1).transpose(), second);
-  EXPECT_EQ(rows.longer[1], 0);
+  EXPECT_FIELDS(rows, (x_next.row(1).transpose(), second), (longer[1], 0));
   if (rows.z.row(0).transpose() == z) {  // or another one that is near
-    EXPECT_EQ(rows.x_next.row(0).transpose(), first);
-    EXPECT_EQ(rows.longer[0], 0.25);
+    EXPECT_FIELDS(rows, (x_next.row(0).transpose(), first), (longer[0], 0.25));
   }
   problem_.transitions = rows;
   problem_.transitions.longer.setZero();
@@ -249,8 +243,7 @@ TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {
   const Eigen::VectorXd z = problem_.transitions.z.row(3).transpose();
   EXPECT_EQ(Learn(certifier, z, Next(z, 1e-3)), Certifier::Learned::kAdded);
   ASSERT_TRUE(certifier.violation());
-  EXPECT_EQ(certifier.violation()->second, kBase);
-  EXPECT_EQ(certifier.violation()->coordinate, 2);
+  EXPECT_FIELDS(*certifier.violation(), (second, kBase), (coordinate, 2));
   Tube tube;
   EXPECT_EQ(Certify(certifier, tube).outcome, Outcome::kFalsified);
 }

@@ -17,8 +17,7 @@ Limit AtMost(const std::string& that, double bound, const std::string& name = "i
 Limit AtLeast(const std::string& that, double bound) { return {.name = "it", .that = {that, 1, 1}, .at_least = bound}; }
 
 // A point mass in steps of 0.5 s without a residual: whole numbers stay exact. vx is 0.5 to 1.5 at all samples.
-class Limits : public testing::Test {
- protected:
+struct Limits : testing::Test {
   Decision Judge(const std::vector<Limit>& limits, const std::vector<Obstacle>& obstacles = {}) {
     problem_.limits = limits;
     certifier_.emplace(std::make_shared<Problem>(problem_));
@@ -37,44 +36,39 @@ class Limits : public testing::Test {
 
 // What is reached is rounded away from it.
 TEST_F(Limits, AreShownAsTheyWereGiven) {
-  EXPECT_THAT(Explain(Judge({AtMost("vx", 0.1)}), problem_), testing::EndsWith(", above its limit 0.1"));
-  EXPECT_THAT(Explain(Judge({AtLeast("vx", 1.1)}), problem_), testing::EndsWith(", below its limit 1.1"));
-  EXPECT_THAT(Explain(Judge({AtMost("vx", 1.23456789)}), problem_), testing::EndsWith("above its limit 1.23456789"));
-  EXPECT_THAT(Explain(Judge({AtMost("1/vx - vx", 1e-300)}), problem_), testing::EndsWith("above its limit 1e-300"));
+  EXPECT_THAT(Explain(Judge({AtMost("vx", 0.1)}), problem_), EndsWith(", above its limit 0.1"));
+  EXPECT_THAT(Explain(Judge({AtLeast("vx", 1.1)}), problem_), EndsWith(", below its limit 1.1"));
+  EXPECT_THAT(Explain(Judge({AtMost("vx", 1.23456789)}), problem_), EndsWith("above its limit 1.23456789"));
+  EXPECT_THAT(Explain(Judge({AtMost("1/vx - vx", 1e-300)}), problem_), EndsWith("above its limit 1e-300"));
   problem_.limits = {};
   const auto exit = [&](DomainExit::Kind kind, double bound) {
     Decision decision{.outcome = Outcome::kDomain, .cause = Cause::kDomainExit, .step = 2};
     decision.exit = {kind, 0, std::nextafter(bound, kind == DomainExit::Kind::kLower ? -9 : 9), bound};
     return Explain(decision, problem_);
   };
-  EXPECT_THAT(exit(DomainExit::Kind::kLower, 0.1), testing::EndsWith("px reaches 0.0999999, below its bound 0.1"));
-  EXPECT_THAT(exit(DomainExit::Kind::kUpper, 0.7), testing::EndsWith("px reaches 0.700001, above its bound 0.7"));
-  EXPECT_THAT(exit(DomainExit::Kind::kInequality, 0.7), testing::EndsWith("reaches 0.700001, above its bound 0.7"));
-  EXPECT_THAT(exit(DomainExit::Kind::kBall, 0.7), testing::EndsWith("reaches 0.700001, above its radius 0.7"));
+  EXPECT_THAT(exit(DomainExit::Kind::kLower, 0.1), EndsWith("px reaches 0.0999999, below its bound 0.1"));
+  EXPECT_THAT(exit(DomainExit::Kind::kUpper, 0.7), EndsWith("px reaches 0.700001, above its bound 0.7"));
+  EXPECT_THAT(exit(DomainExit::Kind::kInequality, 0.7), EndsWith("reaches 0.700001, above its bound 0.7"));
+  EXPECT_THAT(exit(DomainExit::Kind::kBall, 0.7), EndsWith("reaches 0.700001, above its radius 0.7"));
   Decision no_stop{.outcome = Outcome::kDomain, .cause = Cause::kNoStop, .step = 2};
   no_stop.coordinate = 2, no_stop.margin = 0.2, no_stop.threshold = 0.1;
-  EXPECT_THAT(Explain(no_stop, problem_), testing::EndsWith("vx reaches 0.200001; standing is up to 0.1"));
+  EXPECT_THAT(Explain(no_stop, problem_), EndsWith("vx reaches 0.200001; standing is up to 0.1"));
 }
 
 TEST_F(Limits, AreClosedToTheLastBit) {
   const Decision above = Judge({AtMost("py", 90), AtMost("vx", 1, "speed")});
-  EXPECT_EQ(above.outcome, Outcome::kSafety);
-  EXPECT_EQ(above.cause, Cause::kLimit);
-  EXPECT_EQ(above.step, 0);
-  EXPECT_EQ(above.coordinate, 1);
-  EXPECT_EQ(above.obstacle, -1);
-  EXPECT_EQ(above.part, -1);
-  EXPECT_EQ(above.closest_step, -1);
+  EXPECT_FIELDS(above, (outcome, Outcome::kSafety), (cause, Cause::kLimit), (step, 0), (coordinate, 1), (obstacle, -1),
+                (part, -1), (closest_step, -1));
   EXPECT_NEAR(above.margin, 1.5, 1e-14);
   EXPECT_GE(above.margin, 1.5);
   EXPECT_EQ(above.threshold, 1);
   EXPECT_THAT(Explain(above, problem_), HasSubstr("abstain S: at step 0 speed may reach 1.5"));
-  EXPECT_THAT(Explain(above, problem_), testing::EndsWith(", above its limit 1"));
+  EXPECT_THAT(Explain(above, problem_), EndsWith(", above its limit 1"));
   const Decision below = Judge({AtLeast("vx", 1)});
   EXPECT_NEAR(below.margin, 0.5, 1e-14);
   EXPECT_LE(below.margin, 0.5);
   EXPECT_EQ(below.threshold, 1);
-  EXPECT_THAT(Explain(below, problem_), testing::EndsWith(", below its limit 1"));
+  EXPECT_THAT(Explain(below, problem_), EndsWith(", below its limit 1"));
 
   controls_ = Eigen::MatrixXd::Zero(2, 1);
   controls_(0, 0) = -2;  // the last sample is well inside
@@ -146,8 +140,7 @@ TEST_F(Limits, UseTheNamesOfTheModel) {
 TEST_F(Limits, TheFirstFailureIsNamed) {
   const std::vector<Obstacle> wall{Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2)};
   EXPECT_EQ(Judge({}, wall).step, 3);
-  EXPECT_EQ(Judge({AtMost("px", 1)}, wall).cause, Cause::kLimit);
-  EXPECT_EQ(Judge({AtMost("px", 1)}, wall).step, 2);
+  EXPECT_FIELDS(Judge({AtMost("px", 1)}, wall), (cause, Cause::kLimit), (step, 2));
   EXPECT_EQ(Judge({AtMost("px", 2)}, wall).cause, Cause::kLimit) << "the same step";
   EXPECT_EQ(Judge({AtMost("px", 2.5)}, wall).cause, Cause::kObstacle);
   EXPECT_EQ(Judge({AtMost("px", 2.5)}, {}).step, 4);
@@ -177,10 +170,9 @@ TEST_F(Limits, ACertificateSaysWhenTheyHold) {
             "certified: no obstacle is there; within its limits at the sample instants; steps on time");
   const std::vector<Obstacle> far{Obstacle::Circle(Eigen::Vector2d(50, 0), 1)};
   problem_.between = Between{Eigen::Vector2d::Zero(), 0, 0, 0.5};
-  EXPECT_THAT(
-      Explain(Judge({AtMost("vx", 2)}, far), problem_),
-      testing::AllOf(HasSubstr("certified: the robot stays clear at all times"),
-                     testing::EndsWith("from obstacle 0; within its limits at the sample instants; steps on time")));
+  EXPECT_THAT(Explain(Judge({AtMost("vx", 2)}, far), problem_),
+              AllOf(HasSubstr("certified: the robot stays clear at all times"),
+                    EndsWith("from obstacle 0; within its limits at the sample instants; steps on time")));
 }
 
 TEST_F(Limits, AreRefusedIfTheyAreMalformed) {

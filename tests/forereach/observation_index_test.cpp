@@ -167,12 +167,8 @@ TEST_P(Search, WithACapIsWiderAndSaysSo) {
       wider += differs;
     }
   }
-  if (GetParam() > 0) {
-    EXPECT_GT(capped, 0);
-  }
-  if (GetParam() > 3) {
-    EXPECT_GT(wider, 0);
-  }
+  if (GetParam() > 0) EXPECT_GT(capped, 0);
+  if (GetParam() > 3) EXPECT_GT(wider, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(ActiveColumns, Search, testing::Range(0, 15));
@@ -297,8 +293,7 @@ TEST(FindViolation, TakesManyRowsAtOneLocation) {
   o.lower(kRows - 1, 0) = o.upper(kRows - 1, 0) = 0.25;
   const auto violation = FindViolation(declaration, o);
   ASSERT_TRUE(violation);
-  EXPECT_EQ(violation->first, kRows - 2);
-  EXPECT_EQ(violation->second, kRows - 1);
+  EXPECT_FIELDS(*violation, (first, kRows - 2), (second, kRows - 1));
 }
 
 TEST(FindViolation, TakesManyObservationsThatAllContradictEachOther) {
@@ -374,8 +369,7 @@ TEST(PairSearch, SaysTheSameOnEveryInstructionSet) {
         return false;
       }));
     }
-    EXPECT_FALSE(pairs.front().empty());
-    EXPECT_EQ(pairs.front(), pairs.back());
+    EXPECT_FIELDS(pairs, (front().empty(), false), (front(), pairs.back()));
   }
 }
 

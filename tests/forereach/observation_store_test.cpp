@@ -118,10 +118,7 @@ LipschitzEnvelope EnvelopeOf(const std::vector<Sample>& samples) {
 }
 
 StoreOptions Options(int tail_capacity, std::size_t max_observations = 1'000'000) {
-  StoreOptions options;
-  options.tail_capacity = tail_capacity;
-  options.max_observations = max_observations;
-  return options;
+  return {.tail_capacity = tail_capacity, .max_observations = max_observations};
 }
 
 ObservationStore StoreOf(const std::vector<Sample>& samples, const StoreOptions& options = {}) {
@@ -336,12 +333,10 @@ TEST(ObservationStore, CompactKeepsWhatArrivesWhileItBuilds) {
     ASSERT_EQ(at_next_allocation, nullptr) << "Compact allocated nothing";
     ASSERT_EQ(std::ssize(ids), arrivals);
     EXPECT_EQ(ids.front(), 45);
-    EXPECT_EQ(store.snapshot().size(), samples.size());
-    EXPECT_EQ(store.tail_size(), arrivals);
+    EXPECT_FIELDS(store, (snapshot().size(), samples.size()), (tail_size(), arrivals));
     ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
     store.Compact();
-    EXPECT_EQ(store.tail_size(), 0);
-    EXPECT_EQ(store.snapshot().size(), samples.size());
+    EXPECT_FIELDS(store, (tail_size(), 0), (snapshot().size(), samples.size()));
     ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
   }
 }

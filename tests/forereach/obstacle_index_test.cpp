@@ -13,15 +13,9 @@ namespace forereach::obstacle_index_test {
 
 // All that is reported; NaN would differ from itself.
 void ExpectSame(const Decision& a, const Decision& b) {
-  EXPECT_EQ(a.outcome, b.outcome);
-  EXPECT_EQ(a.cause, b.cause);
-  EXPECT_EQ(a.step, b.step);
-  EXPECT_EQ(a.coordinate, b.coordinate);
-  EXPECT_EQ(a.obstacle, b.obstacle);
-  EXPECT_EQ(a.part, b.part);
-  EXPECT_EQ(a.closest_step, b.closest_step);
-  EXPECT_EQ(a.margin, b.margin);
-  EXPECT_EQ(a.threshold, b.threshold);
+  EXPECT_FIELDS(a, (outcome, b.outcome), (cause, b.cause), (step, b.step), (coordinate, b.coordinate),
+                (obstacle, b.obstacle), (part, b.part), (closest_step, b.closest_step), (margin, b.margin),
+                (threshold, b.threshold));
 }
 
 Rational SquareOfGap(const Bounds& box, const Hull& hull, int dim) {
@@ -223,9 +217,7 @@ TEST(ObstacleIndex, FindsTheOneThatIsTouchedAmongThousands) {
   cells[3000] = Obstacle::Circle(Vec({2, 0}), 0.1);
   const ObstacleIndex index(cells);
   const Decision found = certifier.Certify(plan, set, {cells, index}, tube);
-  EXPECT_EQ(found.outcome, Outcome::kSafety);
-  EXPECT_EQ(found.obstacle, 3000);
-  EXPECT_EQ(found.step, 4);
+  EXPECT_FIELDS(found, (outcome, Outcome::kSafety), (obstacle, 3000), (step, 4));
   ExpectSame(found, certifier.Certify(plan, set, cells, tube));
 }
 
@@ -253,9 +245,7 @@ TEST(ObstacleIndex, ChangesNoDecisionWhereMostAreBesideTheBody) {
     for (const int place : {100, 700}) blocked[ToSize(place)] = Obstacle::Circle(Vec({x, 0}), 0.125);
     const ObstacleIndex other(blocked);
     const Decision touched = certifier.Certify(plan, set, {blocked, other}, tube);
-    EXPECT_EQ(touched.outcome, Outcome::kSafety);
-    EXPECT_EQ(touched.obstacle, 100);
-    EXPECT_EQ(touched.step, x < 6 ? 1 : 8);
+    EXPECT_FIELDS(touched, (outcome, Outcome::kSafety), (obstacle, 100), (step, x < 6 ? 1 : 8));
     ExpectSame(touched, certifier.Certify(plan, set, blocked, tube));
   }
 }

@@ -22,8 +22,7 @@ BodyPart At(const std::vector<std::vector<std::string>>& places, double radius) 
 }
 
 // Two links of 2 m and 1 m; the inputs are the rates of the joints. Half a second a step, no residual.
-class Places : public testing::Test {
- protected:
+struct Places : testing::Test {
   Places() {
     problem_ = WorldOf(MakeTextModel(TextModel({{"q1", "q1 + dt*u1"}, {"q2", "q2 + dt*u2"}}, {"u1", "u2"},
                                                {{"dt", 0.5, 0.5}, {"length", 2, 2}},
@@ -62,8 +61,7 @@ TEST_F(Places, OfAStandingArmAreDecidedWithinAHair) {
   EXPECT_FALSE(IsClear(Circle(1, 1, 0.75 + kHair)));
   EXPECT_TRUE(IsClear(Circle(2, 2, 0.875 - kHair))) << "above the hand";
   const Decision hand = Judge(Circle(2, 2, 0.875 + kHair));
-  EXPECT_EQ(hand.outcome, Outcome::kSafety);
-  EXPECT_EQ(hand.part, 1);
+  EXPECT_FIELDS(hand, (outcome, Outcome::kSafety), (part, 1));
   EXPECT_THAT(Explain(hand, problem_), HasSubstr("at step 0 part 1 may touch obstacle 0"));
   EXPECT_TRUE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2.25 + kHair)));
   EXPECT_FALSE(IsClear(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2.25 - kHair)));

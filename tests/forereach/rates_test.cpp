@@ -11,11 +11,9 @@
 namespace forereach::rates_test {
 
 using exact::Rational;
-using testing::HasSubstr;
 
 // A bar that turns on the spot in steps of half a second. Its data turn it by `turns`, one transition each, from 0.
-class Rates : public testing::Test {
- protected:
+struct Rates : testing::Test {
   static Problem Bar(double turn_rate, std::initializer_list<double> turns, bool is_angle = false) {
     ModelText text = TextModel({{"x", "x"}, {"y", "y"}, {"th", "th + dt*w"}}, {"w"}, {{"dt", 0.5, 0.5}});
     if (is_angle) text.angles = {"th"};
@@ -43,10 +41,7 @@ class Rates : public testing::Test {
 TEST_F(Rates, ATransitionThatTurnsFasterThanDeclaredFalsifies) {
   const Problem problem = Bar(0.5, {0.125, -3, 1});
   const Decision d = Decide(problem);
-  EXPECT_EQ(d.outcome, Outcome::kFalsified);
-  EXPECT_EQ(d.cause, Cause::kBound);
-  EXPECT_EQ(d.step, -1);
-  EXPECT_EQ(d.coordinate, 2);
+  EXPECT_FIELDS(d, (outcome, Outcome::kFalsified), (cause, Cause::kBound), (step, -1), (coordinate, 2));
   EXPECT_EQ(d.first_observation, 1) << "the worst";
   EXPECT_EQ(d.second_observation, -1);
   EXPECT_LE(d.margin, 6);
@@ -112,8 +107,7 @@ TEST_F(Rates, DeclaredOfAStateAreRefutedByDataAndByThePlan) {
   const auto decide = [&] {
     return Certifier(std::make_shared<Problem>(problem)).Certify({&turning, 1, 1, 1, {}}, start, {}, tube);
   };
-  EXPECT_EQ(decide().cause, Cause::kBetween);
-  EXPECT_EQ(decide().threshold, 2.75);
+  EXPECT_FIELDS(decide(), (cause, Cause::kBetween), (threshold, 2.75));
   problem.timing.rate_bound[2] = 6;
   EXPECT_EQ(decide().outcome, Outcome::kCertified);
 }
@@ -127,13 +121,10 @@ TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
   EXPECT_FALSE(certifier.violation());
   EXPECT_EQ(certifier.Learn(z, next, 0.1), Learned::kAdded);
   ASSERT_TRUE(certifier.violation());
-  EXPECT_EQ(certifier.violation()->first, 2);
-  EXPECT_EQ(certifier.violation()->second, -1);
+  EXPECT_FIELDS(*certifier.violation(), (first, 2), (second, -1));
   const Transitions shown = certifier.Contradiction();
   ASSERT_EQ(shown.size(), 1);
-  EXPECT_EQ(shown.num_learned, 1);
-  EXPECT_EQ(shown.x_next(0, 2), 0.3125);
-  EXPECT_EQ(shown.longer[0], 0.1);
+  EXPECT_FIELDS(shown, (num_learned, 1), (x_next(0, 2), 0.3125), (longer[0], 0.1));
   certifier.Learn(z, next, 0.125);
   EXPECT_TRUE(certifier.violation()) << "it does not become true again";
 }

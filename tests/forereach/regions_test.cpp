@@ -35,8 +35,7 @@ void Append(Problem& problem, double vx, double residual) {
   data.x_next.row(data.x_next.rows() - 1) = next;
 }
 
-class Regions : public testing::Test {
- protected:
+struct Regions : testing::Test {
   // From vx at a constant speed.
   Decision Certify(const Certifier& certifier, double vx) {
     const Zonotope start = Zonotope::FromBox(Eigen::Vector4d(0, 0, vx, 0), Eigen::Vector4d::Constant(0.125));
@@ -68,9 +67,7 @@ TEST_F(Regions, AreContradictedByTwoStepsThatLAllows) {
   EXPECT_FALSE(Certifier(SharedOf(plain)).violation());
   const Certifier certifier(SharedOf(problem));
   ASSERT_TRUE(certifier.violation());
-  EXPECT_EQ(certifier.violation()->first, 0);
-  EXPECT_EQ(certifier.violation()->second, 1);
-  EXPECT_EQ(certifier.violation()->coordinate, 2);
+  EXPECT_FIELDS(*certifier.violation(), (first, 0), (second, 1), (coordinate, 2));
   EXPECT_NEAR(certifier.violation()->difference, 0.05, 1e-12);
   EXPECT_EQ(certifier.violation()->bound, 0);
   EXPECT_EQ(Certify(certifier, 1).outcome, Outcome::kFalsified);
@@ -104,8 +101,7 @@ TEST_F(Regions, AreNarrowedAndContradictedByWhatIsLearned) {
   const auto [slow, after] = StepFrom(problem, -1, 0.03125);
   ASSERT_EQ(certifier.Learn({slow.data(), 6}, {after.data(), 4}), Learned::kAdded);
   ASSERT_TRUE(certifier.violation());
-  EXPECT_EQ(certifier.violation()->second, 2);
-  EXPECT_EQ(certifier.Contradiction().num_learned, 1);
+  EXPECT_FIELDS(certifier, (violation()->second, 2), (Contradiction().num_learned, 1));
 }
 
 // Steps that say nothing new are not kept, and of many the last are.

@@ -41,9 +41,7 @@ TEST(Obstacle, RefusesWrongDimensionsAndNumbers) {
 
 TEST(Obstacle, HasTheHullAndRadiusOfItsKind) {
   const Obstacle box = Obstacle::AxisBox(Vector3d(0, 1, 2), Vector3d(3, 4, 5));
-  EXPECT_EQ(box.hull().size(), 8u);
-  EXPECT_EQ(box.dim(), 3);
-  EXPECT_EQ(box.radius(), 0);
+  EXPECT_FIELDS(box, (hull().size(), 8u), (dim(), 3), (radius(), 0));
   EXPECT_EQ(Obstacle::AxisBox(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1)).hull().size(), 2u);
   EXPECT_TRUE(Obstacle::HalfSpace(Vector3d(0, 0, 1), 2).hull().empty());
   EXPECT_EQ(Obstacle::Circle(Point(1, 2), 3).hull(), std::vector{Vector3d(1, 2, 0)});

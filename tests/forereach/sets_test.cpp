@@ -167,10 +167,9 @@ TEST(LinearMap, RowsThatCopyACoordinateAreExact) {
   Zonotope image;
   EncloseLinearImage(entries, set, HalfWidths(set), 2, image);
   ASSERT_EQ(image.num_generators(), 9) << "no error, so no generator for it";
-  EXPECT_EQ(image.center(0), set.center(2));
-  EXPECT_EQ(image.center(1), -set.center(0));
-  EXPECT_EQ(image.GeneratorMatrix().row(0), set.GeneratorMatrix().row(2));
-  EXPECT_EQ(image.GeneratorMatrix().row(1), -set.GeneratorMatrix().row(0));
+  EXPECT_FIELDS(image, (center(0), set.center(2)), (center(1), -set.center(0)),
+                (GeneratorMatrix().row(0), set.GeneratorMatrix().row(2)),
+                (GeneratorMatrix().row(1), -set.GeneratorMatrix().row(0)));
 }
 
 TEST(LinearMap, MapsAPointToAPoint) {
@@ -178,8 +177,7 @@ TEST(LinearMap, MapsAPointToAPoint) {
   const MatrixEntry entries[] = {{0, 0, Interval(0.5)}, {0, 1, Interval(2)}};
   Zonotope image;
   EncloseLinearImage(entries, point, HalfWidths(point), 1, image);
-  EXPECT_EQ(image.center(0), 7);
-  EXPECT_EQ(image.num_generators(), 0);
+  EXPECT_FIELDS(image, (center(0), 7), (num_generators(), 0));
 }
 
 TEST(Outline, HasTheCornersOfAPointASegmentAndASquare) {
@@ -187,10 +185,10 @@ TEST(Outline, HasTheCornersOfAPointASegmentAndASquare) {
   Eigen::MatrixXd segment(2, 2);
   segment << 1, 0, 1, 0;
   EXPECT_THAT(Outline(Zonotope(Vec({0, 0}), segment)),
-              testing::UnorderedElementsAre(Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, -1)));
+              UnorderedElementsAre(Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, -1)));
   EXPECT_THAT(Outline(Zonotope(Vec({0, 0}), Eigen::MatrixXd::Identity(2, 2))),
-              testing::UnorderedElementsAre(Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1), Eigen::Vector2d(-1, -1),
-                                            Eigen::Vector2d(1, -1)));
+              UnorderedElementsAre(Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1), Eigen::Vector2d(-1, -1),
+                                   Eigen::Vector2d(1, -1)));
 }
 
 double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }

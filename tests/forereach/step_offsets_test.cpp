@@ -153,8 +153,7 @@ TEST(ActedInputs, LieInTheDomainWithTheirErrors) {
   for (const double sign : {1.0, -1.0}) {
     EXPECT_EQ(Drive(problem, sign * 1.5).decision.outcome, Outcome::kCertified) << "exactly at the edge";
     const Decision decision = Drive(problem, sign * std::nextafter(1.5, 2)).decision;
-    EXPECT_EQ(decision.outcome, Outcome::kDomain);
-    EXPECT_EQ(decision.coordinate, 1);
+    EXPECT_FIELDS(decision, (outcome, Outcome::kDomain), (coordinate, 1));
   }
   Problem cut = problem;
   cut.domain.inequalities.push_back({Vec({0, 1}), 1.25});
@@ -171,8 +170,7 @@ TEST(ActedInputs, KeepLimitsWithTheirErrors) {
 
 TEST(ActedInputs, WithoutErrorsChangeNoBit) {
   const Driving exact = Drive(Driven({}), 1, 0.1), zeros = Drive(Driven(Vec({0})), 1, 0.1);
-  EXPECT_EQ(exact.reached.lower, zeros.reached.lower);
-  EXPECT_EQ(exact.reached.upper, zeros.reached.upper);
+  EXPECT_FIELDS(exact.reached, (lower, zeros.reached.lower), (upper, zeros.reached.upper));
   EXPECT_NE(Drive(Driven(Vec({0x1p-40})), 1, 0.1).reached.upper, exact.reached.upper);
 }
 
@@ -210,7 +208,7 @@ TEST(StepOffsets, AddUpOnlyWhereNothingSaysHowTheyAreRelated) {
     Tube tube;
     const Decision decision = certifier.Certify(plan, start, {}, tube);
     EXPECT_EQ(decision.outcome, Outcome::kCertified);
-    EXPECT_THAT(Explain(decision, problem), testing::EndsWith("; steps up to 0.015625 s off their times"));
+    EXPECT_THAT(Explain(decision, problem), EndsWith("; steps up to 0.015625 s off their times"));
     return tube.half_width(t)[ToSize(k)];
   };
   EXPECT_EQ(half_width(0, 0), 0);

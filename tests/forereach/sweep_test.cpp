@@ -16,12 +16,7 @@ Problem BicycleProblem() {
   return WorldOf(MakeKinematicBicycle(0.5, 2.5), Within({40, 40, 3.2, 25, 3, 1}), Within({20, 2}));
 }
 
-Between Curving(double x, double y) {
-  Between between;
-  between.acceleration = Vec({x, y});
-  between.period = 0.5;
-  return between;
-}
+Between Curving(double x, double y) { return {.acceleration = Vec({x, y}), .period = 0.5}; }
 
 Decision Judge(const Problem& problem, const Eigen::VectorXd& start, int steps, const std::vector<Obstacle>& obstacles,
                const Schedule& schedule = {}, const Eigen::VectorXd& half_width = {}) {
@@ -62,7 +57,7 @@ TEST(Between, ASampleBelongsToBothOfItsSteps) {
   problem.between = Curving(0, 0);
   const Decision d = Judge(problem, Vec({0, 0, 4, 0}), 3, {Obstacle::Circle(Vec({4, 1}), 0.5)});
   EXPECT_TRUE(IsCertified(d));
-  EXPECT_THAT(d.closest_step, testing::AnyOf(1, 2));
+  EXPECT_THAT(d.closest_step, AnyOf(1, 2));
   EXPECT_NEAR(d.margin, 1, 1e-12);
 }
 
@@ -94,8 +89,7 @@ TEST(Body, ADiscAndAHullThatDoNotTurnAreJudgedWithinAHair) {
   problem.body = Parts({{{Vector3d(-1, 2, 0), Vector3d(1, 2, 0)}, 0}, {{Vector3d(0, 0, 0), Vector3d(2, 2, 0)}, 0.25}});
   EXPECT_TRUE(IsCertified(Judge(problem, start, 1, disc_at(0, 3 + kHair))));
   const Decision edge = Judge(problem, start, 1, disc_at(0, 3 - kHair));  // between the points of part 0
-  EXPECT_EQ(edge.outcome, Outcome::kSafety);
-  EXPECT_EQ(edge.part, 0);
+  EXPECT_FIELDS(edge, (outcome, Outcome::kSafety), (part, 0));
   const double distance = std::sqrt(0.5) + 0;  // of (2, 1) from the segment of part 1
   EXPECT_NEAR(Judge(problem, start, 1, {Obstacle::Circle(Vec({2, 1}), 0)}).margin, distance, 1e-9);
   EXPECT_EQ(Judge(problem, start, 1, {Obstacle::Circle(Vec({2, 1}), distance - 0.25 - kHair)}).part, 1);
@@ -159,7 +153,6 @@ TEST(Body, IsRefusedIfItIsMalformed) {
     return "accepted";
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  using testing::StartsWith;
   EXPECT_EQ(refusal([](Problem&) {}), "accepted");
   EXPECT_THAT(refusal([](Problem& p) { p.body.heading = 6; }), StartsWith("body: heading 6"));
   EXPECT_THAT(refusal([](Problem& p) { p.projection.conservativeResize(1, 6), p.body.heading = 2; }),
@@ -204,8 +197,7 @@ TEST(Moving, IsWhereItIsAtTheTimeOfTheStep) {
     if (sweeps) problem.between = Curving(0, 0);
     EXPECT_TRUE(IsCertified(Judge(problem, rest, 4, {Approaching(2 - kHair, motion)}, schedule)));
     const Decision touched = Judge(problem, rest, 4, {Approaching(2 + kHair, motion)}, schedule);
-    EXPECT_EQ(touched.outcome, Outcome::kSafety);
-    EXPECT_EQ(touched.step, sweeps ? 3 : 4);
+    EXPECT_FIELDS(touched, (outcome, Outcome::kSafety), (step, sweeps ? 3 : 4));
     // A stamp a second before the plan's start: it is 4 m nearer.
     motion.stamp_us = 6'000'000;
     EXPECT_EQ(Judge(problem, rest, 4, {Approaching(2 - kHair, motion)}, schedule).step, sweeps ? 2 : 3);
@@ -337,9 +329,7 @@ TEST(SafetyTest, BeginsAtTheGivenStep) {
 
 // Bodies and obstacles, more pairs of them than the search for the closest keeps, and fewer.
 TEST(SafetyTest, NamesTheClosestOfAllStepsAndObstacles) {
-  const std::uint64_t seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937_64 random(seed);
+  FreshRandom random;
   const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   const std::vector<Body> bodies{
       {},
@@ -377,20 +367,16 @@ TEST(SafetyTest, NamesTheClosestOfAllStepsAndObstacles) {
     for (int t = 0; t < certifier.safety().NumUnits(tube); ++t)
       for (int o = 0; o < static_cast<int>(obstacles.size()); ++o) least = std::min(least, clearance(t, o));
     const double named = Separation{found.margin, found.threshold}.clearance();
-    if (is_point) {
-      EXPECT_EQ(named, least) << round;
-    }
+    if (is_point) EXPECT_EQ(named, least) << round;
     EXPECT_NEAR(named, least, 1e-5) << round;  // how close to the distance a search for several pieces comes
     EXPECT_NEAR(clearance(found.closest_step, found.obstacle), least, 1e-5) << round;
   }
-  EXPECT_THAT(certified, testing::Each(testing::Gt(10)));
+  EXPECT_THAT(certified, Each(Gt(10)));
 }
 
 // The support along any direction is above that of every place, and not above that of what encloses them.
 TEST(Body, TheSupportOfAPartContainsItsPlaces) {
-  const std::uint64_t seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937_64 random(seed);
+  FreshRandom random;
   const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   for (int round = 0; round < 300; ++round) {
     Body body = Parts({{{Vector3d(3, 1, 0), Vector3d(-1, uniform(-1, 1), 0)}, 0.3}, {{Vector3d(uniform(-3, 3), 0, 0)}}},

@@ -1,10 +1,5 @@
 // A declared turn rate that the plan's own slices contradict: there is no motion that it describes.
-#include <cmath>
-#include <numbers>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/test.h"
 
 #include "forereach/certify/explain.h"
 #include "forereach/certify/standing.h"
@@ -12,14 +7,10 @@
 #include "tests/text_models.h"
 #include "tests/worlds.h"
 
-namespace forereach {
-namespace turn_test {
-
-using testing::HasSubstr;
+namespace forereach::turn_test {
 
 // A bar of 2.4 m that turns on the spot in steps of 1 s; a post stands 1 m beside its middle.
-class Turn : public testing::Test {
- protected:
+struct Turn : testing::Test {
   static Problem Bar(double turn_rate, bool is_angle) {
     ModelText text = TextModel({{"x", "x"}, {"y", "y"}, {"th", "th + dt*w"}}, {"w"}, {{"dt", 1, 1}});
     if (is_angle) text.angles = {"th"};
@@ -49,10 +40,7 @@ class Turn : public testing::Test {
 
 TEST_F(Turn, ThatNoMotionWithinTheDeclaredRateMakesIsAbstainedFrom) {
   const Decision d = Turned(3.1, 0.5);
-  EXPECT_EQ(d.outcome, Outcome::kDomain);
-  EXPECT_EQ(d.cause, Cause::kBetween);
-  EXPECT_EQ(d.step, 1);
-  EXPECT_EQ(d.coordinate, 2);
+  EXPECT_FIELDS(d, (outcome, Outcome::kDomain), (cause, Cause::kBetween), (step, 1), (coordinate, 2));
   EXPECT_NEAR(d.margin, 3.1, 1e-12);
   EXPECT_LE(d.margin, 3.1);
   EXPECT_EQ(d.threshold, 0.5);
@@ -92,9 +80,7 @@ TEST_F(Turn, LeavesTheControlsBeforeItStanding) {
   problem_ = Bar(0.5, false);
   const Certifier certifier(std::make_shared<Problem>(problem_));
   const Standing standing = JudgeAgain(certifier, PlanOf(3.1), StartWithin(0), {}, tube_, 0);
-  EXPECT_EQ(standing.steps, 1);
-  EXPECT_EQ(standing.verdict.cause, Cause::kBetween);
+  EXPECT_FIELDS(standing, (steps, 1), (verdict.cause, Cause::kBetween));
 }
 
-}  // namespace turn_test
-}  // namespace forereach
+}  // namespace forereach::turn_test

@@ -25,11 +25,8 @@ std::optional<Unbounded> Find(const ModelText& text, const Interval& v, double u
 TEST(FindUnbounded, NamesTheFunctionItsPlaceAndItsArgument) {
   const auto found = Find(Of("x + dt*abs(v)"), {-0.25, 0.5});
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->operation, "abs");
-  EXPECT_EQ(found->line, 1);
-  EXPECT_EQ(found->column, 8);
-  EXPECT_EQ(found->states, std::vector<int>{2});
-  EXPECT_EQ(found->argument, Interval(-0.25, 0.5));
+  EXPECT_FIELDS(*found, (operation, "abs"), (line, 1), (column, 8), (states, std::vector<int>{2}),
+                (argument, Interval(-0.25, 0.5)));
 }
 
 // v in the box, and the model's function of it.
@@ -43,8 +40,7 @@ TEST(FindSharp, NamesASmoothingThatIsNarrowerThanTheBoxAndMeetsZero) {
     const auto found = Sharp(equation, {-0.5, 1});
     ASSERT_EQ(found.size(), 1u) << equation;
     EXPECT_NEAR(found[0].width, 0.25, 1e-15);
-    EXPECT_EQ(found[0].argument, "v");
-    EXPECT_EQ(found[0].range, Interval(-0.5, 1));
+    EXPECT_FIELDS(found[0], (argument, "v"), (range, Interval(-0.5, 1)));
     EXPECT_TRUE(found[0].is_square) << equation;
   }
   EXPECT_EQ(Sharp("x + dt*v*hypot(v, 0.25)", {-0.5, 1})[0].column, 10);
@@ -63,6 +59,7 @@ TEST(FindSharp, IsSilentWhereTheBoxIsNarrowOrAwayFromZero) {
 struct Case {
   const char *equation, *operation;
   Interval meets, misses;  // of v
+  friend void PrintTo(const Case& of, std::ostream* out) { *out << of.equation; }
 };
 
 class OfAnOperation : public testing::TestWithParam<Case> {};
@@ -100,8 +97,7 @@ TEST(FindUnbounded, FindsNothingWhereEverythingIsBounded) {
 TEST(FindUnbounded, NamesTheOperationInCompiledEquations) {
   const auto found = FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-9, 9)), 2);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->operation, "tan");
-  EXPECT_EQ(found->states, std::vector<int>{5});
+  EXPECT_FIELDS(*found, (operation, "tan"), (states, std::vector<int>{5}));
 }
 
 TEST(FindUnbounded, APoleInAnInputOrAParameterCounts) {
@@ -115,8 +111,7 @@ TEST(FindUnbounded, NamesTheFirstInTheOrderOfTheTextAndThroughDefinitions) {
   EXPECT_EQ(Find(Of("1/x + 1/v + sqrt(v)"), {-1, 1})->column, 8);
   const auto found = Find(Of("x + a*b", Integrator::kNone, {{"a", "1/w"}, {"b", "2*log(v)"}}), {-1, 1});
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->operation, "log");
-  EXPECT_EQ(found->column, 3);
+  EXPECT_FIELDS(*found, (operation, "log"), (column, 3));
 }
 
 TEST(FindUnbounded, TheAskedStateComesFirst) {

@@ -10,16 +10,11 @@
 namespace forereach::bus_document_test {
 
 using forereach::Output;
+using forereach::Read;
 using forereach::ScratchDirectory;
 using forereach::Shell;
 
 const std::string kFacts = FOREREACH_BINARY_DIR "/lcmtypes/forereach_message_facts ";
-
-std::string TextOf(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  EXPECT_TRUE(file) << path;
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 struct Type {
   std::vector<std::string> fields, constants;
@@ -31,7 +26,7 @@ std::map<std::string, Type> Types() {
   for (const auto& file : std::filesystem::directory_iterator(FOREREACH_SOURCE_DIR "/lcmtypes")) {
     if (file.path().extension() != ".lcm") continue;
     Type& type = types[file.path().stem()];
-    std::string text = std::regex_replace(TextOf(file.path()), std::regex("//[^\n]*"), "");
+    std::string text = std::regex_replace(Read(file.path()), std::regex("//[^\n]*"), "");
     text = text.substr(text.find('{') + 1);
     static const std::regex statement("([^;]*);"), constant("(\\w+)\\s*=\\s*-?\\d+"), field("^\\s*\\w+\\s+(\\w+)");
     for (std::sregex_iterator s(text.begin(), text.end(), statement), end; s != end; ++s) {
@@ -50,7 +45,7 @@ std::map<std::string, Type> Types() {
 
 // The part of docs/bus.md that is about a type: from its heading to the next heading of the same kind.
 std::string SectionOn(const std::string& type) {
-  static const std::string document = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md");
+  static const std::string document = Read(FOREREACH_SOURCE_DIR "/docs/bus.md");
   const std::size_t begin = document.find("\n### `" + type + "`");
   if (begin == std::string::npos) return "";
   return document.substr(begin, document.find("\n## ", begin) - begin)
@@ -60,18 +55,18 @@ std::string SectionOn(const std::string& type) {
 TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
   const auto types = Types();
   EXPECT_EQ(types.size(), 17u);
-  EXPECT_THAT(types.at("candidate_plan_t").fields,
-              testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
-                                   "num_inputs", "num_steps", "progress_steps", "repair", "initial_center",
-                                   "initial_half_width", "control"));
+  EXPECT_THAT(
+      types.at("candidate_plan_t").fields,
+      ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states", "num_inputs",
+                  "num_steps", "progress_steps", "repair", "initial_center", "initial_half_width", "control"));
   EXPECT_EQ(types.at("decision_t").constants.size(), 36u);
 }
 
 TEST(BusDocumentTest, ItsTablesAreThoseOfTheTypes) {
   const ScratchDirectory scratch;
-  const std::string page = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md"), copy = scratch.Write("bus.md", page);
+  const std::string page = Read(FOREREACH_SOURCE_DIR "/docs/bus.md"), copy = scratch.Write("bus.md", page);
   EXPECT_EQ(Shell(kFacts + "document " + copy + " " FOREREACH_SOURCE_DIR "/lcmtypes/*.lcm 2>&1").code, 0);
-  EXPECT_EQ(TextOf(copy), page) << "scripts/bus-tables writes them";
+  EXPECT_EQ(Read(copy), page) << "scripts/bus-tables writes them";
   EXPECT_FALSE(std::regex_search(page, std::regex("\n\\| `[a-z][^|\n]*\\| *\\|\n"))) << "a field without a meaning";
 }
 
@@ -85,9 +80,9 @@ TEST(BusDocumentTest, RefusesALineOfATypeThatItDoesNotUnderstand) {
     EXPECT_EQ(output.code == 0, std::filesystem::exists(scratch / "out"));
     return output.code == 0 ? "" : output.text;
   };
-  EXPECT_THAT(refused("    double x[3]  // no end"), testing::HasSubstr("a_t.lcm:3: neither a field"));
-  EXPECT_THAT(refused("    const int16_t A = 1;  // of no group"), testing::HasSubstr("a_t.lcm:3"));
-  EXPECT_THAT(refused("    double x[3][2];  // {num_x} of one count"), testing::HasSubstr("x: 1 counts"));
+  EXPECT_THAT(refused("    double x[3]  // no end"), HasSubstr("a_t.lcm:3: neither a field"));
+  EXPECT_THAT(refused("    const int16_t A = 1;  // of no group"), HasSubstr("a_t.lcm:3"));
+  EXPECT_THAT(refused("    double x[3][2];  // {num_x} of one count"), HasSubstr("x: 1 counts"));
   EXPECT_EQ(refused("    double x[3];  // {num_x} as it should be"), "");
 }
 
@@ -111,7 +106,7 @@ TEST(BusDocumentTest, EveryConstantIsExplained) {
 }
 
 TEST(BusDocumentTest, EveryChannelIsListed) {
-  const std::string document = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md");
+  const std::string document = Read(FOREREACH_SOURCE_DIR "/docs/bus.md");
   for (const char* channel :
        {"PLAN_CANDIDATE", "PLAN_DECISION", "PLAN_CERTIFIED", "ROBOT_STATE", "OBSTACLES", "TRANSITION", "PLAN_WITHDRAWN",
         "PLAN_ADVICE", "CERTIFIER_STATUS", "EXECUTION_EVENT", "FAULT", "COMMAND", "LOGGER_STATUS"})

@@ -69,12 +69,10 @@ void ExpectListed(const std::string& title, const std::vector<std::string>& kind
     const auto names = [&text = text](const std::regex& kind) { return std::regex_search(text, kind); };
     const bool all = std::ranges::all_of(patterns, names);
     with_all += all;
-    if (all) {
+    if (all)
       EXPECT_TRUE(listed.contains(file)) << title << ": " << file << " names every one, and the page does not list it";
-    }
-    if (listed.contains(file)) {
+    if (listed.contains(file))
       EXPECT_TRUE(std::ranges::any_of(patterns, names)) << title << ": the page lists " << file << ", which names none";
-    }
   }
   EXPECT_GE(with_all, 3u);
   for (const std::string& file : listed) EXPECT_TRUE(sources.contains(file)) << title << ": no source " << file;

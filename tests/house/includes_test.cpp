@@ -11,8 +11,7 @@ Output CheckIncludes(const std::string& root) {
 }
 
 // A small house that keeps to the arrows, to which a test adds one thing.
-class IncludesTest : public testing::Test {
- protected:
+struct IncludesTest : testing::Test {
   IncludesTest() {
     Write("forereach/numerics/interval.h", "#include <cmath>\n");
     Write("forereach/sets/box.h", "#include <Eigen/Core>\n#include \"forereach/numerics/interval.h\"\n");
@@ -63,8 +62,7 @@ TEST_F(IncludesTest, ATreeThatKeepsTheRulesPasses) {
 
 TEST_F(IncludesTest, TheDocumentHasEachFolderWithItsContentAndWhatItIncludes) {
   const std::string table = Shell("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' --table").text;
-  EXPECT_THAT(table, HasSubstr("| `forereach` | the proof as a library"));
-  EXPECT_THAT(table, testing::Not(HasSubstr("| ? |")));
+  EXPECT_THAT(table, AllOf(HasSubstr("| `forereach` | the proof as a library"), Not(HasSubstr("| ? |"))));
   Write("docs/architecture.md", table);  // of another tree, which includes more
   EXPECT_THAT(CheckIncludes(root_.string()),
               Exits(1, "docs/architecture.md:1: the table of folders differs from the sources"));

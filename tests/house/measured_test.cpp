@@ -6,8 +6,7 @@
 
 namespace forereach::measured_test {
 
-class Measured : public testing::Test {
- protected:
+struct Measured : testing::Test {
   Measured() {
     std::filesystem::create_directories(root_ / "scripts");
     std::filesystem::copy_file(FOREREACH_SOURCE_DIR "/scripts/measured", root_ / "scripts/measured");
@@ -24,10 +23,7 @@ class Measured : public testing::Test {
     std::filesystem::create_directories((root_ / file).parent_path());
     std::ofstream(root_ / file) << text;
   }
-  [[nodiscard]] std::string Read(const std::string& file) const {
-    std::ifstream stream(root_ / file);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  [[nodiscard]] std::string Read(const std::string& file) const { return forereach::Read(root_ / file); }
   [[nodiscard]] Output Run(const std::string& arguments = "") const {
     return Shell("'" + (root_ / "scripts/measured").string() + "' " + arguments + " 2>&1");
   }

@@ -56,7 +56,7 @@ TEST(Presets, OfReleaseSetsEveryVariableThatAScriptSets) {
     for (std::string line; std::getline(script, line);) {
       if (!std::regex_match(line, built)) continue;
       for (std::sregex_iterator at(line.begin(), line.end(), variable), end; at != end; ++at, ++found)
-        EXPECT_THAT(set, testing::Contains((*at)[1].str())) << entry.path() << ": " << line;
+        EXPECT_THAT(set, Contains((*at)[1].str())) << entry.path() << ": " << line;
     }
   }
   EXPECT_GT(found, 0);

@@ -10,8 +10,7 @@
 
 namespace forereach::command_delay_test {
 
-class CommandDelayTest : public testing::Test {
- protected:
+struct CommandDelayTest : testing::Test {
   CommandDelayTest() {
     options_.period = 0.1;
     options_.tolerance = 1e-6;
@@ -76,8 +75,7 @@ TEST_F(CommandDelayTest, CannotBeToldWhereTheInputDoesNotVaryOrTheNoiseHidesIt) 
   for (const LogTable& table : {Log(1, 0.001, 1, 1, false), Log(1, 0, 1, 1, false), Log(1, 5)}) {
     const CommandDelay delay = Estimate(table);
     EXPECT_FALSE(delay.IsKnown()) << delay.best;
-    EXPECT_EQ(delay.least, 0);
-    EXPECT_EQ(delay.largest, 4);
+    EXPECT_FIELDS(delay, (least, 0), (largest, 4));
   }
   EXPECT_FALSE(Estimate(Log(1, 0, 1, 1, true, 3)).IsKnown()) << "too short";
 }

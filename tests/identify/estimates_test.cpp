@@ -57,8 +57,7 @@ TEST(LoneSlopes, AreOfPairsThatDifferInOneColumnAlone) {
   ASSERT_EQ(found.size(), 3u);
   EXPECT_EQ(found[0].pairs, 4) << "0 1, 2 3, 2 4, 3 4";
   EXPECT_DOUBLE_EQ(found[0].slope, 7.5 / 4);
-  EXPECT_EQ(found[0].first, 0);
-  EXPECT_EQ(found[0].second, 1);
+  EXPECT_FIELDS(found[0], (first, 0), (second, 1));
   EXPECT_EQ(found[1].pairs, 3) << "0 2, 1 3, and 0 4 which differ a little in column 0";
   EXPECT_EQ(found[1].slope, 0) << "2 * 0.2 is within twice eps";
   EXPECT_EQ(found[2].pairs, 0) << "it never varies";
@@ -79,9 +78,8 @@ TEST(SmallestRow, IsConsistentAndNeverWeighsMoreThanTheTruth) {
     declaration.lipschitz.row(0) = found.slopes;
     EXPECT_FALSE(FindViolation(declaration, world.observations));
     declaration.lipschitz.row(0) = 0.999 * found.slopes;
-    if (found.slopes.maxCoeff() > 1e-6) {
+    if (found.slopes.maxCoeff() > 1e-6)
       EXPECT_TRUE(FindViolation(declaration, world.observations)) << "a lighter row would do as well";
-    }
     for (Eigen::Index l = 0; l < found.slopes.size(); ++l) {
       const auto& reason = found.reasons[static_cast<std::size_t>(l)];
       EXPECT_EQ(reason.has_value(), found.slopes[l] > 0);
@@ -104,9 +102,7 @@ TEST(SmallestRow, ASingleEntryIsNeverAboveTheTruthIfTheOthersAreTrue) {
       const SmallestRow found = FindSmallestEntry(world.declaration, world.observations, 0, l);
       EXPECT_LE(found.slopes[l], world.true_slopes[l] * (1 + 1e-6) + 1e-9);
       for (int m = 0; m < 3; ++m)
-        if (m != l) {
-          EXPECT_EQ(found.slopes[m], world.true_slopes[m]);
-        }
+        if (m != l) EXPECT_EQ(found.slopes[m], world.true_slopes[m]);
     }
   }
 }
@@ -223,8 +219,7 @@ TEST(Split, AlternatesBlocksAndCoversEveryTransition) {
   EXPECT_NO_THROW((void)SplitByTime(10, 10));
 }
 
-class HoldOutTest : public testing::Test {
- protected:
+struct HoldOutTest : testing::Test {
   // The point mass from rest, with a residual of vx that falls with vx and noise.
   HoldOutTest() : random_(seed_) {
     SCOPED_TRACE("seed " + std::to_string(seed_));
@@ -270,9 +265,7 @@ TEST_F(HoldOutTest, CountsEachFreshTransitionThatContradictsALearnedOne) {
     declaration_.lipschitz(2, 2) = slope;
     const Split split = SplitByTime(120, 8);
     const Contradictions found = CountContradictions(problem_, declaration_, split);
-    EXPECT_EQ(found.contradicting, Expected(split));
-    EXPECT_EQ(found.transitions, 60);
-    EXPECT_EQ(found.blocks, 4);
+    EXPECT_FIELDS(found, (contradicting, Expected(split)), (transitions, 60), (blocks, 4));
     EXPECT_LE(found.contradicting, last);
     EXPECT_EQ(found.blocks_contradicting == 0, found.contradicting == 0);
     last = found.contradicting;

@@ -11,15 +11,15 @@ namespace forereach::fit_test {
 
 // A pendulum with damping: rates, by Runge and Kutta.
 ModelText Pendulum(double length, double damping, double unused = 1) {
-  ModelText text;
-  text.name = "pendulum";
-  text.states = {{"angle", "rad"}, {"rate", "rad/s"}};
-  text.inputs = {{"torque", "N m"}};
-  text.parameters = {
-      {"dt", 0.05, 0.05}, {"length", length, length}, {"damping", damping, damping}, {"unused", unused, unused}};
-  text.equations = {{"rate", 1, 1}, {"torque - 9.81/length*sin(angle) - damping*rate + 0*unused", 2, 1}};
-  text.integrator = ModelText::Integrator::kRk4;
-  return text;
+  return {.name = "pendulum",
+          .states = {{"angle", "rad"}, {"rate", "rad/s"}},
+          .inputs = {{"torque", "N m"}},
+          .parameters = {{"dt", 0.05, 0.05},
+                         {"length", length, length},
+                         {"damping", damping, damping},
+                         {"unused", unused, unused}},
+          .equations = {{"rate", 1, 1}, {"torque - 9.81/length*sin(angle) - damping*rate + 0*unused", 2, 1}},
+          .integrator = ModelText::Integrator::kRk4};
 }
 
 Transitions Drive(const ModelText& truth, unsigned seed, double noise) {
@@ -73,22 +73,19 @@ TEST(Fit, KeepsTheOtherParametersAndNamesAnUndeterminedOne) {
   ASSERT_EQ(one.parameters.size(), 1u);
   EXPECT_NEAR(one.parameters[0].after, 0.3, 0.05);
   const Fit with = FitParameters(Pendulum(0.8, 0), data, {"damping", "unused"});
-  EXPECT_EQ(with.parameters[1].deviation, kInfinity);
-  EXPECT_EQ(with.parameters[1].after, 1);
+  EXPECT_FIELDS(with.parameters[1], (deviation, kInfinity), (after, 1));
   EXPECT_TRUE(with.parameters[1].together.empty()) << "it has no effect";
   EXPECT_NEAR(with.parameters[0].deviation, one.parameters[0].deviation, 0.01 * one.parameters[0].deviation);
 }
 
 // x+ = a b x + c u, y+ = y + d: of a and b only the product is determined, and e cancels.
 ModelText Products() {
-  ModelText text;
-  text.name = "products";
-  text.states = {{"x", "m"}, {"y", "m"}};
-  text.inputs = {{"u", "m"}};
-  text.parameters = {{"dt", 0.1, 0.1}, {"a", 0.9, 0.9}, {"c", 1, 1}, {"b", 1, 1}, {"d", 0, 0}, {"e", 2, 2}};
-  text.equations = {{"a*b*x + c*u", 1, 1}, {"y + d + e - e", 2, 1}};
-  text.integrator = ModelText::Integrator::kNone;
-  return text;
+  return {.name = "products",
+          .states = {{"x", "m"}, {"y", "m"}},
+          .inputs = {{"u", "m"}},
+          .parameters = {{"dt", 0.1, 0.1}, {"a", 0.9, 0.9}, {"c", 1, 1}, {"b", 1, 1}, {"d", 0, 0}, {"e", 2, 2}},
+          .equations = {{"a*b*x + c*u", 1, 1}, {"y + d + e - e", 2, 1}},
+          .integrator = ModelText::Integrator::kNone};
 }
 
 TEST(Fit, NamesThoseThatAreUndeterminedTogether) {
@@ -102,8 +99,8 @@ TEST(Fit, NamesThoseThatAreUndeterminedTogether) {
   }
   const Fit fit = FitParameters(Products(), data, {"a", "c", "b", "d", "e"});
   EXPECT_NEAR(fit.parameters[0].after * fit.parameters[2].after, 0.5, 0.01);
-  EXPECT_THAT(fit.parameters[0].together, testing::ElementsAre("b"));
-  EXPECT_THAT(fit.parameters[2].together, testing::ElementsAre("a"));
+  EXPECT_THAT(fit.parameters[0].together, ElementsAre("b"));
+  EXPECT_THAT(fit.parameters[2].together, ElementsAre("a"));
   for (const std::size_t undetermined : {0, 2, 4}) EXPECT_EQ(fit.parameters[undetermined].deviation, kInfinity);
   for (const std::size_t determined : {1, 3}) {
     EXPECT_LT(fit.parameters[determined].deviation, 0.01);
@@ -174,14 +171,12 @@ Transitions FourSteps(double place) {
 
 // p+ = p + 0.1 v, v+ = v + 0.1 (gain a + what is given).
 ModelText Cart(const std::string& rate, double gain, double k) {
-  ModelText text;
-  text.name = "cart";
-  text.states = {{"p", "m"}, {"v", "m/s"}};
-  text.inputs = {{"a", "m/s^2"}};
-  text.parameters = {{"dt", 0.1, 0.1}, {"gain", gain, gain}, {"k", k, k}};
-  text.equations = {{"p + dt*v", 1, 1}, {"v + dt*(gain*a" + rate + ")", 2, 1}};
-  text.integrator = ModelText::Integrator::kNone;
-  return text;
+  return {.name = "cart",
+          .states = {{"p", "m"}, {"v", "m/s"}},
+          .inputs = {{"a", "m/s^2"}},
+          .parameters = {{"dt", 0.1, 0.1}, {"gain", gain, gain}, {"k", k, k}},
+          .equations = {{"p + dt*v", 1, 1}, {"v + dt*(gain*a" + rate + ")", 2, 1}},
+          .integrator = ModelText::Integrator::kNone};
 }
 
 TEST(FitDeviation, IsOfTheStateThatShowsTheParameter) {

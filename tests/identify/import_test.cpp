@@ -17,8 +17,7 @@ struct Row {
   double t, px = 0, ax = 0;
 };
 
-class ImportTest : public testing::Test {
- protected:
+struct ImportTest : testing::Test {
   ImportTest() {
     options_.period = 0.1;
     options_.tolerance = 1e-9;
@@ -57,9 +56,7 @@ TEST_F(ImportTest, AFirstStampFarAwayDoesNotShiftTheOthers) {
 TEST_F(ImportTest, AStepGoesFromAStampToTheOneThatIsDtLater) {
   const ImportedLog log = From({{0, 1}, {0.05, 2}, {0.1, 3}, {0.15, 4}, {0.2, 5}, {0.25, 6}});
   EXPECT_THAT(log.lines, ElementsAre(2, 4));
-  EXPECT_EQ(log.transitions.z(0, 0), 1);
-  EXPECT_EQ(log.transitions.x_next(0, 0), 3);
-  EXPECT_EQ(log.transitions.x_next(1, 0), 5);
+  EXPECT_FIELDS(log.transitions, (z(0, 0), 1), (x_next(0, 0), 3), (x_next(1, 0), 5));
   EXPECT_EQ(log.At(Dropped::kEnd).count, 2) << "from 0.2 and 0.25";
   options_.overlapping = true;
   EXPECT_THAT(Again().lines, ElementsAre(2, 3, 4, 5));
@@ -242,9 +239,7 @@ TEST_F(ImportTest, KeepsItsPromisesOnRandomLogs) {
     for (const Dropped cause : {Dropped::kEnd, Dropped::kGap, Dropped::kNoState, Dropped::kNoInput,
                                 Dropped::kInputChanges, Dropped::kOutsideDomain, Dropped::kNoNominalValue})
       starts += log.At(cause).count;
-    if (options_.overlapping) {
-      EXPECT_EQ(starts, log.samples);
-    }
+    if (options_.overlapping) EXPECT_EQ(starts, log.samples);
     EXPECT_LE(starts, log.samples);
     for (std::size_t i = 0; i < log.lines.size(); ++i) {
       const auto begin = static_cast<std::size_t>(log.lines[i] - 2);

@@ -13,8 +13,7 @@
 
 namespace forereach::joined_logs_test {
 
-class JoinedLogsTest : public testing::Test {
- protected:
+struct JoinedLogsTest : testing::Test {
   LogTable Join(const std::string& states, const std::string& commands) {
     return Joined(ReadLog(files_.Write("states.csv", "t,x\n" + states), {"t", "x"}, {}),
                   ReadLog(files_.Write("commands.csv", "t,u\n" + commands), {"t", "u"}, {}));
@@ -65,14 +64,11 @@ TEST_F(JoinedLogsTest, TransitionsKnowWhatHappensBetweenTheirEnds) {
     commands += fmt::format("{},{},0\n", 0.05 * i, i == 7 || i == 8 ? 0.5 : i > 20 ? 0.25 : 0);
   const LogTable table = Joined(ReadLog(files_.Write("s.csv", states), {"t", "px", "py", "vx", "vy"}, {}),
                                 ReadLog(files_.Write("c.csv", commands), {"t", "ax", "ay"}, {}));
-  ImportOptions options;
-  options.period = 0.1;
-  options.tolerance = 1e-3;
+  ImportOptions options{.period = 0.1, .tolerance = 1e-3};
   options.factors.assign(6, 1);
   options.input_tolerance = Eigen::Vector2d::Zero();
   const ImportedLog log = Import(table, problem, options);
-  EXPECT_EQ(log.samples, 21);
-  EXPECT_EQ(log.rows, 21);
+  EXPECT_FIELDS(log, (samples, 21), (rows, 21));
   EXPECT_NEAR(log.typical_spacing, 0.1, 1e-9);
   EXPECT_EQ(log.At(Dropped::kInputChanges).count, 3) << "from 0.3, 0.4 and 1.0 s";
   EXPECT_EQ(log.At(Dropped::kNoState).count, 0);

@@ -5,24 +5,20 @@
 
 #include <fmt/format.h>
 
-#include "forereach/obstacles_t.hpp"
-#include "forereach/robot_state_t.hpp"
 #include "records/event_log.h"
 #include "task/config_error.h"
+#include "tests/messages.h"
 #include "tests/paths.h"
 
 namespace forereach::lcm_table_test {
 
-class LcmTableTest : public testing::Test {
- protected:
+struct LcmTableTest : testing::Test {
   LcmTableTest() {
     for (const auto& entry : std::filesystem::directory_iterator(FOREREACH_SOURCE_DIR "/lcmtypes"))
       if (entry.path().extension() == ".lcm") types_.Add(entry.path().string());
   }
   static obstacles_t Obstacles(std::int64_t utime, double value) {
-    obstacles_t message{};
-    message.utime = utime;
-    message.num_obstacles = -3;
+    obstacles_t message{.utime = utime, .num_obstacles = -3};
     message.obstacle[1].shape.point[2][1] = value;
     return message;
   }

@@ -11,8 +11,7 @@
 
 namespace forereach::log_table_test {
 
-class LogTableTest : public testing::Test {
- protected:
+struct LogTableTest : testing::Test {
   LogTable Table(const std::string& text, const LogFormat& format = {}) {
     return ReadLog(files_.Write("log.csv", text), {"t", "pos x"}, format);
   }
@@ -36,19 +35,14 @@ TEST_F(LogTableTest, ColumnsAreFoundByNameAndTheOthersMayHoldAnything) {
 TEST_F(LogTableTest, LinesAreCountedAsAnEditorCountsThem) {
   const LogTable table = Table("# made by hand\nt,pos x,note\n\n1,2,\"two\nlines\"\n# here\n\n3,4,one\n");
   EXPECT_THAT(table.lines, ElementsAre(4, 8));
-  EXPECT_EQ(table.blank.count, 2);
-  EXPECT_EQ(table.blank.first_line, 3);
-  EXPECT_EQ(table.comments.count, 2);
-  EXPECT_EQ(table.comments.first_line, 1);
+  EXPECT_FIELDS(table, (blank.count, 2), (blank.first_line, 3), (comments.count, 2), (comments.first_line, 1));
 }
 
 TEST_F(LogTableTest, AFieldThatIsNoNumberIsNanAndCounted) {
   const LogTable table = Table("t,pos x\n1,2\n2,nan\n3,\n4,inf\n5,1.5m\n6,1e999\n7,0x10\n8,\"7\"\n9,1 2\n");
   ASSERT_EQ(table.values.rows(), 9);
-  EXPECT_EQ(table.not_a_number[0].count, 0);
-  EXPECT_EQ(table.not_a_number[1].count, 7);
-  EXPECT_EQ(table.not_a_number[1].first_line, 3);
-  EXPECT_EQ(table.not_a_number[1].first, "nan");
+  EXPECT_FIELDS(table, (not_a_number[0].count, 0), (not_a_number[1].count, 7), (not_a_number[1].first_line, 3),
+                (not_a_number[1].first, "nan"));
   for (const int row : {1, 2, 3, 4, 5, 6, 8}) EXPECT_TRUE(std::isnan(table.values(row, 1))) << row;
   EXPECT_EQ(table.values(7, 1), 7) << "quotes do not make it less of a number";
 }
@@ -62,9 +56,7 @@ TEST_F(LogTableTest, AZeroInFrontOrAPlusMakesItNoLessOfANumber) {
 TEST_F(LogTableTest, ARowWithOtherFieldsThanTheHeaderIsLostAndSaid) {
   const LogTable table = Table("t,pos x\n1,2\n2\n3,4\n4,5,6\n5,\"a\"b\n6,7\n7,8");
   EXPECT_THAT(table.lines, ElementsAre(2, 4, 7, 8));
-  EXPECT_EQ(table.lost.count, 3);
-  EXPECT_EQ(table.lost.first_line, 3);
-  EXPECT_EQ(table.lost.first, "1 fields, the header has 2");
+  EXPECT_FIELDS(table.lost, (count, 3), (first_line, 3), (first, "1 fields, the header has 2"));
   EXPECT_THAT(table.after_loss, ElementsAre(false, true, true, false));
 }
 
@@ -72,9 +64,7 @@ TEST_F(LogTableTest, ARowWithOtherFieldsThanTheHeaderIsLostAndSaid) {
 TEST_F(LogTableTest, ACarriageReturnInsideARowEndsIt) {
   const LogTable table = Table("t,pos x\r\n1\r2\n3,4\r\n\r\n5\r,6\r\n\"7\r\",8\n9,10\r");
   EXPECT_THAT(table.lines, ElementsAre(3, 6, 7));
-  EXPECT_EQ(table.lost.count, 2);
-  EXPECT_EQ(table.lost.first_line, 2);
-  EXPECT_EQ(table.lost.first, "a carriage return inside a row");
+  EXPECT_FIELDS(table.lost, (count, 2), (first_line, 2), (first, "a carriage return inside a row"));
   EXPECT_EQ(Error("t,pos x\r1,2\r3,4\r"), "log.csv:1: the names of the columns: a carriage return inside a row");
   EXPECT_EQ(Error("t,\"pos\"x\n1,2\n"), "log.csv:1: the names of the columns: quotes inside a field");
 }

@@ -28,7 +28,7 @@ TEST(Units, WhatIsNoUnitIsRefused) {
   for (const char* text : {"degree", "", "0", "-1", "nan", "inf", "deg ", "1e400"})
     EXPECT_THROW((void)FactorOf(text, ""), std::invalid_argument) << text;
   EXPECT_THAT([&] { (void)FactorOf("dek", "rad"); },
-              ThrowsMessage<std::invalid_argument>(testing::HasSubstr("did you mean deg?")));
+              ThrowsMessage<std::invalid_argument>(HasSubstr("did you mean deg?")));
 }
 
 }  // namespace forereach::units_test

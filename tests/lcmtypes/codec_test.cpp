@@ -1,23 +1,6 @@
-#include "lcmtypes/codec.h"
 
+#include "tests/messages.h"
 #include "tests/test.h"
-
-#include "forereach/advice_change_t.hpp"
-#include "forereach/advice_t.hpp"
-#include "forereach/candidate_batch_t.hpp"
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/command_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/fault_t.hpp"
-#include "forereach/logger_status_t.hpp"
-#include "forereach/obstacle_shape_t.hpp"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/robot_state_t.hpp"
-#include "forereach/transition_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 
 namespace forereach::codec_test {
 
@@ -48,8 +31,7 @@ const std::map<std::string, Contract> kContracts = {
 };
 
 template <class Message>
-class MessageTest : public testing::Test {
- protected:
+struct MessageTest : testing::Test {
   // A message of random bits: every field differs from zero, doubles may be NaN with any payload.
   std::vector<std::uint8_t> RandomBytes() {
     std::vector<std::uint8_t> bytes = Encode(Message{});
@@ -57,9 +39,7 @@ class MessageTest : public testing::Test {
     return bytes;
   }
 
-  const unsigned seed_ = std::random_device{}();
-  const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
-  std::mt19937 random_{seed_};
+  FreshRandom random_;
 };
 
 using Messages = testing::Types<advice_change_t, advice_t, candidate_batch_t, candidate_plan_t, certified_plan_t,
@@ -87,9 +67,7 @@ TYPED_TEST(MessageTest, EveryShorterLengthIsRefusedAndLeavesZero) {
   TypeParam message{};
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     ASSERT_EQ(Decode(Bytes(bytes).first(size), message), DecodeStatus::kWrongLength) << size;
-    if (size % 97 == 0) {
-      ASSERT_EQ(Encode(message), zero) << size;
-    }
+    if (size % 97 == 0) ASSERT_EQ(Encode(message), zero) << size;
   }
 }
 

@@ -13,12 +13,10 @@ using Constants = std::map<std::string, int>;
 
 // NAME = NUMBER of every `const` line of an .lcm file.
 Constants ConstantsOf(const std::string& type) {
-  std::ifstream file(std::string(FOREREACH_SOURCE_DIR "/lcmtypes/") + type + ".lcm");
-  std::stringstream text;
-  text << std::regex_replace(std::string(std::istreambuf_iterator<char>(file), {}), std::regex("//[^\n]*"), "");
   Constants constants;
   static const std::regex statement("const\\s+int16_t\\s+([^;]*);"), assignment("(\\w+)\\s*=\\s*(-?\\d+)");
-  const std::string all = text.str();
+  const std::string all =
+      std::regex_replace(Read(FOREREACH_SOURCE_DIR "/lcmtypes/" + type + ".lcm"), std::regex("//[^\n]*"), "");
   for (std::sregex_iterator s(all.begin(), all.end(), statement), end; s != end; ++s) {
     const std::string list = (*s)[1];
     for (std::sregex_iterator a(list.begin(), list.end(), assignment); a != end; ++a)
@@ -52,9 +50,7 @@ void ExpectNamed(const Constants& constants, std::string_view (*name_of)(std::in
   }
   for (int number = std::numeric_limits<std::int16_t>::min(); number <= std::numeric_limits<std::int16_t>::max();
        ++number)
-    if (!numbers.contains(number)) {
-      ASSERT_EQ(name_of(static_cast<std::int16_t>(number)), "unknown") << number;
-    }
+    if (!numbers.contains(number)) ASSERT_EQ(name_of(static_cast<std::int16_t>(number)), "unknown") << number;
 }
 
 TEST(NamesTest, EveryOutcomeHasItsName) { ExpectNamed(OutcomesAndCauses().first, OutcomeName); }
@@ -70,20 +66,19 @@ TEST(NamesTest, EveryKindOfAdviceHasItsName) { ExpectNamed(ConstantsOf("advice_c
 TEST(NamesTest, EveryFaultHasAnAdvice) {
   for (const auto& [name, number] : ConstantsOf("fault_t")) {
     const std::string advice(FaultAdvice(static_cast<std::int16_t>(number)));
-    EXPECT_THAT(advice, testing::HasSubstr("`forereach reset`")) << name;
+    EXPECT_THAT(advice, HasSubstr("`forereach reset`")) << name;
   }
   for (const int stays : {3, 4})  // what made it is still there after a reset
-    EXPECT_THAT(std::string(FaultAdvice(static_cast<std::int16_t>(stays))), testing::HasSubstr("reset alone"));
+    EXPECT_THAT(std::string(FaultAdvice(static_cast<std::int16_t>(stays))), HasSubstr("reset alone"));
 }
 
 TEST(NamesTest, TheAdviceIsThatOfTheDocument) {
-  std::ifstream file(FOREREACH_SOURCE_DIR "/docs/reliability.md");
-  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  const std::string page = Read(FOREREACH_SOURCE_DIR "/docs/reliability.md");
   for (std::int16_t cause = 1; cause <= 5; ++cause) {
     const std::size_t row = page.find("fault `" + std::string(FaultName(cause)) + "` |");
     ASSERT_NE(row, std::string::npos) << cause;
     const std::string line = page.substr(row, page.find('\n', row) - row);
-    EXPECT_THAT(line, testing::EndsWith("| " + std::string(FaultAdvice(cause)) + " |"));
+    EXPECT_THAT(line, EndsWith("| " + std::string(FaultAdvice(cause)) + " |"));
   }
 }
 
@@ -113,95 +108,45 @@ TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
     EXPECT_EQ(LevelName(other), "unknown");
 }
 
+// Of "NAME number, NAME number".
+Constants Listed(const std::string& text) {
+  Constants constants;
+  std::istringstream words(text);
+  for (std::string name; words >> name; words.ignore()) words >> constants[name];
+  return constants;
+}
+
 // Recorded logs carry the numbers, and the fingerprint does not cover them: a new constant gets a new line, no line
 // ever changes.
 TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
   const auto [outcomes, causes] = OutcomesAndCauses();
-  EXPECT_EQ(outcomes, (Constants{{"CERTIFIED", 1},
-                                 {"ABSTAIN_FALSIFIED", 2},
-                                 {"ABSTAIN_DOMAIN", 3},
-                                 {"ABSTAIN_SAFETY", 4},
-                                 {"REJECTED", 5},
-                                 {"ABSTAIN_DEADLINE", 6},
-                                 {"ABSTAIN_OBSTACLES", 7}}));
-  EXPECT_EQ(causes, (Constants{{"NONE", 0},
-                               {"PAIRWISE", 1},
-                               {"DOMAIN_EXIT", 2},
-                               {"NO_FINITE_ENCLOSURE", 3},
-                               {"OBSTACLE", 4},
-                               {"NO_STOP", 5},
-                               {"LIMIT", 8},
-                               {"STALE", 10},
-                               {"FUTURE", 11},
-                               {"DUPLICATE", 12},
-                               {"WRONG_LENGTH", 13},
-                               {"TRAILING_BYTES", 14},
-                               {"UNKNOWN_FINGERPRINT", 15},
-                               {"WRONG_DIMENSION", 16},
-                               {"NON_FINITE", 17},
-                               {"TOO_MANY_SOURCES", 18},
-                               {"TOO_LATE", 19},
-                               {"QUEUE_FULL", 20},
-                               {"INTERNAL_ERROR", 21},
-                               {"DEADLINE", 22},
-                               {"OVERRUN", 23},
-                               {"NOT_ARMED", 24},
-                               {"FAULT", 25},
-                               {"SHADOW", 26},
-                               {"NO_OBSTACLES", 27},
-                               {"SECOND_CERTIFIER", 28},
-                               {"LATCH_UNWRITABLE", 29},
-                               {"BETWEEN", 30},
-                               {"BOUND", 31}}));
-  EXPECT_EQ(ConstantsOf("execution_event_t"), (Constants{{"ACCEPTED", 1},
-                                                         {"REFUSED", 2},
-                                                         {"STARTED", 3},
-                                                         {"STEP_INSIDE", 4},
-                                                         {"STEP_OUTSIDE", 5},
-                                                         {"TAIL_BEGUN", 6},
-                                                         {"STANDING", 7},
-                                                         {"GOAL_REACHED", 8},
-                                                         {"CONTACT", 9},
-                                                         {"HALTED", 10},
-                                                         {"RESET", 11},
-                                                         {"WITHDRAWN", 12},
-                                                         {"EMERGENCY_STOP", 13},
-                                                         {"OFF_SCHEDULE", 14},
-                                                         {"LIMIT_EXCEEDED", 15},
-                                                         {"ERROR_STOP", 16},
-                                                         {"STEP_CONSISTENT", 17}}));
-  EXPECT_EQ(ConstantsOf("withdrawal_t"), (Constants{{"FALSIFIED", 1},
-                                                    {"DOMAIN_EXIT", 2},
-                                                    {"NO_FINITE_ENCLOSURE", 3},
-                                                    {"OBSTACLE", 4},
-                                                    {"NO_STOP", 5},
-                                                    {"NOT_JUDGED", 6},
-                                                    {"UNKNOWN_PLAN", 7},
-                                                    {"LIMIT", 8},
-                                                    {"OBSTACLES_LOST", 9},
-                                                    {"BETWEEN", 30},
-                                                    {"BOUND", 31}}));
-  EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
-                                               {"CLOCK_JUMP", 2},
-                                               {"SLICE_LEFT", 3},
-                                               {"DECLARATION_FALSIFIED", 4},
-                                               {"UNCERTIFIED_PLAN", 5}}));
-  EXPECT_EQ(ConstantsOf("certifier_status_t"), (Constants{{"OK", 1},
-                                                          {"STALE", 2},
-                                                          {"ERROR", 3},
-                                                          {"DISARMED", 1},
-                                                          {"ARMED", 2},
-                                                          {"FAULT", 3},
-                                                          {"LISTENING", 4},
-                                                          {"STANDBY", 5},
-                                                          {"LATCH_NONE", 0},
-                                                          {"LATCH_WRITTEN", 1},
-                                                          {"LATCH_UNWRITABLE", 2},
-                                                          {"OBSTACLES_TASK", 1},
-                                                          {"OBSTACLES_BUS", 2}}));
-  EXPECT_EQ(ConstantsOf("command_t"), (Constants{{"RESET", 1}, {"RELOAD", 2}}));
-  EXPECT_EQ(ConstantsOf("robot_state_t"), (Constants{{"STANDING", 1}, {"EXECUTING", 2}, {"FINISHED", 3}}));
-  EXPECT_EQ(ConstantsOf("obstacle_shape_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
+  EXPECT_EQ(
+      outcomes,
+      Listed("CERTIFIED 1, ABSTAIN_FALSIFIED 2, ABSTAIN_DOMAIN 3, ABSTAIN_SAFETY 4, REJECTED 5, ABSTAIN_DEADLINE 6, "
+             "ABSTAIN_OBSTACLES 7"));
+  EXPECT_EQ(
+      causes,
+      Listed("NONE 0, PAIRWISE 1, DOMAIN_EXIT 2, NO_FINITE_ENCLOSURE 3, OBSTACLE 4, NO_STOP 5, LIMIT 8, STALE 10, "
+             "FUTURE 11, DUPLICATE 12, WRONG_LENGTH 13, TRAILING_BYTES 14, UNKNOWN_FINGERPRINT 15, "
+             "WRONG_DIMENSION 16, NON_FINITE 17, TOO_MANY_SOURCES 18, TOO_LATE 19, QUEUE_FULL 20, INTERNAL_ERROR 21, "
+             "DEADLINE 22, OVERRUN 23, NOT_ARMED 24, FAULT 25, SHADOW 26, NO_OBSTACLES 27, SECOND_CERTIFIER 28, "
+             "LATCH_UNWRITABLE 29, BETWEEN 30, BOUND 31"));
+  EXPECT_EQ(ConstantsOf("execution_event_t"),
+            Listed("ACCEPTED 1, REFUSED 2, STARTED 3, STEP_INSIDE 4, STEP_OUTSIDE 5, TAIL_BEGUN 6, STANDING 7, "
+                   "GOAL_REACHED 8, CONTACT 9, HALTED 10, RESET 11, WITHDRAWN 12, EMERGENCY_STOP 13, OFF_SCHEDULE 14, "
+                   "LIMIT_EXCEEDED 15, ERROR_STOP 16, STEP_CONSISTENT 17"));
+  EXPECT_EQ(
+      ConstantsOf("withdrawal_t"),
+      Listed("FALSIFIED 1, DOMAIN_EXIT 2, NO_FINITE_ENCLOSURE 3, OBSTACLE 4, NO_STOP 5, NOT_JUDGED 6, UNKNOWN_PLAN 7, "
+             "LIMIT 8, OBSTACLES_LOST 9, BETWEEN 30, BOUND 31"));
+  EXPECT_EQ(ConstantsOf("fault_t"),
+            Listed("ROBOT_STATE_LOST 1, CLOCK_JUMP 2, SLICE_LEFT 3, DECLARATION_FALSIFIED 4, UNCERTIFIED_PLAN 5"));
+  EXPECT_EQ(ConstantsOf("certifier_status_t"),
+            Listed("OK 1, STALE 2, ERROR 3, DISARMED 1, ARMED 2, FAULT 3, LISTENING 4, STANDBY 5, LATCH_NONE 0, "
+                   "LATCH_WRITTEN 1, LATCH_UNWRITABLE 2, OBSTACLES_TASK 1, OBSTACLES_BUS 2"));
+  EXPECT_EQ(ConstantsOf("command_t"), Listed("RESET 1, RELOAD 2"));
+  EXPECT_EQ(ConstantsOf("robot_state_t"), Listed("STANDING 1, EXECUTING 2, FINISHED 3"));
+  EXPECT_EQ(ConstantsOf("obstacle_shape_t"), Listed("CIRCLE 1, BOX 2, POLYGON 3, HALF_SPACE 4"));
 }
 
 }  // namespace forereach::names_test

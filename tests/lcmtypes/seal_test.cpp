@@ -14,9 +14,7 @@ constexpr int kAllStates = 16, kAllSlices = 129;
 constexpr std::size_t kFingerprint = 8, kRow = kAllStates * sizeof(double);
 
 certified_plan_t Plan(int states, int steps) {
-  certified_plan_t certified{};
-  certified.utime = 1'700'000'000'000'000;
-  certified.sequence = 3;
+  certified_plan_t certified{.utime = 1'700'000'000'000'000, .sequence = 3};
   certified.expires_utime = certified.utime + 2'000'000;
   certified.plan.plan_id = 7;
   certified.plan.num_states = static_cast<std::int16_t>(states);
@@ -82,9 +80,7 @@ TEST(Seal, DigestOfAnExampleIsTheRecordedOne) {
 
 // Of a small plan each byte, of the largest one in eight at random.
 TEST(Seal, BreaksWhenAnyBitIsFlipped) {
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  FreshRandom random;
   for (const auto& [states, steps, stride] : {std::tuple(6, 12, 1), {16, 128, 8}}) {
     const std::vector<std::uint8_t> good = Encode(Plan(states, steps));
     std::vector<std::uint8_t> bad = good;
@@ -129,11 +125,8 @@ TEST(Seal, TheFirstStrayEntryIsNamed) {
   Seal(certified);  // no digest covers it
   const std::vector<SealFault> faults = FindSealFaults(certified);
   ASSERT_EQ(faults.size(), 1u);
-  EXPECT_EQ(faults[0].field, "slice_lower[40][3]");
-  EXPECT_EQ(faults[0].step, 40);
-  EXPECT_EQ(faults[0].coordinate, 3);
-  EXPECT_EQ(faults[0].value, 1e-300);
-  EXPECT_EQ(faults[0].found, "1e-300");
+  EXPECT_FIELDS(faults[0], (field, "slice_lower[40][3]"), (step, 40), (coordinate, 3), (value, 1e-300),
+                (found, "1e-300"));
 }
 
 TEST(Seal, BreaksWhenThePlanChanges) {

@@ -10,8 +10,7 @@ using Place = SoleSender::Place;
 constexpr std::int64_t kTimeout = 1'000'000, kHour = 3'600'000'000;
 constexpr std::uint64_t kA = 0xa, kB = 0xb, kC = 0xc;
 
-class SoleSenderTest : public testing::Test {
- protected:
+struct SoleSenderTest : testing::Test {
   // Every period until then; at `until` nothing is heard.
   void Hears(std::uint64_t who, std::int64_t from, std::int64_t until, std::int64_t period = kTimeout / 4) {
     for (std::int64_t t = from; t < until; t += period) sender_.Hear(who, t);
@@ -71,9 +70,7 @@ TEST_F(SoleSenderTest, AfterALongSilenceItIsLikeTheFirst) {
 
 // At whatever rates, and whoever is first.
 TEST_F(SoleSenderTest, TwoThatAlternateNeverCount) {
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  FreshRandom random;
   for (int i = 0; i < 200; ++i) {
     sender_ = SoleSender(kTimeout);
     const auto period = [&] { return std::uniform_int_distribution<std::int64_t>(1000, kTimeout)(random); };

@@ -6,13 +6,10 @@ each line of that, a seed, with a line of news, after messages whose fields hold
 #include <random>
 #include <string>
 
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/fault_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "live/web_server.h"
 #include "tests/any_fields.h"
 #include "tests/live/live_fixture.h"
+#include "tests/messages.h"
 
 namespace forereach {
 namespace {

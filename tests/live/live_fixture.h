@@ -7,17 +7,16 @@
 #include <nlohmann/json.hpp>
 
 #include "live/watcher.h"
-#include "tests/paths.h"
+#include "tests/records/course.h"
 
 namespace forereach {
 
-inline Config CourseTask() { return LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml"); }
+inline Config CourseTask() { return LoadConfig(kCourseTask); }
 
 /** The events of the recorded course. */
 inline std::vector<LogEvent> CourseEvents() {
   std::vector<LogEvent> events;
-  ForEachEvent({FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog"},
-               [&](const LogEvent& event, const std::string&) { events.push_back(event); });
+  ForEachEvent({kCourseLog}, [&](const LogEvent& event, const std::string&) { events.push_back(event); });
   return events;
 }
 

@@ -3,11 +3,9 @@
 #include "tests/test.h"
 
 #include "bus/authentic.h"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/fault_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "tests/keys.h"
 #include "tests/live/live_fixture.h"
+#include "tests/messages.h"
 #include "tests/records/course.h"
 #include "tests/tries.h"
 
@@ -42,9 +40,7 @@ TEST(WatcherTest, SendsEveryDecisionOfTheRecordedCourse) {
     if (detail.at("svg") == "") continue;
     EXPECT_GT(detail.at("units"), 0);
     EXPECT_THAT(detail.at("svg").get<std::string>(), HasSubstr("<circle"));
-    if (decision.at("step") >= 0) {
-      EXPECT_EQ(detail.at("binding"), decision.at("step"));
-    }
+    if (decision.at("step") >= 0) EXPECT_EQ(detail.at("binding"), decision.at("step"));
   }
   EXPECT_THAT(reader.obstacles.get<std::string>(), HasSubstr("<circle"));
   EXPECT_GT(reader.places.size(), 50u);
@@ -210,10 +206,8 @@ TEST(WatcherTest, AFloodIsBounded) {
   watcher.Tick(1);
   Reader reader;
   EXPECT_LT(reader.Read(watcher), 4'000'000u);
-  EXPECT_EQ(reader.decisions.size(), Watcher::kDecisions);
-  EXPECT_EQ(reader.faults.size(), Watcher::kOthers);
-  EXPECT_EQ(reader.withdrawals.size(), Watcher::kOthers);
-  EXPECT_EQ(reader.gaps.size(), Watcher::kOthers);
+  EXPECT_FIELDS(reader, (decisions.size(), Watcher::kDecisions), (faults.size(), Watcher::kOthers),
+                (withdrawals.size(), Watcher::kOthers), (gaps.size(), Watcher::kOthers));
   EXPECT_EQ(reader.now.at("counts").at("decisions"), 20'000);
   EXPECT_GT(reader.now.at("counts").at("not_shown"), 15'000);
 }

@@ -50,8 +50,7 @@ class Connection final {
   bool is_open_ = false;
 };
 
-class WebServerTest : public testing::Test {
- protected:
+struct WebServerTest : testing::Test {
   WebServerTest() : watcher_(CourseTask(), {}, CourseTask), server_(watcher_, 0) { watcher_.Tick(1); }
 
   [[nodiscard]] std::string Ask(const std::string& bytes) const {
@@ -72,15 +71,12 @@ const std::string kEvents = "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
 TEST_F(WebServerTest, ServesThePageWithItsPolicy) {
   const std::string page = Get("/");
-  EXPECT_THAT(page, StartsWith("HTTP/1.1 200 OK\r\n"));
-  EXPECT_THAT(page, testing::EndsWith("</html>\n"));
-  EXPECT_THAT(page, HasSubstr("Content-Security-Policy: default-src 'none'"));
-  EXPECT_THAT(page, HasSubstr("connect-src 'self'"));
-  EXPECT_THAT(page, HasSubstr("frame-ancestors 'none'"));
-  EXPECT_THAT(page, Not(HasSubstr("unsafe-inline")));
-  EXPECT_THAT(page, HasSubstr("X-Content-Type-Options: nosniff"));
-  EXPECT_THAT(page, HasSubstr("Cross-Origin-Resource-Policy: same-origin"));
-  EXPECT_THAT(page, Not(HasSubstr("Access-Control-Allow")));
+  EXPECT_THAT(
+      page, AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("</html>\n"),
+                  HasSubstr("Content-Security-Policy: default-src 'none'"), HasSubstr("connect-src 'self'"),
+                  HasSubstr("frame-ancestors 'none'"), Not(HasSubstr("unsafe-inline")),
+                  HasSubstr("X-Content-Type-Options: nosniff"), HasSubstr("Cross-Origin-Resource-Policy: same-origin"),
+                  Not(HasSubstr("Access-Control-Allow"))));
 }
 
 TEST_F(WebServerTest, SendsWhatTheWatcherTells) {

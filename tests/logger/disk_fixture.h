@@ -1,13 +1,13 @@
 /** A logger's node on a bus without threads and on a disk of a test's choice, and what it left there. */
 #pragma once
 
-#include <sqlite3.h>
 #include <unistd.h>
 
 #include "forereach/logger_status_t.hpp"
 #include "logger/logger_node.h"
 #include "tests/logger/direct_bus.h"
 #include "tests/records/logs.h"
+#include "tests/records/sql.h"
 #include "tests/small_disk.h"
 #include "tests/test.h"
 
@@ -15,8 +15,7 @@ namespace forereach {
 
 inline constexpr std::int64_t kRecord = 28 + 15 + 336;  // of an execution event
 
-class DiskTest : public testing::Test {
- protected:
+struct DiskTest : testing::Test {
   DiskTest() {
     config_.logger.directory = scratch_ / "log";
     config_.logger.flush_ms = 10;
@@ -59,12 +58,7 @@ class DiskTest : public testing::Test {
     for (const GapRow& gap : rows.gaps) lost += gap.reason == reason ? gap.lost : 0;
     return lost;
   }
-  void Sql(const char* statement) const {
-    sqlite3* handle = nullptr;
-    ASSERT_EQ(sqlite3_open((scratch_ / "log/decisions.sqlite").c_str(), &handle), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(handle, statement, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
-    sqlite3_close(handle);
-  }
+  void Sql(const std::string& statement) const { forereach::Sql(scratch_ / "log/decisions.sqlite", statement); }
   [[nodiscard]] const logger_status_t& last() const { return bus_.heartbeats.back(); }
 
   static std::vector<std::int64_t> UpTo(std::int64_t end) {

@@ -1,16 +1,10 @@
 // Log files that follow one another, and disks that fill.
-#include <csignal>
-
-#include <sys/resource.h>
-
 #include "tests/test.h"
 
+#include "tests/file_size_limit.h"
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach::disk_test {
-
-using testing::Ge;
-using testing::Le;
 
 constexpr std::int64_t kMinuteUs = 60'000'000;
 
@@ -22,14 +16,12 @@ TEST_F(DiskTest, AFileEndsBeforeTheEventThatWouldExceedItsSize) {
   const std::vector<RunRow> runs = Runs();
   ASSERT_EQ(runs.size(), 4u);
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    EXPECT_EQ(runs[i].continues, i == 0 ? "" : runs[i - 1].log_file);
-    EXPECT_TRUE(runs[i].end_utime.has_value());
+    EXPECT_FIELDS(runs[i], (continues, i == 0 ? "" : runs[i - 1].log_file), (end_utime.has_value(), true));
     EXPECT_EQ(std::filesystem::file_size(PathOf(runs[i])), static_cast<std::uintmax_t>((i < 3 ? 10 : 5) * kRecord));
     EXPECT_EQ(ReadLog(PathOf(runs[i])).events.front().number, 0);
   }
   EXPECT_EQ(Recorded(), UpTo(35));
-  EXPECT_EQ(ReadRows().events.size(), 35u);
-  EXPECT_TRUE(ReadRows().gaps.empty());
+  EXPECT_FIELDS(ReadRows(), (events.size(), 35u), (gaps.empty(), true));
   EXPECT_THAT(out_.str(), HasSubstr("the last of 4"));
 }
 
@@ -98,8 +90,7 @@ TEST_F(DiskTest, CountsGoOnFromFileToFile) {
   EXPECT_GE(Runs().size(), 3u) << "candidate and decision lie in different files";
   const Rows rows = ReadRows();
   ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_EQ(rows.gaps[0].lost, 3);
-  EXPECT_EQ(rows.gaps[0].event.event_number, 0);
+  EXPECT_FIELDS(rows.gaps[0], (lost, 3), (event.event_number, 0));
   ASSERT_EQ(rows.decisions.size(), 1u);
   EXPECT_EQ(rows.decisions[0].latency_us, 1250);
 }
@@ -123,9 +114,7 @@ std::vector<std::string> RowTexts(const Rows& rows) {
 TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
   config_.logger.rotate_mb = 0.02;
   Start();
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE(testing::Message() << "seed " << seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   for (std::int64_t i = 0; i < 60; ++i) {
     const candidate_plan_t candidate = MakeCandidate(i, i);
     bus_.Publish("PLAN_CANDIDATE", candidate);
@@ -163,12 +152,11 @@ TEST_F(DiskTest, AdoptsALogWithoutARunAndMakesItsRows) {
   EXPECT_EQ(runs[0].log_file, old_name);
   runs.erase(runs.begin());
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    EXPECT_EQ(runs[i].log_file, before[i].log_file);
-    EXPECT_EQ(runs[i].start_utime, kStart + static_cast<std::int64_t>(10'000 * i));
-    EXPECT_TRUE(runs[i].end_utime.has_value());
+    EXPECT_FIELDS(runs[i], (log_file, before[i].log_file),
+                  (start_utime, kStart + static_cast<std::int64_t>(10'000 * i)), (end_utime.has_value(), true));
   }
   EXPECT_EQ(ReadRows().events.size(), 35u);
-  Sql(("DELETE FROM execution_events WHERE log_file = '" + old_name + "'").c_str());
+  Sql("DELETE FROM execution_events WHERE log_file = '" + old_name + "'");
   EXPECT_EQ(RowTexts(ReadRows()), live);
   EXPECT_EQ(std::filesystem::file_size(scratch_ / "log/stray.lcmlog"), 3u);
   std::filesystem::remove(scratch_ / ("log/" + old_name));  // its rows were deleted above
@@ -269,8 +257,7 @@ TEST_F(DiskTest, BelowTheFloorRecordingPausesAndResumesByItself) {
   EXPECT_EQ(last().state, logger_status_t::ERROR) << "an eighth more has to be free";
   free_bytes_ = 1'125'000;
   Feed(600);
-  EXPECT_EQ(last().state, logger_status_t::OK);
-  EXPECT_EQ(last().failed_flushes, 0);
+  EXPECT_FIELDS(last(), (state, logger_status_t::OK), (failed_flushes, 0));
   Stop();
   EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk"), fed_);
   EXPECT_EQ(LostTo("bus"), 0) << "what the pause cost is not counted again";
@@ -296,17 +283,13 @@ TEST_F(DiskTest, HeartbeatReportsCountsAndState) {
   Feed(1200);
   ASSERT_EQ(bus_.heartbeats.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(bus_.heartbeats[i].sequence, static_cast<std::int64_t>(i));
-  EXPECT_EQ(last().utime, kStart + 1'001'000);
-  EXPECT_EQ(last().state, logger_status_t::OK);
+  EXPECT_FIELDS(last(), (utime, kStart + 1'001'000), (state, logger_status_t::OK));
   EXPECT_EQ(GetText(last().message), "recording");
   EXPECT_EQ(last().events_lost, 0);
   EXPECT_GT(last().events_written, 980);
   EXPECT_LE(last().events_written, 1001);
-  EXPECT_EQ(last().queue_depth, 1);
-  EXPECT_EQ(last().queue_high_water, 1);
-  EXPECT_EQ(last().file_bytes, 1001 * kRecord);
-  EXPECT_EQ(last().log_bytes, last().file_bytes);
-  EXPECT_EQ(last().free_bytes, free_bytes_);
+  EXPECT_FIELDS(last(), (queue_depth, 1), (queue_high_water, 1), (file_bytes, 1001 * kRecord),
+                (log_bytes, last().file_bytes), (free_bytes, free_bytes_));
   EXPECT_GT(last().flush_us, 0);
   EXPECT_GE(last().flush_worst_us, last().flush_us);
 
@@ -394,16 +377,12 @@ TEST_F(DiskTest, ADatabaseThatRefusesForLongCostsNoGapWithoutAnEvent) {
 TEST_F(DiskTest, AFailingFlushIsAnError) {
   Start();
   Feed(20);
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  const rlimit full{std::filesystem::file_size(node_->recorder().log_path()) + 10, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+  std::optional<FileSizeLimit> full(std::in_place, std::filesystem::file_size(node_->recorder().log_path()) + 10);
   Feed(500);
   EXPECT_EQ(last().state, logger_status_t::ERROR);
   EXPECT_GT(last().failed_flushes, 10);
   EXPECT_THAT(GetText(last().message), HasSubstr("File too large"));
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  full.reset();
   Feed(600);
   EXPECT_EQ(last().state, logger_status_t::OK);
   node_->Tick(bus_.now_us += 10'000);

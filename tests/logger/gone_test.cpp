@@ -10,8 +10,7 @@ namespace forereach::gone_test {
 
 namespace fs = std::filesystem;
 
-class GoneTest : public DiskTest {
- protected:
+struct GoneTest : DiskTest {
   GoneTest() {
     Start();
     Feed(50);
@@ -141,8 +140,7 @@ TEST_F(GoneTest, GoesOnAfterItsLogIsDeletedManyTimes) {
   EXPECT_EQ(Runs().size(), 21u);
 }
 
-class DatabaseGoneTest : public GoneTest {
- protected:
+struct DatabaseGoneTest : GoneTest {
   // What is heard from now on has its rows; the next start makes those of before.
   void ExpectRowsAgain() {
     Feed(700);

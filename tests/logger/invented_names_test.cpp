@@ -16,8 +16,7 @@ std::int64_t ResidentBytes() {
   return resident * ::sysconf(_SC_PAGESIZE);
 }
 
-class InventedNamesTest : public DiskTest {
- protected:
+struct InventedNamesTest : DiskTest {
   // A tick after every hundred, some of them while the disk is full.
   void Invent(int from, int to) {
     for (int i = from; i < to; ++i) {
@@ -48,8 +47,7 @@ TEST_F(InventedNamesTest, DoNotReachTheTerminal) {
   bus_.Publish("CLEAR\x1b[2J\x9b\n", Bytes(kData));
   node_->Tick(bus_.now_us += 1000);
   Stop();
-  EXPECT_THAT(out_.str(), HasSubstr("CLEAR\\x1b[2J\\x9b\\x0a 1"));
-  EXPECT_THAT(out_.str(), Not(HasSubstr("\x1b")));
+  EXPECT_THAT(out_.str(), AllOf(HasSubstr("CLEAR\\x1b[2J\\x9b\\x0a 1"), Not(HasSubstr("\x1b"))));
 }
 
 }  // namespace forereach::invented_names_test

@@ -2,22 +2,20 @@
 
 #include <csignal>
 
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "tests/test.h"
 
-#include "forereach/obstacles_t.hpp"
-#include "forereach/robot_state_t.hpp"
+#include "tests/file_size_limit.h"
 #include "tests/keys.h"
 #include "tests/logger/direct_bus.h"
+#include "tests/messages.h"
 #include "tests/records/logs.h"
 
 namespace forereach::logger_node_test {
 
-class LoggerNodeTest : public testing::Test {
- protected:
+struct LoggerNodeTest : testing::Test {
   LoggerNodeTest() { config_.logger.directory = scratch_ / "log"; }
   void TearDown() override { ExpectRowsOfTheLogs(config_.logger.directory, {.file = config_.bus.key}); }
 
@@ -37,7 +35,7 @@ TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
     EXPECT_TRUE(node.recorder().recovered().empty());
     node.Tick(bus_.now_us);
     log_path = node.recorder().log_path();
-    EXPECT_THAT(log_path, testing::EndsWith("/events-20231114-221320-000000.lcmlog"));
+    EXPECT_THAT(log_path, EndsWith("/events-20231114-221320-000000.lcmlog"));
     const candidate_plan_t first = MakeCandidate(0, 100), second = MakeCandidate(1, 101);
     bus_.Publish("PLAN_CANDIDATE", first);
     bus_.now_us += 150;
@@ -55,25 +53,19 @@ TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
   const LogContents log = ReadLog(log_path);
   EXPECT_EQ(log.end, LogStatus::kEnd);
   ASSERT_EQ(log.events.size(), 7u);
-  EXPECT_EQ(log.events[0].utime, kStart);
-  EXPECT_EQ(log.events[6].channel, "ANYTHING_ELSE");
+  EXPECT_FIELDS(log, (events[0].utime, kStart), (events[6].channel, "ANYTHING_ELSE"));
 
   const Rows rows = ReadRows();
   ASSERT_EQ(rows.decisions.size(), 2u);
-  EXPECT_EQ(rows.decisions[0].event.log_file, "events-20231114-221320-000000.lcmlog");
-  EXPECT_EQ(rows.decisions[0].event.event_number, 1);
-  EXPECT_EQ(rows.decisions[0].latency_us, 150);
-  EXPECT_EQ(rows.decisions[0].outcome, "certified");
-  EXPECT_EQ(rows.decisions[1].latency_us, 350);
-  EXPECT_EQ(rows.decisions[1].cause, "domain_exit");
-  EXPECT_EQ(rows.decisions[1].source, "test");
+  EXPECT_FIELDS(rows, (decisions[0].event.log_file, "events-20231114-221320-000000.lcmlog"),
+                (decisions[0].event.event_number, 1), (decisions[0].latency_us, 150),
+                (decisions[0].outcome, "certified"), (decisions[1].latency_us, 350),
+                (decisions[1].cause, "domain_exit"), (decisions[1].source, "test"));
   ASSERT_EQ(rows.events.size(), 1u);
-  EXPECT_EQ(rows.events[0].kind, "step_inside");
-  EXPECT_TRUE(rows.gaps.empty());
+  EXPECT_FIELDS(rows, (events[0].kind, "step_inside"), (gaps.empty(), true));
   EXPECT_EQ(Runs()[0].end_utime, bus_.now_us);
-  EXPECT_THAT(out_.str(),
-              testing::AllOf(testing::HasSubstr(log_path), testing::HasSubstr("domain_exit 1"),
-                             testing::HasSubstr("PLAN_CANDIDATE 2"), testing::HasSubstr("p50 150.0 us, p99 350.0 us")));
+  EXPECT_THAT(out_.str(), AllOf(HasSubstr(log_path), HasSubstr("domain_exit 1"), HasSubstr("PLAN_CANDIDATE 2"),
+                                HasSubstr("p50 150.0 us, p99 350.0 us")));
 }
 
 TEST_F(LoggerNodeTest, FlushesOnTimeOnly) {
@@ -114,34 +106,19 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
   candidate(1, "b");
   candidate(0, "a");
   candidate(1, "a");
-  bus_.Publish("OBSTACLES", [] {
-    obstacles_t obstacles{.sequence = 5};
-    return obstacles;
-  }());
-  bus_.Publish("OBSTACLES", [] {
-    obstacles_t obstacles{};
-    obstacles.sequence = 9;
-    return obstacles;
-  }());
+  bus_.Publish("OBSTACLES", obstacles_t{.sequence = 5});
+  bus_.Publish("OBSTACLES", obstacles_t{.sequence = 9});
   node.Tick(kStart);
   node.Stop();
   const Rows rows = ReadRows();
   ASSERT_EQ(rows.gaps.size(), 3u);
-  EXPECT_EQ(rows.gaps[2].channel, "OBSTACLES");
-  EXPECT_EQ(rows.gaps[2].lost, 3);
-  EXPECT_EQ(rows.gaps[0].channel, "PLAN_CANDIDATE");
-  EXPECT_EQ(rows.gaps[0].source, "a");
-  EXPECT_EQ(rows.gaps[0].expected, 9);
-  EXPECT_EQ(rows.gaps[0].got, 11);
-  EXPECT_EQ(rows.gaps[0].lost, 2);
-  EXPECT_EQ(rows.gaps[0].reason, "bus");
-  EXPECT_EQ(rows.gaps[0].event.event_number, 3);
-  EXPECT_EQ(rows.gaps[1].reason, "restart");
-  EXPECT_EQ(rows.gaps[1].lost, 0);
+  EXPECT_FIELDS(rows, (gaps[2].channel, "OBSTACLES"), (gaps[2].lost, 3), (gaps[0].channel, "PLAN_CANDIDATE"),
+                (gaps[0].source, "a"), (gaps[0].expected, 9), (gaps[0].got, 11), (gaps[0].lost, 2),
+                (gaps[0].reason, "bus"), (gaps[0].event.event_number, 3), (gaps[1].reason, "restart"),
+                (gaps[1].lost, 0));
 }
 
-class SignedLoggerTest : public LoggerNodeTest {
- protected:
+struct SignedLoggerTest : LoggerNodeTest {
   SignedLoggerTest() {
     config_.bus.key = MakeTestKeys(scratch_ / "keys");
     planner_.emplace(LoadAllKeys(config_.bus.key), "the bus");
@@ -163,10 +140,7 @@ class SignedLoggerTest : public LoggerNodeTest {
   }
   static void ExpectOneGap(const Rows& rows) {
     ASSERT_EQ(rows.gaps.size(), 1u);
-    EXPECT_EQ(rows.gaps[0].expected, 2);
-    EXPECT_EQ(rows.gaps[0].got, 4);
-    EXPECT_EQ(rows.gaps[0].lost, 2);
-    EXPECT_EQ(rows.gaps[0].event.event_number, 5);
+    EXPECT_FIELDS(rows.gaps[0], (expected, 2), (got, 4), (lost, 2), (event.event_number, 5));
   }
 
   std::optional<Signer> planner_;
@@ -181,10 +155,10 @@ TEST_F(SignedLoggerTest, RecordsEverythingAndMakesRowsOfAuthenticMessagesOnly) {
   bus_.Publish("PLAN_DECISION",
                Bytes(planner_->Sign(Role::kCertifier, "PLAN_DECISION", Encode(decision), bus_.now_us)));
   node.Tick(bus_.now_us += 600'000);
-  EXPECT_THAT(GetText(bus_.heartbeats.back().message), testing::HasSubstr("3 (unsigned 1, forged 1, replayed 1)"));
+  EXPECT_THAT(GetText(bus_.heartbeats.back().message), HasSubstr("3 (unsigned 1, forged 1, replayed 1)"));
   EXPECT_EQ(bus_.heartbeats.back().state, logger_status_t::OK);
   node.Stop();
-  EXPECT_THAT(out_.str(), testing::HasSubstr("not authentic             3 (unsigned 1, forged 1, replayed 1)"));
+  EXPECT_THAT(out_.str(), HasSubstr("not authentic             3 (unsigned 1, forged 1, replayed 1)"));
   EXPECT_EQ(ReadLog(node.recorder().log_path()).events.size(), 7u);
   const Rows rows = ReadRows();
   ExpectOneGap(rows);
@@ -234,12 +208,9 @@ TEST_F(LoggerNodeTest, RecordsAnOverflowOfItsQueueOnce) {
   ASSERT_EQ(rows.gaps.size(), 3u);
   EXPECT_EQ(rows.gaps[0].reason, "bus");
   EXPECT_EQ(rows.gaps[0].lost, 1) << "the six dropped here must not be counted again";
-  EXPECT_EQ(rows.gaps[1].reason, "backlog");
-  EXPECT_EQ(rows.gaps[1].lost, 5);
-  EXPECT_EQ(rows.gaps[2].reason, "queue");
-  EXPECT_EQ(rows.gaps[2].channel, "EXECUTION_EVENT");
-  EXPECT_EQ(rows.gaps[2].lost, 6);
-  EXPECT_THAT(out_.str(), testing::HasSubstr("7 (bus 1, queue 6)"));
+  EXPECT_FIELDS(rows, (gaps[1].reason, "backlog"), (gaps[1].lost, 5), (gaps[2].reason, "queue"),
+                (gaps[2].channel, "EXECUTION_EVENT"), (gaps[2].lost, 6));
+  EXPECT_THAT(out_.str(), HasSubstr("7 (bus 1, queue 6)"));
 }
 
 TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
@@ -249,14 +220,11 @@ TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
   node.Tick(kStart + 1'000'000);
   const auto size = std::filesystem::file_size(node.recorder().log_path());
 
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  const rlimit full{size + 10, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
-  for (int i = 1; i < 4; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(i, execution_event_t::STARTED));
-  node.Tick(kStart + 2'000'000);
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  {
+    const FileSizeLimit full(size + 10);
+    for (int i = 1; i < 4; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(i, execution_event_t::STARTED));
+    node.Tick(kStart + 2'000'000);
+  }
   EXPECT_EQ(std::filesystem::file_size(node.recorder().log_path()), size) << "no torn record stays";
 
   bus_.Publish("EXECUTION_EVENT", MakeEvent(4, execution_event_t::STANDING));
@@ -264,14 +232,11 @@ TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
   node.Stop();
   const LogContents log = ReadLog(node.recorder().log_path());
   ASSERT_EQ(log.events.size(), 2u);
-  EXPECT_EQ(log.events[1].number, 4);
-  EXPECT_EQ(log.damage.places, 0);
+  EXPECT_FIELDS(log, (events[1].number, 4), (damage.places, 0));
   const Rows rows = ReadRows();
   EXPECT_EQ(rows.events.size(), 2u);
   ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_EQ(rows.gaps[0].reason, "disk");
-  EXPECT_EQ(rows.gaps[0].channel, "EXECUTION_EVENT");
-  EXPECT_EQ(rows.gaps[0].lost, 3);
+  EXPECT_FIELDS(rows.gaps[0], (reason, "disk"), (channel, "EXECUTION_EVENT"), (lost, 3));
 }
 
 TEST_F(LoggerNodeTest, SaysSoIfItCannotWrite) {
@@ -304,19 +269,17 @@ TEST_F(LoggerNodeTest, MakesMissingRowsAgainFromTheLog) {
     ASSERT_EQ(node.recorder().recovered().size(), start == 0 ? 2u : 0u) << "a mended run is mended once";
     if (start > 0) break;
     EXPECT_THAT(node.recorder().recovered()[0],
-                testing::AllOf(testing::HasSubstr("3 events kept"), testing::HasSubstr("50 bytes"),
-                               testing::HasSubstr("3 rows written")));
-    EXPECT_THAT(node.recorder().recovered()[1], testing::HasSubstr("no log file was written"));
+                AllOf(HasSubstr("3 events kept"), HasSubstr("50 bytes"), HasSubstr("3 rows written")));
+    EXPECT_THAT(node.recorder().recovered()[1], HasSubstr("no log file was written"));
   }
   EXPECT_EQ(std::filesystem::file_size(log), size);
   const Rows rows = ReadRows();
   ASSERT_EQ(rows.decisions.size(), 2u);
-  EXPECT_EQ(rows.decisions[0].latency_us, 70);
-  EXPECT_EQ(rows.decisions[1].cause, "future");
+  EXPECT_FIELDS(rows, (decisions[0].latency_us, 70), (decisions[1].cause, "future"));
   ASSERT_EQ(rows.gaps.size(), 1u);
   EXPECT_EQ(rows.gaps[0].lost, 2);
   EXPECT_EQ(Runs()[0].end_utime, kStart + 90);
-  EXPECT_THAT(Runs()[0].recovered, testing::HasSubstr("cut tail of 50 bytes"));
+  EXPECT_THAT(Runs()[0].recovered, HasSubstr("cut tail of 50 bytes"));
 }
 
 TEST_F(LoggerNodeTest, LeavesARunningLoggersFileAlone) {
@@ -349,10 +312,7 @@ TEST_F(LoggerNodeTest, LeavesARunningLoggersFileAlone) {
 TEST_F(LoggerNodeTest, KeepsConfirmedEventsWhenItIsKilled) {
   config_.logger.flush_ms = 5;
   config_.logger.rotate_mb = 0.4;  // some 40 candidates and their decisions
-  const unsigned seed = std::random_device{}();
-  RecordProperty("seed", std::to_string(seed));
-  SCOPED_TRACE(testing::Message() << "seed " << seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   constexpr int kRounds = 8;
   std::vector<std::int64_t> reported;
   for (int round = 0; round < kRounds; ++round) {
@@ -392,8 +352,7 @@ TEST_F(LoggerNodeTest, KeepsConfirmedEventsWhenItIsKilled) {
     for (const RunRow& run : chains[i]) {
       SCOPED_TRACE(run.log_file + ": " + run.recovered);
       const LogContents log = ReadLog(scratch_ / ("log/" + run.log_file));
-      EXPECT_EQ(log.end, LogStatus::kEnd);
-      EXPECT_EQ(log.damage.places, 0);
+      EXPECT_FIELDS(log, (end, LogStatus::kEnd), (damage.places, 0));
       events += std::ssize(log.events);
       std::vector<std::int64_t> decisions;
       for (std::size_t k = 0; k < log.events.size(); ++k) {
@@ -403,10 +362,9 @@ TEST_F(LoggerNodeTest, KeepsConfirmedEventsWhenItIsKilled) {
       const Rows rows = database.Read(run.log_file);
       ASSERT_EQ(rows.decisions.size(), decisions.size());
       for (std::size_t k = 0; k < decisions.size(); ++k) {
-        EXPECT_EQ(rows.decisions[k].event.event_number, decisions[k]);
-        EXPECT_EQ(rows.decisions[k].event.digest, ToHex(DigestOf(log.events[static_cast<std::size_t>(decisions[k])])));
-        EXPECT_EQ(rows.decisions[k].sequence, sequence++);
-        EXPECT_EQ(rows.decisions[k].latency_us, 0);
+        EXPECT_FIELDS(rows.decisions[k], (event.event_number, decisions[k]),
+                      (event.digest, ToHex(DigestOf(log.events[static_cast<std::size_t>(decisions[k])]))),
+                      (sequence, sequence++), (latency_us, 0));
       }
       EXPECT_TRUE(rows.gaps.empty());
     }
@@ -424,8 +382,7 @@ TEST_F(LoggerNodeTest, TakesWhatTheMemoryBusCarries) {
   node.Stop();
   const LogContents log = ReadLog(node.recorder().log_path());
   ASSERT_EQ(log.events.size(), 2u) << "the logger hears its own heartbeat";
-  EXPECT_EQ(log.events[0].channel, "LOGGER_STATUS");
-  EXPECT_EQ(log.events[1].utime, kStart + 5);
+  EXPECT_FIELDS(log, (events[0].channel, "LOGGER_STATUS"), (events[1].utime, kStart + 5));
   EXPECT_EQ(node.recorder().summary().contacts, 1);
 }
 

@@ -29,12 +29,9 @@ extern "C" int fdatasync(int file) { return Note(file, SYS_fdatasync); }
 
 namespace forereach::power_cut_test {
 
-using testing::Contains;
-
 constexpr const char* kJournal = "decisions.sqlite-wal";
 
-class PowerCutTest : public testing::Test {
- protected:
+struct PowerCutTest : testing::Test {
   PowerCutTest() { std::filesystem::create_directories(scratch_ / "log"); }
 
   const ScratchDirectory scratch_;

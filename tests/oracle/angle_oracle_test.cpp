@@ -98,7 +98,7 @@ TEST(Conform, ComparesAStateWithItsErrorAsRealNumbers) {
         << value << " +- " << error << " in [" << lower << ", " << upper << "]";
     ++found[conformance];
   }
-  EXPECT_THAT(found, testing::SizeIs(3));
+  EXPECT_THAT(found, SizeIs(3));
   for (const auto& [conformance, count] : found) EXPECT_GT(count, 500);
 }
 

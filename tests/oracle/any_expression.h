@@ -1,9 +1,12 @@
 /** Random expressions: of every operation, tame ones, and ones with kinks. */
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -35,113 +38,102 @@ inline std::string AnyExpression(Random& random, const std::vector<std::string>&
   }
 }
 
-/** Writes random expressions over names whose values are about 1. Most have all derivatives there; one in thirty calls
-of a function may have a pole or a kink. */
-class TameExpression {
+/** Writes random expressions by rules, which a text separates by "; ". In a rule A and B are expressions of one level
+less, L is a leaf, # a power and N a number. A rule that stands twice is twice as likely. */
+class RuledExpression {
  public:
-  TameExpression(Random& random, std::vector<std::string> names) : random_(random), names_(std::move(names)) {}
+  struct Rules {
+    std::string_view rules, bold{};  // one expression in thirty is a bold one, if there are any
+    double leaves = 0.1;             // how likely an expression ends early
+    int least_power, largest_power;
+    double numbers = 0;  // how likely a leaf is a number
+    std::function<std::string(Random&)> number{};
+  };
+  RuledExpression(Random& random, const Rules& rules, std::vector<std::string> names)
+      : random_(random), rules_(rules), names_(std::move(names)), all_(Split(rules.rules)), bold_(Split(rules.bold)) {}
 
   void Add(const std::string& name) { names_.push_back(name); }
 
   [[nodiscard]] std::string operator()(int depth) {
-    if (depth == 0 || random_.Coin(0.1)) return Leaf();
-    if (random_.Coin(0.03)) return Bold(depth - 1);
+    if (depth == 0 || random_.Coin(rules_.leaves)) return Leaf();
+    const bool is_bold = !bold_.empty() && random_.Coin(0.03);
     const std::string a = (*this)(depth - 1);
-    switch (random_.Below(23)) {
-      case 0:
-      case 1: return a + " + " + (*this)(depth - 1);
-      case 2:
-      case 3: return a + " - (" + (*this)(depth - 1) + ")";
-      case 4:
-      case 5:
-      case 6: return "(" + a + ")*" + "(" + (*this)(depth - 1) + ")";
-      case 7: return "(" + a + ")/(1.5 + sin(" + (*this)(depth - 1) + "))";
-      case 8: return "-(" + a + ")^" + std::to_string(random_.Integer(2, 4));
-      case 9: return "(2 + tanh(" + a + "))^" + (random_.Coin() ? "-2" : Number());
-      case 10: return "sin(" + a + ")";
-      case 11: return "cos(" + a + ")";
-      case 12: return "tan(tanh(" + a + "))";
-      case 13: return "asin(0.9*sin(" + a + "))";
-      case 14: return "acos(0.9*cos(" + a + "))";
-      case 15: return "atan(" + a + ")";
-      case 16: return "atan2(" + a + ", 2 + cos(" + (*this)(depth - 1) + "))";
-      case 17: return "sqrt(0.5 + (" + a + ")^2)";
-      case 18: return "exp(-(" + a + ")^2)";
-      case 19: return "log(1.2 + (" + a + ")^2)";
-      case 20: return "hypot(" + a + ", 0.3)";
-      case 21: return "0.5*signed_square(sin(" + a + ") - 0.5)";
-      default: return "tanh(" + a + ")";
+    std::string text;
+    for (const char c : OneOf(is_bold ? bold_ : all_)) {
+      if (c == 'A')
+        text += a;
+      else if (c == 'B')
+        text += (*this)(depth - 1);
+      else if (c == 'L')
+        text += Leaf();
+      else if (c == '#')
+        text += std::to_string(random_.Integer(rules_.least_power, rules_.largest_power));
+      else if (c == 'N')
+        text += rules_.number(random_);
+      else
+        text += c;
     }
+    return text;
   }
 
  private:
-  std::string Number() {
-    std::array<char, 32> text;
-    return {text.data(), static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.*g",
-                                                                random_.Integer(1, 17), random_.Uniform(0.1, 2)))};
-  }
-  std::string Leaf() {
-    return random_.Coin(0.2) ? Number()
-                             : names_[static_cast<std::size_t>(random_.Below(static_cast<int>(names_.size())))];
-  }
-  std::string Bold(int depth) {
-    const std::string a = (*this)(depth);
-    switch (random_.Below(7)) {
-      case 0: return "abs(" + a + ")";
-      case 1: return "min(" + a + ", " + Leaf() + ")";
-      case 2: return "max(" + a + ", " + Leaf() + ")";
-      case 3: return "1/(" + a + ")";
-      case 4: return "sqrt(" + a + ")";
-      case 5: return "log(" + a + ")";
-      default: return "tan(" + a + ")";
-    }
-  }
-
-  Random& random_;
-  std::vector<std::string> names_;
-};
-
-/** Writes random expressions with kinks and edges of domains where names are whole halves. */
-class KinkedExpression {
- public:
-  KinkedExpression(Random& random, std::vector<std::string> names) : random_(random), names_(std::move(names)) {}
-
-  void Add(const std::string& name) { names_.push_back(name); }
-
-  [[nodiscard]] std::string operator()(int depth) {
-    if (depth == 0 || random_.Coin(0.15)) return Leaf();
-    const std::string a = (*this)(depth - 1);
-    switch (random_.Below(18)) {
-      case 0: return a + " + " + (*this)(depth - 1);
-      case 1: return a + " - (" + (*this)(depth - 1) + ")";
-      case 2:
-      case 3: return "(" + a + ")*(" + (*this)(depth - 1) + ")";
-      case 4: return "(" + a + ")^" + std::to_string(random_.Integer(2, 3));
-      case 5:
-      case 6:
-      case 7: return "abs(" + a + ")";
-      case 8:
-      case 9: return "min(" + a + ", " + (*this)(depth - 1) + ")";
-      case 10:
-      case 11: return "max(" + a + ", " + (*this)(depth - 1) + ")";
-      case 12: return "sqrt(" + a + ")";
-      case 13: return "hypot(" + a + ", " + (*this)(depth - 1) + ")";
-      case 14: return "(" + a + ")/(" + (*this)(depth - 1) + ")";
-      case 15: return "asin(" + a + ")";
-      case 16: return "atan2(" + a + ", " + (*this)(depth - 1) + ")";
-      default: return "sin(" + a + ")";
-    }
-  }
-
- private:
-  std::string Leaf() {
-    static const std::vector<std::string> numbers{"0", "0.5", "1", "2"};
-    const auto& all = random_.Coin(0.25) ? numbers : names_;
+  template <class T>
+  [[nodiscard]] const T& OneOf(const std::vector<T>& all) {
     return all[static_cast<std::size_t>(random_.Below(static_cast<int>(all.size())))];
   }
+  std::string Leaf() {
+    return rules_.numbers > 0 && random_.Coin(rules_.numbers) ? rules_.number(random_) : OneOf(names_);
+  }
+
+  static std::vector<std::string_view> Split(std::string_view rules) {
+    std::vector<std::string_view> all;
+    for (std::size_t end; !rules.empty(); rules.remove_prefix(std::min(end, rules.size())))
+      end = std::min(rules.find("; "), rules.size()), all.push_back(rules.substr(0, end)), end += 2;
+    return all;
+  }
 
   Random& random_;
+  const Rules& rules_;
   std::vector<std::string> names_;
+  std::vector<std::string_view> all_, bold_;
 };
+
+/** Over names whose values are about 1. Most have all derivatives there; one in thirty calls of a function may have a
+pole or a kink. */
+inline RuledExpression TameExpression(Random& random, std::vector<std::string> names) {
+  static const RuledExpression::Rules rules{
+      .rules =
+          "A + B; A + B; A - (B); A - (B); (A)*(B); (A)*(B); (A)*(B); (A)/(1.5 + sin(B)); -(A)^#; "
+          "(2 + tanh(A))^-2; (2 + tanh(A))^N; sin(A); cos(A); tan(tanh(A)); asin(0.9*sin(A)); "
+          "acos(0.9*cos(A)); atan(A); atan2(A, 2 + cos(B)); sqrt(0.5 + (A)^2); exp(-(A)^2); log(1.2 + (A)^2); "
+          "hypot(A, 0.3); 0.5*signed_square(sin(A) - 0.5); tanh(A)",
+      .bold = "abs(A); min(A, L); max(A, L); 1/(A); sqrt(A); log(A); tan(A)",
+      .least_power = 2,
+      .largest_power = 4,
+      .numbers = 0.2,
+      .number = [](Random& of) {
+        std::array<char, 32> text;
+        const int digits = of.Integer(1, 17);
+        return std::string(text.data(), static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.*g", digits,
+                                                                               of.Uniform(0.1, 2))));
+      }};
+  return {random, rules, std::move(names)};
+}
+
+/** With kinks and edges of domains where names are whole halves. */
+inline RuledExpression KinkedExpression(Random& random, std::vector<std::string> names) {
+  static const RuledExpression::Rules rules{
+      .rules =
+          "A + B; A - (B); (A)*(B); (A)*(B); (A)^#; abs(A); abs(A); abs(A); min(A, B); min(A, B); max(A, B); "
+          "max(A, B); sqrt(A); hypot(A, B); (A)/(B); asin(A); atan2(A, B); sin(A)",
+      .leaves = 0.15,
+      .least_power = 2,
+      .largest_power = 3,
+      .numbers = 0.25,
+      .number = [](Random& of) {
+        return std::array{"0", "0.5", "1", "2"}[static_cast<std::size_t>(of.Below(4))];
+      }};
+  return {random, rules, std::move(names)};
+}
 
 }  // namespace forereach

@@ -156,6 +156,16 @@ std::optional<double> JustAccepted(Accepted accepted) {
   return far;
 }
 
+/** How far away an obstacle has to be for the certifier to accept it, alone, from a unit of time on up to a control. */
+inline std::optional<double> JustAccepted(const Certifier& certifier, const Approach& approach,
+                                          const Schedule& schedule, Tube& tube, int first = 0, int kept = kMaxSteps) {
+  return JustAccepted([&](double away) {
+    const std::vector<Obstacle> alone{approach.At(away)};
+    const Decision decision = certifier.safety().Judge(alone, schedule, tube, first);
+    return decision.outcome == Outcome::kCertified || decision.step - (certifier.problem().between ? 0 : 1) >= kept;
+  });
+}
+
 /** A problem of problems.h in 1, 2 or 3 safety coordinates, with a body and mostly with bounds between the samples. In
 half of them the model is exact, and the tube is as narrow as X_0. */
 inline std::shared_ptr<Problem> AnyWorld(Random& random, bool bicycle) {

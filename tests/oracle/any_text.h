@@ -61,7 +61,7 @@ inline ModelText TameText(Random& random) {
     parameters.push_back({name, lower, lower + (random.Coin() ? 0 : std::ldexp(1, -random.Integer(4, 20)))});
     known.push_back(name);
   }
-  TameExpression expression(random, known);
+  RuledExpression expression = TameExpression(random, known);
   Lines definitions, equations;
   for (const std::string& name : names_of("d", random.Integer(0, 3))) {
     definitions.emplace_back(name, expression(random.Integer(1, 2)));
@@ -86,7 +86,7 @@ inline ModelText KinkedText(Random& random) {
     parameters.push_back({"p", 0, random.Coin() ? 0 : 0.03125});
     known.emplace_back("p");
   }
-  KinkedExpression expression(random, known);
+  RuledExpression expression = KinkedExpression(random, known);
   Lines definitions, equations;
   if (random.Coin()) {
     definitions.emplace_back("d", expression(2));

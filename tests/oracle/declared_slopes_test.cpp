@@ -97,8 +97,7 @@ TEST(DeclaredSlopes, OfEachFunctionBoundItAndAreConfirmed) {
   Count count;
   for (const std::string& text : texts)
     for (int i = 0; i < 3; ++i) Examine(random, text, 1, count);
-  EXPECT_EQ(count.bounded, 3 * static_cast<int>(texts.size()));
-  EXPECT_EQ(count.confirmed, count.checked);
+  EXPECT_FIELDS(count, (bounded, 3 * static_cast<int>(texts.size())), (confirmed, count.checked));
   EXPECT_GT(count.confirmed, 20);
   EXPECT_EQ(count.refuted, count.narrowed);
 }

@@ -223,20 +223,11 @@ struct Counts {
   long withdrawn = 0, withdrawn_confirmed = 0;
 
   void Add(const Counts& other) {
-    calls += other.calls;
-    certified += other.certified;
-    confirmed += other.confirmed;
-    refuted += other.refuted;
-    cannot_verify += other.cannot_verify;
-    problems += other.problems;
-    refused += other.refused;
-    contacts += other.contacts;
-    contacts_refuted += other.contacts_refuted;
-    contacts_confirmed += other.contacts_confirmed;
-    inside += other.inside;
-    inside_refuted += other.inside_refuted;
-    withdrawn += other.withdrawn;
-    withdrawn_confirmed += other.withdrawn_confirmed;
+    for (long Counts::*const each : {&Counts::calls, &Counts::certified, &Counts::confirmed, &Counts::refuted,
+                                     &Counts::cannot_verify, &Counts::problems, &Counts::refused, &Counts::contacts,
+                                     &Counts::contacts_refuted, &Counts::contacts_confirmed, &Counts::inside,
+                                     &Counts::inside_refuted, &Counts::withdrawn, &Counts::withdrawn_confirmed})
+      this->*each += other.*each;
   }
 };
 
@@ -315,11 +306,7 @@ std::optional<verifier::Certificate> Remainder(Random& random, const Certifier& 
   const int steps = query.plan().num_steps, first = random.Below(steps), kept = random.Integer(first, steps - 1);
   const auto approach = AnyApproach(random, problem, tube, query.schedule);
   if (!approach) return std::nullopt;
-  const auto away = JustAccepted([&](double far) {
-    const std::vector<Obstacle> alone{approach->At(far)};
-    const Decision decision = certifier.safety().Judge(alone, query.schedule, tube, first);
-    return decision.outcome == Outcome::kCertified || decision.step - (problem.between ? 0 : 1) >= kept;
-  });
+  const auto away = JustAccepted(certifier, *approach, query.schedule, tube, first, kept);
   if (!away) return std::nullopt;
   verifier::Certificate certificate = Among(whole, approach->At(*away));
   const Standing standing = JudgeAgain(certifier, query.plan(), query.initial_set, certificate.obstacles, tube, first);
@@ -356,10 +343,7 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
     for (int o = random.Integer(1, 3); o > 0; --o) {
       const auto approach = AnyApproach(random, *problem, tube, query.schedule);
       if (!approach) continue;
-      const auto away = JustAccepted([&](double far) {
-        const std::vector<Obstacle> alone{approach->At(far)};
-        return certifier.safety().Judge(alone, query.schedule, tube, 0).outcome == Outcome::kCertified;
-      });
+      const auto away = JustAccepted(certifier, *approach, query.schedule, tube);
       if (!away) continue;
       query.obstacles.push_back(approach->At(*away));
       if (problem->body.heading < 0 && *away > 1e-5) further_in.push_back(approach->At(*away - 1e-6 * (1 + *away)));
@@ -408,28 +392,16 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
   return counts;
 }
 
-// An expression of these names, nested up to `depth`.
-std::string AnyExpression(Random& random, const std::vector<std::string>& names, int depth) {
-  const auto name = [&] { return names[static_cast<std::size_t>(random.Below(static_cast<int>(names.size())))]; };
-  if (depth == 0) return random.Coin(0.8) ? name() : std::to_string(random.Integer(1, 9)) + "/7";
-  const auto inner = [&] { return std::string("(").append(AnyExpression(random, names, depth - 1)).append(")"); };
-  switch (random.Below(14)) {
-    case 0: return inner() + "+" + inner();
-    case 1: return inner() + "-" + inner();
-    case 2:
-    case 3: return inner() + "*" + inner();
-    case 4: return inner() + "/(2+" + inner() + "^2)";
-    case 5: return inner() + "^" + std::to_string(random.Integer(2, 3));
-    case 6: return "sin" + inner();
-    case 7: return "cos" + inner();
-    case 8: return "sqrt(1+" + inner() + "^2)";
-    case 9: return "atan2(" + inner() + ",1+" + inner() + "^2)";
-    case 10: return "tanh" + inner();
-    case 11: return "abs" + inner();
-    case 12: return "max(" + inner() + "," + inner() + ")";
-    default: return "exp(-abs" + inner() + ")";
-  }
-}
+// With kinks, and finite everywhere.
+const RuledExpression::Rules kFinite{
+    .rules =
+        "(A)+(B); (A)-(B); (A)*(B); (A)*(B); (A)/(2+(B)^2); (A)^#; sin(A); cos(A); sqrt(1+(A)^2); "
+        "atan2((A),1+(B)^2); tanh(A); abs(A); max((A),(B)); exp(-abs(A))",
+    .leaves = 0,
+    .least_power = 2,
+    .largest_power = 3,
+    .numbers = 0.2,
+    .number = [](Random& of) { return std::to_string(of.Integer(1, 9)) + "/7"; }};
 
 // The value of an expression of the model's states and inputs in 256 bits.
 Real ValueOf(const ExpressionText& text, const std::vector<std::string>& names, const std::vector<Real>& z) {
@@ -448,7 +420,7 @@ Counts RunLimits(const Options& options, long number, Tube& tube, std::mutex& ou
   for (int i = random.Integer(1, 4); i > 0; --i)
     problem->limits.push_back(
         {.name = "limit " + std::to_string(i),
-         .that = {AnyExpression(random, random.Coin() ? names : states, random.Integer(0, 3)), 1, 1},
+         .that = {RuledExpression(random, kFinite, random.Coin() ? names : states)(random.Integer(0, 3)), 1, 1},
          .at_most = 1e300});
   const Certifier certifier(problem);
   for (int i = 0; i < options.calls; ++i) {

@@ -139,9 +139,7 @@ void ExpectRoot(double x) {
   ASSERT_LE(Rational(down) * Rational(down), Rational(x)) << x;
   ASSERT_GE(down, 0) << x;
   const double less = x < 0x1p-960 ? NextDown(NextDown(up)) : NextDown(up);
-  if (x > 0) {
-    ASSERT_LT(Rational(less) * Rational(less), Rational(x)) << x;
-  }
+  if (x > 0) ASSERT_LT(Rational(less) * Rational(less), Rational(x)) << x;
   const double more = x < 0x1p-960 ? NextUp(NextUp(down)) : NextUp(down);
   ASSERT_GT(Rational(more) * Rational(more), Rational(x)) << x;
 }

@@ -142,9 +142,7 @@ TEST(FindExit, AgainstABallNoSetOutsideIsFoundInside) {
       ASSERT_EQ(exit.bound, ball.radius);
       ASSERT_GE(Rational(exit.value) * Rational(exit.value), square);
       const Rational nearly = radius - Rational(0x1p-44) * (radius + 16);  // the ends of the box are rounded
-      if (nearly > 0) {
-        ASSERT_GT(square, nearly * nearly) << "found outside";
-      }
+      if (nearly > 0) ASSERT_GT(square, nearly * nearly) << "found outside";
       outside += square > bound;
     }
   }

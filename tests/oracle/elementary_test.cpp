@@ -42,8 +42,7 @@ const std::array kFunctions{
     Function{FOREREACH_FUNCTION(tanh), -kMaxDouble, kMaxDouble, true, 3, 8},
 };
 
-class Elementary : public testing::TestWithParam<Function> {
- protected:
+struct Elementary : testing::TestWithParam<Function> {
   [[nodiscard]] static bool InDomain(double x) { return GetParam().lower <= x && x <= GetParam().upper; }
 
   // A number of the domain: anything, a moderate one, or one next to an end of the domain or to a special value.

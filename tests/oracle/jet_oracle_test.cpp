@@ -188,8 +188,7 @@ TEST(JetOutsideTheDomain, HasNoFiniteValueWhateverItIsMultipliedBy) {
       EXPECT_EQ(result.value, Interval::Entire());
   }
   for (const Jet& undefined : {log(at(-2, -1)), asin(at(0, 1.5)), sqrt(at(-2, -1))}) {
-    EXPECT_EQ(undefined.slope, Interval::Entire());
-    EXPECT_EQ(undefined.curvature[0], Interval::Entire());
+    EXPECT_FIELDS(undefined, (slope, Interval::Entire()), (curvature[0], Interval::Entire()));
   }
 }
 

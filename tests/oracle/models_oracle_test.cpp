@@ -71,8 +71,7 @@ struct ModelCase {
   friend void PrintTo(const ModelCase& model, std::ostream* out) { *out << model.name; }
 };
 
-class Model : public testing::TestWithParam<ModelCase> {
- protected:
+struct Model : testing::TestWithParam<ModelCase> {
   const NominalModel& model() const { return *GetParam().model; }
 
   // Typical, extreme and special values of every variable; angles within what can be reduced.
@@ -345,9 +344,8 @@ TEST(Program, DerivativesAgreeWithThoseMadeByHand) {
       for (int i = 0; i < 3; ++i) {
         const auto entry = first.find({output, i});
         ASSERT_NEAR(entry == first.end() ? 0 : plain.jacobian[entry->second], expected.gradient[i], 1e-13);
-        if (entry != first.end()) {
+        if (entry != first.end())
           ASSERT_NEAR(linearization.entries[entry->second].value.Middle(), expected.gradient[i], 1e-13);
-        }
         for (int j = i; j < 3; ++j) {
           const auto place = second.find({output, i, j});
           ASSERT_NEAR(place == second.end() ? 0 : plain.hessian[place->second].lower, expected.hessian[i][j], 1e-12)

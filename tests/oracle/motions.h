@@ -339,12 +339,7 @@ class MotionTrial {
     if (told.motion && untold_ == Untold::kVelocity) told.motion->velocity.setZero();
     if (told.motion && untold_ == Untold::kGrowth)
       told.motion->uncertainty = told.motion->growth = told.motion->growth_rate = 0;
-    const auto accepted = [&](double away) {
-      const std::vector<Obstacle> alone{told.At(away)};
-      const Decision decision = certifier.safety().Judge(alone, told_schedule, tube_, first);
-      return decision.outcome == Outcome::kCertified || decision.step - (problem.between ? 0 : 1) >= kept;
-    };
-    const std::optional<double> away = JustAccepted(accepted);
+    const std::optional<double> away = JustAccepted(certifier, told, told_schedule, tube_, first, kept);
     if (!away) return std::nullopt;
     return Neighbour{approach->At(*away), told.At(*away)};
   }
@@ -366,7 +361,7 @@ class MotionTrial {
         most.push_back(abs(r) + DisturbanceAt(problem, z, static_cast<Eigen::Index>(k)));
       }
       const Real before = std::exchange(offset, NextOffset(problem, offset));
-      const std::vector<Real> next = LongerSuccessor(winds_, problem, z, unexpected, most, offset - before);
+      const std::vector<Real> next = Rolled(winds_, problem, residual, z, offset - before);
       RequireInSlice(next, t + 1);
       const Chord chord = judge.ChordOf(x, next, before, offset);
       if (t >= first && problem.between)

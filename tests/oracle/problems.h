@@ -280,6 +280,20 @@ inline std::vector<Real> LongerSuccessor(Random& random, const Problem& problem,
   return next;
 }
 
+/** The next state of an admissible rollout, whose step lasts `longer` than dt. @param residual r_k(z), as it is called.
+ */
+template <class Residual>
+std::vector<Real> Rolled(Random& random, const Problem& problem, const Residual& residual, const std::vector<Real>& z,
+                         const Real& longer) {
+  std::vector<Real> unexpected = AnyDisturbance(random, problem, z), most;
+  for (std::size_t k = 0; k < unexpected.size(); ++k) {
+    const Real r = residual(z, static_cast<int>(k));
+    unexpected[k] += r;
+    most.push_back(abs(r) + DisturbanceAt(problem, z, static_cast<Eigen::Index>(k)));
+  }
+  return LongerSuccessor(random, problem, z, unexpected, most, longer);
+}
+
 inline Query AnyQuery(Random& random, const Problem& problem) {
   const bool bicycle = problem.model->num_states() == 6;
   const int n = problem.model->num_states();

@@ -15,8 +15,7 @@ using exact::Rational;
 
 constexpr double kReach = 2;  // of the domain, in each variable
 
-class Nothing final : public ResidualEnclosure {
- public:
+struct Nothing final : ResidualEnclosure {
   void Enclose(const QuerySet&, ResidualBounds& bounds) const noexcept override {
     bounds.lower.fill(-kInfinity);
     bounds.upper.fill(kInfinity);

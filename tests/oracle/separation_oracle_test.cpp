@@ -83,9 +83,7 @@ void ExpectSoundAndExact(const Zonotope& slice, const Obstacle& obstacle) {
   const Separation best = Separate(slice, obstacle), quick = SeparateByHulls(slice, obstacle);
   ASSERT_EQ(best.threshold, obstacle.radius());
   for (const Separation& s : {best, quick}) {
-    if (s.distance > 0) {
-      ASSERT_LE(Rational(s.distance) * Rational(s.distance), square);
-    }
+    if (s.distance > 0) ASSERT_LE(Rational(s.distance) * Rational(s.distance), square);
     if (s.IsProven()) {
       ASSERT_GT(square, radius * radius);
       ASSERT_LE(s.clearance(), s.distance - s.threshold);
@@ -177,12 +175,8 @@ TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
                                             : Obstacle::AxisBox(center, center + random.Vector(2, scale).cwiseAbs());
     const Rational square = SquaredDistance(slice, obstacle), radius(obstacle.radius());
     for (const Separation& s : {Separate(slice, obstacle), SeparateByHulls(slice, obstacle)}) {
-      if (s.distance > 0) {
-        ASSERT_LE(Rational(s.distance) * Rational(s.distance), square);
-      }
-      if (s.IsProven()) {
-        ASSERT_GT(square, radius * radius);
-      }
+      if (s.distance > 0) ASSERT_LE(Rational(s.distance) * Rational(s.distance), square);
+      if (s.IsProven()) ASSERT_GT(square, radius * radius);
       proven += s.IsProven();
     }
   }
@@ -313,13 +307,9 @@ TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
     const Obstacle box = Obstacle::AxisBox(lower, lower + size);
     const double gap = WidestSpatialGap(slice, box);
     for (const Separation& s : {Separate(slice, box), SeparateByHulls(slice, box)}) {
-      if (s.IsProven()) {
-        ASSERT_GT(gap, 0) << "proven, though they meet or touch";
-      }
+      if (s.IsProven()) ASSERT_GT(gap, 0) << "proven, though they meet or touch";
     }
-    if (gap > 1e-11) {
-      ASSERT_TRUE(Separate(slice, box).IsProven()) << "gap " << gap;
-    }
+    if (gap > 1e-11) ASSERT_TRUE(Separate(slice, box).IsProven()) << "gap " << gap;
     proven += gap > 0;
     met += gap <= 0;
   }
@@ -336,12 +326,8 @@ TEST(LineSeparation, IsDecidedAtTheLastBit) {
     const Rational right = Rational(slice.center(0)) + exact::HalfWidth(slice, 0),
                    left = Rational(slice.center(0)) - exact::HalfWidth(slice, 0);
     const Rational gap = std::max(Rational(Rational(lower[0]) - right), Rational(left - Rational(upper[0])));
-    if (s.distance > 0) {
-      ASSERT_LE(Rational(s.distance), gap);
-    }
-    if (gap > Rational(1e-12)) {
-      ASSERT_NEAR(s.distance, gap.get_d(), 1e-12);
-    }
+    if (s.distance > 0) ASSERT_LE(Rational(s.distance), gap);
+    if (gap > Rational(1e-12)) ASSERT_NEAR(s.distance, gap.get_d(), 1e-12);
   }
   const Zonotope point(Eigen::VectorXd::Constant(1, 2), Eigen::MatrixXd(1, 0));
   const auto from = [](double lower) {
@@ -439,12 +425,8 @@ TEST(HullSeparation, NextToAnObstacleIsNeverWronglyProven) {
     const double radius = std::max(0.0, few(std::sqrt(square.get_d()), -1));
     const Separation s =
         SeparateHulls(hull, is_circle ? Obstacle::Circle(lower, radius) : Obstacle::AxisBox(lower, upper));
-    if (s.distance > 0) {
-      ASSERT_LE(Rational(s.distance) * Rational(s.distance), square) << "trial " << trial;
-    }
-    if (s.IsProven()) {
-      ASSERT_GT(square, Rational(s.threshold) * Rational(s.threshold)) << "trial " << trial;
-    }
+    if (s.distance > 0) ASSERT_LE(Rational(s.distance) * Rational(s.distance), square) << "trial " << trial;
+    if (s.IsProven()) ASSERT_GT(square, Rational(s.threshold) * Rational(s.threshold)) << "trial " << trial;
     proven += s.IsProven();
   }
   EXPECT_GT(proven, 500);

@@ -208,9 +208,7 @@ TEST(ZonogonOracle, RadiusIsTheFarthestCorner) {
     }
     const Rational radius(RadiusUpper(set));
     ASSERT_LE(farthest, radius * radius);
-    if (dim <= 2 && farthest > Rational(1e-200)) {
-      ASSERT_LE(radius * radius, farthest * Rational(1 + 2e-11));
-    }
+    if (dim <= 2 && farthest > Rational(1e-200)) ASSERT_LE(radius * radius, farthest * Rational(1 + 2e-11));
   }
 }
 

@@ -12,8 +12,7 @@ namespace forereach::slope_oracle_test {
 constexpr std::size_t kStates = 4;
 constexpr double kStep = 0.125;  // its square and half of it are doubles
 
-class Sloped final : public ResidualEnclosure {
- public:
+struct Sloped final : ResidualEnclosure {
   explicit Sloped(Random& random) {
     const double scale = random.Coin(0.2) ? 0x1p-500 : random.Coin(0.2) ? 100 : 0.1;
     for (std::size_t k = 0; k < kStates; ++k) {
@@ -90,9 +89,7 @@ TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
       const std::span<const double> direction(d.data(), kStates);
       const Rational exactly = Support(slice, input, residual, d), bound = exact::Support(next, direction);
       ASSERT_GE(bound, exactly) << trial;
-      if (is_whole && !has_slack) {
-        ASSERT_LE(bound, exactly + Rational(1e-10)) << trial;
-      }
+      if (is_whole && !has_slack) ASSERT_LE(bound, exactly + Rational(1e-10)) << trial;
     }
     for (std::size_t k = 0; k < kStates; ++k)
       ASSERT_GE(Rational(next_half_width[k]), exact::HalfWidth(next, static_cast<int>(k)));

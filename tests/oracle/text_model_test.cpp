@@ -46,8 +46,7 @@ struct Pair {
   double largest_state;
 };
 
-class SameBitsTest : public testing::TestWithParam<int> {
- protected:
+struct SameBitsTest : testing::TestWithParam<int> {
   [[nodiscard]] static Pair Models() {
     if (GetParam() == 0) return {MakeTextModel(Bicycle()), MakeKinematicBicycle(0.1, 2.7), 1.2};
     return {MakeTextModel(PointMass()), MakePointMass(0.1), 20};

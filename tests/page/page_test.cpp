@@ -8,7 +8,6 @@
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/tries.h"
@@ -121,16 +120,15 @@ TEST(DrawTest, ObstaclesMoveByTheDrawingsClock) {
       DrawTube({{square}, {square}, {square}}, {}, {circle.Moving(motion), box.Moving(brief), circle}, 1, detail));
   EXPECT_THAT(
       detail.svg,
-      HasSubstr("type=\"translate\" calcMode=\"discrete\" dur=\"3s\" fill=\"freeze\" values=\"0 0;1057 0;2114 0\""));
-  EXPECT_THAT(detail.svg,
-              HasSubstr("attributeName=\"r\" calcMode=\"discrete\" dur=\"3s\" fill=\"freeze\" values=\"132;198;264\""));
-  EXPECT_THAT(detail.svg, HasSubstr("values=\"hidden;inherit;inherit\""));
-  EXPECT_THAT(detail.svg, HasSubstr("class=\"obstacle binding\""));
-  EXPECT_THAT(detail.svg, HasSubstr(">2</text>"));
+      AllOf(
+          HasSubstr("type=\"translate\" calcMode=\"discrete\" dur=\"3s\" fill=\"freeze\" values=\"0 0;1057 0;2114 0\""),
+          HasSubstr("attributeName=\"r\" calcMode=\"discrete\" dur=\"3s\" fill=\"freeze\" values=\"132;198;264\""),
+          HasSubstr("values=\"hidden;inherit;inherit\""), HasSubstr("class=\"obstacle binding\""),
+          HasSubstr(">2</text>")));
 }
 
 TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
-  const PageRun run = GatherPage({kLog}, kTask, {}, {});
+  const PageRun run = GatherPage({kCourseLog}, kCourseTask, {}, {});
   ASSERT_GT(run.decisions.size(), 20u);
   std::size_t judged = 0;
   for (const DecisionRow& row : run.decisions)
@@ -143,9 +141,7 @@ TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
     EXPECT_THAT(detail.svg, HasSubstr("<path"));
     ASSERT_GE(detail.binding, 0);
     EXPECT_EQ(detail.hull_lower.size(), 6u);
-    if (const int step = run.decisions[detail.decision].step; step >= 0) {
-      EXPECT_EQ(detail.binding, step);
-    }
+    if (const int step = run.decisions[detail.decision].step; step >= 0) EXPECT_EQ(detail.binding, step);
     executed += detail.executed.size();
   }
   EXPECT_GT(executed, 50u);
@@ -154,9 +150,9 @@ TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
 }
 
 TEST(GatherTest, DrawsNoMoreThanItsBounds) {
-  const PageRun few = GatherPage({kLog}, kTask, {}, {.certified = 3, .abstained = 2, .bytes = 1'000'000});
+  const PageRun few = GatherPage({kCourseLog}, kCourseTask, {}, {.certified = 3, .abstained = 2, .bytes = 1'000'000});
   EXPECT_EQ(few.details.size(), 5u);
-  const PageRun none = GatherPage({kLog}, kTask, {}, {.certified = 3, .abstained = 2, .bytes = 10});
+  const PageRun none = GatherPage({kCourseLog}, kCourseTask, {}, {.certified = 3, .abstained = 2, .bytes = 10});
   for (const PageDetail& detail : none.details) {
     EXPECT_THAT(detail.missing, HasSubstr("reached their bound"));
     EXPECT_EQ(detail.svg, "");
@@ -225,10 +221,9 @@ TEST(DetailTest, NamesTheNearestObservationOfEachState) {
 }
 
 /** A logger's directory with the course's log and its rows. */
-class DirectoryTest : public testing::Test {
- protected:
+struct DirectoryTest : testing::Test {
   DirectoryTest() {
-    std::filesystem::copy(kLog, log_);
+    std::filesystem::copy(kCourseLog, log_);
     Database database(directory_ / "decisions.sqlite");
     database.BeginRun("events-20260101-120000-000000.lcmlog", 1);
     Interpreter interpreter({}, "events-20260101-120000-000000.lcmlog");
@@ -246,65 +241,61 @@ class DirectoryTest : public testing::Test {
 };
 
 TEST_F(DirectoryTest, HasTheRowsOfTheDatabaseAndTheTubesOfTheLog) {
-  const PageRun of_log = GatherPage({kLog}, kTask, {}, {});
-  const PageRun run = GatherPage({directory_.path()}, kTask, {}, {});
-  EXPECT_EQ(run.decisions.size(), of_log.decisions.size());
-  EXPECT_EQ(run.events.size(), of_log.events.size());
-  EXPECT_EQ(run.details.size(), of_log.details.size());
+  const PageRun of_log = GatherPage({kCourseLog}, kCourseTask, {}, {});
+  const PageRun run = GatherPage({directory_.path()}, kCourseTask, {}, {});
+  EXPECT_FIELDS(run, (decisions.size(), of_log.decisions.size()), (events.size(), of_log.events.size()),
+                (details.size(), of_log.details.size()));
   for (const PageDetail& detail : run.details) EXPECT_EQ(detail.missing, "");
-  EXPECT_THAT(run.notes, testing::IsEmpty());
+  EXPECT_THAT(run.notes, IsEmpty());
 }
 
 TEST_F(DirectoryTest, WithoutTheLogItHasTheRowsAlone) {
   std::filesystem::remove(log_);
   const PageRun run = GatherPage({directory_ / "decisions.sqlite"}, "", {}, {});
-  EXPECT_EQ(run.decisions.size(), std::size_t{kCourseDecisions});
-  EXPECT_TRUE(run.details.empty());
-  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("the log is not in the database's directory")));
+  EXPECT_FIELDS(run, (decisions.size(), std::size_t{kCourseDecisions}), (details.empty(), true));
+  EXPECT_THAT(run.notes, ElementsAre(HasSubstr("the log is not in the database's directory")));
 }
 
 TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
   const PageRun run = GatherPage({directory_.path()}, "", {}, {});
-  EXPECT_EQ(run.decisions.size(), std::size_t{kCourseDecisions});
-  EXPECT_TRUE(run.details.empty());
-  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not kept next to it")));
+  EXPECT_FIELDS(run, (decisions.size(), std::size_t{kCourseDecisions}), (details.empty(), true));
+  EXPECT_THAT(run.notes, ElementsAre(HasSubstr("is not kept next to it")));
 }
 
 TEST_F(DirectoryTest, WithoutADatabaseItReadsTheLogs) {
   std::filesystem::remove(directory_ / "decisions.sqlite");
-  EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), std::size_t{kCourseDecisions});
+  EXPECT_EQ(GatherPage({directory_.path()}, kCourseTask, {}, {0, 0, 0}).decisions.size(),
+            std::size_t{kCourseDecisions});
   std::filesystem::remove(log_);
-  EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kTask, {}, {})), BadInput);
+  EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kCourseTask, {}, {})), BadInput);
 }
 
 // Two robots with the same plans at the same times, and a file that is no log.
-class ManyRunsTest : public testing::Test {
- protected:
+struct ManyRunsTest : testing::Test {
   ManyRunsTest() {
     for (const char* robot : {"a", "b"}) {
       std::filesystem::create_directories(directory_ / ("night/" + std::string(robot)));
-      std::filesystem::copy(kLog, directory_ / ("night/" + std::string(robot) + "/one.lcmlog"));
+      std::filesystem::copy(kCourseLog, directory_ / ("night/" + std::string(robot) + "/one.lcmlog"));
     }
     directory_.Write("night/b/two.lcmlog", "no log");
   }
   Output Report(const std::string& page, const std::string& options) const {
-    return Forereach("report '" + (directory_ / "night") + "' --config '" + kTask + "' --out '" + (directory_ / page) +
-                     "' " + options + " 2>&1");
+    return Forereach("report '" + (directory_ / "night") + "' --config '" + kCourseTask + "' --out '" +
+                     (directory_ / page) + "' " + options + " 2>&1");
   }
 
   const ScratchDirectory directory_;
 };
 
 TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
-  const PageRun run = GatherPage({directory_ / "night"}, kTask, {}, {});
-  const PageRun one = GatherPage({kLog}, kTask, {}, {});
+  const PageRun run = GatherPage({directory_ / "night"}, kCourseTask, {}, {});
+  const PageRun one = GatherPage({kCourseLog}, kCourseTask, {}, {});
   ASSERT_EQ(run.parts.size(), 2u);
-  EXPECT_EQ(run.parts[0].robot, directory_ / "night/a");
-  EXPECT_EQ(run.parts[1].robot, directory_ / "night/b");
+  EXPECT_FIELDS(run, (parts[0].robot, directory_ / "night/a"), (parts[1].robot, directory_ / "night/b"));
   EXPECT_THAT(run.parts[1].replays.at("one.lcmlog"), HasSubstr(directory_ / "night/b/one.lcmlog"));
   EXPECT_EQ(run.parts[1].decisions, std::size_t{kCourseDecisions});
   EXPECT_EQ(run.decisions.size(), std::size_t{2 * kCourseDecisions});
-  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("two.lcmlog: is no LCM event log")));
+  EXPECT_THAT(run.notes, ElementsAre(HasSubstr("two.lcmlog: is no LCM event log")));
   ASSERT_EQ(run.details.size(), 2 * one.details.size());
   for (std::size_t i = 0; i < one.details.size(); ++i) {
     const PageDetail &a = one.details[i], &b = run.details[one.details.size() + i];
@@ -313,7 +304,7 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
     EXPECT_GE(b.decision, std::size_t{kCourseDecisions});
     EXPECT_EQ(b.missing, "");
   }
-  const PageRun few = GatherPage({directory_ / "night"}, kTask, {}, {.certified = 3, .abstained = 2});
+  const PageRun few = GatherPage({directory_ / "night"}, kCourseTask, {}, {.certified = 3, .abstained = 2});
   EXPECT_EQ(few.details.size(), 5u) << "of the page, not of each run";
 }
 
@@ -327,19 +318,20 @@ TEST_F(ManyRunsTest, APageMadeOnOneCoreIsTheSame) {
 
 TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
   const ScratchDirectory directory;
-  const std::string page = directory / "a page.html", report = "report '" + kLog + "' --config '" + kTask + "' --out '";
+  const std::string page = directory / "a page.html",
+                    report = "report '" + kCourseLog + "' --config '" + kCourseTask + "' --out '";
   EXPECT_THAT(Forereach(report + page + "' 2>&1"), Exits(0, std::to_string(kCourseDecisions) + " decisions"));
-  EXPECT_THAT(Read(page), testing::StartsWith("<!DOCTYPE html>"));
+  EXPECT_THAT(Read(page), StartsWith("<!DOCTYPE html>"));
   directory.Write("a page.html", "mine");
   EXPECT_THAT(Forereach(report + page + "' 2>&1"), Exits(2, "the file exists"));
   EXPECT_EQ(Read(page), "mine");
   EXPECT_EQ(Forereach(report + page + "' --force 2>&1").code, 0);
-  EXPECT_THAT(Read(page), testing::EndsWith("</html>\n"));
+  EXPECT_THAT(Read(page), EndsWith("</html>\n"));
   EXPECT_EQ(Forereach(report + directory.path() + "/none/page.html' 2>&1").code, 2);
 }
 
 TEST(WriteTest, TextsOfARunCannotOpenATag) {
-  PageRun run = GatherPage({kLog}, kTask, {}, {0, 0, 0});
+  PageRun run = GatherPage({kCourseLog}, kCourseTask, {}, {0, 0, 0});
   const std::string plain = PageHtml(run);
   const auto tags = [](const std::string& html) { return std::ranges::count(html, '<'); };
   for (DecisionRow& row : run.decisions) row.source = row.cause = "</script><!--<b>";
@@ -381,15 +373,13 @@ TEST(WriteTest, ALogNamedLikeAKeyIsWritten) {
 
 TEST(WriteTest, PolicyForbidsRequests) {
   const std::string html = PageHtml({});
-  EXPECT_THAT(html, HasSubstr("default-src 'none'"));
-  EXPECT_THAT(html, HasSubstr("script-src 'sha256-"));
-  EXPECT_THAT(html, Not(HasSubstr("unsafe-inline")));
-  EXPECT_THAT(html, Not(HasSubstr(" src=\"http")));
+  EXPECT_THAT(html, AllOf(HasSubstr("default-src 'none'"), HasSubstr("script-src 'sha256-"),
+                          Not(HasSubstr("unsafe-inline")), Not(HasSubstr(" src=\"http"))));
 }
 
 // A browser keeps other characters in texts twice as large, and takes twice as long over what is next to them.
 TEST(WriteTest, APageIsOfAsciiWhereItsTextsAre) {
-  const std::string html = PageHtml(GatherPage({kLog}, kTask, {}, {0, 0, 0}));
+  const std::string html = PageHtml(GatherPage({kCourseLog}, kCourseTask, {}, {0, 0, 0}));
   EXPECT_TRUE(std::ranges::all_of(html, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
 }
 

@@ -11,7 +11,7 @@ forereach_page_samples any FILE.lcmlog SEED: a log of the recorded course, some 
 #include "page/detail.h"
 #include "page/write.h"
 #include "tests/any_fields.h"
-#include "tests/paths.h"
+#include "tests/records/course.h"
 
 namespace forereach {
 namespace {
@@ -31,9 +31,8 @@ PageRun Many(int count) {
   run.name = "many";
   const std::string configs[] = {Digest(random), Digest(random)};
   for (int i = 0; i < count; ++i) {
-    DecisionRow row;
-    row.event = {"events-20260101-120000-000000.lcmlog", 5 * i, Digest(random)};
-    row.utime = kBegin + i * 400'000ll + static_cast<std::int64_t>(random() % 90'000);
+    DecisionRow row{.event = {"events-20260101-120000-000000.lcmlog", 5 * i, Digest(random)},
+                    .utime = kBegin + i * 400'000ll + static_cast<std::int64_t>(random() % 90'000)};
     row.sequence = row.plan_id = i;
     row.source = "planner " + std::to_string(random() % 3);
     row.elapsed_us = took(random);
@@ -89,9 +88,7 @@ PageRun Hostile() {
   run.events = {{{evil, 2, evil}, 5, 6, 7, evil, evil, -1, -1, {}, infinity}};
   run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil, 2}};
   run.parts = {{evil, {{evil, evil}}, run.decisions.size()}};
-  PageDetail detail;
-  detail.decision = 4;
-  detail.task = 0;
+  PageDetail detail{.decision = 4, .task = 0};
   detail.start_utime = detail.step_us = std::numeric_limits<std::int64_t>::max();
   detail.binding = detail.steps = std::numeric_limits<int>::max();
   detail.hull_lower = {-infinity}, detail.hull_upper = {infinity};
@@ -110,7 +107,7 @@ PageRun Hostile() {
 
 void WriteAny(const std::string& path, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  EventLogReader reader(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog");
+  EventLogReader reader(kCourseLog);
   EventLogWriter writer(path);
   LogEvent event;
   while (reader.Next(event) == LogStatus::kEvent) {

@@ -27,8 +27,7 @@ TEST(CertifiedPlan, TakesThePointMassToTheGoalInOnePlanThatEndsInAStop) {
     const Plan again{plan.controls.data(), 2, static_cast<int>(plan.controls.cols()), 2};
     Tube tube;
     const Decision decision = certifier.Certify(again, Zonotope::Enclose(config.initial_set), config.obstacles, tube);
-    EXPECT_EQ(decision.outcome, Outcome::kCertified);
-    EXPECT_EQ(decision.margin, plan.decision.margin);
+    EXPECT_FIELDS(decision, (outcome, Outcome::kCertified), (margin, plan.decision.margin));
     EXPECT_NEAR(tube.slice(tube.length()).center(2), 0, 1e-9);
     EXPECT_NEAR(tube.slice(tube.length()).center(3), 0, 1e-9);
     EXPECT_EQ(tube.slice(tube.length()).center(0), plan.end(0));
@@ -42,8 +41,7 @@ TEST(CertifiedPlan, WithoutACertificateItHasNoControlsAndTheLastAnswer) {
   config.problem = problem;
   const auto proposer = MakeProposer(config);
   const CertifiedPlan plan = FindCertifiedPlan(*proposer, Certifier(problem), config, 1);
-  EXPECT_EQ(plan.controls.cols(), 0);
-  EXPECT_EQ(plan.decision.outcome, Outcome::kDomain);
+  EXPECT_FIELDS(plan, (controls.cols(), 0), (decision.outcome, Outcome::kDomain));
   EXPECT_GT(plan.candidates, 1);
 }
 
@@ -64,12 +62,8 @@ TEST(CertifiedPlan, LearnsTheMarginFromALimit) {
 
 TEST(Lessons, AnExceededLimitAddsTheExcessOfTheTubeToItsMargin) {
   Lessons lessons(PlannerOptions{}, 2);
-  Decision decision;
-  decision.outcome = Outcome::kSafety;
-  decision.cause = Cause::kLimit;
-  decision.coordinate = 1;
-  decision.margin = -3.5;
-  decision.threshold = -3;
+  Decision decision{
+      .outcome = Outcome::kSafety, .cause = Cause::kLimit, .coordinate = 1, .margin = -3.5, .threshold = -3};
   lessons.Learn(decision);
   decision.margin = 4.25;
   decision.threshold = 4;
@@ -83,8 +77,7 @@ TEST(Lessons, AnExceededLimitAddsTheExcessOfTheTubeToItsMargin) {
     decision.coordinate = coordinate;
     lessons.Learn(decision);
   }
-  EXPECT_EQ(lessons.limit_margin(), (std::vector<double>{0, 0.75}));
-  EXPECT_EQ(lessons.clearance(), PlannerOptions{}.clearance);
+  EXPECT_FIELDS(lessons, (limit_margin(), (std::vector<double>{0, 0.75})), (clearance(), PlannerOptions{}.clearance));
   decision.cause = Cause::kObstacle;
   lessons.Learn(decision);
   EXPECT_GT(lessons.clearance(), PlannerOptions{}.clearance);
@@ -108,8 +101,7 @@ TEST(Lessons, AnAdviceSetsTheClearancesThatItNames) {
   advice_t advice = Advised(advice_change_t::OBSTACLE, 3, 0.25);
   advice.change[0].step = 20;
   EXPECT_TRUE(lessons.Heed(advice));
-  EXPECT_EQ(lessons.obstacle_clearance().size(), 4u);
-  EXPECT_EQ(lessons.obstacle_clearance()[2].clearance, 0);
+  EXPECT_FIELDS(lessons, (obstacle_clearance().size(), 4u), (obstacle_clearance()[2].clearance, 0));
   EXPECT_EQ(to_the_last(), std::pair(0.75, 20)) << "it does not say where the plan was";
   advice.change[0].clearance = 1.5;
   advice.change[0].step = 30;

@@ -12,7 +12,7 @@ namespace forereach::disturbed_run_test {
 // X0 of a candidate leaves room for the two steps until it starts.
 Config Task(const std::string& disturbance, int seed, bool grows = false) {
   Config config = Bicycle();
-  Problem problem = *config.problem;
+  Problem& problem = Own(config.problem);
   problem.declaration.disturbance = Vec({0.002, 0.002, 0.0005, 0.004, 0, 0});
   if (grows) {
     problem.declaration.disturbance.setZero();
@@ -29,7 +29,6 @@ Config Task(const std::string& disturbance, int seed, bool grows = false) {
   const auto target = MakeTarget(config);
   Disturbance of_data(problem.declaration, config.robot);
   problem.transitions = MakeTransitions(*target, problem, 1, 400, {}, {}, &of_data);
-  config.problem = std::make_shared<const Problem>(std::move(problem));
   config.grounds = GroundsOf(DigestOf(std::string_view("disturbed run")), *config.problem, config.obstacles);
   return config;
 }
@@ -60,7 +59,7 @@ Ending Drive(const Config& config) {
   return run;
 }
 
-class DisturbedRun : public testing::TestWithParam<std::tuple<const char*, int, bool>> {};
+class DisturbedRun : public testing::TestWithParam<std::tuple<std::string, int, bool>> {};
 
 TEST_P(DisturbedRun, StaysInItsSlicesAndClear) {
   const auto [disturbance, seed, grows] = GetParam();
@@ -68,8 +67,7 @@ TEST_P(DisturbedRun, StaysInItsSlicesAndClear) {
   SCOPED_TRACE(run.robot.dump() + run.planner.dump());
   EXPECT_EQ(run.robot["contacts"], 0);
   EXPECT_GT(run.robot["steps_executed"], 60);
-  EXPECT_EQ(run.robot["steps_inside_slice"], run.robot["steps_executed"]);
-  EXPECT_EQ(run.robot["goal_reached"], true);
+  EXPECT_FIELDS(run, (robot["steps_inside_slice"], run.robot["steps_executed"]), (robot["goal_reached"], true));
   EXPECT_EQ(run.faults, 0) << "learned transitions and measured states agree with the declaration";
 }
 
@@ -80,19 +78,18 @@ INSTANTIATE_TEST_SUITE_P(Kinds, DisturbedRun,
 // The robot of the task without disturbances, whose sensors err.
 Config MeasuredTask(const std::string& sensor_error, int seed) {
   Config config = Task("none", seed);
-  Problem problem = *config.problem;
+  Problem& problem = Own(config.problem);
   problem.declaration.disturbance.setZero();
   problem.declaration.state_error = Vec({0.02, 0.02, 0.004, 0.02, 0, 0.01});
   problem.declaration.given_are_exact = true;
   config.robot.sensor_error = sensor_error;
   config.planner.initial_half_width = {0.05, 0.06, 0.012, 0.045, 0.01, 0.022};
   config.gate.learns = false;  // its transitions are measured, too
-  config.problem = std::make_shared<const Problem>(std::move(problem));
   config.grounds = GroundsOf(DigestOf(std::string_view("measured run")), *config.problem, config.obstacles);
   return config;
 }
 
-class MeasuredRun : public testing::TestWithParam<std::pair<const char*, int>> {};
+class MeasuredRun : public testing::TestWithParam<std::pair<std::string, int>> {};
 
 TEST_P(MeasuredRun, LeavesNoSliceAndStaysClear) {
   const auto [sensor_error, seed] = GetParam();
@@ -102,8 +99,7 @@ TEST_P(MeasuredRun, LeavesNoSliceAndStaysClear) {
   EXPECT_GT(run.robot["steps_executed"], 60);
   const int inside = run.robot["steps_inside_slice"], consistent = run.robot["steps_consistent"];
   EXPECT_EQ(inside + consistent, run.robot["steps_executed"]);
-  EXPECT_EQ(run.robot["goal_reached"], true);
-  EXPECT_EQ(run.faults, 0);
+  EXPECT_FIELDS(run, (robot["goal_reached"], true), (faults, 0));
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, MeasuredRun,
@@ -113,11 +109,10 @@ INSTANTIATE_TEST_SUITE_P(Kinds, MeasuredRun,
 // A car that stands before a post and cannot turn away from it.
 Config DeadEnd() {
   Config config = Bicycle();
-  Problem problem = *config.problem;
+  Problem& problem = Own(config.problem);
   Eigen::VectorXd lower = problem.domain.state.lower();
   lower[3] = -2;
   problem.domain.state = Box(lower, problem.domain.state.upper());
-  config.problem = std::make_shared<const Problem>(std::move(problem));
   config.obstacles = {Obstacle::Circle(Vec({3, 0.5}), 1.5)};
   config.planner.goal = {30, 0};
   config.gate.obstacles = ObstaclesSource::kTask;
@@ -132,8 +127,7 @@ TEST(DeadEnd, ACarThatMayBackOffLeavesItAndReachesItsGoal) {
   config.laws.back_off = {{"(min(max((-1.2 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
   const Ending run = Drive(config);
   SCOPED_TRACE(run.robot.dump() + run.planner.dump());
-  EXPECT_EQ(run.robot["goal_reached"], true);
-  EXPECT_EQ(run.robot["contacts"], 0);
+  EXPECT_FIELDS(run, (robot["goal_reached"], true), (robot["contacts"], 0));
   EXPECT_GE(run.planner["back_off_rounds"], 1);
   EXPECT_EQ(run.faults, 0);
 }
@@ -143,9 +137,7 @@ TEST(DeadEnd, ACarThatMayNotStaysInIt) {
   config.robot.time_limit_s = 4;
   const Ending run = Drive(config);
   SCOPED_TRACE(run.robot.dump() + run.planner.dump());
-  EXPECT_EQ(run.robot["goal_reached"], false);
-  EXPECT_EQ(run.robot["contacts"], 0);
-  EXPECT_EQ(run.planner["back_off_rounds"], 0);
+  EXPECT_FIELDS(run, (robot["goal_reached"], false), (robot["contacts"], 0), (planner["back_off_rounds"], 0));
   EXPECT_GT(run.planner["rounds_without_certificate"], PlannerNode::kLostRounds);
 }
 

@@ -13,14 +13,16 @@ std::span<const double> Span(const Eigen::VectorXd& x) { return {x.data(), stati
 
 // A unicycle whose model has a definition that uses an input.
 Config Unicycle() {
-  ModelText text;
-  text.name = "unicycle";
-  text.states = {{"x", "m"}, {"y", "m"}, {"theta", "rad"}, {"v", "m/s"}, {"omega", "rad/s"}};
-  text.inputs = {{"a", "m/s^2"}, {"alpha", "rad/s^2"}};
-  text.parameters = {{"dt", 0.1, 0.1}, {"gain", 0.5, 1.5}};
-  text.definitions = {{"change", {"dt*a"}}, {"twice", {"2*v"}}};
-  text.equations = {
-      {"x + dt*v*cos(theta)"}, {"y + dt*v*sin(theta)"}, {"theta + dt*omega"}, {"v + change"}, {"omega + dt*alpha"}};
+  ModelText text{.name = "unicycle",
+                 .states = {{"x", "m"}, {"y", "m"}, {"theta", "rad"}, {"v", "m/s"}, {"omega", "rad/s"}},
+                 .inputs = {{"a", "m/s^2"}, {"alpha", "rad/s^2"}},
+                 .parameters = {{"dt", 0.1, 0.1}, {"gain", 0.5, 1.5}},
+                 .definitions = {{"change", {"dt*a"}}, {"twice", {"2*v"}}},
+                 .equations = {{"x + dt*v*cos(theta)"},
+                               {"y + dt*v*sin(theta)"},
+                               {"theta + dt*omega"},
+                               {"v + change"},
+                               {"omega + dt*alpha"}}};
   Config config;
   config.path = "unicycle";
   config.problem = std::make_shared<const Problem>(WorldOf(MakeTextModel(text),

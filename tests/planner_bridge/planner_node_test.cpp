@@ -3,10 +3,9 @@
 #include "tests/test.h"
 
 #include "bus/log.h"
-#include "certifier/gate/obstacle_message.h"
 #include "forereach/numerics/directed.h"
-#include "forereach/withdrawal_t.hpp"
 #include "task/canonical.h"
+#include "tests/messages.h"
 #include "tests/planner_bridge/tasks.h"
 
 namespace forereach::planner_node_test {
@@ -14,19 +13,14 @@ namespace forereach::planner_node_test {
 constexpr std::int64_t kNow = 1'700'000'000'000'000, kPeriod = 40'000;
 
 /** A planner node with the test as its robot and certifier. */
-class PlannerNodeTest : public testing::Test {
- protected:
+struct PlannerNodeTest : testing::Test {
   void SetUp() override { Start(Bicycle()); }
 
   void Start(const Config& config) {
     config_ = config;
     bus_ = OpenBus("memq://", [this] { return now_; });
     node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
-    bus_->Subscribe(config_.bus.candidate, [this](const Received& received) {
-      candidate_plan_t candidate;
-      ASSERT_EQ(Decode(received.bytes, candidate), DecodeStatus::kOk);
-      candidates_.push_back(candidate);
-    });
+    Hear(*bus_, config_.bus.candidate, candidates_);
     Run(1);
   }
 
@@ -44,19 +38,23 @@ class PlannerNodeTest : public testing::Test {
     }
   }
 
-  robot_state_t Standing() {
-    robot_state_t state{.utime = now_};
-    state.executing_plan_id = state.executing_step = -1;
-    state.mode = robot_state_t::STANDING;
+  void StartOnTheBus(double timeout_ms = 1000) {
+    Config config = Bicycle();
+    config.gate.obstacles = ObstaclesSource::kBus;
+    config.gate.obstacles_timeout_ms = timeout_ms;
+    Start(config);
+  }
+
+  robot_state_t Standing(double x = 0, double y = 0, std::int64_t sequence = 0) {
+    robot_state_t state = StateOf(now_, sequence);
     state.num_states = 6;
+    state.state[0] = x, state.state[1] = y;
     return state;
   }
 
   robot_state_t Executing(const candidate_plan_t& plan, int step) {
-    robot_state_t state = Standing();
-    state.mode = robot_state_t::EXECUTING;
-    state.executing_plan_id = plan.plan_id;
-    state.executing_step = static_cast<std::int16_t>(step);
+    robot_state_t state = StateOf(now_, 0, plan.plan_id, step);
+    state.num_states = 6;
     std::copy_n(plan.initial_center, 6, state.state);
     std::array<double, 8> z;
     for (int t = 0; t < step; ++t) {
@@ -74,14 +72,15 @@ class PlannerNodeTest : public testing::Test {
     return decision;
   }
 
-  void Say(const robot_state_t& state) {
-    ASSERT_TRUE(bus_->Publish(config_.bus.robot_state, state));
+  template <class Message>
+  void Publish(const std::string& channel, const Message& message) {
+    ASSERT_TRUE(bus_->Publish(channel, message));
     Deliver();
   }
-  void Say(const decision_t& decision) {
-    ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
-    Deliver();
-  }
+  void Say(const robot_state_t& state) { Publish(config_.bus.robot_state, state); }
+  void Say(const decision_t& decision) { Publish(config_.bus.decision, decision); }
+  void Say(const advice_t& advice) { Publish(config_.bus.advice, advice); }
+  void Say(const obstacles_t& obstacles) { Publish(config_.bus.obstacles, obstacles); }
   // And lets it plan.
   template <class Message>
   void Tell(const Message& message) {
@@ -90,6 +89,16 @@ class PlannerNodeTest : public testing::Test {
   }
   void Certify() { Say(Decision(candidates_.back(), decision_t::CERTIFIED, decision_t::CAUSE_NONE)); }
   void AbstainS() { Say(Decision(candidates_.back(), decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE)); }
+
+  // The robot is at a step of a plan.
+  void ReachStep(const candidate_plan_t& plan, int step) {
+    now_ = plan.start_utime + step * kPeriod;
+    Tell(Executing(plan, step));
+  }
+  // At which the next plan has to be found.
+  [[nodiscard]] int DueStep(const candidate_plan_t& plan) const {
+    return plan.progress_steps - config_.planner.lead_steps;
+  }
 
   nlohmann::json Summary() const { return nlohmann::json::parse(node_->Summary()); }
 
@@ -130,18 +139,16 @@ TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
 
 // So that a guard, which asks for all of the measured state +- its error inside X0, lets it start.
 TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
-  Problem problem = *config_.problem;
+  Problem& problem = Own(config_.problem);
   problem.declaration.state_error = Vec({0.03, 0.1, 0, 0, 0, 0});
   problem.declaration.given_are_exact = true;
-  config_.problem = std::make_shared<const Problem>(std::move(problem));
   Start(config_);
   robot_state_t state = Standing();
   Tell(state);
   ASSERT_EQ(candidates_.size(), 1u);
   const std::vector<double>& given = config_.planner.initial_half_width;
-  EXPECT_EQ(candidates_[0].initial_half_width[0], AddUp(given[0], 0.03));
-  EXPECT_EQ(candidates_[0].initial_half_width[1], AddUp(given[1], 0.1));
-  EXPECT_EQ(candidates_[0].initial_half_width[2], given[2]);
+  EXPECT_FIELDS(candidates_[0], (initial_half_width[0], AddUp(given[0], 0.03)),
+                (initial_half_width[1], AddUp(given[1], 0.1)), (initial_half_width[2], given[2]));
 
   Start(config_);
   state.num_state_errors = 6;
@@ -166,11 +173,8 @@ TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
   EXPECT_EQ(plan.sequence, 0);
   EXPECT_EQ(plan.plan_id, plan.utime);  // so it grows over restarts
   EXPECT_EQ(GetText(plan.source), PlannerNode::kSource);
-  EXPECT_EQ(plan.start_utime, state.utime + config_.planner.lead_steps * kPeriod);
-  EXPECT_EQ(plan.step_us, kPeriod);
-  EXPECT_EQ(plan.num_states, 6);
-  EXPECT_EQ(plan.num_inputs, 2);
-  EXPECT_EQ(plan.progress_steps, config_.planner.progress_steps);
+  EXPECT_FIELDS(plan, (start_utime, state.utime + config_.planner.lead_steps * kPeriod), (step_us, kPeriod),
+                (num_states, 6), (num_inputs, 2), (progress_steps, config_.planner.progress_steps));
   EXPECT_LE(plan.num_steps, plan.progress_steps + config_.planner.tail_steps);
   for (int k = 0; k < 6; ++k) {
     EXPECT_EQ(plan.initial_center[k], state.state[k]);
@@ -219,10 +223,7 @@ TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
     }
     Certify();
     now_ += 10 * kPeriod;
-    state = Standing();
-    state.sequence = 9;
-    state.state[0] = 0.5;
-    Tell(state);
+    Tell(Standing(0.5, 0, 9));
     ASSERT_EQ(candidates_.size(), 4u);
     first.push_back(controls(candidates_.back()));
   }
@@ -237,8 +238,7 @@ TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
   config_.planner.lead_steps = 20;  // time for all of them
   config_.planner.clearance_step = 0.5;
   Start(config_);
-  robot_state_t state = Standing();
-  state.state[0] = 8;
+  robot_state_t state = Standing(8);
   state.state[3] = 5;  // it comes to rest still
   Tell(state);
   ASSERT_EQ(candidates_.size(), 0u);
@@ -255,18 +255,14 @@ TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
   }
 }
 
-class AdvisedPlannerTest : public PlannerNodeTest {
- protected:
+struct AdvisedPlannerTest : PlannerNodeTest {
   void SetUp() override {
     config_ = Bicycle();
     config_.gate.advises = true;
     config_.planner.lead_steps = 20;
     config_.planner.clearance_step = 0;
     Start(config_);
-    robot_state_t state = Standing();
-    state.state[0] = 8;
-    state.state[1] = 3.5;
-    Tell(state);
+    Tell(Standing(8, 3.5));
     ASSERT_EQ(candidates_.size(), 1u);
   }
 
@@ -290,11 +286,6 @@ class AdvisedPlannerTest : public PlannerNodeTest {
     }
     return advice;
   }
-  void Say(const advice_t& advice) {
-    ASSERT_TRUE(bus_->Publish(config_.bus.advice, advice));
-    Deliver();
-  }
-  using PlannerNodeTest::Say;
 };
 
 TEST_F(AdvisedPlannerTest, GivesWayAsItIsTold) {
@@ -333,8 +324,7 @@ TEST_F(AdvisedPlannerTest, IgnoresAdviceThatIsNotOnItsCandidate) {
   advice_t empty = Advice();
   empty.num_changes = 0;
   Say(empty);
-  EXPECT_EQ(Summary()["messages_ignored"], ignored + 4);
-  EXPECT_EQ(Summary()["advised"], 0);
+  EXPECT_THAT(Summary(), Holds({{"messages_ignored", ignored + 4}, {"advised", 0}}));
   Say(Advice());
   Say(Advice());  // repeated
   EXPECT_EQ(Summary()["advised"], 1);
@@ -352,18 +342,13 @@ TEST_F(AdvisedPlannerTest, FalseAdviceCostsARoundAtMost) {
   }
   EXPECT_GE(Summary()["rounds_without_certificate"], 1);
   const std::size_t before = candidates_.size();
-  robot_state_t state = Standing();
-  state.sequence = 7;
-  state.state[0] = 8;
-  state.state[1] = 3.5;
-  Tell(state);
+  Tell(Standing(8, 3.5, 7));
   ASSERT_EQ(candidates_.size(), before + 1) << "the next round begins anew";
   Certify();
   EXPECT_EQ(Summary()["certified"], 1);
 }
 
-class RepairingPlannerTest : public AdvisedPlannerTest {
- protected:
+struct RepairingPlannerTest : AdvisedPlannerTest {
   void SetUp() override {
     config_ = Bicycle();
     config_.planner.repairs = true;
@@ -410,8 +395,7 @@ TEST_F(RepairingPlannerTest, SendsTheNearestProposalAfterItsOwnCandidates) {
   EXPECT_TRUE(std::ranges::equal(sent.initial_center, own.initial_center)) << "only controls are taken from a proposal";
   EXPECT_EQ(Summary()["repairs"], 1);
   Certify();
-  EXPECT_EQ(Summary()["certified"], 1);
-  EXPECT_EQ(Summary()["rounds_without_certificate"], 0);
+  EXPECT_THAT(Summary(), Holds({{"certified", 1}, {"rounds_without_certificate", 0}}));
 }
 
 TEST_F(RepairingPlannerTest, EndsItsRoundWhereTheProposalIsRefusedToo) {
@@ -554,8 +538,7 @@ TEST_F(PlannerNodeTest, SaysOnceWhereToLookWhenNoRoundHasACertificate) {
   EXPECT_THAT(lose(30), Not(HasSubstr("without a certificate"))) << "it has been said";
 }
 
-class StuckPlannerTest : public PlannerNodeTest {
- protected:
+struct StuckPlannerTest : PlannerNodeTest {
   void SetUp() override {
     config_ = Bicycle();
     config_.planner.candidates = 4;
@@ -573,10 +556,7 @@ class StuckPlannerTest : public PlannerNodeTest {
   // Stands at x for so long, and has no candidate certified.
   void StandAt(double x, std::int64_t us) {
     for (const std::int64_t end = now_ + us; now_ < end; now_ += kPeriod - 12'000) {
-      robot_state_t state = Standing();
-      state.sequence = sequence_++;
-      state.state[0] = x;
-      Tell(state);
+      Tell(Standing(x, 0, sequence_++));
       for (int i = 0; i < 3; ++i) {
         if (!candidates_.empty() && candidates_.back().utime + 3000 >= now_) AbstainS();
         Run(3);
@@ -632,14 +612,11 @@ TEST_F(StuckPlannerTest, WhereItHasRoomToDriveOnItWaitsLongerForWhatMoves) {
 
 TEST_F(StuckPlannerTest, ARobotThatHasBegunToDriveDoesNotBackOff) {
   StandAt(0, PlannerNode::kWaitsUs - 200'000);
-  robot_state_t state = Standing();
-  state.sequence = sequence_++;
-  Tell(state);
+  Tell(Standing(0, 0, sequence_++));
   Certify();
   const candidate_plan_t plan = candidates_.back();
-  const int step = plan.progress_steps - config_.planner.lead_steps;
-  now_ = plan.start_utime + step * kPeriod;
-  state = Executing(plan, step);
+  now_ = plan.start_utime + DueStep(plan) * kPeriod;
+  robot_state_t state = Executing(plan, DueStep(plan));
   state.sequence = sequence_++;
   const std::size_t before = candidates_.size();
   Tell(state);
@@ -684,14 +661,11 @@ TEST_F(PlannerNodeTest, PlansTheHandoverInTimeForTheTail) {
   Tell(Standing());
   Certify();
   const candidate_plan_t first = candidates_[0];
-  for (int step = 0; step < first.progress_steps - config_.planner.lead_steps; ++step) {
-    now_ = first.start_utime + step * kPeriod;
-    Tell(Executing(first, step));
+  for (int step = 0; step < DueStep(first); ++step) {
+    ReachStep(first, step);
     ASSERT_EQ(candidates_.size(), 1u) << "step " << step;
   }
-  const int due = first.progress_steps - config_.planner.lead_steps;
-  now_ = first.start_utime + due * kPeriod;
-  Tell(Executing(first, due));
+  ReachStep(first, DueStep(first));
   ASSERT_EQ(candidates_.size(), 2u);
   EXPECT_EQ(candidates_[1].start_utime, first.start_utime + first.progress_steps * kPeriod);
   const robot_state_t expected = Executing(first, first.progress_steps);  // the residual of this task is zero
@@ -702,12 +676,9 @@ TEST_F(PlannerNodeTest, PredictsThatARobotStandsAfterItsTail) {
   Tell(Standing());
   Certify();
   const candidate_plan_t first = candidates_[0];
-  const int last = first.num_steps - 1;
-  now_ = first.start_utime + last * kPeriod;
-  Tell(Executing(first, last));
+  ReachStep(first, first.num_steps - 1);
   ASSERT_EQ(candidates_.size(), 2u);
-  EXPECT_EQ(candidates_[1].initial_center[3], 0);
-  EXPECT_EQ(candidates_[1].initial_center[4], 0);
+  EXPECT_FIELDS(candidates_[1], (initial_center[3], 0), (initial_center[4], 0));
   EXPECT_NEAR(candidates_[1].initial_center[0], Executing(first, first.num_steps).state[0], 1e-9);
 }
 
@@ -729,8 +700,7 @@ TEST_F(PlannerNodeTest, GivesUpWaitingForADecisionAtTheStart) {
 }
 
 TEST_F(PlannerNodeTest, LeavesAPlanThatItDidNotSendAlone) {
-  candidate_plan_t foreign{.plan_id = 5, .num_steps = 20};
-  Say(Executing(foreign, 10));
+  Say(Executing(candidate_plan_t{.plan_id = 5, .num_steps = 20}, 10));
   Run(10);
   EXPECT_TRUE(candidates_.empty());
 }
@@ -743,8 +713,7 @@ TEST_F(PlannerNodeTest, IgnoresDecisionsThatConcernSomebodyElse) {
   decision = Decision(candidates_[0], decision_t::CERTIFIED, decision_t::CAUSE_NONE);
   ++decision.plan_id;
   Say(decision);
-  EXPECT_EQ(Summary()["certified"], 0);
-  EXPECT_EQ(Summary()["messages_ignored"], 2);
+  EXPECT_THAT(Summary(), Holds({{"certified", 0}, {"messages_ignored", 2}}));
   AbstainS();
   AbstainS();  // twice: the second concerns nothing that is awaited
   EXPECT_EQ(Summary()["abstained"]["obstacle"], 1);
@@ -813,16 +782,9 @@ TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
 }
 
 TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
-  Config config = Bicycle();
-  config.gate.obstacles = ObstaclesSource::kBus;
-  Start(config);
-  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)}, now_);
-  const auto see = [&] {
-    message.utime = now_;
-    ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
-    ++message.sequence;
-    Deliver();
-  };
+  StartOnTheBus();
+  std::int64_t sequence = 0;
+  const auto see = [&] { Say(Sighted({Obstacle::Circle(Vec({12, 0}), 2)}, now_, sequence++)); };
   const auto round = [&] { Tell(Standing()); };
   round();
   EXPECT_TRUE(candidates_.empty()) << "none has been heard";
@@ -836,7 +798,7 @@ TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
   see();
   round();
   EXPECT_EQ(candidates_.size(), 2u);
-  ++message.sequence;  // one is lost
+  ++sequence;  // one is lost
   see();
   Run(200);
   round();
@@ -850,8 +812,7 @@ TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
   SetText(decision.source, PlannerNode::kSource);
   decision.outcome = decision_t::ABSTAIN_OBSTACLES;
   decision.cause = decision_t::CAUSE_NO_OBSTACLES;
-  ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
-  Deliver();
+  Say(decision);
   Run(20);
   EXPECT_EQ(candidates_.size(), 1u) << "no other candidate before the next state";
   EXPECT_EQ(Summary()["abstained"], nlohmann::json({{"no_obstacles", 1}}));
@@ -859,35 +820,26 @@ TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
 
 // As the gate does: else the planner would go on around the obstacles of before, and the gate refuse what it finds.
 TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
-  Config config = Bicycle();
-  config.gate.obstacles = ObstaclesSource::kBus;
-  Start(config);
-  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)}, now_);
-  message.sequence = 7;
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // a repetition: ignored
+  StartOnTheBus();
+  obstacles_t message = Sighted({Obstacle::Circle(Vec({12, 0}), 2)}, now_, 7);
+  Say(message);
+  Say(message);  // a repetition: ignored
   message.sequence = 0;
   message.utime = now_ + 50'001;  // gate.max_ahead_ms is 50: ignored
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  Say(message);
   message.utime = now_ + 1;
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
-  Deliver();
+  Say(message);
   EXPECT_EQ(Summary()["messages_ignored"], 2);
 }
 
 TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
-  Config config = Bicycle();
-  config.gate.obstacles = ObstaclesSource::kBus;
-  config.gate.obstacles_timeout_ms = 10'000;
-  Start(config);
+  StartOnTheBus(10'000);
   config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
-  obstacles_t message = ToMessage(config_.obstacles, now_);
-  message.sequence = 1;
+  obstacles_t message = Sighted(config_.obstacles, now_, 1);
   message.num_obstacles = 65;
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // cannot be: ignored
+  Say(message);  // cannot be: ignored
   message.num_obstacles = 1;
-  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
-  Deliver();
+  Say(message);
   EXPECT_EQ(Summary()["messages_ignored"], 1);
   robot_state_t state = Standing();
   for (int plan = 0; plan < 8; ++plan) {
@@ -895,8 +847,8 @@ TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
     ASSERT_EQ(candidates_.size(), static_cast<std::size_t>(plan + 1));
     EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
     Certify();
-    now_ = candidates_.back().start_utime + (candidates_.back().progress_steps - config_.planner.lead_steps) * kPeriod;
-    state = Executing(candidates_.back(), candidates_.back().progress_steps - config_.planner.lead_steps);
+    now_ = candidates_.back().start_utime + DueStep(candidates_.back()) * kPeriod;
+    state = Executing(candidates_.back(), DueStep(candidates_.back()));
   }
 }
 
@@ -915,9 +867,7 @@ TEST_F(PlannerNodeTest, SendsNothingOnceTheRobotHasFinished) {
 }
 
 TEST_F(PlannerNodeTest, SendsNothingAtTheGoal) {
-  robot_state_t state = Standing();
-  state.state[0] = 64;
-  Say(state);
+  Say(Standing(64));
   Run(20);
   EXPECT_TRUE(candidates_.empty());
   EXPECT_FALSE(node_->done());
@@ -942,25 +892,19 @@ TEST_F(PlannerNodeTest, TheSameMessagesGetTheSameCandidates) {
   EXPECT_EQ(first, run());
 }
 
-class WithdrawnPlanTest : public PlannerNodeTest {
- protected:
+struct WithdrawnPlanTest : PlannerNodeTest {
   // The robot executes the first candidate, at this step.
   void Execute(int step) {
     Tell(Standing());
     Certify();
-    now_ = candidates_[0].start_utime + step * kPeriod;
-    Tell(Executing(candidates_[0], step));
+    ReachStep(candidates_[0], step);
     ASSERT_EQ(candidates_.size(), 1u) << "no other is due";
   }
   void Withdraw(int valid_steps, std::size_t which = 0) {
-    withdrawal_t withdrawal{};
-    withdrawal.utime = now_;
-    withdrawal.sequence = sequence_++;
-    withdrawal.plan_id = candidates_[which].plan_id;
+    withdrawal_t withdrawal{.utime = now_, .sequence = sequence_++, .plan_id = candidates_[which].plan_id};
     withdrawal.valid_steps = static_cast<std::int16_t>(valid_steps);
-    std::copy(std::begin(candidates_[which].source), std::end(candidates_[which].source), withdrawal.source);
-    ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
-    Deliver();
+    std::ranges::copy(candidates_[which].source, withdrawal.source);
+    Publish(config_.bus.withdrawn, withdrawal);
   }
 
   std::int64_t sequence_ = 0;
@@ -972,15 +916,13 @@ TEST_F(WithdrawnPlanTest, AStopIsProposedAtOnceFromTheNextHandover) {
   Run(1);
   ASSERT_EQ(candidates_.size(), 2u);
   const candidate_plan_t& stop = candidates_[1];
-  EXPECT_EQ(stop.start_utime, candidates_[0].start_utime + 4 * kPeriod);
-  EXPECT_EQ(stop.progress_steps, 0);
+  EXPECT_FIELDS(stop, (start_utime, candidates_[0].start_utime + 4 * kPeriod), (progress_steps, 0));
   const robot_state_t begin = Executing(candidates_[0], 4), end = Executing(stop, stop.num_steps);
   for (int k = 0; k < 6; ++k) EXPECT_NEAR(stop.initial_center[k], begin.state[k], 1e-12);
   EXPECT_NEAR(end.state[3], 0, 1e-9);
   EXPECT_NEAR(end.state[4], 0, 1e-9);
   for (int t = 0; t < stop.num_steps; ++t) EXPECT_EQ(stop.control[t][1], 0) << "the steering is held";
-  EXPECT_EQ(Summary()["withdrawn"], 1);
-  EXPECT_EQ(Summary()["stopping_rounds"], 1);
+  EXPECT_THAT(Summary(), Holds({{"withdrawn", 1}, {"stopping_rounds", 1}}));
 }
 
 TEST_F(WithdrawnPlanTest, OtherStopsAreProposedAfterAnAbstention) {
@@ -1034,9 +976,8 @@ TEST_F(WithdrawnPlanTest, ARepeatedWithdrawalStartsNoNewRound) {
 
 TEST_F(WithdrawnPlanTest, ARoundUnderWayGivesWayToTheStop) {
   Execute(3);
-  const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
-  now_ = candidates_[0].start_utime + due * kPeriod;
-  Tell(Executing(candidates_[0], due));
+  const int due = DueStep(candidates_[0]);
+  ReachStep(candidates_[0], due);
   ASSERT_EQ(candidates_.size(), 2u);
   Withdraw(due + 2);
   Run(1);
@@ -1046,9 +987,8 @@ TEST_F(WithdrawnPlanTest, ARoundUnderWayGivesWayToTheStop) {
 
 TEST_F(WithdrawnPlanTest, NoStopIsProposedWhereACertifiedPlanTakesOverInTime) {
   Execute(3);
-  const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
-  now_ = candidates_[0].start_utime + due * kPeriod;
-  Tell(Executing(candidates_[0], due));
+  const int due = DueStep(candidates_[0]);
+  ReachStep(candidates_[0], due);
   Certify();
   Withdraw(due + config_.planner.lead_steps);
   Run(3);
@@ -1073,9 +1013,8 @@ TEST_F(WithdrawnPlanTest, WithdrawalsOfOthersAreIgnored) {
   Execute(3);
   withdrawal_t withdrawal{.plan_id = candidates_[0].plan_id};
   SetText(withdrawal.source, "another");
-  ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
-  ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, Bytes(std::vector<std::uint8_t>{1, 2, 3})));
-  Deliver();
+  Publish(config_.bus.withdrawn, withdrawal);
+  Publish(config_.bus.withdrawn, Bytes(std::vector<std::uint8_t>{1, 2, 3}));
   Run(3);
   EXPECT_EQ(candidates_.size(), 1u);
   EXPECT_EQ(Summary()["messages_ignored"], 2);
@@ -1097,12 +1036,8 @@ TEST_F(PlannerNodeTest, StopPrintsTheCounts) {
   Certify();
   node_->Stop();
   const auto summary = nlohmann::json::parse(out_.str());
-  EXPECT_EQ(summary["proposed"], 2);
-  EXPECT_EQ(summary["certified"], 1);
-  EXPECT_EQ(summary["abstained"], nlohmann::json({{"obstacle", 1}}));
-  EXPECT_EQ(summary["rejected"], nlohmann::json::object());
-  EXPECT_EQ(summary["rounds"], 1);
-  EXPECT_EQ(summary["rounds_without_certificate"], 0);
+  EXPECT_THAT(summary, Holds({{"proposed", 2}, {"certified", 1}, {"rounds", 1}, {"rounds_without_certificate", 0}}));
+  EXPECT_THAT(summary, Holds({{"abstained", {{"obstacle", 1}}}, {"rejected", nlohmann::json::object()}}));
 }
 
 TEST(PlannerNode, RefusesATaskThatDoesNotFit) {

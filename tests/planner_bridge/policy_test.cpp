@@ -6,7 +6,6 @@
 #include "tests/test.h"
 
 #include "planner_bridge/reference.h"
-#include "tests/paths.h"
 #include "tests/planner_bridge/tasks.h"
 
 namespace forereach::policy_test {
@@ -17,13 +16,11 @@ Json Read(const std::string& path) { return Json::parse(std::ifstream(path)); }
 
 // Two features, a hidden layer of one, two steps of one input.
 Policy Small() {
-  Policy policy;
-  policy.model = "small";
-  policy.num_inputs = 1;
-  policy.input = {Vec({1, 2}), Vec({2, 4})};
-  policy.output = {Vec({0.5, -0.5}), Vec({3, 7})};
-  policy.layers = {{Eigen::RowVector2d(0.3, -0.1), Vec({0.25})}, {Eigen::Vector2d(2, -1), Vec({0.1, 1.0 / 3})}};
-  return policy;
+  return {.model = "small",
+          .num_inputs = 1,
+          .input = {Vec({1, 2}), Vec({2, 4})},
+          .output = {Vec({0.5, -0.5}), Vec({3, 7})},
+          .layers = {{Eigen::RowVector2d(0.3, -0.1), Vec({0.25})}, {Eigen::Vector2d(2, -1), Vec({0.1, 1.0 / 3})}}};
 }
 
 TEST(Policy, ComputesTheDocumentedFormula) {
@@ -41,8 +38,7 @@ TEST(Policy, ComesBackFromItsFileToTheLastBit) {
   SavePolicy(path, Small());
   const Policy again = LoadPolicy(path);
   EXPECT_EQ(again.Act(Vec({0.1, 0.7})), Small().Act(Vec({0.1, 0.7})));
-  EXPECT_EQ(again.model, "small");
-  EXPECT_EQ(again.num_steps(), 2);
+  EXPECT_FIELDS(again, (model, "small"), (num_steps(), 2));
   EXPECT_THROW(SavePolicy("/nowhere/policy.json", Small()), PolicyError);
 }
 
@@ -98,9 +94,9 @@ TEST(Policy, AFieldOfAMillionListsInOneAnotherIsRefused) {
   const ScratchDirectory scratch;
   const std::string path = scratch / "policy.json";
   SavePolicy(path, Small());
-  const std::string text = forereach::Read(path), field = "\"forereach-policy\"",
-                    deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
-  std::ofstream(path) << std::string(text).replace(text.find(field), field.size(), deep);
+  const std::string deep = std::string(1'000'000, '[') + std::string(1'000'000, ']'),
+                    text = Replaced(forereach::Read(path), "\"forereach-policy\"", deep);
+  std::ofstream(path) << text;
   EXPECT_THROW(static_cast<void>(LoadPolicy(path)), PolicyError);
 }
 

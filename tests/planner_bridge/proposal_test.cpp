@@ -3,7 +3,6 @@
 #include "tests/test.h"
 
 #include "forereach/safety/clearance.h"
-#include "tests/paths.h"
 #include "tests/planner_bridge/tasks.h"
 
 namespace forereach::proposal_test {
@@ -11,11 +10,7 @@ namespace forereach::proposal_test {
 std::unique_ptr<Proposer> PlannerOf(const Config& config) { return MakeOmplProposer(config); }
 
 PlanRequest From(const Eigen::VectorXd& state, std::uint32_t seed, double clearance = 0.3) {
-  PlanRequest request;
-  request.state = state;
-  request.clearance = clearance;
-  request.seed = seed;
-  return request;
+  return {.state = state, .clearance = clearance, .seed = seed};
 }
 
 PlanRequest WithHints(PlanRequest request) {
@@ -44,54 +39,57 @@ void ExpectSound(const Config& config, const PlanRequest& request, const Proposa
     EXPECT_LE(std::abs(proposal.states(bound.coordinate, steps)), bound.tolerance);
 }
 
-TEST(Planner, BicycleProposalsAreAllowedEndAtStandstillAndComeNearer) {
-  const Config config = Bicycle();
+struct Drive {
+  const char* name;
+  Config (*task)();
+  Eigen::VectorXd state;
+  double reaches;  // at least, along the first coordinate
+  friend void PrintTo(const Drive& drive, std::ostream* out) { *out << drive.name; }
+};
+struct ProposalsOf : testing::TestWithParam<Drive> {};
+
+TEST_P(ProposalsOf, AreAllowedEndAtStandstillAndComeNearer) {
+  const Config config = GetParam().task();
   const auto planner = PlannerOf(config);
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), seed);
+    const PlanRequest request = From(GetParam().state, seed);
     const auto proposal = planner->Propose(request);
     ASSERT_TRUE(proposal);
     EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
     ExpectSound(config, request, *proposal);
-    EXPECT_GT(proposal->states(0, proposal->progress_steps), 3);
+    EXPECT_GT(proposal->states(0, proposal->progress_steps), GetParam().reaches);
   }
 }
 
+INSTANTIATE_TEST_SUITE_P(Each, ProposalsOf,
+                         testing::Values(Drive{"Bicycle", Bicycle, Vec({0, 0, 0, 7, 0, 0}), 3},
+                                         Drive{"PointMass", PointMass, Vec({0, 0, 1, 0}), 0.5}),
+                         [](const auto& drive) { return drive.param.name; });
+
+struct Planner : testing::Test {
+  const Config config_ = Bicycle();
+  const std::unique_ptr<Proposer> planner_ = PlannerOf(config_);
+};
+
 // Where little can be achieved, the search must not take the nearest miss for an answer.
-TEST(Planner, EveryProposalHasAllItsProgressSteps) {
-  const Config config = Bicycle();
-  const auto planner = PlannerOf(config);
+TEST_F(Planner, EveryProposalHasAllItsProgressSteps) {
   int found = 0;
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     for (const Eigen::VectorXd& state :
          {Vec({18, 1, 0, 2, 0, 0}), Vec({20, 1, 0, 0, 0, 0}), Vec({70, 0, 0.5, 4, 0, 0})}) {
       const PlanRequest request = From(state, seed);
-      const auto proposal = planner->Propose(request);
+      const auto proposal = planner_->Propose(request);
       if (!proposal) continue;
       ++found;
-      EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps) << state.transpose() << ", seed " << seed;
-      ExpectSound(config, request, *proposal);
+      EXPECT_EQ(proposal->progress_steps, config_.planner.progress_steps) << state.transpose() << ", seed " << seed;
+      ExpectSound(config_, request, *proposal);
     }
   }
   EXPECT_GT(found, 10);
 }
 
-TEST(Planner, PointMassProposalsAreAllowedEndAtStandstillAndComeNearer) {
-  const Config config = PointMass();
-  const auto planner = PlannerOf(config);
-  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const PlanRequest request = From(Vec({0, 0, 1, 0}), seed);
-    const auto proposal = planner->Propose(request);
-    ASSERT_TRUE(proposal);
-    EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
-    ExpectSound(config, request, *proposal);
-    EXPECT_GT(proposal->states(0, proposal->progress_steps), 0.5);
-  }
-}
-
-TEST(Planner, EveryAlgorithmFindsAProposal) {
+TEST_F(Planner, EveryAlgorithmFindsAProposal) {
   for (const char* name : {"kpiece", "est", "pdst", "rrt", "sst"}) {
     SCOPED_TRACE(name);
     Config config = Bicycle();
@@ -105,7 +103,7 @@ TEST(Planner, EveryAlgorithmFindsAProposal) {
   }
 }
 
-TEST(Planner, TheSameRequestGivesTheSameProposalWhateverWasAskedBefore) {
+TEST_F(Planner, TheSameRequestGivesTheSameProposalWhateverWasAskedBefore) {
   const Config config = Bicycle();
   const auto planner = PlannerOf(config), other = PlannerOf(config);
   const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 11);
@@ -123,42 +121,38 @@ bool AreEqual(const Proposal& one, const Proposal& other) {
   return one.controls.cols() == other.controls.cols() && one.controls == other.controls;
 }
 
-TEST(Planner, DoesWhatTheHintsDoWhereThereIsRoom) {
-  const Config config = Bicycle();
-  const auto planner = PlannerOf(config);
+TEST_F(Planner, DoesWhatTheHintsDoWhereThereIsRoom) {
   const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 1);
-  const auto proposal = planner->Propose(WithHints(request));
+  const auto proposal = planner_->Propose(WithHints(request));
   ASSERT_TRUE(proposal);
-  EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
+  EXPECT_EQ(proposal->progress_steps, config_.planner.progress_steps);
   PlanRequest wider = request;
-  wider.clearance += kRoomOfHints * config.planner.clearance_step;
-  ExpectSound(config, wider, *proposal);
+  wider.clearance += kRoomOfHints * config_.planner.clearance_step;
+  ExpectSound(config_, wider, *proposal);
   EXPECT_GT(proposal->states(0, proposal->progress_steps), 4.5) << "straight on";
   EXPECT_LT(proposal->states.row(1).head(proposal->progress_steps).cwiseAbs().maxCoeff(), 0.5);
-  const auto another = planner->Propose(WithHints(From(request.state, 2))), searched = planner->Propose(request);
+  const auto another = planner_->Propose(WithHints(From(request.state, 2))), searched = planner_->Propose(request);
   ASSERT_TRUE(another && searched);
   EXPECT_TRUE(AreEqual(*another, *proposal)) << "no seed has a part in it";
   EXPECT_FALSE(AreEqual(*searched, *proposal));
 }
 
 // The robot drives by the first obstacle at a distance of 3.2 m.
-TEST(Planner, SearchesWhereTheHintsHaveLessRoom) {
-  const Config config = Bicycle();
-  const auto planner = PlannerOf(config);
+TEST_F(Planner, SearchesWhereTheHintsHaveLessRoom) {
   const Eigen::VectorXd beside = Vec({25, -5.2, 0, 2, 0, 0});
-  ASSERT_NEAR(ApproximateDistance(config.obstacles[0], beside.head(2)), 3.2, 1e-9);
+  ASSERT_NEAR(ApproximateDistance(config_.obstacles[0], beside.head(2)), 3.2, 1e-9);
   const auto searches = [&](double clearance) {
     const PlanRequest request = From(beside, 1, clearance);
-    const auto searched = planner->Propose(request), proposed = planner->Propose(WithHints(request));
+    const auto searched = planner_->Propose(request), proposed = planner_->Propose(WithHints(request));
     EXPECT_TRUE(searched && proposed) << clearance;
     return searched && proposed && AreEqual(*searched, *proposed);
   };
-  const double least = 3.2 - kRoomOfHints * config.planner.clearance_step;
+  const double least = 3.2 - kRoomOfHints * config_.planner.clearance_step;
   EXPECT_FALSE(searches(least - 0.2));
   EXPECT_TRUE(searches(least + 0.01));
 }
 
-TEST(Planner, SearchesWhereHintsAreOfNoUse) {
+TEST_F(Planner, SearchesWhereHintsAreOfNoUse) {
   Config config = PointMass();
   config.obstacles.clear();
   const std::vector<ExpressionText> hints = config.laws.hints;
@@ -181,7 +175,7 @@ TEST(Planner, SearchesWhereHintsAreOfNoUse) {
   EXPECT_FALSE(AreEqual(*searched, *proposed)) << "otherwise the above shows nothing";
 }
 
-TEST(Planner, ProposalsByHintsKeepTheMargins) {
+TEST_F(Planner, ProposalsByHintsKeepTheMargins) {
   const Config config = Bicycle();
   PlanRequest request = WithHints(From(Vec({0, 3, 0, 7, 0, 0}), 1));
   const auto planner = PlannerOf(config);
@@ -194,36 +188,30 @@ TEST(Planner, ProposalsByHintsKeepTheMargins) {
   EXPECT_LT(proposal->states.row(5).cwiseAbs().maxCoeff(), free->states.row(5).cwiseAbs().maxCoeff());
 }
 
-TEST(Planner, KeepsTheMarginFromTheDomain) {
-  const Config config = Bicycle();
-  const auto planner = PlannerOf(config);
+TEST_F(Planner, KeepsTheMarginFromTheDomain) {
   PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 4);
   request.domain_margin = Vec({0, 10, 0, 0, 0.2, 0.2});
-  const auto proposal = planner->Propose(request);
+  const auto proposal = planner_->Propose(request);
   ASSERT_TRUE(proposal);
   EXPECT_LE(proposal->states.row(1).cwiseAbs().maxCoeff(), 5);
   EXPECT_LE(proposal->states.row(5).cwiseAbs().maxCoeff(), 0.28 + 1e-12);
 }
 
-TEST(Planner, AnObstacleNearerThanTheClearanceAtTheStartDoesNotStopIt) {
-  const Config config = Bicycle();
-  const auto planner = PlannerOf(config);
+TEST_F(Planner, AnObstacleNearerThanTheClearanceAtTheStartDoesNotStopIt) {
   const Eigen::VectorXd beside = Vec({25, -2.5, 0, 2, 0, 0});
-  ASSERT_LT(ApproximateDistance(config.obstacles[0], Vec({25, -2.5})), 1);
-  EXPECT_TRUE(planner->Propose(From(beside, 5, 1)));
+  ASSERT_LT(ApproximateDistance(config_.obstacles[0], Vec({25, -2.5})), 1);
+  EXPECT_TRUE(planner_->Propose(From(beside, 5, 1)));
 }
 
-TEST(Planner, ProposesNothingFromAnObstacleFromOutsideTheDomainOrWithoutRoomToStop) {
-  const Config config = Bicycle();
-  const auto planner = PlannerOf(config);
-  EXPECT_FALSE(planner->Propose(From(Vec({25, 1, 0, 0, 0, 0}), 1)));   // inside an obstacle
-  EXPECT_FALSE(planner->Propose(From(Vec({0, 0, 0, 20, 0, 0}), 1)));   // outside the domain
-  EXPECT_FALSE(planner->Propose(From(Vec({18, 1, 0, 10, 0, 0}), 1)));  // too fast to miss the obstacle ahead
-  EXPECT_FALSE(planner->Propose(From(Vec({0, 0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0}), 1)));
-  EXPECT_FALSE(planner->Propose(From(Vec({0, 0}), 1)));
+TEST_F(Planner, ProposesNothingFromAnObstacleFromOutsideTheDomainOrWithoutRoomToStop) {
+  EXPECT_FALSE(planner_->Propose(From(Vec({25, 1, 0, 0, 0, 0}), 1)));   // inside an obstacle
+  EXPECT_FALSE(planner_->Propose(From(Vec({0, 0, 0, 20, 0, 0}), 1)));   // outside the domain
+  EXPECT_FALSE(planner_->Propose(From(Vec({18, 1, 0, 10, 0, 0}), 1)));  // too fast to miss the obstacle ahead
+  EXPECT_FALSE(planner_->Propose(From(Vec({0, 0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0}), 1)));
+  EXPECT_FALSE(planner_->Propose(From(Vec({0, 0}), 1)));
 }
 
-TEST(Planner, ObstaclesCanBeReplaced) {
+TEST_F(Planner, ObstaclesCanBeReplaced) {
   Config config = Bicycle();
   const auto planner = PlannerOf(config);
   const PlanRequest blocked = From(Vec({18, 1, 0, 10, 0, 0}), 1);
@@ -238,10 +226,9 @@ TEST(Planner, ObstaclesCanBeReplaced) {
 // The bicycle with a car's rectangle, to be certified at all times.
 Config Car() {
   Config config = Bicycle();
-  Problem problem = *config.problem;
+  Problem& problem = Own(config.problem);
   problem.body = {.heading = 2, .parts = {{{{-1, -0.9, 0}, {3.3, -0.9, 0}, {3.3, 0.9, 0}, {-1, 0.9, 0}}, 0}}};
   problem.between = Between{Vec({25, 25}), 2.3, 6, 0.1};  // its data turn at up to 2.26 rad/s
-  config.problem = std::make_shared<const Problem>(problem);
   return config;
 }
 
@@ -268,7 +255,7 @@ void ExpectClear(const Config& config, const PlanRequest& request, const Proposa
     }
 }
 
-TEST(Planner, KeepsTheBodyAwayFromObstaclesFromSampleToSample) {
+TEST_F(Planner, KeepsTheBodyAwayFromObstaclesFromSampleToSample) {
   const Config config = Car();
   const auto planner = PlannerOf(config);
   int found = 0;
@@ -286,19 +273,17 @@ TEST(Planner, KeepsTheBodyAwayFromObstaclesFromSampleToSample) {
   EXPECT_GT(found, 25);
 }
 
-TEST(Planner, TheBodyCountsAndNotOnlyItsPoint) {
+TEST_F(Planner, TheBodyCountsAndNotOnlyItsPoint) {
   const Eigen::VectorXd beside = Vec({25, -2.6, 0, 2, 0, 0});  // the point is 0.6 m away, the body reaches 0.9 m
   EXPECT_TRUE(PlannerOf(Bicycle())->Propose(From(beside, 5)));
   EXPECT_FALSE(PlannerOf(Car())->Propose(From(beside, 5)));
 }
 
 // A wall ahead that drives on leaves the way free; one that comes towards the robot does not.
-TEST(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
+TEST_F(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
   Config config = Car();
   const Obstacle ahead = Obstacle::AxisBox(Vec({14, -15}), Vec({16, 15}));
-  ObstacleMotion motion;
-  motion.stamp_us = 5'000'000;
-  motion.velocity = {10, 0, 0};
+  ObstacleMotion motion{.stamp_us = 5'000'000, .velocity = {10, 0, 0}};
   PlanRequest request = From(Vec({0, 0, 0, 10, 0, 0}), 1);
   request.schedule = {5'000'000, 100'000, 10'000};
   const auto proposed = [&](const std::vector<Obstacle>& obstacles) {
@@ -316,7 +301,7 @@ TEST(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
 }
 
 // A crate stands in the way until it is taken away.
-TEST(Planner, GoesStraightOnWhereAnObstacleHasGone) {
+TEST_F(Planner, GoesStraightOnWhereAnObstacleHasGone) {
   Config config = Car();
   ObstacleMotion until;
   until.until_us = 4'000'000;
@@ -352,9 +337,7 @@ Limit AtMost(const char* that, double bound) { return {.name = that, .that = {th
 // The point mass with limits of its speed, 1.2 m/s, and of its acceleration.
 Config Limited() {
   Config config = PointMass();
-  Problem problem = *config.problem;
-  problem.limits = {AtMost("vx^2 + vy^2", 1.44), AtMost("abs(ax)", 1)};
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).limits = {AtMost("vx^2 + vy^2", 1.44), AtMost("abs(ax)", 1)};
   config.planner.braking = 0.8;
   for (ModelText::Definition& definition : config.laws.definitions)
     if (definition.name == "hardest") definition.value.text = "0.8";
@@ -372,7 +355,7 @@ std::vector<double> Room(const Config& config, const Proposal& proposal) {
   return room;
 }
 
-TEST(Planner, KeepsLimitsOfStatesAndInputsByTheMarginThatIsAskedFor) {
+TEST_F(Planner, KeepsLimitsOfStatesAndInputsByTheMarginThatIsAskedFor) {
   const Config config = Limited();
   Config without = config;
   Problem problem = *config.problem;
@@ -395,7 +378,7 @@ TEST(Planner, KeepsLimitsOfStatesAndInputsByTheMarginThatIsAskedFor) {
   EXPECT_GT(faster, 3) << "otherwise the limits show nothing";
 }
 
-TEST(Planner, AStartNearerToALimitThanTheMarginDoesNotStopItButOneBeyondDoes) {
+TEST_F(Planner, AStartNearerToALimitThanTheMarginDoesNotStopItButOneBeyondDoes) {
   const auto planner = PlannerOf(Limited());
   PlanRequest request = From(Vec({0, 0, 1.1, 0}), 3);
   request.limit_margin = {0.5, 0};
@@ -405,7 +388,7 @@ TEST(Planner, AStartNearerToALimitThanTheMarginDoesNotStopItButOneBeyondDoes) {
 }
 
 // Each part of the arm keeps the clearance, and its deviation between the samples.
-TEST(Planner, KeepsPartsAtExpressionsAwayFromObstacles) {
+TEST_F(Planner, KeepsPartsAtExpressionsAwayFromObstacles) {
   const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/config/drive/reaching_arm.yaml");
   const Problem& problem = *config.problem;
   const BodyPlaces places(*problem.model, problem.projection, problem.body);
@@ -429,7 +412,7 @@ TEST(Planner, KeepsPartsAtExpressionsAwayFromObstacles) {
   EXPECT_GT(found, 5);
 }
 
-TEST(Planner, RefusesOptionsThatDoNotFit) {
+TEST_F(Planner, RefusesOptionsThatDoNotFit) {
   for (const auto& spoil :
        std::vector<void (*)(PlannerOptions&)>{[](PlannerOptions& options) { options.algorithm = "astar"; },
                                               [](PlannerOptions& options) { options.goal = {}; },

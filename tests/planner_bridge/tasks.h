@@ -23,10 +23,7 @@ inline Config Bicycle() {
   problem->declaration.state_error = Vec({0, 0, 0, 0, 0, 0});
   problem->declaration.lipschitz(2, 3) = 0.018;
   problem->declaration.lipschitz(2, 5) = 0.61;
-  Config config;
-  config.path = "bicycle";
-  config.laws = laws;
-  config.says_between = true;
+  Config config{.path = "bicycle", .says_between = true, .laws = laws};
   config.gate.step_error_ms = kAnyTime;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({25, 1}), 3), Obstacle::Circle(Vec({45, -4}), 3)};
@@ -44,10 +41,7 @@ inline Config PointMass() {
   auto problem = std::make_shared<Problem>(PaperPointMass(5.4, 2));
   problem->declaration.state_error = Vec({0, 0, 0, 0});
   problem->domain.balls = {{{2, 3}, Vec({0, 0}), 5.4}};
-  Config config;
-  config.path = "point_mass";
-  config.laws = laws;
-  config.says_between = true;
+  Config config{.path = "point_mass", .says_between = true, .laws = laws};
   config.gate.step_error_ms = kAnyTime;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({5, 0.3}), 1.5)};

@@ -1,12 +1,10 @@
 // Planner, certifier and simulated robot on one bus and a simulated clock: a wall appears across the whole way.
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "planner_bridge/planner_node.h"
 #include "simulator/sim_node.h"
+#include "tests/messages.h"
 #include "tests/planner_bridge/tasks.h"
 
 namespace forereach::withdrawal_run_test {
@@ -20,8 +18,7 @@ Config Task() {
   return config;
 }
 
-class WithdrawalRunTest : public testing::Test {
- protected:
+struct WithdrawalRunTest : testing::Test {
   WithdrawalRunTest() {
     bus_->Subscribe(config_.bus.event, [this](const Received& received) {
       ++events_[Decoded<execution_event_t>(received.bytes).value().kind];
@@ -41,11 +38,7 @@ class WithdrawalRunTest : public testing::Test {
       }
     }
   }
-  void SendObstacles() {
-    obstacles_t message = ToMessage(obstacles_, now_);
-    message.sequence = sequence_++;
-    bus_->Publish(config_.bus.obstacles, message);
-  }
+  void SendObstacles() { bus_->Publish(config_.bus.obstacles, Sighted(obstacles_, now_, sequence_++)); }
   // Everything from so many metres ahead of the robot on is unsafe.
   double SeeWall(double ahead) {
     const double offset = robot_.state()[0] + ahead;

@@ -5,26 +5,18 @@
 #include "tests/test.h"
 
 #include "bus/process.h"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/command_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/fault_t.hpp"
-#include "forereach/robot_state_t.hpp"
 #include "task/files.h"
 #include "tests/cli/program.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::bus_commands_test {
 
-class BusCommands : public testing::Test {
- protected:
+struct BusCommands : testing::Test {
   BusCommands() {
     EXPECT_EQ(Forereach("keygen --robot test '" + key_ + "'").code, 0);
-    std::string task = PatientTask();
-    task.replace(task.find("arming: none"), 12, "arming: robot_state, robot_timeout_ms: 2000");
-    scratch_.Write("task.yaml", task);
+    scratch_.Write("task.yaml", Replaced(PatientTask(), "arming: none", "arming: robot_state, robot_timeout_ms: 2000"));
     config_ = LoadConfig(path_);
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = key_;
@@ -39,9 +31,7 @@ class BusCommands : public testing::Test {
                      (with_key ? " --key '" + key_ + "'" : "") + " 2>&1");
   }
   void SayState(const std::vector<double>& position = {0, 0, 0, 0}) {
-    robot_state_t state{};
-    state.utime = WallClockUs();
-    state.sequence = sequence_++;
+    robot_state_t state{.utime = WallClockUs(), .sequence = sequence_++};
     state.executing_plan_id = state.executing_step = -1;
     state.mode = robot_state_t::STANDING;
     state.num_states = 4;
@@ -87,8 +77,7 @@ TEST_F(BusCommands, AReloadIsTakenOrItsErrorIsShown) {
   EXPECT_TRUE(certifier_->WaitForLog("version 2 stays in force")) << certifier_->error();
   std::filesystem::rename(path_ + ".away", path_);
   const Output status = Say("status");
-  EXPECT_THAT(status.text, HasSubstr("hovercraft"));
-  EXPECT_THAT(status.text, HasSubstr("version 2"));
+  EXPECT_THAT(status.text, AllOf(HasSubstr("hovercraft"), HasSubstr("version 2")));
 }
 
 // Strangers' datagrams are refused all the time.
@@ -132,9 +121,7 @@ TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {
   auto status = nlohmann::json::parse(Say("status --json").text);
   for (int i = 0; i < 10 && status["refused_unsigned"] != 2; ++i)
     status = nlohmann::json::parse(Say("status --json").text);
-  EXPECT_EQ(status["state"], "disarmed");
-  EXPECT_EQ(status["candidates"], 0);
-  EXPECT_EQ(status["refused_unsigned"], 2);
+  EXPECT_THAT(status, Holds({{"state", "disarmed"}, {"candidates", 0}, {"refused_unsigned", 2}}));
 }
 
 // A stranger, or somebody with another role's key, says that all is well, once the certifier is dead.
@@ -148,11 +135,8 @@ TEST_F(BusCommands, AForgedHeartbeatIsNoSignOfLife) {
   std::atomic<bool> stop = false;
   std::thread forging([&] {
     for (std::int64_t i = 0; !stop; ++i, std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
-      certifier_status_t status{};
-      status.utime = WallClockUs();
-      status.sequence = i;
-      status.level = certifier_status_t::OK;
-      status.state = certifier_status_t::ARMED;
+      certifier_status_t status{
+          .utime = WallClockUs(), .sequence = i, .level = certifier_status_t::OK, .state = certifier_status_t::ARMED};
       const auto bytes = Encode(status);
       open->Publish("CERTIFIER_STATUS", Bytes(bytes));
       open->Publish("CERTIFIER_STATUS",
@@ -225,10 +209,7 @@ TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
   EXPECT_EQ(channels, 13);
   EXPECT_EQ(heard, wanted);
   const Refusals refusals = ear->refusals();
-  EXPECT_EQ(refusals.unsigned_ones, channels);
-  EXPECT_EQ(refusals.forged, forged);
-  EXPECT_EQ(refusals.replayed, channels);
-  EXPECT_EQ(refusals.foreign, channels);
+  EXPECT_FIELDS(refusals, (unsigned_ones, channels), (forged, forged), (replayed, channels), (foreign, channels));
 }
 
 TEST(BusCommandsTest, StatusSaysThatNoCertifierAnswered) {

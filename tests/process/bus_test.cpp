@@ -5,17 +5,13 @@
 
 #include "tests/test.h"
 
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/robot_state_t.hpp"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 #include "tests/sanitized.h"
 
 namespace forereach::bus_test {
 
-robot_state_t State(std::int64_t sequence) {
-  robot_state_t state{.sequence = sequence};
-  return state;
-}
+robot_state_t State(std::int64_t sequence) { return robot_state_t{.sequence = sequence}; }
 
 std::int64_t SequenceOf(const Received& received) { return Decoded<robot_state_t>(received.bytes).value().sequence; }
 
@@ -31,8 +27,7 @@ TEST(MemoryBusTest, DeliversInOrderStampedByItsClock) {
   EXPECT_EQ(bus->Dispatch(0), 3);
   now_us = 3000;
   bus->Publish("A", State(7));
-  EXPECT_EQ(bus->Dispatch(0), 1);
-  EXPECT_EQ(bus->Dispatch(0), 0);
+  EXPECT_FIELDS(*bus, (Dispatch(0), 1), (Dispatch(0), 0));
   using P = std::pair<std::int64_t, std::int64_t>;
   EXPECT_THAT(heard, ElementsAre(P{0, 2000}, P{1, 2000}, P{2, 2000}, P{7, 3000}));
 }
@@ -47,8 +42,7 @@ TEST(MemoryBusTest, WhatAHandlerPublishesComesWithTheNextDispatch) {
   bus->Subscribe("PONG", [&](const Received& r) { heard.push_back(r.channel); });
   bus->Publish("PING", State(1));
   bus->Publish("PING", State(2));
-  EXPECT_EQ(bus->Dispatch(0), 2);
-  EXPECT_EQ(bus->Dispatch(0), 2);
+  EXPECT_FIELDS(*bus, (Dispatch(0), 2), (Dispatch(0), 2));
   EXPECT_THAT(heard, ElementsAre("PING", "PING", "PONG", "PONG"));
 }
 
@@ -68,7 +62,7 @@ TEST(MemoryBusTest, EverySubscriberHears) {
   bus->Subscribe(".*", [&](const Received&) { heard.push_back(2); });
   bus->Publish("A", State(0));
   EXPECT_EQ(bus->Dispatch(0), 2);
-  EXPECT_THAT(heard, testing::UnorderedElementsAre(1, 2));
+  EXPECT_THAT(heard, UnorderedElementsAre(1, 2));
 }
 
 TEST(MemoryBusTest, TwoBusesDoNotHearEachOther) {
@@ -91,8 +85,7 @@ TEST(MemoryBusTest, CountsWhatItsQueueCannotHold) {
   bus->Dispatch(0);
   EXPECT_GT(bus->dropped(), 0);
   EXPECT_EQ(std::ssize(heard) + bus->dropped(), kSent);
-  EXPECT_EQ(heard.back(), kSent - 1);
-  EXPECT_EQ(heard.front(), bus->dropped());
+  EXPECT_FIELDS(heard, (back(), kSent - 1), (front(), bus->dropped()));
 }
 
 // Messages that are long are bounded by their bytes, before there are so many.
@@ -140,8 +133,7 @@ TEST(MemoryBusTest, GivesTheMemoryOfABurstBack) {
   EXPECT_LT(ResidentBytes(::getpid()), in_burst - kBurst / 2);
 }
 
-class ThrowingHandlerTest : public testing::TestWithParam<const char*> {
- protected:
+struct ThrowingHandlerTest : testing::TestWithParam<const char*> {
   std::string url() const { return std::string(GetParam()) == "memq" ? "memq://" : PrivateBusUrl(); }
 };
 INSTANTIATE_TEST_SUITE_P(Buses, ThrowingHandlerTest, testing::Values("memq", "udpm"),
@@ -226,8 +218,7 @@ TEST(BusErrorTest, WithoutAMulticastRouteThereIsAdvice) {
   })
       .join();
   if (!alone) GTEST_SKIP() << "a network of its own needs root";
-  EXPECT_THAT(error, HasSubstr("udpm://239.255.76.67:7667"));
-  EXPECT_THAT(error, HasSubstr("ip route add 224.0.0.0/4 dev lo"));
+  EXPECT_THAT(error, AllOf(HasSubstr("udpm://239.255.76.67:7667"), HasSubstr("ip route add 224.0.0.0/4 dev lo")));
 }
 
 TEST(BusErrorTest, OtherKindsOfBusAreRefused) {

@@ -6,10 +6,7 @@ namespace forereach::bus_url_test {
 
 TEST(BusUrlTest, EveryPartIsRead) {
   const MulticastUrl url = ParseMulticastUrl("udpm://224.1.2.3:65535?ttl=255&recv_buf_size=4096");
-  EXPECT_EQ(url.group, "224.1.2.3");
-  EXPECT_EQ(url.port, 65535);
-  EXPECT_EQ(url.ttl, 255);
-  EXPECT_EQ(url.receive_buffer_bytes, 4096);
+  EXPECT_FIELDS(url, (group, "224.1.2.3"), (port, 65535), (ttl, 255), (receive_buffer_bytes, 4096));
   EXPECT_EQ(url.ForSending(), "udpm://224.1.2.3:65535?ttl=255") << "LCM's sender receives nothing";
 }
 

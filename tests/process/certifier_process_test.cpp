@@ -8,22 +8,16 @@
 
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::certifier_process_test {
 
 const Eigen::Vector2d kGentle(0.2, 0), kIntoTheCircle(0, 1.2), kOutsideDomain(0, 3.5);
 
-class CertifierProcessTest : public testing::Test {
- protected:
+struct CertifierProcessTest : testing::Test {
   void SetUp() override { ASSERT_TRUE(certifier_.WaitForLog("ready on")) << certifier_.error(); }
 
   void Send(const std::vector<std::uint8_t>& bytes, int expected_cause) {
@@ -53,7 +47,7 @@ TEST(CertifierRealtimeTest, AllItsThreadsAreUnderFifoAndWhatTheyStartIsNot) {
   const std::string path = scratch.Write("task.yaml", PatientTask() + "realtime: {fifo_priority: 5}\n");
   ChildProcess certifier({FOREREACH_CERTIFIER, "--config", path, "--lcm-url", PrivateBusUrl()});
   if (!certifier.WaitForLog("ready on")) {
-    EXPECT_THAT(certifier.error(), testing::HasSubstr("realtime.fifo_priority: "));
+    EXPECT_THAT(certifier.error(), HasSubstr("realtime.fifo_priority: "));
     EXPECT_EQ(certifier.WaitForExit(), 2);
     GTEST_SKIP() << "this user may not ask for real time";
   }
@@ -128,31 +122,25 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
 
   const auto status = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
   ASSERT_FALSE(status.empty());
-  EXPECT_EQ(status.back().candidates, 15);
-  EXPECT_EQ(status.back().by_outcome[decision_t::CERTIFIED], 3);
-  EXPECT_EQ(status.back().by_outcome[decision_t::ABSTAIN_SAFETY], 1);
-  EXPECT_EQ(status.back().by_outcome[decision_t::ABSTAIN_DOMAIN], 1);
-  EXPECT_EQ(status.back().by_outcome[decision_t::REJECTED], 10);
+  EXPECT_FIELDS(status.back(), (candidates, 15), (by_outcome[decision_t::CERTIFIED], 3),
+                (by_outcome[decision_t::ABSTAIN_SAFETY], 1), (by_outcome[decision_t::ABSTAIN_DOMAIN], 1),
+                (by_outcome[decision_t::REJECTED], 10));
 
   EXPECT_EQ(certifier_.Terminate(), 0) << certifier_.error();
   const auto summary = nlohmann::json::parse(certifier_.output());
-  EXPECT_EQ(summary["candidates"], 15);
-  EXPECT_EQ(summary["certified"], 3);
+  EXPECT_THAT(summary, Holds({{"candidates", 15}, {"certified", 3}}));
 }
 
 // ---- Obstacles from the bus.
 
-class CertifierObstaclesTest : public testing::Test {
- protected:
+struct CertifierObstaclesTest : testing::Test {
   // The file has no obstacles: all are on the bus.
   CertifierObstaclesTest() {
-    std::string task = PatientTask();
-    const std::string none = "obstacles:\n    - circle: {center: [0, 2], radius: 0.8}\n";
-    EXPECT_NE(task.find(none), std::string::npos);
-    world_ = scratch_.Write("world.yaml", task);
-    task.replace(task.find(none), none.size(), "obstacles: []\n");
-    task.replace(task.find("obstacles: task,"), 16, "obstacles: bus, obstacles_lost_ms: never,");
-    path_ = scratch_.Write("task.yaml", task);
+    world_ = scratch_.Write("world.yaml", PatientTask());
+    const std::string none =
+        Replaced(PatientTask(), "obstacles:\n    - circle: {center: [0, 2], radius: 0.8}\n", "obstacles: []\n");
+    path_ =
+        scratch_.Write("task.yaml", Replaced(none, "obstacles: task,", "obstacles: bus, obstacles_lost_ms: never,"));
     config_ = LoadConfig(path_);
   }
   std::unique_ptr<ChildProcess> StartCertifier(const std::string& state = "state") const {
@@ -276,15 +264,13 @@ TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
 }
 
 TEST_F(CertifierObstaclesTest, RefusesATaskThatDoesNotSayWhereObstaclesComeFrom) {
-  std::string task = PatientTask();
-  task.replace(task.find("obstacles: task, "), 17, "");
-  const std::string path = scratch_.Write("unsaid.yaml", task);
+  const std::string path = scratch_.Write("unsaid.yaml", Replaced(PatientTask(), "obstacles: task, ", ""));
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{FOREREACH_CERTIFIER, "--config", path, "--lcm-url", PrivateBusUrl()},
         {FOREREACH_PROGRAM, "run", "--config", path, "--directory", scratch_ / "log"}}) {
     ChildProcess process(command);
     EXPECT_EQ(process.WaitForExit(), 2);
-    EXPECT_THAT(process.error(), testing::HasSubstr(path + ": gate.obstacles: missing. `bus`: "));
+    EXPECT_THAT(process.error(), HasSubstr(path + ": gate.obstacles: missing. `bus`: "));
   }
 }
 

@@ -3,8 +3,6 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 #include <thread>
 
@@ -17,11 +15,6 @@ namespace forereach {
 namespace {
 
 constexpr std::chrono::milliseconds kPoll{5};
-
-std::string TextOf(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // In the child, between fork and exec: only calls that are safe there.
 [[noreturn]] void Become(char* const* arguments, const char* output, const char* error) {
@@ -87,9 +80,9 @@ std::optional<int> ChildProcess::Terminate() {
   return WaitForExit(kEndsWithin);
 }
 
-std::string ChildProcess::output() const { return TextOf(output_path_); }
+std::string ChildProcess::output() const { return Read(output_path_); }
 
-std::string ChildProcess::error() const { return TextOf(error_path_); }
+std::string ChildProcess::error() const { return Read(error_path_); }
 
 std::string SanitizerAfterPreload() {
   const char* others = std::getenv("ASAN_OPTIONS");

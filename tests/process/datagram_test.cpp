@@ -9,10 +9,8 @@ namespace forereach::datagram_test {
 
 DatagramKind KindOf(const RawDatagram& bytes) {
   const Datagram datagram = ParseDatagram(bytes);
-  if (datagram.kind != DatagramKind::kMessage) {
-    EXPECT_TRUE(datagram.channel.empty());
-    EXPECT_TRUE(datagram.payload.empty());
-  }
+  if (datagram.kind != DatagramKind::kMessage)
+    EXPECT_FIELDS(datagram, (channel.empty(), true), (payload.empty(), true));
   return datagram.kind;
 }
 
@@ -104,8 +102,7 @@ TEST(DatagramTest, RefusedOnesAreCountedByTheirCauseAndSaid) {
                                   DatagramKind::kFragment, DatagramKind::kUnterminatedName, DatagramKind::kBadName})
     counts.Count(kind);
   counts.truncated = 1;
-  EXPECT_EQ(counts.messages, 1);
-  EXPECT_EQ(counts.refused(), 7);
+  EXPECT_FIELDS(counts, (messages, 1), (refused(), 7));
   const std::string words = DescribeRefused(counts);
   for (const char* part :
        {"2 fragments", "1 not of LCM", "1 too short", "1 without the end", "1 with a channel's name", "1 truncated"})

@@ -3,11 +3,8 @@
 #include "tests/test.h"
 
 #include "bus/authentic.h"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/logger_status_t.hpp"
 #include "tests/keys.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 
@@ -66,8 +63,7 @@ const std::vector<Attack>& Attacks() {
   return attacks;
 }
 
-class HostileDatagramsTest : public testing::TestWithParam<Attack> {
- protected:
+struct HostileDatagramsTest : testing::TestWithParam<Attack> {
   struct Process {
     const char* channel;  // on which it speaks
     ChildProcess child;
@@ -84,9 +80,7 @@ class HostileDatagramsTest : public testing::TestWithParam<Attack> {
   }
   std::string WriteKey() const { return MakeTestKeys(scratch_ / "keys"); }
   static std::string FarTask() {  // the drive has no end while the attacks last, however slow the machine is
-    std::string task = PatientTask(600);
-    const std::string goal = "goal: [6, 0]\n  goal_radius: 0.5";
-    return task.replace(task.find(goal), goal.size(), "goal: [18, 0]\n  goal_radius: 1e-9");
+    return Replaced(PatientTask(600), "goal: [6, 0]\n  goal_radius: 0.5", "goal: [18, 0]\n  goal_radius: 1e-9");
   }
   bool AllSpeak() {
     std::array<std::size_t, 4> before{};
@@ -122,9 +116,7 @@ TEST_P(HostileDatagramsTest, EveryProcessLivesOnAndWorks) {
   for (Process& process : processes_) {
     EXPECT_FALSE(HasEnded(process)) << "what speaks on " << process.channel << " ended: " << process.child.error();
     const double grown = ResidentBytes(process.child.pid()) - process.resident_before;
-    if (GetParam().refused) {
-      EXPECT_TRUE(process.child.WaitForLog("datagrams refused: ")) << "it says so";
-    }
+    if (GetParam().refused) EXPECT_TRUE(process.child.WaitForLog("datagrams refused: ")) << "it says so";
     EXPECT_LT(grown / kMegabyte, kMayGrowBy / kMegabyte) << process.channel << " grew by so many MB";
   }
   EXPECT_GT(probe_.Heard<logger_status_t>("LOGGER_STATUS").back().events_written, events_before);

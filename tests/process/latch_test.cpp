@@ -1,8 +1,5 @@
 // What a certifier does not forget when it ends: faults and contradictions, on disks that work and on disks that do
 // not.
-#include <csignal>
-
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,35 +9,16 @@
 #include "certifier/process/faults.h"
 #include "forereach/withdrawal_t.hpp"
 #include "tests/certifier/small_task.h"
-#include "tests/reset.h"
+#include "tests/file_size_limit.h"
+#include "tests/messages.h"
 #include "tests/small_disk.h"
 
 namespace forereach::latch_test {
 
-std::string Contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 void WriteFile(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+using Harm = std::function<void(const std::string& file)>;
 
-// The next write to any file fails, as long as this lives.
-class NoWrites final {
- public:
-  NoWrites() {
-    std::signal(SIGXFSZ, SIG_IGN);
-    EXPECT_EQ(getrlimit(RLIMIT_FSIZE, &before_), 0);
-    const rlimit none{0, before_.rlim_max};
-    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
-  }
-  ~NoWrites() { EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &before_), 0); }
-
- private:
-  rlimit before_{};
-};
-
-class LatchTest : public testing::Test {
- protected:
+struct LatchTest : testing::Test {
   LatchTest() { config_.gate.needs_robot_state = true; }
 
   // Ends a certifier without a word, as SIGKILL does, and begins the next.
@@ -50,13 +28,11 @@ class LatchTest : public testing::Test {
     certified_ = 0;
     status_ = {};
     bus_ = OpenBus("memq://", clock_);
-    bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
-    bus_->Subscribe("PLAN_DECISION", [this](const Received& r) { decision_ = Decoded<decision_t>(r.bytes).value(); });
+    Hear(*bus_, "FAULT", faults_);
+    Hear(*bus_, "PLAN_DECISION", decision_);
     bus_->Subscribe("PLAN_CERTIFIED", [this](const Received&) { ++certified_; });
-    bus_->Subscribe("PLAN_WITHDRAWN",
-                    [this](const Received& r) { withdrawal_ = Decoded<withdrawal_t>(r.bytes).value(); });
-    bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
+    Hear(*bus_, "PLAN_WITHDRAWN", withdrawal_);
+    Hear(*bus_, "CERTIFIER_STATUS", status_);
     node_ = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, clock_}, 0,
                                             std::make_unique<LatchFile>(directory_));
     Run();
@@ -71,13 +47,7 @@ class LatchTest : public testing::Test {
     SayState();
   }
   void SayState(std::int64_t executing = -1) {
-    robot_state_t state{};
-    state.utime = now_us_;
-    state.sequence = sequence_++;
-    state.mode = executing < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
-    state.executing_plan_id = executing;
-    state.num_states = 4;
-    bus_->Publish("ROBOT_STATE", state);
+    bus_->Publish("ROBOT_STATE", StateOf(now_us_, sequence_++, executing, executing < 0 ? -1 : 0));
     Run();
   }
   const decision_t& Ask() {
@@ -99,11 +69,8 @@ class LatchTest : public testing::Test {
     node_.reset();
   }
   void Falsify(std::int64_t duration_us = 150'000) {
-    const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
-    transition_t transition{.duration_us = duration_us, .num_states = 4, .num_inputs = 2};
-    std::copy_n(z.data(), 4, transition.state);
-    config_.problem->model->Evaluate({z.data(), 6}, {transition.next_state, 4});
-    transition.next_state[2] += 0.01;
+    transition_t transition = Executed(*config_.problem->model, Vec({1, 1, 0.5, 0.5, 0, 0}), 0.01);
+    transition.duration_us = duration_us;
     bus_->Publish("TRANSITION", transition);
     Run();
   }
@@ -115,20 +82,27 @@ class LatchTest : public testing::Test {
     now_us_ += 1;
     Reset(now_us_);
   }
-  void Declare(double noise_bound) {
-    Problem problem = *config_.problem;
-    problem.declaration.noise_bound.setConstant(noise_bound);
-    config_.problem = std::make_shared<const Problem>(problem);
+  // The next certifier, on a reset and a state: whether it finds the declaration false.
+  bool IsFalsifiedAfterARestart() {
+    Begin();
+    Reset();
+    SayState();
+    return Ask().outcome == decision_t::ABSTAIN_FALSIFIED;
   }
+  void ExpectFalsified() {
+    Begin();
+    SayState();
+    EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  }
+  void Declare(double noise_bound) { Own(config_.problem).declaration.noise_bound.setConstant(noise_bound); }
   void ExpectNotArmed(const std::string& why) {
     SayState();
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_LATCH_UNWRITABLE);
     EXPECT_EQ(decision_.outcome, decision_t::REJECTED);
     EXPECT_THAT(GetText(decision_.message), StartsWith("rejected: no fault could be stored: "));
     Heartbeat();
-    EXPECT_EQ(status_.state, certifier_status_t::DISARMED);
-    EXPECT_EQ(status_.level, certifier_status_t::ERROR);
-    EXPECT_EQ(status_.latch, certifier_status_t::LATCH_UNWRITABLE);
+    EXPECT_FIELDS(status_, (state, certifier_status_t::DISARMED), (level, certifier_status_t::ERROR),
+                  (latch, certifier_status_t::LATCH_UNWRITABLE));
     EXPECT_THAT(node_->watch().Lacks(Watch::Need::kLatch), HasSubstr(why));
     EXPECT_EQ(certified_, 0);
   }
@@ -192,10 +166,8 @@ TEST_F(LatchTest, AFaultOutlivesTheProcessUntilAReset) {
     Heartbeat();
     EXPECT_GE(faults_.size(), 2u) << "and again";
     for (const fault_t& said : faults_) EXPECT_EQ(Encode(said), Encode(fault));
-    EXPECT_EQ(status_.state, certifier_status_t::FAULT);
-    EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
-    EXPECT_EQ(status_.fault_utime, fault.utime);
-    EXPECT_EQ(status_.latch, certifier_status_t::LATCH_WRITTEN);
+    EXPECT_FIELDS(status_, (state, certifier_status_t::FAULT), (fault, fault_t::ROBOT_STATE_LOST),
+                  (fault_utime, fault.utime), (latch, certifier_status_t::LATCH_WRITTEN));
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
     EXPECT_EQ(GetText(decision_.message), sentence);
     EXPECT_EQ(certified_, 0);
@@ -249,16 +221,12 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
     EXPECT_THAT(GetText(status_.message), HasSubstr("contradict"));
   }
   Declare(0.004);  // 0.01 is the difference, twice this is allowed
-  Begin();
-  SayState();
-  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  ExpectFalsified();
   Declare(0.006);
   Begin();
   ExpectArmed();
   Declare(0);
-  Begin();
-  SayState();
-  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED) << "nor is it forgotten after another";
+  ExpectFalsified();  // nor is it forgotten after another
   config_.grounds.model = DigestOf(std::string_view("another model"));
   Begin();
   ExpectArmed();
@@ -271,13 +239,8 @@ TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmal
   Falsify(170'000);  // vx by 0.01, in a step that lasted 0.02 s longer, which was not looked at
   const Problem exact = *config_.problem;
   const auto is_falsified = [&](const std::function<void(Problem&)>& declare) {
-    Problem problem = exact;
-    declare(problem);
-    config_.problem = std::make_shared<const Problem>(problem);
-    Begin();
-    Reset();
-    SayState();
-    return Ask().outcome == decision_t::ABSTAIN_FALSIFIED;
+    declare(Own(config_.problem) = exact);
+    return IsFalsifiedAfterARestart();
   };
   const auto with_state_error = [&](double e, bool given_are_exact) {
     return is_falsified([&](Problem& problem) {
@@ -308,21 +271,13 @@ TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmal
 
 TEST_F(LatchTest, ATransitionOutsideTheDomainSaysNothing) {
   FalsifyAndEnd();
-  Problem problem = *config_.problem;
-  problem.domain.state = Box(Vec({-9, -9, -9, -9}), Vec({9, 9, 9, 9}));
-  config_.problem = std::make_shared<const Problem>(problem);
-  Begin();
-  Reset();
-  SayState();
-  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  Own(config_.problem).domain.state = Within({9, 9, 9, 9});
+  EXPECT_TRUE(IsFalsifiedAfterARestart());
+  Problem& problem = Own(config_.problem);
   problem.domain.state = Box(Vec({-9, -9, -9, 0.4}), Vec({9, 9, 9, 9}));  // the file's first transition
   problem.transitions.z = problem.transitions.z.bottomRows(1).eval();
   problem.transitions.x_next = problem.transitions.x_next.bottomRows(1).eval();
-  config_.problem = std::make_shared<const Problem>(problem);
-  Begin();
-  Reset();
-  SayState();
-  EXPECT_NE(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  EXPECT_FALSE(IsFalsifiedAfterARestart());
 }
 
 // The guard leaves a plan whose certificate names the digest of the file's transitions.
@@ -400,26 +355,18 @@ TEST_F(LatchTest, AsManyContradictionsFitAsAreAllowed) {
   ASSERT_TRUE(read) << file.why_not();
   EXPECT_EQ(read->why, content.why);
   const Transitions& back = read->contradictions.back().rows;
-  EXPECT_EQ(back.z, rows.z);
-  EXPECT_EQ(back.x_next, rows.x_next);
-  EXPECT_EQ(back.longer, rows.longer);
-  EXPECT_EQ(back.num_learned, 1);
+  EXPECT_FIELDS(back, (z, rows.z), (x_next, rows.x_next), (longer, rows.longer), (num_learned, 1));
 }
 
 // A transition that changes vx by 2 m/s in a step contradicts a bound on its rate, and its residual nothing.
 TEST_F(LatchTest, ADeclaredRateThatATransitionContradictsStaysSoOverRestartsAndResets) {
   const auto declare = [&](double rate) {
-    Problem problem = *config_.problem;
-    problem.timing.rate_bound = Eigen::Vector4d(INFINITY, INFINITY, rate, INFINITY);
-    config_.problem = std::make_shared<const Problem>(problem);
+    Own(config_.problem).timing.rate_bound = Eigen::Vector4d(INFINITY, INFINITY, rate, INFINITY);
   };
   declare(1);
   Begin();
   SayState();
-  transition_t transition{.num_states = 4, .num_inputs = 2, .input = {2, 0}};
-  const Eigen::VectorXd z = (Eigen::VectorXd(6) << 0, 0, 0, 0, 2, 0).finished();
-  config_.problem->model->Evaluate({z.data(), 6}, {transition.next_state, 4});
-  bus_->Publish("TRANSITION", transition);
+  bus_->Publish("TRANSITION", Executed(*config_.problem->model, Vec({0, 0, 0, 0, 2, 0})));
   Run();
   ASSERT_FALSE(faults_.empty());
   EXPECT_EQ(faults_.back().cause, fault_t::DECLARATION_FALSIFIED);
@@ -428,14 +375,9 @@ TEST_F(LatchTest, ADeclaredRateThatATransitionContradictsStaysSoOverRestartsAndR
   Reset();
   SayState();
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_BOUND);
-  Begin();
-  Reset();
-  SayState();
-  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  EXPECT_TRUE(IsFalsifiedAfterARestart());
   declare(2 - 1e-9);
-  Begin();
-  SayState();
-  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  ExpectFalsified();
   declare(2);
   Begin();
   ExpectArmed();
@@ -452,8 +394,9 @@ TEST_F(LatchTest, RefusesADirectoryThatAnotherCertifierUses) {
 // What cannot be trusted is not taken for "no fault", and no reset mends it.
 struct Damage {
   const char* name;
-  std::function<void(const std::string& file)> harm;
+  Harm harm;
   const char* says;
+  friend void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
 };
 class DamagedLatchTest : public LatchTest, public testing::WithParamInterface<Damage> {};
 
@@ -473,55 +416,44 @@ TEST_P(DamagedLatchTest, ADamagedLatchFileDoesNotArm) {
   ExpectArmed();
 }
 
-std::function<void(const std::string&)> Edit(const std::string& from, const std::string& to) {
+Harm Edit(const std::string& from, const std::string& to) {
   return [=](const std::string& file) {
-    std::string text = Contents(file);
-    const std::size_t at = text.find(from);
-    ASSERT_NE(at, std::string::npos);
-    text.replace(at, from.size(), to);
+    std::string text = Replaced(Read(file), from, to);
     text.resize(LatchFile::kBytes, ' ');
     WriteFile(file, text);
+  };
+}
+Harm Write(const std::string& text) {
+  return [text](const std::string& file) { WriteFile(file, text); };
+}
+Harm Resize(std::uintmax_t size) {
+  return [size](const std::string& file) { std::filesystem::resize_file(file, size); };
+}
+// Something else takes the place of the file.
+Harm Replace(int (*make)(const char* path)) {
+  return [make](const std::string& file) {
+    std::filesystem::rename(file, file + "2");
+    ASSERT_EQ(make(file.c_str()), 0);
   };
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Any, DamagedLatchTest,
     testing::Values(
-        Damage{"Empty", [](const std::string& file) { WriteFile(file, ""); }, "has 0 bytes, has to have 65536"},
-        Damage{"Short", [](const std::string& file) { std::filesystem::resize_file(file, 65535); }, "65535 bytes"},
-        Damage{"Huge", [](const std::string& file) { std::filesystem::resize_file(file, std::uintmax_t{1} << 40); },
-               "bytes"},
-        Damage{"Zeros", [](const std::string& file) { WriteFile(file, std::string(65536, '\0')); }, "is damaged"},
-        Damage{"Spaces", [](const std::string& file) { WriteFile(file, std::string(65536, ' ')); }, "is damaged"},
-        Damage{"Deep", [](const std::string& file) { WriteFile(file, std::string(65536, '[')); }, "is damaged"},
-        Damage{"Half",
-               [](const std::string& file) {
-                 std::string text = Contents(file);
-                 text.replace(400, 65136, 65136, '\0');
-                 WriteFile(file, text);
-               },
+        Damage{"Empty", Write(""), "has 0 bytes, has to have 65536"}, Damage{"Short", Resize(65535), "65535 bytes"},
+        Damage{"Huge", Resize(std::uintmax_t{1} << 40), "bytes"},
+        Damage{"Zeros", Write(std::string(65536, '\0')), "is damaged"},
+        Damage{"Spaces", Write(std::string(65536, ' ')), "is damaged"},
+        Damage{"Deep", Write(std::string(65536, '[')), "is damaged"},
+        Damage{"Half", [](const std::string& file) { WriteFile(file, Read(file).replace(400, 65136, 65136, '\0')); },
                "is damaged"},
         Damage{"NoFault", Edit("\"fault\":{", "\"fault\":null,\"no\":{"), "digest"},
         Damage{"AnotherDigit", Edit("\"fault_t\":[", "\"fault_t\":[1"), "digest"},
         Damage{"AnotherVersion", Edit("\"version\":1", "\"version\":2"), "it has version 2, this certifier knows 1"},
         Damage{"AnotherFormat", Edit("forereach latch", "forereach match"), "it has another format"},
-        Damage{"Fifo",
-               [](const std::string& file) {
-                 std::filesystem::remove(file);
-                 ASSERT_EQ(mkfifo(file.c_str(), 0600), 0);
-               },
-               "is no regular file"},
-        Damage{"Directory",
-               [](const std::string& file) {
-                 std::filesystem::remove(file);
-                 std::filesystem::create_directory(file);
-               },
-               "is no regular file"},
-        Damage{"Link",
-               [](const std::string& file) {
-                 std::filesystem::rename(file, file + "2");
-                 std::filesystem::create_symlink(file + "2", file);
-               },
+        Damage{"Fifo", Replace([](const char* path) { return mkfifo(path, 0600); }), "is no regular file"},
+        Damage{"Directory", Replace([](const char* path) { return mkdir(path, 0700); }), "is no regular file"},
+        Damage{"Link", Replace([](const char* path) { return symlink((path + std::string("2")).c_str(), path); }),
                "is a symbolic link"},
         Damage{"OthersMayWrite", [](const std::string& file) { ASSERT_EQ(chmod(file.c_str(), 0622), 0); },
                "others than its owner may write it"}),
@@ -529,7 +461,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_F(LatchTest, NoAlteredByteIsTakenForAnythingElse) {
   FalsifyAndEnd();
-  const std::string good = Contents(file_);
+  const std::string good = Read(file_);
   const std::size_t used = good.find_last_not_of(" \n") + 1;
   const auto held = LatchFile(directory_).Read();
   ASSERT_TRUE(held && held->fault && held->contradictions.size() == 1);
@@ -582,7 +514,7 @@ TEST_F(LatchTest, AFaultThatCannotBeWrittenIsNotForgottenByARestart) {
   Begin();
   ExpectArmed();
   {
-    const NoWrites no_writes;
+    const FileSizeLimit no_writes(0);
     Fault();
     ASSERT_EQ(faults_.size(), 1u) << "it is said all the same";
     Heartbeat();
@@ -600,11 +532,11 @@ TEST_F(LatchTest, AFaultIsWrittenOnceTheDiskTakesIt) {
   Begin();
   ExpectArmed();
   {
-    const NoWrites no_writes;
+    const FileSizeLimit no_writes(0);
     Fault();
   }
   Heartbeat();
-  EXPECT_THAT(GetText(status_.message), testing::Not(HasSubstr("not stored")));
+  EXPECT_THAT(GetText(status_.message), Not(HasSubstr("not stored")));
   Begin();
   EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
 }
@@ -613,7 +545,7 @@ TEST_F(LatchTest, AResetThatCannotBeWrittenClearsNothing) {
   Begin();
   Fault();
   {
-    const NoWrites no_writes;
+    const FileSizeLimit no_writes(0);
     Reset();
     EXPECT_TRUE(node_->watch().fault());
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
@@ -640,7 +572,7 @@ TEST_F(LatchTest, StoresAFaultOnAFullDiskOrDoesNotArm) {
   fill();
   Fault();
   Heartbeat();
-  EXPECT_THAT(GetText(status_.message), testing::Not(HasSubstr("not stored")));
+  EXPECT_THAT(GetText(status_.message), Not(HasSubstr("not stored")));
   Begin();
   EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST) << "full from before it on";
   Reset();

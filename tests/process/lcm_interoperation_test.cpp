@@ -7,10 +7,8 @@
 #include "tests/test.h"
 
 #include "bus/authentic.h"
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
 #include "records/event_log.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::lcm_interoperation_test {
@@ -73,8 +71,7 @@ class PlainLcm final {
   lcm::LCM lcm_;
 };
 
-class LcmInteroperationTest : public testing::Test {
- protected:
+struct LcmInteroperationTest : testing::Test {
   static std::vector<Message> Sample() {
     certified_plan_t certified{};
     certified.sequence = 7;

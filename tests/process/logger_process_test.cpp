@@ -1,9 +1,7 @@
 // forereach-logger as a process: its files contain the messages of the bus when it ends.
 #include "tests/test.h"
 
-#include "forereach/decision_t.hpp"
-#include "forereach/logger_status_t.hpp"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::logger_process_test {

@@ -2,10 +2,7 @@
 // its tube. How far it gets depends on the machine; these things do not.
 #include "tests/test.h"
 
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::pipeline_test {
@@ -45,9 +42,7 @@ TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   for (const certified_plan_t& plan : probe.Heard<certified_plan_t>("PLAN_CERTIFIED"))
     EXPECT_TRUE(certificates.contains(plan.plan.plan_id)) << plan.plan.plan_id;
   for (const execution_event_t& event : probe.Heard<execution_event_t>("EXECUTION_EVENT")) {
-    if (event.kind == execution_event_t::STARTED) {
-      EXPECT_TRUE(certificates.contains(event.plan_id)) << event.plan_id;
-    }
+    if (event.kind == execution_event_t::STARTED) EXPECT_TRUE(certificates.contains(event.plan_id)) << event.plan_id;
   }
 }
 

@@ -3,23 +3,20 @@
 
 #include "certifier/gate/gate.h"
 #include "forereach/robot_state_t.hpp"
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::planner_process_test {
 
-class PlannerProcessTest : public testing::Test {
- protected:
+struct PlannerProcessTest : testing::Test {
   void SetUp() override { ASSERT_TRUE(planner_.WaitForLog("ready on")) << planner_.error(); }
 
   void SendState(std::int16_t mode) {
-    robot_state_t state{};
-    state.utime = WallClockUs();
-    state.sequence = states_++;
-    state.executing_plan_id = -1;
-    state.executing_step = -1;
-    state.mode = mode;
-    state.num_states = 4;
+    robot_state_t state{.utime = WallClockUs(),
+                        .sequence = states_++,
+                        .executing_plan_id = -1,
+                        .executing_step = -1,
+                        .mode = mode,
+                        .num_states = 4};
     probe_.bus().Publish("ROBOT_STATE", state);
   }
   // Reports a standing robot at every boundary until `count` candidates have come.

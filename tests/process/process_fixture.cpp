@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include "bus/authentic.h"
-#include "tests/paths.h"
 
 namespace forereach {
 

@@ -10,6 +10,7 @@
 #include "bus/bus.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "task/config.h"
+#include "tests/paths.h"
 #include "tests/process/child_process.h"
 #include "tests/scratch.h"
 

@@ -29,8 +29,7 @@ namespace forereach::receive_errors_test {
 
 using std::chrono::milliseconds;
 
-class NoErrorsTest : public testing::Test {
- protected:
+struct NoErrorsTest : testing::Test {
   ~NoErrorsTest() override { error_now = 0; }
 
   template <class Done>

@@ -8,12 +8,9 @@
 
 #include "tests/process/process_fixture.h"
 
-#include "tests/paths.h"
-
 namespace forereach::reload_process_test {
 
-class ReloadProcessTest : public testing::TestWithParam<const char*> {
- protected:
+struct ReloadProcessTest : testing::TestWithParam<const char*> {
   void SetUp() override { ASSERT_TRUE(process_.WaitForLog("ready on")) << process_.error(); }
   [[nodiscard]] const char* taken() const {
     return std::string(GetParam()) == FOREREACH_CERTIFIER ? "version 2 of" : "as it is now are accepted";

@@ -4,31 +4,17 @@
 
 #include "tests/test.h"
 
-#include "forereach/decision_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/robot_state_t.hpp"
-#include "forereach/withdrawal_t.hpp"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::restart_process_test {
 
 constexpr int kSteps = 14;  // 4.2 s
 
-std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return at == std::string::npos ? text : text.replace(at, from.size(), to);
-}
-
-class RestartProcessTest : public testing::Test {
- protected:
+struct RestartProcessTest : testing::Test {
   RestartProcessTest() { EXPECT_TRUE(robot_.WaitForLog("ready on")) << robot_.error(); }
 
-  static std::string Transitions() {
-    std::ifstream file(FOREREACH_SOURCE_DIR "/config/data/point_mass_100.csv");
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  static std::string Transitions() { return Read(FOREREACH_SOURCE_DIR "/config/data/point_mass_100.csv"); }
   // With the transitions beside the task file, and time for a restart within a plan.
   static std::string Task() {
     return Replaced(Replaced(PatientTask(), FOREREACH_SOURCE_DIR "/config/data/point_mass_100.csv", "transitions.csv"),

@@ -2,20 +2,15 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
-#include "forereach/command_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/robot_state_t.hpp"
-#include "forereach/transition_t.hpp"
 #include "lcmtypes/seal.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::robot_process_test {
 
 constexpr int kSteps = 5;
 
-class RobotProcessTest : public testing::Test {
- protected:
+struct RobotProcessTest : testing::Test {
   void SetUp() override {
     ASSERT_TRUE(robot_.WaitForLog("ready on")) << robot_.error();
     ASSERT_TRUE(probe_.WaitUntil([&] { return !probe_.heard("ROBOT_STATE").empty(); }));
@@ -55,8 +50,7 @@ TEST_F(RobotProcessTest, AReloadMakesItTakePlansOfTheTaskAsItIsNow) {
   ASSERT_TRUE(answer.certified);
   probe_.bus().Publish("PLAN_CERTIFIED", *answer.certified);
   ASSERT_TRUE(WaitForEvents(execution_event_t::REFUSED));
-  command_t reload{.utime = WallClockUs(), .kind = command_t::RELOAD};
-  probe_.bus().Publish("COMMAND", reload);
+  probe_.bus().Publish("COMMAND", command_t{.utime = WallClockUs(), .kind = command_t::RELOAD});
   ASSERT_TRUE(robot_.WaitForLog("as it is now are accepted")) << robot_.error();
   probe_.bus().Publish("PLAN_CERTIFIED", *answer.certified);
   ASSERT_TRUE(WaitForEvents(execution_event_t::ACCEPTED));
@@ -64,8 +58,7 @@ TEST_F(RobotProcessTest, AReloadMakesItTakePlansOfTheTaskAsItIsNow) {
 }
 
 TEST_F(RobotProcessTest, StandsUntilACertifiedPlanComesThenDrivesItToItsEnd) {
-  EXPECT_EQ(Last().mode, robot_state_t::STANDING);
-  EXPECT_EQ(Last().executing_plan_id, -1);
+  EXPECT_FIELDS(Last(), (mode, robot_state_t::STANDING), (executing_plan_id, -1));
   probe_.bus().Publish("PLAN_CERTIFIED", Certified(1, 20));
   ASSERT_TRUE(WaitForEvents(execution_event_t::STANDING));
   ASSERT_TRUE(probe_.WaitUntil([&] { return Last().mode == robot_state_t::STANDING; }));
@@ -77,8 +70,7 @@ TEST_F(RobotProcessTest, StandsUntilACertifiedPlanComesThenDrivesItToItsEnd) {
   EXPECT_GT(Last().state[0], 0.1) << "it has moved";
   EXPECT_EQ(robot_.Terminate(), 0) << robot_.error();
   const auto summary = nlohmann::json::parse(robot_.output());
-  EXPECT_EQ(summary["steps_executed"], kSteps);
-  EXPECT_EQ(summary["steps_inside_slice"], kSteps);
+  EXPECT_THAT(summary, Holds({{"steps_executed", kSteps}, {"steps_inside_slice", kSteps}}));
 }
 
 TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {

@@ -11,8 +11,7 @@ namespace forereach::screen_test {
 constexpr std::uint8_t kGood = 1, kBad = 2, kThrows = 3, kElsewhere = 4;
 
 // A message is its bytes behind the first one, which says what becomes of it.
-class FirstByteScreen final : public Screen {
- public:
+struct FirstByteScreen final : Screen {
   std::optional<Bytes> Admit(const std::string& channel, Bytes raw) override {
     static const std::vector<std::uint8_t> elsewhere(3);
     asked_.push_back(channel);
@@ -29,8 +28,7 @@ class FirstByteScreen final : public Screen {
   std::thread::id thread_;
 };
 
-class ScreenTest : public testing::TestWithParam<const char*> {
- protected:
+struct ScreenTest : testing::TestWithParam<const char*> {
   using Raw = std::vector<std::uint8_t>;
   struct Heard {
     Raw bytes, raw;
@@ -121,8 +119,7 @@ TEST_P(ScreenTest, RefusedMessagesNeverDisplaceAdmittedOnes) {
   DispatchAll();
   EXPECT_EQ(std::ranges::count_if(heard, [](const Heard& h) { return h.raw[0] == kGood; }), 5);
   EXPECT_EQ(std::ranges::count_if(heard, [](const Heard& h) { return h.raw[0] == kBad; }), 256);
-  EXPECT_EQ(bus_->refused_dropped(), kForged - 256);
-  EXPECT_EQ(bus_->dropped(), 0);
+  EXPECT_FIELDS(*bus_, (refused_dropped(), kForged - 256), (dropped(), 0));
 }
 
 TEST_P(ScreenTest, RefusedMessagesAreBoundedByTheirBytes) {

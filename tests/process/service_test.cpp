@@ -5,7 +5,6 @@
 
 #include "tests/test.h"
 
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::service_test {

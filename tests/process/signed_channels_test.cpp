@@ -4,20 +4,12 @@
 
 #include "bus/bus_options.h"
 #include "bus/process.h"
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
-#include "forereach/advice_t.hpp"
-#include "forereach/command_t.hpp"
-#include "forereach/decision_t.hpp"
-#include "forereach/execution_event_t.hpp"
-#include "forereach/fault_t.hpp"
-#include "forereach/logger_status_t.hpp"
-#include "forereach/transition_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "logger/logger_node.h"
 #include "planner_bridge/planner_node.h"
 #include "simulator/sim_node.h"
 #include "tests/keys.h"
+#include "tests/messages.h"
 #include "tests/planner_bridge/tasks.h"
 #include "tests/process/process_fixture.h"
 
@@ -35,8 +27,7 @@ struct Listener {
   std::function<std::string()> state;
 };
 
-class SignedChannelsTest : public testing::TestWithParam<std::string> {
- protected:
+struct SignedChannelsTest : testing::TestWithParam<std::string> {
   SignedChannelsTest() {
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = MakeTestKeys(scratch_ / "keys");
@@ -148,34 +139,20 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "OBSTACLES")
     return Certifier([](int number) {
-      obstacles_t message = ToMessage({Obstacle::Circle(Vec({9.0 + number, 9}), 0.5)}, WallClockUs());
-      message.sequence = number;
-      return Encode(message);
+      return Encode(Sighted({Obstacle::Circle(Vec({9.0 + number, 9}), 0.5)}, WallClockUs(), number));
     });
   if (channel == "TRANSITION")
     return Certifier([](int number) {
-      transition_t transition{.utime = WallClockUs(), .sequence = number, .num_states = 4, .num_inputs = 2};
-      return Encode(transition);
+      return Encode(transition_t{.utime = WallClockUs(), .sequence = number, .num_states = 4, .num_inputs = 2});
     });
   if (channel == "CERTIFIER_STATUS")
     return Certifier([](int) {
-      certifier_status_t status{};
-      status.utime = WallClockUs();
-      status.started_utime = 1;
-      status.instance = 1;
-      status.state = certifier_status_t::ARMED;
+      certifier_status_t status{
+          .utime = WallClockUs(), .instance = 1, .started_utime = 1, .state = certifier_status_t::ARMED};
       return Encode(status);
     });
-  if (channel == "PLAN_DECISION")
-    return Planner([](int number) {
-      decision_t decision{.sequence = number};
-      return Encode(decision);
-    });
-  if (channel == "PLAN_ADVICE")
-    return Planner([](int number) {
-      advice_t advice{.sequence = number};
-      return Encode(advice);
-    });
+  if (channel == "PLAN_DECISION") return Planner([](int number) { return Encode(decision_t{.sequence = number}); });
+  if (channel == "PLAN_ADVICE") return Planner([](int number) { return Encode(advice_t{.sequence = number}); });
   if (channel == "PLAN_CERTIFIED")
     return Robot([](int number) {
       certified_plan_t certified{};
@@ -191,8 +168,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
   if (channel == "FAULT" || channel == "COMMAND")
     return Robot([channel](int number) {
       fault_t fault{.utime = WallClockUs(), .sequence = number, .cause = fault_t::SLICE_LEFT};
-      command_t reset{.utime = WallClockUs(), .kind = command_t::RESET};
-      return channel == "FAULT" ? Encode(fault) : Encode(reset);
+      return channel == "FAULT" ? Encode(fault) : Encode(command_t{.utime = WallClockUs(), .kind = command_t::RESET});
     });
   if (channel == "EXECUTION_EVENT")
     return Logger([](int number) {
@@ -200,8 +176,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
       return Encode(event);
     });
   return Logger([](int number) {  // of which every second one is lost
-    logger_status_t status{.utime = WallClockUs(), .sequence = 1000 + 2 * number};
-    return Encode(status);
+    return Encode(logger_status_t{.utime = WallClockUs(), .sequence = 1000 + 2 * number});
   });
 }
 
@@ -246,9 +221,7 @@ TEST_P(SignedChannelsTest, OnlyWhatItsSpeakerSignsNowHasAnEffect) {
     send_refused(
         Signer(*keys_, config_.bus.bus_name()).Sign(speaker, channel, listener_.make(++number), WallClockUs() + ahead));
   AwaitRefusals(refused);
-  EXPECT_EQ(listener_.state(), before);
-  EXPECT_EQ(listener_.bus->refusals().old, 2);
-  EXPECT_EQ(listener_.bus->refusals().ahead, 2);
+  EXPECT_FIELDS(listener_, (state(), before), (bus->refusals().old, 2), (bus->refusals().ahead, 2));
 
   Message genuine;
   for (int tries = 0; tries < 3 && listener_.state() == before; ++tries) {
@@ -261,8 +234,7 @@ TEST_P(SignedChannelsTest, OnlyWhatItsSpeakerSignsNowHasAnEffect) {
   const std::string after = listener_.state();
   send_refused(genuine);  // a second time
   AwaitRefusals(refused);
-  EXPECT_EQ(listener_.state(), after);
-  EXPECT_EQ(listener_.bus->refusals().all(), refused);
+  EXPECT_FIELDS(listener_, (state(), after), (bus->refusals().all(), refused));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, SignedChannelsTest, testing::ValuesIn([] {

@@ -7,7 +7,6 @@
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/codec.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::tail_test {
@@ -19,8 +18,7 @@ decision_t Decided(std::int64_t sequence, std::int16_t outcome, const std::strin
   return decision;
 }
 
-class TailTest : public testing::Test {
- protected:
+struct TailTest : testing::Test {
   std::unique_ptr<ChildProcess> Start(const std::vector<std::string>& options) const {
     std::vector<std::string> command{FOREREACH_PROGRAM, "tail", "--lcm-url", url_};
     command.insert(command.end(), options.begin(), options.end());
@@ -71,9 +69,7 @@ TEST_F(TailTest, WithAKeyOnlyAuthenticDecisionsAreShown) {
   const ScratchDirectory scratch;
   const std::string key = MakeTestKeys(scratch / "keys");
   const auto tail = Start({"--count", "1", "--key", key + "/verify.pub"});
-  BusOptions options;
-  options.url = url_;
-  options.key = key;
+  BusOptions options{.url = url_, .key = key};
   const auto open = OpenBus(url_);
   const auto certifier = OpenBusOfAllRoles(options);
   open->Publish("PLAN_DECISION", Decided(0, decision_t::CERTIFIED, "a stranger's"));

@@ -1,7 +1,6 @@
 // Two processes under one key on one stream: the certifier certifies nothing on what either of them says.
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
 #include "forereach/execution_event_t.hpp"
@@ -15,8 +14,7 @@ constexpr std::int64_t kTimeout = 1'000'000;  // of obstacles and of the robot's
 constexpr std::uint64_t kTrueOne = 0xaaaa, kOldOne = 0xbbbb;
 
 // A certifier on a signed bus. Only PLAN_CANDIDATE has a planner all the time.
-class TwoSendersTest : public testing::Test {
- protected:
+struct TwoSendersTest : testing::Test {
   TwoSendersTest() {
     config_.obstacles.clear();
     Begin();
@@ -26,13 +24,12 @@ class TwoSendersTest : public testing::Test {
     node_.reset();
     air_ = OpenAir(clock_, {"PLAN_DECISION", "PLAN_CERTIFIED", "PLAN_WITHDRAWN", "CERTIFIER_STATUS", "FAULT"});
     node_ = std::make_unique<CertifierNode>(config_, *air_, Clocks{clock_, clock_});
-    air_->Subscribe("PLAN_DECISION",
-                    [this](const Received& r) { decisions_.push_back(Decoded<decision_t>(r.bytes).value()); });
-    air_->Subscribe("PLAN_WITHDRAWN",
-                    [this](const Received& r) { withdrawals_.push_back(Decoded<withdrawal_t>(r.bytes).value()); });
-    air_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_t>(r.bytes).value(); });
-    air_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+    withdrawals_.clear();
+    faults_.clear();
+    Hear(*air_, "PLAN_DECISION", decisions_);
+    Hear(*air_, "PLAN_WITHDRAWN", withdrawals_);
+    Hear(*air_, "CERTIFIER_STATUS", status_);
+    Hear(*air_, "FAULT", faults_);
     planner_.emplace(*air_, Role::kPlanner, 1);
   }
 
@@ -89,8 +86,7 @@ class Watching final {
 
 const std::vector<Obstacle> kWall{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)};
 
-class TwoPerceptionsTest : public TwoSendersTest, public testing::WithParamInterface<int> {
- protected:
+struct TwoPerceptionsTest : TwoSendersTest, testing::WithParamInterface<int> {
   static std::int64_t Period() { return ObstacleSender::PeriodUs(GateOptions{}); }
   void ExpectCertified(const char* when) { EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << when; }
 };
@@ -106,9 +102,9 @@ TEST_P(TwoPerceptionsTest, TheWallOfTheTrueOneIsNeverCertifiedThrough) {
       if (!old_one_first || now_us_ - begin >= Period() / 2) true_one.Tick(now_us_);
       EXPECT_NE(Ask().outcome, decision_t::CERTIFIED) << now_us_ - begin << " us after the start";
     });
-    EXPECT_THAT(GetText(decisions_.back().message), HasSubstr("two senders are heard"));
-    EXPECT_THAT(GetText(decisions_.back().message), HasSubstr("000000000000aaaa"));
-    EXPECT_THAT(GetText(decisions_.back().message), HasSubstr("000000000000bbbb"));
+    EXPECT_THAT(
+        GetText(decisions_.back().message),
+        AllOf(HasSubstr("two senders are heard"), HasSubstr("000000000000aaaa"), HasSubstr("000000000000bbbb")));
     EXPECT_EQ(status_.obstacles_known, 0);
     EXPECT_THAT(GetText(status_.message), HasSubstr("two senders are heard"));
   }
@@ -162,9 +158,8 @@ TEST_P(PerceptionTest, OneThatSpeaksOnceIsForgottenAfterTheTimeout) {
 TEST_P(PerceptionTest, ASecondOneWhoseClockIsBehindIsASecondOne) {
   Watching one(*air_, kTrueOne, Period(), {});
   For(2 * kTimeout, [&] { one.Tick(now_us_); });
-  Speaking behind(*air_, Role::kPerception, kOldOne);
-  obstacles_t message = ToMessage(kWall, now_us_ - 1'500'000);
-  behind.Say("OBSTACLES", message, now_us_ - 1'500'000);
+  const std::int64_t behind = now_us_ - 1'500'000;
+  Speaking(*air_, Role::kPerception, kOldOne).Say("OBSTACLES", Sighted(kWall, behind), behind);
   EXPECT_NE(Ask().outcome, decision_t::CERTIFIED);
   EXPECT_THAT(GetText(decisions_.back().message), HasSubstr("two senders are heard"));
   EXPECT_TRUE(node_->gate().obstacles().empty()) << "but its message is not used";
@@ -202,41 +197,32 @@ TEST_P(PerceptionTest, AFloodOfStartsIsUnknownWhileItLastsAndNotLonger) {
 
 // ---- The robot's streams.
 
-class TwoRobotsTest : public TwoSendersTest {
- protected:
+struct TwoRobotsTest : TwoSendersTest {
   TwoRobotsTest() {
     config_.gate.obstacles = ObstaclesSource::kTask;
     config_.gate.needs_robot_state = true;
     Begin();
   }
-  void Stands(Speaking& robot, std::int64_t sequence) {
-    robot_state_t state{.utime = now_us_, .sequence = sequence, .mode = robot_state_t::STANDING};
-    state.executing_plan_id = state.executing_step = -1;
-    state.num_states = 4;
-    robot.Say("ROBOT_STATE", state, now_us_);
+  void Stands(Speaking& robot, std::int64_t sequence) { robot.Say("ROBOT_STATE", StateOf(now_us_, sequence), now_us_); }
+  // As many states of one that stands, a tenth of a second apart.
+  void StandsFor(Speaking& robot, int count, int first = 0) {
+    for (int i = 0; i < count; ++i, now_us_ += 100'000) Stands(robot, first + i), Run();
   }
   // At the first step of the plan. Of every second number, so that none of them follows another.
   void Executes(Speaking& robot, std::int64_t number, std::int64_t plan_id) {
-    robot_state_t state{.utime = now_us_,
-                        .sequence = 2 * number,
-                        .executing_plan_id = plan_id,
-                        .mode = robot_state_t::EXECUTING,
-                        .num_states = 4};
-    const candidate_plan_t plan = Candidate(plan_id);
-    std::ranges::copy(plan.initial_center, state.state);
+    robot_state_t state = StateOf(now_us_, 2 * number, plan_id, 0);
+    std::ranges::copy(Candidate(plan_id).initial_center, state.state);
     robot.Say("ROBOT_STATE", state, now_us_);
   }
   // 20 states of one robot that stands; then a certified plan. @return its plan_id.
   std::int64_t CertifyForOne(Speaking& robot) {
-    for (int i = 0; i < 20; ++i, now_us_ += 100'000) Stands(robot, i), Run();
+    StandsFor(robot, 20);
     EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
     return decisions_.back().plan_id;
   }
   // Says what makes every certificate void.
   void ContradictTheDeclaration(Speaking& robot) {
-    transition_t false_one = Step();
-    false_one.next_state[2] = 1;
-    robot.Say("TRANSITION", false_one, now_us_);
+    robot.Say("TRANSITION", AtRest(now_us_, 1), now_us_);
     Run();
     EXPECT_EQ(node_->gate().Status(now_us_).learned, 1);
   }
@@ -254,11 +240,6 @@ class TwoRobotsTest : public TwoSendersTest {
     Run();
     return withdrawals_.size() > sent;
   }
-  transition_t Step() const {
-    transition_t step{.utime = now_us_, .num_states = 4, .num_inputs = 2};
-    return step;
-  }
-
   Speaking one() { return {*air_, Role::kRobot, kTrueOne}; }
   Speaking other() { return {*air_, Role::kRobot, kOldOne}; }
 };
@@ -312,8 +293,7 @@ TEST_F(TwoRobotsTest, BothSilentIsARobotThatIsLost) {
 TEST_F(TwoRobotsTest, AReloadDoesNotArm) {
   const ScratchDirectory scratch;
   Speaking first = one(), second = other();
-  for (int i = 0; i < 20; ++i, now_us_ += 100'000) Stands(first, i), Run();
-  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  CertifyForOne(first);
   Stands(second, 0);
   Run();
   node_->Reload();  // of a task file that is not there: it stays as it is
@@ -324,21 +304,19 @@ TEST_F(TwoRobotsTest, AReloadDoesNotArm) {
 TEST_F(TwoRobotsTest, TransitionsOfTwoAreNotLearned) {
   Speaking first = one(), second = other();
   const auto learned = [&] { return node_->gate().Status(now_us_).learned; };
-  first.Say("TRANSITION", Step(), now_us_);
+  first.Say("TRANSITION", AtRest(now_us_), now_us_);
   Run();
   EXPECT_EQ(learned(), 1);
-  transition_t false_one = Step();
-  false_one.next_state[2] = 1;  // contradicts the declaration
-  second.Say("TRANSITION", false_one, now_us_);
+  second.Say("TRANSITION", AtRest(now_us_, 1), now_us_);
   Run();
   EXPECT_EQ(learned(), 1);
   EXPECT_TRUE(faults_.empty());
   now_us_ += kTimeout;
-  first.Say("TRANSITION", Step(), now_us_);
+  first.Say("TRANSITION", AtRest(now_us_), now_us_);
   Run();
   EXPECT_EQ(learned(), 1) << "the second one is still heard";
   now_us_ += 1;
-  transition_t another = Step();
+  transition_t another = AtRest(now_us_);
   another.state[0] = another.next_state[0] = 1;
   first.Say("TRANSITION", another, now_us_);
   Run();
@@ -351,8 +329,7 @@ TEST_F(TwoRobotsTest, NeitherOfTwoAnswersAWithdrawal) {
   CertifyForOne(first);
   ContradictTheDeclaration(first);
   ASSERT_FALSE(withdrawals_.empty());
-  execution_event_t accepted{.kind = execution_event_t::ACCEPTED};
-  first.Say("EXECUTION_EVENT", accepted, now_us_);
+  first.Say("EXECUTION_EVENT", execution_event_t{.kind = execution_event_t::ACCEPTED}, now_us_);
   Answer(second);
   EXPECT_TRUE(IsSentAgain());
   Answer(first);
@@ -383,8 +360,6 @@ TEST_F(TwoRobotsTest, NoneAnswersAWithdrawalWhileTheStatesOfTwoAreHeard) {
 TEST_F(TwoRobotsTest, APlanThatBeganWhileTwoWereHeardIsWithdrawnAsLongAsOneExecutesIt) {
   constexpr std::int64_t kRun = 2'500'000;  // the longest run of the plan after a state in which it is executed
   for (const std::int64_t after : {std::int64_t{0}, kRun, kRun + 1}) {
-    withdrawals_.clear();
-    faults_.clear();
     Begin();
     Speaking first = one(), second = other();
     const std::int64_t plan = CertifyForOne(first);
@@ -401,8 +376,6 @@ TEST_F(TwoRobotsTest, APlanThatBeganWhileTwoWereHeardIsWithdrawnAsLongAsOneExecu
 
 TEST_F(TwoRobotsTest, APlanThatTheSilentOneMayStillExecuteIsWithdrawnAndNotAnsweredByTheOther) {
   for (const std::int64_t silent : {kTimeout + 200'000, std::int64_t{2'500'000}, std::int64_t{2'500'001}}) {
-    withdrawals_.clear();
-    faults_.clear();
     Begin();
     Speaking first = one(), second = other();
     const std::int64_t plan = CertifyForOne(first);
@@ -429,7 +402,7 @@ TEST_F(TwoRobotsTest, APlanThatTheOneThatFellSilentExecutesStaysThoughTheOtherSt
   Executes(first, 50, plan);
   Executes(second, 0, plan);
   Run();
-  for (int i = 101; i < 116; ++i, now_us_ += 100'000) Stands(first, i), Run();
+  StandsFor(first, 15, 101);
   ContradictTheDeclaration(first);
   EXPECT_EQ(withdrawals_.size(), 1u);
 }
@@ -440,13 +413,11 @@ TEST_F(TwoRobotsTest, APlanThatIsNotKnownIsWithdrawnThoughTwoAreHeard) {
   Executes(first, 0, 77);
   Run();
   ASSERT_EQ(withdrawals_.size(), 1u);
-  EXPECT_EQ(withdrawals_[0].plan_id, 77);
-  EXPECT_EQ(withdrawals_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_FIELDS(withdrawals_[0], (plan_id, 77), (cause, withdrawal_t::UNKNOWN_PLAN));
 }
 
 TEST_F(TwoRobotsTest, ThatOneHasFinishedSwitchesNoFaultOffForTheOther) {
   for (const bool are_two : {true, false}) {
-    faults_.clear();
     Begin();
     Speaking first = one(), second = other();
     for (int i = 0; i < 3; ++i, now_us_ += 100'000) {
@@ -454,17 +425,14 @@ TEST_F(TwoRobotsTest, ThatOneHasFinishedSwitchesNoFaultOffForTheOther) {
       if (are_two) Stands(second, i);
       Run();
     }
-    robot_state_t finished{.utime = now_us_, .sequence = 3, .mode = robot_state_t::FINISHED};
-    finished.executing_plan_id = finished.executing_step = -1;
-    finished.num_states = 4;
+    robot_state_t finished = StateOf(now_us_, 3);
+    finished.mode = robot_state_t::FINISHED;
     (are_two ? second : first).Say("ROBOT_STATE", finished, now_us_);
     Run();
     now_us_ += kTimeout + 1;
     Run();
     ASSERT_EQ(faults_.size(), are_two ? 1u : 0u);
-    if (are_two) {
-      EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
-    }
+    if (are_two) EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
   }
 }
 
@@ -505,10 +473,7 @@ TEST_F(TwoRobotsTest, WithoutArmingAStateOfAClockThatIsOffIsForgotten) {
     config_.gate.needs_robot_state = needs_robot;
     Begin();
     Speaking robot = one();
-    robot_state_t late{.utime = now_us_ - 300'000, .mode = robot_state_t::STANDING};
-    late.executing_plan_id = late.executing_step = -1;
-    late.num_states = 4;
-    robot.Say("ROBOT_STATE", late, now_us_);
+    robot.Say("ROBOT_STATE", StateOf(now_us_ - 300'000), now_us_);
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
     now_us_ += kTimeout;
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
@@ -521,12 +486,8 @@ TEST_F(TwoRobotsTest, WithoutArmingAStateOfAClockThatIsOffIsForgotten) {
 // One that is left running may be the one that errs.
 TEST_F(TwoRobotsTest, WhatOneOfThemReportsAsWrongCounts) {
   Speaking first = one(), second = other();
-  for (int i = 0; i < 20; ++i, now_us_ += 100'000) Stands(first, i), Run();
-  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  robot_state_t state{.utime = now_us_,
-                      .executing_plan_id = decisions_.back().plan_id,
-                      .mode = robot_state_t::EXECUTING,
-                      .num_states = 4};
+  robot_state_t state = StateOf(now_us_, 0, CertifyForOne(first), 0);
+  state.utime = now_us_;
   state.state[0] = 10;
   second.Say("ROBOT_STATE", state, now_us_);
   Run();
@@ -546,8 +507,7 @@ TEST_F(TwoSendersTest, TwoOperatorsAndTwoPlannersAreHeard) {
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
   EXPECT_EQ(decisions_.size(), 2u);
   for (const std::uint64_t id : {1u, 2u}) {
-    command_t reset{.utime = now_us_, .kind = 99};
-    Speaking(*air_, Role::kOperator, id).Say("COMMAND", reset, now_us_);
+    Speaking(*air_, Role::kOperator, id).Say("COMMAND", command_t{.utime = now_us_, .kind = 99}, now_us_);
   }
   const std::int64_t refused = status_.messages_refused;
   For(kTimeout, [&] { one.Tick(now_us_); });
@@ -558,8 +518,7 @@ TEST_F(TwoSendersTest, TwoOperatorsAndTwoPlannersAreHeard) {
 
 // The certifier has one ahead of it in the record of an hour in which a clock was ahead, and starts again.
 TEST_F(TwoRobotsTest, ATransitionThatWasSignedWhileAClockWasAheadDoesNotLatchTheNextCertifier) {
-  transition_t false_one = Step();
-  false_one.next_state[2] = 1;
+  const transition_t false_one = AtRest(now_us_, 1);
   std::vector<std::vector<std::uint8_t>> recorded;
   for (const std::int64_t off :
        std::initializer_list<std::int64_t>{-3'600'000'000, -1'000'000, -1, 1'000'001, 10'000'000, 3'600'000'000})
@@ -569,8 +528,7 @@ TEST_F(TwoRobotsTest, ATransitionThatWasSignedWhileAClockWasAheadDoesNotLatchThe
   Run();
   EXPECT_TRUE(faults_.empty());
   EXPECT_EQ(node_->gate().Status(now_us_).learned, 0);
-  EXPECT_EQ(air_->refusals().all(), 6);
-  EXPECT_EQ(air_->refusals().ahead, 3);
+  EXPECT_FIELDS(air_->refusals(), (all(), 6), (ahead, 3));
   For(kTimeout, [] {});
   EXPECT_EQ(status_.refused_replayed, 6) << "the heartbeat says it";
 }
@@ -582,11 +540,10 @@ TEST_F(TwoRobotsTest, TheHeartbeatNamesARoleWhoseClockIsApart) {
     const obstacles_t obstacles{.utime = now_us_ + seconds * 1'000'000};
     Speaking perception(*air_, Role::kPerception, 5);
     For(kTimeout, [&] { perception.Say("OBSTACLES", obstacles, now_us_ + seconds * 1'000'000); });
-    EXPECT_THAT(GetText(status_.message),
-                testing::StartsWith(seconds > 0 ? "perception's messages are signed 600 s ahead of"
-                                                : "perception's messages are signed 600 s before"));
+    EXPECT_THAT(GetText(status_.message), StartsWith(seconds > 0 ? "perception's messages are signed 600 s ahead of"
+                                                                 : "perception's messages are signed 600 s before"));
     For(2 * kTimeout, [] {});
-    EXPECT_THAT(GetText(status_.message), testing::Not(HasSubstr("perception")));
+    EXPECT_THAT(GetText(status_.message), Not(HasSubstr("perception")));
   }
 }
 

@@ -18,8 +18,7 @@
 
 namespace forereach::udp_receiver_test {
 
-class UdpReceiverTest : public testing::Test {
- protected:
+struct UdpReceiverTest : testing::Test {
   explicit UdpReceiverTest(const std::string& options = "") : url_(PrivateBusUrl() + options) {}
 
   void Deliver(std::string_view channel, std::int64_t utime) {
@@ -65,15 +64,8 @@ TEST_F(UdpReceiverTest, CountsWhatItRefusesByItsCause) {
   sender_.Send(Bytes(ShortMessage("LAST", {})));
   ASSERT_TRUE(HeardLast("LAST"));
   const DatagramCounts counts = receiver_.counts();
-  EXPECT_EQ(counts.messages, 1);
-  EXPECT_EQ(counts.too_short, 1);
-  EXPECT_EQ(counts.fragments, 1 + 20 + 5);
-  EXPECT_EQ(counts.unterminated_names, 5);
-  EXPECT_EQ(counts.bad_names, 1);
-  EXPECT_EQ(counts.not_lcm, 1);
-  EXPECT_EQ(counts.truncated, 0);
-  EXPECT_EQ(counts.lost_by_kernel, 0);
-  EXPECT_EQ(counts.receive_errors, 0);
+  EXPECT_FIELDS(counts, (messages, 1), (too_short, 1), (fragments, 1 + 20 + 5), (unterminated_names, 5), (bad_names, 1),
+                (not_lcm, 1), (truncated, 0), (lost_by_kernel, 0), (receive_errors, 0));
   EXPECT_THAT(heard(), ElementsAre("LAST"));
 }
 
@@ -163,8 +155,7 @@ TEST_F(UdpReceiverTest, NoDatagramMakesItsMemoryGrow) {
 #endif
 }
 
-class SmallBufferTest : public UdpReceiverTest {
- protected:
+struct SmallBufferTest : UdpReceiverTest {
   SmallBufferTest() : UdpReceiverTest("&recv_buf_size=20000") {}
 };
 
@@ -187,8 +178,7 @@ TEST_F(SmallBufferTest, CountsWhatTheKernelCouldNotKeep) {
 
 TEST(BusCountsTest, WhatTheKernelLostIsDroppedByTheBus) {
   const std::string url = PrivateBusUrl() + "&recv_buf_size=20000";
-  class SlowScreen final : public Screen {
-   public:
+  struct SlowScreen final : Screen {
     std::optional<Bytes> Admit(const std::string&, Bytes raw) override {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
       return raw;

@@ -2,14 +2,17 @@
 #include "tests/test.h"
 
 #include "tests/keys.h"
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::usage_test {
 
-class UsageTest : public testing::TestWithParam<std::pair<const char*, const char*>> {
- protected:
-  std::string program() const { return GetParam().second; }
+struct Program {
+  const char *name, *path;
+  friend void PrintTo(const Program& program, std::ostream* out) { *out << program.name; }
+};
+
+struct UsageTest : testing::TestWithParam<Program> {
+  std::string program() const { return GetParam().path; }
 
   // The last line on standard error, without its end; LCM itself may have written lines before it.
   static std::string LastLine(const ChildProcess& process) {
@@ -22,10 +25,10 @@ class UsageTest : public testing::TestWithParam<std::pair<const char*, const cha
 };
 
 INSTANTIATE_TEST_SUITE_P(Processes, UsageTest,
-                         testing::Values(std::pair{"certifier", FOREREACH_CERTIFIER},
-                                         std::pair{"planner", FOREREACH_PLANNER}, std::pair{"logger", FOREREACH_LOGGER},
-                                         std::pair{"robot_sim", FOREREACH_ROBOT_SIM}),
-                         [](const auto& instance) { return std::string(instance.param.first); });
+                         testing::Values(Program{"certifier", FOREREACH_CERTIFIER},
+                                         Program{"planner", FOREREACH_PLANNER}, Program{"logger", FOREREACH_LOGGER},
+                                         Program{"robot_sim", FOREREACH_ROBOT_SIM}),
+                         [](const auto& instance) { return instance.param.name; });
 
 TEST_P(UsageTest, HelpTeachesWithAnExample) {
   ChildProcess process({program(), "--help"});
@@ -70,8 +73,7 @@ TEST_P(UsageTest, VersionIsNameAndVersion) {
   ChildProcess process({program(), "--version"});
   EXPECT_EQ(process.WaitForExit(), 0);
   const std::string name = program().substr(program().rfind('/') + 1);
-  EXPECT_EQ(process.output(), name + " " FOREREACH_VERSION "\n");
-  EXPECT_EQ(process.error(), "");
+  EXPECT_FIELDS(process, (output(), name + " " FOREREACH_VERSION "\n"), (error(), ""));
 }
 
 TEST_P(UsageTest, AMissingFileIsNamedInOneLine) {

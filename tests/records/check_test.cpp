@@ -2,30 +2,26 @@
 
 #include <cctype>
 
-#include <sqlite3.h>
-
 #include "tests/test.h"
 
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/kept_tasks.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
+#include "tests/records/sql.h"
 
 namespace forereach::check_test {
 
-class CheckTest : public testing::Test {
- protected:
+struct CheckTest : testing::Test {
   // A log of five execution events, every one with its row.
   CheckTest() : database_(scratch_ / "decisions.sqlite") {
     EventLogWriter writer(log_);
     for (std::int64_t i = 0; i < 5; ++i)
       writer.Append(i, "EXECUTION_EVENT", Encode(MakeEvent(i, execution_event_t::STARTED)));
     EXPECT_TRUE(writer.Flush());
-    Interpreter interpreter({}, "a.lcmlog");
-    Rows rows;
-    for (const LogEvent& event : ReadLog(log_).events) interpreter.Observe(event, rows);
+    const Rows rows = RowsOf(log_, "a.lcmlog");
     database_.BeginRun("a.lcmlog", 1);
     EXPECT_EQ(database_.Write(rows, "a.lcmlog", 5), 5);
     database_.EndRun("a.lcmlog", 2);
@@ -67,8 +63,7 @@ TEST_F(CheckTest, ACutTailAndDamageAreSaid) {
   WriteBytes(log_, bytes);
   const LogCheck check = Check();
   EXPECT_THAT(check.missing, ElementsAre(1, 4));
-  EXPECT_EQ(check.damage.places, 1);
-  EXPECT_EQ(check.cut_bytes, static_cast<std::int64_t>(kRecord) - 10);
+  EXPECT_FIELDS(check, (damage.places, 1), (cut_bytes, static_cast<std::int64_t>(kRecord) - 10));
   EXPECT_THAT(ToText({check}), HasSubstr("  missing: event 1, 4\n"));
   EXPECT_EQ(ToJson({check})[0]["missing"], (std::vector<int>{1, 4}));
 }
@@ -111,7 +106,7 @@ TEST_F(CheckTest, WithoutADatabaseItSaysSoAndMakesNone) {
 }
 
 TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
-  const Config task = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  const Config task = LoadConfig(kCourseTask);
   KeptTasks(scratch_.path()).Keep(CopyTask(task));
   decision_t decision = MakeDecision(MakeCandidate(0, 1), 0, decision_t::CERTIFIED, decision_t::CAUSE_NONE);
   SetDigest(decision.config_digest, task.grounds.config);
@@ -139,8 +134,7 @@ TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
 }
 
 // A log of candidates, decisions and execution events, each with its row, and with gaps.
-class RowsTest : public testing::Test {
- protected:
+struct RowsTest : testing::Test {
   RowsTest() {
     EventLogWriter writer(log_);
     std::int64_t utime = 1000;
@@ -161,9 +155,7 @@ class RowsTest : public testing::Test {
     }
     EXPECT_TRUE(writer.Flush());
     Database database(path_);
-    Interpreter interpreter({}, "a.lcmlog");
-    Rows rows;
-    for (const LogEvent& event : ReadLog(log_).events) interpreter.Observe(event, rows);
+    Rows rows = RowsOf(log_, "a.lcmlog");
     rows.gaps.push_back({{"a.lcmlog", -1, ""}, "CAMERA", "", -1, -1, 7, 1, "queue"});
     database.BeginRun("a.lcmlog", 1);
     EXPECT_EQ(database.Write(rows, "a.lcmlog", 12), 4 + 4 + 6 + 1);
@@ -173,20 +165,7 @@ class RowsTest : public testing::Test {
 
   void TearDown() override { EXPECT_TRUE(Check({}).empty()) << "what was damaged was made whole again"; }
 
-  // The rows of a statement's result, as texts.
-  std::vector<std::vector<std::string>> Sql(const std::string& statement) const {
-    sqlite3* handle = nullptr;
-    EXPECT_EQ(sqlite3_open(path_.c_str(), &handle), SQLITE_OK);
-    std::vector<std::vector<std::string>> rows;
-    const auto add = [](void* all, int count, char** values, char**) {
-      auto& row = static_cast<std::vector<std::vector<std::string>>*>(all)->emplace_back();
-      for (int i = 0; i < count; ++i) row.emplace_back(values[i] ? values[i] : "");
-      return 0;
-    };
-    EXPECT_EQ(sqlite3_exec(handle, statement.c_str(), add, &rows, nullptr), SQLITE_OK) << statement;
-    sqlite3_close(handle);
-    return rows;
-  }
+  auto Sql(const std::string& statement) const { return forereach::Sql(path_, statement); }
 
   // What is amiss in a copy of the database after the statement.
   [[nodiscard]] std::vector<std::string> Check(const std::string& statement) const {
@@ -256,7 +235,7 @@ TEST_F(RowsTest, TheSentenceNamesTableEventAndColumn) {
 TEST_F(RowsTest, WhatALoggerThatIsStillRunningHasNotWrittenYetIsNotMissing) {
   const std::string unended = "UPDATE runs SET end_utime = NULL, events = 4; ";
   EXPECT_THAT(Check(unended + "DELETE FROM decisions WHERE event_number >= 4"), IsEmpty());
-  EXPECT_THAT(Check(unended + "DELETE FROM decisions WHERE event_number >= 1"), testing::SizeIs(1));
+  EXPECT_THAT(Check(unended + "DELETE FROM decisions WHERE event_number >= 1"), SizeIs(1));
 }
 
 TEST_F(RowsTest, OfARunWithKeysOnlyAuthenticMessagesHaveRows) {

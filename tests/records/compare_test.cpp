@@ -6,18 +6,14 @@
 #include "records/database.h"
 #include "records/timeline.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 
 namespace forereach::compare_test {
 
-const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
-const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
-
-class CompareTest : public testing::Test {
- protected:
-  Output CompareUnder(const std::string& config, const std::string& logs = kLog, const std::string& more = "") const {
+struct CompareTest : testing::Test {
+  Output CompareUnder(const std::string& config, const std::string& logs = kCourseLog,
+                      const std::string& more = "") const {
     return Forereach("replay '" + logs + "' --compare --config '" + config + "' " + more + " 2>&1");
   }
 
@@ -25,20 +21,19 @@ class CompareTest : public testing::Test {
 };
 
 TEST_F(CompareTest, TheSameTaskChangesNothing) {
-  const Output output = CompareUnder(kConfig);
+  const Output output = CompareUnder(kCourseTask);
   EXPECT_EQ(output.code, 0) << output.text;
-  EXPECT_EQ(output.text, "compare: had " + kConfig + " been declared, 0 of " + std::to_string(kCourseAbstained) +
+  EXPECT_EQ(output.text, "compare: had " + kCourseTask + " been declared, 0 of " + std::to_string(kCourseAbstained) +
                              " abstentions and rejections would have been certificates, and none of the " +
                              std::to_string(kCourseCertified) + " certificates lost\n");
 }
 
 TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
-  const Config task = LoadConfig(kConfig);
+  const Config task = LoadConfig(kCourseTask);
   Config free = task;
   free.obstacles.clear();
-  const Comparison none = Compare({kLog}, free);
-  EXPECT_EQ(none.candidates, kCourseDecisions);
-  EXPECT_EQ(none.certificates, kCourseCertified);
+  const Comparison none = Compare({kCourseLog}, free);
+  EXPECT_FIELDS(none, (candidates, kCourseDecisions), (certificates, kCourseCertified));
   EXPECT_EQ(none.num_lost(), 0) << "without obstacles every certificate stands";
   std::int64_t safety = 0;
   class Counter final : public TimelineUser {
@@ -52,7 +47,7 @@ TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
     std::int64_t& count_;
   } counter(safety);
   Timeline timeline(task, {&counter});
-  timeline.Read({kLog}, false);
+  timeline.Read({kCourseLog}, false);
   EXPECT_GT(safety, 0);
   std::int64_t gained_of_safety = 0;
   for (const auto& [why, count] : none.gained) {
@@ -67,12 +62,12 @@ TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
 }
 
 TEST_F(CompareTest, ACertificateThatIsLostIsNamed) {
-  Config task = LoadConfig(kConfig);
+  Config task = LoadConfig(kCourseTask);
   auto problem = std::make_shared<Problem>(*task.problem);
   problem->declaration.noise_bound *= 100;
   problem->declaration.noise_bound.array() += 0.5;
   task.problem = problem;
-  const Comparison compared = Compare({kLog}, task);
+  const Comparison compared = Compare({kCourseLog}, task);
   EXPECT_EQ(compared.num_gained(), 0);
   EXPECT_GT(compared.num_lost(), 0);
   ASSERT_FALSE(compared.lost_plans.empty());
@@ -80,17 +75,14 @@ TEST_F(CompareTest, ACertificateThatIsLostIsNamed) {
   EXPECT_THAT(compared.lost_plans[0], HasSubstr("event "));
   Comparison twice = compared;
   twice += compared;
-  EXPECT_EQ(twice.num_lost(), 2 * compared.num_lost());
-  EXPECT_EQ(twice.candidates, 2 * kCourseDecisions);
+  EXPECT_FIELDS(twice, (num_lost(), 2 * compared.num_lost()), (candidates, 2 * kCourseDecisions));
 }
 
 TEST_F(CompareTest, PrintsJson) {
-  const Output output = CompareUnder(kConfig, kLog, "--json");
+  const Output output = CompareUnder(kCourseTask, kCourseLog, "--json");
   EXPECT_EQ(output.code, 0) << output.text;
   const auto document = nlohmann::json::parse(output.text);
-  EXPECT_EQ(document["candidates"], kCourseDecisions);
-  EXPECT_EQ(document["gained"], 0);
-  EXPECT_EQ(document["refused_alike"], kCourseAbstained);
+  EXPECT_THAT(document, Holds({{"candidates", kCourseDecisions}, {"gained", 0}, {"refused_alike", kCourseAbstained}}));
   EXPECT_TRUE(document["lost_by"].empty());
 }
 
@@ -100,29 +92,29 @@ TEST_F(CompareTest, ADirectoryIsReplayedAndCompared) {
   {
     Database database(directory + "/decisions.sqlite");
     for (const char* name : {"events-1.lcmlog", "events-2.lcmlog"}) {
-      std::filesystem::copy_file(kLog, directory + "/" + name);
+      std::filesystem::copy_file(kCourseLog, directory + "/" + name);
       database.BeginRun(name, 3);
     }
   }
-  const Output replay = Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1");
+  const Output replay = Forereach("replay '" + directory + "' --config '" + kCourseTask + "' 2>&1");
   EXPECT_EQ(replay.code, 0) << replay.text;
   EXPECT_THAT(replay.text, HasSubstr("replay: " + std::to_string(2 * kCourseDecisions) + " candidates, " +
                                      std::to_string(2 * kCourseDecisions) + " decisions agree, 0 differ"));
-  EXPECT_THAT(CompareUnder(kConfig, directory).text,
+  EXPECT_THAT(CompareUnder(kCourseTask, directory).text,
               HasSubstr("none of the " + std::to_string(2 * kCourseCertified) + " certificates lost"));
   std::filesystem::remove(directory + "/events-1.lcmlog");
-  EXPECT_THAT(Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1"),
+  EXPECT_THAT(Forereach("replay '" + directory + "' --config '" + kCourseTask + "' 2>&1"),
               Exits(1, "events-1.lcmlog: the log is not in the database's directory"));
-  EXPECT_EQ(Forereach("replay '" + directory + "' '" + directory + "' --config '" + kConfig + "' 2>&1").code, 2);
+  EXPECT_EQ(Forereach("replay '" + directory + "' '" + directory + "' --config '" + kCourseTask + "' 2>&1").code, 2);
 }
 
 // Every line about a plan names its robot.
 TEST_F(CompareTest, ManyRobotsAreToldApart) {
   for (const char* robot : {"a", "b"}) {
     std::filesystem::create_directories(scratch_ / ("night/" + std::string(robot)));
-    std::filesystem::copy_file(kLog, scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
+    std::filesystem::copy_file(kCourseLog, scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
   }
-  const Output output = CompareUnder(kConfig, scratch_ / "night", "--json");
+  const Output output = CompareUnder(kCourseTask, scratch_ / "night", "--json");
   const auto document = nlohmann::json::parse(output.text);
   ASSERT_EQ(document["by_robot"].size(), 2u) << output.text;
   EXPECT_EQ(document["by_robot"][0]["robot"], scratch_ / "night/a");
@@ -133,8 +125,9 @@ TEST_F(CompareTest, ManyRobotsAreToldApart) {
 }
 
 TEST_F(CompareTest, RefusesToCompareWithoutOneTask) {
-  EXPECT_EQ(Forereach("replay '" + kLog + "' --compare 2>&1").code, 2);
-  EXPECT_EQ(Forereach("replay '" + kLog + "' --compare --other-task --config '" + kConfig + "' 2>&1").code, 2);
+  EXPECT_EQ(Forereach("replay '" + kCourseLog + "' --compare 2>&1").code, 2);
+  EXPECT_EQ(Forereach("replay '" + kCourseLog + "' --compare --other-task --config '" + kCourseTask + "' 2>&1").code,
+            2);
 }
 
 }  // namespace forereach::compare_test

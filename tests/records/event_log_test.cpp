@@ -1,23 +1,20 @@
 #include "records/event_log.h"
 
-#include <csignal>
-
 #include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <unistd.h>
 #include <lcm/lcm-cpp.hpp>
 
 #include "tests/test.h"
 
+#include "tests/file_size_limit.h"
 #include "tests/records/logs.h"
 
 namespace forereach::event_log_test {
 
 constexpr int kHeader = 28;
 
-class EventLog : public testing::Test {
- protected:
+struct EventLog : testing::Test {
   const ScratchDirectory scratch_;
   const std::string log_ = scratch_ / "log";
 };
@@ -47,14 +44,11 @@ TEST_F(EventLog, EventsSurviveARoundTrip) {
   WriteSample(log_);
   const LogContents contents = ReadLog(log_);
   ASSERT_EQ(contents.events.size(), 5u);
-  EXPECT_EQ(contents.end, LogStatus::kEnd);
-  EXPECT_EQ(contents.damage.places, 0);
+  EXPECT_FIELDS(contents, (end, LogStatus::kEnd), (damage.places, 0));
   for (int i = 0; i < 5; ++i) {
     const LogEvent& event = contents.events[static_cast<std::size_t>(i)];
-    EXPECT_EQ(event.number, i);
-    EXPECT_EQ(event.utime, 1'000'000 + i);
-    EXPECT_EQ(event.channel, "CHANNEL_" + std::to_string(i));
-    EXPECT_EQ(event.data, std::vector<std::uint8_t>(static_cast<std::size_t>(10 * i), static_cast<std::uint8_t>(i)));
+    EXPECT_FIELDS(event, (number, i), (utime, 1'000'000 + i), (channel, "CHANNEL_" + std::to_string(i)),
+                  (data, std::vector<std::uint8_t>(static_cast<std::size_t>(10 * i), static_cast<std::uint8_t>(i))));
   }
 }
 
@@ -62,8 +56,7 @@ TEST_F(EventLog, OffsetIsTheFileSizeAfterFlush) {
   EventLogWriter writer(log_);
   const std::vector<std::uint8_t> data(7);
   writer.Append(1, "C", data);
-  EXPECT_EQ(writer.offset(), 0);
-  EXPECT_EQ(writer.pending_bytes(), kHeader + 1 + 7);
+  EXPECT_FIELDS(writer, (offset(), 0), (pending_bytes(), kHeader + 1 + 7));
   ASSERT_TRUE(writer.Flush());
   EXPECT_EQ(writer.offset(), kHeader + 1 + 7);
   EXPECT_EQ(std::filesystem::file_size(log_), static_cast<std::uintmax_t>(writer.offset()));
@@ -76,9 +69,7 @@ TEST_F(EventLog, LcmReadsOurFile) {
   for (int i = 0; i < 5; ++i) {
     const lcm::LogEvent* event = file.readNextEvent();
     ASSERT_NE(event, nullptr) << i;
-    EXPECT_EQ(event->eventnum, i);
-    EXPECT_EQ(event->timestamp, 1'000'000 + i);
-    EXPECT_EQ(event->channel, "CHANNEL_" + std::to_string(i));
+    EXPECT_FIELDS(*event, (eventnum, i), (timestamp, 1'000'000 + i), (channel, "CHANNEL_" + std::to_string(i)));
     ASSERT_EQ(event->datalen, 10 * i);
     for (int k = 0; k < event->datalen; ++k) EXPECT_EQ(static_cast<std::uint8_t*>(event->data)[k], i);
   }
@@ -99,9 +90,7 @@ TEST_F(EventLog, WeReadLcmsFile) {
   }
   const LogContents contents = ReadLog(log_);
   ASSERT_EQ(contents.events.size(), 3u);
-  EXPECT_EQ(contents.end, LogStatus::kEnd);
-  EXPECT_EQ(contents.events[2].number, 2);
-  EXPECT_EQ(contents.events[2].channel, "FROM_LCM");
+  EXPECT_FIELDS(contents, (end, LogStatus::kEnd), (events[2].number, 2), (events[2].channel, "FROM_LCM"));
   EXPECT_EQ(std::string(contents.events[2].data.begin(), contents.events[2].data.end()), data);
 }
 
@@ -120,21 +109,17 @@ TEST_F(EventLog, ALogCutInsideItsLastRecordKeepsTheOthers) {
     SCOPED_TRACE(size);
     WriteBytes(scratch_ / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
     const LogContents contents = ReadLog(scratch_ / "cut");
-    EXPECT_EQ(contents.events.size(), 4u);
-    EXPECT_EQ(contents.end, size == last ? LogStatus::kEnd : LogStatus::kCutTail);
-    EXPECT_EQ(contents.damage.places, 0);
+    EXPECT_FIELDS(contents, (events.size(), 4u), (end, size == last ? LogStatus::kEnd : LogStatus::kCutTail),
+                  (damage.places, 0));
 
     EventLogWriter writer(scratch_ / "cut");
-    EXPECT_EQ(writer.recovery().events, 4);
-    EXPECT_EQ(writer.recovery().cut_bytes, static_cast<std::int64_t>(size - last));
-    EXPECT_EQ(writer.recovery().damage.places, 0);
-    EXPECT_EQ(writer.recovery().last_utime, 1'000'003);
+    EXPECT_FIELDS(writer.recovery(), (events, 4), (cut_bytes, static_cast<std::int64_t>(size - last)),
+                  (damage.places, 0), (last_utime, 1'000'003));
     EXPECT_EQ(writer.Append(7, "AFTER", {}), 4);
     ASSERT_TRUE(writer.Flush());
     const LogContents mended = ReadLog(scratch_ / "cut");
     ASSERT_EQ(mended.events.size(), 5u);
-    EXPECT_EQ(mended.end, LogStatus::kEnd);
-    EXPECT_EQ(mended.events[4].channel, "AFTER");
+    EXPECT_FIELDS(mended, (end, LogStatus::kEnd), (events[4].channel, "AFTER"));
   }
 }
 
@@ -148,12 +133,9 @@ TEST_P(CorruptLength, ARecordWithACorruptLengthIsTheOnlyOneLost) {
     PutLength(bytes, RecordOffset(2) + field, GetParam());
     WriteBytes(scratch_ / "bad", bytes);
     const LogContents contents = ReadLog(scratch_ / "bad");
-    EXPECT_EQ(contents.end, LogStatus::kEnd);
-    EXPECT_EQ(contents.damage.places, 1);
-    EXPECT_EQ(contents.damage.bytes, kHeader + 9 + 20);
+    EXPECT_FIELDS(contents, (end, LogStatus::kEnd), (damage.places, 1), (damage.bytes, kHeader + 9 + 20));
     ASSERT_EQ(contents.events.size(), 4u);
-    EXPECT_EQ(contents.events[2].number, 3);
-    EXPECT_EQ(contents.events[3].number, 4);
+    EXPECT_FIELDS(contents, (events[2].number, 3), (events[3].number, 4));
   }
 }
 
@@ -202,8 +184,7 @@ TEST_F(EventLog, BytesCutOutCostThatRecordOnly) {
     WriteBytes(log_, bytes);
     const LogContents contents = ReadLog(log_);
     ASSERT_EQ(contents.events.size(), 4u) << cut;
-    EXPECT_EQ(contents.events[2].number, 3);
-    EXPECT_EQ(contents.damage.places, 1);
+    EXPECT_FIELDS(contents, (events[2].number, 3), (damage.places, 1));
   }
 }
 
@@ -223,9 +204,7 @@ TEST_F(EventLog, RecoveryKeepsWhatFollowsDamage) {
   bytes.erase(bytes.end() - 3, bytes.end());
   WriteBytes(log_, bytes);
   const EventLogWriter writer(log_);
-  EXPECT_EQ(writer.recovery().events, 3);
-  EXPECT_EQ(writer.recovery().damage.places, 1);
-  EXPECT_EQ(writer.recovery().cut_bytes, kHeader + 9 + 40 - 3);
+  EXPECT_FIELDS(writer.recovery(), (events, 3), (damage.places, 1), (cut_bytes, kHeader + 9 + 40 - 3));
   EXPECT_EQ(std::filesystem::file_size(log_), RecordOffset(4));
   EXPECT_EQ(writer.next_number(), 4);
 }
@@ -237,8 +216,7 @@ TEST_F(EventLog, RecoveryRemovesNoGarbage) {
   bytes.resize(size + 100);
   WriteBytes(log_, bytes);
   EventLogWriter writer(log_);
-  EXPECT_EQ(writer.recovery().cut_bytes, 0);
-  EXPECT_EQ(writer.recovery().damage.bytes, 100);
+  EXPECT_FIELDS(writer.recovery(), (cut_bytes, 0), (damage.bytes, 100));
   writer.Append(9, "AFTER", {});
   ASSERT_TRUE(writer.Flush());
   const LogContents contents = ReadLog(log_);
@@ -251,23 +229,6 @@ TEST_F(EventLog, RefusesASecondWriter) {
   const EventLogWriter writer(log_);
   EXPECT_THROW(EventLogWriter{log_}, LogError);
 }
-
-/** While it lives, no file of this process grows beyond so many bytes: writes stop there and fail. */
-class FileSizeLimit final {
- public:
-  explicit FileSizeLimit(std::int64_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    EXPECT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
-    const rlimit limit{static_cast<rlim_t>(bytes), before_.rlim_max};
-    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
-  }
-  ~FileSizeLimit() { EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &before_), 0); }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 // A flush fails half-way, and the file cannot be cut back: it is sealed against that here.
 TEST_F(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
@@ -282,7 +243,7 @@ TEST_F(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
     return writer.Flush();
   };
   const auto flush_with_room_for_half = [&](const std::string& channel) {
-    const FileSizeLimit limit(writer.offset() + 50);
+    const FileSizeLimit limit(static_cast<std::uintmax_t>(writer.offset()) + 50);
     return flush(channel);
   };
   EXPECT_TRUE(flush("KEPT_1"));
@@ -296,11 +257,8 @@ TEST_F(EventLog, KeepsConfirmedEventsWhenAFailedFlushCannotBeUndone) {
   const LogContents contents = ReadLog(path);
   ::close(file);
   ASSERT_EQ(contents.events.size(), 3u);
-  EXPECT_EQ(contents.events[0].channel, "KEPT_1");
-  EXPECT_EQ(contents.events[1].channel, "KEPT_3");
-  EXPECT_EQ(contents.events[2].channel, "KEPT_5");
-  EXPECT_EQ(contents.end, LogStatus::kEnd);
-  EXPECT_EQ(contents.damage.places, 0);
+  EXPECT_FIELDS(contents, (events[0].channel, "KEPT_1"), (events[1].channel, "KEPT_3"), (events[2].channel, "KEPT_5"),
+                (end, LogStatus::kEnd), (damage.places, 0));
 }
 
 TEST_F(EventLog, RefusesWhatTheFormatCannotHold) {

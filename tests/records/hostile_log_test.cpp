@@ -6,7 +6,7 @@
 #include "tests/test.h"
 
 #include "records/event_log.h"
-#include "tests/paths.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 
 // This program counts what it holds on the heap. Inlined, the compiler would see new end in free and warn.
@@ -58,8 +58,7 @@ struct Damaged {
   }
 };
 
-class HostileLog : public testing::Test {
- protected:
+struct HostileLog : testing::Test {
   // Reads all that can be read, one event's room for all; `after_each` event and damage, until it fails.
   template <class AfterEach>
   static int CountEvents(EventLogReader& reader, LogEvent& event, AfterEach after_each) {
@@ -169,9 +168,7 @@ class HostileLog : public testing::Test {
     return end > start && log.EndsARecord(static_cast<std::size_t>(end));
   }
 
-  const unsigned seed_ = std::random_device{}();
-  const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
-  std::mt19937 random_{seed_};
+  FreshRandom random_;
   std::map<std::int64_t, std::int64_t> ends_;
   const ScratchDirectory scratch_;
 };
@@ -180,7 +177,7 @@ TEST_F(HostileLog, EveryUndamagedRecordIsRecovered) {
   std::size_t undamaged = 0, hidden = 0, damaged_rounds = 0;
   for (int round = 0; round < 200; ++round) {
     SCOPED_TRACE(testing::Message() << "round " << round);
-    Damaged log = Window(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog", Below(380), 1 + Below(45));
+    Damaged log = Window(kCourseLog, Below(380), 1 + Below(45));
     for (std::size_t harms = 1 + Below(8); harms > 0 && !log.bytes.empty(); --harms) Harm(log);
     WriteBytes(scratch_ / "bad", log.bytes);
     const auto returned = Returned(scratch_ / "bad");

@@ -9,8 +9,7 @@ namespace forereach::interpreter_test {
 
 constexpr std::int64_t kNow = 1'700'000'000'000'000, kSecond = 1'000'000;
 
-class InterpreterTest : public testing::Test {
- protected:
+struct InterpreterTest : testing::Test {
   /** A candidate with this sequence, stamped so long after kNow, and heard then or at another time after kNow. */
   void Hear(std::int64_t sequence, std::int64_t stamp, std::optional<std::int64_t> heard = {}) {
     candidate_plan_t candidate = MakeCandidate(sequence, sequence);
@@ -20,10 +19,7 @@ class InterpreterTest : public testing::Test {
 
   void ExpectOneGap(const std::string& reason, std::int64_t expected, std::int64_t got, std::int64_t lost) const {
     ASSERT_EQ(rows_.gaps.size(), 1u);
-    EXPECT_EQ(rows_.gaps[0].reason, reason);
-    EXPECT_EQ(rows_.gaps[0].expected, expected);
-    EXPECT_EQ(rows_.gaps[0].got, got);
-    EXPECT_EQ(rows_.gaps[0].lost, lost);
+    EXPECT_FIELDS(rows_.gaps[0], (reason, reason), (expected, expected), (got, got), (lost, lost));
   }
 
   Interpreter interpreter_{{}, "log"};
@@ -46,10 +42,7 @@ TEST_F(InterpreterTest, SequenceZeroAfterHigherOnesIsARestartWhateverItsStamp) {
     for (std::int64_t sequence = 0; sequence < 10; ++sequence) Hear(sequence, first + sequence);
   ASSERT_EQ(rows_.gaps.size(), 2u);
   for (const GapRow& gap : rows_.gaps) {
-    EXPECT_EQ(gap.reason, "restart");
-    EXPECT_EQ(gap.expected, 10);
-    EXPECT_EQ(gap.got, 0);
-    EXPECT_EQ(gap.lost, 0);
+    EXPECT_FIELDS(gap, (reason, "restart"), (expected, 10), (got, 0), (lost, 0));
   }
 }
 
@@ -80,8 +73,7 @@ TEST_F(InterpreterTest, ARestartIsFoundAfterAStampFarAhead) {
   Hear(8, std::numeric_limits<std::int64_t>::max() - kNow, 1);
   Hear(3, 2 * kSecond);
   ASSERT_EQ(rows_.gaps.size(), 1u);
-  EXPECT_EQ(rows_.gaps[0].reason, "restart");
-  EXPECT_EQ(rows_.gaps[0].got, 3);
+  EXPECT_FIELDS(rows_.gaps[0], (reason, "restart"), (got, 3));
 }
 
 TEST_F(InterpreterTest, CountsGapsAtTheEndsOfTheRangeOfSequences) {

@@ -12,12 +12,9 @@ namespace forereach::kept_tasks_test {
 
 namespace fs = std::filesystem;
 
-class KeptTest : public DiskTest {
- protected:
+struct KeptTest : DiskTest {
   KeptTest() {
     fs::copy(FOREREACH_SOURCE_DIR "/tests/data/course_transitions.csv", scratch_ / "course_transitions.csv");
-    std::ifstream file(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
-    text_.assign(std::istreambuf_iterator<char>(file), {});
     Write("");
     StartWithTask();
   }
@@ -31,9 +28,7 @@ class KeptTest : public DiskTest {
     node_->Tick(bus_.now_us += 1000);
   }
   void Heartbeat(const Digest& config, std::int64_t version) {
-    certifier_status_t status{};
-    status.sequence = heartbeats_++;
-    status.version = version;
+    certifier_status_t status{.sequence = heartbeats_++, .version = version};
     SetDigest(status.config_digest, config);
     bus_.Publish("CERTIFIER_STATUS", status);
     node_->Tick(bus_.now_us += 2'000'000);
@@ -50,7 +45,7 @@ class KeptTest : public DiskTest {
     return KeptTasks(scratch_ / "log").Find(digest, {}).has_value();
   }
 
-  std::string text_;
+  const std::string text_ = Read(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
   std::int64_t heartbeats_ = 0;
 };
 
@@ -87,9 +82,8 @@ TEST(KeptTasks, AModelFileIsKeptWithItsTask) {
 
   const std::optional<Config> found = kept.Find(config.grounds.config, {});
   ASSERT_TRUE(found.has_value());
-  EXPECT_EQ(found->grounds.model, config.grounds.model);
-  EXPECT_EQ(found->problem->model->text()->equations, config.problem->model->text()->equations);
-  EXPECT_EQ(found->period, 0.2);
+  EXPECT_FIELDS(*found, (grounds.model, config.grounds.model),
+                (problem->model->text()->equations, config.problem->model->text()->equations), (period, 0.2));
   const std::string hex = ToHex(config.grounds.config), copy = kept.PathOf(config.grounds.config) + "/model.yaml";
   EXPECT_TRUE(kept.FindDamage(hex).empty());
   std::ofstream(copy, std::ios::app) << "# more\n";
@@ -113,8 +107,7 @@ TEST(KeptTasks, TransitionsThatAreLeftOutAreKeptToo) {
   kept.Keep(CopyTask(config));
   const std::optional<Config> found = kept.Find(config.grounds.config, {});
   ASSERT_TRUE(found.has_value());
-  EXPECT_EQ(found->grounds, config.grounds);
-  EXPECT_EQ(found->problem->transitions.z, config.problem->transitions.z);
+  EXPECT_FIELDS(*found, (grounds, config.grounds), (problem->transitions.z, config.problem->transitions.z));
   EXPECT_TRUE(kept.FindDamage(ToHex(config.grounds.config)).empty());
 }
 

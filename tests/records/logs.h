@@ -6,6 +6,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "lcmtypes/codec.h"
 #include "records/event_log.h"
+#include "records/interpreter.h"
 #include "tests/test.h"
 
 namespace forereach {
@@ -44,6 +45,14 @@ inline LogContents ReadLog(const std::string& path) {
   return contents;
 }
 
+/** What a log makes of rows, as one of this name. */
+inline Rows RowsOf(const std::string& path, const std::string& name, const BusOptions& channels = {}) {
+  Interpreter interpreter(channels, name);
+  Rows rows;
+  for (const LogEvent& event : ReadLog(path).events) interpreter.Observe(event, rows);
+  return rows;
+}
+
 /** Copies a log, each event changed by `edit`, which leaves it out where it returns false. */
 template <class Edit>
 void CopyLog(const std::string& from, const std::string& to, Edit edit) {
@@ -53,6 +62,22 @@ void CopyLog(const std::string& from, const std::string& to, Edit edit) {
   while (reader.Next(event) == LogStatus::kEvent)
     if (edit(event)) writer.Append(event.utime, event.channel, event.data);
   EXPECT_TRUE(writer.Flush());
+}
+
+/** An edit of CopyLog: changes the first message of a type, or leaves it out where `edit` returns false. */
+template <class Message, class Edit>
+auto OfFirst(Edit edit) {
+  return [edit, done = false](LogEvent& event) mutable {
+    auto message = Decoded<Message>(event.data);
+    if (!message || std::exchange(done, true)) return true;
+    if constexpr (std::is_same_v<decltype(edit(*message)), bool>) {
+      if (!edit(*message)) return false;
+    } else {
+      edit(*message);
+    }
+    event.data = Encode(*message);
+    return true;
+  };
 }
 
 inline candidate_plan_t MakeCandidate(std::int64_t sequence, std::int64_t plan_id, const std::string& source = "test") {
@@ -71,9 +96,8 @@ inline decision_t MakeDecision(const candidate_plan_t& candidate, std::int64_t s
   return decision;
 }
 
-inline execution_event_t MakeEvent(std::int64_t sequence, std::int16_t kind) {
-  execution_event_t event{.sequence = sequence, .kind = kind};
-  return event;
+inline execution_event_t MakeEvent(std::int64_t sequence, std::int16_t kind, std::int64_t plan_id = 0, int step = 0) {
+  return {.sequence = sequence, .plan_id = plan_id, .kind = kind, .step = static_cast<std::int16_t>(step)};
 }
 
 }  // namespace forereach

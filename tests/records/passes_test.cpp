@@ -5,7 +5,6 @@
 #include "cli/commands.h"
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/seal.h"
-#include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 
@@ -22,8 +21,7 @@ std::int64_t BytesRead() {
   return bytes;
 }
 
-class PassesTest : public testing::TestWithParam<const char*> {
- protected:
+struct PassesTest : testing::TestWithParam<const char*> {
   // The recorded course in the directory of a logger, without a database.
   PassesTest() {
     fs::create_directory(scratch_ / "log");
@@ -82,8 +80,7 @@ INSTANTIATE_TEST_SUITE_P(Commands, PassesTest,
                                          "report DIRECTORY --out OUT.html --config TASK",
                                          "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT"));
 
-class ThreadsTest : public PassesTest {
- protected:
+struct ThreadsTest : PassesTest {
   // Slices shrunken so that every certificate is refuted, and every other one sealed anew: there is much to say.
   ThreadsTest() {
     bool reseals = false;

@@ -8,9 +8,7 @@
 namespace forereach::picture_test {
 
 Picture Sample() {
-  Picture picture;
-  picture.title = "Title";
-  picture.key_numbers = {"1 plan"};
+  Picture picture{.title = "Title", .key_numbers = {"1 plan"}};
   using Eigen::Vector2d;
   picture.obstacles = {Obstacle::Circle(Vector2d(5, 3), 1),
                        Obstacle::Polygon({Vector2d(0, 5), Vector2d(1, 5), Vector2d(1, 6)}),
@@ -29,7 +27,7 @@ TEST(Picture, WritesSvgAndPng) {
   DrawPicture(Sample(), scratch / "a.svg");
   DrawPicture(Sample(), scratch / "a.png", 600, 400);
   const std::vector<std::uint8_t> svg = ReadBytes(scratch / "a.svg"), png = ReadBytes(scratch / "a.png");
-  EXPECT_THAT(std::string(svg.begin(), svg.end()), testing::HasSubstr("</svg>"));
+  EXPECT_THAT(std::string(svg.begin(), svg.end()), HasSubstr("</svg>"));
   ASSERT_GT(png.size(), 24u);
   EXPECT_EQ(std::string(png.begin() + 1, png.begin() + 4), "PNG");
   EXPECT_EQ(png[18] << 8 | png[19], 600);
@@ -50,11 +48,11 @@ TEST(Picture, TheSameInputGivesTheSameBytes) {
 TEST(Picture, DrawsAnEmptyPictureAndDegenerateShapes) {
   const ScratchDirectory scratch;
   EXPECT_NO_THROW(DrawPicture({}, scratch / "empty.svg"));
-  Picture picture;
-  picture.path = {{1, 1}};
-  picture.executed = {{{1, 1}}, {}};
-  picture.obstacles = {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1), Obstacle::Circle(Eigen::Vector2d(0, 0), 0)};
-  picture.bodies = {{{NAN, 0}, {1, 1}, {0, 1}}};
+  Picture picture{
+      .obstacles = {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1), Obstacle::Circle(Eigen::Vector2d(0, 0), 0)},
+      .executed = {{{1, 1}}, {}},
+      .path = {{1, 1}},
+      .bodies = {{{NAN, 0}, {1, 1}, {0, 1}}}};
   EXPECT_NO_THROW(DrawPicture(picture, scratch / "point.png"));
 }
 
@@ -74,7 +72,7 @@ TEST(Picture, FilesAreThoseOfTheNameOrRefusedWithASentence) {
   EXPECT_EQ(PictureFiles(in("a.png")), Files{in("a.png")});
   EXPECT_EQ(PictureFiles(in("a")), (Files{in("a.svg"), in("a.png")}));
   const auto refused = [](const std::string& name, const std::string& why) {
-    EXPECT_THAT([&] { (void)PictureFiles(name); }, testing::ThrowsMessage<PictureError>(testing::HasSubstr(why)));
+    EXPECT_THAT([&] { (void)PictureFiles(name); }, ThrowsMessage<PictureError>(HasSubstr(why)));
   };
   for (const char* ending : {".jpg", ".pdf", ".PNG", ".v2", "."})
     refused(in(std::string("a") + ending), std::string("ends in ") + ending + "; it has to end in .svg or .png");

@@ -1,59 +1,30 @@
 // docs/queries.md: its columns are those of the database, and its queries answer.
 #include <regex>
 
-#include <sqlite3.h>
-
 #include "tests/test.h"
 
 #include "records/database.h"
-#include "records/interpreter.h"
 #include "task/config.h"
-#include "tests/paths.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
+#include "tests/records/sql.h"
 
 namespace forereach::queries_test {
 
-const std::string kData = FOREREACH_SOURCE_DIR "/tests/data/";
-
 std::string Document() { return Read(FOREREACH_SOURCE_DIR "/docs/queries.md"); }
 
-using Table = std::vector<std::vector<std::string>>;
-
-class QueriesTest : public testing::Test {
- protected:
-  void SetUp() override {
-    const std::string path = scratch_ / "decisions.sqlite";
-    const Config config = LoadConfig(kData + "course.yaml");
-    Interpreter interpreter(config.bus, "course.lcmlog");
-    Rows rows;
-    std::int64_t events = 0;
-    for (const LogEvent& event : ReadLog(kData + "course.lcmlog").events) {
-      interpreter.Observe(event, rows);
-      ++events;
-    }
-    Database database(path);
+struct QueriesTest : testing::Test {
+  QueriesTest() {
+    Database database(path_);
     database.BeginRun("course.lcmlog", 1);
-    ASSERT_TRUE(database.Write(rows, "course.lcmlog", events));
-    ASSERT_EQ(sqlite3_open_v2(path.c_str(), &handle_, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
-  }
-  ~QueriesTest() override { sqlite3_close(handle_); }
-
-  Table Ask(const std::string& sql) {
-    Table rows;
-    char* error = nullptr;
-    const auto add = [](void* to, int count, char** values, char**) {
-      std::vector<std::string>& row = static_cast<Table*>(to)->emplace_back();
-      for (int i = 0; i < count; ++i) row.emplace_back(values[i] ? values[i] : "NULL");
-      return 0;
-    };
-    EXPECT_EQ(sqlite3_exec(handle_, sql.c_str(), add, &rows, &error), SQLITE_OK) << sql << (error ? error : "");
-    sqlite3_free(error);
-    return rows;
+    EXPECT_TRUE(database.Write(RowsOf(kCourseLog, "course.lcmlog", LoadConfig(kCourseTask).bus), "course.lcmlog",
+                               std::ssize(ReadLog(kCourseLog).events)));
   }
 
-  ScratchDirectory scratch_;
-  sqlite3* handle_ = nullptr;
+  auto Ask(const std::string& sql) const { return Sql(path_, sql); }
+
+  const ScratchDirectory scratch_;
+  const std::string path_ = scratch_ / "decisions.sqlite";
 };
 
 TEST_F(QueriesTest, EveryColumnIsExplained) {

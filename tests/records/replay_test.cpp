@@ -4,10 +4,6 @@
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/plan_ledger.h"
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/decision_t.hpp"
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/seal.h"
 #include "records/event_log.h"
@@ -16,14 +12,12 @@
 #include "records/result_json.h"
 #include "tests/certifier/small_task.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 
 namespace forereach::replay_test {
-
-const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
-const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
 // A gate and the log of what it hears and says.
 struct LoggedGate {
@@ -62,7 +56,7 @@ struct LoggedGate {
 void ExpectAgreed(const std::string& path, const Config& config, int decisions) {
   const ReplayResult result = Replay({path}, {config});
   EXPECT_EQ(result.agreed, decisions);
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_THAT(result.differences, IsEmpty());
 }
 
 // The result, which three shards find together, too.
@@ -83,11 +77,21 @@ class ReplayTest : public testing::Test {
   // The path of a log that is not there yet.
   std::string NewLog() { return scratch_ / std::to_string(logs_++); }
 
+  // A log that `write` writes.
+  template <class Write>
+  std::string Written(Write write) {
+    const std::string path = NewLog();
+    EventLogWriter writer(path);
+    write(writer);
+    EXPECT_TRUE(writer.Flush());
+    return path;
+  }
+
   // A copy of the log, as CopyLog changes it.
   template <class Edit>
   std::string Edited(Edit edit) {
     const std::string path = NewLog();
-    CopyLog(kLog, path, edit);
+    CopyLog(kCourseLog, path, edit);
     return path;
   }
 
@@ -115,7 +119,7 @@ TEST_F(ReplayTest, TheDecisionOnABatchIsThatOnItsCandidateAlone) {
   logged.Decide(Candidate(9), decision_t::CERTIFIED);
   ASSERT_TRUE(log.Flush());
   const ReplayResult result = ReplayedInShards(path, config);
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_THAT(result.differences, IsEmpty());
   EXPECT_EQ(result.agreed, 5);
   EXPECT_EQ(result.candidates, 5) << "a batch counts once";
 
@@ -131,8 +135,8 @@ TEST_F(ReplayTest, TheDecisionOnABatchIsThatOnItsCandidateAlone) {
 }
 
 TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
-  const Config config = LoadConfig(kConfig);
-  const ReplayResult result = Replay({kLog}, {config});
+  const Config config = LoadConfig(kCourseTask);
+  const ReplayResult result = Replay({kCourseLog}, {config});
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
   EXPECT_EQ(result.agreed, result.candidates);
   EXPECT_GE(result.candidates, 10);
@@ -141,8 +145,7 @@ TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
 
 // A log of a plan that is certified, then withdrawn because of a wall, then because of a nearer one; `alter` changes
 // each withdrawal before it is logged.
-class WithdrawnReplayTest : public ReplayTest {
- protected:
+struct WithdrawnReplayTest : ReplayTest {
   template <class Alter>
   ReplayResult Replayed(Alter alter) {
     const std::string path = NewLog();
@@ -152,8 +155,7 @@ class WithdrawnReplayTest : public ReplayTest {
     PlanLedger plans(config.gate, kNow);
     std::int64_t sequence = 0;
     const auto see = [&](const std::vector<Obstacle>& obstacles) {
-      obstacles_t message = ToMessage(obstacles, kNow);
-      message.sequence = sequence++;
+      obstacles_t message = Sighted(obstacles, kNow, sequence++);
       EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
       log.Append(kNow, config.bus.obstacles, Encode(message));
       plans.Judge(gate, kNow);
@@ -187,33 +189,31 @@ class WithdrawnReplayTest : public ReplayTest {
 TEST_F(WithdrawnReplayTest, EachWithdrawalIsJudgedAgainOnce) {
   const ReplayResult result = Replayed([](withdrawal_t&) {});
   EXPECT_EQ(sent_, 3) << "one is a repetition";
-  EXPECT_EQ(result.withdrawals, 2);
-  EXPECT_EQ(result.agreed, 1);
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_FIELDS(result, (withdrawals, 2), (agreed, 1));
+  EXPECT_THAT(result.differences, IsEmpty());
 }
 
 TEST_F(WithdrawnReplayTest, ListsAWithdrawalWithOtherStepsAnotherObstacleOrOtherGrounds) {
   const auto differences = [this](auto alter) { return Replayed(alter).differences; };
   EXPECT_THAT(differences([](withdrawal_t& message) { ++message.valid_steps; }),
-              testing::Each(HasSubstr("steps that stand, cause obstacle; replayed")));
+              Each(HasSubstr("steps that stand, cause obstacle; replayed")));
   EXPECT_EQ(differences([](withdrawal_t& message) { ++message.obstacle; }).size(), 2u);
   EXPECT_THAT(differences([](withdrawal_t& message) { SetDigest(message.obstacles_digest, DigestOf("another")); }),
-              testing::Each(HasSubstr("withdrawn under other obstacles")));
+              Each(HasSubstr("withdrawn under other obstacles")));
   EXPECT_THAT(differences([](withdrawal_t& message) { SetDigest(message.certificate_digest, DigestOf("another")); }),
-              testing::Each(HasSubstr("its certified plan is not in the log")));
+              Each(HasSubstr("its certified plan is not in the log")));
 }
 
 TEST_F(WithdrawnReplayTest, ListsNoDifferenceForAWithdrawalWithoutAJudgement) {
   for (const std::int16_t cause : {withdrawal_t::NOT_JUDGED, withdrawal_t::OBSTACLES_LOST}) {
     const ReplayResult result = Replayed([cause](withdrawal_t& message) { message.cause = cause; });
     EXPECT_EQ(result.circumstances, 2) << cause;
-    EXPECT_THAT(result.differences, testing::IsEmpty()) << cause;
+    EXPECT_THAT(result.differences, IsEmpty()) << cause;
   }
 }
 
 // The candidate that was refused, what was proposed in its place, as `alter` changes it, and that as a candidate.
-class RepairedReplayTest : public ReplayTest {
- protected:
+struct RepairedReplayTest : ReplayTest {
   template <class Alter>
   ReplayResult Replayed(Alter alter) {
     const std::string path = NewLog();
@@ -240,7 +240,7 @@ class RepairedReplayTest : public ReplayTest {
 TEST_F(RepairedReplayTest, AProposalIsCertifiedAgainAndWhatIsSentIsACandidateLikeAll) {
   const ReplayResult result = Replayed([](advice_t&) {});
   EXPECT_EQ(std::tuple(result.proposals, result.agreed, result.candidates), std::tuple(1, 2, 2));
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_THAT(result.differences, IsEmpty());
 }
 
 TEST_F(RepairedReplayTest, ListsAProposalThatIsNotCertified) {
@@ -249,7 +249,7 @@ TEST_F(RepairedReplayTest, ListsAProposalThatIsNotCertified) {
       for (auto& control : advice.proposal.control) control[0] = acceleration, control[1] = 0;
     });
     EXPECT_EQ(result.proposals, 0) << acceleration;
-    EXPECT_THAT(result.differences, testing::ElementsAre(HasSubstr("proposed in its place is not certified")));
+    EXPECT_THAT(result.differences, ElementsAre(HasSubstr("proposed in its place is not certified")));
   }
   EXPECT_EQ(Replayed([](advice_t& advice) { advice.proposal.num_steps = 129; }).differences.size(), 1u);
   EXPECT_EQ(Replayed([](advice_t& advice) { advice.proposal.num_states = -1; }).differences.size(), 1u);
@@ -258,12 +258,12 @@ TEST_F(RepairedReplayTest, ListsAProposalThatIsNotCertified) {
 TEST_F(RepairedReplayTest, ComparesNoProposalUnderGroundsThatTheLogDoesNotGive) {
   const ReplayResult result = Replayed([](advice_t& advice) { advice.observations_digest[0] ^= 1; });
   EXPECT_EQ(std::tuple(result.proposals, result.circumstances), std::tuple(0, 1));
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_THAT(result.differences, IsEmpty());
 }
 
 TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {
   int certified = 0, domain = 0, safety = 0;
-  EventLogReader reader(kLog);
+  EventLogReader reader(kCourseLog);
   LogEvent event;
   while (reader.Next(event) == LogStatus::kEvent) {
     const auto decision = Decoded<decision_t>(event.data);
@@ -278,45 +278,22 @@ TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {
 }
 
 TEST_F(ReplayTest, ChangedOutcomeIsListed) {
-  bool changed = false;
-  const std::string path = Edited([&](LogEvent& event) {
-    if (auto decision = Decoded<decision_t>(event.data); decision && !changed) {
-      changed = true;
-      decision->outcome =
-          decision->outcome == decision_t::CERTIFIED ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED;
-      event.data = Encode(*decision);
-    }
-    return true;
-  });
-  EXPECT_EQ(Replay({path}, {LoadConfig(kConfig)}).differences.size(), 1u);
+  const std::string path = Edited(OfFirst<decision_t>([](decision_t& decision) {
+    const bool certified = decision.outcome == decision_t::CERTIFIED;
+    decision.outcome = certified ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED;
+  }));
+  EXPECT_EQ(Replay({path}, {LoadConfig(kCourseTask)}).differences.size(), 1u);
 }
 
 TEST_F(ReplayTest, MissingDecisionAndMissingCandidateAreListed) {
-  for (const bool drop_decision : {true, false}) {
-    bool dropped = false;
-    const std::string path = Edited([&](LogEvent& event) {
-      const bool wanted = drop_decision ? Decoded<decision_t>(event.data).has_value()
-                                        : Decoded<candidate_plan_t>(event.data).has_value();
-      if (dropped || !wanted) return true;
-      dropped = true;
-      return false;
-    });
-    EXPECT_EQ(Replay({path}, {LoadConfig(kConfig)}).differences.size(), 1u) << drop_decision;
-  }
+  const auto dropped = [](auto&) { return false; };
+  for (const std::string& path : {Edited(OfFirst<decision_t>(dropped)), Edited(OfFirst<candidate_plan_t>(dropped))})
+    EXPECT_EQ(Replay({path}, {LoadConfig(kCourseTask)}).differences.size(), 1u) << path;
 }
 
 TEST_F(ReplayTest, ACertifiedPlanThatWasAlteredIsListed) {
   const auto difference = [this](auto alter) {
-    bool altered = false;
-    const std::string path = Edited([&](LogEvent& event) {
-      auto certified = Decoded<certified_plan_t>(event.data);
-      if (!certified || altered) return true;
-      altered = true;
-      alter(*certified);
-      event.data = Encode(*certified);
-      return true;
-    });
-    const ReplayResult result = Replay({path}, {LoadConfig(kConfig)});
+    const ReplayResult result = Replay({Edited(OfFirst<certified_plan_t>(alter))}, {LoadConfig(kCourseTask)});
     EXPECT_EQ(result.differences.size(), 1u);
     return result.differences.empty() ? std::string() : result.differences.front();
   };
@@ -346,13 +323,12 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
       return here;
     }));
   }
-  const Config config = LoadConfig(kConfig);
-  const ReplayResult whole = Replay({kLog}, {config}), parts = Replay(logs, {config});
+  const Config config = LoadConfig(kCourseTask);
+  const ReplayResult whole = Replay({kCourseLog}, {config}), parts = Replay(logs, {config});
   EXPECT_TRUE(parts.differences.empty()) << parts.differences.front();
-  EXPECT_EQ(parts.candidates, whole.candidates);
-  EXPECT_EQ(parts.agreed, whole.agreed);
+  EXPECT_FIELDS(parts, (candidates, whole.candidates), (agreed, whole.agreed));
   EXPECT_THAT(Replay({logs[1]}, {config}).differences,
-              testing::Contains(HasSubstr("transitions that had been learned are not in the log")));
+              Contains(HasSubstr("transitions that had been learned are not in the log")));
 }
 
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
@@ -363,9 +339,7 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
   for (const std::int64_t heartbeat : {0, 7}) {
     certifier_status_t status{};
     status.sequence = heartbeat;
-    const std::string path = NewLog();
-    {
-      EventLogWriter writer(path);
+    const std::string path = Written([&](EventLogWriter& writer) {
       LoggedGate gate{config, writer};
       if (heartbeat > 0)
         gate.Hear(Encode(on_the_way));
@@ -373,8 +347,7 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
         writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
       gate.Say(status);
       gate.Decide(Candidate(1), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
-      EXPECT_TRUE(writer.Flush());
-    }
+    });
     ExpectAgreed(path, config, 1);
   }
 }
@@ -386,9 +359,7 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
   certifier_status_t first{}, second{};
   second.sequence = 1;
   first.version = 1, second.version = 2;
-  const std::string path = NewLog();
-  {
-    EventLogWriter writer(path);
+  const std::string path = Written([&](EventLogWriter& writer) {
     LoggedGate before{config, writer}, after{config, writer};
     before.Say(first);
     before.Decide(Candidate(1), decision_t::CERTIFIED);
@@ -396,8 +367,7 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
     after.gate.Inherit(before.gate);
     after.Say(second);
     after.Decide(Candidate(2), decision_t::ABSTAIN_SAFETY);
-    EXPECT_TRUE(writer.Flush());
-  }
+  });
   ExpectAgreed(path, config, 2);
 }
 
@@ -405,10 +375,8 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
 // obstacles were not known nothing is compared.
 TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
   const Config config = SmallTaskOnTheBus();
-  const std::string path = NewLog();
   int decided = 0;
-  {
-    EventLogWriter writer(path);
+  const std::string path = Written([&](EventLogWriter& writer) {
     certifier_status_t mine{}, others{};
     mine.state = certifier_status_t::ARMED, mine.instance = 1;
     others.state = certifier_status_t::STANDBY, others.instance = 2;
@@ -419,11 +387,9 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
       gate.Say(mine);
       gate.RefuseForNoObstacles(Candidate(id++));
       for (int i = 0; i < 12; ++i) {
-        obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
-                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)},
-                                        kNow + 100 * start + i);
-        message.sequence = 20 * start + i;
-        gate.Hear(Encode(message));
+        gate.Hear(Encode(Sighted(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
+                                            : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)},
+                                 kNow + 100 * start + i, 20 * start + i)));
         others.sequence = 3 + i % 5;
         gate.Say(others);
         gate.Decide(Candidate(id++), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
@@ -432,87 +398,68 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
         gate.Say(mine);
       }
     }
-    EXPECT_TRUE(writer.Flush());
-  }
+  });
   const ReplayResult result = Replay({path}, {config});
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
-  EXPECT_EQ(result.agreed, decided);
-  EXPECT_EQ(result.circumstances, 2);
+  EXPECT_FIELDS(result, (agreed, decided), (circumstances, 2));
 }
 
 // They are in force though they are not known, by the times of the log as by those of the certifier.
 TEST_F(ReplayTest, ObstaclesOfAClockThatIsOffReplay) {
   Config config = SmallTaskOnTheBus();
   config.gate.max_clock_error_ms = 20;
-  const std::string path = NewLog();
-  {
-    EventLogWriter writer(path);
-    certifier_status_t status{};
-    status.state = certifier_status_t::ARMED;
+  const std::string path = Written([&](EventLogWriter& writer) {
     LoggedGate gate{config, writer};
-    gate.Say(status);
+    gate.Say({.state = certifier_status_t::ARMED});
     for (int i = 0; i < 6; ++i) {
       const bool is_late = i % 2 == 0;
-      obstacles_t message =
-          ToMessage({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)}, kNow - (is_late ? 30'001 : 30'000));
-      message.sequence = i;
-      gate.Hear(Encode(message));
+      gate.Hear(
+          Encode(Sighted({Obstacle::Circle(Eigen::Vector2d(0.1 * i, 15), 1)}, kNow - (is_late ? 30'001 : 30'000), i)));
       EXPECT_EQ(gate.gate.WhyObstaclesUnknown(kNow).empty(), !is_late);
       if (is_late)
         gate.RefuseForNoObstacles(Candidate(i + 1));
       else
         gate.Decide(Candidate(i + 1), decision_t::CERTIFIED);
     }
-    EXPECT_TRUE(writer.Flush());
-  }
+  });
   const ReplayResult result = Replay({path}, {config});
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
-  EXPECT_EQ(result.agreed, 3);
-  EXPECT_EQ(result.circumstances, 3);
+  EXPECT_FIELDS(result, (agreed, 3), (circumstances, 3));
 }
 
 // Each message has other stamps; in some of them nothing moves.
 TEST_F(ReplayTest, AgreesOnARunWithMovingObstacles) {
   Config config = SmallTaskOnTheBus();
   config.gate.max_clock_error_ms = 20;
-  const std::string path = NewLog();
-  {
-    EventLogWriter writer(path);
-    certifier_status_t status{};
-    status.state = certifier_status_t::ARMED;
+  const std::string path = Written([&](EventLogWriter& writer) {
     LoggedGate gate{config, writer};
-    gate.Say(status);
+    gate.Say({.state = certifier_status_t::ARMED});
     for (int i = 0; i < 12; ++i) {
       ObstacleMotion motion;
       motion.stamp_us = kNow - 12 + i;
       motion.velocity.y() = -1;
       const bool is_met = i % 3 == 1, stands = i % 3 == 2;
       const Obstacle seen = Obstacle::Circle(Eigen::Vector2d(0.75, is_met ? 1.25 : 5), 0.2);
-      obstacles_t message = ToMessage({stands ? seen : seen.Moving(motion)}, kNow + i);
-      message.sequence = i;
-      gate.Hear(Encode(message));
+      gate.Hear(Encode(Sighted({stands ? seen : seen.Moving(motion)}, kNow + i, i)));
       gate.Decide(Candidate(i + 1), is_met ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
     }
-    EXPECT_TRUE(writer.Flush());
-  }
+  });
   ExpectAgreed(path, config, 12);
 }
 
 TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   const ScratchDirectory scratch;
-  const auto [key, log] = SignedLog(scratch, kLog);
-  Config config = LoadConfig(kConfig);
-  const ReplayResult before = Replay({kLog}, {config}), believed = Replay({log}, {config});
+  const auto [key, log] = SignedLog(scratch, kCourseLog);
+  Config config = LoadConfig(kCourseTask);
+  const ReplayResult before = Replay({kCourseLog}, {config}), believed = Replay({log}, {config});
   EXPECT_EQ(believed.differences.size(), 4u) << "three undecided candidates, an altered certificate";
   EXPECT_EQ(DescribePassedOver(believed.passed_over), "");
   config.bus.key = key;
   const ReplayResult result = Replay({log}, {config});
-  EXPECT_THAT(result.differences, testing::IsEmpty());
-  EXPECT_EQ(result.agreed, before.agreed);
-  EXPECT_EQ(result.candidates, before.candidates);
-  EXPECT_EQ(result.passed_over.not_authentic.unsigned_ones, kUnsigned);
-  EXPECT_EQ(result.passed_over.not_authentic.forged, kForged);
-  EXPECT_EQ(result.passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_THAT(result.differences, IsEmpty());
+  EXPECT_FIELDS(result, (agreed, before.agreed), (candidates, before.candidates),
+                (passed_over.not_authentic.unsigned_ones, kUnsigned), (passed_over.not_authentic.forged, kForged),
+                (passed_over.not_authentic.replayed, kRepeated));
   EXPECT_EQ(DescribePassedOver(result.passed_over),
             "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
   config.bus.key = scratch / "none";
@@ -521,8 +468,8 @@ TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
 
 TEST_F(ReplayTest, ThroughTheCommandWithAKeyAndWithout) {
   const ScratchDirectory scratch;
-  const auto [key, log] = SignedLog(scratch, kLog);
-  const std::string replay = "replay " + log + " --config " + kConfig;
+  const auto [key, log] = SignedLog(scratch, kCourseLog);
+  const std::string replay = "replay " + log + " --config " + kCourseTask;
   const Output judged = Forereach(replay + " --key " + key), believed = Forereach(replay + " --no-key");
   EXPECT_THAT(judged, Exits(0, "passed over: 5 (unsigned 2, forged 1, replayed 2)"));
   EXPECT_EQ(believed.code, 1) << believed.text;
@@ -536,15 +483,15 @@ TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
     event.data = {1, 2, 3};
     return true;
   });
-  const ReplayResult result = Replay({path}, {LoadConfig(kConfig)});
-  EXPECT_THAT(result.differences, testing::IsEmpty());
+  const ReplayResult result = Replay({path}, {LoadConfig(kCourseTask)});
+  EXPECT_THAT(result.differences, IsEmpty());
   EXPECT_EQ(DescribePassedOver(result.passed_over), "; no certified plan and passed over: 1");
 }
 
 TEST_F(ReplayTest, AnotherTaskIsNoticed) {
-  Config config = LoadConfig(kConfig);
+  Config config = LoadConfig(kCourseTask);
   config.grounds.declaration[0] ^= 1;
-  const ReplayResult result = Replay({kLog}, {config});
+  const ReplayResult result = Replay({kCourseLog}, {config});
   EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
 }
 

@@ -3,11 +3,9 @@
 
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
 #include "forereach/dynamics/models/named_models.h"
-#include "forereach/obstacles_t.hpp"
-#include "forereach/robot_state_t.hpp"
-#include "tests/paths.h"
+#include "tests/messages.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/worlds.h"
 
@@ -34,8 +32,7 @@ candidate_plan_t Drive(std::int64_t plan_id, bool along_x) {
   return candidate;
 }
 
-class LogPictureTest : public testing::Test {
- protected:
+struct LogPictureTest : testing::Test {
   template <class Message>
   void Append(const std::string& channel, const Message& message) {
     writer_.Append(++now_, channel, Encode(message));
@@ -50,9 +47,7 @@ class LogPictureTest : public testing::Test {
   }
 
   void Step(std::int64_t plan_id, std::int16_t kind, int step) {
-    execution_event_t event = MakeEvent(step, kind);
-    event.plan_id = plan_id;
-    event.step = static_cast<std::int16_t>(step);
+    execution_event_t event = MakeEvent(step, kind, plan_id, step);
     event.num_states = 4;
     event.state[1] = 0.45 * step;
     Append("EXECUTION_EVENT", event);
@@ -76,9 +71,7 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
   Append("ROBOT_STATE", state);
 
   const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
-  EXPECT_EQ(drawn.disagreements, 0);
-  EXPECT_EQ(drawn.picture.executed.size(), 5u);
-  EXPECT_EQ(drawn.picture.certified.size(), 6u);
+  EXPECT_FIELDS(drawn, (disagreements, 0), (picture.executed.size(), 5u), (picture.certified.size(), 6u));
   ASSERT_EQ(drawn.picture.abstained.size(), 1u);
   EXPECT_EQ(drawn.picture.abstained[0].size(), 7u) << "up to the slice that may touch";
   ASSERT_EQ(drawn.picture.path.size(), 1u);
@@ -100,9 +93,7 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
   Config config = PointMassConfig();
   config.gate.obstacles = ObstaclesSource::kBus;
   auto see = [&, sequence = 0](const std::vector<Obstacle>& obstacles, std::int64_t utime) mutable {
-    obstacles_t message = ToMessage(obstacles, utime);
-    message.sequence = sequence++;
-    Append("OBSTACLES", message);
+    Append("OBSTACLES", Sighted(obstacles, utime, sequence++));
   };
   const std::vector<Obstacle> on_the_way = std::exchange(config.obstacles, {});
   see(on_the_way, now_);
@@ -121,8 +112,8 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
   ASSERT_TRUE(std::ranges::equal(drawn.picture.obstacles, kinds, {}, &Obstacle::kind));
   const auto place = PlaceOf(drawn.picture.obstacles[1], 0);
   ASSERT_TRUE(place);
-  EXPECT_THAT(place->points, testing::ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5), Eigen::Vector2d(6, 6),
-                                                  Eigen::Vector2d(5, 6)));
+  EXPECT_THAT(place->points,
+              ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(5, 6)));
 }
 
 TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {
@@ -132,9 +123,7 @@ TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {
   wrong_size.num_states = 6;
   Decide(wrong_size, decision_t::CERTIFIED, -1);
   const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
-  EXPECT_EQ(drawn.disagreements, 3);
-  EXPECT_TRUE(drawn.picture.certified.empty());
-  EXPECT_TRUE(drawn.picture.abstained.empty());
+  EXPECT_FIELDS(drawn, (disagreements, 3), (picture.certified.empty(), true), (picture.abstained.empty(), true));
 }
 
 TEST_F(LogPictureTest, RefusesATaskThatIsNotPlanar) {
@@ -152,7 +141,7 @@ TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {
       [&] {
         Report({{scratch_ / "log"}, scratch_ / "missing.yaml", ""}, out);
       },
-      testing::ThrowsMessage<BadInput>(testing::HasSubstr("missing.yaml")));
+      ThrowsMessage<BadInput>(HasSubstr("missing.yaml")));
   EXPECT_EQ(out.str(), "");
 }
 
@@ -162,7 +151,7 @@ TEST_F(LogPictureTest, TheReportRefusesAPictureItCannotWriteBeforeItReadsAnythin
       [&] {
         Report({{"none.lcmlog"}, "none.yaml", scratch_ / "x.gif"}, out);
       },
-      testing::ThrowsMessage<BadInput>(testing::HasSubstr("x.gif ends in .gif")));
+      ThrowsMessage<BadInput>(HasSubstr("x.gif ends in .gif")));
 }
 
 // The name of a channel may be any bytes.

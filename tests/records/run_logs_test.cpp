@@ -6,21 +6,18 @@
 #include "forereach/logger_status_t.hpp"
 #include "records/log_survey.h"
 #include "records/output_file.h"
-#include "tests/cli/program.h"
 #include "tests/records/logs.h"
 
 namespace forereach::run_logs_test {
 
-class RunLogsTest : public testing::Test {
- protected:
+struct RunLogsTest : testing::Test {
   // A log with the logger's heartbeats [first, last], a second apart.
   std::string Log(const std::string& name, std::int64_t first, std::int64_t last) const {
     const std::string path = scratch_ / name;
     std::filesystem::create_directories(std::filesystem::path(path).parent_path());
     EventLogWriter writer(path);
     for (std::int64_t sequence = first; sequence <= last; ++sequence) {
-      logger_status_t status{.sequence = sequence};
-      writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(status));
+      writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(logger_status_t{.sequence = sequence}));
     }
     EXPECT_TRUE(writer.Flush());
     return path;
@@ -49,8 +46,7 @@ TEST_F(RunLogsTest, ALongLogGoesOnByItsEnds) {
   const auto log = [&](const std::string& name, std::int64_t first, std::int64_t last) {
     EventLogWriter writer(scratch_ / name);
     const auto beat = [&](std::int64_t sequence) {
-      logger_status_t status{.sequence = sequence};
-      writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(status));
+      writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(logger_status_t{.sequence = sequence}));
     };
     beat(first);
     for (int i = 0; i < 100; ++i) writer.Append(1'000'000 * first, "CAMERA", std::vector<std::uint8_t>(100'000));
@@ -61,10 +57,7 @@ TEST_F(RunLogsTest, ALongLogGoesOnByItsEnds) {
   };
   const std::string a = log("a", 0, 5), b = log("b", 6, 9);
   const LogEnds ends = EndsOf(a);
-  EXPECT_EQ(ends.logger.first, 0);
-  EXPECT_EQ(ends.logger.last, 5);
-  EXPECT_EQ(ends.utime.first, 0);
-  EXPECT_EQ(ends.utime.last, 5'000'000);
+  EXPECT_FIELDS(ends, (logger.first, 0), (logger.last, 5), (utime.first, 0), (utime.last, 5'000'000));
   EXPECT_THAT(LogsOf(RunsNamedBy({a, b}, 1)), ElementsAre(ElementsAre(a, b)));
 }
 
@@ -84,8 +77,7 @@ TEST_F(RunLogsTest, ADirectoryIsReadWithItsSubdirectories) {
   EXPECT_THAT(named.missing, IsEmpty());
   EXPECT_THAT(LogsOf(named), ElementsAre(ElementsAre(a, b), ElementsAre(c), ElementsAre(unknown)))
       << "a log without heartbeats continues none, and that of another directory neither";
-  EXPECT_EQ(named.runs[0].robot, scratch_ / "night/a");
-  EXPECT_EQ(named.runs[1].robot, scratch_ / "night/b/log");
+  EXPECT_FIELDS(named, (runs[0].robot, scratch_ / "night/a"), (runs[1].robot, scratch_ / "night/b/log"));
   EXPECT_TRUE(named.is_many);
 }
 
@@ -102,14 +94,11 @@ TEST_F(RunLogsTest, ADatabaseKnowsItsRunsAndItsRobot) {
   for (const std::string& input : {database, scratch_ / "log"}) {
     const NamedRuns named = RunsNamedBy({input}, 1);
     ASSERT_EQ(named.runs.size(), input == database ? 2u : 3u);
-    EXPECT_EQ(named.runs[0].robot, "rover");
-    EXPECT_EQ(named.runs[0].missing.at(0).log_file, "events-0.lcmlog");
+    EXPECT_FIELDS(named.runs[0], (robot, "rover"), (missing.at(0).log_file, "events-0.lcmlog"));
     EXPECT_THAT(named.runs[0].logs, ElementsAre(one));
     EXPECT_EQ(named.runs[1].robot, scratch_ / "log");
     EXPECT_THAT(named.missing, ElementsAre("events-0.lcmlog: the log was deleted for the quota"));
-    if (input != database) {
-      EXPECT_THAT(named.runs[2].logs, ElementsAre(other)) << "no database lists it";
-    }
+    if (input != database) EXPECT_THAT(named.runs[2].logs, ElementsAre(other)) << "no database lists it";
   }
 }
 

@@ -23,7 +23,7 @@ TEST(Shard, EachCaseIsJudgedByExactlyOne) {
       for (int& times : judged) times += results.Next({index, count});
       EXPECT_EQ(results.cases, 20);
     }
-    EXPECT_THAT(judged, testing::Each(1)) << count;
+    EXPECT_THAT(judged, Each(1)) << count;
   }
 }
 
@@ -37,8 +37,7 @@ TEST(ResultJson, KeepsEachNumberOfPassedOverMessages) {
 
 // The recorded course, and a copy in which much is changed: outcomes of decisions, slices of certified plans, some of
 // them sealed anew, missing candidates and decisions, and damage.
-class ShardsTest : public testing::Test {
- protected:
+struct ShardsTest : testing::Test {
   ShardsTest() {
     fs::create_directories(scratch_ / "night/a");
     fs::create_directories(scratch_ / "night/b");
@@ -66,14 +65,9 @@ class ShardsTest : public testing::Test {
   }
   // The course's task with this bound on the noise.
   std::string Noisy(const std::string& name, const std::string& bound) {
-    std::string task = Read(kCourseTask);
-    const auto replace = [&task](const std::string& from, const std::string& to) {
-      ASSERT_NE(task.find(from), std::string::npos) << from;
-      task.replace(task.find(from), from.size(), to);
-    };
-    replace("transitions: ", "transitions: " FOREREACH_SOURCE_DIR "/tests/data/");
-    replace("noise_bound: [0, 0, 0, 0, 0, 0]", "noise_bound: [" + bound + "]");
-    return scratch_.Write(name, task);
+    const std::string task =
+        Replaced(Read(kCourseTask), "transitions: ", "transitions: " FOREREACH_SOURCE_DIR "/tests/data/");
+    return scratch_.Write(name, Replaced(task, "noise_bound: [0, 0, 0, 0, 0, 0]", "noise_bound: [" + bound + "]"));
   }
 
   [[nodiscard]] std::string PathOf(int number) const { return scratch_ / ("part" + std::to_string(number) + ".json"); }

@@ -9,7 +9,6 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "records/event_log.h"
-#include "task/config.h"
 #include "tests/keys.h"
 #include "tests/scratch.h"
 

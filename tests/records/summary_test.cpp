@@ -2,8 +2,7 @@
 
 #include "tests/test.h"
 
-#include "forereach/fault_t.hpp"
-#include "forereach/robot_state_t.hpp"
+#include "tests/messages.h"
 #include "tests/records/logs.h"
 
 namespace forereach::summary_test {
@@ -57,29 +56,20 @@ TEST(Summary, CountsAHandMadeLog) {
   const ScratchDirectory scratch;
   WriteRun(scratch / "log");
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
-  EXPECT_EQ(summary.proposed, 100);
-  EXPECT_EQ(summary.decided, 100);
-  EXPECT_EQ(summary.certified, 70);
-  EXPECT_EQ(summary.abstained, (std::map<std::string, std::int64_t>{{"domain_exit", 8}, {"obstacle", 20}}));
-  EXPECT_EQ(summary.rejected, (std::map<std::string, std::int64_t>{{"stale", 2}}));
-  EXPECT_EQ(summary.latency_us.p50, 50);
-  EXPECT_EQ(summary.latency_us.p99, 99);
+  EXPECT_FIELDS(summary, (proposed, 100), (decided, 100), (certified, 70),
+                (abstained, (std::map<std::string, std::int64_t>{{"domain_exit", 8}, {"obstacle", 20}})),
+                (rejected, (std::map<std::string, std::int64_t>{{"stale", 2}})), (latency_us.p50, 50),
+                (latency_us.p99, 99));
   EXPECT_EQ(summary.certify_us.p50, 50) << "rejected ones, 0 and 1, are not certify steps";
   EXPECT_EQ(summary.distance_to_goal_m, 0.5);
   EXPECT_TRUE(summary.goal_reached);
-  EXPECT_EQ(summary.contacts, 1);
-  EXPECT_EQ(summary.limits_exceeded, 1);
-  EXPECT_EQ(summary.steps_inside, 3);
-  EXPECT_EQ(summary.steps_outside, 1);
-  EXPECT_EQ(summary.steps_consistent, 2);
-  EXPECT_THAT(ToText(summary), testing::ContainsRegex("certified +70 .*if the declaration is true"));
+  EXPECT_FIELDS(summary, (contacts, 1), (limits_exceeded, 1), (steps_inside, 3), (steps_outside, 1),
+                (steps_consistent, 2));
+  EXPECT_THAT(ToText(summary), ContainsRegex("certified +70 .*if the declaration is true"));
   EXPECT_THAT(ToText(summary),
-              testing::ContainsRegex("steps in certified slice +3 of 6, 2 consistent .within the state error.\n"));
-  EXPECT_EQ(summary.tails, 1);
-  EXPECT_EQ(summary.stops, 3);
-  EXPECT_EQ(summary.refused, 1);
-  EXPECT_EQ(summary.lost, (std::map<std::string, std::int64_t>{{"bus", 4}}));
-  EXPECT_EQ(summary.restarts, 0);
+              ContainsRegex("steps in certified slice +3 of 6, 2 consistent .within the state error.\n"));
+  EXPECT_FIELDS(summary, (tails, 1), (stops, 3), (refused, 1),
+                (lost, (std::map<std::string, std::int64_t>{{"bus", 4}})), (restarts, 0));
   EXPECT_DOUBLE_EQ(summary.duration_s, 2.0);
   EXPECT_EQ(summary.messages.at("PLAN_CANDIDATE"), 100);
 }
@@ -89,20 +79,15 @@ TEST(Summary, CountsAWithdrawalOnceHoweverOftenItIsAnswered) {
   EventLogWriter writer(scratch / "log");
   int sequence = 0;
   const auto answer = [&](std::int64_t plan_id, std::int16_t kind, std::int16_t step) {
-    execution_event_t event = MakeEvent(sequence++, kind);
-    event.plan_id = plan_id;
-    event.step = step;
-    writer.Append(1'000'000, "EXECUTION_EVENT", Encode(event));
+    writer.Append(1'000'000, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind, plan_id, step)));
   };
   for (const std::int16_t step : std::vector<std::int16_t>{5, 5, 3, 3}) answer(7, execution_event_t::WITHDRAWN, step);
   answer(7, execution_event_t::EMERGENCY_STOP, 3);
   for (const std::int64_t plan : {8, 7, 8, 7}) answer(plan, execution_event_t::WITHDRAWN, 3);  // repeated in turn
   ASSERT_TRUE(writer.Flush());
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
-  EXPECT_EQ(summary.withdrawals, 3);
-  EXPECT_EQ(summary.emergency_stops, 1);
-  EXPECT_EQ(summary.stops, 1);
-  EXPECT_THAT(ToText(summary), testing::HasSubstr("withdrawals               3 (1 emergency stops, not certified)"));
+  EXPECT_FIELDS(summary, (withdrawals, 3), (emergency_stops, 1), (stops, 1));
+  EXPECT_THAT(ToText(summary), HasSubstr("withdrawals               3 (1 emergency stops, not certified)"));
 }
 
 TEST(Summary, NoTimePassesWhereTheClockWasSetBack) {
@@ -128,12 +113,7 @@ TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
   const ScratchDirectory scratch;
   WriteRun(scratch / "log");
   Database database(scratch / "d.sqlite");
-  EventLogReader reader(scratch / "log");
-  Interpreter interpreter({}, "log");
-  LogEvent event;
-  Rows rows;
-  while (reader.Next(event) == LogStatus::kEvent) interpreter.Observe(event, rows);
-  ASSERT_TRUE(database.Write(rows, "log", event.number + 1));
+  ASSERT_TRUE(database.Write(RowsOf(scratch / "log", "log"), "log", std::ssize(ReadLog(scratch / "log").events)));
   nlohmann::json of_log = ToJson(SummarizeLogs({scratch / "log"}, GoalConfig()));
   SummaryBuilder of_rows(GoalConfig());
   of_rows.Add(database.Read("log"));
@@ -149,12 +129,11 @@ TEST(Summary, DistanceToTheGoalOfAnEmptyLogIsUnknownNotZero) {
   const ScratchDirectory scratch;
   WriteBytes(scratch / "log", {});
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
-  EXPECT_EQ(summary.proposed, 0);
-  EXPECT_EQ(summary.distance_to_goal_m, std::nullopt);
+  EXPECT_FIELDS(summary, (proposed, 0), (distance_to_goal_m, std::nullopt));
   const nlohmann::json json = ToJson(summary);
   EXPECT_TRUE(json["decision_latency_us"]["p50"].is_null());
   EXPECT_TRUE(json["distance_to_goal_m"].is_null());
-  EXPECT_THAT(ToText(summary), testing::HasSubstr("not measured"));
+  EXPECT_THAT(ToText(summary), HasSubstr("not measured"));
 }
 
 // A robot that has been at the goal may have driven on.
@@ -179,11 +158,11 @@ TEST(Summary, TimesOfASimulatedClockAreNotMeasurements) {
   Summary summary;
   summary.latency_us = summary.certify_us = {0, 0};
   const std::string text = ToText(summary);
-  EXPECT_THAT(text, testing::HasSubstr("decision latency          not measured\n"));
-  EXPECT_THAT(text, testing::HasSubstr("certify step              not measured\n"));
+  EXPECT_THAT(text, HasSubstr("decision latency          not measured\n"));
+  EXPECT_THAT(text, HasSubstr("certify step              not measured\n"));
   EXPECT_TRUE(ToJson(summary)["decision_latency_us"]["p50"].is_null());
   summary.latency_us = {0, 3};
-  EXPECT_THAT(ToText(summary), testing::HasSubstr("p50 0.0 us, p99 3.0 us"));
+  EXPECT_THAT(ToText(summary), HasSubstr("p50 0.0 us, p99 3.0 us"));
 }
 
 TEST(Summary, LeavesOutWhatLiesAcrossAStepOfTheClock) {
@@ -227,8 +206,7 @@ TEST(Summary, PassesDamageAndCountsIt) {
   bytes[0] = 0;
   WriteBytes(scratch / "log", bytes);
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
-  EXPECT_EQ(summary.proposed, 99);
-  EXPECT_EQ(summary.damage.places, 1);
+  EXPECT_FIELDS(summary, (proposed, 99), (damage.places, 1));
   EXPECT_GT(summary.damage.bytes, 0);
 }
 

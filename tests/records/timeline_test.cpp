@@ -13,8 +13,9 @@
 #include "lcmtypes/names.h"
 #include "records/replay.h"
 #include "records/report.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/records/certificates.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 #include "tests/sanitized.h"
@@ -22,13 +23,10 @@
 namespace forereach::timeline_test {
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000;
-const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
-const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
-class TimelineTest : public testing::Test {
- protected:
-  TimelineTest() : config_(LoadConfig(kConfig)), gate_(std::make_unique<Gate>(config_)) {
-    candidate_ = FirstCertified(kLog);
+struct TimelineTest : testing::Test {
+  TimelineTest() : config_(LoadConfig(kCourseTask)), gate_(std::make_unique<Gate>(config_)) {
+    candidate_ = FirstCertified(kCourseLog);
     NextFile();
   }
 
@@ -48,21 +46,15 @@ class TimelineTest : public testing::Test {
   }
 
   void Heartbeat(std::int64_t sequence, std::int64_t version) {
-    certifier_status_t status{};
-    status.utime = ++now_;
-    status.sequence = sequence;
-    status.version = version;
+    certifier_status_t status{.utime = ++now_, .sequence = sequence, .version = version};
     SetDigest(status.config_digest, config_.grounds.config);
     Append(config_.bus.status, status);
   }
 
   // @param is_heard the certifier receives them too.
   void Obstacles(double x, bool is_heard = true) {
-    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, ++now_);
-    message.sequence = obstacles_++;
-    if (is_heard) {
-      EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_), "");
-    }
+    obstacles_t message = Sighted({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, ++now_, obstacles_++);
+    if (is_heard) EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_), "");
     Append(config_.bus.obstacles, message);
   }
 
@@ -85,11 +77,10 @@ class TimelineTest : public testing::Test {
   transition_t NextTransition() {
     const Transitions& known = config_.problem->transitions;
     const int n = config_.problem->model->num_states(), m = config_.problem->model->num_inputs();
-    transition_t message{};
-    message.utime = ++now_;
-    message.sequence = transitions_++;
-    message.num_states = static_cast<std::int16_t>(n);
-    message.num_inputs = static_cast<std::int16_t>(m);
+    transition_t message{.utime = ++now_,
+                         .sequence = transitions_++,
+                         .num_states = static_cast<std::int16_t>(n),
+                         .num_inputs = static_cast<std::int16_t>(m)};
     for (int k = 0; k < n; ++k) message.state[k] = known.z(0, k), message.next_state[k] = known.x_next(0, k);
     for (int k = 0; k < m; ++k) message.input[k] = known.z(0, n + k);
     return message;
@@ -135,24 +126,20 @@ class TimelineTest : public testing::Test {
   }
   // @param is_taken by the certifier.
   void ObstaclesBy(std::uint64_t sender, double x, bool is_taken) {
-    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, ++now_);
-    message.sequence = obstacles_++;
+    obstacles_t message = Sighted({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, ++now_, obstacles_++);
     EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_, sender).empty(), is_taken);
     AppendSigned(config_.bus.obstacles, message, sender);
   }
   // @param is_learned by the certifier.
   void TransitionBy(std::uint64_t sender, bool is_learned) {
     const transition_t message = NextTransition();
-    if (is_learned) {
-      EXPECT_EQ(gate_->Learn(Encode(message)), "");
-    }
+    if (is_learned) EXPECT_EQ(gate_->Learn(Encode(message)), "");
     AppendSigned(config_.bus.transition, message, sender);
   }
 
   // Each user of the timeline finds the grounds that each decision names.
   void ExpectAllAgree() {
-    class Comparer final : public TimelineUser {
-     public:
+    struct Comparer final : TimelineUser {
       void OnDecision(const RecordedDecision& recorded) override {
         ++decisions;
         EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.decision)) << recorded.event;
@@ -166,14 +153,13 @@ class TimelineTest : public testing::Test {
     } comparer;
     Timeline timeline(config_, {&comparer});
     timeline.Read(logs_, true);
-    EXPECT_EQ(comparer.decisions, certified_);
-    EXPECT_EQ(comparer.plans, certified_);
+    EXPECT_FIELDS(comparer, (decisions, certified_), (plans, certified_));
 
     const ReplayResult replayed = Replay(logs_, {config_});
     EXPECT_THAT(replayed.differences, IsEmpty());
     EXPECT_EQ(replayed.agreed, certified_);
 
-    const CertificateFile file = ReadLogs(logs_, kConfig);
+    const CertificateFile file = ReadLogs(logs_, kCourseTask);
     ASSERT_EQ(std::ssize(file.certificates), certified_);
     const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
     for (const RecordedCertificate& certificate : file.certificates) {
@@ -324,7 +310,7 @@ TEST_F(TimelineTest, TransitionsOfTwoSendersAreNotLearned) {
 
 TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
   const ScratchDirectory scratch;
-  const auto [key, honest] = SignedLog(scratch, kLog);
+  const auto [key, honest] = SignedLog(scratch, kCourseLog);
   const std::string log = scratch / "forged.lcmlog";
   {
     EventLogReader reader(honest);
@@ -350,18 +336,16 @@ TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
     EXPECT_TRUE(Report(options, out));
     return nlohmann::json::parse(out.str());
   };
-  const nlohmann::json recorded = report(kLog, {}), judged = report(log, {key}), believed = report(log, {"", true});
-  EXPECT_EQ(judged["plans"], recorded["plans"]);
-  EXPECT_EQ(judged["messages"], recorded["messages"]);
-  EXPECT_EQ(judged["passed_over"]["not_authentic"]["unsigned"], kUnsigned + 1);
-  EXPECT_EQ(judged["passed_over"]["not_authentic"]["forged"], kForged);
+  const nlohmann::json recorded = report(kCourseLog, {}), judged = report(log, {key}),
+                       believed = report(log, {"", true});
+  EXPECT_THAT(judged, Holds({{"plans", recorded["plans"]}, {"messages", recorded["messages"]}}));
+  EXPECT_THAT(judged["passed_over"]["not_authentic"], Holds({{"unsigned", kUnsigned + 1}, {"forged", kForged}}));
   EXPECT_EQ(believed["plans"]["decided"], recorded["plans"]["decided"].get<int>() + 1);
   EXPECT_EQ(believed["passed_over"]["not_authentic"]["unsigned"], 0);
 }
 
 // The most that is allocated while the certificates of a log are handed on, and how many there are.
-class PeakOfMemory final : public CertificateUser {
- public:
+struct PeakOfMemory final : CertificateUser {
   void OnCertificate(RecordedCertificate&&, const Basis*) override {
     const struct mallinfo2 now = mallinfo2();
     peak = std::max(peak, static_cast<std::int64_t>(now.uordblks + now.hblkhd));
@@ -377,7 +361,7 @@ TEST_F(TimelineTest, ALogOfFourTimesTheCertificatesNeedsNotFourTimesTheMemory) {
   const auto peak_with = [&](int certificates) {
     while (certified_ < certificates) Certify();
     PeakOfMemory user;
-    ReadCertificates(logs_[0], kConfig, {}, user);
+    ReadCertificates(logs_[0], kCourseTask, {}, user);
     EXPECT_EQ(user.certificates, certificates);
     return user.peak;
   };

@@ -7,17 +7,14 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/plan_ledger.h"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/decision_t.hpp"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/text.h"
-#include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
+#include "tests/messages.h"
 #include "tests/records/certificates.h"
+#include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 
@@ -27,39 +24,37 @@ using verifier::Status;
 using verifier::Verdict;
 
 constexpr std::int64_t kStart = 1'700'000'000'000'000;
-const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
-const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
 Verdict Judge(const CertificateFile& file, std::size_t i) {
   return verifier::Verifier(file.config.problem, verifier::MethodOf(*file.config.problem))
       .Verify(file.certificates[i].certificate);
 }
 
+// The first certificate has one mismatch.
+void ExpectMismatch(const CertificateFile& file, const testing::Matcher<std::string>& what) {
+  ASSERT_EQ(file.certificates.at(0).mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, what);
+}
+
 // A copy of the recorded log, as CopyLog changes it.
 std::string Edited(const ScratchDirectory& scratch, const std::function<bool(LogEvent&)>& edit) {
   const std::string path = scratch / "edited.lcmlog";
   std::filesystem::remove(path);
-  CopyLog(kLog, path, edit);
+  CopyLog(kCourseLog, path, edit);
   return path;
 }
 
 // Changes the first certified plan, and if asked makes its digest good again.
 std::string EditedCertificate(const ScratchDirectory& scratch, bool reseal,
                               const std::function<void(certified_plan_t&)>& edit) {
-  bool done = false;
-  return Edited(scratch, [&](LogEvent& event) {
-    auto certified = Decoded<certified_plan_t>(event.data);
-    if (!certified || done) return true;
-    done = true;
-    edit(*certified);
-    if (reseal) SetDigest(certified->certificate_digest, CertificateDigest(*certified));
-    event.data = Encode(*certified);
-    return true;
-  });
+  return Edited(scratch, OfFirst<certified_plan_t>([&](certified_plan_t& certified) {
+                  edit(certified);
+                  if (reseal) SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                }));
 }
 
 TEST(VerifyLog, RecordedCourseIsConfirmed) {
-  const CertificateFile file = ReadCertificates(kLog, kConfig);
+  const CertificateFile file = ReadCertificates(kCourseLog, kCourseTask);
   EXPECT_GE(file.certificates.size(), 10u);
   EXPECT_GT(file.not_certificates, 0u);
   for (std::size_t i = 0; i < file.certificates.size(); ++i) {
@@ -74,9 +69,8 @@ TEST(VerifyLog, NoticesASliceShrunkenByOneUlp) {
   const auto path = EditedCertificate(scratch, false, [](certified_plan_t& certified) {
     certified.slice_upper[9][0] = std::nextafter(certified.slice_upper[9][0], -HUGE_VAL);
   });
-  const auto file = ReadCertificates(path, kConfig);
-  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
-  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("altered"));
+  const auto file = ReadCertificates(path, kCourseTask);
+  ExpectMismatch(file, HasSubstr("altered"));
   EXPECT_TRUE(file.certificates[1].mismatches.empty());
 }
 
@@ -85,9 +79,8 @@ TEST(VerifyLog, NoticesAnUnusedEntryThatIsNotZero) {
   ScratchDirectory scratch;
   const auto path = EditedCertificate(
       scratch, true, [](certified_plan_t& certified) { certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5; });
-  const auto file = ReadCertificates(path, kConfig);
-  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
-  EXPECT_THAT(file.certificates[0].mismatches[0].what, AllOf(HasSubstr("altered"), HasSubstr("slice_lower[")));
+  const auto file = ReadCertificates(path, kCourseTask);
+  ExpectMismatch(file, AllOf(HasSubstr("altered"), HasSubstr("slice_lower[")));
   EXPECT_EQ(file.certificates[0].mismatches[0].found, "0.5");
   EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed) << "the mathematics does not see it";
 }
@@ -96,20 +89,18 @@ TEST(VerifyLog, NoticesALaterExpiry) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1'000'000; });
-  const auto file = ReadCertificates(path, kConfig);
-  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
-  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("certificate_digest"));
+  const auto file = ReadCertificates(path, kCourseTask);
+  ExpectMismatch(file, HasSubstr("certificate_digest"));
 }
 
 TEST(VerifyLog, RefutesASliceThatWasShrunkenAndResealed) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
-  const auto file = ReadCertificates(path, kConfig);
+  const auto file = ReadCertificates(path, kCourseTask);
   EXPECT_TRUE(file.certificates[0].mismatches.empty());
   const Verdict verdict = Judge(file, 0);
-  EXPECT_EQ(verdict.status, Status::kRefuted);
-  EXPECT_EQ(verdict.failure.step, 9);
+  EXPECT_FIELDS(verdict, (status, Status::kRefuted), (failure.step, 9));
   EXPECT_THAT(verdict.failure.what, HasSubstr("contains x"));
 }
 
@@ -117,7 +108,7 @@ TEST(VerifyLog, NoticesAChangedControlOfTheCertifiedPlan) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
-  const auto file = ReadCertificates(path, kConfig);
+  const auto file = ReadCertificates(path, kCourseTask);
   EXPECT_EQ(file.certificates[0].mismatches.size(), 2u);  // the plan's digest, and no such candidate was sent
   EXPECT_EQ(Judge(file, 0).failure.step, 5);
 }
@@ -128,38 +119,33 @@ TEST(VerifyLog, AFileWhoseNameIsNoTextIsStillNamedInJson) {
   std::filesystem::rename(
       EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1; }), path);
   const std::string next = scratch.Write("next.lcmlog", "");  // files are named where there are several
-  const Output output = Forereach("verify --json --config " + kConfig + " " + path + " " + next);
+  const Output output = Forereach("verify --json --config " + kCourseTask + " " + path + " " + next);
   EXPECT_EQ(output.code, 1);
   EXPECT_THAT(nlohmann::json::parse(output.text)["failures"][0]["certificate"], HasSubstr("\uFFFD.lcmlog event "));
 }
 
 TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
   ScratchDirectory scratch;
-  bool dropped = false;
-  const auto path = Edited(scratch, [&](LogEvent& event) {
-    if (dropped || !Decoded<certified_plan_t>(event.data)) return true;
-    dropped = true;
-    return false;
-  });
-  const auto whole = ReadCertificates(kLog, kConfig), file = ReadCertificates(path, kConfig);
+  const auto path = Edited(scratch, OfFirst<certified_plan_t>([](auto&) { return false; }));
+  const auto whole = ReadCertificates(kCourseLog, kCourseTask), file = ReadCertificates(path, kCourseTask);
   EXPECT_EQ(file.certificates.size(), whole.certificates.size());
   EXPECT_THAT(file.certificates.back().missing, HasSubstr("no certified plan"));
 }
 
 TEST(VerifyLog, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   ScratchDirectory scratch;
-  const auto [key, log] = SignedLog(scratch, kLog);
+  const auto [key, log] = SignedLog(scratch, kCourseLog);
   const auto is_whole = [](const RecordedCertificate& c) { return c.missing.empty() && c.mismatches.empty(); };
-  EXPECT_FALSE(std::ranges::all_of(ReadCertificates(log, kConfig).certificates, is_whole)) << "all are believed";
-  const auto whole = ReadCertificates(kLog, kConfig), file = ReadCertificates(log, kConfig, {key});
+  EXPECT_FALSE(std::ranges::all_of(ReadCertificates(log, kCourseTask).certificates, is_whole)) << "all are believed";
+  const auto whole = ReadCertificates(kCourseLog, kCourseTask), file = ReadCertificates(log, kCourseTask, {key});
   EXPECT_EQ(file.certificates.size(), whole.certificates.size());
   EXPECT_TRUE(std::ranges::all_of(file.certificates, is_whole));
   EXPECT_EQ(file.not_certificates, whole.not_certificates);
   EXPECT_EQ(DescribePassedOver(file.passed_over),
             "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
-  EXPECT_EQ(ReadCertificates(log, kConfig, {key}).passed_over.not_authentic.replayed, kRepeated);
-  EXPECT_THROW((void)ReadCertificates(log, kConfig, {scratch / "none"}), KeyError);
-  const Output output = Forereach("verify --json " + log + " --config " + kConfig + " --key " + key);
+  EXPECT_EQ(ReadCertificates(log, kCourseTask, {key}).passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_THROW((void)ReadCertificates(log, kCourseTask, {scratch / "none"}), KeyError);
+  const Output output = Forereach("verify --json " + log + " --config " + kCourseTask + " --key " + key);
   EXPECT_EQ(output.code, 0);
   EXPECT_EQ(nlohmann::json::parse(output.text)["passed_over"]["not_authentic"]["forged"], kForged);
 }
@@ -172,37 +158,34 @@ TEST(VerifyLog, WhatIsNoCertifiedPlanIsPassedOver) {
     writer.Append(kStart, "PLAN_CERTIFIED", std::vector<std::uint8_t>{1, 2, 3});
     ASSERT_TRUE(writer.Flush());
   }
-  const auto file = ReadCertificates(path, kConfig);
-  EXPECT_EQ(file.certificates.size(), ReadCertificates(kLog, kConfig).certificates.size());
+  const auto file = ReadCertificates(path, kCourseTask);
+  EXPECT_EQ(file.certificates.size(), ReadCertificates(kCourseLog, kCourseTask).certificates.size());
   EXPECT_EQ(file.passed_over.undecodable, 1);
 }
 
 TEST(VerifyLog, DamageIsNoticed) {
   ScratchDirectory scratch;
-  std::filesystem::copy(kLog, scratch / "damaged.lcmlog");
+  std::filesystem::copy(kCourseLog, scratch / "damaged.lcmlog");
   std::fstream log(scratch / "damaged.lcmlog", std::ios::in | std::ios::out | std::ios::binary);
-  log.seekp(static_cast<std::streamoff>(Read(kLog).find("PLAN_CERTIFIED")) + 1000);
+  log.seekp(static_cast<std::streamoff>(Read(kCourseLog).find("PLAN_CERTIFIED")) + 1000);
   log << std::string(300, 'x');
   log.close();
-  const auto file = ReadCertificates(scratch / "damaged.lcmlog", kConfig);
+  const auto file = ReadCertificates(scratch / "damaged.lcmlog", kCourseTask);
   EXPECT_TRUE(std::ranges::any_of(file.certificates,
                                   [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
 }
 
 // ---- Obstacles that come by the bus.
 
-class VerifyObstacles : public testing::Test {
- protected:
-  VerifyObstacles() : config_(LoadConfig(kConfig)) {
-    candidate_ = FirstCertified(kLog);
+struct VerifyObstacles : testing::Test {
+  VerifyObstacles() : config_(LoadConfig(kCourseTask)) {
+    candidate_ = FirstCertified(kCourseLog);
     candidate_.utime = kStart + 2;
     candidate_.start_utime = kStart + 100'000;
   }
 
   [[nodiscard]] obstacles_t Message(double x, std::int64_t sequence, std::int64_t utime) const {
-    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, utime);
-    message.sequence = sequence;
-    return message;
+    return Sighted({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)}, utime, sequence);
   }
 
   // The number of the first obstacle behind those of the task.
@@ -242,10 +225,9 @@ class VerifyObstacles : public testing::Test {
 };
 
 TEST_F(VerifyObstacles, JudgesByTheObstaclesInForce) {
-  const auto file = ReadCertificates(Record(), kConfig);
+  const auto file = ReadCertificates(Record(), kCourseTask);
   ASSERT_EQ(file.certificates.size(), 1u);
-  EXPECT_TRUE(file.certificates[0].mismatches.empty());
-  EXPECT_EQ(file.certificates[0].certificate.obstacles.back().points()[0][0], 80);
+  EXPECT_FIELDS(file.certificates[0], (mismatches.empty(), true), (certificate.obstacles.back().points()[0][0], 80));
   EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
 }
 
@@ -254,9 +236,8 @@ TEST_F(VerifyObstacles, NoticesAnObstacleMovedOntoThePath) {
                                        obstacles.obstacle[0].shape.point[0][0] = certified.slice_lower[20][0];
                                        obstacles.obstacle[0].shape.point[0][1] = certified.slice_lower[20][1];
                                      }),
-                                     kConfig);
-  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
-  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("obstacles in force"));
+                                     kCourseTask);
+  ExpectMismatch(file, HasSubstr("obstacles in force"));
   EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle " + OfTheBus()));
 }
 
@@ -269,7 +250,7 @@ TEST_F(VerifyObstacles, RefutesAnObstacleMovedOntoThePathAndResealed) {
                                        SetDigest(certified.obstacles_digest, ObstaclesDigest(all));
                                        SetDigest(certified.certificate_digest, CertificateDigest(certified));
                                      }),
-                                     kConfig);
+                                     kCourseTask);
   for (const Mismatch& mismatch : file.certificates[0].mismatches)
     EXPECT_THAT(mismatch.what, HasSubstr("its decision's"));
   EXPECT_EQ(Judge(file, 0).status, Status::kRefuted);
@@ -281,9 +262,8 @@ TEST_F(VerifyObstacles, NoticesOtherTransitionsOfTheTaskThatAreResealed) {
                                        certified.transitions_digest[7] ^= 1;
                                        SetDigest(certified.certificate_digest, CertificateDigest(certified));
                                      }),
-                                     kConfig);
-  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
-  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("digest of the transitions of the task"));
+                                     kCourseTask);
+  ExpectMismatch(file, HasSubstr("digest of the transitions of the task"));
 }
 
 // The guard goes by them.
@@ -293,7 +273,7 @@ TEST_F(VerifyObstacles, NoticesOtherErrorsOfStepsOrStatesThatAreResealed) {
                                        certified.state_error[1] += 0x1p-60;
                                        SetDigest(certified.certificate_digest, CertificateDigest(certified));
                                      }),
-                                     kConfig);
+                                     kCourseTask);
   ASSERT_EQ(file.certificates[0].mismatches.size(), 2u);
   EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("state_error[1]"));
   EXPECT_THAT(file.certificates[0].mismatches[1].what, HasSubstr("step_error_us"));
@@ -302,7 +282,7 @@ TEST_F(VerifyObstacles, NoticesOtherErrorsOfStepsOrStatesThatAreResealed) {
 // The sentence and the numbers of the decision that goes with a certified plan.
 TEST_F(VerifyObstacles, AlteredDecisionsAreRefused) {
   const auto mismatches = [&](const std::function<void(decision_t&)>& change) {
-    const auto file = ReadCertificates(RecordWith(change), kConfig);
+    const auto file = ReadCertificates(RecordWith(change), kCourseTask);
     return std::pair(file.certificates.at(0).mismatches.size(), Judge(file, 0).status);
   };
   EXPECT_EQ(mismatches([](decision_t&) {}), std::pair(std::size_t{0}, Status::kConfirmed));
@@ -372,17 +352,16 @@ class VerifyWithdrawal : public VerifyObstacles {
 };
 
 TEST_F(VerifyWithdrawal, WhatItLeavesIsClearOfTheNewObstacle) {
-  const auto file = ReadCertificates(Recorded(), kConfig);
+  const auto file = ReadCertificates(Recorded(), kCourseTask);
   ASSERT_EQ(file.certificates.size(), 2u);
   EXPECT_GT(withdrawal_.valid_steps, 2);
   EXPECT_LT(withdrawal_.valid_steps, 12);
-  EXPECT_TRUE(file.certificates[1].mismatches.empty());
-  EXPECT_EQ(file.certificates[1].missing, "");
+  EXPECT_FIELDS(file.certificates[1], (mismatches.empty(), true), (missing, ""));
   EXPECT_EQ(Judge(file, 1).status, Status::kConfirmed) << Judge(file, 1).failure.what;
 }
 
 TEST_F(VerifyWithdrawal, OneControlTooManyIsRefuted) {
-  const auto file = ReadCertificates(Recorded([](withdrawal_t& message) { ++message.valid_steps; }), kConfig);
+  const auto file = ReadCertificates(Recorded([](withdrawal_t& message) { ++message.valid_steps; }), kCourseTask);
   EXPECT_EQ(Judge(file, 1).status, Status::kRefuted);
   EXPECT_THAT(Judge(file, 1).failure.what, HasSubstr("clear of obstacle " + OfTheBus()));
 }
@@ -393,33 +372,33 @@ TEST_F(VerifyWithdrawal, StepsThatArePastAreNotJudged) {
     message.first_step = candidate_.num_steps - 1;
     message.valid_steps = candidate_.num_steps;
   };
-  const auto file = ReadCertificates(Recorded(all), kConfig);
+  const auto file = ReadCertificates(Recorded(all), kCourseTask);
   EXPECT_EQ(Judge(file, 1).status, Status::kConfirmed) << Judge(file, 1).failure.what;
   const auto from_the_start = ReadCertificates(Recorded([&](withdrawal_t& message) {
                                                  all(message);
                                                  message.first_step = 0;
                                                }),
-                                               kConfig);
+                                               kCourseTask);
   EXPECT_EQ(Judge(from_the_start, 1).status, Status::kRefuted);
 }
 
 TEST_F(VerifyWithdrawal, OfAnotherPlanOrUnderOtherGroundsIsNoticed) {
   const auto other = ReadCertificates(
-      Recorded([](withdrawal_t& message) { SetDigest(message.certificate_digest, DigestOf("another")); }), kConfig);
+      Recorded([](withdrawal_t& message) { SetDigest(message.certificate_digest, DigestOf("another")); }), kCourseTask);
   EXPECT_THAT(other.certificates[1].missing, HasSubstr("its certified plan is not in the log"));
   const auto grounds = ReadCertificates(
-      Recorded([](withdrawal_t& message) { SetDigest(message.obstacles_digest, DigestOf("another")); }), kConfig);
+      Recorded([](withdrawal_t& message) { SetDigest(message.obstacles_digest, DigestOf("another")); }), kCourseTask);
   EXPECT_THAT(grounds.certificates[1].mismatches.at(0).what, HasSubstr("obstacles in force"));
-  const auto longer = ReadCertificates(Recorded([](withdrawal_t& message) { message.valid_steps = 200; }), kConfig);
+  const auto longer = ReadCertificates(Recorded([](withdrawal_t& message) { message.valid_steps = 200; }), kCourseTask);
   EXPECT_THAT(longer.certificates[1].missing, HasSubstr("its plan has"));
-  const auto none = ReadCertificates(Recorded([](withdrawal_t& message) { message.valid_steps = 0; }), kConfig);
+  const auto none = ReadCertificates(Recorded([](withdrawal_t& message) { message.valid_steps = 0; }), kCourseTask);
   EXPECT_EQ(none.certificates.size(), 1u) << "nothing is claimed";
 }
 
 class VerifyMovingObstacles : public VerifyObstacles {
  protected:
   VerifyMovingObstacles() {
-    std::string text = Read(kConfig);
+    std::string text = Read(kCourseTask);
     text = std::regex_replace(text, std::regex("  projection:[^\n]*"), R"(  body:
     pose: [x, y, theta]
     parts: [{hull: {points: [[-1, -1], [-1, 1], [3, -1], [3, 1]]}}, {disc: {at: [3, 0], radius: 0.5}}]
@@ -441,11 +420,7 @@ class VerifyMovingObstacles : public VerifyObstacles {
     config_ = LoadConfig(task_);
   }
 
-  [[nodiscard]] static obstacles_t Message(const Obstacle& obstacle) {
-    obstacles_t message = ToMessage({obstacle}, kStart);
-    message.sequence = 0;
-    return message;
-  }
+  [[nodiscard]] static obstacles_t Message(const Obstacle& obstacle) { return Sighted({obstacle}, kStart, 0); }
   [[nodiscard]] Obstacle Mover(double x) const { return Obstacle::Circle(Eigen::Vector2d(x, 0), 1).Moving(motion_); }
 
   // A log of a decision among `decided`, in which `logged` is written and named instead.
@@ -483,9 +458,7 @@ TEST_F(VerifyMovingObstacles, AreMetAtTheTimesOfThePlan) {
   for (const Mismatch& mismatch : file.certificates[0].mismatches)
     ADD_FAILURE() << mismatch.what << ": " << mismatch.expected << ", found " << mismatch.found;
   const Schedule& schedule = file.certificates[0].certificate.schedule;
-  EXPECT_EQ(schedule.start_us, candidate_.start_utime);
-  EXPECT_EQ(schedule.step_us, candidate_.step_us);
-  EXPECT_EQ(schedule.clock_error_us, 20'000);
+  EXPECT_FIELDS(schedule, (start_us, candidate_.start_utime), (step_us, candidate_.step_us), (clock_error_us, 20'000));
   const Verdict verdict = Judge(file, 0);
   EXPECT_EQ(verdict.status, Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
 }
@@ -550,9 +523,9 @@ TEST_F(VerifyMovingObstacles, WhatIsNowhereDuringThePlanIsNotNamed) {
 
 TEST_F(VerifyObstacles, NoticesStaleObstaclesThatWereNeverInForce) {
   const auto file = ReadCertificates(
-      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
+      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kCourseTask);
   EXPECT_GE(file.certificates[0].mismatches.size(), 1u);
-  EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
+  EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kCourseTask).obstacles.size());
 }
 
 }  // namespace forereach::verify_log_test

@@ -100,8 +100,7 @@ TEST(DriftDrive, ReachesItsGoalInsideItsSlices) {
     EXPECT_EQ(driven.counts.stops, 0);
     EXPECT_GT(driven.counts.steps, 300);
     EXPECT_GT(driven.counts.certified, 20);
-    EXPECT_EQ(driven.faulted, 0);
-    EXPECT_EQ(driven.beyond_between, 0);
+    EXPECT_FIELDS(driven, (faulted, 0), (beyond_between, 0));
   }
 }
 

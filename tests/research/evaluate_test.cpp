@@ -10,8 +10,7 @@
 namespace forereach::research::evaluate_test {
 
 // Claims that the residual is zero.
-class NoResidual final : public ResidualEnclosure {
- public:
+struct NoResidual final : ResidualEnclosure {
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override {
     for (std::size_t k = 0; k < query.half_width.size(); ++k) bounds.lower[k] = bounds.upper[k] = 0;
     bounds.capped = false;
@@ -222,10 +221,7 @@ TEST(RunCell, CountsAddUpAndADeclarationThatDataContradictIsF) {
   for (const Tally& tally : RunCell(cell, {10, 20})) {
     EXPECT_EQ(tally.plans, 10);
     EXPECT_EQ(tally.certified + tally.falsified + tally.domain + tally.safety, tally.plans);
-    EXPECT_EQ(tally.falsified, 0);
-    EXPECT_EQ(tally.covered, tally.complete());
-    EXPECT_EQ(tally.false_certificates(), 0);
-    EXPECT_EQ(tally.areas.size(), 10u);
+    EXPECT_FIELDS(tally, (falsified, 0), (covered, tally.complete()), (false_certificates(), 0), (areas.size(), 10u));
   }
   cell.declared = {"hundredth", cell.declared.matrix / 100};
   for (const Tally& tally : RunCell(cell, {10, 20})) EXPECT_EQ(tally.falsified, tally.plans);

@@ -67,7 +67,7 @@ TEST(Labels, WithoutRoomAreAnError) {
       [&] {
         (void)PlaceLabels({0, 0, 20, 20}, {}, {}, labels, 1);
       },
-      testing::ThrowsMessage<std::runtime_error>("picture: no room for the label 100"));
+      ThrowsMessage<std::runtime_error>("picture: no room for the label 100"));
 }
 
 }  // namespace forereach::research::labels_test

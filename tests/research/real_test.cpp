@@ -67,8 +67,7 @@ std::string MakeLog(const MadeUpCar& car, double seconds, unsigned seed) {
   return text;
 }
 
-class RealTest : public testing::Test {
- protected:
+struct RealTest : testing::Test {
   [[nodiscard]] Drive DriveOf(const MadeUpCar& car, double seconds, unsigned seed) const {
     const std::string path = scratch_.Write("drive" + std::to_string(seed) + ".csv", MakeLog(car, seconds, seed));
     return TransitionsOf(ReadRecording(path, car.asked_late ? kMeanAge : 0), driving_);
@@ -247,12 +246,10 @@ TEST_F(RealTest, LearningLeavesOutOrExplainsTheLargeErrors) {
   const int count = drive.transitions.size();
   const Fitted fitted = FitTo(driving_, Whole(drive));
   const Learned all = Learn(fitted, {.quantile = 1});
-  EXPECT_EQ(all.left_out, 0);
-  EXPECT_EQ(all.problem->transitions.size(), count);
+  EXPECT_FIELDS(all, (left_out, 0), (problem->transitions.size(), count));
   const Learned some = Learn(fitted, {.quantile = 0.9});
   EXPECT_GT(some.left_out, count / 20);
-  EXPECT_EQ(some.problem->transitions.size(), count - some.left_out);
-  EXPECT_EQ(some.problem->declaration.lipschitz.maxCoeff(), 0);
+  EXPECT_FIELDS(*some.problem, (transitions.size(), count - some.left_out), (declaration.lipschitz.maxCoeff(), 0));
   const Learned slopes = Learn(fitted, {.quantile = 0.97, .slopes = true});
   ASSERT_TRUE(slopes.explained);
   EXPECT_EQ(slopes.problem->transitions.size(), count);

@@ -14,8 +14,7 @@ namespace forereach::research::run_test {
 
 namespace fs = std::filesystem;
 
-class RunTest : public testing::Test {
- protected:
+struct RunTest : testing::Test {
   [[nodiscard]] RunOptions Quick(std::vector<std::string> names, const std::string& directory) const {
     return {std::move(names), {2, true}, {30, 24}, 1, root_ / directory, "", {}};
   }
@@ -112,14 +111,14 @@ TEST(RunCell, CpSlsIsStarvedWithFewObservationsAndVacuousWithMany) {
   int vacuous = 0;
   for (const Tally& few : run(100)) {
     EXPECT_EQ(few.domain, few.plans);
-    EXPECT_THAT(few.budgets.total, testing::Each(-1));
-    EXPECT_THAT(few.budgets.least_mass, testing::Each(testing::Lt(119)));
+    EXPECT_THAT(few.budgets.total, Each(-1));
+    EXPECT_THAT(few.budgets.least_mass, Each(Lt(119)));
   }
   for (const Tally& many : run(400)) {
     vacuous += many.vacuous;
     EXPECT_EQ(many.certified, 0);
     EXPECT_EQ(many.vacuous + many.safety + many.domain, many.plans);
-    EXPECT_THAT(many.budgets.least_mass, testing::Each(testing::Gt(119)));
+    EXPECT_THAT(many.budgets.least_mass, Each(Gt(119)));
     for (std::size_t i = 0; i < many.budgets.total.size(); ++i) {
       if (many.budgets.complete[i] == 0) continue;
       EXPECT_NEAR(many.budgets.total[i], 0.1 + many.budgets.drift[i] + many.budgets.tube[i], 1e-12);
@@ -134,21 +133,17 @@ TEST_F(RunTest, LimitsAndAssumptionsHoldInAQuickRun) {
   options.effort = {3, 8};
   RunExperiments(options, out);
   EXPECT_THAT(out.str(),
-              HasSubstr("| admissible pairs | exact | 64 | Short-horizon lower-bound scan | 64 | 0 | same |"));
-  EXPECT_THAT(out.str(),
-              HasSubstr("| of these with a positive bound | ours | 64 | Short-horizon lower-bound scan | 64 |"));
-  EXPECT_THAT(out.str(),
-              HasSubstr("| bicycle, N = 400: tubes that miss an extremal state, of 4 | not given |  |  | 0 |"));
+              AllOf(HasSubstr("| admissible pairs | exact | 64 | Short-horizon lower-bound scan | 64 | 0 | same |"),
+                    HasSubstr("| of these with a positive bound | ours | 64 | Short-horizon lower-bound scan | 64 |"),
+                    HasSubstr("| bicycle, N = 400: tubes that miss an extremal state, of 4 | not given |  |  | 0 |")));
   for (const char* system : {"bicycle", "point_mass"})
     EXPECT_THAT(out.str(), HasSubstr(std::string("| ") + system +
                                      ": false certificates, all groups | not given |  |  | 0 |  |  |  |"));
   EXPECT_THAT(out.str(),
-              HasSubstr("| Affine residual, linear target: F | ours | 0.000 | Affine control example | 0.000 "));
-  EXPECT_THAT(out.str(),
-              HasSubstr("| Affine residual, linear target: C coverage | ours | 1.000 | Affine control example | "
-                        "1.000 "));
-  EXPECT_THAT(out.str(),
-              HasSubstr("| Affine residual, knee target: F | ours | 1.000 | Affine control example | 1.000 "));
+              AllOf(HasSubstr("| Affine residual, linear target: F | ours | 0.000 | Affine control example | 0.000 "),
+                    HasSubstr("| Affine residual, linear target: C coverage | ours | 1.000 | Affine control example | "
+                              "1.000 "),
+                    HasSubstr("| Affine residual, knee target: F | ours | 1.000 | Affine control example | 1.000 ")));
 }
 
 std::string WithoutOrigin(std::string report) {
@@ -204,9 +199,8 @@ TEST_F(RunTest, AnotherEffortOrADamagedFileIsRefusedByName) {
       },
       ThrowsMessage<std::runtime_error>(HasSubstr("run.json: scenarios: begun with 2, this run has 3")));
   std::ofstream(root_ / "cells" / (cell.key() + ".json")) << "{\"groups\": {\"A\"";
-  EXPECT_THAT(
-      [&] { (void)RunAll({cell}, directory, 1); },
-      ThrowsMessage<std::runtime_error>(testing::AllOf(HasSubstr(cell.key() + ".json: "), HasSubstr("delete it"))));
+  EXPECT_THAT([&] { (void)RunAll({cell}, directory, 1); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(cell.key() + ".json: "), HasSubstr("delete it"))));
 }
 
 TEST_F(RunTest, TooSmallADeclarationIsSeenByTheTestOrByTheTruth) {
@@ -299,8 +293,8 @@ TEST_F(RunTest, PlansAreWrittenOneByOneWithTheColumnsOfTheDocuments) {
   for (const int seed : {100, 101, 102})
     for (const Tally& tally : RunCell(PaperCell(shorter, 60, 0, seed), {6, 10}))
       for (std::size_t i = 0; i < tally.answers.size(); ++i)
-        EXPECT_THAT(outcomes[at++], testing::StartsWith(std::to_string(seed) + "," + tally.group + "," +
-                                                        std::to_string(i) + "," + tally.answers[i] + ","));
+        EXPECT_THAT(outcomes[at++], StartsWith(std::to_string(seed) + "," + tally.group + "," + std::to_string(i) +
+                                               "," + tally.answers[i] + ","));
   std::ostringstream ignored;
   RunPlans({"bicycle", "Scalar envelope", 60, 8, 100, 3, {6, 10}, 2, root_ / "other"}, ignored);
   EXPECT_NE(Read(root_ / "other/outcomes.csv"), Read(root_ / "one/outcomes.csv"));

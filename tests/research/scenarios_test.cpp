@@ -23,9 +23,7 @@ double DistanceFromPath(const System& system, const Scenario& scenario) {
 TEST(Scenarios, AreTheSameEachTimeAndOthersOtherwise) {
   for (const System* system : Systems()) {
     const Scenario a = MakeScenario(*system, Group::kC, 2, 7), b = MakeScenario(*system, Group::kC, 2, 7);
-    EXPECT_EQ(a.center, b.center);
-    EXPECT_EQ(a.controls, b.controls);
-    EXPECT_EQ(a.obstacle.center, b.obstacle.center);
+    EXPECT_FIELDS(a, (center, b.center), (controls, b.controls), (obstacle.center, b.obstacle.center));
     EXPECT_NE(a.center, MakeScenario(*system, Group::kC, 2, 8).center);
     EXPECT_NE(a.center, MakeScenario(*system, Group::kC, 3, 7).center);
   }
@@ -43,8 +41,7 @@ TEST(Scenarios, BicyclesAreInTheirBounds) {
       EXPECT_EQ(s.controls.cols(), 12);
       EXPECT_LE(s.controls.row(0).cwiseAbs().maxCoeff(), 0.5);
       EXPECT_LE(s.controls.row(1).cwiseAbs().maxCoeff(), 0.05);
-      EXPECT_EQ(s.controls.col(0), s.controls.col(11));
-      EXPECT_EQ(s.obstacle.radius, 1);
+      EXPECT_FIELDS(s, (controls.col(0), s.controls.col(11)), (obstacle.radius, 1));
     }
 }
 

@@ -72,8 +72,7 @@ TEST(Data, OfASmallerCountAreTheFirstOfALarger) {
   for (const System* system : Systems()) {
     const Transitions few = MakeData(*system, Layout::kCorridor, 3, 25, 1e-3),
                       many = MakeData(*system, Layout::kCorridor, 3, 60, 1e-3);
-    EXPECT_EQ(few.z, many.z.topRows(25));
-    EXPECT_EQ(few.x_next, many.x_next.topRows(25));
+    EXPECT_FIELDS(few, (z, many.z.topRows(25)), (x_next, many.x_next.topRows(25)));
     EXPECT_NE(few.z, MakeData(*system, Layout::kCorridor, 4, 25, 1e-3).z);
   }
 }

@@ -67,8 +67,7 @@ TEST(JointTest, TakesRowsThatAreNearOneByOneAsFarTogether) {
   EXPECT_NEAR(test.chi_square, 9 * 1.8 * 1.8, 1e-9);
   EXPECT_NEAR(test.p, 0.0011738, 1e-7);
   EXPECT_NEAR(test.p_of_least, 10 * 0.0886443, 1e-5);  // t = 1.8 with 18 degrees of freedom
-  EXPECT_EQ(test.below, 9);
-  EXPECT_EQ(test.above, 1);
+  EXPECT_FIELDS(test, (below, 9), (above, 1));
   EXPECT_NEAR(test.p_of_signs, 22.0 / 1024, 1e-12);
   EXPECT_THAT(ToMarkdown(table),
               HasSubstr("All rows together: chi-square 29.16 over the 10 rows with a standard error, "
@@ -82,11 +81,8 @@ TEST(JointTest, LeavesOutWhatOtherRowsDecide) {
   const JointTest all = TestJointly(table);
   for (std::size_t i = 1; i < table.rows.size(); ++i) table.rows[i].follows = true;
   const JointTest one = TestJointly(table);
-  EXPECT_EQ(all.rows, 9);
-  EXPECT_EQ(all.left_out, 0);
-  EXPECT_EQ(one.rows, 1);
-  EXPECT_EQ(one.left_out, 8);
-  EXPECT_EQ(one.below, 1);
+  EXPECT_FIELDS(all, (rows, 9), (left_out, 0));
+  EXPECT_FIELDS(one, (rows, 1), (left_out, 8), (below, 1));
   EXPECT_NEAR(one.chi_square, all.chi_square / 9, 1e-12);
   EXPECT_NEAR(one.p_of_least, all.p_of_least / 9, 1e-12);
   EXPECT_EQ(one.p_of_signs, 1);
@@ -98,8 +94,8 @@ TEST(JointTest, NoProbabilityIsPrintedAsZero) {
   for (int i = 0; i < 20; ++i) table.rows.push_back(RowOf(kWithSeeds, {0.9, 0.001, 10}));
   const std::string text = ToMarkdown(table);
   EXPECT_THAT(text,
-              HasSubstr("with a standard error, p < 0.0001; the least of one row times their number, p < 0.0001"));
-  EXPECT_THAT(text, HasSubstr("sign test p < 0.0001."));
+              AllOf(HasSubstr("with a standard error, p < 0.0001; the least of one row times their number, p < 0.0001"),
+                    HasSubstr("sign test p < 0.0001.")));
 }
 
 TEST(Statistics, AreThoseOfTheTables) {
@@ -132,10 +128,10 @@ TEST(Table, PrintsPaperOursAndTheDifference) {
   const Table table{
       "T", "About.", {{"recall", {Mark::kFitted, kRecall}, {0.5061, 0.02, 10}, 3, ""}, {"none", {}, {}, 3, ""}}};
   const std::string text = ToMarkdown(table);
-  EXPECT_THAT(text, HasSubstr("## T\nAbout.\n"));
-  EXPECT_THAT(text, HasSubstr("| recall | fitted | 0.490 | Table 1 | 0.506 ± 0.020 | +0.016 | off | "
-                              "searched for, and not met |"));
-  EXPECT_THAT(text, HasSubstr("| none | not given |  |  | none |  |  |  |"));
+  EXPECT_THAT(text, AllOf(HasSubstr("## T\nAbout.\n"),
+                          HasSubstr("| recall | fitted | 0.490 | Table 1 | 0.506 ± 0.020 | +0.016 | off | "
+                                    "searched for, and not met |"),
+                          HasSubstr("| none | not given |  |  | none |  |  |  |")));
   EXPECT_EQ(
       ToCsv({table}),
       "table,what,mark,paper,ours,deviation,low,high,difference,word,why\n"

@@ -17,9 +17,7 @@ TEST(Rollouts, StartAtTheCenterThenAtEachCornerThenInside) {
       for (int k = 0; k < n; ++k) {
         const double center = scenario.center[k], half_width = system->initial_half_width[k];
         const double x = rollouts.state(i, 0)[static_cast<std::size_t>(k)];
-        if (i == 0) {
-          EXPECT_EQ(x, center);
-        }
+        if (i == 0) EXPECT_EQ(x, center);
         EXPECT_LE(x, center + half_width);
         EXPECT_GE(x, center - half_width);
         extremes += x == center + half_width || x == center - half_width;

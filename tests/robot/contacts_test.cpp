@@ -9,7 +9,6 @@
 namespace forereach::contacts_test {
 
 using Eigen::Vector2d;
-using testing::SizeIs;
 
 constexpr double kLittle = 1e-9;
 constexpr std::int64_t kT0 = 1'700'000'000'000'000;
@@ -38,9 +37,7 @@ TEST(Contacts, AreMetAtTheFullBulgeOnEitherSide) {
   for (const double side : {-1, 1}) {
     const auto met = Contacts(Bicycle(), Post(1.2, side * (bulge + 0.05 - kLittle)));
     ASSERT_THAT(met, SizeIs(1));
-    EXPECT_EQ(met[0].obstacle, 0);
-    EXPECT_EQ(met[0].part, 0);
-    EXPECT_EQ(met[0].at, 0.5);
+    EXPECT_FIELDS(met[0], (obstacle, 0), (part, 0), (at, 0.5));
     EXPECT_NEAR(met[0].clearance, -kLittle, 1e-14);
     EXPECT_THAT(Contacts(Bicycle(), Post(1.2, side * (bulge + 0.05 + kLittle))), IsEmpty());
   }
@@ -79,9 +76,7 @@ TEST(Contacts, OfABodyThatTurnsAreMetWhereItsCornersBulge) {
 TEST(Contacts, WithAMovingObstacleAreMetAtTheirTime) {
   Problem problem = Bicycle();
   problem.between->acceleration.setZero();
-  ObstacleMotion motion;
-  motion.stamp_us = kT0;
-  motion.velocity = {0, 10, 0};
+  ObstacleMotion motion{.stamp_us = kT0, .velocity = {0, 10, 0}};
   const auto crossing = [&](double y) { return Post(1.2, y).Moving(motion); };
   const auto met = Contacts(problem, crossing(-1));  // at (1.2, 0) after 0.1 s, as the robot
   ASSERT_THAT(met, SizeIs(1));

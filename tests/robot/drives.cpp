@@ -20,6 +20,7 @@
 #include "simulator/drive_counts.h"
 #include "simulator/lockstep.h"
 #include "task/step_time.h"
+#include "tests/worlds.h"
 
 namespace forereach {
 namespace {
@@ -75,7 +76,7 @@ Drive DriveOnce(Config config, const Config& world, int seed) {
 // their times by the same share of a tenth of a step. A task that declares errors keeps its own.
 Config WithErrors(Config config, double share) {
   if (share == 0 || config.problem->declaration.HasErrorInZ()) return config;
-  Problem problem = *config.problem;
+  Problem& problem = Own(config.problem);
   std::vector<double>& half_width = config.planner.initial_half_width;
   problem.declaration.state_error =
       share * Eigen::Map<const Eigen::VectorXd>(half_width.data(), std::ssize(half_width));
@@ -85,7 +86,6 @@ Config WithErrors(Config config, double share) {
   config.gate.step_us = StepUs(config);
   problem.timing.error = StepErrorSeconds(config);
   if (problem.between) problem.between->period = LongestPeriod(config);
-  config.problem = std::make_shared<const Problem>(std::move(problem));
   return config;
 }
 

@@ -6,6 +6,7 @@
 #include "robot/guard.h"
 #include "task/config.h"
 #include "tests/paths.h"
+#include "tests/worlds.h"
 
 namespace forereach::guard_domain_test {
 
@@ -19,13 +20,12 @@ class RandomCandidates final {
 
   candidate_plan_t Next() {
     const Domain& domain = config_.problem->domain;
-    candidate_plan_t candidate{};
-    candidate.utime = kNow;
-    candidate.plan_id = ++plan_id_;
-    candidate.start_utime = kNow + 1'000'000;
-    candidate.step_us = 40'000;
-    candidate.num_states = static_cast<std::int16_t>(domain.state.dim());
-    candidate.num_inputs = static_cast<std::int16_t>(domain.input.dim());
+    candidate_plan_t candidate{.utime = kNow,
+                               .plan_id = ++plan_id_,
+                               .start_utime = kNow + 1'000'000,
+                               .step_us = 40'000,
+                               .num_states = static_cast<std::int16_t>(domain.state.dim()),
+                               .num_inputs = static_cast<std::int16_t>(domain.input.dim())};
     candidate.num_steps = candidate.progress_steps = static_cast<std::int16_t>(1 + random_() % 4);
     for (int k = 0; k < candidate.num_states; ++k) {
       const double lower = domain.state.lower()[k], upper = domain.state.upper()[k];
@@ -61,9 +61,8 @@ TEST(GuardDomainProperty, EveryHonestCertificatePasses) {
        {FOREREACH_SOURCE_DIR "/tests/data/field.yaml", FOREREACH_SOURCE_DIR "/config/point_mass.yaml"}) {
     Config config = LoadConfig(path);
     config.obstacles.clear();
-    Problem problem = *config.problem;
+    Problem& problem = Own(config.problem);
     problem.rest.clear();  // these short plans end at speed
-    config.problem = std::make_shared<const Problem>(std::move(problem));
     const Domain& domain = config.problem->domain;
     GuardOptions options{domain.state.dim(), domain.input.dim(), 40'000, config.grounds.config, config.grounds.model};
     options.domain = GuardDomain{Entries(domain.state.lower()), Entries(domain.state.upper()),

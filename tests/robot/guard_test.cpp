@@ -44,8 +44,7 @@ TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
   EXPECT_EQ(verdict.cause, GuardCause::kNone) << verdict.message;
   EXPECT_EQ(verdict.plan_id, 7);
   ASSERT_NE(guard.pending(), nullptr);
-  EXPECT_EQ(guard.pending()->plan.plan_id, 7);
-  EXPECT_EQ(guard.executing(), nullptr);
+  EXPECT_FIELDS(guard, (pending()->plan.plan_id, 7), (executing(), nullptr));
 }
 
 TEST(GuardAccept, TakesPlansOfTheTaskThatItIsToldToExpect) {
@@ -182,10 +181,8 @@ TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
   const GuardVerdict verdict = altered([](auto& c) { c.slice_upper[4][1] = 5; });
   EXPECT_EQ(verdict.cause, GuardCause::kUnusedEntry);
   EXPECT_EQ(GuardCauseName(verdict.cause), "unused_entry");
-  EXPECT_EQ(verdict.step, 4);
-  EXPECT_EQ(verdict.coordinate, 1);
-  EXPECT_EQ(verdict.value, 5);
-  EXPECT_EQ(verdict.message, "slice_upper[4][1] is 5, it has to be 0, because it is not in use");
+  EXPECT_FIELDS(verdict, (step, 4), (coordinate, 1), (value, 5),
+                (message, "slice_upper[4][1] is 5, it has to be 0, because it is not in use"));
   EXPECT_EQ(altered([](auto& c) { c.slice_lower[0][2] = -0.0; }).cause, GuardCause::kUnusedEntry);
   EXPECT_EQ(altered([](auto& c) { c.slice_lower[128][15] = kNaN; }).cause, GuardCause::kUnusedEntry);
 }
@@ -216,12 +213,8 @@ TEST(GuardAccept, RefusesAnEmptySliceWithItsWitness) {
   certified.slice_lower[3][1] = Above(0.5);
   Guard guard(TwoStates());
   const GuardVerdict verdict = guard.Accept(Sealed(certified), kNow);
-  EXPECT_EQ(verdict.cause, GuardCause::kEmptySlice);
-  EXPECT_EQ(verdict.step, 3);
-  EXPECT_EQ(verdict.coordinate, 1);
-  EXPECT_EQ(verdict.value, Above(0.5));
-  EXPECT_EQ(verdict.bound, 0.5);
-  EXPECT_EQ(verdict.plan_id, 7);
+  EXPECT_FIELDS(verdict, (cause, GuardCause::kEmptySlice), (step, 3), (coordinate, 1), (value, Above(0.5)),
+                (bound, 0.5), (plan_id, 7));
 }
 
 TEST(GuardAccept, ExpiryItselfIsStillInTime) {
@@ -282,10 +275,7 @@ TEST(GuardStart, TakesTheBoundsOfX0AsInside) {
     EXPECT_EQ(Start(SmallPlan(), outside).cause, GuardCause::kOutsideInitialSet) << outside[0] << ' ' << outside[1];
 
   const GuardVerdict verdict = Start(SmallPlan(), {1, Above(-1.75)});
-  EXPECT_EQ(verdict.coordinate, 1);
-  EXPECT_EQ(verdict.value, Above(-1.75));
-  EXPECT_EQ(verdict.bound, -1.75);
-  EXPECT_EQ(verdict.plan_id, 7);
+  EXPECT_FIELDS(verdict, (coordinate, 1), (value, Above(-1.75)), (bound, -1.75), (plan_id, 7));
 }
 
 // center +- half_width is rarely a double: the comparison has to be that of real numbers.
@@ -339,9 +329,7 @@ TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
   certified.slice_upper[0][0] = 1.25;
   EXPECT_TRUE(Start(certified, {1.25, -2}).ok());
   const GuardVerdict verdict = Start(certified, {Above(1.25), -2});
-  EXPECT_EQ(verdict.cause, GuardCause::kOutsideSlice);
-  EXPECT_EQ(verdict.step, 0);
-  EXPECT_EQ(verdict.bound, 1.25);
+  EXPECT_FIELDS(verdict, (cause, GuardCause::kOutsideSlice), (step, 0), (bound, 1.25));
 }
 
 TEST(GuardStart, HalfAStepOffIsOnTime) {
@@ -411,10 +399,8 @@ TEST(GuardCheck, BoundsAreInsideAndTheNextNumberIsNot) {
       for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}, kNow).ok());
       const GuardVerdict verdict = guard.Check(step, outside, kNow);
       const int k = outside[0] != 0 ? 0 : 1;
-      EXPECT_EQ(verdict.cause, GuardCause::kOutsideSlice);
-      EXPECT_EQ(verdict.step, step);
-      EXPECT_EQ(verdict.coordinate, k);
-      EXPECT_EQ(verdict.value, outside[static_cast<std::size_t>(k)]);
+      EXPECT_FIELDS(verdict, (cause, GuardCause::kOutsideSlice), (step, step), (coordinate, k),
+                    (value, outside[static_cast<std::size_t>(k)]));
       EXPECT_EQ(std::abs(verdict.bound), k == 0 ? reach : 5);
       EXPECT_EQ(verdict.plan_id, 7);
     }
@@ -461,9 +447,8 @@ TEST(GuardCheck, AgainItLooksAtHowLongTheStepBeforeHasLasted) {
     EXPECT_TRUE(guard.TryStart(kStart, kStart - 1000, State{1, -2}).ok());
     EXPECT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
     EXPECT_EQ(guard.CheckAgain(State{0, 0}, kStart + kStep + 2000 + too_long).ok(), !too_long);
-    if (!too_long) {
+    if (!too_long)
       EXPECT_TRUE(guard.Check(2, State{0, 0}, kStart + 2 * kStep + 2000).ok()) << "its control is applied from then on";
-    }
   }
 }
 
@@ -492,9 +477,7 @@ TEST(GuardCheck, AgainAtTheFirstStepItBeginsThen) {
     EXPECT_TRUE(guard.CheckAgain(State{1, -2}, kStart + 2500).ok());
     const GuardVerdict verdict = guard.Check(1, State{0, 0}, kStart + kStep - 500 - too_early);
     EXPECT_EQ(verdict.ok(), !too_early);
-    if (too_early) {
-      EXPECT_THAT(verdict.message, HasSubstr("us by the first step, it is 3001 us too early"));
-    }
+    if (too_early) EXPECT_THAT(verdict.message, HasSubstr("us by the first step, it is 3001 us too early"));
   }
 }
 
@@ -542,14 +525,11 @@ TEST(GuardSchedule, AStepWithinTheJitterPassesAndOneOutsideEndsThePlan) {
       Guard guard = ExecutingOnTime();
       for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}, kStart + t * kStep).ok());
       const GuardVerdict verdict = guard.Check(step, State{0, 0}, kStart + step * kStep + off);
-      EXPECT_EQ(verdict.cause, GuardCause::kOffSchedule);
-      EXPECT_EQ(verdict.plan_id, 7);
-      EXPECT_EQ(verdict.step, step);
-      EXPECT_EQ(verdict.value, static_cast<double>(off));
-      EXPECT_EQ(verdict.bound, static_cast<double>(kJitter));
+      EXPECT_FIELDS(verdict, (cause, GuardCause::kOffSchedule), (plan_id, 7), (step, step),
+                    (value, static_cast<double>(off)), (bound, static_cast<double>(kJitter)));
       EXPECT_THAT(verdict.message,
-                  testing::HasSubstr("was due at " + std::to_string(kStart + step * kStep) + " us, it is 3001 us too " +
-                                     (off > 0 ? "late" : "early") + ", at most 3000 us are allowed"));
+                  HasSubstr("was due at " + std::to_string(kStart + step * kStep) + " us, it is 3001 us too " +
+                            (off > 0 ? "late" : "early") + ", at most 3000 us are allowed"));
       EXPECT_EQ(guard.executing(), nullptr);
       EXPECT_FALSE(guard.halted()) << "the next plan is looked at by its own time";
       EXPECT_EQ(guard.Check(step + 1, State{0, 0}, kStart + (step + 1) * kStep).cause, GuardCause::kNotExecuting);
@@ -571,12 +551,9 @@ TEST(GuardSchedule, AStepLastsNoLongerThanTheJitterAllows) {
     const GuardVerdict second = guard.Check(2, State{0, 0}, kStart + 2 * kStep + too_long);
     EXPECT_EQ(second.cause, too_long ? GuardCause::kOffSchedule : GuardCause::kNone);
     if (!too_long) continue;
-    EXPECT_EQ(second.step, 2);
-    EXPECT_EQ(second.value, static_cast<double>(kJitter + 1));
-    EXPECT_EQ(second.bound, static_cast<double>(kJitter));
-    EXPECT_THAT(second.message,
-                testing::HasSubstr("the step before step 2 lasted " + std::to_string(kStep + kJitter + 1) +
-                                   " us, at most " + std::to_string(kStep + kJitter) + " us are allowed"));
+    EXPECT_FIELDS(second, (step, 2), (value, static_cast<double>(kJitter + 1)), (bound, static_cast<double>(kJitter)));
+    EXPECT_THAT(second.message, HasSubstr("the step before step 2 lasted " + std::to_string(kStep + kJitter + 1) +
+                                          " us, at most " + std::to_string(kStep + kJitter) + " us are allowed"));
     EXPECT_EQ(guard.executing(), nullptr);
     EXPECT_FALSE(guard.halted());
   }
@@ -588,9 +565,7 @@ TEST(GuardSchedule, AStepOffItsTimeEndsThePlanAloneWhereverTheRobotIs) {
     for (const auto& [late, cause] :
          {std::pair(kJitter, GuardCause::kOutsideSlice), std::pair(kJitter + 1, GuardCause::kOffSchedule)}) {
       Guard guard = ExecutingOnTime();
-      if (again) {
-        ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
-      }
+      if (again) ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep).ok());
       const std::int64_t now = kStart + kStep + late;
       EXPECT_EQ((again ? guard.CheckAgain(State{100, 0}, now) : guard.Check(1, State{100, 0}, now)).cause, cause);
       EXPECT_EQ(guard.halted(), cause == GuardCause::kOutsideSlice) << late;
@@ -607,8 +582,7 @@ TEST(GuardSchedule, AStartIsWithinTheJitterToo) {
   for (const std::int64_t off : {-kJitter - 1, kJitter + 1}) {
     Guard guard = OnTime();
     EXPECT_EQ(guard.TryStart(kStart, kStart + off, State{1, -2}).cause, GuardCause::kOffSchedule);
-    EXPECT_EQ(guard.pending(), nullptr);
-    EXPECT_EQ(guard.executing(), nullptr);
+    EXPECT_FIELDS(guard, (pending(), nullptr), (executing(), nullptr));
   }
   Guard early = OnTime(), late = OnTime();
   EXPECT_EQ(early.TryStart(kStart - kJitter - 1, kStart - kJitter - 1, State{1, -2}).cause, GuardCause::kTooEarly);
@@ -665,8 +639,7 @@ TEST(GuardSchedule, RefusesAStepErrorThatIsNone) {
   for (const std::int64_t none : {std::int64_t{-2}, -kMost - 1}) {
     Guard guard(TwoStates());
     const GuardVerdict verdict = guard.Accept(Sealed(SmallPlan(7, none)), kNow);
-    EXPECT_EQ(verdict.cause, GuardCause::kNonFinite);
-    EXPECT_EQ(verdict.message, "step_error_us is " + std::to_string(none));
+    EXPECT_FIELDS(verdict, (cause, GuardCause::kNonFinite), (message, "step_error_us is " + std::to_string(none)));
   }
 }
 
@@ -703,9 +676,8 @@ TEST(GuardKey, TakesPlansThatTheCertifierSignedOnly) {
     return who.Sign(role, channel, plan, kNow);
   };
   for (const Role role : kAllRoles)
-    if (role != Role::kCertifier) {
+    if (role != Role::kCertifier)
       EXPECT_EQ(guard.Accept(by(signer, role), kNow).cause, GuardCause::kForged) << RoleName(role);
-    }
   EXPECT_EQ(guard.Accept(by(stranger, Role::kCertifier), kNow).cause, GuardCause::kForged);
   EXPECT_EQ(guard.Accept(by(signer, Role::kCertifier, "PLAN_DECISION"), kNow).cause, GuardCause::kForged);
   EXPECT_EQ(guard.Accept(by(elsewhere, Role::kCertifier), kNow).cause, GuardCause::kForeign);
@@ -773,10 +745,7 @@ TEST(GuardDomainTest, APlanThatLeavesItIsRefusedWithTheWitness) {
   const auto refused = [&](auto alter, int step, int coordinate, double value, double bound) {
     const GuardVerdict verdict = judge(alter);
     EXPECT_EQ(verdict.cause, GuardCause::kOutsideDomain) << verdict.message;
-    EXPECT_EQ(verdict.step, step);
-    EXPECT_EQ(verdict.coordinate, coordinate);
-    EXPECT_EQ(verdict.value, value);
-    EXPECT_EQ(verdict.bound, bound);
+    EXPECT_FIELDS(verdict, (step, step), (coordinate, coordinate), (value, value), (bound, bound));
   };
   refused([](auto& c) { c.slice_upper[2][0] = Above(12); }, 2, 0, Above(12), 12);
   refused([](auto& c) { c.slice_lower[2][0] = Below(-12); }, 2, 0, Below(-12), -12);
@@ -919,8 +888,7 @@ TEST(GuardHalt, ForgetsThePendingAndTheExecutingPlan) {
   Guard guard = Executing();
   ASSERT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   guard.Halt();
-  EXPECT_EQ(guard.executing(), nullptr);
-  EXPECT_EQ(guard.pending(), nullptr);
+  EXPECT_FIELDS(guard, (executing(), nullptr), (pending(), nullptr));
 }
 
 TEST(GuardOptionsTest, ImpossibleOptionsThrow) {

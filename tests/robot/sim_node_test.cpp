@@ -8,20 +8,14 @@
 #include "bus/log.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/upheld.h"
-#include "forereach/command_t.hpp"
-#include "forereach/decision_t.hpp"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/text_model.h"
-#include "forereach/fault_t.hpp"
 #include "forereach/residual/observations.h"
-#include "forereach/robot_state_t.hpp"
-#include "forereach/transition_t.hpp"
-#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "tests/keys.h"
+#include "tests/messages.h"
 #include "tests/paths.h"
-#include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
 #include "tests/worlds.h"
 
@@ -95,6 +89,10 @@ class Rig {
 
   void Send(const certified_plan_t& certified) { bus_->Publish(config_.bus.certified, Bytes(Sealed(certified))); }
   void SendRaw(const std::string& channel, Bytes bytes) { bus_->Publish(channel, bytes); }
+  template <class Message>
+  void Publish(const std::string& channel, const Message& message) {
+    bus_->Publish(channel, message);
+  }
 
   /** Runs the process's loop until boundary j has been handled. */
   void RunTo(int j, std::int64_t tick = 2000) {
@@ -122,15 +120,13 @@ class Rig {
     for (const auto& event : events) kinds.push_back(event.kind);
     return kinds;
   }
-  [[nodiscard]] int Count(std::int16_t kind) const {
-    int count = 0;
-    for (const auto& event : events) count += event.kind == kind;
-    return count;
+  [[nodiscard]] std::ptrdiff_t Count(std::int16_t kind) const {
+    return std::ranges::count(events, kind, &execution_event_t::kind);
   }
   [[nodiscard]] const execution_event_t& First(std::int16_t kind) const {
-    for (const auto& event : events)
-      if (event.kind == kind) return event;
-    throw std::runtime_error("no event of kind " + std::to_string(kind));
+    const auto first = std::ranges::find(events, kind, &execution_event_t::kind);
+    if (first == events.end()) throw std::runtime_error("no event of kind " + std::to_string(kind));
+    return *first;
   }
   [[nodiscard]] nlohmann::json Summary() const { return nlohmann::json::parse(node_.Summary()); }
   RobotSimNode& node() { return node_; }
@@ -143,12 +139,8 @@ class Rig {
  private:
   template <class Message>
   void Record(const std::string& channel, std::vector<Message>& into) {
-    bus_->Subscribe(channel, [&into](const Received& received) {
-      const std::optional<Message> message = Decoded<Message>(received.bytes);
-      ASSERT_TRUE(message);
-      ASSERT_EQ(message->sequence, std::ssize(into));
-      into.push_back(*message);
-    });
+    Hear(*bus_, channel, into);
+    bus_->Subscribe(channel, [&into](const Received&) { EXPECT_EQ(into.back().sequence, std::ssize(into) - 1); });
   }
 
   std::int64_t now_ = kT0;
@@ -161,6 +153,16 @@ class Rig {
 // Boundary 0 has been handled.
 struct RunningRig : Rig {
   explicit RunningRig(Config config, Plant plant = {}) : Rig(std::move(config), std::move(plant)) { RunTo(0); }
+};
+
+// It has been sent a plan since, and has been run until boundary j.
+struct DrivingRig : RunningRig {
+  DrivingRig(int j, const certified_plan_t& plan, const Config& config = PointMassTask()) : RunningRig(config) {
+    Send(plan);
+    RunTo(j);
+  }
+  explicit DrivingRig(int j, const Config& config = PointMassTask())
+      : DrivingRig(j, Plan(config, 1, 1, config.robot.start), config) {}
 };
 
 const std::vector<double> kOrigin{0, 0, 0, 0};
@@ -178,10 +180,8 @@ TEST(RobotSim, StandsAndReportsAtEveryBoundary) {
   ASSERT_EQ(rig.states.size(), 6u);
   for (int j = 0; j <= 5; ++j) {
     const robot_state_t& state = rig.states[static_cast<std::size_t>(j)];
-    EXPECT_EQ(state.utime, BoundaryTime(j));
-    EXPECT_EQ(state.mode, robot_state_t::STANDING);
-    EXPECT_EQ(state.executing_plan_id, -1);
-    EXPECT_EQ(state.executing_step, -1);
+    EXPECT_FIELDS(state, (utime, BoundaryTime(j)), (mode, robot_state_t::STANDING), (executing_plan_id, -1),
+                  (executing_step, -1));
     EXPECT_EQ(rig.StateAt(j), kOrigin);
   }
   EXPECT_THAT(rig.events, IsEmpty());
@@ -194,31 +194,28 @@ TEST(RobotSim, ObeysNothingButACertifiedPlan) {
   const certified_plan_t good = Plan(config, 1, 3, kOrigin);
 
   decision_t decision{.plan_id = 1, .outcome = decision_t::CERTIFIED};
-  rig.SendRaw(config.bus.candidate, Encode(good.plan));
-  rig.SendRaw(config.bus.decision, Encode(decision));
+  rig.Publish(config.bus.candidate, good.plan);
+  rig.Publish(config.bus.decision, decision);
   rig.RunTo(1);
   EXPECT_THAT(rig.events, IsEmpty());
 
-  rig.SendRaw(config.bus.certified, Encode(good.plan));
-  rig.SendRaw(config.bus.certified, Encode(decision));
+  rig.Publish(config.bus.certified, good.plan);
+  rig.Publish(config.bus.certified, decision);
   certified_plan_t tampered = good;
   Seal(tampered);
   tampered.plan.control[0][0] = 2;
-  rig.SendRaw(config.bus.certified, Encode(tampered));
+  rig.Publish(config.bus.certified, tampered);
   certified_plan_t elsewhere = good;
   SetDigest(elsewhere.model_digest, DigestOf("another model"));
   rig.Send(elsewhere);
   rig.RunTo(8);
   EXPECT_THAT(rig.EventKinds(), ElementsAre(kRefused, kRefused, kRefused, kRefused));
   EXPECT_EQ(GetText(rig.events[2].message).substr(0, 13), "plan_digest: ");
-  EXPECT_EQ(rig.events[2].plan_id, 1);
-  EXPECT_EQ(rig.events[0].plan_id, -1);
+  EXPECT_FIELDS(rig, (events[2].plan_id, 1), (events[0].plan_id, -1));
   for (int j = 0; j <= 8; ++j) EXPECT_EQ(rig.StateAt(j), kOrigin);
   EXPECT_THAT(rig.transitions, IsEmpty());
   const auto refused = rig.Summary()["plans_refused"];
-  EXPECT_EQ(refused["unknown_fingerprint"], 2);
-  EXPECT_EQ(refused["plan_digest"], 1);
-  EXPECT_EQ(refused["model_digest"], 1);
+  EXPECT_THAT(refused, Holds({{"unknown_fingerprint", 2}, {"plan_digest", 1}, {"model_digest", 1}}));
 
   rig.Send(Plan(config, 1, 10, kOrigin));
   rig.RunTo(10);
@@ -227,20 +224,15 @@ TEST(RobotSim, ObeysNothingButACertifiedPlan) {
 
 TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
-  rig.Send(Plan(config, 5, 3, {0.05, 0, 0, 0}));
-  rig.RunTo(6);
+  DrivingRig rig(6, Plan(config, 5, 3, {0.05, 0, 0, 0}), config);
 
   EXPECT_EQ(rig.First(kAccepted).utime, kT0 + 2000) << "when it arrived";
-  EXPECT_EQ(rig.First(kStarted).utime, BoundaryTime(3));
-  EXPECT_EQ(rig.First(kStarted).plan_id, 5);
+  EXPECT_FIELDS(rig.First(kStarted), (utime, BoundaryTime(3)), (plan_id, 5));
   EXPECT_EQ(rig.states[2].mode, robot_state_t::STANDING);
   std::vector<double> x = kOrigin;
   for (int j = 3; j <= 6; ++j) {
     const robot_state_t& state = rig.states[static_cast<std::size_t>(j)];
-    EXPECT_EQ(state.mode, robot_state_t::EXECUTING);
-    EXPECT_EQ(state.executing_plan_id, 5);
-    EXPECT_EQ(state.executing_step, j - 3);
+    EXPECT_FIELDS(state, (mode, robot_state_t::EXECUTING), (executing_plan_id, 5), (executing_step, j - 3));
     EXPECT_EQ(rig.StateAt(j), x);
     std::vector<double> z = x;
     z.insert(z.end(), {j - 3 < 2 ? 1.0 : -1.0, 0.0});
@@ -282,17 +274,13 @@ TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
   for (const char* input : {"ax", "ay"}) text.inputs.push_back({input, ""});
   text.parameters = {{"dt", 0.25, 0.25}};
   text.equations = {{"px + dt*vx + dt^2/2*ax"}, {"py + dt*vy + dt^2/2*ay"}, {"vx + dt*ax"}, {"vy + dt*ay"}};
-  Problem problem = *config.problem;
-  problem.model = MakeTextModel(text);
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).model = MakeTextModel(text);
   EXPECT_THAT([&] { Rig rig(config); }, ThrowsMessage<ConfigError>(HasSubstr("task.yaml: robot.hold: missing")));
   config.robot.hold = std::vector<std::string>{"vx"};
-  RunningRig rig(config);
   certified_plan_t first = Plan(config, 1, 1, kOrigin);
   first.plan.control[3][0] = -0.75;
   first.plan.control[3][1] = 0.1;
-  rig.Send(first);
-  rig.RunTo(8);
+  DrivingRig rig(8, first, config);
   EXPECT_NE(rig.First(kStanding).state[2], 0) << "measured, before the hold mode";
   EXPECT_EQ(rig.StateAt(5)[2], 0);
   EXPECT_EQ(rig.StateAt(5)[3], rig.First(kStanding).state[3]) << "not named";
@@ -300,25 +288,21 @@ TEST(RobotSim, ATextModelStandsWithTheStatesOfRobotHoldAtZero) {
 
 TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
   certified_plan_t first = Plan(config, 1, 1, kOrigin);
   first.plan.control[3][0] = -0.75;  // it ends near rest, not at it
-  rig.Send(first);
-  rig.RunTo(8);
+  DrivingRig rig(8, first, config);
   EXPECT_THAT(rig.EventKinds(),
               ElementsAre(kAccepted, kStarted, kInside, kInside, kTailBegun, kInside, kInside, kStanding));
   EXPECT_EQ(rig.First(kTailBegun).utime, BoundaryTime(3));
   EXPECT_EQ(rig.First(kStanding).utime, BoundaryTime(5));
   EXPECT_NEAR(rig.First(kStanding).state[2], 0.15 * 0.25, 1e-12) << "measured, before the hold mode";
   EXPECT_EQ(rig.StateAt(5)[2], 0) << "the hold mode";
-  EXPECT_EQ(rig.StateAt(5)[0], rig.First(kStanding).state[0]);
-  EXPECT_EQ(rig.StateAt(8), rig.StateAt(5));
-  EXPECT_EQ(rig.states[5].mode, robot_state_t::STANDING);
+  EXPECT_FIELDS(rig, (StateAt(5)[0], rig.First(kStanding).state[0]), (StateAt(8), rig.StateAt(5)),
+                (states[5].mode, robot_state_t::STANDING));
 
   rig.Send(Plan(config, 2, 10, rig.StateAt(8)));
   rig.RunTo(14);
-  EXPECT_EQ(rig.states[9].mode, robot_state_t::STANDING);
-  EXPECT_EQ(rig.states[10].executing_plan_id, 2);
+  EXPECT_FIELDS(rig, (states[9].mode, robot_state_t::STANDING), (states[10].executing_plan_id, 2));
   EXPECT_EQ(rig.Count(kStanding), 2);
   EXPECT_EQ(rig.Summary()["stops"], 2);
   EXPECT_GT(rig.StateAt(14)[0], rig.StateAt(8)[0]);
@@ -327,19 +311,16 @@ TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
 TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) {
   const Config config = PointMassTask();
   Rig rig(config);
-  const auto send = [&](const std::string& channel, const auto& message) {
-    rig.SendRaw(channel, Bytes(Encode(message)));
-  };
   rig.RunTo(0);
   rig.Send(Plan(config, 1, 1, kOrigin, 40));
   rig.RunTo(2);
   fault_t fault{.utime = BoundaryTime(2), .cause = fault_t::ROBOT_STATE_LOST};
-  send("FAULT", fault);
+  rig.Publish("FAULT", fault);
   rig.RunTo(3);
   EXPECT_EQ(rig.states[3].mode, robot_state_t::EXECUTING) << "that is the certifier's own affair";
   fault.cause = fault_t::DECLARATION_FALSIFIED;
-  send("FAULT", fault);
-  send("FAULT", fault);
+  rig.Publish("FAULT", fault);
+  rig.Publish("FAULT", fault);
   rig.RunTo(20);
   EXPECT_EQ(rig.states[4].mode, robot_state_t::STANDING);
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
@@ -349,12 +330,12 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   EXPECT_EQ(rig.states[22].mode, robot_state_t::STANDING);
 
   command_t reset = ResetAt(BoundaryTime(22) - 500'000);  // gate.max_age_ms is 500
-  send("COMMAND", reset);
+  rig.Publish("COMMAND", reset);
   rig.RunTo(23);
   EXPECT_EQ(rig.Count(execution_event_t::RESET), 0);
   reset.utime = BoundaryTime(23);
-  send("COMMAND", reset);
-  send("FAULT", fault);
+  rig.Publish("COMMAND", reset);
+  rig.Publish("FAULT", fault);
   rig.RunTo(24);
   EXPECT_EQ(rig.Count(execution_event_t::RESET), 1);
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
@@ -364,14 +345,14 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   ++fault.sequence;
   fault.utime = BoundaryTime(25);
   fault.cause = fault_t::SLICE_LEFT;
-  send("FAULT", fault);
+  rig.Publish("FAULT", fault);
   rig.RunTo(26);
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 2) << "another fault";
-  send("COMMAND", reset);
+  rig.Publish("COMMAND", reset);
   rig.RunTo(27);
   EXPECT_EQ(rig.Count(execution_event_t::RESET), 1) << "it was sent before that one, and is fresh all the same";
   reset.utime = BoundaryTime(27);
-  send("COMMAND", reset);
+  rig.Publish("COMMAND", reset);
   rig.RunTo(28);
   EXPECT_EQ(rig.Count(execution_event_t::RESET), 2);
 }
@@ -380,16 +361,13 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
 TEST(RobotSim, IgnoresAFaultFromBeforeTheLastReset) {
   const Config config = PointMassTask();
   Rig rig(config);
-  const auto send = [&](const std::string& channel, const auto& message) {
-    rig.SendRaw(channel, Bytes(Encode(message)));
-  };
   rig.RunTo(1);
   const command_t reset = ResetAt(BoundaryTime(1));
-  send("COMMAND", reset);
+  rig.Publish("COMMAND", reset);
   fault_t fault{.cause = fault_t::SLICE_LEFT};
   for (const std::int64_t after : {-1, 0, 1}) {
     fault.utime = reset.utime + after;
-    send("FAULT", fault);
+    rig.Publish("FAULT", fault);
     rig.RunTo(static_cast<int>(3 + after));
     EXPECT_EQ(rig.Count(execution_event_t::HALTED), after > 0) << after;
   }
@@ -399,24 +377,22 @@ TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
   Rig rig(PointMassTask());
   rig.RunTo(1);
   const command_t reset = ResetAt(BoundaryTime(1) + 50'000);  // gate.max_ahead_ms is 50
-  rig.SendRaw("COMMAND", Bytes(Encode(reset)));
+  rig.Publish("COMMAND", reset);
   rig.RunTo(2);
   fault_t fault{.utime = BoundaryTime(2), .cause = fault_t::SLICE_LEFT};
   ASSERT_LT(fault.utime, reset.utime);
-  rig.SendRaw("FAULT", Bytes(Encode(fault)));
+  rig.Publish("FAULT", fault);
   rig.RunTo(3);
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
 }
 
 TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
-  rig.Send(PlanThatIsLeft(config));
-  rig.RunTo(1);
+  DrivingRig rig(1, PlanThatIsLeft(config), config);
   rig.RunTo(6, 49 * kPeriod / 10);  // held up: boundary 3 is handled shortly before the sixth
   ASSERT_EQ(rig.Count(kOutside), 1);
   for (const int at : {4, 11}) {
-    rig.SendRaw("COMMAND", Bytes(Encode(ResetAt(BoundaryTime(at)))));
+    rig.Publish("COMMAND", ResetAt(BoundaryTime(at)));
     rig.RunTo(at + 8);
     EXPECT_EQ(rig.Count(execution_event_t::RESET), at == 4 ? 0 : 1) << at;
   }
@@ -424,9 +400,7 @@ TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
 
 TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(2);
+  DrivingRig rig(2, config);
   const std::vector<double> at_two = rig.StateAt(2);
   std::vector<double> at_three(4);
   std::vector<double> z = at_two;
@@ -436,26 +410,17 @@ TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
   rig.RunTo(4);
   EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kAccepted, kInside, kStarted, kInside))
       << "the last step of the old plan is checked before the new one starts, and no tail has begun";
-  EXPECT_EQ(rig.events[4].plan_id, 1);
-  EXPECT_EQ(rig.events[4].step, 2);
-  EXPECT_EQ(rig.events[5].plan_id, 2);
-  EXPECT_EQ(rig.states[3].executing_plan_id, 2);
-  EXPECT_EQ(rig.states[3].executing_step, 0);
-  EXPECT_EQ(rig.events[6].step, 1);
+  EXPECT_FIELDS(rig, (events[4].plan_id, 1), (events[4].step, 2), (events[5].plan_id, 2),
+                (states[3].executing_plan_id, 2), (states[3].executing_step, 0), (events[6].step, 1));
 }
 
 TEST(RobotSim, APlanForAnotherStateIsRefusedAndTheOldOneGoesOn) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(2);
+  DrivingRig rig(2, config);
   rig.Send(Plan(config, 2, 3, {5, 0, 0, 0}));
   rig.RunTo(3);
-  EXPECT_EQ(rig.First(kRefused).plan_id, 2);
-  EXPECT_EQ(rig.First(kRefused).coordinate, 0);
-  EXPECT_EQ(rig.First(kRefused).utime, BoundaryTime(3));
-  EXPECT_EQ(rig.states[3].executing_plan_id, 1);
-  EXPECT_EQ(rig.states[3].executing_step, 2);
+  EXPECT_FIELDS(rig.First(kRefused), (plan_id, 2), (coordinate, 0), (utime, BoundaryTime(3)));
+  EXPECT_FIELDS(rig.states[3], (executing_plan_id, 1), (executing_step, 2));
   EXPECT_EQ(rig.Count(kTailBegun), 1);
   EXPECT_EQ(rig.Summary()["plans_refused"]["outside_initial_set"], 1);
 }
@@ -506,23 +471,15 @@ TEST(RobotSim, APlanThatArrivesAfterItsStartIsNotStarted) {
 
 TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
-  rig.Send(PlanThatIsLeft(config));
-  rig.RunTo(6);
+  DrivingRig rig(6, PlanThatIsLeft(config), config);
   EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kOutside));
   const execution_event_t& outside = rig.First(kOutside);
-  EXPECT_EQ(outside.step, 2);
-  EXPECT_EQ(outside.coordinate, 2);
-  EXPECT_EQ(outside.value, outside.state[2]);
+  EXPECT_FIELDS(outside, (step, 2), (coordinate, 2), (value, outside.state[2]));
   EXPECT_NEAR(outside.value, 0.3, 1e-12);
   EXPECT_EQ(GetText(outside.message).substr(0, 16), "emergency stop: ");
-  EXPECT_EQ(rig.states[3].mode, robot_state_t::STANDING);
-  EXPECT_EQ(rig.StateAt(3)[2], 0);
-  EXPECT_EQ(rig.StateAt(6), rig.StateAt(3));
+  EXPECT_FIELDS(rig, (states[3].mode, robot_state_t::STANDING), (StateAt(3)[2], 0), (StateAt(6), rig.StateAt(3)));
   const auto summary = rig.Summary();
-  EXPECT_EQ(summary["steps_executed"], 2);
-  EXPECT_EQ(summary["steps_inside_slice"], 1);
-  EXPECT_EQ(summary["stops"], 1);
+  EXPECT_THAT(summary, Holds({{"steps_executed", 2}, {"steps_inside_slice", 1}, {"stops", 1}}));
 }
 
 // vx falls by 0.15 in each step; vy is not named, so it is zero at once.
@@ -535,9 +492,7 @@ Config TaskWithBrake() {
 
 TEST(RobotSim, ComesToRestAsItsEmergencyStopSays) {
   Config config = TaskWithBrake();
-  RunningRig rig(config);
-  rig.Send(PlanThatIsLeft(config));
-  rig.RunTo(8);
+  DrivingRig rig(8, PlanThatIsLeft(config), config);
   EXPECT_EQ(rig.First(kOutside).utime, BoundaryTime(3));
   const double place = rig.StateAt(3)[0];
   EXPECT_NEAR(rig.StateAt(3)[2], 0.3, 1e-12);
@@ -552,13 +507,10 @@ TEST(RobotSim, ComesToRestAsItsEmergencyStopSays) {
 TEST(RobotSim, WhatItsEmergencyStopDoesNotNameIsZeroAtOnce) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0.5};
-  RunningRig rig(config);
   certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   plan.slice_upper[1][0] = 0;
-  rig.Send(plan);
-  rig.RunTo(10);
-  EXPECT_EQ(rig.StateAt(2)[3], 0);
-  EXPECT_EQ(rig.StateAt(9)[1], rig.StateAt(2)[1]);
+  DrivingRig rig(10, plan, config);
+  EXPECT_FIELDS(rig, (StateAt(2)[3], 0), (StateAt(9)[1], rig.StateAt(2)[1]));
   EXPECT_GT(rig.StateAt(9)[2], 0) << "it takes eight steps";
   EXPECT_EQ(rig.StateAt(10)[2], 0);
 }
@@ -574,7 +526,7 @@ TEST(RobotSim, AnEmergencyStopInTheMiddleOfAStepBrakesForTheRestOfIt) {
   withdrawal_t message{.utime = BoundaryTime(2), .plan_id = 1, .cause = withdrawal_t::OBSTACLE};
   SetGrounds(message, GroundsOf(plan));
   SetDigest(message.certificate_digest, GetDigest(plan.certificate_digest));
-  rig.SendRaw("PLAN_WITHDRAWN", Bytes(Encode(message)));  // 2 ms after boundary 2
+  rig.Publish("PLAN_WITHDRAWN", message);  // 2 ms after boundary 2
   rig.RunTo(12);
   const double speed = 1 + 0.15;
   EXPECT_NEAR(rig.StateAt(2)[2], speed, 1e-12);
@@ -589,11 +541,9 @@ TEST(RobotSim, WhatItMeetsWhileItStopsIsAContact) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0};
   config.obstacles = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.4)};
-  RunningRig rig(config);
   certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
   plan.slice_upper[1][0] = 0;
-  rig.Send(plan);
-  rig.RunTo(2);
+  DrivingRig rig(2, plan, config);
   EXPECT_LT(rig.StateAt(2)[0], 0.4);
   EXPECT_EQ(rig.Count(kContact), 0);
   rig.RunTo(9);
@@ -604,9 +554,7 @@ TEST(RobotSim, WhatItMeetsWhileItStopsIsAContact) {
 TEST(RobotSim, ANewPlanMayTakeOverWhileItStops) {
   Config config = TaskWithBrake();
   config.robot.start = {0, 0, 1, 0};
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, config.robot.start, 1));
-  rig.RunTo(2);
+  DrivingRig rig(2, Plan(config, 1, 1, config.robot.start, 1), config);
   EXPECT_EQ(rig.Count(kStanding), 1) << "the plan ends in motion";
   const std::vector<double> then{rig.StateAt(2)[0] + 0.15 * rig.StateAt(2)[2], 0, rig.StateAt(2)[2] - 0.15, 0};
   rig.Send(Plan(config, 2, 3, then, 2));
@@ -619,9 +567,7 @@ TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
   Config config = PointMassTask();
   config.planner.goal = {0.1, 0};
   config.planner.goal_radius = 0.09;
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(3);
+  DrivingRig rig(3, config);
   rig.Send(Plan(config, 2, 4, kOrigin));
   rig.RunTo(30);
   EXPECT_EQ(rig.Count(kGoalReached), 1);
@@ -636,8 +582,7 @@ TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
     EXPECT_EQ(rig.states[j].mode == robot_state_t::FINISHED, j >= 5) << j;
   EXPECT_TRUE(rig.node().done());
   const auto summary = rig.Summary();
-  EXPECT_EQ(summary["goal_reached"], true);
-  EXPECT_EQ(summary["stops"], 0);
+  EXPECT_THAT(summary, Holds({{"goal_reached", true}, {"stops", 0}}));
   EXPECT_NEAR(summary["distance_to_goal"].get<double>(), 0.01, 1e-9);
 }
 
@@ -656,15 +601,12 @@ TEST(RobotSim, TakesADistanceEqualToTheGoalRadiusAsReached) {
 TEST(RobotSim, AfterTheTimeLimitItStandsAndIsDone) {
   Config config = PointMassTask();
   config.robot.time_limit_s = 0.12;  // boundary 3
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 2, kOrigin));
-  rig.RunTo(2);
+  DrivingRig rig(2, Plan(config, 1, 2, kOrigin), config);
   EXPECT_FALSE(rig.node().done());
   rig.RunTo(40);
   EXPECT_EQ(rig.First(kStanding).utime, BoundaryTime(6)) << "the certified tail is run to its end";
-  EXPECT_EQ(rig.states.size(), 6u + RobotSimNode::kFinishedBoundaries);
-  EXPECT_EQ(rig.states[5].mode, robot_state_t::EXECUTING);
-  EXPECT_EQ(rig.states[6].mode, robot_state_t::FINISHED);
+  EXPECT_FIELDS(rig, (states.size(), 6u + RobotSimNode::kFinishedBoundaries),
+                (states[5].mode, robot_state_t::EXECUTING), (states[6].mode, robot_state_t::FINISHED));
   EXPECT_TRUE(rig.node().done());
   EXPECT_EQ(rig.Summary()["goal_reached"], false);
 }
@@ -672,9 +614,7 @@ TEST(RobotSim, AfterTheTimeLimitItStandsAndIsDone) {
 TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
   Config config = PointMassTask();
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(50, 0), 1), Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)};
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(4);
+  DrivingRig rig(4, config);
   ASSERT_EQ(rig.Count(kContact), 2) << "positions 0, 0, 0.011, 0.045, 0.079";
   EXPECT_EQ(rig.First(kContact).utime, BoundaryTime(3));
   EXPECT_NEAR(rig.First(kContact).value, 1 - 0.045 - 0.96, 1e-12);
@@ -685,14 +625,10 @@ TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
 // The plan goes forward for two steps and back for two: vx is 0, 0.15, 0.3, 0.15, 0 from boundary 1 on.
 TEST(RobotSim, ReportsLimitsThatDoNotHoldAtABoundaryOrWithItsControl) {
   Config config = PointMassTask();
-  Problem problem = *config.problem;
-  problem.limits = {{.name = "speed", .that = {"vx", 1, 1}, .at_most = 0.2},
-                    {.name = "braking", .that = {"ax", 1, 1}, .at_least = -0.75},
-                    {.name = "force", .that = {"ax", 1, 1}, .at_least = -1, .at_most = 1}};
-  config.problem = std::make_shared<const Problem>(problem);
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(8);
+  Own(config.problem).limits = {{.name = "speed", .that = {"vx", 1, 1}, .at_most = 0.2},
+                                {.name = "braking", .that = {"ax", 1, 1}, .at_least = -0.75},
+                                {.name = "force", .that = {"ax", 1, 1}, .at_least = -1, .at_most = 1}};
+  DrivingRig rig(8, config);
   std::vector<std::string> reported;
   std::vector<std::int64_t> times;
   for (const execution_event_t& event : rig.events)
@@ -702,19 +638,15 @@ TEST(RobotSim, ReportsLimitsThatDoNotHoldAtABoundaryOrWithItsControl) {
       EXPECT_NEAR(event.value, reported.size() == 1 ? 0.1 : 0.25, 1e-12);
     }
   ASSERT_EQ(reported.size(), 3u);
-  EXPECT_THAT(reported[0], testing::StartsWith("speed is 0.0999"));
-  EXPECT_THAT(reported[0], testing::EndsWith(" beyond its bound"));
+  EXPECT_THAT(reported[0], AllOf(StartsWith("speed is 0.0999"), EndsWith(" beyond its bound")));
   EXPECT_EQ(reported[1], "braking is 0.25 beyond its bound");
   EXPECT_THAT(times, ElementsAre(BoundaryTime(3), BoundaryTime(4), BoundaryTime(5)));
-  EXPECT_EQ(rig.Summary()["limits_exceeded"], 3);
-  EXPECT_EQ(rig.Summary()["contacts"], 0);
+  EXPECT_FIELDS(rig, (Summary()["limits_exceeded"], 3), (Summary()["contacts"], 0));
 }
 
 TEST(RobotSim, ReportsContactOfPartsAtExpressions) {
   Config config = PointMassTask();
-  Problem problem = *config.problem;
-  problem.body.parts = {BodyPart{{}, 0.25, {{{"px + 1"}, {"py"}}}}};
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).body.parts = {BodyPart{{}, 0.25, {{{"px + 1"}, {"py"}}}}};
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(1, 0.5), 0.125), Obstacle::Circle(Eigen::Vector2d(1, 0.3), 0.1),
                       Obstacle::Circle(Eigen::Vector2d(0, 0), 0.1)};
   Rig rig(config);
@@ -726,11 +658,8 @@ TEST(RobotSim, ReportsContactOfPartsAtExpressions) {
 TEST(RobotSim, ReportsContactWithAnObstacleOfTheBusThatAppearsOnTheWay) {
   Config config = PointMassTask();
   config.gate.obstacles = ObstaclesSource::kBus;
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(2);
-  obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)}, BoundaryTime(2));
-  rig.SendRaw("OBSTACLES", Bytes(Encode(message)));
+  DrivingRig rig(2, config);
+  rig.Publish("OBSTACLES", ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)}, BoundaryTime(2)));
   rig.RunTo(4);
   EXPECT_EQ(rig.Count(kContact), 2) << "as with one of the file";
   EXPECT_EQ(rig.First(kContact).utime, BoundaryTime(3));
@@ -738,14 +667,10 @@ TEST(RobotSim, ReportsContactWithAnObstacleOfTheBusThatAppearsOnTheWay) {
 
 TEST(RobotSim, BulgesBetweenItsSamplesWhileItMoves) {
   Config config = PointMassTask();
-  Problem problem = *config.problem;
-  problem.between = Between{Eigen::Vector2d(0, 4), 0, 0, 0.15};
-  config.problem = std::make_shared<const Problem>(problem);
+  Own(config.problem).between = Between{Eigen::Vector2d(0, 4), 0, 0, 0.15};
   const double bulge = 4 * 0.15 * 0.15 / 8;  // at 0, 0.011 and 0.045 the middles of steps are at 0.0055 and 0.028
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d((0.01125 + 0.045) / 2, 1 + bulge - 1e-9), 1)};
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, kOrigin));
-  rig.RunTo(9);
+  DrivingRig rig(9, config);
   ASSERT_EQ(rig.Count(kContact), 1);
   EXPECT_EQ(rig.First(kContact).utime, BoundaryTime(3));
   EXPECT_NEAR(rig.First(kContact).value, -1e-9, 1e-12);
@@ -784,9 +709,7 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   config.problem = std::make_shared<const Problem>(problem);
   config.robot.start = {0, 0, 0, 20, 1, 0.3};
   config.robot_residual = ResidualOf(*problem.model, ResidualNamed("heading_saturation"));
-  RunningRig rig(config);
-  rig.Send(Plan(config, 1, 1, config.robot.start, 2));
-  rig.RunTo(4);
+  DrivingRig rig(4, Plan(config, 1, 1, config.robot.start, 2), config);
   std::vector<double> expected = config.robot.start;
   const std::unique_ptr<Target> target = MakeTarget(config);
   for (const double jerk : {1.0, -1.0}) target->Step(expected, std::array{jerk, 0.0}, expected);
@@ -798,11 +721,9 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
 
 TEST(RobotSim, APlanThatLeavesItsDomainIsRefused) {
   const Config config = PointMassTask();
-  RunningRig rig(config);
   certified_plan_t certified = Plan(config, 1, 1, kOrigin);
   certified.slice_upper[1][0] = 1e9;
-  rig.Send(certified);
-  rig.RunTo(3);
+  DrivingRig rig(3, certified, config);
   EXPECT_EQ(rig.Summary()["plans_refused"]["outside_domain"], 1);
   EXPECT_EQ(rig.Count(kStarted), 0);
 }
@@ -832,9 +753,8 @@ TEST(RobotSim, MeasuresWithItsSensorErrorAndDrivesByTheTruth) {
   for (const std::string kind : {"none", "random", "adversarial"}) {
     SCOPED_TRACE(kind);
     Config config = PointMassTask();
-    Problem problem = *config.problem;
+    Problem& problem = Own(config.problem);
     problem.declaration.state_error = Eigen::Vector4d(0.02, 0.02, 0.01, 0);
-    config.problem = std::make_shared<const Problem>(problem);
     config.robot.sensor_error = kind;
     config.planner.goal = {0.021, 0};
     config.planner.goal_radius = 0.0205;
@@ -858,8 +778,7 @@ TEST(RobotSim, MeasuresWithItsSensorErrorAndDrivesByTheTruth) {
         EXPECT_LE(std::abs(measured[k] - is[k]), problem.declaration.state_error[static_cast<int>(k)]) << j;
       largest = std::max(largest, std::abs(measured[0] - is[0]));
     }
-    EXPECT_EQ(rig.transitions[0].state[0], rig.StateAt(42)[0]);
-    EXPECT_EQ(rig.transitions[0].next_state[0], rig.StateAt(43)[0]);
+    EXPECT_FIELDS(rig.transitions[0], (state[0], rig.StateAt(42)[0]), (next_state[0], rig.StateAt(43)[0]));
     EXPECT_EQ(rig.Count(kInside), 3);
     if (kind == "none")
       EXPECT_EQ(largest, 0);
@@ -879,8 +798,7 @@ TEST(RobotSim, StopPrintsOneLineOfJson) {
                           "limits_exceeded", "goal_reached", "distance_to_goal", "stops", "plans_accepted",
                           "plans_started", "plans_refused", "messages_not_sent"})
     EXPECT_TRUE(summary.contains(key)) << key;
-  EXPECT_EQ(summary["boundaries"], 3);
-  EXPECT_EQ(summary["distance_to_goal"], 100);
+  EXPECT_THAT(summary, Holds({{"boundaries", 3}, {"distance_to_goal", 100}}));
 }
 
 TEST(RobotSim, AConfigThatDoesNotFitTheModelIsAnError) {
@@ -967,9 +885,8 @@ TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
     for (double* const end : {&wrapped.slice_lower[t][2], &wrapped.slice_upper[t][2]}) *end -= 2 * std::numbers::pi;
   wrapped.plan.initial_center[2] -= 2 * std::numbers::pi;
   for (const bool has_angles : {true, false}) {
-    Problem problem = *config.problem;
+    Problem& problem = Own(config.problem);
     if (!has_angles) problem.model = MakeKinematicBicycle(0.1, 2);
-    config.problem = std::make_shared<const Problem>(problem);
     Rig rig(config);
     rig.Send(wrapped);
     rig.RunTo(5);
@@ -992,8 +909,7 @@ TEST(RobotSim, AStepLastsAsLongAsTheClockSays) {
     rig.Send(Plan(config, 1, 1, kOrigin));
     for (const auto& [j, late_us] : {std::pair(1, 300), {2, 1700}, {3, 500}}) rig.TickLate(j, late_us);
     ASSERT_EQ(rig.transitions.size(), 2u);
-    EXPECT_EQ(rig.transitions[0].duration_us, kPeriod + 1400);
-    EXPECT_EQ(rig.transitions[1].duration_us, kPeriod - 1200);
+    EXPECT_FIELDS(rig, (transitions[0].duration_us, kPeriod + 1400), (transitions[1].duration_us, kPeriod - 1200));
     EXPECT_THAT(longer, looks_at_time ? ElementsAre(1400 * 1e-6, -1200 * 1e-6) : ElementsAre(0.0, 0.0));
   }
 }
@@ -1002,8 +918,7 @@ TEST(RobotSim, HoldsEachPlanToTheStepErrorOfItsTask) {
   const ScratchDirectory scratch;
   const std::string path = scratch / "task.yaml";
   const auto write = [&](const std::string& step_error_ms) {
-    std::ifstream shipped(FOREREACH_SOURCE_DIR "/config/point_mass.yaml");
-    std::string text{std::istreambuf_iterator<char>(shipped), {}};
+    std::string text = Read(FOREREACH_SOURCE_DIR "/config/point_mass.yaml");
     text = std::regex_replace(text, std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/");
     text = std::regex_replace(text, std::regex("step_error_ms: any"),
                               "start: [0, 0, 0, 0]\n  step_error_ms: " + step_error_ms);
@@ -1015,8 +930,7 @@ TEST(RobotSim, HoldsEachPlanToTheStepErrorOfItsTask) {
   Rig rig(write("10"));
   int at = 0;
   const auto reload = [&] {
-    const command_t command{.utime = BoundaryTime(at), .kind = command_t::RELOAD};
-    rig.SendRaw("COMMAND", Bytes(Encode(command)));
+    rig.Publish("COMMAND", command_t{.utime = BoundaryTime(at), .kind = command_t::RELOAD});
     rig.RunTo(++at);
     while (reloads_under_way > 0) std::this_thread::yield();
     rig.RunTo(++at);

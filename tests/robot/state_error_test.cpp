@@ -42,11 +42,8 @@ TEST(GuardStateError, APlanStartsOnlyIfTheTrueStateIsInX0ForSure) {
   };
   EXPECT_EQ(Pending(certified).TryStart(kStart, kStart, State{0.049, -2}).cause, GuardCause::kNone);
   const GuardVerdict verdict = start(0.049);
-  EXPECT_EQ(verdict.cause, GuardCause::kOutsideInitialSet);
-  EXPECT_EQ(verdict.coordinate, 0);
-  EXPECT_EQ(verdict.value, 0.049);
-  EXPECT_EQ(verdict.bound, 0.05);
-  EXPECT_THAT(verdict.message, testing::HasSubstr("is 0.049000000000000002 +- 0.01, not inside X0 = 0 +- 0.05"));
+  EXPECT_FIELDS(verdict, (cause, GuardCause::kOutsideInitialSet), (coordinate, 0), (value, 0.049), (bound, 0.05));
+  EXPECT_THAT(verdict.message, HasSubstr("is 0.049000000000000002 +- 0.01, not inside X0 = 0 +- 0.05"));
   for (const double sign : {1, -1}) {
     // 0.04 + 0.01 is 0.05 in doubles, and above it in real numbers.
     EXPECT_EQ(0.04 + 0.01, 0.05);
@@ -104,19 +101,14 @@ TEST(GuardStateError, ASliceIsLeftOnlyIfTheTrueStateIsOutsideForSure) {
   for (const double sign : {1, -1}) {
     const GuardVerdict consistent = check(sign * 0.012);
     EXPECT_TRUE(consistent.ok()) << consistent.message;
-    EXPECT_EQ(consistent.coordinate, 1);
-    EXPECT_EQ(consistent.value, sign * 0.012);
-    EXPECT_EQ(consistent.bound, sign * 0.008);
-    EXPECT_EQ(consistent.message, "");
+    EXPECT_FIELDS(consistent, (coordinate, 1), (value, sign * 0.012), (bound, sign * 0.008), (message, ""));
     EXPECT_TRUE(check(sign * 0.017999).ok());
     EXPECT_EQ(check(sign * 0.018001).cause, GuardCause::kOutsideSlice);
   }
   EXPECT_TRUE(check(0).ok()) << "the slice is narrower than the error, so no measurement is inside";
   const GuardVerdict left = check(0.02);
-  EXPECT_EQ(left.cause, GuardCause::kOutsideSlice);
-  EXPECT_EQ(left.value, 0.02);
-  EXPECT_EQ(left.bound, 0.008);
-  EXPECT_THAT(left.message, testing::HasSubstr("is 0.02 +- 0.01 at step 1, outside [-0.0080000000000000002, "));
+  EXPECT_FIELDS(left, (cause, GuardCause::kOutsideSlice), (value, 0.02), (bound, 0.008));
+  EXPECT_THAT(left.message, HasSubstr("is 0.02 +- 0.01 at step 1, outside [-0.0080000000000000002, "));
   Guard exact = Executing(NarrowTail());
   EXPECT_EQ(exact.Check(1, State{0, 0.012}, kNow).cause, GuardCause::kOutsideSlice);
 }
@@ -144,8 +136,7 @@ TEST(GuardStateError, TheFirstStateThatIsNotInsideIsNamedUnlessALaterOneHasLeft)
   EXPECT_TRUE(consistent.ok());
   EXPECT_EQ(consistent.coordinate, 0);
   const GuardVerdict left = guard.Check(2, State{12.2, 5.6}, kNow);
-  EXPECT_EQ(left.cause, GuardCause::kOutsideSlice);
-  EXPECT_EQ(left.coordinate, 1);
+  EXPECT_FIELDS(left, (cause, GuardCause::kOutsideSlice), (coordinate, 1));
 }
 
 TEST(GuardStateError, AgainItAsksTheSameOfX0AndOfTheSlice) {
@@ -182,8 +173,7 @@ TEST(GuardStateError, RefusesErrorsThatAreNoneOrNotOneForEachState) {
        std::vector<std::vector<double>>{{kNaN, 0}, {0, kNaN}, {-1e-300, 0}, {0, kInf}, {0, -kInf}, {0.1}, {0, 0, 0}}) {
     Guard guard = Pending(SmallPlan());
     EXPECT_EQ(guard.TryStart(kStart, kStart, State{1, -2}, bad).cause, GuardCause::kWrongStateError);
-    EXPECT_EQ(guard.executing(), nullptr);
-    EXPECT_EQ(guard.pending(), nullptr);
+    EXPECT_FIELDS(guard, (executing(), nullptr), (pending(), nullptr));
     for (const bool again : {false, true}) {
       Guard executing = Executing(SmallPlan());
       const GuardVerdict verdict =
@@ -201,8 +191,7 @@ TEST(GuardStateError, RefusesAPlanWhoseErrorsAreNone) {
   for (const State& bad : {State{kNaN, 0}, {0, kNaN}, {-1e-300, 0}, {0, kInf}, {0, -kInf}}) {
     Guard guard(TwoStates());
     const GuardVerdict verdict = guard.Accept(Sealed(Measuring(bad)), kNow);
-    EXPECT_EQ(verdict.cause, GuardCause::kNonFinite);
-    EXPECT_EQ(verdict.coordinate, bad[0] == 0 ? 1 : 0);
+    EXPECT_FIELDS(verdict, (cause, GuardCause::kNonFinite), (coordinate, bad[0] == 0 ? 1 : 0));
   }
   EXPECT_TRUE(Guard(TwoStates()).Accept(Sealed(Measuring({0, 1e300})), kNow).ok());
 }

@@ -4,10 +4,9 @@
 
 #include <new>
 
-#include "forereach/robot_state_t.hpp"
-#include "forereach/transition_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "robot/supervisor.h"
+#include "tests/messages.h"
 #include "tests/robot/sealed_plan.h"
 #include "tests/tries.h"
 
@@ -385,15 +384,10 @@ TEST(SupervisorExceptions, AtEachCallInTurnOnlyCheckedControlsAreGiven) {
           strikes = trouble.struck;
           const Supervisor::Counts& counts = robot.supervisor_.counts();
           EXPECT_EQ(counts.failed_sends > 0, strikes && site == kSend);
-          if (strikes && (site == kState || site == kHold || site == kBrake || site == kReload)) {
+          if (strikes && (site == kState || site == kHold || site == kBrake || site == kReload))
             EXPECT_GT(counts.errors, 0);
-          }
-          if (site == kSend || site == kClock) {
-            EXPECT_EQ(counts.errors, 0);
-          }
-          if (site == kSend && !tries_again) {
-            EXPECT_EQ(robot.controls_, 8) << "a send that throws stops nobody";
-          }
+          if (site == kSend || site == kClock) EXPECT_EQ(counts.errors, 0);
+          if (site == kSend && !tries_again) EXPECT_EQ(robot.controls_, 8) << "a send that throws stops nobody";
           robot.ExpectEachReportOnceOrCounted();
         }
       }
@@ -454,8 +448,7 @@ TEST(SupervisorExceptions, InAnyOrderOfCallsOnlyCheckedControlsAreGiven) {
 }
 
 // What a robot is told and what it sends, with each function as the test sets it.
-class OddRobot final : public Supervisor::Robot {
- public:
+struct OddRobot final : Supervisor::Robot {
   OddRobot() { trouble = {}; }
   std::span<const double> state() const override { return measure(); }
   void Hold() override { hold(); }
@@ -534,13 +527,11 @@ TEST(SupervisorSends, OfMoreThanFitTheOldestAreLostAndAGapSaysHowMany) {
     OddRobot robot;
     robot.send = [](const std::string&) { throw 7; };
     for (int j = 0; j < kMost + more; ++j) EXPECT_TRUE(robot.supervisor.Boundary(At(j), At(j)).empty());
-    EXPECT_EQ(robot.supervisor.reports_waiting(), ReportQueue::kMostWaiting);
-    EXPECT_EQ(robot.supervisor.counts().reports_lost, more);
+    EXPECT_FIELDS(robot.supervisor, (reports_waiting(), ReportQueue::kMostWaiting), (counts().reports_lost, more));
     robot.send = [](const std::string&) {};
     robot.supervisor.Report(At(0), execution_event_t::CONTACT, 0, "a curb");
     ASSERT_EQ(std::ssize(robot.states), kMost);
-    EXPECT_EQ(robot.states.front().sequence, more);
-    EXPECT_EQ(robot.states.back().sequence, kMost + more - 1);
+    EXPECT_FIELDS(robot.states, (front().sequence, more), (back().sequence, kMost + more - 1));
   }
 }
 
@@ -571,8 +562,7 @@ TEST(SupervisorSends, ABoundaryInASendGivesNoControlAndEndsThePlan) {
     EXPECT_TRUE(robot.supervisor.Boundary(At(2), At(2)).empty());
   };
   EXPECT_TRUE(robot.supervisor.Boundary(At(1), At(1)).empty());
-  EXPECT_EQ(robot.holds, 1);
-  EXPECT_EQ(robot.supervisor.counts().boundaries, 2);
+  EXPECT_FIELDS(robot, (holds, 1), (supervisor.counts().boundaries, 2));
 }
 
 TEST(SupervisorExceptions, ThePlanEndsAndItsCauseIsReportedWithoutAHalt) {
@@ -586,8 +576,7 @@ TEST(SupervisorExceptions, ThePlanEndsAndItsCauseIsReportedWithoutAHalt) {
     EXPECT_TRUE(robot.supervisor.Boundary(At(1), At(1)).empty());
     EXPECT_EQ(robot.holds, 1);
     EXPECT_THAT(SequencesOf(robot.states), ElementsAre(0)) << "there is no state to send";
-    EXPECT_EQ(robot.events.back().kind, execution_event_t::ERROR_STOP);
-    EXPECT_EQ(robot.events.back().plan_id, 7);
+    EXPECT_FIELDS(robot.events.back(), (kind, execution_event_t::ERROR_STOP), (plan_id, 7));
     EXPECT_THAT(GetText(robot.events.back().message),
                 HasSubstr(is_standard ? "threw an exception: no scan" : "threw what is no std::exception"));
     EXPECT_FALSE(robot.supervisor.halted());
@@ -639,15 +628,12 @@ TEST(SupervisorExceptions, AFaultHaltsARobotThatCanNeitherMeasureNorHold) {
   robot.Start();
   robot.measure = []() -> std::span<const double> { throw 7; };
   robot.hold = [] { throw 7; };
-  fault_t fault{.utime = At(1), .cause = fault_t::SLICE_LEFT};
-  robot.supervisor.OnFault(Encode(fault), At(1));
+  robot.supervisor.OnFault(Encode(fault_t{.utime = At(1), .cause = fault_t::SLICE_LEFT}), At(1));
   EXPECT_TRUE(robot.supervisor.halted());
   EXPECT_TRUE(robot.supervisor.control().empty());
   const auto halted = std::ranges::find(robot.events, execution_event_t::HALTED, &execution_event_t::kind);
   ASSERT_NE(halted, robot.events.end()) << "nobody else says that it needs a reset";
-  EXPECT_EQ(halted->plan_id, 7);
-  EXPECT_EQ(halted->step, 0);
-  EXPECT_EQ(halted->num_states, 2);
+  EXPECT_FIELDS(*halted, (plan_id, 7), (step, 0), (num_states, 2));
   EXPECT_EQ(halted->state[0], 1) << "measured last";
   EXPECT_EQ(robot.events.back().kind, execution_event_t::ERROR_STOP);
 }
@@ -691,9 +677,7 @@ TEST(SupervisorExceptions, BoundaryChecksTheStateAndTheTimeOfAStepThatWasFinishe
     EXPECT_TRUE(robot.supervisor.control().empty()) << "no boundary has returned it";
     robot.x[0] = x;
     EXPECT_EQ(!robot.supervisor.Boundary(At(1), At(1) + late_us).empty(), passes) << x << " " << late_us;
-    EXPECT_EQ(robot.holds, passes ? 0 : 1);
-    EXPECT_EQ(robot.transitions.size(), 1u);
-    EXPECT_EQ(robot.supervisor.halted(), x == 1.11);
+    EXPECT_FIELDS(robot, (holds, passes ? 0 : 1), (transitions.size(), 1u), (supervisor.halted(), x == 1.11));
   }
 }
 

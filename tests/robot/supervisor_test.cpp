@@ -3,9 +3,8 @@
 #include "tests/test.h"
 
 #include "certifier/gate/plan_ledger.h"
-#include "forereach/robot_state_t.hpp"
-#include "forereach/transition_t.hpp"
 #include "tests/keys.h"
+#include "tests/messages.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach::supervisor_test {
@@ -13,8 +12,7 @@ namespace forereach::supervisor_test {
 constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs;
 
 // A robot whose state the test sets, and its supervisor. Boundary j lies at kStart + j * kStep.
-class SupervisorTest : public testing::Test, protected Supervisor::Robot {
- protected:
+struct SupervisorTest : testing::Test, protected Supervisor::Robot {
   std::span<const double> state() const override {
     if (fails_) throw std::runtime_error("the sensor does not answer");
     return state_;
@@ -35,12 +33,10 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
   }
   std::span<const double> Boundary(int j) { return supervisor_.Boundary(At(j), At(j)); }
   void Fault(std::int64_t utime, std::int64_t now_us, std::int16_t cause = fault_t::SLICE_LEFT) {
-    fault_t fault{.utime = utime, .cause = cause};
-    supervisor_.OnFault(Encode(fault), now_us);
+    supervisor_.OnFault(Encode(fault_t{.utime = utime, .cause = cause}), now_us);
   }
   std::string Command(std::int16_t kind, std::int64_t utime, std::int64_t now_us) {
-    command_t command{.utime = utime, .kind = kind};
-    return supervisor_.OnCommand(Encode(command), now_us);
+    return supervisor_.OnCommand(Encode(command_t{.utime = utime, .kind = kind}), now_us);
   }
   std::string ResetAt(std::int64_t utime, std::int64_t now_us) { return Command(command_t::RESET, utime, now_us); }
   std::vector<std::int16_t> Events() const {
@@ -58,6 +54,13 @@ class SupervisorTest : public testing::Test, protected Supervisor::Robot {
   std::vector<transition_t> transitions_;
   Supervisor supervisor_{SupervisorOptions{TwoStates()}, *this};
 };
+
+SupervisorOptions WithKeys() {
+  SupervisorOptions options{TwoStates()};
+  options.guard.keys = TestKeys();
+  options.guard.bus_name = "memq";
+  return options;
+}
 
 certified_plan_t Measuring(double error) {
   certified_plan_t certified = SmallPlan();
@@ -83,10 +86,7 @@ TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
   EXPECT_EQ(states_[1].mode, robot_state_t::EXECUTING);
   EXPECT_EQ(states_[4].mode, robot_state_t::STANDING);
   ASSERT_EQ(transitions_.size(), 3u);
-  EXPECT_EQ(transitions_[1].utime, At(1));
-  EXPECT_EQ(transitions_[1].state[0], 2);
-  EXPECT_EQ(transitions_[1].input[0], 11);
-  EXPECT_EQ(transitions_[1].next_state[0], 3);
+  EXPECT_FIELDS(transitions_[1], (utime, At(1)), (state[0], 2), (input[0], 11), (next_state[0], 3));
 }
 
 TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
@@ -101,9 +101,7 @@ TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
   EXPECT_EQ(holds_, 1);
   EXPECT_FALSE(supervisor.halted());
   EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kInside, kTailBegun, kOffSchedule));
-  EXPECT_EQ(events_.back().plan_id, 7);
-  EXPECT_EQ(events_.back().step, 2);
-  EXPECT_EQ(events_.back().value, 3001);
+  EXPECT_FIELDS(events_.back(), (plan_id, 7), (step, 2), (value, 3001));
   EXPECT_THAT(GetText(events_.back().message), HasSubstr("emergency stop: plan 7: step 2 was due at"));
   EXPECT_EQ(transitions_.size(), 1u) << "the step that was too long is no observation of the model's step";
 
@@ -199,13 +197,9 @@ TEST_F(SupervisorTest, GoesOnWhereAStateIsConsistentAndStopsWhereItsSliceIsLeft)
   state_error_.clear();
   state_[0] = 11.4;
   EXPECT_FALSE(supervisor.Boundary(At(1), At(1)).empty());
-  EXPECT_EQ(events_[2].kind, execution_event_t::STEP_CONSISTENT);
-  EXPECT_EQ(events_[2].coordinate, 0);
-  EXPECT_EQ(events_[2].value, 11.4);
-  EXPECT_EQ(events_[2].step, 1);
+  EXPECT_FIELDS(events_[2], (kind, execution_event_t::STEP_CONSISTENT), (coordinate, 0), (value, 11.4), (step, 1));
   EXPECT_EQ(GetText(events_[2].message), "consistent with the certified slice, within the state error");
-  EXPECT_EQ(supervisor.counts().steps_consistent, 1);
-  EXPECT_EQ(supervisor.counts().steps_inside, 0);
+  EXPECT_FIELDS(supervisor.counts(), (steps_consistent, 1), (steps_inside, 0));
   state_[0] = 12.6;
   EXPECT_TRUE(supervisor.Boundary(At(2), At(2)).empty());
   EXPECT_EQ(events_.back().kind, kOutside);
@@ -221,9 +215,7 @@ TEST_F(SupervisorTest, StatesBringTheirOwnErrorsOrNone) {
   state_error_.clear();
   (void)Boundary(-1);
   ASSERT_EQ(states_.size(), 2u);
-  EXPECT_EQ(states_[0].num_state_errors, 2);
-  EXPECT_EQ(states_[0].state_error[0], 0.25);
-  EXPECT_EQ(states_[0].state_error[1], 0.5);
+  EXPECT_FIELDS(states_[0], (num_state_errors, 2), (state_error[0], 0.25), (state_error[1], 0.5));
   EXPECT_EQ(states_[1].num_state_errors, 0);
 }
 
@@ -413,8 +405,7 @@ TEST_F(SupervisorTest, FinishesEachStepOnceWithAndWithoutFinishStep) {
   supervisor_.FinishStep(At(1), At(1));
   supervisor_.FinishStep(At(1), At(1));
   Boundary(1);
-  EXPECT_EQ(supervisor_.counts().steps, 1);
-  EXPECT_EQ(supervisor_.counts().steps_inside, 1);
+  EXPECT_FIELDS(supervisor_.counts(), (steps, 1), (steps_inside, 1));
 }
 
 TEST_F(SupervisorTest, BytesThatAreNoMessageDoNothing) {
@@ -427,10 +418,7 @@ TEST_F(SupervisorTest, BytesThatAreNoMessageDoNothing) {
 }
 
 TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
-  SupervisorOptions options{TwoStates()};
-  options.guard.keys = TestKeys();
-  options.guard.bus_name = "memq";
-  Supervisor supervisor(options, *this);
+  Supervisor supervisor(WithKeys(), *this);
   Signer signer(TestKeys(), "memq");
   fault_t fault{.utime = At(1), .cause = fault_t::SLICE_LEFT};
   supervisor.OnFault(Encode(fault), At(1));
@@ -450,14 +438,11 @@ TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
 // Somebody has recorded what was signed earlier, or while a clock was ahead.
 TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNothingAndIsReported) {
   constexpr std::int64_t kHour = 3'600'000'000;
-  SupervisorOptions options{TwoStates()};
-  options.guard.keys = TestKeys();
-  options.guard.bus_name = "memq";
   for (const auto& [off, cause] :
        {std::pair(-kHour, "signed_before_the_start"), std::pair(-kClockErrorUs, "signed_before_the_start"),
         std::pair(std::int64_t{60'000'001}, "signed_ahead"), std::pair(kHour, "signed_ahead")}) {
     SCOPED_TRACE(off);
-    Supervisor supervisor(options, *this);
+    Supervisor supervisor(WithKeys(), *this);
     events_.clear();
     const std::int64_t start = At(0) - 1000;
     const auto signed_off = [&, off = off](Role role, const char* channel, Bytes message) {
@@ -471,13 +456,13 @@ TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNoth
     supervisor.OnWithdrawn(signed_off(Role::kCertifier, "PLAN_WITHDRAWN", Encode(withdrawal)), start);
     EXPECT_THAT(Events(), ElementsAre(kRefused, kRefused, kRefused));
     for (const execution_event_t& event : events_)
-      EXPECT_THAT(GetText(event.message), testing::StartsWith(std::string(cause) + ": "));
+      EXPECT_THAT(GetText(event.message), StartsWith(std::string(cause) + ": "));
     command_t reload{.utime = start, .kind = command_t::RELOAD};
     const auto stale = signed_off(Role::kOperator, "COMMAND", Encode(reload));
     EXPECT_THAT(supervisor.OnCommand(stale, start), HasSubstr("COMMAND was signed"));
     EXPECT_EQ(reloads_, 0);
     EXPECT_THAT(Events(), ElementsAre(kRefused, kRefused, kRefused, kRefused)) << "that one is reported, too";
-    EXPECT_THAT(GetText(events_.back().message), testing::StartsWith(std::string(cause) + ": COMMAND was signed"));
+    EXPECT_THAT(GetText(events_.back().message), StartsWith(std::string(cause) + ": COMMAND was signed"));
     EXPECT_EQ(supervisor.counts().refused.at(cause), 4);
   }
 }
@@ -485,12 +470,9 @@ TEST_F(SupervisorTest, WhatWasSignedBeforeItsStartOrAheadOfItsClockCountsForNoth
 // A certifier whose clock is ahead stops the robot nevertheless. It starts nothing.
 TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
   constexpr std::int64_t kMinute = 60'000'000;
-  SupervisorOptions options{TwoStates()};
-  options.guard.keys = TestKeys();
-  options.guard.bus_name = "memq";
   for (const std::int64_t ahead : {kClockErrorUs, kClockErrorUs + 1, kMinute, kMinute + 1}) {
     SCOPED_TRACE(ahead);
-    Supervisor supervisor(options, *this);
+    Supervisor supervisor(WithKeys(), *this);
     events_.clear();
     const bool plan_counts = ahead <= kClockErrorUs, stop_counts = ahead <= kMinute;
     const auto say = [&](std::int64_t off, const char* channel, Bytes message) {
@@ -509,18 +491,13 @@ TEST_F(SupervisorTest, WhatOnlyStopsMayBeSignedAMinuteAhead) {
     fault_t fault{.utime = At(0) + ahead, .cause = fault_t::SLICE_LEFT};
     supervisor.OnFault(say(ahead, "FAULT", Encode(fault)), At(0) - 1000);
     EXPECT_EQ(supervisor.halted(), stop_counts);
-    if (!stop_counts) {
-      EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
-    }
+    if (!stop_counts) EXPECT_THAT(GetText(events_.back().message), HasSubstr("signed more than 60000 ms ahead"));
   }
 }
 
 // A certifier that was started again sends its latched fault with the stamp of then, and signs it now.
 TEST_F(SupervisorTest, ALatchedFaultThatIsSentAgainHaltsARobotThatHasJustStarted) {
-  SupervisorOptions options{TwoStates()};
-  options.guard.keys = TestKeys();
-  options.guard.bus_name = "memq";
-  Supervisor supervisor(options, *this);
+  Supervisor supervisor(WithKeys(), *this);
   fault_t fault{.utime = At(0) - 3'600'000'000, .cause = fault_t::SLICE_LEFT};
   supervisor.OnFault(Signer(TestKeys(), "memq").Sign(Role::kCertifier, "FAULT", Encode(fault), At(0)), At(0) + 100);
   EXPECT_TRUE(supervisor.halted());

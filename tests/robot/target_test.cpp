@@ -57,11 +57,9 @@ Reals PointMassTarget(const std::vector<double>& z) {
 }
 
 Config Task(const Problem& problem, const ResidualText& residual) {
-  Config config;
-  config.path = "task.yaml";
-  config.robot_residual = ResidualOf(*problem.model, residual);
-  config.problem = std::make_shared<const Problem>(problem);
-  return config;
+  return {.path = "task.yaml",
+          .problem = std::make_shared<const Problem>(problem),
+          .robot_residual = ResidualOf(*problem.model, residual)};
 }
 
 Config Bicycle() { return Task(PaperBicycle(), ResidualNamed("heading_saturation")); }
@@ -322,8 +320,7 @@ TEST(MakeTransitionsTest, SamplesLieInTheNarrowedDomainAndAreThoseOfTheSeed) {
   EXPECT_TRUE((made.z.col(6).array() == 1).all());
   EXPECT_LT(made.z.col(0).minCoeff(), -35);
   const Transitions again = MakeTransitions(*target, *config.problem, 5, 500, ranges);
-  EXPECT_EQ(made.z, again.z);
-  EXPECT_EQ(made.x_next, again.x_next);
+  EXPECT_FIELDS(made, (z, again.z), (x_next, again.x_next));
   EXPECT_NE(made.z, MakeTransitions(*target, *config.problem, 6, 500, ranges).z);
 }
 
@@ -464,9 +461,8 @@ TEST_P(DisturbanceTest, MeasuresWithinTheStateErrorAndReachesIt) {
   const auto [least, largest] = std::ranges::minmax(first);
   EXPECT_LT(least, -0.24);
   EXPECT_GT(largest, 0.24);
-  if (GetParam() == "adversarial") {
+  if (GetParam() == "adversarial")
     EXPECT_TRUE(std::ranges::all_of(first, [](double error) { return std::abs(error) > 0.2499; })) << "at a corner";
-  }
   options.sensor_error = "none";
   std::vector<double> exact = truth;
   Disturbance::OfMeasurements(declaration, options).Add(exact);

@@ -33,8 +33,7 @@ withdrawal_t Withdrawal(const certified_plan_t& plan, int valid_steps, std::int1
   return message;
 }
 
-class GuardWithdrawTest : public testing::Test {
- protected:
+struct GuardWithdrawTest : testing::Test {
   void Accept(std::int64_t plan_id = 7) { EXPECT_TRUE(guard_.Accept(Sealed(SmallPlan(plan_id)), kNow).ok()); }
   void Start(std::int64_t plan_id = 7) {
     Accept(plan_id);
@@ -127,8 +126,7 @@ TEST_F(GuardWithdrawTest, ThePlanAfterAWithdrawnOneHasAllItsSteps) {
   Start(7);
   EXPECT_EQ(Withdraw(1), 1);
   Start(8);
-  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
-  EXPECT_EQ(guard_.control().size(), 1u);
+  EXPECT_FIELDS(guard_, (standing_steps(), std::nullopt), (control().size(), 1u));
 }
 
 TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate) {
@@ -212,9 +210,7 @@ TEST(GuardWithdrawKeys, OnlyTheCertifierWithdraws) {
   };
   EXPECT_EQ(guard.Withdraw(message, kNow).verdict.cause, GuardCause::kUnsigned);
   for (const Role role : kAllRoles)
-    if (role != Role::kCertifier) {
-      EXPECT_EQ(cause(signer, role), GuardCause::kForged) << RoleName(role);
-    }
+    if (role != Role::kCertifier) EXPECT_EQ(cause(signer, role), GuardCause::kForged) << RoleName(role);
   EXPECT_EQ(cause(stranger, Role::kCertifier), GuardCause::kForged);
   EXPECT_EQ(cause(signer, Role::kCertifier, "PLAN_CERTIFIED"), GuardCause::kForged);
   EXPECT_EQ(cause(elsewhere, Role::kCertifier), GuardCause::kForeign);
@@ -226,8 +222,7 @@ TEST(GuardWithdrawKeys, OnlyTheCertifierWithdraws) {
 }
 
 // A robot whose state is always inside. Boundary j lies at kStart + j * kStep.
-class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot {
- protected:
+struct SupervisorWithdrawTest : testing::Test, protected Supervisor::Robot {
   std::span<const double> state() const override { return kInSlice; }
   void Hold() override { ++holds_; }
   void Reload() override {}
@@ -290,8 +285,7 @@ TEST_F(SupervisorWithdrawTest, GoesOnWithinWhatStandsThenStopsWithoutACertificat
   EXPECT_FALSE(Boundary(2));
   EXPECT_EQ(holds_, 1);
   EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kWithdrawn, kInside, kTailBegun, kInside, kStop));
-  EXPECT_EQ(events_[2].plan_id, 7);
-  EXPECT_EQ(events_[2].step, 2);
+  EXPECT_FIELDS(events_[2], (plan_id, 7), (step, 2));
   EXPECT_EQ(events_[2].value, 4) << "the withdrawal's sequence";
   EXPECT_EQ(GetText(events_[2].message), "a wall");
   EXPECT_EQ(events_[6].step, 2);
@@ -466,9 +460,7 @@ TEST(BrakeTest, StopsInTheNumberOfStepsThatItReports) {
       const int steps = brake.StepsToRest(lower, upper);
       ASSERT_LE(std::abs(speed), steps * decline * (1 + 1e-15));
       for (int t = 0; t < steps; ++t) {
-        if (t < steps - 1) {
-          ASSERT_NE(x[1], 0) << "of " << steps << " steps";
-        }
+        if (t < steps - 1) ASSERT_NE(x[1], 0) << "of " << steps << " steps";
         brake.Apply(x, 1, x);
       }
       ASSERT_EQ(x[1], 0) << speed << " by " << decline;

@@ -23,37 +23,35 @@ Eigen::VectorXd Numbers(std::initializer_list<double> entries) {
   return vector;
 }
 
-TEST(LoadConfig, ReadsWhatIsRequired) {
-  const TaskFiles files;
-  const Config config = files.Load();
+struct LoadConfig : testing::Test {
+  const TaskFiles files_{};
+};
+
+TEST_F(LoadConfig, ReadsWhatIsRequired) {
+  const Config config = files_.Load();
   const Problem& problem = *config.problem;
-  EXPECT_EQ(config.path, files.directory() / "task.yaml");
-  EXPECT_EQ(problem.model->description(), "point_mass dt=0.15");
-  EXPECT_EQ(problem.domain.state.lower(), Numbers({-20, -20, -5.4, -5.4}));
-  EXPECT_EQ(problem.domain.input.upper(), Numbers({3, 3}));
-  EXPECT_TRUE(problem.domain.balls.empty());
-  EXPECT_TRUE(problem.domain.inequalities.empty());
+  EXPECT_EQ(config.path, files_.directory() / "task.yaml");
+  EXPECT_FIELDS(problem, (model->description(), "point_mass dt=0.15"),
+                (domain.state.lower(), Numbers({-20, -20, -5.4, -5.4})), (domain.input.upper(), Numbers({3, 3})),
+                (domain.balls.empty(), true), (domain.inequalities.empty(), true));
   Eigen::MatrixXd lipschitz = Eigen::MatrixXd::Zero(4, 6);
   lipschitz.block(2, 2, 2, 2) << 0.1, 0.05, 0.05, 0.1;
-  EXPECT_EQ(problem.declaration.lipschitz, lipschitz);
-  EXPECT_EQ(problem.declaration.noise_bound, Numbers({0, 0, 0.01, 0.01}));
+  EXPECT_FIELDS(problem.declaration, (lipschitz, lipschitz), (noise_bound, Numbers({0, 0, 0.01, 0.01})));
   ASSERT_EQ(problem.transitions.size(), 2);
   EXPECT_EQ(Eigen::VectorXd(problem.transitions.z.row(1)), Numbers({1, 2, 2, 0.5, 0, -0.5}));
   EXPECT_EQ(Eigen::VectorXd(problem.transitions.x_next.row(1)), Numbers({1.3, 2.07, 2, 0.42}));
   EXPECT_EQ(problem.projection, Eigen::MatrixXd::Identity(2, 4));
   ASSERT_EQ(config.obstacles.size(), 1u);
-  EXPECT_EQ(config.obstacles[0].kind(), Obstacle::Kind::kCircle);
-  EXPECT_EQ(config.obstacles[0].radius(), 0.8);
+  EXPECT_FIELDS(config.obstacles[0], (kind(), Obstacle::Kind::kCircle), (radius(), 0.8));
   EXPECT_LE(config.initial_set.lower()[2], 0.9);
   EXPECT_GE(config.initial_set.upper()[2], 1.1);
   EXPECT_NEAR(config.initial_set.upper()[2], 1.1, 1e-15);
 }
 
-TEST(LoadConfig, TellsAnErrorThatIsNotDeclaredFromZero) {
-  const TaskFiles files;
+TEST_F(LoadConfig, TellsAnErrorThatIsNotDeclaredFromZero) {
   const auto with = [&](const std::string& errors) {
     const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
-    return files.Load(Replaced(kTask, line, line + errors)).problem->declaration;
+    return files_.Load(Replaced(kTask, line, line + errors)).problem->declaration;
   };
   EXPECT_FALSE(with("").DeclaresStateError());
   EXPECT_FALSE(with("  input_error: {ax: 0.1}\n").DeclaresStateError());
@@ -68,20 +66,19 @@ TEST(LoadConfig, TellsAnErrorThatIsNotDeclaredFromZero) {
   EXPECT_TRUE(both.HasErrorInZ());
   std::vector<double> errors(6);
   for (int l = 0; l < 6; ++l) errors[static_cast<std::size_t>(l)] = both.VariableError(l);
-  EXPECT_THAT(errors, testing::ElementsAre(0, 0, 0.01, 0, 0.1, 0.2));
+  EXPECT_THAT(errors, ElementsAre(0, 0, 0.01, 0, 0.1, 0.2));
 }
 
-TEST(LoadConfig, ReadsWhichRowsAreAffine) {
-  const TaskFiles files;
+TEST_F(LoadConfig, ReadsWhichRowsAreAffine) {
   const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
   const auto with = [&](const std::string& affine, const std::string& task = kTask) {
-    return files.Load(Replaced(task, line, line + "  affine: " + affine + "\n"));
+    return files_.Load(Replaced(task, line, line + "  affine: " + affine + "\n"));
   };
   const std::string only_vy = Replaced(kTask, "    vx: {vx: 0.1, vy: 0.05}\n", "");
   const Config config = with("{rows: [vx], columns: [ay, vx]}", only_vy);
-  EXPECT_THAT(config.problem->declaration.affine.rows, testing::ElementsAre(2));
-  EXPECT_THAT(config.problem->declaration.affine.columns, testing::ElementsAre(2, 5));
-  EXPECT_NE(config.grounds.declaration, files.Load(only_vy).grounds.declaration);
+  EXPECT_THAT(config.problem->declaration.affine.rows, ElementsAre(2));
+  EXPECT_THAT(config.problem->declaration.affine.columns, ElementsAre(2, 5));
+  EXPECT_NE(config.grounds.declaration, files_.Load(only_vy).grounds.declaration);
   EXPECT_NE(config.grounds.declaration, with("{rows: [vx], columns: [ay]}", only_vy).grounds.declaration);
   const auto error = [&](const std::string& affine, const std::string& task) {
     return Thrown<ConfigError>([&] { static_cast<void>(with(affine, task)); });
@@ -96,32 +93,29 @@ TEST(LoadConfig, ReadsWhichRowsAreAffine) {
               HasSubstr("declare a bound on that slope as declaration.lipschitz.vx.vx"));
 }
 
-TEST(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
-  const TaskFiles files;
+TEST_F(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
   const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
   const auto text = [&](const std::string& regions) { return Replaced(kTask, line, line + "  regions:\n" + regions); };
   const std::string good = "    - {in: {vy: [-1, 1], vx: [0, 0.5]}, lipschitz: {vx: {vy: 0.01}}}\n";
-  const Config config = files.Load(text(good));
+  const Config config = files_.Load(text(good));
   const std::vector<Region>& regions = config.problem->declaration.regions;
   ASSERT_EQ(regions.size(), 1);
   ASSERT_EQ(regions[0].box.size(), 2);
-  EXPECT_EQ(regions[0].box[0].variable, 2);
-  EXPECT_EQ(regions[0].box[0].range, Interval(0, 0.5));
-  EXPECT_EQ(regions[0].box[1].variable, 3);
+  EXPECT_FIELDS(regions[0], (box[0].variable, 2), (box[0].range, Interval(0, 0.5)), (box[1].variable, 3));
   Eigen::MatrixXd slopes = config.problem->declaration.lipschitz;
   EXPECT_EQ(slopes(2, 2), 0.1);
   slopes.row(2).setZero();
   slopes(2, 3) = 0.01;
   EXPECT_EQ(regions[0].lipschitz, slopes) << "the rows that are not named are those of the whole domain";
-  const auto digest = [&](const std::string& changed) { return files.Load(text(changed)).grounds.declaration; };
-  EXPECT_NE(config.grounds.declaration, files.Load(kTask).grounds.declaration);
+  const auto digest = [&](const std::string& changed) { return files_.Load(text(changed)).grounds.declaration; };
+  EXPECT_NE(config.grounds.declaration, files_.Load(kTask).grounds.declaration);
   EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "0.5]", "0.25]")));
   EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "vy: 0.01", "vy: 0.02")));
   EXPECT_NE(config.grounds.declaration, digest(Replaced(good, "vx: [0", "px: [0")));
-  EXPECT_EQ(files.Load(text(Replaced(good, "{vy: 0.01}", "{}"))).problem->declaration.regions[0].lipschitz(2, 3), 0);
+  EXPECT_EQ(files_.Load(text(Replaced(good, "{vy: 0.01}", "{}"))).problem->declaration.regions[0].lipschitz(2, 3), 0);
 
   const auto error = [&](const std::string& from, const std::string& to) {
-    return files.Error(text(Replaced(good, from, to)));
+    return files_.Error(text(Replaced(good, from, to)));
   };
   EXPECT_THAT(
       error("vy: 0.01", "vy: 0.06"),
@@ -132,62 +126,51 @@ TEST(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
   EXPECT_THAT(error("{vy: [-1, 1], vx: [0, 0.5]}", "{}"), HasSubstr("declaration.regions[0].in: names no state"));
   EXPECT_THAT(error(", lipschitz: {vx: {vy: 0.01}}", ""), HasSubstr("declaration.regions[0].lipschitz: missing"));
   const std::string many = Replaced(good, "vx: [0, 0.5]", "px: [0, 1], py: [0, 1], vx: [0, 0.5]");
-  EXPECT_THAT(files.Error(text(many)),
+  EXPECT_THAT(files_.Error(text(many)),
               HasSubstr("declaration.regions: cut 4 variables and 3 x 3 x 3 x 3 = 81 cells, has to be at most 3"));
   std::string fine;
   for (int i = 1; i <= 33; ++i)
     fine += fmt::format("    - {{in: {{vx: [0, {}], vy: [0, {}]}}, lipschitz: {{vx: {{}}}}}}\n", 0.01 * i, 0.02 * i);
-  EXPECT_THAT(files.Error(text(fine)), HasSubstr("35 x 35 = 1225 cells, has to be at most 3 variables and 1024 cells"));
+  EXPECT_THAT(files_.Error(text(fine)),
+              HasSubstr("35 x 35 = 1225 cells, has to be at most 3 variables and 1024 cells"));
 }
 
-TEST(LoadConfig, LeavesOutTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
-  const TaskFiles files;
+TEST_F(LoadConfig, LeavesOutTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {
   const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n", rows = kTransitions;
   const auto with = [&](const std::string& error) {
     return Replaced(kTask, line, line + "  state_error: {px: " + error + "}\n");
   };
   const std::string edge = "19.5,0,1,0,0,0,19.65,0,1,0\n", last = "3,0,1,0,0,0,3.15,0,1,0\n";
-  const Config exact = files.Load(kTask, rows + edge + last), at = files.Load(with("0.5"), rows + edge + last),
-               beyond = files.Load(with("0.5000000000000001"), rows + edge + last);
+  const Config exact = files_.Load(kTask, rows + edge + last), at = files_.Load(with("0.5"), rows + edge + last),
+               beyond = files_.Load(with("0.5000000000000001"), rows + edge + last);
   EXPECT_EQ(at.left_out, 0);
-  EXPECT_THAT(at.rows, testing::ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(at.rows, ElementsAre(0, 1, 2, 3));
   EXPECT_EQ(beyond.left_out, 1);
-  EXPECT_THAT(beyond.rows, testing::ElementsAre(0, 1, 3));
-  EXPECT_EQ(beyond.problem->transitions.z(2, 0), 3);
-  EXPECT_EQ(beyond.problem->transitions.x_next(2, 0), 3.15);
+  EXPECT_THAT(beyond.rows, ElementsAre(0, 1, 3));
+  EXPECT_FIELDS(beyond.problem->transitions, (z(2, 0), 3), (x_next(2, 0), 3.15));
   EXPECT_EQ(beyond.grounds.observations, exact.grounds.observations) << "they are those of the file";
-  EXPECT_EQ(files.Error(with("25"), rows),
+  EXPECT_EQ(files_.Error(with("25"), rows),
             "steps.csv: no transition is inside the domain with all of declaration.state_error and "
             "declaration.input_error; at least one is needed");
 }
 
-TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
-  const Config config = TaskFiles().Load();
-  EXPECT_EQ(config.problem->zonotope_order, 5);
-  EXPECT_EQ(config.gate.max_age_ms, 500);
-  EXPECT_EQ(config.gate.max_ahead_ms, 50);
-  EXPECT_EQ(config.gate.certificate_lifetime_ms, 2000);
-  EXPECT_EQ(config.gate.queue, 64);
-  EXPECT_EQ(config.gate.state, "state");
-  EXPECT_EQ(config.bus.url, "udpm://239.255.76.67:7667?ttl=0");
-  EXPECT_EQ(config.bus.candidate, "PLAN_CANDIDATE");
-  EXPECT_EQ(config.bus.event, "EXECUTION_EVENT");
-  EXPECT_EQ(config.planner.source, "ompl");
-  EXPECT_EQ(config.planner.algorithm, PlannerOptions{}.algorithm);
-  EXPECT_TRUE(config.planner.goal.empty());
-  EXPECT_EQ(config.planner.initial_half_width, (std::vector<double>{0.1, 0.1, 0.1, 0.1}));
-  EXPECT_EQ(config.robot.start, (std::vector<double>{0, 0, 1, 0}));
+TEST_F(LoadConfig, DefaultsAreThoseOfTheStructures) {
+  const Config config = files_.Load();
+  EXPECT_FIELDS(config, (problem->zonotope_order, 5), (gate.max_age_ms, 500), (gate.max_ahead_ms, 50),
+                (gate.certificate_lifetime_ms, 2000), (gate.queue, 64), (gate.state, "state"),
+                (bus.url, "udpm://239.255.76.67:7667?ttl=0"), (bus.candidate, "PLAN_CANDIDATE"),
+                (bus.event, "EXECUTION_EVENT"), (planner.source, "ompl"),
+                (planner.algorithm, PlannerOptions{}.algorithm), (planner.goal.empty(), true),
+                (planner.initial_half_width, (std::vector<double>{0.1, 0.1, 0.1, 0.1})),
+                (robot.start, (std::vector<double>{0, 0, 1, 0})));
   EXPECT_EQ(config.robot.step_period_ms, 150) << "model.dt";
   EXPECT_FALSE(config.robot_residual);
-  EXPECT_EQ(config.logger.directory, "log");
-  EXPECT_EQ(config.logger.queue, LoggerOptions{}.queue);
-  EXPECT_EQ(config.logger.quota_mb, std::nullopt);
-  EXPECT_EQ(config.bus.logger_status, "LOGGER_STATUS");
+  EXPECT_FIELDS(config, (logger.directory, "log"), (logger.queue, LoggerOptions{}.queue),
+                (logger.quota_mb, std::nullopt), (bus.logger_status, "LOGGER_STATUS"));
 }
 
-TEST(LoadConfig, ReadsEveryOption) {
-  const TaskFiles files;
-  const Config config = files.Load(
+TEST_F(LoadConfig, ReadsEveryOption) {
+  const Config config = files_.Load(
       std::string(kTask) +
       "certifier: {method: paper, zonotope_order: 7}\n"
       "gate: {max_age_ms: 1, max_ahead_ms: 0, certificate_lifetime_ms: 3, queue: 4, obstacles: bus,\n"
@@ -211,18 +194,15 @@ TEST(LoadConfig, ReadsEveryOption) {
             std::make_tuple(1.0, 0.0, 3.0, 4));
   EXPECT_EQ(gate.obstacles, ObstaclesSource::kBus);
   EXPECT_TRUE(gate.advises);
-  EXPECT_EQ(gate.obstacles_timeout_ms, 5);
-  EXPECT_EQ(gate.state, files.directory() / "kept");
+  EXPECT_FIELDS(gate, (obstacles_timeout_ms, 5), (state, files_.directory() / "kept"));
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
                 bus.status + bus.event + bus.logger_status + bus.fault + bus.command + bus.withdrawn + bus.advice,
             "ABCDEFGHIJKLM");
   const PlannerOptions& planner = config.planner;
-  EXPECT_EQ(planner.source, "policy");
-  EXPECT_EQ(planner.policy, files.directory() / "p/own.json");
-  EXPECT_EQ(planner.algorithm, "rrt");
-  EXPECT_EQ(planner.goal, (std::vector<double>{1, 2}));
+  EXPECT_FIELDS(planner, (source, "policy"), (policy, files_.directory() / "p/own.json"), (algorithm, "rrt"),
+                (goal, (std::vector<double>{1, 2})));
   EXPECT_EQ(std::tie(planner.goal_radius, planner.clearance, planner.clearance_step, planner.progress_steps,
                      planner.tail_steps, planner.lead_steps, planner.candidates),
             std::make_tuple(3.0, 4.0, 5.0, 6, 7, 8, 9));
@@ -232,8 +212,7 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(planner.initial_half_width, (std::vector<double>{1, 2, 3, 4}));
   EXPECT_EQ(config.robot.start, (std::vector<double>{4, 3, 2, 1}));
   EXPECT_EQ(std::tie(config.robot.step_period_ms, config.robot.time_limit_s), std::make_tuple(14.0, 15.0));
-  EXPECT_EQ(config.robot_residual->name, "velocity_knee");
-  EXPECT_EQ(config.logger.directory, files.directory() / "here");
+  EXPECT_FIELDS(config, (robot_residual->name, "velocity_knee"), (logger.directory, files_.directory() / "here"));
   const LoggerOptions& logger = config.logger;
   EXPECT_EQ(std::tie(logger.queue, logger.flush_ms, logger.rotate_mb, logger.rotate_minutes, logger.min_free_mb),
             std::make_tuple(16, 17.0, 18.0, 19.0, 21.0));
@@ -250,31 +229,27 @@ std::string RefusalOnBus(const Config& config) { return Refusal(RequireForCertif
 const std::string kMeasuredTask =
     Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound") + std::string("robot: {step_error_ms: any}\n");
 
-TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStateMayBeOff) {
-  const TaskFiles files;
-  const Config unsaid = files.Load(std::string(kTask) + "gate: {obstacles: task}\n");
-  EXPECT_THAT(RefusalOnBus(unsaid),
-              testing::AllOf(testing::StartsWith(unsaid.path + ": declaration.state_error: missing"),
-                             testing::HasSubstr("`state_error: {}` if you mean 0 for all")));
+TEST_F(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStateMayBeOff) {
+  const Config unsaid = files_.Load(std::string(kTask) + "gate: {obstacles: task}\n");
+  EXPECT_THAT(RefusalOnBus(unsaid), AllOf(StartsWith(unsaid.path + ": declaration.state_error: missing"),
+                                          HasSubstr("`state_error: {}` if you mean 0 for all")));
   EXPECT_NO_THROW(RequireForCertifying(unsaid)) << "`forereach certify` measures nothing";
-  EXPECT_EQ(RefusalOnBus(files.Load(std::string(kTask) + "gate: {obstacles: task, arming: none}\n")), "");
+  EXPECT_EQ(RefusalOnBus(files_.Load(std::string(kTask) + "gate: {obstacles: task, arming: none}\n")), "");
   for (const char* declared : {"{}", "{vx: 0.1}", "[0, 0, 0, 0]"})
-    EXPECT_EQ(RefusalOnBus(files.Load(
+    EXPECT_EQ(RefusalOnBus(files_.Load(
                   Replaced(kTask, "  noise_bound", std::string("  state_error: ") + declared + "\n  noise_bound") +
                   "robot: {step_error_ms: any}\ngate: {obstacles: task}\n")),
               "");
 }
 
-TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
-  const TaskFiles files;
+TEST_F(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
   const auto with = [&](const std::string& robot, const std::string& gate = "obstacles: task") {
-    return files.Load(Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound") + "gate: {" + gate + "}\n" +
-                      robot);
+    return files_.Load(Replaced(kTask, "  noise_bound", "  state_error: {}\n  noise_bound") + "gate: {" + gate + "}\n" +
+                       robot);
   };
   const Config unsaid = with("");
-  EXPECT_THAT(RefusalOnBus(unsaid),
-              testing::AllOf(testing::StartsWith(unsaid.path + ": robot.step_error_ms: missing"),
-                             testing::HasSubstr("forereach doctor"), testing::HasSubstr("`step_error_ms: any`")));
+  EXPECT_THAT(RefusalOnBus(unsaid), AllOf(StartsWith(unsaid.path + ": robot.step_error_ms: missing"),
+                                          HasSubstr("forereach doctor"), HasSubstr("`step_error_ms: any`")));
   EXPECT_NO_THROW(RequireForCertifying(unsaid)) << "`forereach certify` executes nothing";
   EXPECT_EQ(RefusalOnBus(with("", "obstacles: task, arming: none")), "");
   for (const char* said : {"0", "2.5", "any"})
@@ -282,93 +257,85 @@ TEST(LoadConfig, WhoseRobotArmsTheGateHasToSayHowFarItsStepsMayBeOff) {
   EXPECT_EQ(with("robot: {step_error_ms: any}\n").problem->timing.error, 0);
   EXPECT_EQ(with("robot: {step_error_ms: 0}\n").problem->timing.error, 0);
   EXPECT_THAT(RefusalOnBus(with("", "obstacles: task, max_clock_error_ms: 20")),
-              testing::HasSubstr("robot.step_error_ms: missing"))
+              HasSubstr("robot.step_error_ms: missing"))
       << "it is not taken from that of the clocks";
   EXPECT_THAT(
       [&] { static_cast<void>(with("robot: {step_error_ms: any}\n", "obstacles: task, max_clock_error_ms: 20")); },
-      ThrowsMessage<ConfigError>(testing::HasSubstr("robot.step_error_ms: any, and with gate.max_clock_error_ms")));
+      ThrowsMessage<ConfigError>(HasSubstr("robot.step_error_ms: any, and with gate.max_clock_error_ms")));
 }
 
 // A guard counts whole microseconds, here half of one more in each step than the model.
-TEST(LoadConfig, StepsOfNoWholeMicrosecondsAreOffTheirTimes) {
-  const TaskFiles files;
-  const Config config = files.Load(Replaced(Replaced(kTask, "0.15", "0.1500005"), "samples", "{acceleration: [9, 9]}") +
-                                   "robot: {step_error_ms: 0}\ngate: {obstacles: task}\n");
+TEST_F(LoadConfig, StepsOfNoWholeMicrosecondsAreOffTheirTimes) {
+  const Config config =
+      files_.Load(Replaced(Replaced(kTask, "0.15", "0.1500005"), "samples", "{acceleration: [9, 9]}") +
+                  "robot: {step_error_ms: 0}\ngate: {obstacles: task}\n");
   EXPECT_GE(config.problem->timing.error, 128 * 0.4999e-6);
   EXPECT_LE(config.problem->timing.error, 128 * 0.5001e-6);
   EXPECT_GE(config.problem->between->period, 0.15);
   EXPECT_EQ(config.problem->between->period, std::max(0.1500005, static_cast<double>(config.gate.step_us) / 1e6));
 }
 
-TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
-  const TaskFiles files;
-  const Config unsaid = files.Load(kTask);
+TEST_F(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
+  const Config unsaid = files_.Load(kTask);
   EXPECT_EQ(unsaid.gate.obstacles, ObstaclesSource::kUnsaid) << "`forereach certify` needs none";
   EXPECT_NO_THROW(RequireForCertifying(unsaid));
-  EXPECT_THAT(RefusalOnBus(unsaid), testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles: missing"),
-                                                   testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
+  EXPECT_THAT(RefusalOnBus(unsaid),
+              AllOf(StartsWith(unsaid.path + ": gate.obstacles: missing"), HasSubstr("`bus`"), HasSubstr("`task`")));
   for (const auto& [word, source] : std::initializer_list<std::pair<std::string, ObstaclesSource>>{
            {"bus", ObstaclesSource::kBus}, {"task", ObstaclesSource::kTask}}) {
-    const Config config = files.Load(kMeasuredTask + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
+    const Config config = files_.Load(kMeasuredTask + "gate: {obstacles: " + word + ", obstacles_lost_ms: 1500}\n");
     EXPECT_EQ(config.gate.obstacles, source);
     EXPECT_EQ(RefusalOnBus(config), "");
   }
 }
 
-TEST(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
-  const TaskFiles files;
+TEST_F(LoadConfig, WhoseObstaclesComeFromTheBusHasToSayWhenTheyAreLost) {
   const auto load = [&](const std::string& more) {
-    return files.Load(kMeasuredTask + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
+    return files_.Load(kMeasuredTask + "gate: {obstacles: bus, obstacles_timeout_ms: 400" + more + "}\n");
   };
   const Config unsaid = load("");
   EXPECT_FALSE(unsaid.gate.obstacles_lost_ms);
   EXPECT_THAT(RefusalOnBus(unsaid),
-              testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles_lost_ms: missing"),
-                             testing::HasSubstr("`never`")));
+              AllOf(StartsWith(unsaid.path + ": gate.obstacles_lost_ms: missing"), HasSubstr("`never`")));
   EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: 600")), "");
   EXPECT_EQ(load(", obstacles_lost_ms: 600").gate.obstacles_lost_ms, 600);
   EXPECT_EQ(RefusalOnBus(load(", obstacles_lost_ms: never")), "");
   EXPECT_EQ(load(", obstacles_lost_ms: never").gate.obstacles_lost_ms, kNeverLost);
   EXPECT_THAT([&] { static_cast<void>(load(", obstacles_lost_ms: 599")); },
-              ThrowsMessage<ConfigError>(testing::HasSubstr(
-                  "gate.obstacles_lost_ms: 599 is less than 1.5 times gate.obstacles_timeout_ms, 400")));
+              ThrowsMessage<ConfigError>(
+                  HasSubstr("gate.obstacles_lost_ms: 599 is less than 1.5 times gate.obstacles_timeout_ms, 400")));
 }
 
-TEST(LoadConfig, TheDelayOfTheBusHasADefaultAndMayBeDeclared) {
-  const TaskFiles files;
-  EXPECT_EQ(files.Load(kTask).bus.delay_ms, 10);
-  EXPECT_EQ(files.Load(std::string(kTask) + "bus: {delay_ms: 0}\n").bus.delay_ms, 0);
+TEST_F(LoadConfig, TheDelayOfTheBusHasADefaultAndMayBeDeclared) {
+  EXPECT_EQ(files_.Load(kTask).bus.delay_ms, 10);
+  EXPECT_EQ(files_.Load(std::string(kTask) + "bus: {delay_ms: 0}\n").bus.delay_ms, 0);
 }
 
-TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
-  const TaskFiles files;
+TEST_F(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   const std::string task = kMeasuredTask + "gate: {obstacles: task}\n", line = "  between: samples\n";
-  const Config unsaid = files.Load(Replaced(task, line, ""));
+  const Config unsaid = files_.Load(Replaced(task, line, ""));
   EXPECT_FALSE(unsaid.says_between);
   EXPECT_FALSE(unsaid.problem->between);
-  const auto says = testing::AllOf(testing::StartsWith(unsaid.path + ": task.between: missing. Write "),
-                                   testing::HasSubstr("`between: samples`"));
+  const auto says = AllOf(StartsWith(unsaid.path + ": task.between: missing. Write "), HasSubstr("`between: samples`"));
   EXPECT_THAT(Refusal(RequireForCertifying, unsaid), says);
   EXPECT_THAT(RefusalOnBus(unsaid), says);
-  EXPECT_EQ(RefusalOnBus(files.Load(Replaced(task, line, "") + "certifier: {method: paper}\n")), "");
+  EXPECT_EQ(RefusalOnBus(files_.Load(Replaced(task, line, "") + "certifier: {method: paper}\n")), "");
 
-  const Config samples = files.Load(task);
+  const Config samples = files_.Load(task);
   EXPECT_TRUE(samples.says_between);
   EXPECT_FALSE(samples.problem->between);
   EXPECT_EQ(RefusalOnBus(samples), "");
-  const Config bounds = files.Load(Replaced(task, "samples", "{acceleration: [3.5, 0]}"));
+  const Config bounds = files_.Load(Replaced(task, "samples", "{acceleration: [3.5, 0]}"));
   EXPECT_EQ(RefusalOnBus(bounds), "");
   ASSERT_TRUE(bounds.problem->between);
-  EXPECT_EQ(bounds.problem->between->acceleration, Numbers({3.5, 0}));
-  EXPECT_EQ(bounds.problem->between->period, 0.15);
+  EXPECT_FIELDS(*bounds.problem->between, (acceleration, Numbers({3.5, 0})), (period, 0.15));
   for (const auto& [error_ms, period] : {std::pair{"0.001", 0.150001}, {"10", 0.16}}) {
-    const double longer = files.Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "any", error_ms))
+    const double longer = files_.Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "any", error_ms))
                               .problem->between->period;
     EXPECT_GE(longer, period);
     EXPECT_LE(longer, period * (1 + 0x1p-51));
   }
-  EXPECT_EQ(bounds.problem->between->turn_rate, 0);
-  EXPECT_EQ(bounds.problem->between->turn_acceleration, 0);
+  EXPECT_FIELDS(*bounds.problem->between, (turn_rate, 0), (turn_acceleration, 0));
 }
 
 // The bicycle of tests/data/field.yaml with this for its projection.
@@ -380,8 +347,8 @@ std::string BicycleWith(const std::string& body) {
                   "\ntransitions: " FOREREACH_SOURCE_DIR "/config/data/demo_transitions.csv");
 }
 
-TEST(LoadConfig, ReadsABodyThatTurns) {
-  const Problem problem = *TaskFiles()
+TEST_F(LoadConfig, ReadsABodyThatTurns) {
+  const Problem problem = *files_
                                .Load(BicycleWith("  body:\n"
                                                  "    pose: [x, y, theta]\n"
                                                  "    parts:\n"
@@ -393,42 +360,38 @@ TEST(LoadConfig, ReadsABodyThatTurns) {
                                .problem;
   EXPECT_EQ(problem.body.heading, 2);
   ASSERT_EQ(problem.body.parts.size(), 3u);
-  EXPECT_EQ(problem.body.parts[0], (BodyPart{{{1.4, 0, 0}}, 0.9}));
-  EXPECT_EQ(problem.body.parts[1], (BodyPart{{{-1, 0.5, 0}, {-1, -0.5, 0}, {4, 0, 0}}, 0}));
-  EXPECT_EQ(problem.body.parts[2], (BodyPart{{{2, 0, 0}}, 0.25}));
-  EXPECT_EQ(problem.projection, (Eigen::MatrixXd{{1, 0, 0, 0, 0, 0}, {0, 1, 0, 0, 0, 0}}));
+  EXPECT_FIELDS(problem, (body.parts[0], (BodyPart{{{1.4, 0, 0}}, 0.9})),
+                (body.parts[1], (BodyPart{{{-1, 0.5, 0}, {-1, -0.5, 0}, {4, 0, 0}}, 0})),
+                (body.parts[2], (BodyPart{{{2, 0, 0}}, 0.25})),
+                (projection, (Eigen::MatrixXd{{1, 0, 0, 0, 0, 0}, {0, 1, 0, 0, 0, 0}})));
   ASSERT_TRUE(problem.between);
-  EXPECT_EQ(problem.between->acceleration, Numbers({1, 2}));
-  EXPECT_EQ(problem.between->turn_rate, 3);
-  EXPECT_EQ(problem.between->turn_acceleration, 4);
-  EXPECT_EQ(problem.between->period, 0.1);
+  EXPECT_FIELDS(*problem.between, (acceleration, Numbers({1, 2})), (turn_rate, 3), (turn_acceleration, 4),
+                (period, 0.1));
 }
 
-TEST(LoadConfig, ReadsABodyThatDoesNotTurn) {
-  const TaskFiles files;
+TEST_F(LoadConfig, ReadsABodyThatDoesNotTurn) {
   const auto with = [&](const std::string& body) {
-    return *files.Load(Replaced(kTask, "  projection: [px, py]\n", "  body: " + body + "\n")).problem;
+    return *files_.Load(Replaced(kTask, "  projection: [px, py]\n", "  body: " + body + "\n")).problem;
   };
   const Problem flat = with("{pose: [py, px], parts: [{disc: {at: [1, 2], radius: 0}}]}");
   EXPECT_EQ(flat.body, (Body{-1, {{{{1, 2, 0}}, 0}}}));
   EXPECT_EQ(flat.projection, (Eigen::MatrixXd{{0, 1, 0, 0}, {1, 0, 0, 0}}));
-  EXPECT_EQ(files.Load(kTask).problem->body, Body{}) << "a projection is the short form for a point";
+  EXPECT_EQ(files_.Load(kTask).problem->body, Body{}) << "a projection is the short form for a point";
 
   // In space, a fourth name would be the heading.
   for (const auto& [pose, heading] : {std::pair{"[px, py, vx]", -1}, {"[px, py, vx, vy]", 3}}) {
-    const Problem space = *files
+    const Problem space = *files_
                                .Load(Replaced(Replaced(kTask, "  projection: [px, py]\n",
                                                        "  body: {pose: " + std::string(pose) +
                                                            ", parts: [{hull: {points: [[1, 2, 3], [4, 5, 6]]}}]}\n"),
                                               "[{circle: {center: [3, 2], radius: 0.8}}]", "[]"))
                                .problem;
-    EXPECT_EQ(space.body, (Body{heading, {{{{1, 2, 3}, {4, 5, 6}}, 0}}}));
-    EXPECT_EQ(space.projection.rows(), 3);
+    EXPECT_FIELDS(space, (body, (Body{heading, {{{{1, 2, 3}, {4, 5, 6}}, 0}}})), (projection.rows(), 3));
   }
 }
 
-TEST(LoadConfig, ReadsObstaclesThatMove) {
-  const Config config = TaskFiles().Load(Replaced(
+TEST_F(LoadConfig, ReadsObstaclesThatMove) {
+  const Config config = files_.Load(Replaced(
       kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
       "\n    - {motion: {velocity: [1, -2]}, circle: {center: [3, 2], radius: 0.8}}\n"
       "    - box: {lower: [1, 1], upper: [2, 2]}\n"
@@ -445,76 +408,69 @@ TEST(LoadConfig, ReadsObstaclesThatMove) {
   EXPECT_NO_THROW(RequireForCertifying(config));
 }
 
-TEST(LoadConfig, OnABusNoObstacleOfTheFileMoves) {
-  const TaskFiles files;
+TEST_F(LoadConfig, OnABusNoObstacleOfTheFileMoves) {
   const std::string moves =
       Replaced(kMeasuredTask, "radius: 0.8}}",
                "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
   for (const char* source : {"bus", "task"}) {
-    const Config config = files.Load(moves + "gate: {obstacles: " + source + ", obstacles_lost_ms: never}\n");
-    EXPECT_THAT(RefusalOnBus(config), testing::AllOf(testing::StartsWith(config.path + ": task.obstacles[1].motion: "),
-                                                     testing::HasSubstr("`forereach obstacles`")));
+    const Config config = files_.Load(moves + "gate: {obstacles: " + source + ", obstacles_lost_ms: never}\n");
+    EXPECT_THAT(RefusalOnBus(config),
+                AllOf(StartsWith(config.path + ": task.obstacles[1].motion: "), HasSubstr("`forereach obstacles`")));
   }
 }
 
-TEST(LoadConfig, APlanHasToStopWhereTheTaskSaysWhatStandingIs) {
-  const TaskFiles files;
+TEST_F(LoadConfig, APlanHasToStopWhereTheTaskSaysWhatStandingIs) {
   const std::string says = Replaced(kTask, "  projection:", "  rest: {vy: 0.25, vx: 0.5}\n  projection:");
-  EXPECT_TRUE(files.Load().problem->rest.empty());
+  EXPECT_TRUE(files_.Load().problem->rest.empty());
   for (const char* gate : {"", "gate: {require_stop: true}\n"}) {
-    const std::vector<RestBound> rest = files.Load(says + gate).problem->rest;
+    const std::vector<RestBound> rest = files_.Load(says + gate).problem->rest;
     ASSERT_EQ(rest.size(), 2u) << gate;
-    EXPECT_EQ(rest[0].coordinate, 2);
-    EXPECT_EQ(rest[0].tolerance, 0.5);
-    EXPECT_EQ(rest[1].coordinate, 3);
-    EXPECT_EQ(rest[1].tolerance, 0.25);
+    EXPECT_FIELDS(rest[0], (coordinate, 2), (tolerance, 0.5));
+    EXPECT_FIELDS(rest[1], (coordinate, 3), (tolerance, 0.25));
   }
-  EXPECT_TRUE(files.Load(says + "gate: {require_stop: false}\n").problem->rest.empty());
+  EXPECT_TRUE(files_.Load(says + "gate: {require_stop: false}\n").problem->rest.empty());
 }
 
-TEST(LoadConfig, AStepPeriodThatNobodyWroteIsNoLongerThanTheModels) {
-  const TaskFiles files;
-  EXPECT_EQ(files.Load().robot.step_period_ms, 150);
+TEST_F(LoadConfig, AStepPeriodThatNobodyWroteIsNoLongerThanTheModels) {
+  EXPECT_EQ(files_.Load().robot.step_period_ms, 150);
   const std::string fast =
       Replaced(Replaced(kTask, "dt: 0.15", "dt: 0.02"), "between: samples", "between: {acceleration: [1, 1]}");
-  EXPECT_EQ(files.Load(fast).robot.step_period_ms, 20);
-  EXPECT_EQ(files.Load(fast + "robot: {time_limit_s: 3}\n").robot.step_period_ms, 20);
-  EXPECT_EQ(files.Load(fast + "robot: {step_period_ms: 20}\n").robot.step_period_ms, 20);
-  EXPECT_THAT(files.Error(fast + "robot: {step_period_ms: 10}\n"), HasSubstr("is 10, and has to be model.dt, 20 ms"));
-  EXPECT_THAT(files.Error(fast + "robot: {step_period_ms: 20.5}\n"),
+  EXPECT_EQ(files_.Load(fast).robot.step_period_ms, 20);
+  EXPECT_EQ(files_.Load(fast + "robot: {time_limit_s: 3}\n").robot.step_period_ms, 20);
+  EXPECT_EQ(files_.Load(fast + "robot: {step_period_ms: 20}\n").robot.step_period_ms, 20);
+  EXPECT_THAT(files_.Error(fast + "robot: {step_period_ms: 10}\n"), HasSubstr("is 10, and has to be model.dt, 20 ms"));
+  EXPECT_THAT(files_.Error(fast + "robot: {step_period_ms: 20.5}\n"),
               HasSubstr("robot.step_period_ms: is 20.5, and has to be model.dt"));
 }
 
-TEST(LoadConfig, TheLongestStepIsTheModelsOrTheRobots) {
-  const TaskFiles files;
-  EXPECT_EQ(files.Load().gate.longest_step_ms, 150);
-  EXPECT_EQ(files.Load(std::string(kTask) + "robot: {step_period_ms: 200}\n").gate.longest_step_ms, 200);
+TEST_F(LoadConfig, TheLongestStepIsTheModelsOrTheRobots) {
+  EXPECT_EQ(files_.Load().gate.longest_step_ms, 150);
+  EXPECT_EQ(files_.Load(std::string(kTask) + "robot: {step_period_ms: 200}\n").gate.longest_step_ms, 200);
 }
 
 using Parameters = std::vector<ModelText::Parameter>;
 
-TEST(LoadConfig, NamedResidualsHaveTheModelsParametersAndThePapersValues) {
-  const TaskFiles files;
-  const auto given = files.Load(std::string(kTask) + "robot: {residual: {name: velocity_knee, knee: 2}}\n");
+TEST_F(LoadConfig, NamedResidualsHaveTheModelsParametersAndThePapersValues) {
+  const auto given = files_.Load(std::string(kTask) + "robot: {residual: {name: velocity_knee, knee: 2}}\n");
   const VelocityKnee knee{.dt = 0.15};
   Parameters expected;
   for (std::size_t i = 0; i < knee.parameters().size(); ++i)
     expected.push_back({VelocityKnee::kParameterNames[i], knee.parameters()[i], knee.parameters()[i]});
   expected[3].lower = expected[3].upper = 2;
   EXPECT_EQ(given.robot_residual->names.parameters, expected);
-  EXPECT_FALSE(files.Load(std::string(kTask) + "robot: {residual: none}\n").robot_residual);
-  EXPECT_FALSE(files.Load(std::string(kTask) + "robot: {residual: {name: none}}\n").robot_residual);
+  EXPECT_FALSE(files_.Load(std::string(kTask) + "robot: {residual: none}\n").robot_residual);
+  EXPECT_FALSE(files_.Load(std::string(kTask) + "robot: {residual: {name: none}}\n").robot_residual);
 
   const HeadingSaturation saturation{.dt = 0.1, .wheelbase = 2.5};
   Parameters heading;
   for (std::size_t i = 0; i < saturation.parameters().size(); ++i)
     heading.push_back({HeadingSaturation::kParameterNames[i], saturation.parameters()[i], saturation.parameters()[i]});
-  EXPECT_EQ(LoadConfig(FOREREACH_SOURCE_DIR "/config/bicycle.yaml").robot_residual->names.parameters, heading);
+  EXPECT_EQ(forereach::LoadConfig(FOREREACH_SOURCE_DIR "/config/bicycle.yaml").robot_residual->names.parameters,
+            heading);
 }
 
 // Each parameter of the library's residuals has a row, as a number and, for a proof, as an interval.
-TEST(LoadConfig, EachParameterOfANamedResidualMayBeSet) {
-  const TaskFiles files;
+TEST_F(LoadConfig, EachParameterOfANamedResidualMayBeSet) {
   for (const ResidualText& text : NamedResiduals()) {
     if (text.name != "velocity_knee") continue;  // that of the task's model
     for (const ModelText::Parameter& parameter : text.parameters) {
@@ -523,22 +479,21 @@ TEST(LoadConfig, EachParameterOfANamedResidualMayBeSet) {
       const auto find = [&](const ParametricResidual& residual) {
         return *std::ranges::find(residual.names.parameters, name, &ModelText::Parameter::name);
       };
-      EXPECT_EQ(find(*files.Load(std::string(kTask) + begin + "[0.25, 0.5]}\n").residual),
+      EXPECT_EQ(find(*files_.Load(std::string(kTask) + begin + "[0.25, 0.5]}\n").residual),
                 (ModelText::Parameter{name, 0.25, 0.5}));
-      EXPECT_EQ(find(*files.Load(std::string(kTask) + "robot: {" + begin + "0.5}}\n").robot_residual),
+      EXPECT_EQ(find(*files_.Load(std::string(kTask) + "robot: {" + begin + "0.5}}\n").robot_residual),
                 (ModelText::Parameter{name, 0.5, 0.5}));
     }
   }
 }
 
-TEST(LoadConfig, ReadsResidualsAsText) {
-  const TaskFiles files;
-  const Config config = files.Load(std::string(kTask) +
-                                   "residual:\n"
-                                   "  parameters: {c: [0.1, 0.2], k: 3}\n"
-                                   "  let: {size: 'hypot(vx, vy)'}\n"
-                                   "  add: {vy: -dt*c*vy*size, px: k*ax}\n"
-                                   "robot: {residual: {parameters: {c: 0.15}, add: {vx: -c*abs(vx)}}}\n");
+TEST_F(LoadConfig, ReadsResidualsAsText) {
+  const Config config = files_.Load(std::string(kTask) +
+                                    "residual:\n"
+                                    "  parameters: {c: [0.1, 0.2], k: 3}\n"
+                                    "  let: {size: 'hypot(vx, vy)'}\n"
+                                    "  add: {vy: -dt*c*vy*size, px: k*ax}\n"
+                                    "robot: {residual: {parameters: {c: 0.15}, add: {vx: -c*abs(vx)}}}\n");
   const ParametricResidual& residual = *config.residual;
   EXPECT_EQ(residual.names.parameters, (Parameters{{"dt", 0.15, 0.15}, {"c", 0.1, 0.2}, {"k", 3, 3}}));
   EXPECT_EQ(residual.names.states, config.problem->model->state_names());
@@ -552,39 +507,33 @@ TEST(LoadConfig, ReadsResidualsAsText) {
   EXPECT_EQ(config.robot_residual->values[2].text, "-c*abs(vx)");
 }
 
-TEST(LoadConfig, ReadsBallsAndInequalities) {
-  const Config config = TaskFiles().Load(Replaced(kTask, "  input: {lower",
-                                                  "  balls: [{coordinates: [vy, ax], center: [0.5, 0], radius: 2}]\n"
-                                                  "  inequalities:\n"
-                                                  "    - {coefficients: {ay: 2, vx: 1}, bound: 3}\n"
-                                                  "  input: {lower"));
+TEST_F(LoadConfig, ReadsBallsAndInequalities) {
+  const Config config = files_.Load(Replaced(kTask, "  input: {lower",
+                                             "  balls: [{coordinates: [vy, ax], center: [0.5, 0], radius: 2}]\n"
+                                             "  inequalities:\n"
+                                             "    - {coefficients: {ay: 2, vx: 1}, bound: 3}\n"
+                                             "  input: {lower"));
   const Domain& domain = config.problem->domain;
   ASSERT_EQ(domain.balls.size(), 1u);
-  EXPECT_EQ(domain.balls[0].coordinates, (std::vector<int>{3, 4}));
-  EXPECT_EQ(domain.balls[0].center, Numbers({0.5, 0}));
-  EXPECT_EQ(domain.balls[0].radius, 2);
+  EXPECT_FIELDS(domain.balls[0], (coordinates, (std::vector<int>{3, 4})), (center, Numbers({0.5, 0})), (radius, 2));
   ASSERT_EQ(domain.inequalities.size(), 1u);
-  EXPECT_EQ(domain.inequalities[0].coefficients, Numbers({0, 0, 1, 0, 0, 2}));
-  EXPECT_EQ(domain.inequalities[0].bound, 3);
+  EXPECT_FIELDS(domain.inequalities[0], (coefficients, Numbers({0, 0, 1, 0, 0, 2})), (bound, 3));
 }
 
-TEST(LoadConfig, ReadsEveryObstacle) {
-  const Config config = TaskFiles().Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
-                                                  "\n    - box: {lower: [1, 2], upper: [1, 4]}\n"
-                                                  "    - polygon: {vertices: [[0, 0], [1, 0], [0, 1]]}\n"
-                                                  "    - half_plane: {normal: [0, 1], offset: 5}"));
+TEST_F(LoadConfig, ReadsEveryObstacle) {
+  const Config config = files_.Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
+                                             "\n    - box: {lower: [1, 2], upper: [1, 4]}\n"
+                                             "    - polygon: {vertices: [[0, 0], [1, 0], [0, 1]]}\n"
+                                             "    - half_plane: {normal: [0, 1], offset: 5}"));
   ASSERT_EQ(config.obstacles.size(), 3u);
-  EXPECT_EQ(config.obstacles[0].kind(), Obstacle::Kind::kBox);
-  EXPECT_EQ(config.obstacles[0].points()[1], Numbers({1, 4}));
-  EXPECT_EQ(config.obstacles[1].points().size(), 3u);
-  EXPECT_EQ(config.obstacles[2].kind(), Obstacle::Kind::kHalfSpace);
-  EXPECT_EQ(config.obstacles[2].offset(), 5);
+  EXPECT_FIELDS(config, (obstacles[0].kind(), Obstacle::Kind::kBox), (obstacles[0].points()[1], Numbers({1, 4})),
+                (obstacles[1].points().size(), 3u), (obstacles[2].kind(), Obstacle::Kind::kHalfSpace),
+                (obstacles[2].offset(), 5));
 }
 
-TEST(LoadConfig, ProjectionsHaveOneToThreeRows) {
-  const TaskFiles files;
+TEST_F(LoadConfig, ProjectionsHaveOneToThreeRows) {
   const auto projection = [&](const std::string& rows, const std::string& obstacles) {
-    return files
+    return files_
         .Load(Replaced(Replaced(kTask, "[px, py]", rows), "[{circle: {center: [3, 2], radius: 0.8}}]", obstacles))
         .problem->projection;
   };
@@ -593,11 +542,10 @@ TEST(LoadConfig, ProjectionsHaveOneToThreeRows) {
   EXPECT_EQ(projection("[vx, px, py]", "[{box: {lower: [1, 1, 1], upper: [2, 2, 2]}}]").rows(), 3);
 }
 
-TEST(LoadConfig, TransitionsNeedNotExistWhereTheyAreStillToBeMade) {
+TEST_F(LoadConfig, TransitionsNeedNotExistWhereTheyAreStillToBeMade) {
   const ScratchDirectory directory;
-  const Config config = LoadConfig(directory.Write("task.yaml", kTask), TransitionsFile::kIgnore);
-  EXPECT_EQ(config.problem->transitions.size(), 0);
-  EXPECT_EQ(config.problem->domain.state.dim(), 4);
+  const Config config = forereach::LoadConfig(directory.Write("task.yaml", kTask), TransitionsFile::kIgnore);
+  EXPECT_FIELDS(*config.problem, (transitions.size(), 0), (domain.state.dim(), 4));
 }
 
 TEST(Schema, DefaultsStandInsideTheirRanges) {

@@ -11,8 +11,7 @@
 
 namespace forereach::csv_test {
 
-class CsvTest : public testing::Test {
- protected:
+struct CsvTest : testing::Test {
   std::string Error(const std::string& text) {
     return files_.Cut(Thrown<ConfigError>([&] { (void)ReadCsv(files_.Write("t.csv", text), {"a", "b"}); }));
   }
@@ -60,25 +59,23 @@ TEST_F(CsvTest, RefusesAWrongHeader) {
   EXPECT_THAT(Error("a b\n"), HasSubstr("separated by blanks"));
   EXPECT_THAT(Error("a\tb\n"), HasSubstr("separated by tabs"));
   EXPECT_THAT([&] { (void)CsvColumns(files_.Write("t.csv", "a;b\n")); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("separated by semicolons")));
+              ThrowsMessage<ConfigError>(HasSubstr("separated by semicolons")));
 }
 
 TEST_F(CsvTest, OtherColumnsOfTransitionsNameTheImport) {
   EXPECT_THAT([&] { (void)LoadTransitions(files_.Write("t.csv", "t,px\n"), *MakePointMass(0.1)); },
-              testing::ThrowsMessage<ConfigError>(
+              ThrowsMessage<ConfigError>(
                   HasSubstr("vy_next; `forereach import` makes transitions of a log with other columns")));
   EXPECT_THAT([&] { (void)LoadTransitions(files_.Write("t.csv", "px;py\n"), *MakePointMass(0.1)); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("in numbers; `forereach import` makes transitions")));
+              ThrowsMessage<ConfigError>(HasSubstr("in numbers; `forereach import` makes transitions")));
 }
 
 TEST_F(CsvTest, RefusesMissingFilesAndDirectories) {
   EXPECT_THAT([&] { (void)ReadCsv(files_ / "none.csv", {"a"}); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("none.csv: cannot be read: No such file or directory")));
-  EXPECT_THAT([&] { (void)ReadCsv(files_ / "", {"a"}); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory")));
-  EXPECT_THAT(
-      [&] { WriteCsv(files_ / "no/such/place.csv", {"a"}, Eigen::MatrixXd::Zero(1, 1)); },
-      testing::ThrowsMessage<ConfigError>(HasSubstr("place.csv: cannot be written: No such file or directory")));
+              ThrowsMessage<ConfigError>(HasSubstr("none.csv: cannot be read: No such file or directory")));
+  EXPECT_THAT([&] { (void)ReadCsv(files_ / "", {"a"}); }, ThrowsMessage<ConfigError>(HasSubstr("is a directory")));
+  EXPECT_THAT([&] { WriteCsv(files_ / "no/such/place.csv", {"a"}, Eigen::MatrixXd::Zero(1, 1)); },
+              ThrowsMessage<ConfigError>(HasSubstr("place.csv: cannot be written: No such file or directory")));
 }
 
 // Any finite double, by its bits: every exponent, subnormals and both zeros.
@@ -135,10 +132,9 @@ TEST_F(CsvTest, PlansHaveOneToTheLargestNumberOfSteps) {
   };
   EXPECT_EQ(plan(1), 1);
   EXPECT_EQ(plan(kMaxSteps), kMaxSteps);
-  EXPECT_THAT([&] { (void)plan(0); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("p.csv:2: 0 steps are outside [1, 128]")));
+  EXPECT_THAT([&] { (void)plan(0); }, ThrowsMessage<ConfigError>(HasSubstr("p.csv:2: 0 steps are outside [1, 128]")));
   EXPECT_THAT([&] { (void)plan(kMaxSteps + 1); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("p.csv:130: 129 steps are outside [1, 128]")));
+              ThrowsMessage<ConfigError>(HasSubstr("p.csv:130: 129 steps are outside [1, 128]")));
 }
 
 }  // namespace forereach::csv_test

@@ -5,8 +5,7 @@
 
 namespace forereach::error_test {
 
-class ErrorTest : public testing::Test {
- protected:
+struct ErrorTest : testing::Test {
   // The error after `line` is added to the good task file.
   std::string ErrorAfter(const std::string& line) { return files_.Error(kTask + line); }
 
@@ -117,8 +116,8 @@ TEST_F(ErrorTest, ABodyThatDoesNotFitIsAnError) {
             "task.yaml:17: task.body.pose[1]: ax is not a coordinate; did you mean px?");
   for (const auto& [pose, points] : {std::pair{"[px, py]", "[[1, 0, 0]]"}, {"[px, py, vx, vy]", "[[1, 0]]"}})
     EXPECT_THAT(error("{pose: " + std::string(pose) + ", parts: [{hull: {points: " + points + "}}]}"),
-                testing::AllOf(StartsWith("task.yaml:17: task.body.pose: has "),
-                               HasSubstr(", as many as the points of the body, or one more, the heading")));
+                AllOf(StartsWith("task.yaml:17: task.body.pose: has "),
+                      HasSubstr(", as many as the points of the body, or one more, the heading")));
 }
 
 TEST_F(ErrorTest, ABodyAtExpressionsThatDoesNotFitIsAnError) {
@@ -502,7 +501,7 @@ TEST_F(ErrorTest, YamlThatIsReadOtherwiseThanItLooksIsAnError) {
   EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt:0.15"),
             "task.yaml:1: model.dt:0.15: unknown key; write a space after the colon: dt: 0.15");
   EXPECT_THAT(files_.ErrorWith("  lipschitz:", "\tlipschitz:"),
-              testing::EndsWith("; line 8 is indented with a tab, write spaces"));
+              EndsWith("; line 8 is indented with a tab, write spaces"));
   EXPECT_EQ(ErrorAfter("robot:\n  time_limit_s: 0,5\n"),
             "task.yaml:21: robot.time_limit_s: 0,5 is not a number; write 0.5, with a point");
 }
@@ -571,8 +570,7 @@ TEST_F(ErrorTest, ATransitionOutsideTheDomainIsAnError) {
       Replaced(kTask, "  input: {", "  balls: [{coordinates: [vx, vy], center: [0, 0], radius: 5}]\n  input: {");
   EXPECT_EQ(files_.Error(ball, good + "0,0,3,4,0,0,0,0,0,0\n"), "");
   EXPECT_EQ(files_.Error(ball, good + "0,0,6e-1,-5.1,0,0,0,0,0,0\n").substr(0, 31), "steps.csv:4: vx, vy: distance 5");
-  EXPECT_THAT(files_.Error(ball, good + "0,0,3,5,0,0,0,0,0,0\n"),
-              testing::EndsWith(" is outside (-inf, 5] of domain.balls[0]"));
+  EXPECT_THAT(files_.Error(ball, good + "0,0,3,5,0,0,0,0,0,0\n"), EndsWith(" is outside (-inf, 5] of domain.balls[0]"));
   const std::string inequality =
       Replaced(kTask, "  input: {", "  inequalities: [{coefficients: {vx: 1, ax: 2}, bound: 3}]\n  input: {");
   EXPECT_EQ(files_.Error(inequality, good + "0,0,2,0,1,0,0,0,0,0\n"),
@@ -605,11 +603,10 @@ TEST_F(ErrorTest, AFileThatIsNoTaskIsAnError) {
 }
 
 TEST_F(ErrorTest, AMissingFileOrADirectoryIsAnError) {
-  EXPECT_THAT(
-      [&] { (void)LoadConfig(files_.directory() / "none.yaml"); },
-      testing::ThrowsMessage<ConfigError>(files_.directory() / "none.yaml: cannot be read: No such file or directory"));
+  EXPECT_THAT([&] { (void)LoadConfig(files_.directory() / "none.yaml"); },
+              ThrowsMessage<ConfigError>(files_.directory() / "none.yaml: cannot be read: No such file or directory"));
   EXPECT_THAT([&] { (void)LoadConfig(files_.directory() / ""); },
-              testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
+              ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
 }
 
 }  // namespace forereach::error_test

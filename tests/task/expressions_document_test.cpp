@@ -76,8 +76,8 @@ TEST(ExpressionsDocument, LimitsAreThoseOfTheCode) {
   EXPECT_EQ(rows[5][1], std::to_string(kLargestExpressions));
   EXPECT_EQ(rows[6][1], std::to_string(kDeepestExpression));
   EXPECT_EQ(rows[8][1], std::to_string(ProgramDraft::kMaxOperations));
-  EXPECT_THAT(Document(), testing::HasSubstr("from -" + std::to_string(kLargestWholePower) + " to " +
-                                             std::to_string(kLargestWholePower)));
+  EXPECT_THAT(Document(),
+              HasSubstr("from -" + std::to_string(kLargestWholePower) + " to " + std::to_string(kLargestWholePower)));
 }
 
 TEST(ExpressionsDocument, ModelsLoad) {
@@ -127,10 +127,9 @@ TEST(ExpressionsDocument, AStepThatIsWrittenOutIsTheIntegrators) {
   };
   const auto whole = model_of(document.substr(begin + open.size(), end - begin - open.size())),
              staged = model_of("model: {file: " FOREREACH_SOURCE_DIR "/config/models/unicycle.yaml}\n");
-  EXPECT_EQ(whole->state_names(), staged->state_names());
-  EXPECT_EQ(whole->input_names(), staged->input_names());
-  EXPECT_EQ(whole->angles(), staged->angles());
-  EXPECT_THAT(whole->parameters(), testing::ElementsAreArray(staged->parameters()));
+  EXPECT_FIELDS(*whole, (state_names(), staged->state_names()), (input_names(), staged->input_names()),
+                (angles(), staged->angles()));
+  EXPECT_THAT(whole->parameters(), ElementsAreArray(staged->parameters()));
   for (int i = 0; i < 50; ++i) {
     const std::vector<double> z{0.1 * i,        1 - 0.2 * i,  0.3 * i - 7, 0.5 - 0.03 * i,
                                 1.5 - 0.06 * i, 1 - 0.05 * i, 0.1 * i};
@@ -139,7 +138,7 @@ TEST(ExpressionsDocument, AStepThatIsWrittenOutIsTheIntegrators) {
     staged->EvaluateWide(z, other);
     for (std::size_t k = 0; k < one.size(); ++k) EXPECT_NEAR(static_cast<double>(one[k] - other[k]), 0, 1e-16);
   }
-  EXPECT_THAT(EquationsHeader(*whole->text(), "robot", ""), testing::HasSubstr("struct Robot {"));
+  EXPECT_THAT(EquationsHeader(*whole->text(), "robot", ""), HasSubstr("struct Robot {"));
   EXPECT_THROW(static_cast<void>(EquationsHeader(*staged->text(), "robot", "")), ExportError);
 }
 

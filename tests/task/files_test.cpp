@@ -21,8 +21,7 @@ namespace forereach::files_test {
 
 using std::chrono::milliseconds;
 
-class FilesTest : public testing::Test {
- protected:
+struct FilesTest : testing::Test {
   [[nodiscard]] std::string Path(const std::string& name) const { return directory_ / name; }
   [[nodiscard]] std::string Write(const std::string& name, const std::string& text) const {
     return directory_.Write(name, text);
@@ -54,8 +53,7 @@ TEST_F(FilesTest, AreReadWholeUpToTheBound) {
   EXPECT_EQ(ReadWhole(path, 4), text);
   EXPECT_EQ(ReadWhole(Write("empty", ""), 4), "");
   EXPECT_THAT([&] { (void)ReadWhole(path, 3); }, ThrowsMessage<ConfigError>(HasSubstr("file: is larger than 3 bytes")));
-  EXPECT_THAT([&] { (void)ReadWhole(path, 3, "x.yaml:2: "); },
-              ThrowsMessage<ConfigError>(testing::StartsWith("x.yaml:2: ")));
+  EXPECT_THAT([&] { (void)ReadWhole(path, 3, "x.yaml:2: "); }, ThrowsMessage<ConfigError>(StartsWith("x.yaml:2: ")));
   EXPECT_EQ(ReadBeginning(path, 2), "a" + std::string(1, '\0'));
   EXPECT_EQ(ReadBeginning(path, 9), text);
   const std::string large(200'000, 'x');
@@ -76,7 +74,7 @@ TEST_F(FilesTest, AsTransitionsAreRefusedWithTheLineThatNamesThem) {
   TaskFiles files;
   ForEachStrangeFile([&](const std::string& path, const char* what) {
     const std::string error = files.ErrorWith("transitions: steps.csv", "transitions: " + path);
-    EXPECT_THAT(error, testing::StartsWith("task.yaml:12: transitions: " + path + ": " + what));
+    EXPECT_THAT(error, StartsWith("task.yaml:12: transitions: " + path + ": " + what));
   });
 }
 
@@ -135,8 +133,7 @@ struct Mount {
   }
 };
 
-class ReloadingTest : public testing::Test {
- protected:
+struct ReloadingTest : testing::Test {
   ~ReloadingTest() override {
     mount_->Set(0, false);
     for (int i = 0; i < 20'000 && reloads_under_way > 0; ++i) std::this_thread::sleep_for(milliseconds(1));

@@ -239,7 +239,7 @@ TEST(ModelLibrary, EachFileIsTestedHere) {
 
 TEST(ModelLibrary, EachFileSaysItsSourceAndUnits) {
   for (const Case& one : Cases()) {
-    EXPECT_THAT(Read(kDirectory + one.file + ".yaml"), testing::HasSubstr("\n# Source: ")) << one.file;
+    EXPECT_THAT(Read(kDirectory + one.file + ".yaml"), HasSubstr("\n# Source: ")) << one.file;
     const auto loaded = Load(one);
     const ModelText& model = *loaded->text();
     EXPECT_EQ(model.name, one.file);
@@ -252,8 +252,8 @@ TEST(ModelLibrary, TheReadmeListsEachFile) {
   const std::string text = Read(FOREREACH_SOURCE_DIR "/config/README.md");
   for (const Case& one : Cases()) {
     const auto bar = [](std::size_t count) { return std::to_string(count) + " [|]"; };
-    EXPECT_THAT(text, testing::ContainsRegex("`models/" + std::string(one.file) + ".yaml` [|] [^|]* [|] " +
-                                             bar(one.middle.size() - one.inputs) + " " + bar(one.inputs)));
+    EXPECT_THAT(text, ContainsRegex("`models/" + std::string(one.file) + ".yaml` [|] [^|]* [|] " +
+                                    bar(one.middle.size() - one.inputs) + " " + bar(one.inputs)));
   }
 }
 

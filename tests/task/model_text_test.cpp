@@ -7,8 +7,6 @@
 
 namespace forereach::model_text_test {
 
-using testing::MatchesRegex;
-
 // In the place of the first line of the good task. Errors are asserted by line and column.
 constexpr const char* kModel =
     "model:\n"                                               // 1
@@ -29,8 +27,7 @@ std::string WithoutModel() {
   return task.substr(task.find('\n') + 1);
 }
 
-class ModelTextTest : public testing::Test {
- protected:
+struct ModelTextTest : testing::Test {
   std::string Error(const std::string& model) const { return files_.Error(model + WithoutModel()); }
   std::string ErrorWith(const std::string& from, const std::string& to) const {
     return Error(Replaced(kModel, from, to));
@@ -46,15 +43,13 @@ TEST_F(ModelTextTest, SaysWhatTheModelIs) {
   EXPECT_EQ(model.state_names(), (std::vector<std::string>{"px", "py", "vx", "vy"}));
   EXPECT_EQ(model.input_names(), (std::vector<std::string>{"ax", "ay"}));
   EXPECT_EQ(model.parameter_names(), (std::vector<std::string>{"dt", "drag", "mass"}));
-  EXPECT_EQ(config.period, 0.15);
-  EXPECT_EQ(config.gate.longest_step_ms, 150);
+  EXPECT_FIELDS(config, (period, 0.15), (gate.longest_step_ms, 150));
   ASSERT_NE(model.text(), nullptr);
   const ModelText& text = *model.text();
-  EXPECT_EQ(text.states[2], (ModelText::Variable{"vx", "m/s"}));
-  EXPECT_EQ(text.parameters[2], (ModelText::Parameter{"mass", 1, 1.2}));
-  EXPECT_EQ(text.definitions[1], (ModelText::Definition{"loss", {"drag/mass", 7, 11}}));
-  EXPECT_EQ(text.equations[3], (ExpressionText{"vy + dt*(ay - loss*vy)", 12, 9}));
-  EXPECT_EQ(text.integrator, ModelText::Integrator::kNone);
+  EXPECT_FIELDS(
+      text, (states[2], (ModelText::Variable{"vx", "m/s"})), (parameters[2], (ModelText::Parameter{"mass", 1, 1.2})),
+      (definitions[1], (ModelText::Definition{"loss", {"drag/mass", 7, 11}})),
+      (equations[3], (ExpressionText{"vy + dt*(ay - loss*vy)", 12, 9})), (integrator, ModelText::Integrator::kNone));
 }
 
 TEST_F(ModelTextTest, EquationsAreInTheOrderOfTheStates) {
@@ -282,16 +277,14 @@ TEST_F(ModelTextTest, RefusesKeysOfTwoFormsOfAModel) {
             "task.yaml:1: model.states: stands in the model file, not beside its name");
 }
 
-class ModelFileTest : public ModelTextTest {
- protected:
+struct ModelFileTest : ModelTextTest {
   ModelFileTest() { files_.directory().Write("drag.yaml", kModel); }
 };
 
 TEST_F(ModelFileTest, GivesTheSameModelAsTheTaskWithItsText) {
   const Config here = Load(kModel), included = Load("model: {file: drag.yaml}\n");
-  EXPECT_EQ(included.problem->model->text()->equations, here.problem->model->text()->equations);
-  EXPECT_EQ(included.problem->model->text()->name, "drag");
-  EXPECT_EQ(included.period, 0.15);
+  EXPECT_FIELDS(included, (problem->model->text()->equations, here.problem->model->text()->equations),
+                (problem->model->text()->name, "drag"), (period, 0.15));
 }
 
 TEST_F(ModelFileTest, TheTaskReplacesParameters) {
@@ -357,8 +350,7 @@ constexpr const char* kTurns =
     "0,0,0,0,0,0,0,0,-6.2,0\n"
     "0,0,0.5,0,0,0,0,0,13,0\n";
 
-class AnglesTest : public testing::Test {
- protected:
+struct AnglesTest : testing::Test {
   std::string Error(const std::string& task, const std::string& steps = kNoTurn) const {
     return files_.Error(task, steps);
   }

@@ -9,6 +9,7 @@
 #include "task/schema.h"
 #include "tests/paths.h"
 #include "tests/task/task_files.h"
+#include "tests/worlds.h"
 
 namespace forereach::shipped_test {
 
@@ -33,14 +34,11 @@ TEST(Shipped, EveryTaskLoads) {
 
 TEST(Shipped, DeclarationsAreThePapers) {
   const Declaration bicycle = LoadConfig(kDirectory + "bicycle.yaml").problem->declaration;
-  EXPECT_EQ(bicycle.lipschitz(2, 3), 0.017926410);
-  EXPECT_EQ(bicycle.lipschitz(2, 5), 0.609638820);
+  EXPECT_FIELDS(bicycle, (lipschitz(2, 3), 0.017926410), (lipschitz(2, 5), 0.609638820));
   EXPECT_EQ((bicycle.lipschitz.array() != 0).count(), 2);
   const Declaration point_mass = LoadConfig(kDirectory + "point_mass.yaml").problem->declaration;
-  EXPECT_EQ(point_mass.lipschitz(0, 2), 0.006914008);
-  EXPECT_EQ(point_mass.lipschitz(1, 2), 0.005689541);
-  EXPECT_EQ(point_mass.lipschitz(2, 2), 0.092186775);
-  EXPECT_EQ(point_mass.lipschitz(3, 2), 0.075860540);
+  EXPECT_FIELDS(point_mass, (lipschitz(0, 2), 0.006914008), (lipschitz(1, 2), 0.005689541),
+                (lipschitz(2, 2), 0.092186775), (lipschitz(3, 2), 0.075860540));
   EXPECT_EQ((point_mass.lipschitz.array() != 0).count(), 8);
 }
 
@@ -84,11 +82,11 @@ TEST(Shipped, EachPlanGetsTheAnswerItIsNamedAfter) {
 void ExpectSameTube(const Tube& a, const Tube& b, const std::string& what) {
   ASSERT_EQ(a.length(), b.length()) << what;
   for (int t = 0; t <= a.length(); ++t) {
-    EXPECT_THAT(a.half_width(t), testing::ElementsAreArray(b.half_width(t))) << what << ", step " << t;
-    EXPECT_THAT(a.slice(t).center(), testing::ElementsAreArray(b.slice(t).center())) << what << ", step " << t;
+    EXPECT_THAT(a.half_width(t), ElementsAreArray(b.half_width(t))) << what << ", step " << t;
+    EXPECT_THAT(a.slice(t).center(), ElementsAreArray(b.slice(t).center())) << what << ", step " << t;
     ASSERT_EQ(a.slice(t).num_generators(), b.slice(t).num_generators()) << what << ", step " << t;
     for (int k = 0; k < a.slice(t).dim(); ++k)
-      EXPECT_THAT(a.slice(t).row(k), testing::ElementsAreArray(b.slice(t).row(k))) << what << ", step " << t;
+      EXPECT_THAT(a.slice(t).row(k), ElementsAreArray(b.slice(t).row(k))) << what << ", step " << t;
   }
 }
 
@@ -123,9 +121,7 @@ TEST(Shipped, AModelAsTextGivesTheDecisionsOfTheCompiledOne) {
       for (const char* end : {"_certified", "_domain", "_safety"}) {
         Config one = compiled, other = text;
         for (Config* config : {&one, &other}) {
-          Problem problem = *config->problem;
-          problem.method = method;
-          config->problem = std::make_shared<const Problem>(std::move(problem));
+          Own(config->problem).method = method;
         }
         const std::string plan = task + end;
         ExpectSameDecision(one, other, LoadPlan(kDirectory + "plans/" + plan + ".csv", *text.problem->model), plan);
@@ -161,7 +157,7 @@ TEST(Shipped, ACarIsCertifiedIfItKeepsItsLane) {
   EXPECT_EQ(Explain(straight, *config.problem),
             "certified: no obstacle is there; within its limits at the sample instants; steps on time");
   EXPECT_EQ(turn.cause, Cause::kLimit);
-  EXPECT_THAT(Explain(turn, *config.problem), testing::HasSubstr("left front corner may reach"));
+  EXPECT_THAT(Explain(turn, *config.problem), HasSubstr("left front corner may reach"));
 }
 
 // Its forearm comes near the post at the end, and would meet one that stands a tenth of a metre nearer.
@@ -170,12 +166,10 @@ TEST(Shipped, AnArmReachesPastAPost) {
   const Eigen::MatrixXd plan = LoadPlan(kDirectory + "plans/arm_reach.csv", *config.problem->model);
   const Decision reaches = Decide(config, plan);
   EXPECT_EQ(reaches.outcome, Outcome::kCertified) << Explain(reaches, *config.problem);
-  EXPECT_EQ(reaches.obstacle, 0);
-  EXPECT_EQ(reaches.part, 1);
+  EXPECT_FIELDS(reaches, (obstacle, 0), (part, 1));
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(1.02, 1.13), 0.08)};
   const Decision touches = Decide(config, plan);
-  EXPECT_EQ(touches.cause, Cause::kObstacle);
-  EXPECT_EQ(touches.part, 1);
+  EXPECT_FIELDS(touches, (cause, Cause::kObstacle), (part, 1));
 }
 
 // What a robot on the bus drives has to end standing; coasting does not, standing still does.
@@ -204,9 +198,8 @@ TEST(Shipped, TheReadmesExampleGetsTheAnswerItQuotes) {
   const TaskFiles files;
   const Config config = files.Load(Block("yaml"), Block("csv"));
   const Decision decision = Decide(config, Eigen::MatrixXd::Zero(2, 6));
-  EXPECT_EQ(decision.outcome, Outcome::kCertified);
-  EXPECT_EQ(decision.closest_step, 5);
-  EXPECT_THAT(Read(kDirectory + "README.md"), testing::HasSubstr(Explain(decision, *config.problem)));
+  EXPECT_FIELDS(decision, (outcome, Outcome::kCertified), (closest_step, 5));
+  EXPECT_THAT(Read(kDirectory + "README.md"), HasSubstr(Explain(decision, *config.problem)));
 }
 
 TEST(Shipped, TheReadmesErrorsAreThoseItQuotes) {
@@ -215,7 +208,7 @@ TEST(Shipped, TheReadmesErrorsAreThoseItQuotes) {
   for (const std::string& error : {files.Error(Replaced(task, "vx: {vx: 0.02", "vx: {vx: -0.02"), steps),
                                    files.Error(Replaced(task, "{lower: [-1, -1]", "{lower: [-1]"), steps),
                                    files.Error(task, Replaced(steps, "1,2,2.0,", "1,2,3.5,"))})
-    EXPECT_THAT(readme, testing::HasSubstr("\n" + error + "\n"));
+    EXPECT_THAT(readme, HasSubstr("\n" + error + "\n"));
 }
 
 }  // namespace forereach::shipped_test

@@ -34,13 +34,6 @@ inline constexpr const char* kTask =
     "  obstacles: [{circle: {center: [3, 2], radius: 0.8}}]\n"  // 18
     "  between: samples\n";                                     // 19
 
-inline std::string Replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  if (at == std::string::npos || text.find(from, at + 1) != std::string::npos)
-    throw std::logic_error("not exactly once in the text: " + from);
-  return text.replace(at, from.size(), to);
-}
-
 /** A task for the line or lines of a model, with the box [-1, 1] for a domain. */
 inline std::string TaskFor(const std::string& model, std::size_t states, std::size_t inputs,
                            const std::string& projection) {

@@ -29,9 +29,8 @@ inline void ExpectConfirmed(const Verdict& verdict) {
 }
 
 inline void ExpectRefuted(const Verdict& verdict, int step, const std::string& what) {
-  EXPECT_EQ(verdict.status, Status::kRefuted);
-  EXPECT_EQ(verdict.failure.step, step);
-  EXPECT_THAT(verdict.failure.what, testing::HasSubstr(what));
+  EXPECT_FIELDS(verdict, (status, Status::kRefuted), (failure.step, step));
+  EXPECT_THAT(verdict.failure.what, HasSubstr(what));
 }
 
 }  // namespace forereach::verifier

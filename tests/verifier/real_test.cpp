@@ -43,7 +43,7 @@ TEST(Real, SineCosineAndTangentOfAnAstronomicalAngleAreNotComputed) {
       const Real value = function(angle);
       EXPECT_FALSE(value.IsFinite());
       EXPECT_EQ(IsAtMost(value, 1.0), Answer::kUnknown);
-      EXPECT_THAT(value.text(), testing::HasSubstr("no finite enclosure"));
+      EXPECT_THAT(value.text(), HasSubstr("no finite enclosure"));
     }
     EXPECT_TRUE(function(0x1p1023).IsFinite());
     EXPECT_TRUE(function(0.0).IsFinite());
@@ -52,10 +52,8 @@ TEST(Real, SineCosineAndTangentOfAnAstronomicalAngleAreNotComputed) {
 
 TEST(Real, AnIntervalHasItsEndsMiddleAndMagnitude) {
   const Real x = Real::FromTo(-1.0, 3.0);
-  EXPECT_EQ(x.lower().ToDouble(), -1);
-  EXPECT_EQ(x.upper().ToDouble(), 3);
-  EXPECT_EQ(x.middle().ToDouble(), 1);
-  EXPECT_EQ(x.magnitude().ToDouble(), 3);
+  EXPECT_FIELDS(x, (lower().ToDouble(), -1), (upper().ToDouble(), 3), (middle().ToDouble(), 1),
+                (magnitude().ToDouble(), 3));
   EXPECT_EQ(Real(12.0).ToDouble(-2), 3);
   EXPECT_EQ(Real(12.0).exponent(), 4);
   EXPECT_EQ(Real(0.1).text(), "0.10000000000000001");

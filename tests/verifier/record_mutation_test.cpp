@@ -4,7 +4,6 @@
 
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/records/certificates.h"
 
 namespace forereach::record_mutation_test {
@@ -12,8 +11,7 @@ namespace forereach::record_mutation_test {
 using Json = nlohmann::json;
 using Pointer = Json::json_pointer;
 
-class RecordMutation : public testing::Test {
- protected:
+struct RecordMutation : testing::Test {
   RecordMutation() {
     scratch_.Write("plan.csv", "ax,ay\n1,0\n1,0.5\n");
     const Output output = Forereach("certify --json --config config/point_mass.yaml --plan " + scratch_ / "plan.csv");

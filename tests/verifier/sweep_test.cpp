@@ -2,7 +2,6 @@
 // false by a hair, and motions within the declared bounds that no proof of clearance may exclude.
 #include <cmath>
 
-#include "forereach/numerics/size.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/verifier/hand_made.h"
 #include "verifier/separation.h"
@@ -239,11 +238,9 @@ TEST(Turning, NoAdmissibleMotionMeetsWhatIsProvenClear) {
 // ---- Certificates of one step, 0.5 s, in which the robot drives from (0, 0) to (4, 0), but for kTiny.
 
 Certificate Driving() {
-  Certificate certificate;
-  certificate.initial_set = {{}, {}, Eigen::Vector4d(0, 0, 8, 0), Eigen::MatrixXd(4, 0)};
-  certificate.controls = Eigen::Vector2d(0, 0);
-  certificate.schedule = {1'000, 500'000, 0};
-  return certificate;
+  return {.initial_set = {{}, {}, Eigen::Vector4d(0, 0, 8, 0), Eigen::MatrixXd(4, 0)},
+          .controls = Eigen::Vector2d(0, 0),
+          .schedule = {1'000, 500'000, 0}};
 }
 
 Between Curving(double ax, double ay, double turn_rate = 0, double turn_acceleration = 0) {
@@ -421,9 +418,7 @@ TEST(Moving, AWindowCountsToItsLastMicrosecond) {
   const auto problem = AtAllTimes(Curving(0, 0));
   const Schedule schedule{1'000, 500'000, 10};
   const auto within = [](std::int64_t from, std::int64_t until) {
-    ObstacleMotion motion;
-    motion.from_us = from;
-    motion.until_us = until;
+    ObstacleMotion motion{.from_us = from, .until_us = until};
     return Crossing(4, motion);
   };
   constexpr std::int64_t kAlways = ObstacleMotion::kAlways;
@@ -433,9 +428,7 @@ TEST(Moving, AWindowCountsToItsLastMicrosecond) {
   ExpectRefuted(With(problem, within(501'010, kAlways), schedule), 0, "keeps clear");
   ExpectRefuted(With(problem, within(300'000, 300'000), schedule), 0, "keeps clear");
   // At the samples alone, only those at which it is there.
-  ObstacleMotion motion;
-  motion.from_us = 1'011;
-  motion.until_us = 500'989;
+  ObstacleMotion motion{.from_us = 1'011, .until_us = 500'989};
   ExpectConfirmed(With(Halves(), Crossing(9, motion), schedule));
   motion.until_us = 500'990;
   ExpectRefuted(With(Halves(), Crossing(9, motion), schedule), 1, "the slice keeps clear");
@@ -449,11 +442,7 @@ TEST(Moving, TheClockErrorMovesTheObstacle) {
 }
 
 TEST(Moving, TheUncertaintyGrowsAwayFromTheStamp) {
-  ObstacleMotion motion;
-  motion.uncertainty = 0.25;
-  motion.growth = 0.5;
-  motion.growth_rate = 2;
-  motion.stamp_us = 1'000;
+  ObstacleMotion motion{.stamp_us = 1'000, .uncertainty = 0.25, .growth = 0.5, .growth_rate = 2};
   const auto problem = AtAllTimes(Curving(0, 0));
   // |tau| <= 1/2 s: 1/4 + 1/4 + 1/4 m.
   ExpectConfirmed(With(problem, Crossing(Down(3.25), motion)));
@@ -469,9 +458,7 @@ TEST(Moving, TheUncertaintyGrowsAwayFromTheStamp) {
 
 TEST(Moving, AWallMovesAlongItsNormal) {
   const auto problem = AtAllTimes(Curving(0, 0));
-  ObstacleMotion motion;
-  motion.stamp_us = 1'000;
-  motion.velocity = Eigen::Vector3d(-4, 0, 0);
+  ObstacleMotion motion{.stamp_us = 1'000, .velocity = Eigen::Vector3d(-4, 0, 0)};
   const auto wall = [&](double x) { return Obstacle::HalfSpace(Eigen::Vector2d(2, 0), 2 * x).Moving(motion); };
   ExpectConfirmed(With(problem, wall(Up(6))));  // at the end it is at 4
   ExpectRefuted(With(problem, wall(6)), 0, "keeps clear");

@@ -256,8 +256,7 @@ TEST(AngleCertificates, AnEnvelopeNarrowerThanTheUnitOfAnAngleIsRefuted) {
 
 // A state that is a point has no part in the remainder, so neither has a kink or an infinite slope along it. The second
 // one leaves the kink in the first step.
-class PointAtAKink : public testing::TestWithParam<std::tuple<const char*, forereach::Method>> {
- protected:
+struct PointAtAKink : testing::TestWithParam<std::tuple<std::string, forereach::Method>> {
   // x is a box, and y = place +- half_width.
   static Zonotope Initial(double place, double half_width) {
     return Zonotope::FromBox(Eigen::Vector2d(0.1, place), Eigen::Vector2d(0.01, half_width));

@@ -2,6 +2,7 @@
 #include "tests/test.h"
 
 #include "forereach/dynamics/models/named_models.h"
+#include "tests/oracle/any_expression.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/equations_by_hand.h"
@@ -55,16 +56,14 @@ void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int
     const auto first = text.First(box), first_by_hand = by_hand.First(box);
     ASSERT_EQ(first.size(), first_by_hand.size());
     for (std::size_t i = 0; i < first.size(); ++i) {
-      EXPECT_EQ(first[i].output, first_by_hand[i].output);
-      EXPECT_EQ(first[i].variable, first_by_hand[i].variable);
+      EXPECT_FIELDS(first[i], (output, first_by_hand[i].output), (variable, first_by_hand[i].variable));
       EXPECT_TRUE(AreEqual(first[i].value, first_by_hand[i].value));
     }
     const auto second = text.Second(box), second_by_hand = by_hand.Second(box);
     ASSERT_EQ(second.size(), second_by_hand.size());
     for (std::size_t i = 0; i < second.size(); ++i) {
-      EXPECT_EQ(second[i].output, second_by_hand[i].output);
-      EXPECT_EQ(second[i].row, second_by_hand[i].row);
-      EXPECT_EQ(second[i].column, second_by_hand[i].column);
+      EXPECT_FIELDS(second[i], (output, second_by_hand[i].output), (row, second_by_hand[i].row),
+                    (column, second_by_hand[i].column));
       EXPECT_TRUE(AreEqual(second[i].value, second_by_hand[i].value));
     }
     const Real duration = Real::FromTo(0.125, trial % 2 == 0 ? 0.125 : 0.1875);
@@ -241,8 +240,7 @@ TEST(TextEquations, NothingIsFiniteAcrossAKinkOrPole) {
       EXPECT_TRUE(beside.value.IsFinite() && beside.first.IsFinite() && beside.second.IsFinite());
       const double across = at - direction * 1e-15 * (1 + std::abs(at));
       const Ranges over(text, Real::FromTo(std::min(across, far), std::max(across, far)));
-      EXPECT_EQ(over.value.IsFinite(), has_value);
-      EXPECT_EQ(over.first.IsFinite(), has_slope);
+      EXPECT_FIELDS(over, (value.IsFinite(), has_value), (first.IsFinite(), has_slope));
       EXPECT_FALSE(over.second.IsFinite());
     }
   }
@@ -353,43 +351,14 @@ TEST(TextEquations, RefuseWhatIsNoModel) {
   }
 }
 
-// Random expressions of two states and an input, kept where they are smooth.
-class Expressions {
- public:
-  explicit Expressions(Random& random) : random_(random) {}
-
-  std::string Any(int depth) {
-    if (depth == 0 || random_.Coin(0.1)) return Leaf();
-    const std::string a = Any(depth - 1);
-    switch (random_.Below(18)) {
-      case 0: return "(" + a + " + " + Any(depth - 1) + ")";
-      case 1: return "(" + a + " - " + Any(depth - 1) + ")";
-      case 2:
-      case 3: return a + "*" + Any(depth - 1);
-      case 4: return "(" + a + ")/(3 + (" + Any(depth - 1) + ")^2)";
-      case 5: return "-" + a;
-      case 6: return "(" + a + ")^" + std::to_string(random_.Integer(0, 4));
-      case 7: return "sin(" + a + ")";
-      case 8: return "cos(" + a + ")";
-      case 9: return "tan(tanh(" + a + "))";
-      case 10: return "asin(0.9*sin(" + a + "))";
-      case 11: return "acos(0.9*tanh(" + a + "))";
-      case 12: return "sqrt(1.5 + cos(" + a + "))";
-      case 13: return "exp(sin(" + a + "))";
-      case 14: return "log(2 + (" + a + ")^2)";
-      case 15: return "atan2(" + a + ", 2 + sin(" + Any(depth - 1) + "))";
-      case 16: return "hypot(" + a + ", 1 + atan(" + Any(depth - 1) + ")^2)";
-      default: return "(2 + cos(" + a + "))^tanh(" + Any(depth - 1) + ")";
-    }
-  }
-
- private:
-  std::string Leaf() {
-    static constexpr std::array kLeaves{"x", "y", "u", "0.75", "x", "y", "k"};
-    return kLeaves[static_cast<std::size_t>(random_.Below(7))];
-  }
-  Random& random_;
-};
+// Of functions that have all derivatives everywhere.
+const RuledExpression::Rules kSmooth{
+    .rules =
+        "(A + B); (A - B); A*B; A*B; (A)/(3 + (B)^2); -A; (A)^#; sin(A); cos(A); tan(tanh(A)); "
+        "asin(0.9*sin(A)); acos(0.9*tanh(A)); sqrt(1.5 + cos(A)); exp(sin(A)); log(2 + (A)^2); "
+        "atan2(A, 2 + sin(B)); hypot(A, 1 + atan(B)^2); (2 + cos(A))^tanh(B)",
+    .least_power = 0,
+    .largest_power = 4};
 
 class RandomTexts : public testing::TestWithParam<int> {};
 
@@ -397,8 +366,8 @@ TEST_P(RandomTexts, HaveTheDerivativesOfTheirValues) {
   TracedRandom random(900 + static_cast<std::uint64_t>(GetParam()));
   const Real step(0x1p-60);
   for (int trial = 0; trial < 60; ++trial) {
-    Expressions expressions(random);
-    const std::string first_text = expressions.Any(4), second_text = expressions.Any(3);
+    RuledExpression expression(random, kSmooth, {"x", "y", "u", "0.75", "x", "y", "k"});
+    const std::string first_text = expression(4), second_text = expression(3);
     SCOPED_TRACE(first_text + " ; " + second_text);
     const auto equations =
         EquationsOf(TextModel({{"x", first_text}, {"y", second_text}}, {"u"}, {{"dt", 0.25, 0.25}, {"k", 1.25, 1.25}},

@@ -46,9 +46,7 @@ TEST(SplitRemainder, HoldsAllOverTheSlice) {
     if (random.Coin()) half[kDelta] = random.Uniform(0, random.Coin() ? 0.01 : 0.4);
     if (random.Coin(0.3))
       center[kDelta] = random.Sign() * random.Uniform(0.8, 1), half[kDelta] = 0.49;  // next to the pole
-    InitialSet initial_set;
-    initial_set.center = center;
-    initial_set.generators = half.asDiagonal();
+    InitialSet initial_set{.center = center, .generators = half.asDiagonal()};
     for (const Method method : {Method::kPaper, Method::kCentred}) {
       const Tube tube = TubeMaker(*problem, *equations, method)
                             .Make(initial_set, Eigen::MatrixXd::Zero(2, 1), {.split_remainder = true});
@@ -409,8 +407,7 @@ TEST(HandMade, CloseChoicesOfTheReductionAreTold) {
   certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::MatrixXd(4, 8)};
   for (int j = 0; j < 8; ++j) certificate.initial_set.generators.col(j) << 0, 0, 0x1p-6 * (j + 1), 0x1p-8 * (j + 1);
   const Verifier verifier(problem, Method::kPaper);
-  EXPECT_EQ(verifier.Derive(certificate).ambiguity, 0);
-  EXPECT_EQ(verifier.Derive(certificate).slices[1].columns.size(), 8u);
+  EXPECT_FIELDS(verifier.Derive(certificate), (ambiguity, 0), (slices[1].columns.size(), 8u));
   certificate.initial_set.generators.col(3) = certificate.initial_set.generators.col(4) * (1 + 0x1p-50);
   EXPECT_GT(verifier.Derive(certificate).ambiguity, 0);
 }
@@ -437,8 +434,7 @@ TEST(HandMade, WithoutRecordedSlicesSafetyIsDerived) {
 
 // ---- The certifier's own certificate, with one thing changed and no digest to tell.
 
-class Tampered : public testing::Test {
- protected:
+struct Tampered : testing::Test {
   Tampered() {
     problem_ = std::make_shared<Problem>(PaperBicycle(3.1));
     problem_->declaration.lipschitz(2, 3) = 0.018;
@@ -525,8 +521,7 @@ TEST_F(Tampered, AChangedWheelbaseIsRefuted) {
 
 TEST_F(Tampered, AChangedControlIsRefuted) {
   certificate_.controls(1, 3) += 1e-9;
-  EXPECT_EQ(Verdict_().status, Status::kRefuted);
-  EXPECT_EQ(Verdict_().failure.step, 4);
+  EXPECT_FIELDS(Verdict_(), (status, Status::kRefuted), (failure.step, 4));
 }
 
 TEST_F(Tampered, AShrunkenEnvelopeOrRemainderIsRefuted) {

@@ -6,7 +6,6 @@
 #include "command_line/progress.h"
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
-#include "tests/paths.h"
 #include "tests/records/logs.h"
 
 namespace forereach::verify_command_test {
@@ -14,8 +13,7 @@ namespace forereach::verify_command_test {
 using Json = nlohmann::json;
 
 // A task of its own beside its transitions, and the decision on a plan of it.
-class VerifyDecision : public testing::Test {
- protected:
+struct VerifyDecision : testing::Test {
   VerifyDecision() {
     std::filesystem::copy(FOREREACH_SOURCE_DIR "/config/data", scratch_ / "data");
     task_ = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
@@ -126,13 +124,11 @@ class StandingDecision : public VerifyDecision {
 TEST_F(StandingDecision, OfABodyOfTwoPartsIsConfirmed) {
   const std::string parts = "[{disc: {at: [0, 2.7], radius: 0}}, {disc: {at: [0, 0], radius: 0}}]";
   CertifyStanding(parts, 0, "{half_plane: {normal: [0, 1], offset: 5.1}}");
-  EXPECT_EQ(decision_["part"], 0);
-  EXPECT_EQ(decision_["threshold"], 0.0);
+  EXPECT_THAT(decision_, Holds({{"part", 0}, {"threshold", 0.0}}));
   EXPECT_NEAR(decision_["margin"].get<double>(), 5.1 - 2.7, 1e-9);
   EXPECT_EQ(Verify().code, 0);
   CertifyStanding(parts, 0, "{half_plane: {normal: [0, -1], offset: 2.8}}");
-  EXPECT_EQ(decision_["part"], 1);
-  EXPECT_EQ(decision_["threshold"], 0.0);
+  EXPECT_THAT(decision_, Holds({{"part", 1}, {"threshold", 0.0}}));
   EXPECT_EQ(Verify().code, 0);
   decision_["part"] = nullptr;
   ExpectRefuted({"threshold"});

@@ -33,8 +33,7 @@ std::string State(const char* name, double x, double y, double yaw, int step) {
 
 constexpr const char* kCar = "<shape><rectangle><length>4</length><width>2</width></rectangle></shape>";
 
-class CommonRoadTest : public testing::Test {
- protected:
+struct CommonRoadTest : testing::Test {
   World Scenario(const std::string& content, const CommonRoadOptions& options = {}) {
     return ReadCommonRoad(scratch_.Write("scenario.xml", kHead + content + "</commonRoad>\n"), options);
   }
@@ -82,7 +81,7 @@ TEST_F(CommonRoadTest, ACrossingIsOpen) {
   const World world = Scenario(Lanelet(1, high, low) + Lanelet(2, west, east));
   EXPECT_FALSE(Contains(world, At(0, 2)) || Contains(world, At(2, 0)) || Contains(world, At(0, -2)));
   EXPECT_TRUE(Contains(world, At(-10, 2)) && Contains(world, At(2, 10)) && Contains(world, At(10, -2)));
-  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("4 segments inside another lanelet")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("4 segments inside another lanelet")));
 }
 
 TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {
@@ -111,9 +110,7 @@ TEST_F(CommonRoadTest, IntervalsOfAStateAreCovered) {
 
 // The center on a straight line, an even turn: corners and middles of the sides at any time.
 TEST_F(CommonRoadTest, MotionBetweenStatesIsCovered) {
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   std::uniform_real_distribution<double> unit(-1, 1);
   for (int round = 0; round < 20; ++round) {
     struct Pose {
@@ -159,7 +156,7 @@ TEST_F(CommonRoadTest, OccupancySetsAndShapesOfSeveralParts) {
                                occupancy(50, Between("time", 0, 5)) + "</occupancySet></phantomObstacle>");
   EXPECT_TRUE(Contains(world, At(3, 1), 0.15) && Contains(world, At(6, 1), 0.25) && Contains(world, At(50, 0), 0.5));
   EXPECT_FALSE(Contains(world, At(3, 0), 0.35) || Contains(world, At(9, 0), 0.05) || Contains(world, At(50, 0), 0.6));
-  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("The first prediction ends at 0.30")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("The first prediction ends at 0.30")));
 }
 
 TEST_F(CommonRoadTest, WithoutAPredictionItStands) {
@@ -169,7 +166,7 @@ TEST_F(CommonRoadTest, WithoutAPredictionItStands) {
                Bound({{10, 0}, {14, 0}, {14, 4}, {13, 1}}) + "</polygon></shape></environmentObstacle>");
   EXPECT_TRUE(Contains(world, At(0, 0), 100) && Contains(world, At(12, 0.1)));
   EXPECT_FALSE(Contains(world, At(12.5, 1.5))) << "the polygon is not convex";
-  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("No prediction of dynamicObstacle 1")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("No prediction of dynamicObstacle 1")));
 }
 
 TEST_F(CommonRoadTest, RefusesWithTheLine) {

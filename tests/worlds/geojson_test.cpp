@@ -9,8 +9,7 @@
 
 namespace forereach::geojson_test {
 
-class GeoJsonTest : public testing::Test {
- protected:
+struct GeoJsonTest : testing::Test {
   World Drawing(const std::string& text, const GeoJsonOptions& options = {.are_metres = true}) {
     return ReadGeoJson(scratch_.Write("site.geojson", text), options);
   }
@@ -80,7 +79,7 @@ TEST_F(GeoJsonTest, DegreesAreMetresEastAndNorthOfTheOrigin) {
   const Obstacle& box = world.pieces[0].obstacle;
   EXPECT_NEAR(box.lower().x(), -111.3195, 1e-3);
   EXPECT_NEAR(box.lower().y(), 110.5743, 2e-3);
-  EXPECT_THAT(world.notes, testing::Contains(HasSubstr("tangent plane")));
+  EXPECT_THAT(world.notes, Contains(HasSubstr("tangent plane")));
 }
 
 // A side along a parallel is straight in degrees and bends in the plane.

@@ -18,9 +18,7 @@ TEST(Pgm, IsReadInBothFormatsWithComments) {
   const std::vector<std::uint16_t> expected{0, 205, 254, 100, 7, 255};
   EXPECT_EQ(Pgm("P2 # a comment\n3\n# another\n2 255\n0 205 254\n100 7 255\n").values, expected);
   const GrayImage image = Pgm("P5\n# CREATOR: map_saver\n3 2\n255\n\x00\xcd\xfe\x64\x07\xff"s);
-  EXPECT_EQ(image.values, expected);
-  EXPECT_EQ(image.width, 3);
-  EXPECT_EQ(image.height, 2);
+  EXPECT_FIELDS(image, (values, expected), (width, 3), (height, 2));
   EXPECT_EQ(Pgm("P5 1 2 65535 \x01\x02\xff\xff"s).values, (std::vector<std::uint16_t>{258, 65535}));
 }
 
@@ -43,9 +41,7 @@ TEST(Pgm, RefusesWhatIsNoneAndAllocatesNothingForIt) {
 }
 
 TEST(Blocks, AreExactlyTheOccupiedCells) {
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   for (int round = 0; round < 300; ++round) {
     const int width = 1 + static_cast<int>(random() % 20), height = 1 + static_cast<int>(random() % 20);
     std::vector<bool> occupied(static_cast<std::size_t>(width * height)), covered(occupied.size());
@@ -65,8 +61,7 @@ TEST(Blocks, AreFew) {
   EXPECT_EQ(Blocks({false, true, false, true, true, true, false, true, false}, 3, 3).size(), 2u);
 }
 
-class MapTest : public testing::Test {
- protected:
+struct MapTest : testing::Test {
   static constexpr const char* kYaml =
       "image: map.pgm\nresolution: 0.1\norigin: [-0.3, 0.7, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
   // From the top: occupied, unknown, free; free, free, occupied.
@@ -167,7 +162,7 @@ TEST_F(MapTest, WhatTheFileLacksIsSaid) {
   EXPECT_THAT(WhyNot(Instead("free_thresh", "free_thresh: 0.9")), HasSubstr("is above occupied_thresh"));
   EXPECT_THAT(WhyNot(Instead("image", "image: none.pgm")), HasSubstr("none.pgm"));
   EXPECT_THAT(WhyNot("[]"), HasSubstr("is not a map"));
-  EXPECT_THAT(Map(With("author: someone")).notes, testing::Contains("Ignored: author of the map's file."));
+  EXPECT_THAT(Map(With("author: someone")).notes, Contains("Ignored: author of the map's file."));
 }
 
 }  // namespace forereach::occupancy_map_test

@@ -62,9 +62,7 @@ TEST(Turn, IsExactWhereRoundingIsNot) {
 }
 
 TEST(ConvexPieces, OfARandomStarAreExact) {
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   std::uniform_real_distribution<double> radius(0.2, 5);
   for (int n = 3; n < 60; ++n) {
     Area area;
@@ -79,9 +77,7 @@ TEST(ConvexPieces, OfARandomStarAreExact) {
 
 // Corners on a grid: many on one line, and holes side by side.
 TEST(ConvexPieces, OfAGridWithHolesAreExact) {
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   for (int round = 0; round < 60; ++round) {
     Area area{{{0, 0}, {5, 0}, {10, 0}, {10, 10}, {5, 9}, {0, 10}, {0, 0}}, {}};  // its first corner again
     for (int x = 1; x < 9; x += 2)
@@ -121,9 +117,7 @@ TEST(ConvexPieces, WhatIsNoAreaIsRefusedWithThePlace) {
 }
 
 TEST(Grown, ContainsAllWithinTheMargin) {
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   std::normal_distribution<double> any;
   for (int round = 0; round < 200; ++round) {
     const std::vector<PlanePoint> points{
@@ -164,9 +158,7 @@ TEST(World, CutsLongHullsExactly) {
 }
 
 TEST(World, WhatIsCutAwayIsBehindHalfPlanes) {
-  const unsigned seed = std::random_device()();
-  SCOPED_TRACE(seed);
-  std::mt19937 random(seed);
+  FreshRandom random;
   std::uniform_real_distribution<double> place(-4, 4);
   const Box region(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 2));
   for (int round = 0; round < 50; ++round) {

@@ -42,8 +42,7 @@ TEST(Layouts, AGridHasItsEndsAndNoPointTwice) {
     EXPECT_EQ(places.size(), static_cast<std::size_t>(count));
     if (count == 1) continue;
     for (const int l : {3, 5}) {
-      EXPECT_EQ(points.col(l).minCoeff(), region.lower()[l]);
-      EXPECT_EQ(points.col(l).maxCoeff(), region.upper()[l]);
+      EXPECT_FIELDS(points.col(l), (minCoeff(), region.lower()[l]), (maxCoeff(), region.upper()[l]));
     }
   }
 }

@@ -12,9 +12,7 @@ TEST(Support, CorrelationOfRanksWithTies) {
   const SupportStatistic support = SupportOf({{0.1, false}, {0.2, false}, {0.2, true}, {7, true}});
   ASSERT_TRUE(support.spearman);
   EXPECT_NEAR(*support.spearman, 1.5 / std::sqrt(4.5), 1e-12);
-  EXPECT_EQ(support.nearest, 0);
-  EXPECT_EQ(support.farthest, 1);
-  EXPECT_EQ(support.gap(), 1);
+  EXPECT_FIELDS(support, (nearest, 0), (farthest, 1), (gap(), 1));
 }
 
 TEST(Support, SeesOrderAndNothingElse) {

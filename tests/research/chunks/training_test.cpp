@@ -25,8 +25,7 @@ TEST(Training, IsTwoLayersOf64From12To40) {
   const Policy policy = TrainPolicy(Few(1, 1));
   EXPECT_EQ(policy.num_features(), 12);
   EXPECT_EQ(policy.num_inputs * policy.num_steps(), 40);
-  EXPECT_EQ(policy.layers[0].bias.size(), 64);
-  EXPECT_EQ(policy.layers[1].bias.size(), 64);
+  EXPECT_FIELDS(policy, (layers[0].bias.size(), 64), (layers[1].bias.size(), 64));
 }
 
 TEST(Training, LearnsWhatItIsShown) {

@@ -64,9 +64,8 @@ TEST(HalfSpread, IsHalfTheLargestDistance) {
 TEST(CornersOf, AreTheCenterAndTheCorners) {
   const Eigen::MatrixXd states = CornersOf(Eigen::Vector3d(1, 2, 3), Eigen::Vector3d(0.5, 0, 0.25));
   ASSERT_EQ(states.cols(), 5);
-  EXPECT_EQ(states.col(0), Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(states.col(1), Eigen::Vector3d(0.5, 2, 2.75));
-  EXPECT_EQ(states.col(4), Eigen::Vector3d(1.5, 2, 3.25));
+  EXPECT_FIELDS(states, (col(0), Eigen::Vector3d(1, 2, 3)), (col(1), Eigen::Vector3d(0.5, 2, 2.75)),
+                (col(4), Eigen::Vector3d(1.5, 2, 3.25)));
 }
 
 // X0 of the rollouts is smaller by 1e-9, so that the rounding of a simulated state does not count.

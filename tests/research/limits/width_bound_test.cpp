@@ -85,8 +85,7 @@ TEST(WidthBound, ScanHasThePapersSixtyFourPairs) {
     EXPECT_FALSE(bound.tau == 10 && (bound.k == 4 || bound.k == 5));
   }
   const WidthBound& largest = *std::ranges::max_element(bounds, {}, &WidthBound::half_width);
-  EXPECT_EQ(largest.tau, 10);
-  EXPECT_EQ(largest.k, 2);
+  EXPECT_FIELDS(largest, (tau, 10), (k, 2));
   EXPECT_NEAR(largest.half_width, 0.013549, 1e-6);  // of our class; the paper's is 0.039228
   EXPECT_EQ(largest.a_star, largest.a_lin);
   EXPECT_NEAR(2 * largest.remainder, 54.1, 0.05);
@@ -119,8 +118,7 @@ TEST(WidthBound, OfThePointMassHasItsGainByHand) {
   EXPECT_NEAR(speed.gain, 7 * 0.15, 1e-14);
   // At the last time there is nothing to propagate: C = 0, and the class alone limits a.
   const WidthBound last = BoundWidth(question, 11, 1);
-  EXPECT_EQ(last.remainder, 0);
-  EXPECT_EQ(last.a_star, last.a_class);
+  EXPECT_FIELDS(last, (remainder, 0), (a_star, last.a_class));
   EXPECT_DOUBLE_EQ(last.half_width, last.a_class);
   const double eps = last.bump_radius;
   EXPECT_DOUBLE_EQ(last.a_class, std::min({1.0, eps / 2.17036, eps * eps / 21.0659}));

@@ -89,8 +89,7 @@ TEST(RegionalCalibration, FallsBackToTheGlobalBoxWhereDataAreMissing) {
   const RegionalCalibration enclosure(task.setting(), {});
   const ResidualBounds there = HandQuery(0, -3).Of(enclosure),
                        global = HandQuery(0, -3).Of(*MakeGlobalCalibration(task.setting()));
-  EXPECT_EQ(there.lower[2], global.lower[2]);
-  EXPECT_EQ(there.upper[2], global.upper[2]);
+  EXPECT_FIELDS(there, (lower[2], global.lower[2]), (upper[2], global.upper[2]));
 }
 
 TEST(RegionalCalibration, EqualsTheGlobalOneWhileNoCellHasNineObservations) {
@@ -159,8 +158,7 @@ TEST(RegionalCalibration, OfTheComparisonIsGlobalWithFewDataAndWiderThanItElsewh
   const Query mirrored(Zonotope::FromBox(center, half_width), {0, 0});
   const ResidualBounds sparse = mirrored.Of(*MakeRegionalCalibration(few.setting())),
                        global = mirrored.Of(*MakeGlobalCalibration(few.setting()));
-  EXPECT_EQ(sparse.lower[2], global.lower[2]);
-  EXPECT_EQ(sparse.upper[2], global.upper[2]);
+  EXPECT_FIELDS(sparse, (lower[2], global.lower[2]), (upper[2], global.upper[2]));
   const ResidualBounds dense = mirrored.Of(*MakeRegionalCalibration(many.setting())),
                        narrow = mirrored.Of(*MakeGlobalCalibration(many.setting()));
   EXPECT_LT(dense.lower[2], narrow.lower[2]);

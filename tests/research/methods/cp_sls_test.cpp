@@ -26,8 +26,7 @@ TEST(CpSls, RadiusIsFiniteFromTheFloorOn) {
   const Query query = HandQuery(0, 0);
   for (const Covariance covariance : kAll) {
     const CpSls below(starved.setting(), With(covariance)), at(fed.setting(), With(covariance));
-    EXPECT_EQ(query.Of(below).upper[2], kInfinity);
-    EXPECT_EQ(query.Of(below).lower[0], -kInfinity);
+    EXPECT_FIELDS(query.Of(below), (upper[2], kInfinity), (lower[0], -kInfinity));
     EXPECT_TRUE(below.Budget(query.set()).IsVacuous());
     EXPECT_EQ(below.Budget(query.set()).total(), kInfinity);
     EXPECT_EQ(at.Mass(Eigen::VectorXd::Zero(6)), 119);
@@ -152,9 +151,7 @@ TEST(CpSls, EveryPlugInIsStarvedOrVacuousOnTheCorridor) {
       }
       EXPECT_TRUE(budget.IsVacuous()) << count;
       EXPECT_GT(budget.starved ? 1 : budget.drift, 0) << count;
-      if (count <= 100) {
-        EXPECT_TRUE(budget.starved) << count;
-      }
+      if (count <= 100) EXPECT_TRUE(budget.starved) << count;
     }
 }
 

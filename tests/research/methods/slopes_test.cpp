@@ -44,7 +44,7 @@ TEST(Slopes, IgnorePairsAtOnePlaceAndRowsWithoutColumns) {
   ObserveAt(task, 0, 1, 0);
   ObserveAt(task, 3, 1, 1);
   for (const SlopeEstimator estimator : kAll)
-    EXPECT_THAT(EstimateSlopes(estimator, task.declaration, Observe(*task.model, task.data), 1), testing::Each(0));
+    EXPECT_THAT(EstimateSlopes(estimator, task.declaration, Observe(*task.model, task.data), 1), Each(0));
 }
 
 // A residual that is zero wherever it was sampled and rises beyond: the paper's three estimates are 0.000.
