@@ -104,6 +104,13 @@ void RegisterCertify(Scenario scenario, int observations) {
     benchmark::RegisterBenchmark(std::string("certify_unrounded/").append(suffix).c_str(), RunCertifyWithoutRounding,
                                  observations)
         ->Unit(benchmark::kMicrosecond);
+  if (scenario == Scenario::kBicycle && observations == 400)
+    benchmark::RegisterBenchmark(std::string("certify_centred/").append(suffix).c_str(), [=](State& state) {
+      const Task& task = CachedTask(scenario, observations);
+      Problem problem = *task.problem;
+      problem.method = Method::kCentred;
+      RunCertify(state, Certifier(std::make_shared<const Problem>(std::move(problem))), task);
+    })->Unit(benchmark::kMicrosecond);
 
   // A second a call and more, and the same work a thousand times: not run.
   if (observations > (scenario == Scenario::kDense ? 400 : 10'000)) return;
