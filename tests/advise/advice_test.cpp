@@ -103,7 +103,6 @@ void ExpectOnly(Change change, const Case& before, const Case& after) {
     EXPECT_EQ(after.initial_set.GeneratorMatrix(), before.initial_set.GeneratorMatrix());
   if (change != Change::kSlopes && change != Change::kLargerSlopes)
     EXPECT_EQ(is.declaration.lipschitz, was.declaration.lipschitz);
-  }
   EXPECT_EQ(is.declaration.noise_bound == was.declaration.noise_bound,
             change != Change::kNoise && change != Change::kLessNoise);
   EXPECT_EQ(is.declaration.disturbance == was.declaration.disturbance, change != Change::kDisturbance);

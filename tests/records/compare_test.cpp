@@ -120,7 +120,7 @@ TEST_F(CompareTest, ManyRobotsAreToldApart) {
   EXPECT_EQ(document["by_robot"][0]["robot"], scratch_ / "night/a");
   EXPECT_EQ(document["by_robot"][1]["certificates"], kCourseCertified);
   EXPECT_EQ(document["candidates"], 2 * kCourseDecisions);
-  EXPECT_THAT(CompareUnder(kConfig, scratch_ / "night").text,
+  EXPECT_THAT(CompareUnder(kCourseTask, scratch_ / "night").text,
               HasSubstr((scratch_ / "night/a") + ": 0 of " + std::to_string(kCourseAbstained) + " abstentions"));
 }
 

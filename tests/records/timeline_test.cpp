@@ -330,7 +330,7 @@ TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
     std::ostringstream out;
     ReportOptions options;
     options.logs = {of};
-    options.config = kConfig;
+    options.config = kCourseTask;
     options.json = true;
     options.key = by;
     EXPECT_TRUE(Report(options, out));
