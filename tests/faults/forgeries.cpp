@@ -251,24 +251,21 @@ class Forged final : Kind {
         obeyed.insert(event->plan_id);
     });
     Signer thief(rig.keys(), rig.config().bus.bus_name());
-    Tries(
-        row, rig,
-        [&](int i) {
-          const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
-          for (int j = 0; j < 20; ++j) {
-            certified_plan_t certified = Widened(*rig.witness().last_certified(), WallClockUs());
-            certified.plan.plan_id += j;
-            certified.plan.start_utime += 40'000 * j;
-            certified = Sealed(certified);
-            forged.insert(certified.plan.plan_id);
-            const std::string& channel = rig.config().bus.certified;
-            rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
-            rig.Listen(milliseconds(20));
-          }
-          rig.Listen(milliseconds(500));
-          Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
-        },
-        options_.others);
+    Tries(row, rig, [&](int i) {
+      const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
+      for (int j = 0; j < 20; ++j) {
+        certified_plan_t certified = Widened(*rig.witness().last_certified(), WallClockUs());
+        certified.plan.plan_id += j;
+        certified.plan.start_utime += 40'000 * j;
+        certified = Sealed(certified);
+        forged.insert(certified.plan.plan_id);
+        const std::string& channel = rig.config().bus.certified;
+        rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
+        rig.Listen(milliseconds(20));
+      }
+      rig.Listen(milliseconds(500));
+      Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
+    });
     Remark(row, std::to_string(forged.size()) + " forged, " + std::to_string(obeyed.size()) + " executed");
   }
 };

@@ -73,21 +73,18 @@ class Lied final : Kind {
     Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)");
     std::int64_t id = 1;
     std::set<RawMessage> sent;
-    Tries(
-        row, rig,
-        [&](int) {
-          for (int j = 0; j < 50; ++j) {
-            candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
-            SetText(candidate.source, "nonsense");
-            const CandidateFlaw& flaw = CandidateFlaws()[static_cast<std::size_t>(j) % CandidateFlaws().size()];
-            const auto messages = flaw.make(candidate, WallClockUs());
-            const RawMessage& message = messages[static_cast<std::size_t>(random_()) % messages.size()];
-            // The same bytes twice are two candidates with one digest, which the witness cannot tell apart.
-            if (sent.insert(message).second) rig.bus().Publish(rig.config().bus.candidate, Bytes(message));
-            if (j % 10 == 0) rig.Listen(milliseconds(5));
-          }
-        },
-        options_.others);
+    Tries(row, rig, [&](int) {
+      for (int j = 0; j < 50; ++j) {
+        candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
+        SetText(candidate.source, "nonsense");
+        const CandidateFlaw& flaw = CandidateFlaws()[static_cast<std::size_t>(j) % CandidateFlaws().size()];
+        const auto messages = flaw.make(candidate, WallClockUs());
+        const RawMessage& message = messages[static_cast<std::size_t>(random_()) % messages.size()];
+        // The same bytes twice are two candidates with one digest, which the witness cannot tell apart.
+        if (sent.insert(message).second) rig.bus().Publish(rig.config().bus.candidate, Bytes(message));
+        if (j % 10 == 0) rig.Listen(milliseconds(5));
+      }
+    });
   }
 
   void Floods() {
