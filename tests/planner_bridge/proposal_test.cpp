@@ -318,7 +318,7 @@ TEST_F(Planner, GoesStraightOnWhereAnObstacleHasGone) {
 }
 
 // A robot that can back off ends its plans only where it could drive on: straight ahead, or along its hints.
-TEST(Planner, EndsBeforeAWallOnlyIfTheHintsLeadAroundIt) {
+TEST(PlannerHints, EndsBeforeAWallOnlyIfTheyLeadAroundIt) {
   Config config = Bicycle();
   config.laws.back_off = {{"(min(max((-0.4 - v)/0.6, -1.5), 0.85) - a)/dt"}, {"-delta/dt"}};
   const PlanRequest request = From(Vec({0, 0, 0, 2, 0, 0}), 1);
