@@ -60,7 +60,7 @@ constexpr const char* kAroundTables = R"sql(
       END LOOP;
       FOREACH base IN ARRAY ARRAY['decisions', 'execution_events', 'gaps'] LOOP
         part := format('%s_%s_%s', base, month / 12, lpad((month % 12 + 1)::TEXT, 2, '0'));
-        IF to_regclass('public.' || part) IS NULL THEN
+        IF NOT EXISTS (SELECT FROM pg_tables WHERE schemaname = 'public' AND tablename = part) THEN
           BEGIN
             EXECUTE format('CREATE TABLE %I PARTITION OF %I FOR VALUES FROM (%s) TO (%s)', part, base, bounds[0],
                            bounds[1]);
@@ -352,8 +352,11 @@ class Store::Connection final {
     work.commit();
   }
 
+  // Read from a table: behind kLock, to_regclass would not know of what another has just made.
   static bool HasTables(pqxx::work& work) {
-    return !work.exec1("SELECT to_regclass('public.forereach_schema')")[0].is_null();
+    return work.exec1(
+        "SELECT EXISTS (SELECT FROM pg_tables WHERE schemaname = 'public' AND tablename = 'forereach_schema')")[0]
+        .as<bool>();
   }
 
   static void Migrate(pqxx::work& work, int version) {
