@@ -12,6 +12,7 @@
 
 #include "bus/bus_url.h"
 #include "bus/clock.h"
+#include "lcmtypes/codec.h"
 
 namespace forereach {
 namespace {
