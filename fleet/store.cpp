@@ -354,8 +354,9 @@ class Store::Connection final {
 
   // Read from a table: behind kLock, to_regclass would not know of what another has just made.
   static bool HasTables(pqxx::work& work) {
-    return work.exec1(
-        "SELECT EXISTS (SELECT FROM pg_tables WHERE schemaname = 'public' AND tablename = 'forereach_schema')")[0]
+    return work
+        .exec1(
+            "SELECT EXISTS (SELECT FROM pg_tables WHERE schemaname = 'public' AND tablename = 'forereach_schema')")[0]
         .as<bool>();
   }
 

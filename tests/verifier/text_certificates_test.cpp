@@ -22,7 +22,8 @@ std::shared_ptr<Problem> ProblemOf(const ModelText& text, double reach) {
   return problem;
 }
 
-// Certifies random plans. All of what is certified has to be confirmed, and refuted with a last hull that is `narrower`.
+// Certifies random plans. All of what is certified has to be confirmed, and refuted with a last hull that is
+// `narrower`.
 void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorXd& input, int steps,
                      double step_error = 0, double narrower = 1e-6) {
   for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
