@@ -2,18 +2,12 @@
 
 #include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
-#include "tests/records/logs.h"
-#include "tests/worlds.h"
+#include "tests/records/point_mass.h"
 
 namespace forereach::shadow_test {
 
-/** A point mass without residual, a circle at (3, 0), and a gate in shadow mode. */
 Config ShadowTask() {
-  Config config;
-  config.problem =
-      std::make_shared<const Problem>(WorldOf(MakePointMass(0.15), Within({20, 20, 20, 20}), Within({1, 1})));
-  config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3, 0), 0.5)};
+  Config config = PointMassConfig();
   config.gate.shadow = true;
   return config;
 }
@@ -25,14 +19,8 @@ class ShadowTest : public testing::Test {
     writer_.Append(++now_, channel, Encode(message));
   }
 
-  // Ten steps from the origin at 3 m/s along x, into the circle, or along y.
   void Decide(std::int64_t plan_id, bool along_x, std::int16_t outcome, std::int16_t cause) {
-    candidate_plan_t candidate = MakeCandidate(plan_id, plan_id);
-    candidate.num_states = 4;
-    candidate.num_inputs = 2;
-    candidate.num_steps = 10;
-    candidate.initial_center[along_x ? 2 : 3] = 3;
-    candidate.initial_half_width[0] = candidate.initial_half_width[1] = 0.1;
+    const candidate_plan_t candidate = Drive(plan_id, along_x);
     Append("PLAN_CANDIDATE", candidate);
     Append("PLAN_DECISION", MakeDecision(candidate, decisions_++, outcome, cause));
   }
