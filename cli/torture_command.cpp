@@ -40,10 +40,9 @@ Command TortureCommand() {
           "gets through: exit 0 if nothing does, 1 if something, 2 bad input. Not to a robot that is in use",
       .footer =
           "It sends stale, future, doubled, altered, not finite and oversized messages, a flood and a clock that "
-          "jumps. "
-          "With --key, the planner's, it also tries that key, replays and alterations on every other role's channel. "
-          "It "
-          "ends by itself.\n\nExample:\n  forereach torture --config my_robot.yaml --key keys/planner.key",
+          "jumps. With --key, the planner's, it also tries that key, replays and alterations on every other role's "
+          "channel. It ends by itself.\n\n"
+          "Example:\n  forereach torture --config my_robot.yaml --key keys/planner.key",
       .options = {ConfigOption(options->config, "Task file (YAML) of the gate and the guard"),
                   {"--flood", &options->torture.flood, "N", "Candidates of the flood", NumberRange{1, 100'000}},
                   {"--patience", &options->torture.patience_s, "S", "How long to wait for an answer or a heartbeat",
