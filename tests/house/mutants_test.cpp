@@ -26,8 +26,8 @@ class MutantsTest : public testing::Test {
   }
   void WriteMutant(const std::string& text = "a + b", const std::string& test = "sum_test Sum.*",
                    const std::string& file = "sum.cpp") {
-    Write("tests/mutants/all.toml", "[[mutant]]\nname = 'subtracts'\nfile = '" + file + "'\ntext = '" + text +
-                                        "'\nbecomes = 'a - b'\ntests = ['" + test + "']\n");
+    Write("tests/mutants/all.toml",
+          "[['" + file + "']]\ntests = ['" + test + "']\n'subtracts' = ['" + text + "', 'a - b']\n");
   }
   void ExpectFault(const std::string& what) const {
     const auto [exit_code, output] = Check(root_.string());
