@@ -5,8 +5,6 @@
 #include <cmath>
 
 #include "fuzz/fuzz.h"
-#include "lcmtypes/grounds.h"
-#include "robot/guard.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {

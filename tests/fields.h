@@ -1,13 +1,27 @@
 /** Expectations of several members of one object. */
 #pragma once
 
+#include <utility>
+
 #include <gtest/gtest.h>
 
-/** `EXPECT_FIELDS(plan, (step, 3), (size(), 4));` is `EXPECT_EQ(plan.step, 3); EXPECT_EQ(plan.size(), 4);`, of up to 40
-members. */
-#define EXPECT_FIELDS(object, ...)                          \
-  do {                                                      \
-    FOREREACH_EXPAND(FOREREACH_FIELDS(object, __VA_ARGS__)) \
+namespace forereach {
+
+/** What is about to go, as a value; anything else as it is. */
+template <class Object>
+Object Kept(Object&& object) {
+  return std::forward<Object>(object);
+}
+
+}  // namespace forereach
+
+/** `EXPECT_FIELDS(Plan(), (step, 3), (size(), 4));` is `const auto plan = Plan(); EXPECT_EQ(plan.step, 3);
+EXPECT_EQ(plan.size(), 4);`, of up to 40 members. */
+#define EXPECT_FIELDS(object, ...)                           \
+  do {                                                       \
+    SCOPED_TRACE(#object);                                   \
+    auto&& object_ = ::forereach::Kept(object);              \
+    FOREREACH_EXPAND(FOREREACH_FIELDS(object_, __VA_ARGS__)) \
   } while (false)
 
 #define FOREREACH_FIELDS(object, pair, ...) \

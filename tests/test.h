@@ -66,6 +66,12 @@ MATCHER_P(HasMembers, members, "") {
 }
 inline auto Holds(nlohmann::json members) { return HasMembers(std::move(members)); }
 
+/** The only entry of a range. @throws std::range_error, which fails the test, if it has none or several. */
+const auto& Only(const auto& range) {
+  return std::size(range) == 1 ? *std::begin(range)
+                               : throw std::range_error(std::to_string(std::size(range)) + " entries, not one");
+}
+
 /** What the Error that `call` throws says; empty if it throws none. */
 template <class Error, class Call>
 std::string Thrown(const Call& call) {

@@ -9,7 +9,6 @@
 
 #include "advise/abstentions.h"
 #include "certifier/gate/gate.h"
-#include "forereach/obstacles_t.hpp"
 #include "tests/certifier/small_task.h"
 #include "tests/oracle/random.h"
 

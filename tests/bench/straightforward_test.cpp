@@ -6,7 +6,6 @@
 
 #include "bench/latencies.h"
 #include "bench/tasks.h"
-#include "forereach/certify/certifier.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/traced_random.h"
 

@@ -11,7 +11,6 @@
 #include "tests/test.h"
 
 #include "bus/authentic.h"
-#include "bus/keys.h"
 #include "tests/file_size_limit.h"
 #include "tests/keys.h"
 

@@ -43,8 +43,7 @@ TEST_F(KeyFiles, AreForTheirOwnerAloneAndOneForEachRole) {
     const KeyRing of_directory = LoadKeys(keys_, role), of_file = LoadKeys(path, role);
     EXPECT_TRUE(of_directory == of_file);
     for (const Role other : kAllRoles) EXPECT_EQ(of_file.Holds(other), other == role);
-    const Signature signature = of_file.Sign(role, {});
-    EXPECT_TRUE(LoadPublicKeys(keys_).IsSigned(role, {}, signature));
+    EXPECT_TRUE(LoadPublicKeys(keys_).IsSigned(role, {}, of_file.Sign(role, {})));
     EXPECT_TRUE(LoadAllKeys(keys_).Holds(role));
   }
   EXPECT_THAT(Read(File("verify.pub")), Not(HasSubstr("secret")));

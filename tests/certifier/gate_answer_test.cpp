@@ -3,7 +3,6 @@
 
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
-#include "forereach/transition_t.hpp"
 #include "lcmtypes/seal.h"
 #include "tests/certifier/small_task.h"
 
@@ -279,15 +278,14 @@ struct GateAdviceTest : GateAnswerTest {
 
 TEST_F(GateAdviceTest, SaysHowFarAPlanHasToGiveWay) {
   const candidate_plan_t candidate = Candidate(1, kAccelerationIntoTheCircle);
-  const auto advice = AdviceOn(gate_, candidate);
-  ASSERT_TRUE(advice);
-  EXPECT_FIELDS(*advice, (plan_id, 1), (candidate_utime, candidate.utime));
-  EXPECT_EQ(GetText(advice->source), "test");
-  EXPECT_EQ(GetDigest(advice->plan_digest), DigestOf(Encode(candidate)));
-  EXPECT_EQ(GroundsOf(*advice), gate_.grounds());
-  EXPECT_EQ(std::tuple(advice->outcome, advice->cause, advice->num_changes),
+  const auto advice = AdviceOn(gate_, candidate).value();
+  EXPECT_FIELDS(advice, (plan_id, 1), (candidate_utime, candidate.utime));
+  EXPECT_EQ(GetText(advice.source), "test");
+  EXPECT_EQ(GetDigest(advice.plan_digest), DigestOf(Encode(candidate)));
+  EXPECT_EQ(GroundsOf(advice), gate_.grounds());
+  EXPECT_EQ(std::tuple(advice.outcome, advice.cause, advice.num_changes),
             std::tuple(decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE, 1));
-  const advice_change_t& change = advice->change[0];
+  const advice_change_t& change = advice.change[0];
   EXPECT_EQ(std::tuple(change.kind, change.index, change.verified, change.step),
             std::tuple(advice_change_t::OBSTACLE, 0, 1, decision_.step));
   EXPECT_NEAR(std::hypot(change.direction[0], change.direction[1]), 1, 1e-12);
@@ -304,10 +302,9 @@ TEST_F(GateAdviceTest, SaysHowFarAPlanHasToGiveWay) {
 }
 
 TEST_F(GateAdviceTest, SaysWhatLeavesTheDomainAndByHowMuch) {
-  const auto advice = AdviceOn(gate_, Candidate(1, kAccelerationOutsideDomain));
-  ASSERT_TRUE(advice);
-  EXPECT_EQ(advice->num_changes, 1);
-  const advice_change_t& change = advice->change[0];
+  const auto advice = AdviceOn(gate_, Candidate(1, kAccelerationOutsideDomain)).value();
+  EXPECT_EQ(advice.num_changes, 1);
+  const advice_change_t& change = advice.change[0];
   EXPECT_EQ(std::tuple(change.kind, change.index, change.verified, change.step),
             std::tuple(advice_change_t::DOMAIN, 4, 0, 0));
   EXPECT_FIELDS(change, (value, 1), (direction[0], -1));
@@ -316,9 +313,8 @@ TEST_F(GateAdviceTest, SaysWhatLeavesTheDomainAndByHowMuch) {
 TEST_F(GateAdviceTest, SaysHowMuchMoreRoomALimitNeeds) {
   Own(config_.problem).limits = {{.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
   Gate gate(config_);
-  const auto advice = AdviceOn(gate, Candidate(1));
-  ASSERT_TRUE(advice);
-  const advice_change_t& change = advice->change[0];
+  const auto advice = AdviceOn(gate, Candidate(1)).value();
+  const advice_change_t& change = advice.change[0];
   EXPECT_EQ(std::tuple(change.kind, change.index, change.direction[0]), std::tuple(advice_change_t::LIMIT, 0, -1.0));
   EXPECT_NEAR(change.value, 1.05 * 1.05 + 0.15 * 0.15 - 1, 1e-9);
 }

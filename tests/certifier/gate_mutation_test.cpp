@@ -4,9 +4,7 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
-#include "certifier/gate/obstacle_message.h"
 #include "tests/certifier/small_task.h"
-#include "tests/messages.h"
 
 namespace forereach::gate_mutation_test {
 

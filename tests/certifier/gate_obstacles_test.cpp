@@ -5,7 +5,6 @@
 
 #include "certifier/gate/gate.h"
 #include "tests/certifier/small_task.h"
-#include "tests/messages.h"
 
 namespace forereach::gate_obstacles_test {
 
@@ -137,8 +136,7 @@ TEST(GateTaskObstaclesTest, RefusesObstaclesOfTheBusWhereTheTaskHasThemAll) {
   EXPECT_THAT(gate.UpdateObstacles({}, kNow), HasSubstr("gate.obstacles is task"));
   EXPECT_EQ(gate.grounds().obstacles, SmallTask().grounds.obstacles);
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
-  const certifier_status_t status = gate.Status(kNow);
-  EXPECT_FIELDS(status, (obstacles_source, certifier_status_t::OBSTACLES_TASK), (obstacles_known, 1),
+  EXPECT_FIELDS(gate.Status(kNow), (obstacles_source, certifier_status_t::OBSTACLES_TASK), (obstacles_known, 1),
                 (obstacles_in_force, 1), (obstacles_age_us, -1));
 }
 

@@ -4,7 +4,6 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
-#include "forereach/transition_t.hpp"
 #include "lcmtypes/freshness.h"
 #include "tests/certifier/small_task.h"
 

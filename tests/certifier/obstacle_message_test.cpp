@@ -3,7 +3,6 @@
 
 #include "tests/test.h"
 
-#include "lcmtypes/codec.h"
 #include "task/canonical.h"
 #include "tests/certifier/small_task.h"
 
@@ -18,10 +17,8 @@ TEST(ObstacleMessageTest, EveryKindGoesThroughTheBus) {
       Obstacle::AxisBox(Eigen::Vector2d(1, 2), Eigen::Vector2d(3, 4.5)),
       Obstacle::Polygon({Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0.5, 2), Eigen::Vector2d(0, 1)}),
       Obstacle::HalfSpace(Eigen::Vector2d(-1, 0.5), -7)};
-  const auto message = Decoded<obstacles_t>(Encode(ToMessage(obstacles, kNow)));
-  ASSERT_TRUE(message);
-  const std::vector<Obstacle> back = FromMessage(*message, 2);
-  EXPECT_EQ(ObstaclesDigest(back), ObstaclesDigest(obstacles));
+  const auto message = Decoded<obstacles_t>(Encode(ToMessage(obstacles, kNow))).value();
+  EXPECT_EQ(ObstaclesDigest(FromMessage(message, 2)), ObstaclesDigest(obstacles));
 }
 
 TEST(ObstacleMessageTest, NamesGoThroughTheBusAndOthersAreRefused) {
@@ -103,8 +100,7 @@ TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
     change(piece);
     const std::vector<Obstacle> taken = Taken({piece});
     ASSERT_TRUE(taken[0].motion());
-    const ObstacleMotion& motion = *taken[0].motion();
-    EXPECT_FIELDS(motion, (velocity, Eigen::Vector3d(piece.velocity[0], piece.velocity[1], 0)),
+    EXPECT_FIELDS(*taken[0].motion(), (velocity, Eigen::Vector3d(piece.velocity[0], piece.velocity[1], 0)),
                   (uncertainty, piece.uncertainty), (growth, piece.growth), (growth_rate, piece.growth_rate),
                   (stamp_us, kNow));
   }

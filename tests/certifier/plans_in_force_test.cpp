@@ -6,7 +6,6 @@
 #include "tests/test.h"
 
 #include "tests/certifier/small_task.h"
-#include "tests/messages.h"
 
 namespace forereach::plans_in_force_test {
 
@@ -104,9 +103,7 @@ TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt
       EXPECT_FIELDS(*just_outside, (step, t + 1), (valid_steps, t));
     }
     SeeWall(Reach(plan, t) - 1e-9);
-    const auto just_inside = Due();
-    ASSERT_TRUE(just_inside);
-    EXPECT_FIELDS(*just_inside, (step, t), (valid_steps, t - 1));
+    EXPECT_FIELDS(Due().value(), (step, t), (valid_steps, t - 1));
     plans_.StandBy();
     SeeAndJudge({});
   }
@@ -126,14 +123,11 @@ TEST_F(PlansInForceTest, WithdrawsFromTheStepWhoseMotionMayTouchBetweenSamples) 
       return DueOf(plans);
     };
     see(15);
-    const auto certified = gate.Decide(Encode(Candidate(t, kAccelerationThatCertifies, now_)), now_).certified;
-    ASSERT_TRUE(certified);
-    plans.Add(*certified, now_);
-    const auto outside = see(Reach(*certified, t) + bulge + 1e-9);
+    const auto certified = gate.Decide(Encode(Candidate(t, kAccelerationThatCertifies, now_)), now_).certified.value();
+    plans.Add(certified, now_);
+    const auto outside = see(Reach(certified, t) + bulge + 1e-9);
     EXPECT_EQ(outside ? outside->valid_steps : kSteps, t);
-    const auto inside = see(Reach(*certified, t) + bulge - 1e-9);
-    ASSERT_TRUE(inside);
-    EXPECT_FIELDS(*inside, (step, t - 1), (valid_steps, t - 1));
+    EXPECT_FIELDS(see(Reach(certified, t) + bulge - 1e-9).value(), (step, t - 1), (valid_steps, t - 1));
   }
 }
 
@@ -149,9 +143,8 @@ TEST_F(PlansInForceTest, WithdrawsEveryStepUnderATaskOfAShorterPeriod) {
         config.gate.step_us = std::llround(period * 1e6);
       });
     };
-    const auto due = WithdrawnByReload(with_period(0.15), with_period(0.1));
-    ASSERT_TRUE(due);
-    EXPECT_FIELDS(*due, (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
+    const auto due = WithdrawnByReload(with_period(0.15), with_period(0.1)).value();
+    EXPECT_FIELDS(due, (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
   }
 }
 
@@ -224,8 +217,7 @@ TEST_F(PlansInForceTest, RepeatsAWithdrawalUntilItIsAnswered) {
   now_ += PlanLedger::kRepeatUs - 1;
   EXPECT_FALSE(Due());
   now_ += 1;
-  const withdrawal_t second = Due().value();
-  EXPECT_FIELDS(second, (sequence, first.sequence + 1), (valid_steps, first.valid_steps));
+  EXPECT_FIELDS(Due().value(), (sequence, first.sequence + 1), (valid_steps, first.valid_steps));
   EXPECT_EQ(plans_.withdrawals(), 1);
   now_ += PlanLedger::kRepeatUs;
   Answer(2, 0, 0);                      // another plan's
@@ -267,8 +259,7 @@ TEST_F(PlansInForceTest, NeverRestoresStepsAndWithdrawsAgainWhenFewerStand) {
   SeeWall(Reach(plan, 8) - 1e-9);
   EXPECT_FALSE(Due());
   SeeWall(Reach(plan, 4) - 1e-9);
-  const withdrawal_t less = Due().value();
-  EXPECT_EQ(less.valid_steps, 3);
+  EXPECT_EQ(Due().value().valid_steps, 3);
   Answer(1, 3, 0);  // the late answer to the first
   now_ += PlanLedger::kRepeatUs;
   EXPECT_TRUE(Due());
@@ -321,8 +312,7 @@ TEST_F(PlansInForceTest, OfManyPendingPlansTheNewestAreJudgedAndTheOthersWithdra
   const int many = static_cast<int>(PlanLedger::kJudged) + 1;
   for (int id = 1; id <= many; ++id) Certify(id);
   SeeWall(15);  // none of them comes near
-  const withdrawal_t message = Due().value();
-  EXPECT_FIELDS(message, (plan_id, 1), (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
+  EXPECT_FIELDS(Due().value(), (plan_id, 1), (cause, withdrawal_t::NOT_JUDGED), (valid_steps, 0));
   EXPECT_FALSE(Due());
 }
 
@@ -539,8 +529,7 @@ TEST_F(PlansInForceTest, AFalsifiedDeclarationWithdrawsEveryStep) {
   EXPECT_EQ(gate_.Learn(Encode(AtRest(now_, 1))), "");
   ASSERT_TRUE(gate_.certifier().violation());
   plans_.Judge(gate_, now_);
-  const withdrawal_t message = Due().value();
-  EXPECT_FIELDS(message, (cause, withdrawal_t::FALSIFIED), (valid_steps, 0));
+  EXPECT_FIELDS(Due().value(), (cause, withdrawal_t::FALSIFIED), (valid_steps, 0));
 }
 
 TEST_F(PlansInForceTest, JudgesThePlanUnderATaskThatWasReadAgain) {
@@ -568,15 +557,13 @@ TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
   const certified_plan_t plan = Certify(1);
   Config narrower = NarrowerFrom(plan, 8);
   narrower.obstacles.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, 4) - 1e-9));
-  const withdrawal_t message = DueUnder(narrower).value();
-  EXPECT_FIELDS(message, (cause, withdrawal_t::OBSTACLE), (valid_steps, 3));
+  EXPECT_FIELDS(DueUnder(narrower).value(), (cause, withdrawal_t::OBSTACLE), (valid_steps, 3));
 }
 
 TEST_F(PlansInForceTest, AnEndThatIsNotAtRestKeepsItsControls) {
   Certify(1);
   const Config resting = Another([](Config&, Problem& problem) { problem.rest = {{2, 0.1}}; });  // it ends at 1 m/s
-  const withdrawal_t message = DueUnder(resting).value();
-  EXPECT_FIELDS(message, (cause, withdrawal_t::NO_STOP), (valid_steps, kSteps));
+  EXPECT_FIELDS(DueUnder(resting).value(), (cause, withdrawal_t::NO_STOP), (valid_steps, kSteps));
 }
 
 // It is exceeded first where the robot has come that far: the control that leads there does not stand.

@@ -1,5 +1,4 @@
 // `forereach advise`: the shipped abstentions, a recorded course, and answers that are about time.
-#include "tests/test.h"
 
 #include "advise/gate_advice.h"
 #include "certifier/gate/gate.h"
@@ -188,8 +187,7 @@ TEST_F(AdviseTest, AfterItsTimeOnlyWhatMissedByLeastIsSearched) {
   const std::ptrdiff_t nearest = std::ranges::min_element(all, {}, shortfall) - all.begin();
   const auto advised = AdviseAll(runs, 1, 0);
   for (std::ptrdiff_t i = 0; i < 3; ++i) {
-    const AbstentionAdvice& advice = advised[0][static_cast<std::size_t>(i)];
-    EXPECT_FIELDS(advice, (advices.empty(), i != nearest),
+    EXPECT_FIELDS(advised[0][static_cast<std::size_t>(i)], (advices.empty(), i != nearest),
                   (missing, i == nearest ? ""
                                          : "not searched within 0 s: `forereach advise` searches all, or write a "
                                            "longer --advice-seconds"));

@@ -1,8 +1,6 @@
 // `forereach declare --from-data` and `--hold-out`: what they propose goes into a task file, and what they say is true.
-#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
-#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 
@@ -89,8 +87,7 @@ TEST_F(DeclareDataTest, ItsLinesGoIntoATaskFileThatNoTransitionContradicts) {
   std::ofstream(task_) << task.substr(0, begin) + document["yaml"].get<std::string>() + task.substr(end);
   const Config config = LoadConfig(task_);
   EXPECT_FALSE(Certifier(config.problem).violation());
-  const double declared = config.problem->declaration.lipschitz(2, 2);
-  EXPECT_EQ(declared, document["lipschitz"][2][2]);
+  EXPECT_EQ(config.problem->declaration.lipschitz(2, 2), document["lipschitz"][2][2]);
   ASSERT_EQ(document["entries"].size(), 1u) << document;
   const Json& entry = document["entries"][0];
   EXPECT_LE(entry["smallest"], 0.02);
@@ -118,9 +115,8 @@ TEST_F(DeclareDataTest, SaysSoIfNoSlopesAreConsistent) {
 }
 
 TEST_F(DeclareDataTest, WhatSlopesAndNoiseExplainIsNoScatter) {
-  const Output output = Declare("--by vx");
-  EXPECT_THAT(output.text, AllOf(Not(HasSubstr("disturbance:")), Not(HasSubstr("knee")),
-                                 HasSubstr("100 of 100 recorded steps of the others lie in their slices")));
+  EXPECT_THAT(Declare("--by vx").text, AllOf(Not(HasSubstr("disturbance:")), Not(HasSubstr("knee")),
+                                             HasSubstr("100 of 100 recorded steps of the others lie in their slices")));
   EXPECT_EQ(Json::parse(Declare("--by vx --json").text)["rows"][2]["scatter"], 0);
 }
 

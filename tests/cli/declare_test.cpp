@@ -1,10 +1,7 @@
 // `forereach declare`: its matrix, its cover, and the results of --check for valid and altered covers.
 #include <regex>
 
-#include "tests/test.h"
-
 #include "identify/cover_file.h"
-#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/records/logs.h"
 #include "tests/task/task_files.h"

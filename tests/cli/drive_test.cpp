@@ -1,5 +1,4 @@
 // `forereach run` drives a robot with each model of the library to its goal.
-#include "tests/test.h"
 
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
@@ -53,8 +52,7 @@ TEST(Run, RefusesAStartAtASpeedAndCheckNamesIt) {
     with(speed);
     EXPECT_THAT(Forereach("run " + path + " --directory '" + (scratch / "log") + "' 2>&1"),
                 Exits(2, "unicycle.yaml: robot.start: v is " + std::string(speed)));
-    const Output check = Forereach("check " + path);
-    EXPECT_THAT(check.text, HasSubstr("robot.start: remark: v begins at " + std::string(speed)));
+    EXPECT_THAT(Forereach("check " + path).text, HasSubstr("robot.start: remark: v begins at " + std::string(speed)));
   }
   with("0.02");  // planner.initial_half_width
   EXPECT_EQ(Forereach("run " + path + " --directory '" + (scratch / "log") + "' 2>&1").code, 0);

@@ -1,5 +1,4 @@
 // `forereach fit`: what it prints goes into a task file, and what cannot be fitted is refused.
-#include "tests/test.h"
 
 #include "forereach/dynamics/model.h"
 #include "tests/cli/program.h"

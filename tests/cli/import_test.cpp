@@ -1,9 +1,7 @@
 // `forereach import`: a log in another's format becomes the transitions of a task; the commands of docs/data.md.
-#include "tests/test.h"
 
 #include <fmt/format.h>
 
-#include "task/config.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 

@@ -1,5 +1,4 @@
 // `forereach import-world`: files of others become the obstacles of a task, in which a plan is certified.
-#include "tests/test.h"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,6 @@
 
 #include "tests/library_texts.h"
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
 namespace forereach {

@@ -1,9 +1,7 @@
 // `forereach init` and `forereach check`: a task to begin with, and what keeps one from certifying plans.
-#include "tests/test.h"
 
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
-#include "task/config.h"
 #include "task/task_template.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
@@ -134,8 +132,7 @@ TEST_F(InitTest, WithoutATaskThatDrivesTheModelTheLawsAreLeftToYou) {
   const auto leaves_them = [&] {
     ASSERT_EQ(Init("--force --model unicycle").code, 0);
     EXPECT_THAT(Read(task_), AllOf(HasSubstr("\n# planner:\n#   goal: ["), HasSubstr("\n#   stop: {a: -v/dt}")));
-    const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
-    EXPECT_FIELDS(config, (laws.stop.empty(), true), (problem->rest.size(), 2u));
+    EXPECT_FIELDS(LoadConfig(task_, TransitionsFile::kIgnore), (laws.stop.empty(), true), (problem->rest.size(), 2u));
   };
   fs::copy_file(scratch_ / "drive/boat.yaml", scratch_ / "drive/unicycle.yaml", fs::copy_options::overwrite_existing);
   leaves_them();  // a task of another model

@@ -1,8 +1,6 @@
 // Which task a log was recorded with, and inputs that are no log or none of this task: a sentence and exit 2.
 #include <regex>
 
-#include "tests/test.h"
-
 #include "forereach/decision_t.hpp"
 #include "records/database.h"
 #include "records/event_log.h"
@@ -121,8 +119,7 @@ TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
     ExpectRefused(command + kCourseLog + " --config " + TaskOf("two"), {"not kept next to the log"});
     ExpectRefused(command + kCourseLog, {"--config"});
   }
-  const Output other = Forereach("replay " + log + " --other-task --config " + TaskOf("two"));
-  EXPECT_THAT(other, Exits(1, "another config"));
+  EXPECT_THAT(Forereach("replay " + log + " --other-task --config " + TaskOf("two")), Exits(1, "another config"));
   EXPECT_EQ(Forereach("replay " + log + " --other-task 2>&1").code, 2);
 }
 

@@ -43,8 +43,7 @@ TEST(Jet, AcrossAKinkTheSlopeCoversBothSidesAndTheCurvatureIsUnbounded) {
   EXPECT_EQ(across.slope, Interval(-1, 1));
   EXPECT_FALSE(across.curvature[0].IsFinite());
   EXPECT_FIELDS(beside, (slope, Interval(1, 1)), (curvature[0], Interval(0, 0)));
-  const Jet larger = max(Jet::Argument({0, 2}, 0, true), Jet(1.0));
-  EXPECT_FIELDS(larger, (value, Interval(1, 2)), (slope, Interval(0, 1)));
+  EXPECT_FIELDS(max(Jet::Argument({0, 2}, 0, true), Jet(1.0)), (value, Interval(1, 2)), (slope, Interval(0, 1)));
 }
 
 TEST(Jet, ASmoothGateThatIsOffIsExactlyZero) {

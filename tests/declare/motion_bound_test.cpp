@@ -79,8 +79,7 @@ TEST(MotionBound, HoldsWhenItsWatchEndsTheSearch) {
 TEST(MotionBound, BoundsAMotionThatBeginsAtRestByItsInputs) {
   const auto model = MakePointMass(0.15);
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, 0, 0), Eigen::Vector4d(9, 9, 0, 0), Eigen::Vector2d(2, 0.5));
-  const MotionBounds bounds = Bound(*model, domain, 0.15, -1, NoRest(4));
-  EXPECT_FIELDS(bounds.acceleration, (at(0).upper, 2), (at(1).upper, 0.5));
+  EXPECT_FIELDS(Bound(*model, domain, 0.15, -1, NoRest(4)).acceleration, (at(0).upper, 2), (at(1).upper, 0.5));
 }
 
 // The acceleration is a along the heading and v^2 tan(delta) / wheelbase across it, so its largest component in any

@@ -78,9 +78,8 @@ TEST_F(FindRegionsTest, KeepsToTheNumberOfCellsAndSavesMoreWithMore) {
 
 TEST(PartIn, IsTheDomainWithinTheRegion) {
   Region region{{{0, {-1, 5}}, {2, {0, 0.5}}}, {}};
-  const auto part = PartIn(Square(2), region);
-  ASSERT_TRUE(part);
-  EXPECT_FIELDS(*part, (state.lower(), Eigen::Vector2d(-1, -2)), (state.upper(), Eigen::Vector2d(2, 2)),
+  const auto part = PartIn(Square(2), region).value();
+  EXPECT_FIELDS(part, (state.lower(), Eigen::Vector2d(-1, -2)), (state.upper(), Eigen::Vector2d(2, 2)),
                 (input.upper()[0], 0.5));
   region.box[0].range = {3, 4};
   EXPECT_FALSE(PartIn(Square(2), region));

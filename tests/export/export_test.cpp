@@ -1,9 +1,7 @@
 // `forereach export`: each format read back by a reader that shares nothing with its writer.
-#include "tests/test.h"
 
-#include "records/database.h"
-#include "records/event_log.h"
 #include "records/export.h"
+#include "records/database.h"
 #include "records/export_table.h"
 #include "records/mcap.h"
 #include "records/message_json.h"

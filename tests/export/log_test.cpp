@@ -1,5 +1,4 @@
 // `forereach log`: listing, cutting and merging logs, damaged ones too.
-#include "tests/test.h"
 
 #include "records/log_edit.h"
 #include "tests/cli/program.h"
@@ -121,8 +120,7 @@ TEST_F(LogTest, TimesMayBeOfSeveralKinds) {
        {"", "+", "-1", "+-1", "+nan", "+inf", "1e3x", "2026-02-30T12:00:00", "2026-01-01", "noon",
         "1969-12-31T23:59:59Z", "2026-01-01T24:00:00", "2026-01-01T12:00:00.5.5", "99999999999999999999"})
     EXPECT_THROW(static_cast<void>(ParseLogTime(text, 0)), LogError) << text;
-  const std::string a = Small("a", 1'000'000, "A");
-  EXPECT_THAT(Log("list '" + a + "' --from +1 --to +2").text, HasSubstr("log: 1 of 3 events"));
+  EXPECT_THAT(Log("list '" + Small("a", 1'000'000, "A") + "' --from +1 --to +2").text, HasSubstr("log: 1 of 3 events"));
 }
 
 TEST_F(LogTest, DamageIsSaidWithItsPlace) {

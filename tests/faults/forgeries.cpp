@@ -8,7 +8,6 @@
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
 #include "torture/hostile_messages.h"
 
 namespace forereach {

@@ -9,7 +9,6 @@
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
-#include "tests/paths.h"
 #include "torture/hostile_messages.h"
 
 namespace forereach {

@@ -10,7 +10,6 @@
 
 #include "bus/authentic.h"
 #include "certifier/gate/gate.h"
-#include "forereach/command_t.hpp"
 #include "robot/supervisor.h"
 #include "task/step_time.h"
 #include "tests/certifier/small_task.h"

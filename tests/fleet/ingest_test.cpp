@@ -10,7 +10,6 @@
 #include "tests/process/process_fixture.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
-#include "tests/test.h"
 
 namespace forereach::ingest_test {
 

@@ -2,7 +2,6 @@
 
 #include "tests/cli/program.h"
 #include "tests/fleet/postgres.h"
-#include "tests/test.h"
 
 namespace forereach::report_test {
 

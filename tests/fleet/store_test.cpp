@@ -3,7 +3,6 @@
 #include "tests/fleet/postgres.h"
 #include "tests/fleet/row_texts.h"
 #include "tests/library_texts.h"
-#include "tests/test.h"
 
 namespace forereach::store_test {
 

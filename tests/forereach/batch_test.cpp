@@ -9,7 +9,6 @@
 
 #include "tests/oracle/affine_problems.h"
 #include "tests/oracle/any_surroundings.h"
-#include "tests/oracle/problems.h"
 
 namespace forereach::batch_test {
 

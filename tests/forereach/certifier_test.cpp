@@ -6,7 +6,6 @@
 
 #include "forereach/certify/explain.h"
 #include "forereach/certify/way_clear.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
@@ -208,8 +207,7 @@ TEST(AbstainDomain, BoundsAreClosed) {
 TEST(AbstainDomain, TheLastSliceMayLieOutside) {
   Judge judge(PointMassInHalves());
   EXPECT_EQ(judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(1), {}).outcome, Outcome::kCertified);
-  const Decision d = judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(2), {});
-  EXPECT_FIELDS(d, (outcome, Outcome::kDomain), (step, 1));
+  EXPECT_FIELDS(judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(2), {}), (outcome, Outcome::kDomain), (step, 1));
 }
 
 TEST(AbstainDomain, ComesBeforeSafety) {
@@ -296,8 +294,7 @@ TEST_P(NoStop, TheBoundIsClosedToTheLastBit) {
 TEST_P(NoStop, ComesBeforeSafety) {
   const std::vector<Obstacle> touched{Obstacle::Circle(Vec({0, 0}), 1)};
   EXPECT_EQ(Brake(3, touched).outcome, Outcome::kSafety);
-  const Decision d = Brake(0.1, touched);
-  EXPECT_FIELDS(d, (cause, Cause::kNoStop), (obstacle, -1));
+  EXPECT_FIELDS(Brake(0.1, touched), (cause, Cause::kNoStop), (obstacle, -1));
 }
 
 INSTANTIATE_TEST_SUITE_P(BothDirections, NoStop, testing::Values(1.0, -1.0));
@@ -720,8 +717,7 @@ TEST(Certifier, SpatialAndLinearProjectionsAreJudged) {
   Judge line(problem);
   const auto wall = [](double x) { return Obstacle::HalfSpace(Eigen::VectorXd::Ones(1), x); };
   EXPECT_EQ(line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3.5)}).outcome, Outcome::kCertified);
-  const Decision d = line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3)});
-  EXPECT_FIELDS(d, (outcome, Outcome::kSafety), (step, 3));
+  EXPECT_FIELDS(line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3)}), (outcome, Outcome::kSafety), (step, 3));
 }
 
 TEST(Decision, ADefaultDecisionIsNoCertificate) {

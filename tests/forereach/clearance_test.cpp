@@ -66,11 +66,10 @@ TEST(BodyPlaces, AtExpressionsUseTheMiddlesOfTheParameters) {
 }
 
 TEST(PartDistance, OfOnePointIsThatOfThePointLessTheRadius) {
-  TracedRandom random(31);
   const std::vector obstacles{Obstacle::Circle(Vector2d(1, 0), 2), Obstacle::AxisBox(Vector2d(0, 0), Vector2d(4, 2)),
                               Obstacle::HalfSpace(Vector2d(0, 2), 4),
                               Obstacle::Polygon({Vector2d(0, 0), Vector2d(4, 2), Vector2d(4, 0), Vector2d(0, 2)})};
-  for (int i = 0; i < 200; ++i)
+  for (TracedRandom random(31); random.Again(200);)
     for (const Obstacle& obstacle : obstacles) {
       const Vector2d y = random.Vector(2, 6);
       EXPECT_EQ(ApproximateDistance(obstacle, Hull({{y.x(), y.y(), 0}}, 0)), ApproximateDistance(obstacle, y));

@@ -59,8 +59,7 @@ TEST(EquationsHeader, ParametersAreTheDoublesThatTheyWere) {
 }
 
 TEST(EquationsHeader, HasTheProgramOfTheText) {
-  const auto model = MakeTextModel(EveryOperation());
-  EXPECT_TRUE(HaveSameValues(EquationsModel<ExportedOperations>::kProgram, model->program()));
+  EXPECT_TRUE(HaveSameValues(EquationsModel<ExportedOperations>::kProgram, MakeTextModel(EveryOperation())->program()));
 }
 
 TEST(HaveSameValues, TellsProgramsApart) {

@@ -2,7 +2,6 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
 namespace forereach::given_enclosure_test {
@@ -72,8 +71,7 @@ TEST_F(GivenEnclosure, AStepOffItsTimeHasMoreOfWhatASlopeBounds) {
 }
 
 TEST_F(GivenEnclosure, InvertedBoundsProveThatNoResidualIsAdmissible) {
-  const Decision decision = Certify(Velocities(0, -1));
-  EXPECT_FIELDS(decision, (outcome, Outcome::kFalsified), (step, 0), (coordinate, 2));
+  EXPECT_FIELDS(Certify(Velocities(0, -1)), (outcome, Outcome::kFalsified), (step, 0), (coordinate, 2));
 }
 
 TEST_F(GivenEnclosure, ASlopeThatIsNotFiniteIsNoBound) {

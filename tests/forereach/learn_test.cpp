@@ -2,7 +2,6 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"

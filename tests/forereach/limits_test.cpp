@@ -165,8 +165,7 @@ TEST_F(Limits, ComeAfterTheDomainAndRest) {
 }
 
 TEST_F(Limits, ACertificateSaysWhenTheyHold) {
-  const Decision d = Judge({AtMost("vx", 2)});
-  EXPECT_EQ(Explain(d, problem_),
+  EXPECT_EQ(Explain(Judge({AtMost("vx", 2)}), problem_),
             "certified: no obstacle is there; within its limits at the sample instants; steps on time");
   const std::vector<Obstacle> far{Obstacle::Circle(Eigen::Vector2d(50, 0), 1)};
   problem_.between = Between{Eigen::Vector2d::Zero(), 0, 0, 0.5};

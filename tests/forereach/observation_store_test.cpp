@@ -162,11 +162,10 @@ TEST(ObservationStore, ASnapshotStaysAsItWas) {
 }
 
 TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
-  TracedRandom random(802);
-  for (int trial = 0; trial < 120; ++trial) {
-    const int coordinate = trial % kStates;
+  for (TracedRandom random(802); random.Again(120);) {
+    const int coordinate = random.trial() % kStates;
     std::vector<Sample> samples = Observe(random, 40);
-    ObservationStore store = StoreOf(samples, Options(trial % 2 ? 64 : 8));
+    ObservationStore store = StoreOf(samples, Options(random.trial() % 2 ? 64 : 8));
     for (int i = 0; i < random.Integer(0, 20); ++i) {
       samples.push_back(Observe(random));
       Insert(store, samples.back());
@@ -358,12 +357,11 @@ TEST(ObservationStore, CompactKeepsAContradictionThatArrivesWhileItBuilds) {
 
 // With a contradiction among them nothing is dropped for want of room, however often the index is built anew.
 TEST(ObservationStore, AContradictionOutlivesAnyNumberOfCompactions) {
-  TracedRandom random(813);
-  for (int trial = 0; trial < 20; ++trial) {
+  for (TracedRandom random(813); random.Again(20);) {
     ObservationStore store = StoreOf(Observe(random, 30), Options(16, 40));
     const Sample honest = Observe(random);
     Sample liar = honest;
-    const int coordinate = trial % kStates;
+    const int coordinate = random.trial() % kStates;
     liar.lower[coordinate] += random.Sign() * 0.02, liar.upper = liar.lower;
     Insert(store, honest);
     ASSERT_FALSE(store.snapshot().violation());
@@ -381,8 +379,7 @@ TEST(ObservationStore, AContradictionOutlivesAnyNumberOfCompactions) {
 }
 
 TEST(EnvelopeTail, BoundsAreRoundedOutwardAndValuesBeyondTheHeadroomAreNotCovered) {
-  TracedRandom random(814);
-  for (int trial = 0; trial < 500; ++trial) {
+  for (TracedRandom random(814); random.Again(500);) {
     Declaration declaration = MakeDeclaration();
     for (double& sigma : declaration.noise_bound) sigma = std::ldexp(random.Uniform(0.5, 1), -random.Integer(0, 8));
     const std::vector<Sample> samples = Observe(random, 4);
@@ -424,10 +421,9 @@ TEST(ObservationStore, HoldsAtMostItsLargestNumberOfObservations) {
 }
 
 TEST(MostUseful, KeepsEveryBoundWhileAllThatAttainTheEnvelopeHaveRoom) {
-  TracedRandom random(810);
   Declaration declaration = MakeDeclaration();
   declaration.lipschitz.row(2).setZero();  // so that some never attain it
-  for (int trial = 0; trial < 20; ++trial) {
+  for (TracedRandom random(810); random.Again(20);) {
     std::vector<Sample> samples = Observe(random, 60);
     for (Sample& sample : samples) {
       sample.lower[2] = sample.upper[2] = 0.1 + random.Uniform(-1e-3, 1e-3);
@@ -498,9 +494,8 @@ TEST(MostUseful, KeepsOnlyTheFirstOfRowsThatDifferWhereLHasNoColumn) {
 }
 
 TEST(MostUseful, KeepsTheFirstOfEachKindOfRow) {
-  TracedRandom random(812);
   const Declaration declaration{Eigen::MatrixXd::Constant(1, 2, 1), Eigen::VectorXd::Zero(1)};
-  for (int trial = 0; trial < 50; ++trial) {
+  for (TracedRandom random(812); random.Again(50);) {
     const int kinds = random.Integer(1, 40);
     Observations o = SameRows(random.Integer(kinds + 1, 400), 2);
     std::vector<int> first(ToSize(kinds), -1), expected;

@@ -3,11 +3,8 @@
 
 #include "tests/test.h"
 
-#include "forereach/certify/certifier.h"
 #include "tests/oracle/any_surroundings.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/traced_random.h"
-#include "tests/worlds.h"
 
 namespace forereach::obstacle_index_test {
 
@@ -36,9 +33,8 @@ HullTree TreeOf(const std::vector<Hull>& hulls, int dim) {
 }
 
 TEST(BoxTree, LeavesOutOnlyWhatIsFurtherThanAsked) {
-  TracedRandom random(1);
   long left_out = 0;
-  for (int round = 0; round < 400; ++round) {
+  for (TracedRandom random(1); random.Again(400);) {
     const int dim = random.Integer(1, 3), count = random.Integer(1, 60);
     const double scale = random.Coin(0.8) ? 20 : std::ldexp(1, random.Integer(-300, 300));
     std::vector<Bounds> boxes(ToSize(count));

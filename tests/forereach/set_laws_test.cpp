@@ -3,7 +3,6 @@
 #include "tests/test.h"
 
 #include "forereach/sets/box.h"
-#include "forereach/sets/zonotope.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/traced_random.h"
 

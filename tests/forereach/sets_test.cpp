@@ -6,7 +6,6 @@
 #include "forereach/sets/box.h"
 #include "forereach/sets/linear_map.h"
 #include "forereach/sets/zonogon.h"
-#include "forereach/sets/zonotope.h"
 #include "tests/oracle/reduce_order.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/worlds.h"
@@ -77,8 +76,7 @@ TEST(Zonotope, FromBoxDropsZeroHalfWidths) {
 }
 
 TEST(Zonotope, EnclosesBoxesWhoseMiddleIsNoDouble) {
-  TracedRandom random(311);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(311); random.Again(2000);) {
     const Interval side = random.AnyInterval();
     if (!std::isfinite(side.upper - side.lower)) continue;
     const Zonotope set = Zonotope::Enclose(Box(Vec({side.lower}), Vec({side.upper})));
@@ -130,8 +128,7 @@ bool HasColumn(const Eigen::MatrixXd& generators, const Eigen::VectorXd& wanted)
 }
 
 TEST(ReduceOrder, KeepsTheBestColumnsAndTheEarlierOfEquals) {
-  TracedRandom random(312);
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(312); random.Again(3000);) {
     const int n = random.Integer(1, 6), order = random.Integer(1, 5);
     const int m = random.Integer(0, std::min(kMaxGenerators, (order + 3) * n));
     const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(n, m, [&] { return random.Integer(-2, 2); });
@@ -195,8 +192,7 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() 
 
 // Integers, so the brute force over all sign vectors is exact.
 TEST(Outline, IsTheHullOfAllSignVectors) {
-  TracedRandom random(315);
-  for (int trial = 0; trial < 500; ++trial) {
+  for (TracedRandom random(315); random.Again(500);) {
     const int m = random.Integer(1, 7);
     const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(2, m, [&] { return random.Integer(-4, 4); });
     const Eigen::Vector2d center(random.Integer(-9, 9), random.Integer(-9, 9));

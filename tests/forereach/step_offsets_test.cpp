@@ -5,7 +5,6 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/text_model.h"
 #include "tests/text_models.h"
 #include "tests/worlds.h"
@@ -152,8 +151,7 @@ TEST(ActedInputs, LieInTheDomainWithTheirErrors) {
   const Problem problem = Driven(Vec({0.5}));
   for (const double sign : {1.0, -1.0}) {
     EXPECT_EQ(Drive(problem, sign * 1.5).decision.outcome, Outcome::kCertified) << "exactly at the edge";
-    const Decision decision = Drive(problem, sign * std::nextafter(1.5, 2)).decision;
-    EXPECT_FIELDS(decision, (outcome, Outcome::kDomain), (coordinate, 1));
+    EXPECT_FIELDS(Drive(problem, sign * std::nextafter(1.5, 2)).decision, (outcome, Outcome::kDomain), (coordinate, 1));
   }
   Problem cut = problem;
   cut.domain.inequalities.push_back({Vec({0, 1}), 1.25});

@@ -2,7 +2,6 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
 namespace forereach::sweep_test {
@@ -317,8 +316,7 @@ TEST(SafetyTest, BeginsAtTheGivenStep) {
   Tube tube;
   const std::vector<double> controls(8, 0.0);
   const Plan plan{controls.data(), 2, 4, 2};
-  const auto start = Zonotope::FromBox(Vec({0, 0, 4, 0}), Vec({0, 0, 0, 0}));
-  ASSERT_TRUE(IsCertified(certifier.Certify(plan, start, {}, tube)));
+  ASSERT_TRUE(IsCertified(certifier.Certify(plan, Zonotope::FromBox(Vec({0, 0, 4, 0}), Vec({0, 0, 0, 0})), {}, tube)));
   const std::vector<Obstacle> behind{Obstacle::Circle(Vec({1, 0}), 0.5)};  // met in step 0 only
   EXPECT_EQ(certifier.safety().Judge(behind, {}, tube, 0).step, 0);
   const Decision later = certifier.safety().Judge(behind, {}, tube, 1);

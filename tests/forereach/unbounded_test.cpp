@@ -23,9 +23,8 @@ std::optional<Unbounded> Find(const ModelText& text, const Interval& v, double u
 }
 
 TEST(FindUnbounded, NamesTheFunctionItsPlaceAndItsArgument) {
-  const auto found = Find(Of("x + dt*abs(v)"), {-0.25, 0.5});
-  ASSERT_TRUE(found);
-  EXPECT_FIELDS(*found, (operation, "abs"), (line, 1), (column, 8), (states, std::vector<int>{2}),
+  const auto found = Find(Of("x + dt*abs(v)"), {-0.25, 0.5}).value();
+  EXPECT_FIELDS(found, (operation, "abs"), (line, 1), (column, 8), (states, std::vector<int>{2}),
                 (argument, Interval(-0.25, 0.5)));
 }
 
@@ -66,9 +65,7 @@ class OfAnOperation : public testing::TestWithParam<Case> {};
 
 TEST_P(OfAnOperation, IsFoundOnlyWhereItMayMeetItsKinkOrPole) {
   const auto& [equation, operation, meets, misses] = GetParam();
-  const auto found = Find(Of(equation), meets);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->operation, operation);
+  EXPECT_EQ(Find(Of(equation), meets).value().operation, operation);
   EXPECT_FALSE(Find(Of(equation), misses));
 }
 
@@ -95,9 +92,8 @@ TEST(FindUnbounded, FindsNothingWhereEverythingIsBounded) {
 }
 
 TEST(FindUnbounded, NamesTheOperationInCompiledEquations) {
-  const auto found = FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-9, 9)), 2);
-  ASSERT_TRUE(found);
-  EXPECT_FIELDS(*found, (operation, "tan"), (states, std::vector<int>{5}));
+  const auto found = FindUnbounded(*MakeKinematicBicycle(0.1, 2), std::vector<Interval>(8, Interval(-9, 9)), 2).value();
+  EXPECT_FIELDS(found, (operation, "tan"), (states, std::vector<int>{5}));
 }
 
 TEST(FindUnbounded, APoleInAnInputOrAParameterCounts) {
@@ -109,9 +105,8 @@ TEST(FindUnbounded, APoleInAnInputOrAParameterCounts) {
 TEST(FindUnbounded, NamesTheFirstInTheOrderOfTheTextAndThroughDefinitions) {
   EXPECT_EQ(Find(Of("sqrt(abs(v))"), {-1, 1})->operation, "abs");
   EXPECT_EQ(Find(Of("1/x + 1/v + sqrt(v)"), {-1, 1})->column, 8);
-  const auto found = Find(Of("x + a*b", Integrator::kNone, {{"a", "1/w"}, {"b", "2*log(v)"}}), {-1, 1});
-  ASSERT_TRUE(found);
-  EXPECT_FIELDS(*found, (operation, "log"), (column, 3));
+  const auto found = Find(Of("x + a*b", Integrator::kNone, {{"a", "1/w"}, {"b", "2*log(v)"}}), {-1, 1}).value();
+  EXPECT_FIELDS(found, (operation, "log"), (column, 3));
 }
 
 TEST(FindUnbounded, TheAskedStateComesFirst) {
@@ -125,10 +120,9 @@ TEST(FindUnbounded, TheAskedStateComesFirst) {
 // v' = v - 1, so v falls through zero within the step.
 TEST(FindUnbounded, FindsAKinkInALaterStageOfTheStep) {
   for (const Integrator integrator : {Integrator::kMidpoint, Integrator::kRk4}) {
-    const auto found = Find(Of("abs(v)", integrator), {0.02, 0.08});
-    ASSERT_TRUE(found);
-    EXPECT_EQ(found->operation, "abs");
-    EXPECT_LT(found->argument.lower, 0);
+    const auto found = Find(Of("abs(v)", integrator), {0.02, 0.08}).value();
+    EXPECT_EQ(found.operation, "abs");
+    EXPECT_LT(found.argument.lower, 0);
     EXPECT_FALSE(Find(Of("abs(v)", integrator), {2, 3}));
   }
   EXPECT_FALSE(Find(Of("abs(v)", Integrator::kEuler), {0.02, 0.08})) << "Euler's step looks at its beginning only";

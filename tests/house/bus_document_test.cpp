@@ -4,7 +4,6 @@
 #include "tests/test.h"
 
 #include "tests/paths.h"
-#include "tests/scratch.h"
 #include "tests/shell.h"
 
 namespace forereach::bus_document_test {

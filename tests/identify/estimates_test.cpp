@@ -2,7 +2,6 @@
 // give Clopper & Pearson's bound.
 #include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/residual/consistency.h"
 #include "identify/binomial.h"
 #include "identify/hold_out.h"

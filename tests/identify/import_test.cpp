@@ -3,7 +3,6 @@
 
 #include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
 #include "task/config_error.h"
 #include "tests/identify/seed.h"
 #include "tests/worlds.h"

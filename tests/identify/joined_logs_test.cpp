@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/text.h"
 #include "identify/import.h"
 #include "task/config_error.h"

@@ -77,8 +77,7 @@ TEST(NamesTest, TheAdviceIsThatOfTheDocument) {
   for (std::int16_t cause = 1; cause <= 5; ++cause) {
     const std::size_t row = page.find("fault `" + std::string(FaultName(cause)) + "` |");
     ASSERT_NE(row, std::string::npos) << cause;
-    const std::string line = page.substr(row, page.find('\n', row) - row);
-    EXPECT_THAT(line, EndsWith("| " + std::string(FaultAdvice(cause)) + " |"));
+    EXPECT_THAT(page.substr(row, page.find('\n', row) - row), EndsWith("| " + std::string(FaultAdvice(cause)) + " |"));
   }
 }
 

@@ -3,7 +3,6 @@
 
 #include "tests/test.h"
 
-#include "lcmtypes/grounds.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach::seal_test {
@@ -28,12 +27,7 @@ certified_plan_t Plan(int states, int steps) {
     }
   for (int k = 0; k < states; ++k) certified.state_error[k] = 0.01 * (k + 1);
   certified.step_error_us = 3000;
-  SetDigest(certified.config_digest, DigestOf("config"));
-  SetDigest(certified.model_digest, DigestOf("model"));
-  SetDigest(certified.declaration_digest, DigestOf("declaration"));
-  SetDigest(certified.observations_digest, DigestOf("observations"));
-  SetDigest(certified.obstacles_digest, DigestOf("obstacles"));
-  SetDigest(certified.transitions_digest, DigestOf("transitions"));
+  NameGrounds(certified);
   Seal(certified);
   return certified;
 }
@@ -86,9 +80,8 @@ TEST(Seal, BreaksWhenAnyBitIsFlipped) {
     std::vector<std::uint8_t> bad = good;
     for (std::size_t i = kFingerprint; i < good.size(); i += 1 + random() % (2 * stride - 1)) {
       bad[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
-      const auto certified = Decoded<certified_plan_t>(bad);
-      ASSERT_TRUE(certified);
-      ASSERT_FALSE(FindSealFaults(*certified).empty()) << "byte " << i << " of " << states << " states";
+      const auto certified = Decoded<certified_plan_t>(bad).value();
+      ASSERT_FALSE(FindSealFaults(certified).empty()) << "byte " << i << " of " << states << " states";
       bad[i] = good[i];
     }
   }
@@ -124,8 +117,7 @@ TEST(Seal, TheFirstStrayEntryIsNamed) {
   certified.slice_lower[40][3] = 1e-300;
   Seal(certified);  // no digest covers it
   const std::vector<SealFault> faults = FindSealFaults(certified);
-  ASSERT_EQ(faults.size(), 1u);
-  EXPECT_FIELDS(faults[0], (field, "slice_lower[40][3]"), (step, 40), (coordinate, 3), (value, 1e-300),
+  EXPECT_FIELDS(Only(faults), (field, "slice_lower[40][3]"), (step, 40), (coordinate, 3), (value, 1e-300),
                 (found, "1e-300"));
 }
 

@@ -6,7 +6,6 @@
 #include "tests/keys.h"
 #include "tests/live/live_fixture.h"
 #include "tests/messages.h"
-#include "tests/records/course.h"
 #include "tests/tries.h"
 
 namespace forereach::watcher_test {
@@ -96,8 +95,7 @@ TEST(WatcherTest, DrawsTheBoxesOfACertificateWhoseCandidateItLacks) {
   }
   watcher.Tick(1);
   reader.Read(watcher);
-  ASSERT_EQ(reader.decisions.size(), 1u);
-  const json& detail = reader.decisions[0].at("detail");
+  const json& detail = Only(reader.decisions).at("detail");
   EXPECT_GT(detail.at("units"), 5);
   EXPECT_THAT(detail.at("missing").get<std::string>(), HasSubstr("the boxes of its certificate"));
 }

@@ -7,7 +7,6 @@
 #include "tests/test.h"
 
 #include "tests/live/live_fixture.h"
-#include "tests/records/course.h"
 #include "tests/tries.h"
 
 namespace forereach::web_server_test {

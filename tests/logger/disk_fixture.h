@@ -3,13 +3,11 @@
 
 #include <unistd.h>
 
-#include "forereach/logger_status_t.hpp"
 #include "logger/logger_node.h"
 #include "tests/logger/direct_bus.h"
 #include "tests/records/logs.h"
 #include "tests/records/sql.h"
 #include "tests/small_disk.h"
-#include "tests/test.h"
 
 namespace forereach {
 

@@ -1,5 +1,4 @@
 // Log files that follow one another, and disks that fill.
-#include "tests/test.h"
 
 #include "tests/file_size_limit.h"
 #include "tests/logger/disk_fixture.h"
@@ -89,10 +88,8 @@ TEST_F(DiskTest, CountsGoOnFromFileToFile) {
   Stop();
   EXPECT_GE(Runs().size(), 3u) << "candidate and decision lie in different files";
   const Rows rows = ReadRows();
-  ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_FIELDS(rows.gaps[0], (lost, 3), (event.event_number, 0));
-  ASSERT_EQ(rows.decisions.size(), 1u);
-  EXPECT_EQ(rows.decisions[0].latency_us, 1250);
+  EXPECT_FIELDS(Only(rows.gaps), (lost, 3), (event.event_number, 0));
+  EXPECT_EQ(Only(rows.decisions).latency_us, 1250);
 }
 
 /** Every row in words, so that sets of them can be compared. */
@@ -174,8 +171,7 @@ TEST_F(DiskTest, DeletesAnEmptyLogWithoutARun) {
   WriteBytes(cut, bytes);
   { const LoggerNode recovery(config_, bus_, out_); }
   EXPECT_FALSE(std::filesystem::exists(empty));
-  ASSERT_EQ(Runs().size(), 1u);
-  EXPECT_EQ(scratch_ / ("log/" + Runs()[0].log_file), cut);
+  EXPECT_EQ(scratch_ / ("log/" + Only(Runs()).log_file), cut);
 }
 
 TEST_F(DiskTest, ALogThatAnotherLoggerWritesIsNotTaken) {

@@ -1,9 +1,6 @@
 // The logger's files are deleted, moved, replaced or cut: it reports this, counts the losses, and continues.
 #include <sys/resource.h>
 
-#include "tests/test.h"
-
-#include "records/check.h"
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach::gone_test {

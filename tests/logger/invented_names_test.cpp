@@ -1,8 +1,6 @@
 // Whoever is on the network invents channels and sources: neither memory nor terminal are theirs.
 #include <unistd.h>
 
-#include "tests/test.h"
-
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach::invented_names_test {

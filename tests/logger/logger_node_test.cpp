@@ -5,8 +5,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "tests/test.h"
-
 #include "tests/file_size_limit.h"
 #include "tests/keys.h"
 #include "tests/logger/direct_bus.h"
@@ -139,8 +137,7 @@ struct SignedLoggerTest : LoggerNodeTest {
             Candidate(*planner_, 4)};
   }
   static void ExpectOneGap(const Rows& rows) {
-    ASSERT_EQ(rows.gaps.size(), 1u);
-    EXPECT_FIELDS(rows.gaps[0], (expected, 2), (got, 4), (lost, 2), (event.event_number, 5));
+    EXPECT_FIELDS(Only(rows.gaps), (expected, 2), (got, 4), (lost, 2), (event.event_number, 5));
   }
 
   std::optional<Signer> planner_;
@@ -162,8 +159,7 @@ TEST_F(SignedLoggerTest, RecordsEverythingAndMakesRowsOfAuthenticMessagesOnly) {
   EXPECT_EQ(ReadLog(node.recorder().log_path()).events.size(), 7u);
   const Rows rows = ReadRows();
   ExpectOneGap(rows);
-  ASSERT_EQ(rows.decisions.size(), 1u);
-  EXPECT_EQ(rows.decisions[0].latency_us, 0);
+  EXPECT_EQ(Only(rows.decisions).latency_us, 0);
 }
 
 TEST_F(SignedLoggerTest, MakesMissingRowsAgainOfAuthenticMessagesOnly) {
@@ -235,8 +231,7 @@ TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
   EXPECT_FIELDS(log, (events[1].number, 4), (damage.places, 0));
   const Rows rows = ReadRows();
   EXPECT_EQ(rows.events.size(), 2u);
-  ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_FIELDS(rows.gaps[0], (reason, "disk"), (channel, "EXECUTION_EVENT"), (lost, 3));
+  EXPECT_FIELDS(Only(rows.gaps), (reason, "disk"), (channel, "EXECUTION_EVENT"), (lost, 3));
 }
 
 TEST_F(LoggerNodeTest, SaysSoIfItCannotWrite) {
@@ -276,8 +271,7 @@ TEST_F(LoggerNodeTest, MakesMissingRowsAgainFromTheLog) {
   const Rows rows = ReadRows();
   ASSERT_EQ(rows.decisions.size(), 2u);
   EXPECT_FIELDS(rows, (decisions[0].latency_us, 70), (decisions[1].cause, "future"));
-  ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_EQ(rows.gaps[0].lost, 2);
+  EXPECT_EQ(Only(rows.gaps).lost, 2);
   EXPECT_EQ(Runs()[0].end_utime, kStart + 90);
   EXPECT_THAT(Runs()[0].recovered, HasSubstr("cut tail of 50 bytes"));
 }

@@ -2,8 +2,6 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "tests/test.h"
-
 #include "logger/recorder.h"
 #include "tests/records/logs.h"
 

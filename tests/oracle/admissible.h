@@ -4,10 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "forereach/certify/problem.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
 
 namespace forereach {
 

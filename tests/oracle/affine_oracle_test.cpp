@@ -2,11 +2,9 @@
 // data admit, in 256 bits, against tubes.
 #include "tests/test.h"
 
-#include "forereach/certify/certifier.h"
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/affine_problems.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/traced_random.h"
 
 namespace forereach::affine_oracle_test {
@@ -102,9 +100,8 @@ std::vector<std::vector<Rational>> Vertices(const Data& data) {
 }
 
 TEST(AffineSetOracle, BoundsEveryParameterThatTheDataAdmitAndLittleMore) {
-  TracedRandom random(861);
   int bounded = 0;
-  for (int trial = 0; trial < 150; ++trial) {
+  for (TracedRandom random(861); random.Again(150);) {
     const int columns = random.Integer(1, 2), count = random.Integer(columns + 1, 7);
     const Data data = AnyData(random, columns, count, std::ldexp(1, -random.Integer(0, 30)), 0);
     const AffineSet set = data.Set();
@@ -127,8 +124,7 @@ TEST(AffineSetOracle, BoundsEveryParameterThatTheDataAdmitAndLittleMore) {
       const Interval bounds = set.Enclose(phi);
       ASSERT_TRUE(exact::AtMost(*most, bounds.upper)) << "no tolerance";
       ASSERT_TRUE(exact::AtLeast(*least, bounds.lower)) << "no tolerance";
-      const double width = Rational(*most - *least).get_d();
-      EXPECT_LE(bounds.upper - bounds.lower, width * (1 + 1e-5) + 1e-9) << "tight";
+      EXPECT_LE(bounds.upper - bounds.lower, Rational(*most - *least).get_d() * (1 + 1e-5) + 1e-9) << "tight";
     }
     for (std::size_t l = 0; l < vertices[0].size(); ++l)
       for (const auto& theta : vertices) {
@@ -186,9 +182,8 @@ TEST(AffineSetOracle, OfMuchThatExcitesTooLittleKeepsWhatSpansIt) {
 
 // A contradiction that is reported holds in rationals, and one that is not tiny is reported.
 TEST(AffineSetOracle, AContradictionIsAProofAndNoneIsMissed) {
-  TracedRandom random(862);
   int found = 0, agreed = 0;
-  for (int trial = 0; trial < 150; ++trial) {
+  for (TracedRandom random(862); random.Again(150);) {
     const int columns = random.Integer(1, 2), count = random.Integer(columns + 2, 7);
     const double width = std::ldexp(1, -random.Integer(2, 20));
     const Data data = AnyData(random, columns, count, width, random.Coin() ? 2 * width : 0);

@@ -6,10 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "forereach/certify/problem.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
 
 namespace forereach {
 

@@ -23,9 +23,8 @@ bool LiesWithin(double value, double lower, double upper, bool is_angle) {
 }
 
 TEST(Conform, FindsAnAngleInsideOnlyIfItIsAfterWholeTurns) {
-  TracedRandom random(641);
   int inside = 0, left_out = 0;
-  for (int trial = 0; trial < 40'000; ++trial) {
+  for (TracedRandom random(641); random.Again(40'000);) {
     const double value = random.Uniform(-20, 20), near = value + random.Integer(-3, 3) * kTurn;
     const double width = std::ldexp(random.Uniform(0, 1), -random.Integer(0, 54));
     double lower = near - width * random.Uniform(-0.1, 1);
@@ -87,9 +86,8 @@ Conformance ExactConformance(double value, double error, double lower, double up
 }
 
 TEST(Conform, ComparesAStateWithItsErrorAsRealNumbers) {
-  TracedRandom random(1127);
   std::map<Conformance, int> found;
-  for (int trial = 0; trial < 20'000; ++trial) {
+  for (TracedRandom random(1127); random.Again(20'000);) {
     const double lower = random.Uniform(-3, 3), upper = lower + random.Uniform(0, 1), error = random.Uniform(0, 1);
     double value = (random.Integer(0, 1) ? lower : upper) + random.Integer(-1, 1) * error;
     for (int i = random.Integer(-2, 2); i != 0; i += i < 0 ? 1 : -1) value = std::nextafter(value, i < 0 ? -99 : 99);
@@ -103,10 +101,9 @@ TEST(Conform, ComparesAStateWithItsErrorAsRealNumbers) {
 }
 
 TEST(Conform, GivesATurnedStateNoBetterAnswerThanItHas) {
-  TracedRandom random(1128);
   std::map<Conformance, int> found;
   int worse = 0;
-  for (int trial = 0; trial < 20'000; ++trial) {
+  for (TracedRandom random(1128); random.Again(20'000);) {
     const double lower = random.Uniform(-3, 3), upper = lower + random.Uniform(0, 0.5), error = random.Uniform(0, 0.5);
     const double edge = (random.Integer(0, 1) ? lower : upper) + random.Integer(-1, 1) * error;
     double value = edge + random.Integer(-3, 3) * kTurn;
@@ -150,8 +147,7 @@ TEST(SumAtMost, ComparesAsRealNumbersAndFailsWhereASumIsTooLarge) {
 }
 
 TEST(TurnTowards, EnclosesTheTurnedNumber) {
-  TracedRandom random(642);
-  for (int trial = 0; trial < 100'000; ++trial) {
+  for (TracedRandom random(642); random.Again(100'000);) {
     const double value = random.Uniform(-1, 1) * std::ldexp(1, random.Integer(-60, 30));
     const int turns = random.Integer(-1000, 1000);
     const double goal = value + turns * kTurn;

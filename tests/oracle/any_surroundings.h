@@ -9,10 +9,7 @@
 #include <vector>
 
 #include "forereach/certify/decision.h"
-#include "forereach/certify/problem.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
 
 namespace forereach {
 

@@ -6,9 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "forereach/dynamics/model_text.h"
 #include "tests/oracle/any_expression.h"
-#include "tests/oracle/random.h"
 #include "tests/text_models.h"
 
 namespace forereach {

@@ -2,10 +2,7 @@
 // leave a slice of the tube, and under a certified plan never meet an obstacle.
 #include "tests/test.h"
 
-#include "forereach/certify/certifier.h"
 #include "tests/oracle/admissible.h"
-#include "tests/oracle/exact.h"
-#include "tests/oracle/problems.h"
 #include "tests/oracle/traced_random.h"
 
 namespace forereach::containment_test {
@@ -320,8 +317,7 @@ TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanTheExpressionAllows) {
 
 // The judge itself: it has to notice a state just outside.
 TEST(ContainmentJudge, NoticesAStateJustOutside) {
-  TracedRandom random(803);
-  for (int trial = 0; trial < 50; ++trial) {
+  for (TracedRandom random(803); random.Again(50);) {
     const Zonotope slice = random.AnyZonotope(6, 20);
     const Membership member(random, slice);
     const int k = random.Below(6);

@@ -41,8 +41,7 @@ void ExpectDeclared(Random& random, const std::string& text, const Domain& domai
       other[l] = std::clamp(beside, ranges[l].lower, ranges[l].upper);
       if (bounds[l].upper > 0) allowed += Real(bounds[l].upper) * abs(z[l] - other[l]);
     }
-    const Real difference = abs(ValueOf(text, z) - ValueOf(text, other));
-    EXPECT_LE(difference, allowed * Real(1 + 0x1p-50) + Real(0x1p-200)) << text;
+    EXPECT_LE(abs(ValueOf(text, z) - ValueOf(text, other)), allowed * Real(1 + 0x1p-50) + Real(0x1p-200)) << text;
   }
 }
 
@@ -103,10 +102,9 @@ TEST(DeclaredSlopes, OfEachFunctionBoundItAndAreConfirmed) {
 }
 
 TEST(DeclaredSlopes, OfRandomExpressionsBoundThemAndAreConfirmed) {
-  TracedRandom random(1742);
   const std::vector<std::string> leaves{"x", "y", "u", "c", "0.5", "2", "x", "y"};
   Count count;
-  for (int trial = 0; trial < 320; ++trial) Examine(random, AnyExpression(random, leaves, 4, true), 1, count);
+  for (TracedRandom random(1742); random.Again(320);) Examine(random, AnyExpression(random, leaves, 4, true), 1, count);
   EXPECT_GT(count.bounded, 120);
   EXPECT_GT(count.checked, 80);
   EXPECT_GE(50 * count.confirmed, 49 * count.checked);

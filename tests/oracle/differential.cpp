@@ -16,13 +16,8 @@
 #include <vector>
 
 #include "command_line/command_line.h"
-#include "forereach/dynamics/expression.h"
 #include "tests/oracle/affine_problems.h"
-#include "tests/oracle/any_surroundings.h"
-#include "tests/oracle/any_text.h"
 #include "tests/oracle/motions.h"
-#include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/text_problems.h"
 #include "tests/verifier/record.h"

@@ -54,8 +54,7 @@ void ExpectBounds(const Operation& operation, double a, double b) {
 class DirectedOperation : public testing::TestWithParam<Operation> {};
 
 TEST_P(DirectedOperation, IsTheNeighbourOfTheExactResult) {
-  TracedRandom random(101);
-  for (int trial = 0; trial < kTrials; ++trial) {
+  for (TracedRandom random(101); random.Again(kTrials);) {
     const double a = random.Double(), b = random.Near(a);
     if (GetParam().divides && b == 0) continue;
     ExpectBounds(GetParam(), a, b);
@@ -78,8 +77,7 @@ TEST_P(DirectedOperation, HoldsAtTheEndsOfTheDoubles) {
 
 // The textbook error of a sum overflows on its way where one operand is the largest double.
 TEST_P(DirectedOperation, HoldsNextToTheLargestDouble) {
-  TracedRandom random(107);
-  for (int trial = 0; trial < 4000; ++trial) {
+  for (TracedRandom random(107); random.Again(4000);) {
     const double large = random.Sign() * (random.Coin() ? kMaxDouble : NextDown(kMaxDouble));
     const double other = random.Sign() * std::ldexp(random.Uniform(1, 2), random.Integer(960, 1023));
     ExpectBounds(GetParam(), large, other);
@@ -89,8 +87,7 @@ TEST_P(DirectedOperation, HoldsNextToTheLargestDouble) {
 }
 
 TEST_P(DirectedOperation, LeavesExactResultsAlone) {
-  TracedRandom random(102);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(102); random.Again(2000);) {
     const double a = random.Integer(-(1 << 20), 1 << 20), b = std::ldexp(random.Sign(), random.Integer(-20, 20));
     const Rational result = GetParam().exact(Rational(a), Rational(b));
     ASSERT_EQ(Rational(GetParam().up(a, b)), result);
@@ -121,8 +118,7 @@ TEST(Directed, InfiniteOperandsStayInfinite) {
 }
 
 TEST(Directed, NextDoublesAgreeWithTheLibrary) {
-  TracedRandom random(103);
-  for (int trial = 0; trial < kTrials; ++trial) {
+  for (TracedRandom random(103); random.Again(kTrials);) {
     const double x = random.Double();
     ASSERT_EQ(NextUp(x), std::nextafter(x, kInfinity)) << x;
     ASSERT_EQ(NextDown(x), std::nextafter(x, -kInfinity)) << x;
@@ -145,8 +141,7 @@ void ExpectRoot(double x) {
 }
 
 TEST(Directed, SquareRootsAreNeighbours) {
-  TracedRandom random(104);
-  for (int trial = 0; trial < kTrials; ++trial) {
+  for (TracedRandom random(104); random.Again(kTrials);) {
     const double x = std::abs(random.Double()), square = x * x;
     ExpectRoot(x);
     if (square < kInfinity) {
@@ -179,8 +174,7 @@ std::vector<double> Terms(Random& random, int count) {
 }
 
 TEST(Directed, SumUpperBoundsSumsInAnyOrder) {
-  TracedRandom random(105);
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(105); random.Again(20000);) {
     std::vector<double> terms = Terms(random, random.Integer(0, 112));
     if (random.Coin()) std::sort(terms.begin(), terms.end(), std::greater<>());  // the order that loses most
     double sum = 0;
@@ -196,8 +190,7 @@ TEST(Directed, SumUpperBoundsSumsInAnyOrder) {
 }
 
 TEST(Directed, DotErrorUpperBoundsTheErrorOfDotProducts) {
-  TracedRandom random(106);
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(106); random.Again(20000);) {
     const int count = random.Integer(1, 24), exponent = random.Coin() ? -537 : 0;
     double dot = 0;
     Rational exact_dot = 0, magnitude = 0;

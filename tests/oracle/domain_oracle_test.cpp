@@ -84,9 +84,8 @@ double Beside(const Rational& value, Random& random) {
 }
 
 TEST(FindExit, AgainstAnInequalityNoSetOutsideIsFoundInside) {
-  TracedRandom random(601);
   int inside = 0, outside = 0;
-  for (int trial = 0; trial < 40000; ++trial) {
+  for (TracedRandom random(601); random.Again(40000);) {
     const Query query(random);
     Eigen::VectorXd coefficients = random.Vector(kSize, std::ldexp(1, random.Integer(-4, 4)));
     for (double& c : coefficients)
@@ -115,9 +114,8 @@ TEST(FindExit, AgainstAnInequalityNoSetOutsideIsFoundInside) {
 }
 
 TEST(FindExit, AgainstABallNoSetOutsideIsFoundInside) {
-  TracedRandom random(602);
   int inside = 0, outside = 0;
-  for (int trial = 0; trial < 40000; ++trial) {
+  for (TracedRandom random(602); random.Again(40000);) {
     Query query(random);
     Domain::Ball ball;
     for (int l = 0; l < kSize; ++l)
@@ -151,8 +149,7 @@ TEST(FindExit, AgainstABallNoSetOutsideIsFoundInside) {
 }
 
 TEST(FindExit, AgainstTheBoxNoSetOutsideIsFoundInside) {
-  TracedRandom random(603);
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(603); random.Again(20000);) {
     const Query query(random);
     const int at = random.Below(kSize);
     const auto l = static_cast<std::size_t>(at);

@@ -79,8 +79,7 @@ int DoublesBetween(double from, double to, int most) {
 
 TEST_P(Elementary, ContainsTheRangeAndReachesFewDoublesBeyond) {
   const Function& f = GetParam();
-  TracedRandom random(220);
-  for (int trial = 0; trial < 12000; ++trial) {
+  for (TracedRandom random(220); random.Again(12000);) {
     const Interval x = AnyInterval(random), range = f.enclose(x);
     SCOPED_TRACE(testing::Message() << std::hexfloat << f.name << "[" << x.lower << ", " << x.upper << "] = ["
                                     << range.lower << ", " << range.upper << "]");
@@ -111,8 +110,7 @@ TEST_P(Elementary, IsEverythingWhereTheArgumentLeavesTheDomain) {
 TEST_P(Elementary, KeepsTheSignOfTheFunction) {
   const Function& f = GetParam();
   if (f.name == std::string("log1p")) return;  // widened on both sides of 0 alike
-  TracedRandom random(221);
-  for (int trial = 0; trial < 10000; ++trial) {
+  for (TracedRandom random(221); random.Again(10000);) {
     const Interval x = AnyInterval(random), range = f.enclose(x);
     const Real at_lower = f.value(Real(x.lower)), at_upper = f.value(Real(x.upper));
     const bool is_positive = at_lower >= Real(0) && at_upper >= Real(0),
@@ -125,9 +123,8 @@ TEST_P(Elementary, KeepsTheSignOfTheFunction) {
 // What elementary.h assumes of the C library, measured.
 TEST_P(Elementary, LibraryErrorIsWithinWhatIsAssumed) {
   const Function& f = GetParam();
-  TracedRandom random(222);
   double worst = 0, worst_at = 0;
-  for (int trial = 0; trial < 30000; ++trial) {
+  for (TracedRandom random(222); random.Again(30000);) {
     const double x = AnyArgument(random), value = f.library(x);
     const Real exact_value = f.value(Real(x));
     const double size = std::abs(exact_value.ToDouble());
@@ -216,9 +213,8 @@ TEST(Atan2, EnclosesAtTheAxesAndAtTheCut) {
 }
 
 TEST(Atan2, LibraryErrorIsBelowOneUnit) {
-  TracedRandom random(225);
   double worst = 0;
-  for (int trial = 0; trial < 30000; ++trial) {
+  for (TracedRandom random(225); random.Again(30000);) {
     const double y = random.Double(), x = random.Coin() ? random.Near(y) : random.Double();
     if (y == 0 && x <= 0) continue;
     const Real exact_value = Angle(y, x);
@@ -233,8 +229,7 @@ TEST(Atan2, LibraryErrorIsBelowOneUnit) {
 // ---- Powers.
 
 TEST(Power, IsTheRange) {
-  TracedRandom random(226);
-  for (int trial = 0; trial < 60000; ++trial) {
+  for (TracedRandom random(226); random.Again(60000);) {
     const double a = random.Coin() ? random.Uniform(-3, 3) : random.Double(), b = random.Near(a);
     const Interval x(std::min(a, b), std::max(a, b));
     const int n = random.Coin() ? random.Integer(-4, 4) : random.Integer(-64, 64);
@@ -334,11 +329,12 @@ TEST(Cut, IsFoundOnTheNegativeHalfAxisAndAtTheOrigin) {
 
 // exp(-1/e) and its derivatives at points of the interval.
 TEST(SmoothGateRanges, ContainTheExactValues) {
-  TracedRandom random(12);
-  for (int i = 0; i < 50'000; ++i) {
+  for (TracedRandom random(12); random.Again(50'000);) {
     const double lower = std::pow(10, random.Uniform(-4, 1)) - 0.01, upper = lower + random.Uniform(0, 1);
     const DerivativeRanges ranges = SmoothGateRanges({lower, upper});
-    const double x = i % 3 == 0 ? lower : i % 3 == 1 ? upper : std::min(upper, random.Uniform(lower, upper));
+    const double x = random.trial() % 3 == 0   ? lower
+                     : random.trial() % 3 == 1 ? upper
+                                               : std::min(upper, random.Uniform(lower, upper));
     if (!(x > 0)) continue;
     const Real e(x), value = exp(Real(-1) / e), first = value / e / e, second = first * (Real(1) - Real(2) * e) / e / e;
     ASSERT_TRUE(Inside(value, ranges.value) && Inside(first, ranges.first) && Inside(second, ranges.second)) << x;

@@ -51,8 +51,7 @@ class IntervalOperation : public testing::TestWithParam<char> {};
 
 // All four operations are monotone in each operand, so the exact range is spanned by the ends.
 TEST_P(IntervalOperation, IsTheRangeUpToTwoDoubles) {
-  TracedRandom random(201);
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(201); random.Again(20000);) {
     const Interval a = random.AnyInterval(), b = random.AnyInterval();
     if (GetParam() == '/' && b.Contains(0)) {
       ASSERT_EQ(a / b, Interval::Entire());
@@ -108,9 +107,8 @@ TEST(Interval, HalfWidthAndMiddleHoldAtEveryScale) {
 }
 
 TEST(Directed, HalfUpIsTheLeastDoubleThatIsNotBelowTheHalf) {
-  TracedRandom random(204);
-  for (int trial = 0; trial < 60000; ++trial) {
-    const double x = trial % 2 == 0 ? random.Double() : random.Sign() * random.Integer(0, 1000) * 0x1p-1074;
+  for (TracedRandom random(204); random.Again(60000);) {
+    const double x = random.trial() % 2 == 0 ? random.Double() : random.Sign() * random.Integer(0, 1000) * 0x1p-1074;
     ASSERT_EQ(HalfUp(x), Ceiling(Rational(x) / 2)) << std::hexfloat << x;
   }
   EXPECT_EQ(HalfUp(kInfinity), kInfinity);
@@ -119,8 +117,7 @@ TEST(Directed, HalfUpIsTheLeastDoubleThatIsNotBelowTheHalf) {
 }
 
 TEST(Interval, SquareIsTheRangeUpToTwoDoubles) {
-  TracedRandom random(202);
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(202); random.Again(20000);) {
     const Interval x = random.AnyInterval();
     const Rational lower(x.lower), upper(x.upper), a = lower * lower, b = upper * upper;
     ExpectRange(sqr(x), x.Contains(0) ? Rational(0) : Rational(std::min(a, b)), std::max(a, b));
@@ -146,8 +143,7 @@ TEST(Interval, ProductsWithZeroAreZero) {
 }
 
 TEST(Interval, MiddleLiesInsideAndDistanceReachesTheEnds) {
-  TracedRandom random(203);
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(203); random.Again(20000);) {
     const Interval x = random.AnyInterval();
     const double middle = x.Middle(), y = random.Near(x.lower);
     ASSERT_TRUE(x.Contains(middle));
@@ -234,8 +230,7 @@ Interval Angle(Random& random) {
 class Trigonometric : public testing::TestWithParam<Function> {};
 
 TEST_P(Trigonometric, IsTheTrueRange) {
-  TracedRandom random(204);
-  for (int trial = 0; trial < 30000; ++trial) {
+  for (TracedRandom random(204); random.Again(30000);) {
     const Interval x = Angle(random);
     if (x.lower > x.upper) continue;
     ExpectFunctionRange(GetParam(), x);
@@ -270,9 +265,8 @@ TEST_P(Trigonometric, OfArgumentsTooLargeToReduceIsEverything) {
 
 // What elementary.cpp assumes of the C library, two units in the last place, measured.
 TEST_P(Trigonometric, LibraryErrorIsBelowOneUnit) {
-  TracedRandom random(205);
   double worst = 0, worst_at = 0;
-  for (int trial = 0; trial < 60000; ++trial) {
+  for (TracedRandom random(205); random.Again(60000);) {
     const double x = Angle(random).lower;
     const double value = GetParam() == Function::kSin   ? std::sin(x)
                          : GetParam() == Function::kCos ? std::cos(x)

@@ -97,9 +97,8 @@ class UnaryJet : public testing::TestWithParam<Unary> {};
 // Of a linear argument a = 3 w_0 - 2 w_1, so that the chain rule counts.
 TEST_P(UnaryJet, ContainsValueSlopeAndCurvature) {
   const Unary& f = GetParam();
-  TracedRandom random(520);
   int finite = 0;
-  for (int trial = 0; trial < 4000; ++trial) {
+  for (TracedRandom random(520); random.Again(4000);) {
     const double size = std::ldexp(1, -random.Integer(0, 40)), center = random.Uniform(f.lower, f.upper);
     const Interval a = Around(center, size, f.lower, f.upper);
     const Interval v = Around(random.Uniform(-1, 1), 0, -1, 1);
@@ -127,14 +126,12 @@ TEST_P(UnaryJet, ContainsValueSlopeAndCurvature) {
 // Over narrow boxes the enclosures are narrow too.
 TEST_P(UnaryJet, IsTightOverNarrowBoxes) {
   const Unary& f = GetParam();
-  TracedRandom random(521);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(521); random.Again(2000);) {
     const double center = random.Uniform(f.lower * 0.9 + f.upper * 0.1, f.upper * 0.9 + f.lower * 0.1);
     const Jet jet = f.jet(Jet::Argument(Interval(center), 0, true));
     const Derivatives exact = f.at(Real(center));
     const auto expect_near = [](const Interval& range, const Real& value) {
-      const double near = 1e-13 * (1 + std::abs(value.ToDouble()));
-      ASSERT_LE(range.upper - range.lower, near) << value;
+      ASSERT_LE(range.upper - range.lower, 1e-13 * (1 + std::abs(value.ToDouble()))) << value;
     };
     expect_near(jet.value, exact.value);
     expect_near(jet.slope, exact.first);
@@ -146,9 +143,8 @@ INSTANTIATE_TEST_SUITE_P(All, UnaryJet, testing::ValuesIn(kFunctions),
                          [](const auto& f) { return std::string(f.param.name); });
 
 TEST(JetAtan2, ContainsValueGradientAndCurvature) {
-  TracedRandom random(522);
   int finite = 0;
-  for (int trial = 0; trial < 20000; ++trial) {
+  for (TracedRandom random(522); random.Again(20000);) {
     const double size = std::ldexp(1, -random.Integer(0, 40));
     const Interval y = Around(random.Uniform(-2, 2), size, -3, 3), x = Around(random.Uniform(-2, 2), size, -3, 3);
     const bool by_y = random.Coin();

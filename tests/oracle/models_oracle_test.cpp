@@ -96,8 +96,7 @@ void ExpectJacobian(const Linearization& linearization, const Formulas& f) {
 }
 
 TEST_P(Model, LinearizationContainsValueAndJacobian) {
-  TracedRandom random(501);
-  for (int trial = 0; trial < 4000; ++trial) {
+  for (TracedRandom random(501); random.Again(4000);) {
     const Eigen::VectorXd z = AnyPoint(random);
     const Formulas f = At(GetParam(), z);
     Linearization linearization;
@@ -112,8 +111,7 @@ TEST_P(Model, LinearizationContainsValueAndJacobian) {
 }
 
 TEST_P(Model, LinearizationIsTight) {
-  TracedRandom random(502);
-  for (int trial = 0; trial < 1000; ++trial) {
+  for (TracedRandom random(502); random.Again(1000);) {
     const Eigen::VectorXd z = random.Vector(model().num_variables(), 1.2);
     Linearization linearization;
     model().Linearize(View(z), linearization);
@@ -127,9 +125,8 @@ TEST_P(Model, LinearizationIsTight) {
 
 // Rounded once from extended precision: the nearest double except where extended precision meets a tie.
 TEST_P(Model, EvaluateIsRoundedOnce) {
-  TracedRandom random(503);
   int nearest = 0, total = 0;
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(503); random.Again(3000);) {
     Eigen::VectorXd z = random.Vector(model().num_variables(), 1.2), next(model().num_states());
     z = z.cwiseAbs();  // no cancellation, so relative accuracy is due
     model().Evaluate(View(z), {next.data(), static_cast<std::size_t>(next.size())});
@@ -164,8 +161,7 @@ std::vector<Real> PointIn(Random& random, const std::vector<Interval>& box) {
 }
 
 TEST_P(Model, HessianContainsAllSecondDerivativesOverTheBox) {
-  TracedRandom random(504);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(504); random.Again(2000);) {
     const std::vector<Interval> box = AnyBox(random, model().num_variables());
     HessianEnclosure hessian;
     model().EncloseHessian(box, hessian);
@@ -202,9 +198,8 @@ TEST(PointMassModel, HasNoSecondDerivativesAtAll) {
 
 // Each second derivative uses every variable once, so its enclosure is its range: dense samples reach almost all of it.
 TEST(BicycleModel, HessianIsTheTrueRange) {
-  TracedRandom random(506);
   const auto model = MakeKinematicBicycle(kDt, kWheelbase);
-  for (int trial = 0; trial < 60; ++trial) {
+  for (TracedRandom random(506); random.Again(60);) {
     std::vector<Interval> box(8, Interval(0));
     const double theta = random.Uniform(-3, 3), v = random.Uniform(-5, 20), delta = random.Uniform(-1, 1);
     box[kTheta] = {theta - random.Uniform(0, 1), theta + random.Uniform(0, 1)};
@@ -318,10 +313,9 @@ Derivatives ByHand(std::size_t expression, double x, double y, double w) {
 }
 
 TEST(Program, DerivativesAgreeWithThoseMadeByHand) {
-  TracedRandom random(507);
   const EquationsModel<Expressions> model{Expressions{}};
   const Program& program = model.program();
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(507); random.Again(300);) {
     const std::array<double, 7> z{random.Uniform(-1, 1), random.Uniform(-1, 1), random.Sign() * random.Uniform(0.5, 2)};
     std::vector<PlainInterval> ranges;
     std::vector<Interval> intervals;
@@ -384,9 +378,8 @@ struct DomainCase {
 };
 
 TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
-  TracedRandom random(508);
   const Program& program = model().program();
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(508); random.Again(3000);) {
     const DomainCase c(random, model().num_variables());
     const ExpansionError error = BoundExpansionError(program, model().parameters(), c.domain);
     Expansion plain;
@@ -417,14 +410,13 @@ TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
 // A heading known to half a turn or worse: the sine's slopes at both ends may have the same sign, and a maximum and a
 // minimum lie between them.
 TEST(BicycleModel, PlainRangesHoldForHeadingsWiderThanPi) {
-  TracedRandom random(510);
   const auto model = MakeKinematicBicycle(kDt, kWheelbase);
   const Program& program = model->program();
   std::vector<Interval> domain(8, Interval(-1, 1));
   domain[kTheta] = Interval(-20, 20);
   domain[kV] = Interval(-20, 20);
   const ExpansionError error = BoundExpansionError(program, model->parameters(), domain);
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(510); random.Again(3000);) {
     std::vector<PlainInterval> ranges(8, {0, 0});
     Eigen::VectorXd center = Eigen::VectorXd::Zero(8);
     const double width = random.Uniform(3, 8);
@@ -457,8 +449,7 @@ TEST(BicycleModel, PlainRangesHoldForHeadingsWiderThanPi) {
 
 // The plain ranges are no looser than interval arithmetic's, which are the true ones where each variable occurs once.
 TEST_P(Model, ExpansionRangesAreTight) {
-  TracedRandom random(509);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(509); random.Again(2000);) {
     const DomainCase c(random, model().num_variables());
     Expansion plain;
     model().Expand(View(c.center), c.ranges, plain);
@@ -496,12 +487,11 @@ struct Differences {
 };
 
 TEST(ExpansionError, BoundsProductsAndQuotientsOfDifferencesThatCancel) {
-  TracedRandom random(511);
   const EquationsModel<Differences> model{Differences{}};
   const std::vector<Interval> domain{{1e6, 1e6 + 1e-3}, {1e6, 1e6 + 1e-3}, {0.5, 1e3}, {0, 1}};
   const ExpansionError error = BoundExpansionError(model.program(), model.parameters(), domain);
   std::array<double, 4> worst{};
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(511); random.Again(3000);) {
     std::vector<double> z;
     std::vector<PlainInterval> ranges;
     for (const Interval& side : domain) {

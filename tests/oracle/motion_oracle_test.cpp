@@ -2,7 +2,6 @@
 // one part of the declaration, they find contacts.
 #include "tests/test.h"
 
-#include "tests/oracle/meeting.h"
 #include "tests/oracle/motions.h"
 #include "tests/oracle/traced_random.h"
 

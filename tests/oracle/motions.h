@@ -20,14 +20,11 @@ is followed in the same way. */
 #include <utility>
 #include <vector>
 
-#include "forereach/certify/certifier.h"
 #include "forereach/certify/standing.h"
 #include "forereach/numerics/size.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/any_surroundings.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/meeting.h"
-#include "tests/oracle/random.h"
 
 namespace forereach {
 

@@ -29,10 +29,9 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
   std::vector<Expression> expressions;
   for (const auto& place : kPlaces)
     for (const std::string& coordinate : place) expressions.push_back(ParseExpression({coordinate, 1, 1}, names));
-  TracedRandom random(7301);
   Placement::Sample sample;
   std::vector<Zonotope> places(kPlaces.size());
-  for (int trial = 0; trial < 1500; ++trial) {
+  for (TracedRandom random(7301); random.Again(1500);) {
     Zonotope slice(random.Vector(3, random.Coin(0.1) ? 100 : 2),
                    random.Matrix(3, random.Integer(0, 12), std::ldexp(1, -random.Integer(1, 40))));
     if (random.Coin())
@@ -60,8 +59,7 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
           along += Real(d[static_cast<Eigen::Index>(k)]) * at;
           ASSERT_TRUE(abs(at - Real(hull.center[k])) <= Real(hull.half_width[k])) << kPlaces[i][k];
         }
-        const double support = placement.SupportUpper(sample, placement.parts()[i], d);
-        ASSERT_TRUE(along <= Real(support)) << i;
+        ASSERT_TRUE(along <= Real(placement.SupportUpper(sample, placement.parts()[i], d))) << i;
         ASSERT_TRUE(along <= Real(places[i].SupportUpper({d.data(), 3}))) << i;
       }
     }

@@ -3,7 +3,6 @@
 #include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/reach/propagator.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/traced_random.h"
@@ -141,15 +140,15 @@ TEST(PropagatorOracle, ADisturbanceFarAboveTheResidualIsRoundedOutward) {
 }
 
 TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
-  TracedRandom random(631);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(631); random.Again(2000);) {
     Zonotope slice = random.AnyZonotope(kStates, random.Integer(0, 60), std::ldexp(1, random.Integer(-40, 40)));
     for (int k = 0; k < kStates; ++k)
       if (random.Coin()) slice.mutable_slack(k) = random.Uniform(0, 1);
     std::array<double, kMaxStates> half_width{};
     Propagator::HalfWidths(slice, half_width.data());
     for (int k = 0; k < kStates; ++k)
-      ASSERT_GE(Rational(half_width[static_cast<std::size_t>(k)]), exact::HalfWidth(slice, k)) << "trial " << trial;
+      ASSERT_GE(Rational(half_width[static_cast<std::size_t>(k)]), exact::HalfWidth(slice, k))
+          << "trial " << random.trial();
   }
 }
 

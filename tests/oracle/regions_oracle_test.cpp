@@ -2,10 +2,8 @@
 // points, stay within the bounds.
 #include "tests/test.h"
 
-#include "forereach/certify/certifier.h"
 #include "forereach/residual/regional_enclosure.h"
 #include "tests/oracle/admissible.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/traced_random.h"
 
@@ -56,10 +54,9 @@ RegionalFunction<Rational> AnyTruth(Random& random, const Scene& scene) {
 }
 
 TEST(RegionsOracle, EveryResidualWithinTheRegionsLiesWithinTheBounds) {
-  TracedRandom random(2101);
   int narrower = 0, touched = 0;
-  for (int trial = 0; trial < 400; ++trial) {
-    SCOPED_TRACE("trial " + std::to_string(trial));
+  for (TracedRandom random(2101); random.Again(400);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
     Scene scene = AnyScene(random);
     const int d = scene.variables, count = random.Integer(1, 3);
     scene.observations = {Eigen::MatrixXd(count, d), Eigen::MatrixXd::Zero(count, d), Eigen::MatrixXd::Zero(count, d)};
@@ -189,10 +186,9 @@ class Costs {
 };
 
 TEST(RegionsOracle, TheCostIsThatOfTheCheapestOrderRoundedUp) {
-  TracedRandom random(2102);
   int compared = 0;
-  for (int trial = 0; trial < 1500; ++trial) {
-    SCOPED_TRACE("trial " + std::to_string(trial));
+  for (TracedRandom random(2102); random.Again(1500);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const Scene scene = AnyScene(random);
     const RegionGrid grid(scene.declaration, scene.lower, scene.upper);
     // All variables have regions, so that each of them is a move of its own.
@@ -230,10 +226,9 @@ class RegionalContainment : public testing::TestWithParam<std::tuple<bool, bool>
 
 TEST_P(RegionalContainment, NoAdmissibleRolloutLeavesTheTube) {
   const auto [bicycle, disturbed] = GetParam();
-  TracedRandom random(2111 + bicycle);
   int certified = 0, slices = 0, learned = 0, narrower = 0;
-  for (int trial = 0; trial < 40; ++trial) {
-    SCOPED_TRACE("trial " + std::to_string(trial));
+  for (TracedRandom random(2111 + bicycle); random.Again(40);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 7), disturbed);
     const auto known = std::make_shared<Problem>(*problem), plain = std::make_shared<Problem>(*problem);
     const int first = random.Coin() ? problem->transitions.size() : 1;

@@ -148,10 +148,9 @@ TEST(RemainderOracle, IsNotFiniteWhereADerivativeIsNan) {
 }
 
 TEST(RemainderOracle, CentredIsNeverWiderThanThePapers) {
-  TracedRandom random(612);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
   int narrower = 0;
-  for (int trial = 0; trial < 1000; ++trial) {
+  for (TracedRandom random(612); random.Again(1000);) {
     const Case c(random, model->program());
     const Remainder paper = c.Bound(*model, Method::kPaper);
     const Remainder centred = c.Bound(*model, Method::kCentred);

@@ -1,13 +1,10 @@
 // Observations, the pairwise test and the envelope against exact rationals.
 #include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
-#include "forereach/dynamics/step_rate.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_envelope.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/text_problems.h"
 #include "tests/oracle/traced_random.h"
 
@@ -43,9 +40,8 @@ Rational PointMassNominal(const Eigen::VectorXd& z, int k) {
 }
 
 TEST(Observe, EnclosesTheExactResidualAndOneUnitOfTheSuccessor) {
-  TracedRandom random(601);
   const auto model = MakePointMass(kDt);
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(601); random.Again(300);) {
     const double scale = std::ldexp(1, random.Integer(-1000, 900));
     Transitions data{random.Matrix(10, 6, scale), random.Matrix(10, 4, scale)};
     data.x_next(0, 0) = 0;
@@ -176,14 +172,13 @@ Rational RecordError(const Declaration& declaration, int k) {
 }
 
 TEST(Observe, WidensByTheErrorsOfTheRecordAndByNoMore) {
-  TracedRandom random(640);
   const auto model = MakePointMass(kDt);
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(640); random.Again(300);) {
     const double scale = std::ldexp(1, random.Integer(-400, 400));
     const Transitions data{random.Matrix(5, 6, scale), random.Matrix(5, 4, scale)};
     Declaration declaration{random.Matrix(4, 6).cwiseAbs(), Eigen::VectorXd::Zero(4)};
-    if (trial % 3 != 0) declaration.state_error = random.Vector(4, scale).cwiseAbs();
-    if (trial % 3 != 1) declaration.input_error = random.Vector(2, scale).cwiseAbs();
+    if (random.trial() % 3 != 0) declaration.state_error = random.Vector(4, scale).cwiseAbs();
+    if (random.trial() % 3 != 1) declaration.input_error = random.Vector(2, scale).cwiseAbs();
     const Observations exact = Observe(*model, data), observations = Observe(*model, declaration, data);
     for (int i = 0; i < 5; ++i)
       for (int k = 0; k < 4; ++k) {
@@ -274,10 +269,9 @@ Record AnyRecord(Random& random, const Robot& robot) {
 // What is observed at a place that is not the true one bounds the residual at that place. Without what e adds to the
 // successor, to f0 or to the residual it does not.
 TEST(Observe, OfAnInexactRecordBoundsTheResidualWhereItWasRecorded) {
-  TracedRandom random(641);
   std::array<int, 3> noticed{};
   int judged = 0, refused = 0;
-  for (int trial = 0; trial < 400; ++trial) {
+  for (TracedRandom random(641); random.Again(400);) {
     const ModelText text = random.Coin(0.3) ? KinkedText(random) : AnyText(random);
     std::vector<double> parameters;
     for (const auto& [name, lower, upper] : text.parameters) parameters.push_back(random.Coin() ? lower : upper);
@@ -302,7 +296,7 @@ TEST(Observe, OfAnInexactRecordBoundsTheResidualWhereItWasRecorded) {
           return Real(seen.lower(0, k)) + Real(less) - eps <= residual &&
                  residual <= Real(seen.upper(0, k)) - Real(less) + eps;
         };
-        ASSERT_TRUE(holds(0)) << "trial " << trial << ", record " << i << ", coordinate " << k;
+        ASSERT_TRUE(holds(0)) << "trial " << random.trial() << ", record " << i << ", coordinate " << k;
         ++judged;
         double of_residual = 0;
         for (int l = 0; l < robot.model->num_variables(); ++l)
@@ -449,9 +443,8 @@ TEST(FindViolation, DecidesAtTheLastBit) {
     };
     EXPECT_FALSE(at(sign * bound)) << "the bound itself is allowed";
     EXPECT_FALSE(at(sign * (bound - 0x1p-50)));
-    const auto violation = at(sign * (bound + 0x1p-50));
-    ASSERT_TRUE(violation);
-    EXPECT_FIELDS(*violation, (first, 0), (second, 1), (coordinate, 0), (difference, bound + 0x1p-50), (bound, bound));
+    const auto violation = at(sign * (bound + 0x1p-50)).value();
+    EXPECT_FIELDS(violation, (first, 0), (second, 1), (coordinate, 0), (difference, bound + 0x1p-50), (bound, bound));
   }
 }
 
@@ -494,9 +487,7 @@ TEST(FindViolation, ConstantCoordinatesDecideAtTheLastBit) {
     return FindViolation(s.declaration, s.observations);
   }());
   const Sample s = TwoPoints(0, 5, 0.5 + 0x1p-50, 0.25);
-  const auto violation = FindViolation(s.declaration, s.observations);
-  ASSERT_TRUE(violation);
-  EXPECT_FIELDS(*violation, (bound, 0.5), (difference, 0.5 + 0x1p-50));
+  EXPECT_FIELDS(FindViolation(s.declaration, s.observations).value(), (bound, 0.5), (difference, 0.5 + 0x1p-50));
 }
 
 // The first pair in the order of k, then i < j, that violates by exact arithmetic.
@@ -517,15 +508,14 @@ std::optional<Violation> BruteForce(const Sample& s) {
 
 // Small binary fractions: nothing rounds, so the test has to agree with exact arithmetic, ties and all.
 TEST(FindViolation, FindsTheFirstPairOfRowsWithColumns) {
-  TracedRandom random(603);
   int found = 0;
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(603); random.Again(2000);) {
     const int count = random.Integer(1, 12), columns = random.Integer(1, 3);
     const auto fraction = [&] { return random.Integer(-16, 16) / 4.0; };
     Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(2, columns, [&] { return random.Integer(1, 8) / 4.0; }),
                        Eigen::MatrixXd::NullaryExpr(count, columns, fraction),
                        Eigen::MatrixXd::NullaryExpr(count, 2, fraction) / 4, random.Integer(0, 2) / 4.0);
-    if (trial % 3 == 1) s.declaration.disturbance = Eigen::Vector2d(trial % 2 / 8.0, 0.25);
+    if (random.trial() % 3 == 1) s.declaration.disturbance = Eigen::Vector2d(random.trial() % 2 / 8.0, 0.25);
     s.observations.upper.array() += random.Integer(0, 1) / 8.0;
     const auto expected = BruteForce(s), violation = FindViolation(s.declaration, s.observations);
     ASSERT_EQ(violation.has_value(), expected.has_value());
@@ -541,8 +531,7 @@ TEST(FindViolation, FindsTheFirstPairOfRowsWithColumns) {
 }
 
 TEST(FindViolation, OfConstantRowsAgreesWithExactArithmetic) {
-  TracedRandom random(604);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(604); random.Again(2000);) {
     const int count = random.Integer(1, 12);
     const Sample s = Exactly(Eigen::MatrixXd::Zero(1, 2), random.Matrix(count, 2),
                              Eigen::MatrixXd::NullaryExpr(count, 1, [&] { return random.Integer(-3, 3) / 8.0; }), 0.25);
@@ -557,8 +546,7 @@ TEST(FindViolation, OfConstantRowsAgreesWithExactArithmetic) {
 }
 
 TEST(FindViolation, NeverFalsifiesWhatRationalsDoNotProve) {
-  TracedRandom random(605);
-  for (int trial = 0; trial < 1500; ++trial) {
+  for (TracedRandom random(605); random.Again(1500);) {
     const int count = random.Integer(2, 6), columns = random.Integer(1, 3);
     // Residuals on the edge of what L allows, each off by the last bits.
     const Eigen::MatrixXd slopes = random.Matrix(1, columns).cwiseAbs();
@@ -575,9 +563,8 @@ TEST(FindViolation, NeverFalsifiesWhatRationalsDoNotProve) {
 
 // A residual that uses up its whole declaration, observed through rounded successors, with sigma = 0.
 TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
-  TracedRandom random(606);
   const auto model = MakeKinematicBicycle(0.1, 2.5);
-  for (int trial = 0; trial < 60; ++trial) {
+  for (TracedRandom random(606); random.Again(60);) {
     const double slope_v = random.Uniform(0, 0.1), slope_delta = random.Uniform(0, 1);
     Transitions data{random.Matrix(60, 8), Eigen::MatrixXd(60, 6)};
     if (random.Coin()) data.z.col(5).setConstant(0.25);
@@ -611,9 +598,8 @@ TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
 
 // Wrapped and unwrapped, the same drives give the same envelope, up to the units and the width of 2 pi.
 TEST(Envelope, OfWrappedDataIsThatOfUnwrappedData) {
-  TracedRandom random(632);
   const auto model = MakeKinematicBicycle(0.1, 2.5, {2});
-  for (int trial = 0; trial < 100; ++trial) {
+  for (TracedRandom random(632); random.Again(100);) {
     auto [wrapped, turns] = TurnedTransitions(random, 40);
     Transitions unwrapped = wrapped;
     for (int i = 0; i < 40; ++i) {
@@ -703,14 +689,13 @@ class Envelope : public testing::TestWithParam<int> {};
 
 TEST_P(Envelope, IsTheExactEnvelopeRoundedOutward) {
   const int active = GetParam(), states = std::max(2, std::min(active, 9)), inputs = std::max(1, active - states + 1);
-  TracedRandom random(607 + static_cast<std::uint64_t>(active));
   const int trials = active <= 3 ? 200 : active <= 8 ? 15 : active <= 12 ? 1 : 30;
-  for (int trial = 0; trial < trials; ++trial) {
+  for (TracedRandom random(607 + static_cast<std::uint64_t>(active)); random.Again(trials);) {
     const int count = active <= 3 ? random.Integer(1, 140) : 4, variables = states + inputs;
     Sample s = Exactly(Eigen::MatrixXd::Zero(1, variables), random.Matrix(count, variables),
                        random.Matrix(count, 1, 0.1), random.Coin() ? 0 : 0.01);
     s.observations.upper.array() += 1e-6;
-    if (trial % 2 == 1) s.declaration.disturbance = Eigen::VectorXd::Constant(1, 0.003 * trial);
+    if (random.trial() % 2 == 1) s.declaration.disturbance = Eigen::VectorXd::Constant(1, 0.003 * random.trial());
     std::vector<int> columns(static_cast<std::size_t>(variables));
     for (int l = 0; l < variables; ++l) columns[static_cast<std::size_t>(l)] = l;
     for (int a = 0; a < active; ++a) {
@@ -731,8 +716,7 @@ TEST_P(Envelope, IsTheExactEnvelopeRoundedOutward) {
 INSTANTIATE_TEST_SUITE_P(ActiveColumns, Envelope, testing::Values(0, 1, 2, 3, 4, 8, 12, 13));
 
 TEST(EnvelopeOracle, HoldsForWildScales) {
-  TracedRandom random(630);
-  for (int trial = 0; trial < 500; ++trial) {
+  for (TracedRandom random(630); random.Again(500);) {
     const double scale = std::ldexp(1, random.Integer(-500, 480));
     Sample s = Exactly(random.Matrix(2, 4).cwiseAbs() * std::ldexp(1, random.Integer(-500, 480)),
                        random.Matrix(9, 4, scale), random.Matrix(9, 2, scale));
@@ -759,8 +743,7 @@ TEST(EnvelopeOracle, OverflowNeverNarrows) {
 }
 
 TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
-  TracedRandom random(631);
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(631); random.Again(3000);) {
     const auto any = [&] { return random.Double(); };
     const Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(1, 3, any).cwiseAbs(),
                              Eigen::MatrixXd::NullaryExpr(3, 3, any), Eigen::MatrixXd::NullaryExpr(3, 1, any));
@@ -782,9 +765,8 @@ TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
 // A step that lasts longer or shorter than dt, by no more than is told: what it says of the residual of dt contains it.
 // With less told it does not always.
 TEST(Observe, OfAStepOffItsTimeContainsTheResidual) {
-  TracedRandom random(3151);
   int missed = 0;
-  for (int trial = 0; trial < 600; ++trial) {
+  for (TracedRandom random(3151); random.Again(600);) {
     const bool bicycle = random.Coin();
     const auto problem = AnyProblem(random, bicycle, 1);
     if (random.Coin()) Disturb(random, *problem);
@@ -814,7 +796,7 @@ TEST(Observe, OfAStepOffItsTimeContainsTheResidual) {
       }
       return all;
     };
-    ASSERT_TRUE(contains(std::abs(longer))) << trial;
+    ASSERT_TRUE(contains(std::abs(longer))) << random.trial();
     missed += !contains(std::abs(longer) / 2);
   }
   EXPECT_GT(missed, 50);

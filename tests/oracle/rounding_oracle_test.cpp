@@ -131,11 +131,10 @@ using Both = testing::Types<Plainly, AfterCancellation>;
 TYPED_TEST_SUITE(RoundingOf, Both);
 
 TYPED_TEST(RoundingOf, ElementaryFunctionsIsBounded) {
-  TracedRandom random(530);
   const auto model = Model<TypeParam>();
   const Program& program = model->program();
   double largest = 0;
-  for (int trial = 0; trial < 400; ++trial) {
+  for (TracedRandom random(530); random.Again(400);) {
     const std::vector<Interval> domain = TypeParam::Domain(random);
     const ExpansionError error = BoundExpansionError(program, {}, domain);
     const AnyBox any(random, domain);

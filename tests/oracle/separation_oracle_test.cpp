@@ -130,25 +130,22 @@ Obstacle AnyPlanarObstacle(Random& random) {
       return Obstacle::Polygon(corners);
     }
     default: {  // a segment
-      const Eigen::VectorXd other = center + random.Vector(2);
-      return Obstacle::Polygon({center, other, center});
+      return Obstacle::Polygon({center, center + random.Vector(2), center});
     }
   }
 }
 
 TEST(PlanarSeparation, IsTheExactDistanceFromBelow) {
-  TracedRandom random(701);
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(701); random.Again(3000);) {
     ExpectSoundAndExact(AnySlice(random), AnyPlanarObstacle(random));
-    ASSERT_FALSE(HasFatalFailure()) << "trial " << trial;
+    ASSERT_FALSE(HasFatalFailure()) << "trial " << random.trial();
   }
 }
 
 // A slice's slack is as much a part of it as its generators, whichever way its distance is found.
 TEST(PlanarSeparation, CountsTheSlack) {
-  TracedRandom random(709);
   int proven = 0;
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(709); random.Again(2000);) {
     Zonotope slice = AnySlice(random);
     for (int k = 0; k < 2; ++k)
       if (random.Coin(0.8)) slice.mutable_slack(k) = std::ldexp(random.Uniform(1, 2), -random.Integer(1, 30));
@@ -157,7 +154,7 @@ TEST(PlanarSeparation, CountsTheSlack) {
     const Rational square = SquaredDistance(same, obstacle);
     for (const Separation& s : {Separate(slice, obstacle), SeparateByHulls(slice, obstacle)}) {
       if (!(s.distance > 0)) continue;
-      ASSERT_LE(Rational(s.distance) * Rational(s.distance), square) << "trial " << trial;
+      ASSERT_LE(Rational(s.distance) * Rational(s.distance), square) << "trial " << random.trial();
       ++proven;
     }
   }
@@ -165,9 +162,8 @@ TEST(PlanarSeparation, CountsTheSlack) {
 }
 
 TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
-  TracedRandom random(702);
   int proven = 0;
-  for (int trial = 0; trial < 1500; ++trial) {
+  for (TracedRandom random(702); random.Again(1500);) {
     const double scale = std::ldexp(1, random.Integer(-460, 460)), away = random.Coin() ? scale : scale * 1e8;
     const Zonotope slice(random.Vector(2, away), random.Matrix(2, random.Integer(0, 6), scale));
     const Eigen::VectorXd center = slice.CenterVector() + random.Vector(2, 8 * scale);
@@ -184,8 +180,7 @@ TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
 }
 
 TEST(PlanarSeparation, AnyDoublesAreNeverWronglyProven) {
-  TracedRandom random(703);
-  for (int trial = 0; trial < 1500; ++trial) {
+  for (TracedRandom random(703); random.Again(1500);) {
     const auto any = [&] { return random.Double(); };
     const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any),
                          Eigen::MatrixXd::NullaryExpr(2, random.Integer(0, 3), any));
@@ -201,9 +196,8 @@ TEST(PlanarSeparation, AnyDoublesAreNeverWronglyProven) {
 
 // Whole numbers, so that touching is exact: the slice's support along d meets the obstacle there.
 TEST(PlanarSeparation, TouchingIsNeverProvenAndAGapAlwaysIs) {
-  TracedRandom random(704);
   constexpr std::array<std::array<int, 3>, 4> triples{{{3, 4, 5}, {5, 12, 13}, {8, 15, 17}, {1, 0, 1}}};
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(704); random.Again(2000);) {
     const int m = random.Integer(0, 6);
     const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(2, m, [&] { return random.Integer(-5, 5); });
     const Zonotope slice(Eigen::Vector2d(random.Integer(-20, 20), random.Integer(-20, 20)), generators);
@@ -295,9 +289,8 @@ double WidestSpatialGap(const Zonotope& slice, const Obstacle& box) {
 }
 
 TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
-  TracedRandom random(705);
   int proven = 0, met = 0;
-  for (int trial = 0; trial < 800; ++trial) {
+  for (TracedRandom random(705); random.Again(800);) {
     const int m = random.Integer(0, 6);
     const bool whole = random.Coin();
     const auto entry = [&] { return whole ? random.Integer(-3, 3) : random.Uniform(-3, 3); };
@@ -318,8 +311,7 @@ TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
 }
 
 TEST(LineSeparation, IsDecidedAtTheLastBit) {
-  TracedRandom random(706);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(706); random.Again(2000);) {
     const Zonotope slice(random.Vector(1), random.Matrix(1, random.Integer(0, 5)));
     const Eigen::VectorXd lower = random.Vector(1, 4), upper = lower + random.Vector(1).cwiseAbs();
     const Separation s = Separate(slice, Obstacle::AxisBox(lower, upper));
@@ -338,8 +330,7 @@ TEST(LineSeparation, IsDecidedAtTheLastBit) {
 }
 
 TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
-  TracedRandom random(707);
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(707); random.Again(3000);) {
     const int p = random.Integer(1, 3);
     const double scale = std::ldexp(1, random.Integer(-30, 30));
     const Zonotope slice = random.AnyZonotope(p, random.Integer(0, 8));
@@ -479,12 +470,11 @@ TEST(ProjectionOracle, HullsContainTheExactProjectionWhereItCancels) {
 }
 
 TEST(ProjectionOracle, ContainsTheExactProjection) {
-  TracedRandom random(708);
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(708); random.Again(300);) {
     const int n = random.Integer(2, 6), p = random.Integer(1, 3);
     Eigen::MatrixXd matrix = random.Matrix(p, n);
-    if (trial % 3 == 1) matrix = (matrix.array() > 0.2).cast<double>();
-    if (trial % 3 == 2)  // copies coordinates
+    if (random.trial() % 3 == 1) matrix = (matrix.array() > 0.2).cast<double>();
+    if (random.trial() % 3 == 2)  // copies coordinates
       for (int k = 0; k < p; ++k) matrix.row(k) = Eigen::RowVectorXd::Unit(n, random.Integer(0, n - 1));
     Zonotope slice = random.AnyZonotope(n, random.Integer(0, 12), std::ldexp(1, random.Integer(-300, 300)));
     for (int k = 0; k < n; ++k)

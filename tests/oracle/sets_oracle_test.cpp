@@ -3,7 +3,6 @@
 
 #include "forereach/sets/linear_map.h"
 #include "forereach/sets/zonogon.h"
-#include "forereach/sets/zonotope.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/reduce_order.h"
 #include "tests/oracle/traced_random.h"
@@ -46,9 +45,8 @@ std::vector<Eigen::VectorXd> Directions(Random& random, const Zonotope& set) {
 }
 
 TEST(ZonotopeOracle, SupportAndHalfWidthsAreNeverBelowTheExactOnes) {
-  TracedRandom random(401);
   int plain_below = 0, trials = 0;
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(401); random.Again(3000);) {
     const Zonotope set = Adversarial(random, random.Integer(1, 6), random.Integer(0, 30));
     for (int k = 0; k < set.dim(); ++k) {
       const Rational half = exact::HalfWidth(set, k);
@@ -67,8 +65,7 @@ TEST(ZonotopeOracle, SupportAndHalfWidthsAreNeverBelowTheExactOnes) {
 }
 
 TEST(ZonotopeOracle, SupportIsTight) {
-  TracedRandom random(402);
-  for (int trial = 0; trial < 1000; ++trial) {
+  for (TracedRandom random(402); random.Again(1000);) {
     const Zonotope set = random.AnyZonotope(random.Integer(1, 6), random.Integer(0, 30));
     const Eigen::VectorXd d = random.Vector(set.dim());
     ASSERT_NEAR(set.SupportUpper(View(d)), exact::Support(set, View(d)).get_d(), 1e-12);
@@ -76,8 +73,7 @@ TEST(ZonotopeOracle, SupportIsTight) {
 }
 
 TEST(ZonotopeOracle, SupportHoldsAtTheEndsOfTheDoubles) {
-  TracedRandom random(403);
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(403); random.Again(3000);) {
     const int n = random.Integer(1, 4), m = random.Integer(0, 6);
     const auto any = [&] { return random.Double(); };
     const Zonotope set(Eigen::VectorXd::NullaryExpr(n, any), Eigen::MatrixXd::NullaryExpr(n, m, any));
@@ -90,8 +86,7 @@ TEST(ZonotopeOracle, SupportHoldsAtTheEndsOfTheDoubles) {
 }
 
 TEST(ZonotopeOracle, ReducedSetsContainTheOriginal) {
-  TracedRandom random(404);
-  for (int trial = 0; trial < 1500; ++trial) {
+  for (TracedRandom random(404); random.Again(1500);) {
     const int n = random.Integer(1, 6), order = random.Integer(1, 4);
     const Zonotope set = Adversarial(random, n, random.Integer(order * n, (order + 2) * n + 1));
     Zonotope reduced = set;
@@ -106,8 +101,7 @@ TEST(ZonotopeOracle, ReducedSetsContainTheOriginal) {
 
 // The size of such a column is infinite, that of the set is not.
 TEST(ZonotopeOracle, ReducesColumnsWhoseSizesOverflow) {
-  TracedRandom random(405);
-  for (int trial = 0; trial < 200; ++trial) {
+  for (TracedRandom random(405); random.Again(200);) {
     Eigen::MatrixXd generators = random.Matrix(6, 13);
     for (int huge = 0; huge < 4; ++huge)
       generators.col(3 * huge + random.Below(3)) =
@@ -154,8 +148,7 @@ std::vector<Rational> Sample(Random& random, const IntervalMatrix& matrix) {
 // Everything the exact image reaches beyond the part of the computed one that belongs to the set's generators has to
 // lie within the axes appended for errors.
 TEST(LinearMapOracle, ErrorAxesCoverEveryMatrixInside) {
-  TracedRandom random(405);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(405); random.Again(2000);) {
     const int n = random.Integer(1, 6), rows = random.Integer(1, 4), m = random.Integer(0, 20);
     const Zonotope set = Adversarial(random, n, m);
     const IntervalMatrix matrix = AnyMatrix(random, rows, n);
@@ -179,8 +172,7 @@ TEST(LinearMapOracle, ErrorAxesCoverEveryMatrixInside) {
 }
 
 TEST(LinearMapOracle, PointMatricesAddOnlyRounding) {
-  TracedRandom random(406);
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(406); random.Again(300);) {
     const Zonotope set = random.AnyZonotope(5, 12);
     std::vector<MatrixEntry> entries;
     for (int k = 0; k < 3; ++k)
@@ -192,8 +184,7 @@ TEST(LinearMapOracle, PointMatricesAddOnlyRounding) {
 }
 
 TEST(ZonogonOracle, RadiusIsTheFarthestCorner) {
-  TracedRandom random(407);
-  for (int trial = 0; trial < 600; ++trial) {
+  for (TracedRandom random(407); random.Again(600);) {
     const int dim = random.Integer(1, 3), m = random.Integer(0, 9);
     const Zonotope set = random.Coin() ? random.AnyZonotope(dim, m) : Adversarial(random, dim, m);
     Rational farthest = 0;  // squared
@@ -213,8 +204,7 @@ TEST(ZonogonOracle, RadiusIsTheFarthestCorner) {
 }
 
 TEST(ZonogonOracle, RadiusOfManyNearlyParallelGeneratorsIsTheFarthestCorner) {
-  TracedRandom random(408);
-  for (int trial = 0; trial < 100; ++trial) {
+  for (TracedRandom random(408); random.Again(100);) {
     const int m = 10;
     const double angle = random.Uniform(0, 3.2);
     Eigen::MatrixXd generators(2, m);

@@ -62,13 +62,12 @@ Rational Support(const Zonotope& slice, const std::array<double, 2>& input, cons
 }
 
 TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
-  TracedRandom random(617);
   const auto model = MakePointMass(kStep);
   Domain domain;
   domain.state = Box(Eigen::VectorXd::Constant(4, -1000), Eigen::VectorXd::Constant(4, 1000));
   domain.input = Box(Eigen::VectorXd::Constant(2, -3), Eigen::VectorXd::Constant(2, 3));
   int reduced = 0;
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(617); random.Again(3000);) {
     const Sloped residual(random);
     const int order = random.Integer(1, 5);
     const Propagator propagator(*model, domain, residual, {}, order, Method::kCentred);
@@ -88,8 +87,8 @@ TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
       const Eigen::VectorXd d = i < 4 ? Eigen::VectorXd(Eigen::VectorXd::Unit(4, i)) : random.Vector(4);
       const std::span<const double> direction(d.data(), kStates);
       const Rational exactly = Support(slice, input, residual, d), bound = exact::Support(next, direction);
-      ASSERT_GE(bound, exactly) << trial;
-      if (is_whole && !has_slack) ASSERT_LE(bound, exactly + Rational(1e-10)) << trial;
+      ASSERT_GE(bound, exactly) << random.trial();
+      if (is_whole && !has_slack) ASSERT_LE(bound, exactly + Rational(1e-10)) << random.trial();
     }
     for (std::size_t k = 0; k < kStates; ++k)
       ASSERT_GE(Rational(next_half_width[k]), exact::HalfWidth(next, static_cast<int>(k)));

@@ -12,11 +12,9 @@
 #include <string>
 
 #include "command_line/command_line.h"
-#include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
 #include "forereach/safety/separation.h"
 #include "tests/oracle/problems.h"
-#include "tests/oracle/random.h"
 
 namespace forereach {
 namespace {

@@ -101,9 +101,8 @@ bool IsInside(const Real& x, const Interval& range) {
 TEST(TextEnclosure, ContainsTheValueAtEveryPoint) {
   const TextEnclosure enclosure(kNames, Texts());
   const Exact exact;
-  TracedRandom random(7201);
   std::size_t finite = 0, all = 0;
-  for (int trial = 0; trial < 3000; ++trial) {
+  for (TracedRandom random(7201); random.Again(3000);) {
     const Enclosed enclosed = AnyEnclosed(random, enclosure);
     for (int sample = 0; sample < 4; ++sample) {
       std::vector<Real> at = PointOf(random, enclosed.slice);
@@ -159,9 +158,8 @@ TEST(GrowingDisturbance, BoundsTheSizeAtEveryPointOfTheBox) {
   const ModelText text = TextModel({{"x", "x"}, {"y", "y"}}, {"u"}, {{"dt", 1, 1}, {"d", 0.5, 1.5}});
   const auto model = MakeTextModel(text);
   const std::vector<std::string> names{"x", "y", "u", "dt", "d"}, leaves{"x", "y", "u", "d", "0.3"};
-  TracedRandom random(7241);
   int finite = 0, tight = 0;
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(7241); random.Again(2000);) {
     std::vector<ExpressionText> bounds;
     for (int k = 0; k < 2; ++k) bounds.push_back({AnyExpression(random, leaves, random.Integer(1, 5), false), 1, 1});
     const GrowingDisturbance growing(*model, bounds);

@@ -4,14 +4,11 @@
 #include "tests/test.h"
 
 #include "forereach/declare/flow.h"
-#include "forereach/dynamics/expression.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/step_rate.h"
 #include "tests/oracle/any_text.h"
-#include "tests/oracle/exact.h"
 #include "tests/oracle/text_in_high_precision.h"
 #include "tests/oracle/traced_random.h"
-#include "tests/text_models.h"
 #include "verifier/equations.h"
 
 namespace forereach::text_model_test {
@@ -65,8 +62,7 @@ TEST_P(SameBitsTest, TextAndCompiledModelAgreeInExpansionRemainderAndImage) {
   EXPECT_TRUE(SameBits(error.value.data(), same.value.data(), n));
   EXPECT_TRUE(SameBits(error.jacobian.data(), same.jacobian.data(), first));
   EXPECT_TRUE(SameBits(error.hessian.data(), same.hessian.data(), second));
-  TracedRandom random(7102);
-  for (int trial = 0; trial < 2000; ++trial) {
+  for (TracedRandom random(7102); random.Again(2000);) {
     const Zonotope slice(random.Vector(static_cast<int>(n)),
                          random.Matrix(static_cast<int>(n), random.Integer(0, 40), 0.05));
     std::vector<double> half_width = HalfWidths(slice), z(d);
@@ -152,8 +148,7 @@ TEST(TextModel, ExpansionsAreWithinTheirErrors) {
 
 TEST_P(SameBitsTest, TextAndCompiledModelAgreeInValuesAndIntervals) {
   const auto [text, compiled, largest] = Models();
-  TracedRandom random(7103);
-  for (int trial = 0; trial < 1000; ++trial) {
+  for (TracedRandom random(7103); random.Again(1000);) {
     std::vector<double> z(static_cast<std::size_t>(text->num_variables())),
         next(static_cast<std::size_t>(text->num_states())), same = next;
     for (double& x : z) x = random.Uniform(-largest, largest);
@@ -196,9 +191,8 @@ TEST_P(StagesTest, EncloseValuesAndDerivatives) {
   for (const ModelText::Parameter& parameter : text.parameters) parameters.push_back(parameter.lower);
   const TextInHighPrecision exact(text, parameters);
   const int n = model->num_states(), d = model->num_variables();
-  TracedRandom random(7104);
   const Real h(0x1p-50);
-  for (int trial = 0; trial < (which == 0 ? 60 : 4); ++trial) {
+  for (TracedRandom random(7104); random.Again((which == 0 ? 60 : 4));) {
     std::vector<double> z(static_cast<std::size_t>(d));
     std::vector<Interval> box;
     std::vector<Real> point;
@@ -279,8 +273,7 @@ TEST_P(StagesTest, TheirRateContainsTheSlopeByTheDuration) {
     return TextInHighPrecision(text, parameters);
   };
   const std::size_t n = text.states.size(), d = n + text.inputs.size();
-  TracedRandom random(7105);
-  for (int trial = 0; trial < 30; ++trial) {
+  for (TracedRandom random(7105); random.Again(30);) {
     std::vector<Interval> box;
     std::vector<Real> point;
     std::vector<verifier::Real> precise_box;

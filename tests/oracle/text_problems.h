@@ -10,7 +10,6 @@
 #include "tests/oracle/any_text.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/text_in_high_precision.h"
-#include "tests/worlds.h"
 
 namespace forereach {
 
@@ -52,10 +51,7 @@ inline std::shared_ptr<Problem> AnyTextProblem(Random& random, const ModelText& 
   return problem;
 }
 
-inline std::shared_ptr<Problem> AnyTextProblem(Random& random) {
-  const ModelText text = AnyText(random);
-  return AnyTextProblem(random, text);
-}
+inline std::shared_ptr<Problem> AnyTextProblem(Random& random) { return AnyTextProblem(random, AnyText(random)); }
 
 /** Of states that are points, at kinks and beside them, or touch a kink with an end; and of boxes. */
 inline Query KinkedQuery(Random& random, const Problem& problem) {

@@ -2,7 +2,6 @@
 // doubles show.
 #include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
 #include "tests/oracle/exact.h"
@@ -85,9 +84,8 @@ TEST_F(Cancelling, ACertificateOfSuchDataIsConfirmed) {
 
 // Steps that cancel, off by up to 2^-62 of their terms; sets from points to wide ones.
 TEST_F(Cancelling, RandomCertificatesOfSuchDataAreConfirmed) {
-  TracedRandom random(1);
   int contradicting = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (TracedRandom random(1); random.Again(300);) {
     const double before = random.Uniform(-0.09, 0.09), rate = -before / kDt;
     const Rational exact = Rational(before) + Rational(kDt) * Rational(rate);
     const double after = Rational(exact + Rational(random.Uniform(-1, 1) * 0x1p-62 * before)).get_d();
@@ -97,10 +95,10 @@ TEST_F(Cancelling, RandomCertificatesOfSuchDataAreConfirmed) {
     problem->transitions.z(1, kDelta) = problem->transitions.x_next(1, kDelta) = after;
     const Rational difference = abs(Residual(0) - Residual(1));
     contradicting += difference > Allowed(0) + Allowed(1);
-    ASSERT_NO_FATAL_FAILURE(Certify(i % 3 == 0 ? 0 : i % 3 == 1 ? 0x1p-60 : 1));
+    ASSERT_NO_FATAL_FAILURE(Certify(random.trial() % 3 == 0 ? 0 : random.trial() % 3 == 1 ? 0x1p-60 : 1));
     const verifier::Verdict verdict = Verify();
-    ASSERT_EQ(verdict.status, verifier::Status::kConfirmed)
-        << i << ": " << verdict.failure.what << ": " << verdict.failure.found << ", " << verdict.failure.bound;
+    ASSERT_EQ(verdict.status, verifier::Status::kConfirmed) << random.trial() << ": " << verdict.failure.what << ": "
+                                                            << verdict.failure.found << ", " << verdict.failure.bound;
   }
   EXPECT_GT(contradicting, 200);
 }

@@ -5,7 +5,6 @@
 #include "forereach/dynamics/text_model.h"
 #include "task/motion.h"
 #include "tests/planner_bridge/tasks.h"
-#include "tests/worlds.h"
 
 namespace forereach::laws_test {
 

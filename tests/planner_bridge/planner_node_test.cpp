@@ -167,8 +167,7 @@ TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
 TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
   const robot_state_t state = Standing();
   Tell(state);
-  ASSERT_EQ(candidates_.size(), 1u);
-  const candidate_plan_t& plan = candidates_[0];
+  const candidate_plan_t& plan = Only(candidates_);
   EXPECT_EQ(plan.utime, now_ - 2000);
   EXPECT_EQ(plan.sequence, 0);
   EXPECT_EQ(plan.plan_id, plan.utime);  // so it grows over restarts
@@ -210,8 +209,7 @@ TEST_F(PlannerNodeTest, FollowsTheHintsOnceForEachStart) {
     Start(config);
     robot_state_t state = Standing();
     Tell(state);
-    ASSERT_EQ(candidates_.size(), 1u);
-    first.push_back(controls(candidates_.back()));
+    first.push_back(controls(Only(candidates_)));
     for (std::size_t round = 2; round <= 3; ++round) {
       AbstainS();
       Run(3);
@@ -790,8 +788,7 @@ TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
   EXPECT_TRUE(candidates_.empty()) << "none has been heard";
   see();
   round();
-  ASSERT_EQ(candidates_.size(), 1u);
-  EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
+  EXPECT_GT(Clearance(Only(candidates_)), config_.planner.clearance);
   Run(1001);
   round();
   EXPECT_EQ(candidates_.size(), 1u) << "they have fallen silent";
@@ -807,8 +804,7 @@ TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
 
 TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
   Tell(Standing());
-  ASSERT_EQ(candidates_.size(), 1u);
-  decision_t decision{.plan_id = candidates_.back().plan_id};
+  decision_t decision{.plan_id = Only(candidates_).plan_id};
   SetText(decision.source, PlannerNode::kSource);
   decision.outcome = decision_t::ABSTAIN_OBSTACLES;
   decision.cause = decision_t::CAUSE_NO_OBSTACLES;
@@ -1025,8 +1021,7 @@ TEST_F(PlannerNodeTest, WorksForThePointMassToo) {
   robot_state_t state = Standing();
   state.num_states = 4;
   Tell(state);
-  ASSERT_EQ(candidates_.size(), 1u);
-  EXPECT_EQ(candidates_[0].num_states, 4);
+  EXPECT_EQ(Only(candidates_).num_states, 4);
 }
 
 TEST_F(PlannerNodeTest, StopPrintsTheCounts) {

@@ -146,15 +146,13 @@ TEST(PolicyProposer, ItsPlansAreThePolicysBlocksAndEndInAStop) {
   const Policy policy = LoadPolicy(config.planner.policy);
   PolicyProposer proposer(config, policy);
   PlanRequest request = AtFiveMetresPerSecond();
-  const auto proposal = proposer.Propose(request);
-  ASSERT_TRUE(proposal);
-  EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
-  EXPECT_NEAR(proposal->states(3, proposal->states.cols() - 1), 0, 1e-9);
+  const auto proposal = proposer.Propose(request).value();
+  EXPECT_EQ(proposal.progress_steps, config.planner.progress_steps);
+  EXPECT_NEAR(proposal.states(3, proposal.states.cols() - 1), 0, 1e-9);
   // The goal is straight ahead: (7 - 5) m/s more over a block, wheels straight.
   const NominalModel& model = *config.problem->model;
   const Reference reference = MakeReference(model, Vec({0, 0, 0, 5, 1, 0}), policy.num_steps());
-  const Eigen::MatrixXd block = policy.Act(Features(request.state, reference));
-  EXPECT_EQ(proposal->controls.leftCols(8), block.leftCols(8));
+  EXPECT_EQ(proposal.controls.leftCols(8), policy.Act(Features(request.state, reference)).leftCols(8));
 
   std::set<double> directions;  // each attempt goes another way
   for (request.attempt = 1; request.attempt <= PolicyProposer::kFan; ++request.attempt)

@@ -54,11 +54,10 @@ TEST_P(ProposalsOf, AreAllowedEndAtStandstillAndComeNearer) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const PlanRequest request = From(GetParam().state, seed);
-    const auto proposal = planner->Propose(request);
-    ASSERT_TRUE(proposal);
-    EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
-    ExpectSound(config, request, *proposal);
-    EXPECT_GT(proposal->states(0, proposal->progress_steps), GetParam().reaches);
+    const auto proposal = planner->Propose(request).value();
+    EXPECT_EQ(proposal.progress_steps, config.planner.progress_steps);
+    ExpectSound(config, request, proposal);
+    EXPECT_GT(proposal.states(0, proposal.progress_steps), GetParam().reaches);
   }
 }
 
@@ -97,9 +96,7 @@ TEST_F(Planner, EveryAlgorithmFindsAProposal) {
     config.planner.time_limit_ms = 60;
     const auto planner = PlannerOf(config);
     const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 3);
-    const auto proposal = planner->Propose(request);
-    ASSERT_TRUE(proposal);
-    ExpectSound(config, request, *proposal);
+    ExpectSound(config, request, planner->Propose(request).value());
   }
 }
 
@@ -112,9 +109,8 @@ TEST_F(Planner, TheSameRequestGivesTheSameProposalWhateverWasAskedBefore) {
   const auto second = other->Propose(request);
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->controls, second->controls);
-  const auto different = planner->Propose(From(request.state, 12));
-  ASSERT_TRUE(different);
-  EXPECT_TRUE(first->controls.cols() != different->controls.cols() || first->controls != different->controls);
+  const auto different = planner->Propose(From(request.state, 12)).value();
+  EXPECT_TRUE(first->controls.cols() != different.controls.cols() || first->controls != different.controls);
 }
 
 bool AreEqual(const Proposal& one, const Proposal& other) {
@@ -123,18 +119,17 @@ bool AreEqual(const Proposal& one, const Proposal& other) {
 
 TEST_F(Planner, DoesWhatTheHintsDoWhereThereIsRoom) {
   const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 1);
-  const auto proposal = planner_->Propose(WithHints(request));
-  ASSERT_TRUE(proposal);
-  EXPECT_EQ(proposal->progress_steps, config_.planner.progress_steps);
+  const auto proposal = planner_->Propose(WithHints(request)).value();
+  EXPECT_EQ(proposal.progress_steps, config_.planner.progress_steps);
   PlanRequest wider = request;
   wider.clearance += kRoomOfHints * config_.planner.clearance_step;
-  ExpectSound(config_, wider, *proposal);
-  EXPECT_GT(proposal->states(0, proposal->progress_steps), 4.5) << "straight on";
-  EXPECT_LT(proposal->states.row(1).head(proposal->progress_steps).cwiseAbs().maxCoeff(), 0.5);
+  ExpectSound(config_, wider, proposal);
+  EXPECT_GT(proposal.states(0, proposal.progress_steps), 4.5) << "straight on";
+  EXPECT_LT(proposal.states.row(1).head(proposal.progress_steps).cwiseAbs().maxCoeff(), 0.5);
   const auto another = planner_->Propose(WithHints(From(request.state, 2))), searched = planner_->Propose(request);
   ASSERT_TRUE(another && searched);
-  EXPECT_TRUE(AreEqual(*another, *proposal)) << "no seed has a part in it";
-  EXPECT_FALSE(AreEqual(*searched, *proposal));
+  EXPECT_TRUE(AreEqual(*another, proposal)) << "no seed has a part in it";
+  EXPECT_FALSE(AreEqual(*searched, proposal));
 }
 
 // The robot drives by the first obstacle at a distance of 3.2 m.
@@ -179,22 +174,19 @@ TEST_F(Planner, ProposalsByHintsKeepTheMargins) {
   const Config config = Bicycle();
   PlanRequest request = WithHints(From(Vec({0, 3, 0, 7, 0, 0}), 1));
   const auto planner = PlannerOf(config);
-  const auto free = planner->Propose(request);
-  ASSERT_TRUE(free);
-  request.domain_margin = Vec({0, 0, 0, 0, 0.2, 0.48 - free->states.row(5).cwiseAbs().maxCoeff() + 1e-6});
+  const auto free = planner->Propose(request).value();
+  request.domain_margin = Vec({0, 0, 0, 0, 0.2, 0.48 - free.states.row(5).cwiseAbs().maxCoeff() + 1e-6});
   request.seed = 4;
-  const auto proposal = planner->Propose(request);
-  ASSERT_TRUE(proposal);
-  EXPECT_LT(proposal->states.row(5).cwiseAbs().maxCoeff(), free->states.row(5).cwiseAbs().maxCoeff());
+  const auto proposal = planner->Propose(request).value();
+  EXPECT_LT(proposal.states.row(5).cwiseAbs().maxCoeff(), free.states.row(5).cwiseAbs().maxCoeff());
 }
 
 TEST_F(Planner, KeepsTheMarginFromTheDomain) {
   PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 4);
   request.domain_margin = Vec({0, 10, 0, 0, 0.2, 0.2});
-  const auto proposal = planner_->Propose(request);
-  ASSERT_TRUE(proposal);
-  EXPECT_LE(proposal->states.row(1).cwiseAbs().maxCoeff(), 5);
-  EXPECT_LE(proposal->states.row(5).cwiseAbs().maxCoeff(), 0.28 + 1e-12);
+  const auto proposal = planner_->Propose(request).value();
+  EXPECT_LE(proposal.states.row(1).cwiseAbs().maxCoeff(), 5);
+  EXPECT_LE(proposal.states.row(5).cwiseAbs().maxCoeff(), 0.28 + 1e-12);
 }
 
 TEST_F(Planner, AnObstacleNearerThanTheClearanceAtTheStartDoesNotStopIt) {
@@ -218,9 +210,7 @@ TEST_F(Planner, ObstaclesCanBeReplaced) {
   ASSERT_FALSE(planner->Propose(blocked));
   config.obstacles.clear();
   planner->SetObstacles({});
-  const auto proposal = planner->Propose(blocked);
-  ASSERT_TRUE(proposal);
-  ExpectSound(config, blocked, *proposal);
+  ExpectSound(config, blocked, planner->Propose(blocked).value());
 }
 
 // The bicycle with a car's rectangle, to be certified at all times.
@@ -291,9 +281,7 @@ TEST_F(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
     return PlannerOf(config)->Propose(request);
   };
   EXPECT_FALSE(proposed({ahead}));
-  const auto behind_it = proposed({ahead.Moving(motion)});
-  ASSERT_TRUE(behind_it);
-  ExpectClear(config, request, *behind_it);
+  ExpectClear(config, request, proposed({ahead.Moving(motion)}).value());
   motion.velocity = {-30, 0, 0};
   EXPECT_FALSE(proposed({Obstacle::AxisBox(Vec({60, -15}), Vec({62, 15})).Moving(motion)}));
   motion.until_us = 5'400'000;  // gone before they meet

@@ -4,7 +4,6 @@
 #include <memory>
 #include <string>
 
-#include "forereach/dynamics/models/named_models.h"
 #include "task/config.h"
 #include "tests/paths.h"
 #include "tests/worlds.h"

@@ -2,8 +2,6 @@
 #include <atomic>
 #include <csignal>
 
-#include "tests/test.h"
-
 #include "bus/process.h"
 #include "task/files.h"
 #include "tests/cli/program.h"
@@ -76,8 +74,7 @@ TEST_F(BusCommands, AReloadIsTakenOrItsErrorIsShown) {
   certifier_->Signal(SIGHUP);
   EXPECT_TRUE(certifier_->WaitForLog("version 2 stays in force")) << certifier_->error();
   std::filesystem::rename(path_ + ".away", path_);
-  const Output status = Say("status");
-  EXPECT_THAT(status.text, AllOf(HasSubstr("hovercraft"), HasSubstr("version 2")));
+  EXPECT_THAT(Say("status").text, AllOf(HasSubstr("hovercraft"), HasSubstr("version 2")));
 }
 
 // Strangers' datagrams are refused all the time.

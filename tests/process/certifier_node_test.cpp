@@ -7,14 +7,12 @@
 
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
 #include "clients/supervised.h"
 #include "forereach/dynamics/models/named_residuals.h"
 #include "lcmtypes/candidate_batch.h"
 #include "simulator/sim_node.h"
 #include "tests/certifier/small_task.h"
 #include "tests/keys.h"
-#include "tests/messages.h"
 #include "tests/paths.h"
 
 namespace forereach::certifier_node_test {
@@ -82,11 +80,9 @@ TEST_F(CertifierNodeTest, ACertificateComesBeforeItsDecision) {
   bus_->Publish("PLAN_CANDIDATE", Candidate(1));
   Run();
   EXPECT_EQ(order_, "cd");
-  ASSERT_EQ(decisions_.size(), 1u);
-  EXPECT_FIELDS(decisions_[0], (outcome, decision_t::CERTIFIED), (utime, kNow));
+  EXPECT_FIELDS(Only(decisions_), (outcome, decision_t::CERTIFIED), (utime, kNow));
   EXPECT_GT(decisions_[0].elapsed_us, 0);
-  ASSERT_EQ(certified_.size(), 1u);
-  EXPECT_EQ(certified_[0].plan.plan_id, 1);
+  EXPECT_EQ(Only(certified_).plan.plan_id, 1);
 }
 
 // What comes after a decision: an advice, where the task asks for it, or a repair, where the candidate does.
@@ -128,8 +124,7 @@ TEST_F(AdvisingCertifierTest, AnAdviceComesAfterItsDecisionAndNotInItsTick) {
   EXPECT_EQ(order_, "da");
   EXPECT_FALSE(node_->busy());
   Run();
-  ASSERT_EQ(advices_.size(), 1u);
-  EXPECT_FIELDS(advices_[0], (plan_id, 1), (sequence, 0), (utime, kNow));
+  EXPECT_FIELDS(Only(advices_), (plan_id, 1), (sequence, 0), (utime, kNow));
   EXPECT_EQ(GetDigest(advices_[0].plan_digest), GetDigest(decisions_[0].plan_digest));
   Ask(2, kAccelerationOutsideDomain);
   Run();
@@ -221,8 +216,7 @@ TEST_F(RepairingCertifierTest, AProposalComesAfterItsDecisionAndIsCertifiedWhenI
   Run();
   EXPECT_EQ(order_, "da");
   EXPECT_FALSE(node_->busy());
-  ASSERT_EQ(advices_.size(), 1u);
-  EXPECT_EQ(GetDigest(advices_[0].plan_digest), GetDigest(decisions_[0].plan_digest));
+  EXPECT_EQ(GetDigest(Only(advices_).plan_digest), GetDigest(decisions_[0].plan_digest));
   EXPECT_NE(advices_[0].changed, 0);
   EXPECT_TRUE(certified_.empty()) << "it is no certificate";
 
@@ -231,8 +225,7 @@ TEST_F(RepairingCertifierTest, AProposalComesAfterItsDecisionAndIsCertifiedWhenI
   sent.plan_id = 2;
   bus_->Publish("PLAN_CANDIDATE", sent);
   Run();
-  ASSERT_EQ(certified_.size(), 1u);
-  EXPECT_EQ(Encode(certified_[0].plan), Encode(sent)) << "byte for byte";
+  EXPECT_EQ(Encode(Only(certified_).plan), Encode(sent)) << "byte for byte";
 }
 
 TEST_F(RepairingCertifierTest, SaysThatItFoundNone) {
@@ -241,8 +234,7 @@ TEST_F(RepairingCertifierTest, SaysThatItFoundNone) {
   AskForRepair(1, kAccelerationThatCertifies);
   Run();
   Run();
-  ASSERT_EQ(advices_.size(), 1u);
-  EXPECT_EQ(std::tuple(advices_[0].changed, advices_[0].num_changes), std::tuple(0, 0));
+  EXPECT_EQ(std::tuple(Only(advices_).changed, advices_[0].num_changes), std::tuple(0, 0));
   Begin(true);  // a task that gives advice gives it then
   AskForRepair(1, kAccelerationThatCertifies);
   Run();
@@ -614,9 +606,7 @@ TEST_F(TwoCertifiersTest, TheLaterOneRefusesToArmAndAnswersNobody) {
   StartInTurn();
   EXPECT_EQ(States(), (Charged{kInCharge, kStandingBy}));
   for (int i = 0; i < 5; ++i) {
-    const auto answers = Answers();
-    ASSERT_EQ(answers.size(), 1u);
-    EXPECT_EQ(answers[0].outcome, decision_t::CERTIFIED);
+    EXPECT_EQ(Only(Answers()).outcome, decision_t::CERTIFIED);
   }
   for (const auto& [channel, bytes] : buses_[1].sent) EXPECT_EQ(channel, "CERTIFIER_STATUS");
   Pass(600'000);
@@ -636,8 +626,7 @@ TEST_F(TwoCertifiersTest, AShadowGivesWayToACertifierAndHoldsUpNone) {
   Start(0);
   Pass(1'000'000);
   auto answers = Answers();
-  ASSERT_EQ(answers.size(), 1u);
-  EXPECT_EQ(answers[0].cause, decision_t::CAUSE_SHADOW);
+  EXPECT_EQ(Only(answers).cause, decision_t::CAUSE_SHADOW);
   config_.gate.shadow = false;
   Start(1);
   Pass(Charge::kListenUs + 100'000);
@@ -656,16 +645,13 @@ TEST_F(TwoCertifiersTest, AShadowGivesWayToACertifierAndHoldsUpNone) {
   nodes_[1].reset();
   Pass(Charge::kSilenceUs + 2 * Charge::kListenUs);
   answers = Answers();
-  ASSERT_EQ(answers.size(), 1u);
-  EXPECT_EQ(answers[0].cause, decision_t::CAUSE_SHADOW);
+  EXPECT_EQ(Only(answers).cause, decision_t::CAUSE_SHADOW);
 }
 
 TEST_F(TwoCertifiersTest, OfTwoThatStartTogetherOneTakesChargeAndCandidatesWaitForIt) {
   Start(0);
   Start(1);
-  const auto answers = Answers();
-  ASSERT_EQ(answers.size(), 1u);
-  EXPECT_EQ(answers[0].cause, decision_t::CAUSE_NO_OBSTACLES) << "it has not listened to anything before";
+  EXPECT_EQ(Only(Answers()).cause, decision_t::CAUSE_NO_OBSTACLES) << "it has not listened to anything before";
   const bool first = Status(0).instance < Status(1).instance;
   EXPECT_EQ(States(), first ? (Charged{kInCharge, kStandingBy}) : (Charged{kStandingBy, kInCharge}));
   EXPECT_EQ(Answers().size(), 1u);
@@ -1009,8 +995,7 @@ TEST_F(RobotClockTest, WhatARobotThatHasFinishedOrAResetLeavesIsForgotten) {
   last.mode = robot_state_t::FINISHED;
   last.utime -= 90'000;
   SayState(last);
-  const decision_t decision = Ask();
-  EXPECT_EQ(GetText(decision.message), "rejected: waits for the robot's state");
+  EXPECT_EQ(GetText(Ask().message), "rejected: waits for the robot's state");
 }
 
 // ---- A certifier that was stopped.
@@ -1058,8 +1043,7 @@ TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "just in time";
   Pass(1);
   Run();
-  ASSERT_EQ(faults_.size(), 1u);
-  EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+  EXPECT_EQ(Only(faults_).cause, fault_t::ROBOT_STATE_LOST);
   SayState(State());
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "that it is back does not clear it";
   EXPECT_EQ(status_.back().level, certifier_status_t::ERROR);
@@ -1218,8 +1202,7 @@ TEST_F(StrangerTest, LatchesOnAnUnknownPlanOnceEarlierCertifiersPlansHaveEnded) 
   EXPECT_TRUE(faults_.empty()) << "the certifier before this may have certified it";
   Pass(1);
   SayState(State(7, 3));
-  ASSERT_EQ(faults_.size(), 1u);
-  EXPECT_FIELDS(faults_[0], (cause, fault_t::UNCERTIFIED_PLAN), (plan_id, 7), (step, 3));
+  EXPECT_FIELDS(Only(faults_), (cause, fault_t::UNCERTIFIED_PLAN), (plan_id, 7), (step, 3));
   EXPECT_EQ(GetText(faults_[0].message), "the robot executes plan 7, which was not certified, or should have ended");
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
   Reset();
@@ -1251,8 +1234,7 @@ TEST_F(StrangerTest, LatchesWhenAnAbstainedCandidateIsExecuted) {
   StandFor(kTolerated + 1);
   ASSERT_EQ(Ask(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
   SayState(State(decisions_.back().plan_id, 0));
-  ASSERT_EQ(faults_.size(), 1u);
-  EXPECT_EQ(faults_[0].cause, fault_t::UNCERTIFIED_PLAN);
+  EXPECT_EQ(Only(faults_).cause, fault_t::UNCERTIFIED_PLAN);
 }
 
 // A certifier in shadow mode looks on while something else decides.
@@ -1287,8 +1269,7 @@ TEST_F(ArmedNodeTest, ATransitionThatContradictsTheDeclarationFalsifiesItForGood
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
   bus_->Publish("TRANSITION", Executed(*config_.problem->model, kStep, 0.01));
   Run();
-  ASSERT_EQ(faults_.size(), 1u);
-  EXPECT_FIELDS(faults_[0], (cause, fault_t::DECLARATION_FALSIFIED), (second_observation, 2),
+  EXPECT_FIELDS(Only(faults_), (cause, fault_t::DECLARATION_FALSIFIED), (second_observation, 2),
                 (transition.next_state[2], Executed(*config_.problem->model, kStep, 0.01).next_state[2]));
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
   Reset();

@@ -127,8 +127,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
                 (by_outcome[decision_t::REJECTED], 10));
 
   EXPECT_EQ(certifier_.Terminate(), 0) << certifier_.error();
-  const auto summary = nlohmann::json::parse(certifier_.output());
-  EXPECT_THAT(summary, Holds({{"candidates", 15}, {"certified", 3}}));
+  EXPECT_THAT(nlohmann::json::parse(certifier_.output()), Holds({{"candidates", 15}, {"certified", 3}}));
 }
 
 // ---- Obstacles from the bus.
@@ -250,8 +249,7 @@ TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
   EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
   const std::int64_t instance = StatusOf(0).instance;
   auto second = StartCertifier("another state");
-  const certifier_status_t other = StatusOf(instance);
-  EXPECT_NE(other.instance, instance);
+  EXPECT_NE(StatusOf(instance).instance, instance);
   ASSERT_TRUE(second->WaitForLog("is in charge on this bus: this one decides nothing")) << second->error();
   const std::size_t before = probe_.heard("PLAN_DECISION").size();
   for (int i = 0; i < 5; ++i) EXPECT_EQ(Ask().cause, decision_t::CAUSE_OBSTACLE);

@@ -5,7 +5,6 @@
 #include "clients/planner_client.h"
 #include "clients/robot_client.h"
 #include "tests/keys.h"
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::clients_test {
@@ -89,8 +88,7 @@ class PlannerClientTest : public testing::Test {
 TEST_F(PlannerClientTest, SendsWhatTheTaskSaysWithPlanIdsThatGrow) {
   const Eigen::MatrixXd controls = Eigen::MatrixXd::Random(2, 5);
   const std::int64_t first = planner_.Propose(controls, start_, {.progress_steps = 3, .repair = true});
-  const std::int64_t second = planner_.Propose(controls, start_);
-  EXPECT_EQ(second, first + 1);
+  EXPECT_EQ(planner_.Propose(controls, start_), first + 1);
   EXPECT_NEAR(static_cast<double>(first), static_cast<double>(WallClockUs()), 60e6) << "ids grow over restarts";
   ASSERT_TRUE(probe_.WaitUntil([&] { return probe_.heard("PLAN_CANDIDATE").size() == 2; }));
   const auto heard = probe_.Heard<candidate_plan_t>("PLAN_CANDIDATE");

@@ -7,10 +7,8 @@
 
 #include "certifier/process/certifier_node.h"
 #include "certifier/process/faults.h"
-#include "forereach/withdrawal_t.hpp"
 #include "tests/certifier/small_task.h"
 #include "tests/file_size_limit.h"
-#include "tests/messages.h"
 #include "tests/small_disk.h"
 
 namespace forereach::latch_test {
@@ -156,8 +154,7 @@ TEST(DeclarationFalsified, SaysWhatContradictsOfEachKindOfDeclaration) {
 TEST_F(LatchTest, AFaultOutlivesTheProcessUntilAReset) {
   Begin();
   Fault();
-  ASSERT_EQ(faults_.size(), 1u);
-  const fault_t fault = faults_[0];
+  const fault_t fault = Only(faults_);
   const std::string sentence = GetText(Ask().message);
   for (int i = 0; i < 3; ++i) {
     now_us_ += 10'000;
@@ -305,9 +302,7 @@ TEST_F(LatchTest, OneContradictionOfADeclarationIsEnough) {
     SayState();
   }
   node_.reset();
-  const auto held = LatchFile(directory_).Read();
-  ASSERT_TRUE(held);
-  EXPECT_EQ(held->contradictions.size(), 1u);
+  EXPECT_EQ(LatchFile(directory_).Read().value().contradictions.size(), 1u);
 }
 
 TEST_F(LatchTest, IsNotReadyWithMoreContradictionsThanFit) {

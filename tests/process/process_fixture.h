@@ -12,7 +12,6 @@
 #include "task/config.h"
 #include "tests/paths.h"
 #include "tests/process/child_process.h"
-#include "tests/scratch.h"
 
 namespace forereach {
 

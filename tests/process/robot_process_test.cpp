@@ -27,8 +27,7 @@ struct RobotProcessTest : testing::Test {
   robot_state_t Last() { return probe_.Heard<robot_state_t>("ROBOT_STATE").back(); }
 
   std::ptrdiff_t Count(int kind) {
-    const auto events = probe_.Heard<execution_event_t>("EXECUTION_EVENT");
-    return std::ranges::count(events, kind, &execution_event_t::kind);
+    return std::ranges::count(probe_.Heard<execution_event_t>("EXECUTION_EVENT"), kind, &execution_event_t::kind);
   }
   [[nodiscard]] bool WaitForEvents(int kind, int count = 1) {
     return probe_.WaitUntil([&] { return Count(kind) >= count; });

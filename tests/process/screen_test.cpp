@@ -3,7 +3,6 @@
 
 #include "tests/test.h"
 
-#include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach::screen_test {

@@ -10,7 +10,6 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/keys.h"
-#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 #include "torture/hostile_messages.h"
 #include "torture/torture.h"

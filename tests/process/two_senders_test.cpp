@@ -3,7 +3,6 @@
 
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
-#include "forereach/execution_event_t.hpp"
 #include "tests/certifier/signed_air.h"
 #include "tests/certifier/small_task.h"
 
@@ -286,8 +285,7 @@ TEST_F(TwoRobotsTest, BothSilentIsARobotThatIsLost) {
   for (int i = 0; i < 3; ++i) Stands(first, i), Stands(second, i), Run();
   now_us_ += kTimeout + 1;
   Run();
-  ASSERT_EQ(faults_.size(), 1u);
-  EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+  EXPECT_EQ(Only(faults_).cause, fault_t::ROBOT_STATE_LOST);
 }
 
 TEST_F(TwoRobotsTest, AReloadDoesNotArm) {
@@ -412,8 +410,7 @@ TEST_F(TwoRobotsTest, APlanThatIsNotKnownIsWithdrawnThoughTwoAreHeard) {
   Stands(second, 0);
   Executes(first, 0, 77);
   Run();
-  ASSERT_EQ(withdrawals_.size(), 1u);
-  EXPECT_FIELDS(withdrawals_[0], (plan_id, 77), (cause, withdrawal_t::UNKNOWN_PLAN));
+  EXPECT_FIELDS(Only(withdrawals_), (plan_id, 77), (cause, withdrawal_t::UNKNOWN_PLAN));
 }
 
 TEST_F(TwoRobotsTest, ThatOneHasFinishedSwitchesNoFaultOffForTheOther) {
@@ -491,8 +488,7 @@ TEST_F(TwoRobotsTest, WhatOneOfThemReportsAsWrongCounts) {
   state.state[0] = 10;
   second.Say("ROBOT_STATE", state, now_us_);
   Run();
-  ASSERT_EQ(faults_.size(), 1u);
-  EXPECT_EQ(faults_[0].cause, fault_t::SLICE_LEFT);
+  EXPECT_EQ(Only(faults_).cause, fault_t::SLICE_LEFT);
 }
 
 // ---- Where two are meant.

@@ -11,7 +11,6 @@
 
 #include "tests/test.h"
 
-#include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 #include "tests/sanitized.h"

@@ -1,11 +1,9 @@
 // The certifier's node and the simulated robot on one bus and a simulated clock: a wall appears while the robot drives.
 #include "tests/test.h"
 
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
 #include "simulator/sim_node.h"
 #include "tests/certifier/small_task.h"
-#include "tests/messages.h"
 
 namespace forereach::withdrawn_drive_test {
 
@@ -164,8 +162,7 @@ TEST_F(WithdrawnDriveTest, LostWithdrawalsAreRepeated) {
   lossy_.to_lose["PLAN_WITHDRAWN"] = 3;
   SeeWall(2);
   RunFor(4'000'000);
-  ASSERT_EQ(withdrawn_.size(), 1u);
-  EXPECT_EQ(withdrawn_[0].sequence, 3);
+  EXPECT_EQ(Only(withdrawn_).sequence, 3);
   EXPECT_LT(Place(), 2);
   EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::CONTACT)));
 }
@@ -179,8 +176,7 @@ TEST_F(WithdrawnDriveTest, AnOldAnswerDoesNotStopTheRepetition) {
   execution_event_t old{.utime = now_ - 500'001, .plan_id = 1, .kind = execution_event_t::WITHDRAWN};
   bus_->Publish("EXECUTION_EVENT", old);
   RunFor(4'000'000);
-  ASSERT_EQ(withdrawn_.size(), 1u);
-  EXPECT_EQ(withdrawn_[0].sequence, 3);
+  EXPECT_EQ(Only(withdrawn_).sequence, 3);
   EXPECT_LT(Place(), 2);
 }
 
@@ -389,8 +385,7 @@ TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereNothingHasChanged) {
   Drive();
   Begin();
   RunFor(6'000'000);
-  ASSERT_EQ(withdrawn_.size(), 1u);
-  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_EQ(Only(withdrawn_).cause, withdrawal_t::UNKNOWN_PLAN);
   EXPECT_GT(certifier_->gate().certifier().num_observations(), 2u) << "what it learns itself takes nothing back";
   ExpectThePlanEnded();
 }
@@ -427,8 +422,7 @@ TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereItRestsOnLearnedTransitions) {
   Drive(predecessor);
   Begin();
   RunFor(6'000'000);
-  ASSERT_EQ(withdrawn_.size(), 1u);
-  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_EQ(Only(withdrawn_).cause, withdrawal_t::UNKNOWN_PLAN);
   ExpectThePlanEnded();
 }
 

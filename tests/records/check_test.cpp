@@ -2,10 +2,7 @@
 
 #include <cctype>
 
-#include "tests/test.h"
-
 #include "records/database.h"
-#include "records/interpreter.h"
 #include "records/kept_tasks.h"
 #include "tests/keys.h"
 #include "tests/records/course.h"

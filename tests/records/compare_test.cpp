@@ -1,8 +1,6 @@
 // `forereach replay --compare`: what another task would have changed.
 #include "records/compare.h"
 
-#include "tests/test.h"
-
 #include "records/database.h"
 #include "records/timeline.h"
 #include "tests/cli/program.h"

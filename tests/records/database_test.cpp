@@ -1,7 +1,5 @@
 #include "records/database.h"
 
-#include "tests/test.h"
-
 #include "tests/records/logs.h"
 #include "tests/records/sql.h"
 
@@ -40,8 +38,7 @@ TEST_F(DatabaseTest, RowsSurviveARoundTrip) {
   database_.BeginRun("a.lcmlog", 10);
   EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 3);
   const Rows rows = database_.Read("a.lcmlog");
-  ASSERT_EQ(rows.decisions.size(), 1u);
-  const DecisionRow& decision = rows.decisions[0];
+  const DecisionRow& decision = Only(rows.decisions);
   EXPECT_FIELDS(decision, (event.event_number, 7), (utime, 11), (candidate_utime, 12), (sequence, 13), (plan_id, 14),
                 (source, "planner"), (outcome, "abstain_safety"), (cause, "obstacle"),
                 (message, SampleRows().decisions[0].message), (step, 3), (coordinate, 4), (obstacle, 5),
@@ -49,11 +46,9 @@ TEST_F(DatabaseTest, RowsSurviveARoundTrip) {
                 (elapsed_us, 1.5));
   EXPECT_TRUE(std::isnan(decision.latency_us));
   EXPECT_FIELDS(decision, (plan_digest, "00ff"), (event.digest, "d7"));
-  ASSERT_EQ(rows.events.size(), 1u);
-  EXPECT_FIELDS(rows.events[0], (kind, "goal_reached"), (state, (std::vector<double>{0.1, -2, 1e300})), (value, 0.7),
+  EXPECT_FIELDS(Only(rows.events), (kind, "goal_reached"), (state, (std::vector<double>{0.1, -2, 1e300})), (value, 0.7),
                 (event.digest, "e8"));
-  ASSERT_EQ(rows.gaps.size(), 1u);
-  EXPECT_FIELDS(rows.gaps[0], (expected, 4), (got, 6), (lost, 2), (reason, "bus"), (event.digest, "f9"));
+  EXPECT_FIELDS(Only(rows.gaps), (expected, 4), (got, 6), (lost, 2), (reason, "bus"), (event.digest, "f9"));
   EXPECT_TRUE(database_.Read("b.lcmlog").empty());
 }
 

@@ -5,8 +5,6 @@
 #include <unistd.h>
 #include <lcm/lcm-cpp.hpp>
 
-#include "tests/test.h"
-
 #include "tests/file_size_limit.h"
 #include "tests/records/logs.h"
 

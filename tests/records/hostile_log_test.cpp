@@ -3,9 +3,6 @@
 
 #include <malloc.h>
 
-#include "tests/test.h"
-
-#include "records/event_log.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 

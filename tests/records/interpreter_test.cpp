@@ -1,8 +1,6 @@
 // Sequence numbers: missing, late and repeated messages, and restarts.
 #include "records/interpreter.h"
 
-#include "tests/test.h"
-
 #include "tests/records/logs.h"
 
 namespace forereach::interpreter_test {
@@ -18,8 +16,7 @@ struct InterpreterTest : testing::Test {
   }
 
   void ExpectOneGap(const std::string& reason, std::int64_t expected, std::int64_t got, std::int64_t lost) const {
-    ASSERT_EQ(rows_.gaps.size(), 1u);
-    EXPECT_FIELDS(rows_.gaps[0], (reason, reason), (expected, expected), (got, got), (lost, lost));
+    EXPECT_FIELDS(Only(rows_.gaps), (reason, reason), (expected, expected), (got, got), (lost, lost));
   }
 
   Interpreter interpreter_{{}, "log"};
@@ -72,8 +69,7 @@ TEST_F(InterpreterTest, ARestartIsFoundAfterAStampFarAhead) {
   Hear(7, 3600 * kSecond, 0);
   Hear(8, std::numeric_limits<std::int64_t>::max() - kNow, 1);
   Hear(3, 2 * kSecond);
-  ASSERT_EQ(rows_.gaps.size(), 1u);
-  EXPECT_FIELDS(rows_.gaps[0], (reason, "restart"), (got, 3));
+  EXPECT_FIELDS(Only(rows_.gaps), (reason, "restart"), (got, 3));
 }
 
 TEST_F(InterpreterTest, CountsGapsAtTheEndsOfTheRangeOfSequences) {

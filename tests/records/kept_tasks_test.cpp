@@ -1,8 +1,6 @@
 // The tasks of a logger's runs are kept next to its logs, including those of reloads, as long as a log needs them.
 #include "records/kept_tasks.h"
 
-#include "tests/test.h"
-
 #include "forereach/certifier_status_t.hpp"
 #include "tests/logger/disk_fixture.h"
 #include "tests/paths.h"

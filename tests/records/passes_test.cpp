@@ -1,6 +1,5 @@
 // Commands that read logs: each reads a log once, and says the same on any number of threads. This program counts the
 // bytes that it reads while a command runs in it.
-#include "tests/test.h"
 
 #include "cli/commands.h"
 #include "forereach/certified_plan_t.hpp"

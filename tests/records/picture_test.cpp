@@ -1,8 +1,6 @@
 #include "records/picture.h"
 #include "records/output_file.h"
 
-#include "tests/test.h"
-
 #include "tests/records/logs.h"
 
 namespace forereach::picture_test {

@@ -1,8 +1,6 @@
 /** A task whose log a test makes by hand, and its plans. */
 #pragma once
 
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/dynamics/models/named_models.h"
 #include "task/config.h"
 #include "tests/records/logs.h"
 #include "tests/worlds.h"

@@ -1,8 +1,6 @@
 // docs/queries.md: its columns are those of the database, and its queries answer.
 #include <regex>
 
-#include "tests/test.h"
-
 #include "records/database.h"
 #include "task/config.h"
 #include "tests/records/course.h"

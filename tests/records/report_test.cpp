@@ -1,8 +1,6 @@
 #include "records/report.h"
 #include "records/outlines.h"
 
-#include "tests/test.h"
-
 #include "tests/messages.h"
 #include "tests/records/course.h"
 #include "tests/records/point_mass.h"
@@ -49,14 +47,10 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
 
   const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
   EXPECT_FIELDS(drawn, (disagreements, 0), (picture.executed.size(), 5u), (picture.certified.size(), 6u));
-  ASSERT_EQ(drawn.picture.abstained.size(), 1u);
-  EXPECT_EQ(drawn.picture.abstained[0].size(), 7u) << "up to the slice that may touch";
-  ASSERT_EQ(drawn.picture.path.size(), 1u);
-  EXPECT_EQ(drawn.picture.path[0], Eigen::Vector2d(0, 1.8));
-  ASSERT_EQ(drawn.picture.stops.size(), 1u);
-  EXPECT_EQ(drawn.picture.stops[0], Eigen::Vector2d(0, 1.8));
-  ASSERT_EQ(drawn.picture.obstacles.size(), 1u);
-  EXPECT_EQ(drawn.picture.obstacles[0].radius(), 0.5);
+  EXPECT_EQ(Only(drawn.picture.abstained).size(), 7u) << "up to the slice that may touch";
+  EXPECT_EQ(Only(drawn.picture.path), Eigen::Vector2d(0, 1.8));
+  EXPECT_EQ(Only(drawn.picture.stops), Eigen::Vector2d(0, 1.8));
+  EXPECT_EQ(Only(drawn.picture.obstacles).radius(), 0.5);
   ASSERT_TRUE(drawn.picture.goal.has_value());
   EXPECT_EQ(drawn.picture.goal->center, Eigen::Vector2d(0, 5));
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
@@ -87,9 +81,7 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
   using Kind = Obstacle::Kind;
   const std::vector<Kind> kinds{Kind::kBox, Kind::kPolygon, Kind::kHalfSpace};
   ASSERT_TRUE(std::ranges::equal(drawn.picture.obstacles, kinds, {}, &Obstacle::kind));
-  const auto place = PlaceOf(drawn.picture.obstacles[1], 0);
-  ASSERT_TRUE(place);
-  EXPECT_THAT(place->points,
+  EXPECT_THAT(PlaceOf(drawn.picture.obstacles[1], 0).value().points,
               ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(5, 6)));
 }
 

@@ -1,8 +1,6 @@
 // Which logs belong together, and whose they are.
 #include "records/run_logs.h"
 
-#include "tests/test.h"
-
 #include "forereach/logger_status_t.hpp"
 #include "records/log_survey.h"
 #include "records/output_file.h"
@@ -56,8 +54,7 @@ TEST_F(RunLogsTest, ALongLogGoesOnByItsEnds) {
     return scratch_ / name;
   };
   const std::string a = log("a", 0, 5), b = log("b", 6, 9);
-  const LogEnds ends = EndsOf(a);
-  EXPECT_FIELDS(ends, (logger.first, 0), (logger.last, 5), (utime.first, 0), (utime.last, 5'000'000));
+  EXPECT_FIELDS(EndsOf(a), (logger.first, 0), (logger.last, 5), (utime.first, 0), (utime.last, 5'000'000));
   EXPECT_THAT(LogsOf(RunsNamedBy({a, b}, 1)), ElementsAre(ElementsAre(a, b)));
 }
 

@@ -1,7 +1,5 @@
 #include "records/shadow.h"
 
-#include "tests/test.h"
-
 #include "tests/records/point_mass.h"
 
 namespace forereach::shadow_test {

@@ -1,7 +1,5 @@
 #include "records/summary.h"
 
-#include "tests/test.h"
-
 #include "tests/messages.h"
 #include "tests/records/logs.h"
 

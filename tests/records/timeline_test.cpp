@@ -3,13 +3,8 @@
 
 #include <malloc.h>
 
-#include "tests/test.h"
-
 #include "certifier/gate/gate.h"
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/obstacle_sender.h"
-#include "forereach/certifier_status_t.hpp"
-#include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
 #include "records/replay.h"
 #include "records/report.h"

@@ -4,8 +4,6 @@
 #include <functional>
 #include <regex>
 
-#include "tests/test.h"
-
 #include "certifier/gate/gate.h"
 #include "certifier/gate/plan_ledger.h"
 #include "forereach/numerics/directed.h"
@@ -89,8 +87,7 @@ TEST(VerifyLog, NoticesALaterExpiry) {
   ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1'000'000; });
-  const auto file = ReadCertificates(path, kCourseTask);
-  ExpectMismatch(file, HasSubstr("certificate_digest"));
+  ExpectMismatch(ReadCertificates(path, kCourseTask), HasSubstr("certificate_digest"));
 }
 
 TEST(VerifyLog, RefutesASliceThatWasShrunkenAndResealed) {
@@ -170,8 +167,7 @@ TEST(VerifyLog, DamageIsNoticed) {
   log.seekp(static_cast<std::streamoff>(Read(kCourseLog).find("PLAN_CERTIFIED")) + 1000);
   log << std::string(300, 'x');
   log.close();
-  const auto file = ReadCertificates(scratch / "damaged.lcmlog", kCourseTask);
-  EXPECT_TRUE(std::ranges::any_of(file.certificates,
+  EXPECT_TRUE(std::ranges::any_of(ReadCertificates(scratch / "damaged.lcmlog", kCourseTask).certificates,
                                   [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
 }
 
@@ -226,8 +222,7 @@ struct VerifyObstacles : testing::Test {
 
 TEST_F(VerifyObstacles, JudgesByTheObstaclesInForce) {
   const auto file = ReadCertificates(Record(), kCourseTask);
-  ASSERT_EQ(file.certificates.size(), 1u);
-  EXPECT_FIELDS(file.certificates[0], (mismatches.empty(), true), (certificate.obstacles.back().points()[0][0], 80));
+  EXPECT_FIELDS(Only(file.certificates), (mismatches.empty(), true), (certificate.obstacles.back().points()[0][0], 80));
   EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
 }
 
@@ -454,8 +449,7 @@ class VerifyMovingObstacles : public VerifyObstacles {
 
 TEST_F(VerifyMovingObstacles, AreMetAtTheTimesOfThePlan) {
   const CertificateFile file = Decide(Mover(80), Mover(80));
-  ASSERT_EQ(file.certificates.size(), 1u);
-  for (const Mismatch& mismatch : file.certificates[0].mismatches)
+  for (const Mismatch& mismatch : Only(file.certificates).mismatches)
     ADD_FAILURE() << mismatch.what << ": " << mismatch.expected << ", found " << mismatch.found;
   const Schedule& schedule = file.certificates[0].certificate.schedule;
   EXPECT_FIELDS(schedule, (start_us, candidate_.start_utime), (step_us, candidate_.step_us), (clock_error_us, 20'000));

@@ -18,8 +18,7 @@ double Distance(const PixelBox& box, const Label& label) {
 }
 
 TEST(Labels, OfClustersOverlapNothing) {
-  TracedRandom random(18);
-  for (int round = 0; round < 100; ++round) {
+  for (TracedRandom random(18); random.Again(100);) {
     std::vector<PixelBox> marks;
     std::vector<Label> labels;
     // Some on one spot, some at the frame's edges.
@@ -48,8 +47,7 @@ TEST(Labels, OfClustersOverlapNothing) {
 TEST(Labels, OfALoneMarkIsBesideIt) {
   const std::vector<Label> labels{{300, 200, "25"}};
   const std::vector<PixelBox> marks{MarkAt(300, 200)};
-  const std::vector<PixelBox> boxes = PlaceLabels(kFrame, marks, {}, labels, kClearance);
-  EXPECT_NEAR(Distance(boxes.front(), labels.front()), kClearance, 1e-9);
+  EXPECT_NEAR(Distance(PlaceLabels(kFrame, marks, {}, labels, kClearance).front(), labels.front()), kClearance, 1e-9);
 }
 
 TEST(Labels, GoOutOfALinesWay) {

@@ -44,9 +44,8 @@ TEST(PaperGrids, BoxesHaveThePapersSlack) {
 TEST(PaperGrids, ABoxBoundsTheSlopesOfAllItsParameters) {
   const HeadingSaturation low = Scaled(0.8), high = Scaled(1.2);
   const BicycleGrid bound = PaperBicycleGrid(low, high, 25, 0.48, 500, 250);
-  TracedRandom random(5);
   double steepest = 0;
-  for (int i = 0; i < 200'000; ++i) {
+  for (TracedRandom random(5); random.Again(200'000);) {
     const auto between = [&](double a, double b) { return random.Uniform(a, b); };
     const HeadingSaturation residual{0.1,
                                      between(low.wheelbase, high.wheelbase),

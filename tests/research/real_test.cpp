@@ -245,8 +245,7 @@ TEST_F(RealTest, LearningLeavesOutOrExplainsTheLargeErrors) {
   const Drive drive = DriveOf({}, 30, 1);
   const int count = drive.transitions.size();
   const Fitted fitted = FitTo(driving_, Whole(drive));
-  const Learned all = Learn(fitted, {.quantile = 1});
-  EXPECT_FIELDS(all, (left_out, 0), (problem->transitions.size(), count));
+  EXPECT_FIELDS(Learn(fitted, {.quantile = 1}), (left_out, 0), (problem->transitions.size(), count));
   const Learned some = Learn(fitted, {.quantile = 0.9});
   EXPECT_GT(some.left_out, count / 20);
   EXPECT_FIELDS(*some.problem, (transitions.size(), count - some.left_out), (declaration.lipschitz.maxCoeff(), 0));

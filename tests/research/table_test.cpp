@@ -92,8 +92,7 @@ TEST(JointTest, LeavesOutWhatOtherRowsDecide) {
 TEST(JointTest, NoProbabilityIsPrintedAsZero) {
   Table table{"T", "About.", {}};
   for (int i = 0; i < 20; ++i) table.rows.push_back(RowOf(kWithSeeds, {0.9, 0.001, 10}));
-  const std::string text = ToMarkdown(table);
-  EXPECT_THAT(text,
+  EXPECT_THAT(ToMarkdown(table),
               AllOf(HasSubstr("with a standard error, p < 0.0001; the least of one row times their number, p < 0.0001"),
                     HasSubstr("sign test p < 0.0001.")));
 }
@@ -127,11 +126,10 @@ TEST(Statistics, AreThoseOfTheTables) {
 TEST(Table, PrintsPaperOursAndTheDifference) {
   const Table table{
       "T", "About.", {{"recall", {Mark::kFitted, kRecall}, {0.5061, 0.02, 10}, 3, ""}, {"none", {}, {}, 3, ""}}};
-  const std::string text = ToMarkdown(table);
-  EXPECT_THAT(text, AllOf(HasSubstr("## T\nAbout.\n"),
-                          HasSubstr("| recall | fitted | 0.490 | Table 1 | 0.506 ± 0.020 | +0.016 | off | "
-                                    "searched for, and not met |"),
-                          HasSubstr("| none | not given |  |  | none |  |  |  |")));
+  EXPECT_THAT(ToMarkdown(table), AllOf(HasSubstr("## T\nAbout.\n"),
+                                       HasSubstr("| recall | fitted | 0.490 | Table 1 | 0.506 ± 0.020 | +0.016 | off | "
+                                                 "searched for, and not met |"),
+                                       HasSubstr("| none | not given |  |  | none |  |  |  |")));
   EXPECT_EQ(
       ToCsv({table}),
       "table,what,mark,paper,ours,deviation,low,high,difference,word,why\n"

@@ -3,7 +3,6 @@
 
 #include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
 #include "tests/worlds.h"
 
 namespace forereach::contacts_test {

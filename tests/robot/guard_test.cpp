@@ -4,8 +4,6 @@
 
 #include "tests/test.h"
 
-#include "forereach/certified_plan_t.hpp"
-#include "lcmtypes/grounds.h"
 #include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
 
@@ -47,53 +45,45 @@ TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
   EXPECT_FIELDS(guard, (pending()->plan.plan_id, 7), (executing(), nullptr));
 }
 
+// With these digests.
+GuardCause CauseOf(Guard& guard, std::int64_t plan_id, const char* config, const char* model = "model") {
+  certified_plan_t certified = SmallPlan(plan_id);
+  SetDigest(certified.config_digest, DigestOf(config));
+  SetDigest(certified.model_digest, DigestOf(model));
+  return guard.Accept(Sealed(certified), kNow).cause;
+}
+
 TEST(GuardAccept, TakesPlansOfTheTaskThatItIsToldToExpect) {
   Guard guard(TwoStates());
-  const auto cause = [&](std::int64_t plan_id, const char* config, const char* model) {
-    certified_plan_t certified = SmallPlan();
-    certified.plan.plan_id = plan_id;
-    SetDigest(certified.config_digest, DigestOf(config));
-    SetDigest(certified.model_digest, DigestOf(model));
-    return guard.Accept(Sealed(certified), kNow).cause;
-  };
-  EXPECT_EQ(cause(10, "another config", "model"), GuardCause::kConfigDigest);
+  EXPECT_EQ(CauseOf(guard, 10, "another config", "model"), GuardCause::kConfigDigest);
   guard.Expect(DigestOf("another config"), DigestOf("another model"));
-  EXPECT_EQ(cause(11, "another config", "model"), GuardCause::kConfigDigest);
-  EXPECT_EQ(cause(12, "config", "another model"), GuardCause::kModelDigest);
-  EXPECT_EQ(cause(13, "config", "model"), GuardCause::kNone) << "the certifier may have refused the new one";
-  EXPECT_EQ(cause(14, "another config", "another model"), GuardCause::kNone);
-  EXPECT_EQ(cause(15, "config", "model"), GuardCause::kConfigDigest) << "it has not";
-  EXPECT_EQ(cause(16, "another config", "another model"), GuardCause::kNone);
+  EXPECT_EQ(CauseOf(guard, 11, "another config", "model"), GuardCause::kConfigDigest);
+  EXPECT_EQ(CauseOf(guard, 12, "config", "another model"), GuardCause::kModelDigest);
+  EXPECT_EQ(CauseOf(guard, 13, "config", "model"), GuardCause::kNone) << "the certifier may have refused the new one";
+  EXPECT_EQ(CauseOf(guard, 14, "another config", "another model"), GuardCause::kNone);
+  EXPECT_EQ(CauseOf(guard, 15, "config", "model"), GuardCause::kConfigDigest) << "it has not";
+  EXPECT_EQ(CauseOf(guard, 16, "another config", "another model"), GuardCause::kNone);
 }
 
 TEST(GuardAccept, EachTaskThatWasReadAgainMayBeTheOneInForce) {
   Guard guard(TwoStates());
-  const auto cause = [&](std::int64_t plan_id, const char* config) {
-    certified_plan_t certified = SmallPlan(plan_id);
-    SetDigest(certified.config_digest, DigestOf(config));
-    return guard.Accept(Sealed(certified), kNow).cause;
-  };
   guard.Expect(DigestOf("second"), DigestOf("model"));
   guard.Expect(DigestOf("third"), DigestOf("model"));
-  EXPECT_EQ(cause(10, "second"), GuardCause::kNone) << "the certifier has refused the third, or not taken it yet";
-  EXPECT_EQ(cause(11, "config"), GuardCause::kConfigDigest);
-  EXPECT_EQ(cause(12, "third"), GuardCause::kNone);
-  EXPECT_EQ(cause(13, "second"), GuardCause::kConfigDigest);
+  EXPECT_EQ(CauseOf(guard, 10, "second"), GuardCause::kNone)
+      << "the certifier has refused the third, or not taken it yet";
+  EXPECT_EQ(CauseOf(guard, 11, "config"), GuardCause::kConfigDigest);
+  EXPECT_EQ(CauseOf(guard, 12, "third"), GuardCause::kNone);
+  EXPECT_EQ(CauseOf(guard, 13, "second"), GuardCause::kConfigDigest);
 }
 
 TEST(GuardAccept, APlanOfTheNewestTaskInvalidatesAllOlderOnesAtOnce) {
   Guard guard(TwoStates());
-  const auto cause = [&](std::int64_t plan_id, const char* config) {
-    certified_plan_t certified = SmallPlan(plan_id);
-    SetDigest(certified.config_digest, DigestOf(config));
-    return guard.Accept(Sealed(certified), kNow).cause;
-  };
   guard.Expect(DigestOf("second"), DigestOf("model"));
   guard.Expect(DigestOf("third"), DigestOf("model"));
-  EXPECT_EQ(cause(10, "third"), GuardCause::kNone);
-  EXPECT_EQ(cause(11, "second"), GuardCause::kConfigDigest) << "no plan of it has come, and none may any more";
-  EXPECT_EQ(cause(12, "config"), GuardCause::kConfigDigest);
-  EXPECT_EQ(cause(13, "third"), GuardCause::kNone);
+  EXPECT_EQ(CauseOf(guard, 10, "third"), GuardCause::kNone);
+  EXPECT_EQ(CauseOf(guard, 11, "second"), GuardCause::kConfigDigest) << "no plan of it has come, and none may any more";
+  EXPECT_EQ(CauseOf(guard, 12, "config"), GuardCause::kConfigDigest);
+  EXPECT_EQ(CauseOf(guard, 13, "third"), GuardCause::kNone);
 }
 
 TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
@@ -328,8 +318,7 @@ TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
   certified_plan_t certified = SmallPlan();
   certified.slice_upper[0][0] = 1.25;
   EXPECT_TRUE(Start(certified, {1.25, -2}).ok());
-  const GuardVerdict verdict = Start(certified, {Above(1.25), -2});
-  EXPECT_FIELDS(verdict, (cause, GuardCause::kOutsideSlice), (step, 0), (bound, 1.25));
+  EXPECT_FIELDS(Start(certified, {Above(1.25), -2}), (cause, GuardCause::kOutsideSlice), (step, 0), (bound, 1.25));
 }
 
 TEST(GuardStart, HalfAStepOffIsOnTime) {

@@ -6,6 +6,7 @@
 
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
+#include "lcmtypes/grounds.h"
 #include "lcmtypes/seal.h"
 #include "robot/guard.h"
 
@@ -16,6 +17,13 @@ template <class Certified>
 void Seal(Certified& certified) {
   SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
+}
+
+/** Each digest of what it rests on is that of its name. */
+inline void NameGrounds(certified_plan_t& certified) {
+  SetGrounds(certified, {DigestOf("config"), DigestOf("model"), DigestOf("declaration"), DigestOf("observations"),
+                         DigestOf("obstacles")});
+  SetDigest(certified.transitions_digest, DigestOf("transitions"));
 }
 
 inline constexpr std::int64_t kPlanStart = 1'000'000'000'000, kPlanStepUs = 40'000;
@@ -44,12 +52,7 @@ inline certified_plan_t SmallPlan(std::int64_t plan_id = 7, std::int64_t step_er
     certified.slice_lower[t][1] = -5;
     certified.slice_upper[t][1] = 5;
   }
-  SetDigest(certified.config_digest, DigestOf("config"));
-  SetDigest(certified.model_digest, DigestOf("model"));
-  SetDigest(certified.declaration_digest, DigestOf("declaration"));
-  SetDigest(certified.observations_digest, DigestOf("observations"));
-  SetDigest(certified.obstacles_digest, DigestOf("obstacles"));
-  SetDigest(certified.transitions_digest, DigestOf("transitions"));
+  NameGrounds(certified);
   return certified;
 }
 

@@ -6,13 +6,10 @@
 
 #include "bus/authentic_bus.h"
 #include "bus/log.h"
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/upheld.h"
-#include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/text_model.h"
 #include "forereach/residual/observations.h"
-#include "lcmtypes/grounds.h"
 #include "tests/keys.h"
 #include "tests/messages.h"
 #include "tests/paths.h"
@@ -478,8 +475,7 @@ TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
   EXPECT_NEAR(outside.value, 0.3, 1e-12);
   EXPECT_EQ(GetText(outside.message).substr(0, 16), "emergency stop: ");
   EXPECT_FIELDS(rig, (states[3].mode, robot_state_t::STANDING), (StateAt(3)[2], 0), (StateAt(6), rig.StateAt(3)));
-  const auto summary = rig.Summary();
-  EXPECT_THAT(summary, Holds({{"steps_executed", 2}, {"steps_inside_slice", 1}, {"stops", 1}}));
+  EXPECT_THAT(rig.Summary(), Holds({{"steps_executed", 2}, {"steps_inside_slice", 1}, {"stops", 1}}));
 }
 
 // vx falls by 0.15 in each step; vy is not named, so it is zero at once.

@@ -3,7 +3,6 @@
 
 #include "tests/test.h"
 
-#include "robot/guard.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach::state_error_test {
@@ -135,8 +134,7 @@ TEST(GuardStateError, TheFirstStateThatIsNotInsideIsNamedUnlessALaterOneHasLeft)
   const GuardVerdict consistent = guard.Check(1, State{11.2, 5.2}, kNow);
   EXPECT_TRUE(consistent.ok());
   EXPECT_EQ(consistent.coordinate, 0);
-  const GuardVerdict left = guard.Check(2, State{12.2, 5.6}, kNow);
-  EXPECT_FIELDS(left, (cause, GuardCause::kOutsideSlice), (coordinate, 1));
+  EXPECT_FIELDS(guard.Check(2, State{12.2, 5.6}, kNow), (cause, GuardCause::kOutsideSlice), (coordinate, 1));
 }
 
 TEST(GuardStateError, AgainItAsksTheSameOfX0AndOfTheSlice) {

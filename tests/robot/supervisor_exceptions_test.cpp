@@ -4,7 +4,6 @@
 
 #include <new>
 
-#include "lcmtypes/grounds.h"
 #include "robot/supervisor.h"
 #include "tests/messages.h"
 #include "tests/robot/sealed_plan.h"
@@ -298,8 +297,7 @@ class TroubledRobot final : public Supervisor::Robot {
     EXPECT_EQ(supervisor.OnCommand({}, 0), "not obeyed");
   }
   void Judge(std::span<const double> control, std::int64_t now) {
-    ASSERT_EQ(control.size(), 1u);
-    const auto number = static_cast<std::int64_t>(control[0]);
+    const auto number = static_cast<std::int64_t>(Only(control));
     const std::int64_t id = number / 10, step = number % 10;
     for (std::size_t k = 0; k < 2; ++k) {
       EXPECT_LE(plans_.at(id).slice_lower[step][k], state_[k]);

@@ -2,7 +2,6 @@
 #include "tests/test.h"
 
 #include "forereach/robot_state_t.hpp"
-#include "lcmtypes/grounds.h"
 #include "robot/brake.h"
 #include "robot/supervisor.h"
 #include "tests/keys.h"

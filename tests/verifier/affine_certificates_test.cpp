@@ -1,7 +1,6 @@
 // Certificates of residuals with affine rows: what the certifier claims, the verifier derives by its own programs.
 #include "tests/test.h"
 
-#include "forereach/certify/certifier.h"
 #include "tests/oracle/affine_problems.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/verifier/is_confirmed.h"

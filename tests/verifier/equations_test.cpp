@@ -59,8 +59,7 @@ SecondEntries SecondOf(const Equations& equations, const std::vector<Real>& z) {
 TEST_P(Derivatives, AreThoseOfTheEquations) {
   const auto& [name, equations, states, variables] = GetParam();
   const Equations& of = *equations;
-  TracedRandom random(71);
-  for (int trial = 0; trial < 4; ++trial) {
+  for (TracedRandom random(71); random.Again(4);) {
     std::vector<Real> z;
     for (int l = 0; l < variables; ++l) z.emplace_back(random.Uniform(-1.4, 1.4));
     FirstEntries first = FirstOf(*equations, z);
@@ -84,8 +83,7 @@ TEST_P(Derivatives, AreThoseOfTheEquations) {
 
 TEST_P(Derivatives, BoundTheirRangeOverABox) {
   const auto& [name, equations, states, variables] = GetParam();
-  TracedRandom random(72);
-  for (int trial = 0; trial < 20; ++trial) {
+  for (TracedRandom random(72); random.Again(20);) {
     std::vector<Real> box, point;
     for (int l = 0; l < variables; ++l) {
       const double lower = random.Uniform(-1.4, 1.2), upper = lower + random.Uniform(0, 0.2);

@@ -1,7 +1,6 @@
 /** A problem whose numbers are known by hand, and what the verifier says of certificates of it. */
 #pragma once
 
-#include "forereach/dynamics/models/named_models.h"
 #include "tests/test.h"
 #include "tests/worlds.h"
 #include "verifier/verifier.h"

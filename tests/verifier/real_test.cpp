@@ -51,8 +51,7 @@ TEST(Real, SineCosineAndTangentOfAnAstronomicalAngleAreNotComputed) {
 }
 
 TEST(Real, AnIntervalHasItsEndsMiddleAndMagnitude) {
-  const Real x = Real::FromTo(-1.0, 3.0);
-  EXPECT_FIELDS(x, (lower().ToDouble(), -1), (upper().ToDouble(), 3), (middle().ToDouble(), 1),
+  EXPECT_FIELDS(Real::FromTo(-1.0, 3.0), (lower().ToDouble(), -1), (upper().ToDouble(), 3), (middle().ToDouble(), 1),
                 (magnitude().ToDouble(), 3));
   EXPECT_EQ(Real(12.0).ToDouble(-2), 3);
   EXPECT_EQ(Real(12.0).exponent(), 4);

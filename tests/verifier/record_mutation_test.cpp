@@ -1,6 +1,5 @@
 // `verify` on a decision of which one thing was changed: each leaf of the document, in every way. What is not refused
 // stands on a list here, with the reason.
-#include "tests/test.h"
 
 #include "records/decision_json.h"
 #include "tests/cli/program.h"

@@ -1,7 +1,6 @@
 // Certificates of residuals with regions: what the certifier claims, the verifier derives by its own ways.
 #include "tests/test.h"
 
-#include "forereach/certify/certifier.h"
 #include "forereach/residual/region_grid.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/traced_random.h"
@@ -12,10 +11,9 @@
 namespace forereach::verifier::regions_test {
 
 TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotDeclared) {
-  TracedRandom random(2121);
   int certified = 0, need_regions = 0, falsified = 0;
-  for (int trial = 0; trial < 80; ++trial) {
-    SCOPED_TRACE("trial " + std::to_string(trial));
+  for (TracedRandom random(2121); random.Again(80);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const bool bicycle = random.Coin();
     auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 8), random.Coin());
     if (random.Coin(0.3)) problem = Recorded(random, *problem);
@@ -60,9 +58,8 @@ TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotD
 
 // The grid's costs are never below those of the ways, and both find the same where no point lies on a side.
 TEST(Ways, CostWhatTheGridSays) {
-  TracedRandom random(2122);
   int equal = 0;
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(2122); random.Again(300);) {
     const auto problem = AnyRegionalProblem(random, random.Coin(), 1, false);
     const auto [lower, upper] = problem->domain.Corners();
     const RegionGrid grid(problem->declaration, lower, upper);

@@ -163,9 +163,8 @@ TEST(Turning, ThePlaceIsCorrelatedWithTheSlice) {
 
 // Samples of motions within the bounds: the verifier's proof excludes none of them.
 TEST(Turning, NoAdmissibleMotionMeetsWhatIsProvenClear) {
-  TracedRandom random(16);
   int close = 0;
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(16); random.Again(300);) {
     const bool spatial = random.Coin(0.3);
     const int p = spatial ? 3 : 2, n = 4, heading = spatial ? 3 : random.Integer(2, 3);
     auto problem = Halves();
@@ -227,7 +226,7 @@ TEST(Turning, NoAdmissibleMotionMeetsWhatIsProvenClear) {
     const Frame first(*problem, slices[0]), last(*problem, slices[1]);
     for (const Sweep& sweep : SweepsOf(*problem, part, first, &last)) {
       Real best;
-      ASSERT_NE(IsClear(sweep, obstacle, 0, best, passage), Answer::kYes) << "trial " << trial;
+      ASSERT_NE(IsClear(sweep, obstacle, 0, best, passage), Answer::kYes) << "trial " << random.trial();
       const Obstacle away = Obstacle::AxisBox(core + 20 * d, core + 20 * d).Moving(motion);
       close += IsClear(sweep, away, 0, best, passage) == Answer::kYes;
     }

@@ -133,12 +133,11 @@ TEST_P(TextCertificates, OfQuadraticDragAreConfirmedFromRest) {
   }
   // Rollouts of 256 bits from corners and from inside.
   const auto equations = EquationsOf(*squared->model);
-  TracedRandom random(94);
-  for (int rollout = 0; rollout < 20; ++rollout) {
+  for (TracedRandom random(94); random.Again(20);) {
     std::vector<Real> z;
     for (int k = 0; k < 8; ++k)
       z.push_back(Real(second.start.center(k)) +
-                  Real(0.03) * Real(rollout < 8 ? random.Sign() : random.Uniform(-1, 1)));
+                  Real(0.03) * Real(random.trial() < 8 ? random.Sign() : random.Uniform(-1, 1)));
     for (const double u : second.controls.col(0)) z.emplace_back(u);
     for (int t = 1; t <= 20; ++t) {
       std::ranges::copy(equations->Value(z), z.begin());
@@ -307,8 +306,7 @@ TEST_P(PointAtAKink, ASetAroundAKinkIsNotConfirmed) {
 // The kink comes in the second step, where the residual has made a box of the point.
 TEST_P(PointAtAKink, AKinkInTheSecondStepIsNotConfirmed) {
   const Zonotope initial = Initial(-0.5, 0);
-  const Decision decision = certifier_.Certify(plan_, initial, {}, tube_);
-  EXPECT_EQ(decision.outcome, Outcome::kDomain);
+  EXPECT_EQ(certifier_.Certify(plan_, initial, {}, tube_).outcome, Outcome::kDomain);
   verifier::Certificate certificate;
   certificate.initial_set = {{}, {}, initial.CenterVector(), initial.GeneratorMatrix()};
   certificate.controls = controls_;

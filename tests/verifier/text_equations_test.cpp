@@ -6,7 +6,6 @@
 #include "tests/oracle/traced_random.h"
 #include "tests/text_models.h"
 #include "tests/verifier/equations_by_hand.h"
-#include "verifier/equations.h"
 #include "verifier/expressions.h"
 
 namespace forereach::verifier::text_equations_test {
@@ -43,11 +42,10 @@ bool Inside(const Real& a, const Real& b) {
 bool AreEqual(const Real& a, const Real& b) { return Inside(a, b) && Inside(b, a); }
 
 void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int variables) {
-  TracedRandom random(81);
-  for (int trial = 0; trial < 50; ++trial) {
+  for (TracedRandom random(81); random.Again(50);) {
     std::vector<Real> box;
     for (int l = 0; l < variables; ++l) {
-      const double lower = random.Uniform(-1.4, 1), upper = lower + (trial % 2) * random.Uniform(0, 0.5);
+      const double lower = random.Uniform(-1.4, 1), upper = lower + (random.trial() % 2) * random.Uniform(0, 0.5);
       box.push_back(Real::FromTo(lower, upper));
     }
     const auto values = text.Value(box), values_by_hand = by_hand.Value(box);
@@ -66,12 +64,12 @@ void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int
                     (column, second_by_hand[i].column));
       EXPECT_TRUE(AreEqual(second[i].value, second_by_hand[i].value));
     }
-    const Real duration = Real::FromTo(0.125, trial % 2 == 0 ? 0.125 : 0.1875);
+    const Real duration = Real::FromTo(0.125, random.trial() % 2 == 0 ? 0.125 : 0.1875);
     const auto rate = text.Rate(box, duration), rate_by_hand = by_hand.Rate(box, duration);
     ASSERT_EQ(rate.size(), rate_by_hand.size());
     // Over a box the texts' order of operations may cost some width.
     for (std::size_t k = 0; k < rate.size(); ++k)
-      EXPECT_TRUE(trial % 2 == 0 ? AreEqual(rate[k], rate_by_hand[k]) : Inside(rate_by_hand[k], rate[k])) << k;
+      EXPECT_TRUE(random.trial() % 2 == 0 ? AreEqual(rate[k], rate_by_hand[k]) : Inside(rate_by_hand[k], rate[k])) << k;
     for (int k = 0; k < static_cast<int>(rate.size()); ++k)
       EXPECT_EQ(text.IsProportional(k), by_hand.IsProportional(k)) << k;
   }

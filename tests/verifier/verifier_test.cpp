@@ -1,11 +1,8 @@
 // Certificates made by hand, true by a hair and false by a hair, and the certifier's own with one thing changed.
-#include "tests/test.h"
 
-#include "forereach/dynamics/models/named_models.h"
 #include "tests/oracle/traced_random.h"
 #include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"
-#include "tests/worlds.h"
 #include "verifier/containment.h"
 #include "verifier/equations.h"
 #include "verifier/tube.h"
@@ -32,12 +29,11 @@ TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), On
 
 // f0(z) - f0(c) - J (z - c) lies inside the split remainder, wherever in the slice z is.
 TEST(SplitRemainder, HoldsAllOverTheSlice) {
-  TracedRandom random(51);
   const auto problem = std::make_shared<Problem>(
       WorldOf(MakeKinematicBicycle(0.1, 2.5), Within({1e3, 1e3, 20, 100, 10, 1.5}), Within({10, 1})));
   const auto equations = EquationsOf(*problem->model);
   constexpr int kTheta = 2, kV = 3, kDelta = 5;
-  for (int trial = 0; trial < 300; ++trial) {
+  for (TracedRandom random(51); random.Again(300);) {
     Eigen::VectorXd center = Eigen::VectorXd::Zero(6), half = Eigen::VectorXd::Zero(6);
     center[kTheta] = random.Uniform(-3, 3), center[kV] = random.Uniform(-20, 20),
     center[kDelta] = random.Uniform(-0.6, 0.6);
@@ -70,8 +66,8 @@ TEST(SplitRemainder, HoldsAllOverTheSlice) {
           const auto& [lower, upper] = tube.steps[0].remainder[k];
           const Real rounding(0x1p-150);  // of 256 bits
           ASSERT_TRUE(CertainlyAtMost(lower - rounding, rest[k]) && CertainlyAtMost(rest[k], upper + rounding))
-              << "trial " << trial << ", coordinate " << k << ": " << rest[k].text() << " outside [" << lower.text()
-              << ", " << upper.text() << "]";
+              << "trial " << random.trial() << ", coordinate " << k << ": " << rest[k].text() << " outside ["
+              << lower.text() << ", " << upper.text() << "]";
         }
       }
     }
@@ -322,8 +318,7 @@ TEST(HandMade, DistanceFromSetToSampleIsExact) {
   problem->transitions.x_next.row(0) << 0.5, 0.5, 1, 1;
   certificate = OneStep();
   certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::Vector4d(0, 0, 1, -1)};
-  const forereach::verifier::Tube tube = Verifier(problem, Method::kPaper).Derive(certificate);
-  EXPECT_DOUBLE_EQ(tube.steps[0].envelope[0].upper.ToDouble(), 1);
+  EXPECT_DOUBLE_EQ(Verifier(problem, Method::kPaper).Derive(certificate).steps[0].envelope[0].upper.ToDouble(), 1);
 }
 
 TEST(HandMade, ContradictingDataAreNoCertificate) {

@@ -1,8 +1,6 @@
 // `forereach verify` on a decision: confirmed as it is, refuted with one thing changed, digests made good again or not.
 #include <regex>
 
-#include "tests/test.h"
-
 #include "command_line/progress.h"
 #include "records/decision_json.h"
 #include "tests/cli/program.h"

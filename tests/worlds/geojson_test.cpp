@@ -75,8 +75,7 @@ TEST_F(GeoJsonTest, DegreesAreMetresEastAndNorthOfTheOrigin) {
   const std::string square =
       R"({"type": "Polygon", "coordinates": [[[179.999,0.001],[180,0.001],[180,0.002],[179.999,0.002]]]})";
   const World world = Drawing(square, {.origin = PlanePoint{180, 0}});
-  ASSERT_EQ(world.pieces.size(), 1u);
-  const Obstacle& box = world.pieces[0].obstacle;
+  const Obstacle& box = Only(world.pieces).obstacle;
   EXPECT_NEAR(box.lower().x(), -111.3195, 1e-3);
   EXPECT_NEAR(box.lower().y(), 110.5743, 2e-3);
   EXPECT_THAT(world.notes, Contains(HasSubstr("tangent plane")));

@@ -54,8 +54,7 @@ TEST(Turn, IsExactWhereRoundingIsNot) {
   for (int i = -8; i <= 8; ++i)
     for (int j = -8; j <= 8; ++j) {
       const PlanePoint moved{0.5 + i * 0x1p-53, 0.5 + j * 0x1p-53};
-      const Rational exact = Cross(ToExact(moved), ToExact(b), ToExact(c));
-      EXPECT_EQ(Turn(moved, b, c), sgn(exact)) << i << ", " << j;
+      EXPECT_EQ(Turn(moved, b, c), sgn(Cross(ToExact(moved), ToExact(b), ToExact(c)))) << i << ", " << j;
     }
   EXPECT_EQ(Turn({0, 0}, {5e-324, 0}, {0, 5e-324}), 1) << "the product underflows";
   EXPECT_EQ(Turn({0, 0}, {1e308, 1e308}, {-1e308, 1e308}), 1) << "the product overflows";

@@ -47,8 +47,7 @@ TEST(AffineEnclosure, IsEmptyWhereNoLineFits) {
 TEST(AffineEnclosure, OfTooFewObservationsIsUnbounded) {
   Task task = HandTask(0, 1);
   ObserveAt(task, 0, 1, 2);
-  const ResidualBounds bounds = HandQuery(0, 3).Of(AffineEnclosure(task.setting()));
-  EXPECT_FIELDS(bounds, (lower[2], -kInfinity), (upper[2], kInfinity));
+  EXPECT_FIELDS(HandQuery(0, 3).Of(AffineEnclosure(task.setting())), (lower[2], -kInfinity), (upper[2], kInfinity));
 }
 
 }  // namespace forereach::research::affine_test

@@ -23,8 +23,7 @@ TEST(CoveringRadius, OfACoordinateWithoutWeightIsNothing) {
 }
 
 TEST(CoveringRadius, IsAboveAGridAndClose) {
-  TracedRandom random(5);
-  for (int trial = 0; trial < 5; ++trial) {
+  for (TracedRandom random(5); random.Again(5);) {
     const Eigen::MatrixXd points = random.Matrix(random.Integer(1, 40), 2);
     const Eigen::Vector2d weights(random.Uniform(0.1, 1), random.Uniform(0.1, 1));
     const std::array<Interval, 2> box{Interval(-1, 1), Interval(-1, 1)};
@@ -85,10 +84,9 @@ TEST(Alanwar, NoiseWidensBothSides) {
 }
 
 TEST(Alanwar, IsNoNarrowerOnALargerQuery) {
-  TracedRandom random(8);
   const Task task = PointMassTask(50, 2);
   const AlanwarEnclosure enclosure(task.setting());
-  for (int trial = 0; trial < 100; ++trial) {
+  for (TracedRandom random(8); random.Again(100);) {
     const Query small = AnyQueryIn(random, task, 0.2);
     const Query large(Zonotope(small.set().slice.CenterVector(), 1.5 * small.set().slice.GeneratorMatrix()),
                       {small.set().input.begin(), small.set().input.end()});

@@ -35,10 +35,10 @@ TEST(CpSls, RadiusIsFiniteFromTheFloorOn) {
 }
 
 TEST(CpSls, UpToOneHundredObservationsAreStarvedEverywhere) {
-  TracedRandom random(2);
   const Task task = BicycleTask(100, 4);
   const CpSls method(task.setting(), {});
-  for (int trial = 0; trial < 100; ++trial) ASSERT_EQ(AnyQueryIn(random, task, 0.1).Of(method).upper[2], kInfinity);
+  for (TracedRandom random(2); random.Again(100);)
+    ASSERT_EQ(AnyQueryIn(random, task, 0.1).Of(method).upper[2], kInfinity);
 }
 
 // 150 observations +-1 at the origin, 50 of +-3 at vx = 4, one half-width of the domain away: weight exp(-1/12).

@@ -1,5 +1,4 @@
 // What holds of the methods as a family, and of ForeReach among them.
-#include "research/methods/method.h"
 
 #include "tests/test.h"
 
@@ -78,10 +77,9 @@ TEST(ScalarEnvelope, IsTheOneNormByHand) {
 }
 
 TEST(ScalarEnvelope, IsNeverNarrowerThanForeReach) {
-  TracedRandom random(10);
   const Task task = BicycleTask(100, 8);
   const auto matrix = MakeForeReach(task.setting()), scalar = MakeScalarEnvelope(task.setting());
-  for (int trial = 0; trial < 50; ++trial) {
+  for (TracedRandom random(10); random.Again(50);) {
     const Query query = AnyQueryIn(random, task, 0.1);
     const ResidualBounds tight = query.Of(*matrix), wide = query.Of(*scalar);
     for (std::size_t k = 0; k < 6; ++k) {
