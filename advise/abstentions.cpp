@@ -81,6 +81,20 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
   if (abstention.missing.empty()) Fill(judged, abstention);
 }
 
+std::vector<std::int64_t> AbstentionReader::Times() const {
+  std::vector<std::int64_t> times;
+  for (const RecordedAbstention& each : all_) times.push_back(each.decision.utime);
+  return times;
+}
+
+void AbstentionReader::KeepFrom(std::int64_t utime) {
+  for (std::size_t i = all_.size(); i-- > 0;)
+    if (all_[i].decision.utime < utime) {
+      all_.erase(all_.begin() + static_cast<std::ptrdiff_t>(i));
+      bases_.erase(bases_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+}
+
 Abstentions AbstentionReader::Finish(std::vector<std::shared_ptr<const Config>> tasks) {
   std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
   for (std::size_t i = 0; i < all_.size(); ++i) {

@@ -62,6 +62,11 @@ class AbstentionReader final : public TimelineUser {
   /** @param tasks those of the timeline. The result has nothing of what was passed over. */
   [[nodiscard]] Abstentions Finish(std::vector<std::shared_ptr<const Config>> tasks);
 
+  /** When they were decided. */
+  [[nodiscard]] std::vector<std::int64_t> Times() const;
+  /** Forgets those that were decided before. */
+  void KeepFrom(std::int64_t utime);
+
  private:
   const std::size_t most_;
   BusOptions channels_;

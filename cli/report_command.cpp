@@ -1,7 +1,9 @@
-#include <atomic>
+#include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 
 #include "cli/abstention_advice.h"
@@ -27,15 +29,27 @@ struct ReportArguments {
 };
 
 constexpr std::size_t kMostAdvised = 300;
-constexpr std::size_t kMostCases = 20'000;  // of all runs, while they are read
 
-// A run that was read once, for its tubes and its advice.
-struct PageRead {
-  explicit PageRead(const DetailBounds& bounds) : pass(bounds) { pass.others = {&abstentions}; }
+// A run that was read once, for its rows, its tubes and its advice.
+struct PageRead : PagePass {
+  explicit PageRead(const PageBounds& bounds) : PagePass(bounds) { others = {&abstentions}; }
 
   AbstentionReader abstentions{kMostAdvised};
-  PagePass pass;
 };
+
+// Forgets what the page has no room for.
+void KeepLast(const std::vector<std::unique_ptr<PageRead>>& read, const PageBounds& bounds) {
+  std::vector<PagePass*> passes;
+  std::vector<std::int64_t> times;
+  for (const auto& each : read) {
+    passes.push_back(each.get());
+    if (each) std::ranges::copy(each->abstentions.Times(), std::back_inserter(times));
+  }
+  KeepLast(passes, bounds);
+  const std::int64_t begin = BeginOfLast(std::move(times), kMostAdvised);
+  for (const auto& each : read)
+    if (each) each->abstentions.KeepFrom(begin);
+}
 
 // The advice on the last decisions that are no certificates. Without a log or its task, there is none.
 void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr<PageRead>>& read, PageRun& page) {
@@ -43,10 +57,10 @@ void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr
   std::vector<Abstentions> runs(read.size());
   std::vector<std::vector<std::size_t>> rows(read.size());  // of the abstentions
   for (std::size_t run = 0; run < read.size(); ++run) {
-    if (chosen[run].empty() || !read[run]) continue;
+    if (chosen[run].empty()) continue;
     std::map<std::string, std::size_t> row_of;  // by the event's name
-    for (const std::size_t row : chosen[run]) row_of.emplace(EventName(page.decisions[row].event), row);
-    runs[run] = read[run]->abstentions.Finish(read[run]->pass.tasks);
+    for (const std::size_t row : chosen[run]) row_of.emplace(EventName(page.decisions[row]), row);
+    runs[run] = read[run]->abstentions.Finish(read[run]->tasks);
     std::erase_if(runs[run].all, [&](const RecordedAbstention& each) { return !row_of.contains(each.event); });
     for (const RecordedAbstention& each : runs[run].all) rows[run].push_back(row_of.at(each.event));
   }
@@ -61,46 +75,43 @@ void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr
     }
 }
 
-// @param bounds of the drawings; without any, there is no advice either.
-PageRun GatherRuns(const ReportArguments& options, const std::vector<std::string>& inputs, const DetailBounds& bounds) {
+// @param bounds without drawings, there is no advice either.
+PageRun GatherRuns(const ReportArguments& options, const std::vector<std::string>& inputs, const PageBounds& bounds) {
   const ReportOptions& report = options.report;
   NamedRuns named = RunsNamedBy(inputs, options.jobs);
   const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
-  std::vector<std::unique_ptr<PageRead>> of_named(named.runs.size()), passes;
-  std::atomic<std::size_t> cases = 0;
-  auto rows = ForEachRun<PageRun>(named, options.jobs, "read", [&](const RunLogs& run, RunWork&) {
-    auto& read = of_named[static_cast<std::size_t>(&run - named.runs.data())];
-    read = std::make_unique<PageRead>(bounds);
-    PageRun of_run = GatherRows(run, tasks, read->pass);
-    if ((cases += read->pass.cases.entries().size()) > kMostCases) read.reset();  // read again if it is drawn
-    return of_run;
-  });
+  std::vector<std::unique_ptr<PageRead>> read(named.runs.size());
+  std::mutex mutex;
+  const RunLogs* first = named.runs.data();
+  static_cast<void>(ForEachRun<bool>(named, options.jobs, "read", [&](const RunLogs& run, RunWork&) {
+    auto of_run = std::make_unique<PageRead>(bounds);
+    ReadPass(run, tasks, bounds, *of_run);
+    const std::lock_guard lock(mutex);
+    read[static_cast<std::size_t>(&run - first)] = std::move(of_run);
+    if (named.is_many) KeepLast(read, bounds);
+    return true;
+  }));
   PageRun page = EmptyPage(inputs);
-  NamedRuns read{{}, {}, named.is_many};
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!rows[k]) continue;
-    AddRows(page, std::move(*rows[k]));
-    read.runs.push_back(named.runs[k]);
-    passes.push_back(std::move(of_named[k]));
+  NamedRuns drawn{{}, {}, named.is_many};
+  for (std::size_t k = 0; k < read.size(); ++k) {
+    if (!read[k]) continue;
+    AddRows(page, std::move(read[k]->rows));
+    drawn.runs.push_back(named.runs[k]);
   }
+  std::erase(read, nullptr);
   AddMissing(page, named);
   std::size_t bytes = bounds.bytes;
   if (bytes == 0) return page;
-  const auto chosen = ChooseDetails(page, bounds), advised = ChooseAdvised(page, kMostAdvised);
-  const RunLogs* const first = read.runs.data();
-  auto drawn = ForEachRun<PageRun>(read, options.jobs, "drawn", [&](const RunLogs& run, RunWork& work) {
+  const auto chosen = ChooseDetails(page, bounds);
+  first = drawn.runs.data();
+  auto drawings = ForEachRun<PageRun>(drawn, options.jobs, "drawn", [&](const RunLogs& run, RunWork& work) {
     const auto k = static_cast<std::size_t>(&run - first);
-    if (chosen[k].empty() && advised[k].empty()) return PageRun();
-    if (!passes[k]) {
-      passes[k] = std::make_unique<PageRead>(bounds);
-      ReadAgain(run, tasks, passes[k]->pass);
-    }
-    return GatherDetails(passes[k]->pass, page, chosen[k], bytes, work.threads);
+    return chosen[k].empty() ? PageRun() : GatherDetails(*read[k], page, chosen[k], bytes, work.threads);
   });
-  for (auto& drawings : drawn)
-    if (drawings) AddDetails(page, std::move(*drawings), bytes);
-  AddAdvice(options, passes, page);
-  AddMissing(page, {{}, read.missing, true});
+  for (auto& of_run : drawings)
+    if (of_run) AddDetails(page, std::move(*of_run), bytes);
+  AddAdvice(options, read, page);
+  AddMissing(page, {{}, drawn.missing, true});
   return page;
 }
 
@@ -109,7 +120,7 @@ int WritePage(const ReportArguments& options) {
   const ReportOptions& report = options.report;
   const PageRun run = GatherRuns(options, report.logs, {});
   std::optional<PageRun> before;
-  if (!options.before.empty()) before = GatherRuns(options, {options.before}, {0, 0, 0});
+  if (!options.before.empty()) before = GatherRuns(options, {options.before}, {.certified = 0, .abstained = 0, .bytes = 0});
   WriteNewFile(options.out, PageHtml(run, before ? &*before : nullptr), options.force);
   std::cout << options.out << ": " << run.decisions.size() << " decisions, " << run.details.size()
             << " with their tube or why there is none";

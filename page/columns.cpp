@@ -1,13 +1,25 @@
 #include "page/columns.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <new>
+#include <utility>
 
 #include <zlib.h>
 
 namespace forereach {
 
 static_assert(std::endian::native == std::endian::little, "columns are written as they lie in memory");
+
+Digest DigestOfHex(std::string_view hex) {
+  const auto value = [](char c) { return '0' <= c && c <= '9' ? c - '0' : 'a' <= c && c <= 'f' ? c - 'a' + 10 : -1; };
+  Digest digest{};
+  if (hex.size() != kHexDigits || std::ranges::any_of(hex, [&](char c) { return value(c) < 0; })) return digest;
+  for (std::size_t i = 0; i < digest.size(); ++i)
+    digest[i] = static_cast<std::uint8_t>(value(hex[2 * i]) << 4 | value(hex[2 * i + 1]));
+  return digest;
+}
 
 std::string Base64(std::string_view bytes) {
   constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -23,14 +35,29 @@ std::string Base64(std::string_view bytes) {
   return text;
 }
 
-nlohmann::json Packed(std::string_view bytes) {
-  uLongf size = compressBound(bytes.size());
-  std::string packed(size, '\0');
-  const int result = compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
-                               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), Z_DEFAULT_COMPRESSION);
-  if (result != Z_OK) throw std::bad_alloc();  // the room is enough, so only memory can be short
-  packed.resize(size);
-  const std::string text = Base64(packed);
+struct Packer::Stream : z_stream {};
+
+Packer::Packer() : stream_(std::make_unique<Stream>()) {
+  if (deflateInit(stream_.get(), Z_DEFAULT_COMPRESSION) != Z_OK) throw std::bad_alloc();
+}
+
+Packer::~Packer() { deflateEnd(stream_.get()); }
+
+void Packer::Deflate(std::string_view bytes, bool is_last) {
+  std::array<Bytef, 1 << 15> block;
+  stream_->next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream_->avail_in = static_cast<uInt>(bytes.size());
+  do {
+    stream_->next_out = block.data();
+    stream_->avail_out = block.size();
+    deflate(stream_.get(), is_last ? Z_FINISH : Z_NO_FLUSH);
+    packed_.append(reinterpret_cast<const char*>(block.data()), block.size() - stream_->avail_out);
+  } while (stream_->avail_out == 0);
+}
+
+nlohmann::json Packer::Finish() {
+  Deflate({}, true);
+  const std::string text = Base64(std::exchange(packed_, {}));
   return nlohmann::json::binary({text.begin(), text.end()});
 }
 

@@ -3,6 +3,8 @@ array with its DecompressionStream. */
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -10,14 +12,44 @@ array with its DecompressionStream. */
 
 #include <nlohmann/json.hpp>
 
+#include "lcmtypes/codec.h"
+
 namespace forereach {
+
+/** What ToHex made a text of; zeros for what is no such text. */
+[[nodiscard]] Digest DigestOfHex(std::string_view hex);
+[[nodiscard]] inline std::string_view BytesOf(const Digest& digest) {
+  return {reinterpret_cast<const char*>(digest.data()), digest.size()};
+}
 
 /** RFC 4648, with padding. */
 [[nodiscard]] std::string Base64(std::string_view bytes);
 
-/** Base64 of the bytes in zlib's format: a binary value, since a document has it in another place (page/document.h).
-@throws std::bad_alloc. */
-[[nodiscard]] nlohmann::json Packed(std::string_view bytes);
+/** Makes base64 of bytes in zlib's format, without holding the bytes. All throw std::bad_alloc. */
+class Packer final {
+ public:
+  Packer();
+  ~Packer();
+  Packer(const Packer&) = delete;
+  Packer& operator=(const Packer&) = delete;
+
+  void Add(std::string_view bytes) { Deflate(bytes, false); }
+  /** A binary value, since a document has it in another place (page/document.h). */
+  [[nodiscard]] nlohmann::json Finish();
+
+ private:
+  struct Stream;
+  void Deflate(std::string_view bytes, bool is_last);
+
+  std::unique_ptr<Stream> stream_;
+  std::string packed_;
+};
+
+[[nodiscard]] inline nlohmann::json Packed(std::string_view bytes) {
+  Packer packer;
+  packer.Add(bytes);
+  return packer.Finish();
+}
 
 /** A column of a page: {"type": "f64", "data": Packed}. Types are u8, u32, i32, i64, f32 and f64, little-endian. */
 template <class Number>
@@ -30,11 +62,11 @@ template <class Number>
 }
 
 /** A column of each row's number, made by `of`. */
-template <class Number, class Row, class Of>
-[[nodiscard]] nlohmann::json ColumnOf(const std::vector<Row>& rows, const Of& of) {
+template <class Number>
+[[nodiscard]] nlohmann::json ColumnOf(const auto& rows, const auto& of) {
   std::vector<Number> values;
   values.reserve(rows.size());
-  for (const Row& row : rows) values.push_back(static_cast<Number>(of(row)));
+  for (const auto& row : rows) values.push_back(static_cast<Number>(std::invoke(of, row)));
   return Column(values);
 }
 

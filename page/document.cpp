@@ -20,15 +20,14 @@ std::string ForPage(const nlohmann::json& json) {
 
 std::string Hashes(const std::vector<const PageAsset*>& assets) {
   std::string all;
-  for (const PageAsset* asset : assets) all += " 'sha256-" + Base64(DigestBytes(asset->sha256)) + "'";
+  for (const PageAsset* asset : assets) all += " 'sha256-" + Base64(BytesOf(DigestOfHex(asset->sha256))) + "'";
   return all;
 }
 
 // Moves binary values into `columns`, and puts their places there.
-void MoveColumns(nlohmann::json& json, std::vector<std::string>& columns) {
+void MoveColumns(nlohmann::json& json, std::vector<nlohmann::json::binary_t>& columns) {
   if (json.is_binary()) {
-    const auto& bytes = json.get_binary();
-    columns.emplace_back(bytes.begin(), bytes.end());
+    columns.push_back(std::move(json.get_binary()));
     json = columns.size() - 1;
   } else if (json.is_structured()) {
     for (nlohmann::json& each : json) MoveColumns(each, columns);
@@ -37,21 +36,13 @@ void MoveColumns(nlohmann::json& json, std::vector<std::string>& columns) {
 
 }  // namespace
 
-std::string DigestBytes(std::string_view hex) {
-  const auto value = [](char c) { return '0' <= c && c <= '9' ? c - '0' : 'a' <= c && c <= 'f' ? c - 'a' + 10 : -1; };
-  std::string bytes(32, '\0');
-  if (hex.size() != 64 || std::ranges::any_of(hex, [&](char c) { return value(c) < 0; })) return bytes;
-  for (std::size_t i = 0; i < 32; ++i) bytes[i] = static_cast<char>(value(hex[2 * i]) << 4 | value(hex[2 * i + 1]));
-  return bytes;
-}
-
 std::string PageDocument::Policy() const {
   return "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; connect-src " + connect +
          "; style-src" + Hashes(styles) + "; script-src" + Hashes(scripts);
 }
 
 std::string PageDocument::Html(nlohmann::json data) const {
-  std::vector<std::string> columns;
+  std::vector<nlohmann::json::binary_t> columns;
   MoveColumns(data, columns);
   std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   html += "<meta http-equiv=\"Content-Security-Policy\" content=\"" + Policy() + "\">\n";
@@ -60,8 +51,8 @@ std::string PageDocument::Html(nlohmann::json data) const {
   for (const PageAsset* style : styles) html.append("<style>").append(style->text).append("</style>\n");
   html.append("</head>\n").append(body.text);
   html += "<script type=\"application/json\" id=\"data\">" + ForPage(data) + "</script>\n";
-  for (const std::string& column : columns)
-    html.append("<script type=\"text/plain\" class=\"column\">").append(column).append("</script>\n");
+  for (const auto& column : columns)
+    html.append("<script type=\"text/plain\" class=\"column\">").append(column.begin(), column.end()).append("</script>\n");
   for (const PageAsset* script : scripts) html.append("<script>").append(script->text).append("</script>\n");
   return html + "</body>\n</html>\n";
 }

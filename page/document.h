@@ -10,9 +10,6 @@
 
 namespace forereach {
 
-/** The 32 bytes of a digest in hexadecimal; of what is none, zeros. */
-[[nodiscard]] std::string DigestBytes(std::string_view hex);
-
 struct PageDocument {
   std::string title;
   const PageAsset& body;

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <ranges>
 #include <set>
 #include <utility>
@@ -16,6 +18,7 @@
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
+#include "page/columns.h"
 #include "page/detail.h"
 #include "records/database.h"
 #include "records/interpreter.h"
@@ -50,12 +53,22 @@ std::string ReplayCommandOf(const Logs& logs, const std::string& config, const L
 
 // ---- Rows.
 
+void TakeRows(const Rows& rows, const PageBounds& bounds, PageRun& run) {
+  run.decisions.insert(run.decisions.end(), rows.decisions.begin(), rows.decisions.end());
+  for (const EventRow& row : rows.events) run.events.push_back({row.utime, row.plan_id, row.kind});
+  for (const GapRow& row : rows.gaps)
+    run.gaps.push_back({row.utime, row.lost, row.reason, row.channel, row.source});
+  run.decisions.KeepLast(bounds.decisions);
+  run.events.KeepLast(bounds.events);
+  run.gaps.KeepLast(bounds.others);
+}
+
 // Takes the rows of a log and what no row tells.
 class RowReader final : public TimelineUser {
  public:
   /** @param makes_rows false: they are known already. */
-  RowReader(const BusOptions& channels, bool makes_rows, PageRun& run)
-      : channels_(channels), makes_rows_(makes_rows), interpreter_(channels, ""), run_(run) {}
+  RowReader(const BusOptions& channels, bool makes_rows, const PageBounds& bounds, PageRun& run)
+      : channels_(channels), makes_rows_(makes_rows), bounds_(bounds), interpreter_(channels, ""), run_(run) {}
 
   void Continue(const std::string& log_file) { interpreter_.Continue(log_file); }
 
@@ -63,15 +76,15 @@ class RowReader final : public TimelineUser {
     if (makes_rows_) {
       Rows rows;
       interpreter_.Observe(event, rows);
-      std::ranges::move(rows.decisions, std::back_inserter(run_.decisions));
-      std::ranges::move(rows.events, std::back_inserter(run_.events));
-      std::ranges::move(rows.gaps, std::back_inserter(run_.gaps));
+      TakeRows(rows, bounds_, run_);
     }
     if (event.channel != channels_.fault) return;
     const auto fault = Decoded<fault_t>(event.message());
-    if (!fault || !faults_.emplace(fault->utime, fault->cause).second) return;  // it is repeated until a reset
+    if (!fault || std::exchange(fault_, std::pair(fault->utime, fault->cause)) == std::pair(fault->utime, fault->cause))
+      return;  // it is repeated until a reset
     run_.faults.push_back(
         {fault->utime, fault->plan_id, std::string(FaultName(fault->cause)), GetText(fault->message)});
+    run_.faults.KeepLast(bounds_.others);
   }
 
   void OnWithdrawn(const RecordedWithdrawal& recorded) override {
@@ -79,13 +92,15 @@ class RowReader final : public TimelineUser {
     run_.withdrawals.push_back({withdrawal.utime, withdrawal.plan_id, GetText(withdrawal.source),
                                 std::string(WithdrawalName(withdrawal.cause)), GetText(withdrawal.message),
                                 withdrawal.valid_steps});
+    run_.withdrawals.KeepLast(bounds_.others);
   }
 
  private:
   const BusOptions channels_;
   const bool makes_rows_;
+  const PageBounds& bounds_;
   Interpreter interpreter_;  // the timeline has looked at the key
-  std::set<std::pair<std::int64_t, std::int16_t>> faults_;
+  std::optional<std::pair<std::int64_t, std::int16_t>> fault_;  // the last one
   PageRun& run_;
 };
 
@@ -101,9 +116,9 @@ void TakeRoom(PageDetail& detail, std::size_t& bytes) {
   detail.missing = "the drawings of this page have reached their bound";
 }
 
-bool IsCertified(const DecisionRow& row) { return row.outcome == OutcomeName(decision_t::CERTIFIED); }
+bool IsCertified(const PageDecision& row) { return row.outcome == OutcomeName(decision_t::CERTIFIED); }
 
-bool IsJudgedAbstention(const DecisionRow& row) {
+bool IsJudgedAbstention(const PageDecision& row) {
   return row.outcome == OutcomeName(decision_t::ABSTAIN_FALSIFIED) ||
          row.outcome == OutcomeName(decision_t::ABSTAIN_DOMAIN) ||
          row.outcome == OutcomeName(decision_t::ABSTAIN_SAFETY);
@@ -134,14 +149,14 @@ class DetailMaker final : CaseJudge {
   /** @param run receives details, and has the tasks. */
   DetailMaker(std::size_t bytes, unsigned threads, PageRun& run) : CaseJudge(threads), bytes_(bytes), run_(run) {}
 
-  void Add(const LastCases::Entry& entry, std::size_t decision) {
+  void Add(LastCases::Entry entry, std::size_t decision) {
     const RecordedCase& recorded = entry.recorded;
     PageDetail& detail = run_.details.emplace_back();
     detail.decision = decision;
     obstacles_.push_back(recorded.basis.obstacles);
     detail.missing = recorded.missing;
     if (!detail.missing.empty()) return;
-    detail.executed = entry.executed;
+    detail.executed = std::move(entry.executed);
     detail.task = TaskIndex(*recorded.basis.task);
     Put(recorded, run_.details.size() - 1);
   }
@@ -181,8 +196,10 @@ void AddTasks(const LogTasks& tasks, PageRun& run) {
 }
 
 // @param makes_rows false: they are known already.
-void ReadRows(const Logs& logs, LogTasks& tasks, bool makes_rows, PageRun& run, PagePass& pass) {
-  RowReader reader(tasks.first().bus, makes_rows, run);
+void ReadLogs(const Logs& logs, LogTasks tasks, bool makes_rows, const PageBounds& bounds, PagePass& pass) {
+  if (!tasks.has_decisions() && !makes_rows) return;
+  PageRun& run = pass.rows;
+  RowReader reader(tasks.first().bus, makes_rows, bounds, run);
   ShadowTally shadow(1);
   std::vector<TimelineUser*> users{&reader, &pass.cases, &shadow};
   users.insert(users.end(), pass.others.begin(), pass.others.end());
@@ -195,43 +212,43 @@ void ReadRows(const Logs& logs, LogTasks& tasks, bool makes_rows, PageRun& run, 
   run.shadow = ToSentence(shadow.Finish());
   if (const std::string passed_over = DescribePassedOver(timeline.passed_over()); !passed_over.empty())
     run.notes.push_back("Messages were passed over" + passed_over + ".");
-}
-
-void ReadLogs(const Logs& logs, LogTasks tasks, bool makes_rows, PageRun& page, PagePass& pass) {
-  pass.was_read = true;
-  if (!tasks.has_decisions() && !makes_rows) return;
-  ReadRows(logs, tasks, makes_rows, page, pass);
-  AddTasks(tasks, page);
+  AddTasks(tasks, run);
   pass.tasks = tasks.found();
 }
 
-void ReadDatabase(const RunLogs& run, PageRun& page) {
+void ReadDatabase(const RunLogs& run, const PageBounds& bounds, PageRun& page) {
   Database database(run.database);
-  std::vector<std::string> files;
-  for (const RunRow& row : run.missing) files.push_back(row.log_file);
-  for (const std::string& log : run.logs) files.push_back(FileName(log));
-  for (const std::string& file : files) {
-    Rows rows = database.Read(file);
-    std::ranges::move(rows.decisions, std::back_inserter(page.decisions));
-    std::ranges::move(rows.events, std::back_inserter(page.events));
-    std::ranges::move(rows.gaps, std::back_inserter(page.gaps));
-  }
-}
-
-// The numbers of new rows are noted when all of them are there.
-void AddPart(const RunLogs& run, const PageTasks& tasks, PageRun& page) {
-  PagePart& part = page.parts.emplace_back();
-  part.robot = run.robot;
-  for (const std::string& log : run.logs)
-    part.replays[FileName(log)] = ReplayCommandOf(run.logs, tasks.config, tasks.key);
-  part.decisions = page.decisions.size();
-  part.events = page.events.size();
-  part.gaps = page.gaps.size();
-  part.faults = page.faults.size();
-  part.withdrawals = page.withdrawals.size();
+  const auto read = [&](const std::string& file) {
+    database.ReadInBlocks(file, [&](const Rows& rows) { TakeRows(rows, bounds, page); });
+  };
+  for (const RunRow& row : run.missing) read(row.log_file);
+  for (const std::string& log : run.logs) read(FileName(log));
 }
 
 }  // namespace
+
+PageDecision::PageDecision(const DecisionRow& row)
+    : log_file(row.event.log_file),
+      event_number(row.event.event_number),
+      utime(row.utime),
+      sequence(row.sequence),
+      plan_id(row.plan_id),
+      source(row.source),
+      outcome(row.outcome),
+      cause(row.cause),
+      message(row.message),
+      step(row.step),
+      coordinate(row.coordinate),
+      obstacle(row.obstacle),
+      first_observation(row.first_observation),
+      second_observation(row.second_observation),
+      margin(row.margin),
+      threshold(row.threshold),
+      elapsed_us(static_cast<float>(row.elapsed_us)),
+      latency_us(static_cast<float>(row.latency_us)),
+      plan_digest(DigestOfHex(row.plan_digest)) {
+  std::ranges::transform(row.grounds, grounds.begin(), DigestOfHex);
+}
 
 void LastCases::OnStart(const Config& task) { channels_ = task.bus; }
 
@@ -269,30 +286,90 @@ void LastCases::OnEvent(const LogEvent& event) {
     entry.executed.push_back({state->executing_step, at.x(), at.y()});
 }
 
-PageRun GatherRows(const RunLogs& run, const PageTasks& tasks, PagePass& pass) {
-  PageRun page;
+void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& bounds, PagePass& pass) {
+  PageRun& page = pass.rows;
   const bool has_database = !run.database.empty();
-  if (has_database) ReadDatabase(run, page);
+  if (has_database) ReadDatabase(run, bounds, page);
   try {
-    if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), !has_database, page, pass);
+    if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), !has_database, bounds, pass);
   } catch (const BadInput& error) {
     if (!has_database) throw;
     page.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
   }
-  const auto shadows = std::ranges::count(page.decisions, "shadow", &DecisionRow::cause);
+  const auto shadows = std::ranges::count(page.decisions, "shadow", &PageDecision::cause);
   if (page.shadow.empty() && shadows > 0)
     page.shadow = fmt::format("Shadow mode: the gate certified nothing. It would have certified {} plans.", shadows);
-  AddPart(run, tasks, page);
-  return page;
+  PagePart& part = page.parts.emplace_back();
+  part.robot = run.robot;
+  for (const std::string& log : run.logs)
+    part.replays[FileName(log)] = ReplayCommandOf(run.logs, tasks.config, tasks.key);
+}
+
+std::int64_t BeginOfLast(std::vector<std::int64_t> times, std::size_t most) {
+  if (times.size() <= most) return std::numeric_limits<std::int64_t>::min();
+  const auto first = times.end() - static_cast<std::ptrdiff_t>(most);
+  if (first == times.end()) return std::numeric_limits<std::int64_t>::max();
+  std::ranges::nth_element(times, first);
+  return *first;
+}
+
+namespace {
+
+// Erases all that is older than the last `most` of all runs. @param of what a pass has, and a time of it.
+template <class Of, class TimeOf>
+void KeepLastOf(const std::vector<PagePass*>& passes, std::size_t most, const Of& of, const TimeOf& time_of) {
+  std::vector<std::int64_t> times;
+  for (PagePass* pass : passes)
+    if (pass)
+      for (const auto& row : of(*pass))
+        if (const std::optional<std::int64_t> time = time_of(row)) times.push_back(*time);
+  const std::int64_t begin = BeginOfLast(std::move(times), most);
+  if (begin == std::numeric_limits<std::int64_t>::min()) return;
+  for (PagePass* pass : passes) {
+    if (!pass) continue;
+    auto& rows = of(*pass);
+    const auto erased = std::erase_if(rows, [&](const auto& row) { return time_of(row).value_or(begin) < begin; });
+    if constexpr (requires { rows.left_out; }) rows.left_out += static_cast<std::int64_t>(erased);
+  }
+}
+
+}  // namespace
+
+void KeepLast(const std::vector<PagePass*>& passes, const PageBounds& bounds) {
+  const auto rows = [&](auto member, std::size_t most) {
+    KeepLastOf(
+        passes, most, [member](PagePass& pass) -> auto& { return pass.rows.*member; },
+        [](const auto& row) { return std::optional(row.utime); });
+  };
+  rows(&PageRun::decisions, bounds.decisions);
+  rows(&PageRun::events, bounds.events);
+  rows(&PageRun::gaps, bounds.others);
+  rows(&PageRun::faults, bounds.others);
+  rows(&PageRun::withdrawals, bounds.others);
+  for (const auto& [is_certified, most] : {std::pair(true, bounds.certified), {false, bounds.abstained}})
+    KeepLastOf(
+        passes, most, [](PagePass& pass) -> auto& { return pass.cases.entries(); },
+        [is_certified = is_certified](const auto& entry) {
+          const decision_t& decision = entry.second.recorded.decision;
+          return (decision.outcome == decision_t::CERTIFIED) == is_certified ? std::optional(decision.utime)
+                                                                             : std::nullopt;
+        });
 }
 
 void AddRows(PageRun& page, PageRun&& run) {
   const auto move = [](auto& from, auto& to) { std::ranges::move(from, std::back_inserter(to)); };
-  move(run.decisions, page.decisions);
-  move(run.events, page.events);
-  move(run.gaps, page.gaps);
-  move(run.faults, page.faults);
-  move(run.withdrawals, page.withdrawals);
+  PagePart& part = run.parts.at(0);
+  const auto move_rows = [&](auto member, std::size_t PagePart::*count) {
+    part.*count = (run.*member).size();
+    (page.*member).left_out += (run.*member).left_out;
+    move(run.*member, page.*member);
+    (run.*member).clear();
+  };
+  move_rows(&PageRun::decisions, &PagePart::decisions);
+  move_rows(&PageRun::events, &PagePart::events);
+  move_rows(&PageRun::gaps, &PagePart::gaps);
+  move_rows(&PageRun::faults, &PagePart::faults);
+  move_rows(&PageRun::withdrawals, &PagePart::withdrawals);
   move(run.parts, page.parts);
   move(run.notes, page.notes);
   for (PageTask& task : run.tasks)
@@ -302,7 +379,7 @@ void AddRows(PageRun& page, PageRun&& run) {
   page.damage += run.damage;
 }
 
-std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds) {
+std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const PageBounds& bounds) {
   auto chosen = LastDecisions(page, bounds.certified, IsCertified);
   const auto abstained = LastDecisions(page, bounds.abstained, IsJudgedAbstention);
   for (std::size_t k = 0; k < chosen.size(); ++k) std::ranges::copy(abstained[k], std::back_inserter(chosen[k]));
@@ -310,28 +387,24 @@ std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const D
 }
 
 std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::size_t most) {
-  return LastDecisions(page, most, [](const DecisionRow& row) { return !IsCertified(row); });
+  return LastDecisions(page, most, [](const PageDecision& row) { return !IsCertified(row); });
 }
 
-std::string EventName(const LogReference& event) {
-  return fmt::format("{} event {}", event.log_file, event.event_number);
+std::string EventName(const PageDecision& decision) {
+  return fmt::format("{} event {}", decision.log_file, decision.event_number);
 }
 
-void ReadAgain(const RunLogs& run, const PageTasks& tasks, PagePass& pass) try {
-  PageRun known;
-  if (!run.logs.empty()) ReadLogs(run.logs, tasks.of_run.Of(run.logs), false, known, pass);
-} catch (const BadInput&) {  // noted when the rows were read
-}
-
-PageRun GatherDetails(const PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions,
+PageRun GatherDetails(PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions,
                       std::size_t bytes, unsigned threads) {
   PageRun made;
   made.tasks = page.tasks;  // so that their places are the page's
   std::map<std::string, std::size_t> wanted;
-  for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i].event), i);
+  for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i]), i);
   DetailMaker maker(bytes, threads, made);
-  for (const auto& [place, entry] : pass.cases.entries())
-    if (const auto found = wanted.find(entry.recorded.event); found != wanted.end()) maker.Add(entry, found->second);
+  auto& entries = pass.cases.entries();
+  for (auto entry = entries.begin(); entry != entries.end(); entry = entries.erase(entry))
+    if (const auto found = wanted.find(entry->second.recorded.event); found != wanted.end())
+      maker.Add(std::move(entry->second), found->second);
   maker.Finish();
   return made;
 }

@@ -17,9 +17,11 @@
 
 namespace forereach {
 
-/** Bounds on the drawings of one page. */
-struct DetailBounds {
-  /** The last certified plans, and the last abstentions. */
+/** Bounds on one page, so that it does not grow with the logs. */
+struct PageBounds {
+  /** Of the rows the last ones by time; of gaps, faults and withdrawals so many each. */
+  std::size_t decisions = 100'000, events = 300'000, others = 20'000;
+  /** Drawn are the last certified plans, and the last abstentions. */
   std::size_t certified = 2000, abstained = 2000;
   /** Of all drawings, before they are packed. */
   std::size_t bytes = 60'000'000;
@@ -41,17 +43,17 @@ class LastCases final : public TimelineUser {
     std::set<int> steps;  ///< That have a state.
   };
 
-  explicit LastCases(const DetailBounds& bounds) : bounds_(bounds) {}
+  explicit LastCases(const PageBounds& bounds) : bounds_(bounds) {}
 
   void OnStart(const Config& task) override;
   void OnEvent(const LogEvent& event) override;
   void OnDecision(const RecordedDecision& recorded) override;
 
   /** In the order of the log. */
-  [[nodiscard]] const std::map<std::int64_t, Entry>& entries() const { return entries_; }
+  [[nodiscard]] std::map<std::int64_t, Entry>& entries() { return entries_; }
 
  private:
-  const DetailBounds bounds_;
+  const PageBounds bounds_;
   BusOptions channels_;
   std::int64_t next_ = 0;
   std::map<std::int64_t, Entry> entries_;
@@ -59,43 +61,47 @@ class LastCases final : public TimelineUser {
   std::map<std::int64_t, std::int64_t> executing_;  // by plan
 };
 
-/** What one pass over the logs of a run leaves beside its rows. */
+/** What one pass over the logs of a run leaves. */
 struct PagePass {
-  explicit PagePass(const DetailBounds& bounds) : cases(bounds) {}
+  explicit PagePass(const PageBounds& bounds) : cases(bounds) {}
 
+  PageRun rows{};
   LastCases cases;
   std::vector<TimelineUser*> others{};                 ///< Who else is told of the run; set before the pass.
   std::vector<std::shared_ptr<const Config>> tasks{};  ///< Of the cases.
-  bool was_read = false;
 };
 
-/** The rows of one run, without drawings. Rows of a database need no log; faults and withdrawals come from the logs
-beside it, and what keeps these from being read is a note. Cost: the logs are read once.
+/** Reads the rows of one run, without drawings, and its cases. Rows of a database need no log; faults and withdrawals
+come from the logs beside it, and what keeps these from being read is a note. Cost: the logs are read once.
 @throws BadInput if a run without a database cannot be read. */
-[[nodiscard]] PageRun GatherRows(const RunLogs& run, const PageTasks& tasks, PagePass& pass);
+void ReadPass(const RunLogs& run, const PageTasks& tasks, const PageBounds& bounds, PagePass& pass);
 
-/** Reads the logs of a run whose rows are known. */
-void ReadAgain(const RunLogs& run, const PageTasks& tasks, PagePass& pass);
+/** Forgets what a page of all these runs has no room for. @param passes may be null. */
+void KeepLast(const std::vector<PagePass*>& passes, const PageBounds& bounds);
 
 /** Puts the rows of one run behind those of others. */
 void AddRows(PageRun& page, PageRun&& run);
 
 /** The tubes of some decisions of a run.
-@param decisions their places in `page`. @param threads that it may use. @return only details and tasks. */
-[[nodiscard]] PageRun GatherDetails(const PagePass& pass, const PageRun& page,
-                                    const std::vector<std::size_t>& decisions, std::size_t bytes, unsigned threads);
+@param pass of which cases that are drawn are forgotten. @param decisions their places in `page`.
+@param threads that it may use. @return only details and tasks. */
+[[nodiscard]] PageRun GatherDetails(PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions,
+                                    std::size_t bytes, unsigned threads);
 
 /** Puts the tubes of one run into a page, as far as there is room. @param bytes for which there is room. */
 void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes);
 
 /** The decisions whose tubes a page has: of each part their places, the last ones by time. */
-[[nodiscard]] std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds);
+[[nodiscard]] std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const PageBounds& bounds);
 
 /** The last decisions by time that are no certificates, likewise. @param most how many of the whole page. */
 [[nodiscard]] std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::size_t most);
 
 /** Names the event of a decision as a Timeline does that names files. */
-[[nodiscard]] std::string EventName(const LogReference& event);
+[[nodiscard]] std::string EventName(const PageDecision& decision);
+
+/** When the last `most` of these times begin; the least number if there are no more. */
+[[nodiscard]] std::int64_t BeginOfLast(std::vector<std::int64_t> times, std::size_t most);
 
 /** Notes what could not be read. */
 void AddMissing(PageRun& page, const NamedRuns& named);

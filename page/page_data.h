@@ -1,7 +1,9 @@
 /** What the page of a run shows, as plain data: it knows neither logs nor HTML. */
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 #include <vector>
@@ -12,6 +14,40 @@
 #include "records/rows.h"
 
 namespace forereach {
+
+/** Rows of which the last are kept, so that they do not grow with the logs. */
+template <class Row>
+struct PageRows : std::deque<Row> {
+  std::int64_t left_out = 0;  ///< So many before them.
+
+  void KeepLast(std::size_t most) {
+    for (; this->size() > most; ++left_out) this->pop_front();
+  }
+};
+
+/** Of a DecisionRow what a page shows. */
+struct PageDecision {
+  PageDecision(const DecisionRow& row);  // NOLINT(google-explicit-constructor): rows are what pages are made of
+
+  std::string log_file;
+  std::int64_t event_number, utime, sequence, plan_id;
+  std::string source, outcome, cause, message;
+  int step, coordinate, obstacle, first_observation, second_observation;
+  double margin, threshold;
+  float elapsed_us, latency_us;
+  Digest plan_digest;  ///< Zeros for what is none, here and below.
+  std::array<Digest, kGrounds.size()> grounds;
+};
+
+struct PageEvent {
+  std::int64_t utime = 0, plan_id = -1;
+  std::string kind;
+};
+
+struct PageGap {
+  std::int64_t utime = 0, lost = 0;
+  std::string reason, channel, source;
+};
 
 /** A task under which decisions were made. */
 struct PageTask {
@@ -87,11 +123,11 @@ struct PagePart {
 /** One side of a page: a run, or several. */
 struct PageRun {
   std::string name;
-  std::vector<DecisionRow> decisions;
-  std::vector<EventRow> events;
-  std::vector<GapRow> gaps;
-  std::vector<PageFault> faults;            ///< Without repetitions. Only logs have them.
-  std::vector<PageWithdrawal> withdrawals;  ///< Likewise.
+  PageRows<PageDecision> decisions;
+  PageRows<PageEvent> events;
+  PageRows<PageGap> gaps;
+  PageRows<PageFault> faults;            ///< Without repetitions. Only logs have them.
+  PageRows<PageWithdrawal> withdrawals;  ///< Likewise.
   std::vector<PageTask> tasks;
   std::vector<PageDetail> details;
   std::vector<PageAdvice> advice;

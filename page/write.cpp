@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "lcmtypes/printable.h"
 #include "page/columns.h"
 #include "page/detail.h"
@@ -31,30 +33,29 @@ class Dictionary {
   Json texts_ = Json::array();
 };
 
-template <class Row, class Of>
-Json NamesColumn(const std::vector<Row>& rows, const Of& of) {
+Json NamesColumn(const auto& rows, const auto& of) {
   Dictionary dictionary;
-  Json column = ColumnOf<std::uint32_t>(rows, [&](const Row& row) { return dictionary(of(row)); });
+  Json column = ColumnOf<std::uint32_t>(rows, [&](const auto& row) { return dictionary(std::invoke(of, row)); });
   column["names"] = dictionary.texts();
   return column;
 }
 
 // Texts that are mostly different: their bytes, and where each ends.
-template <class Row, class Of>
-Json TextColumn(const std::vector<Row>& rows, const Of& of) {
-  std::string bytes;
-  Json ends = ColumnOf<std::uint32_t>(rows, [&](const Row& row) {
-    bytes += Printable(std::invoke(of, row)) + "\n";
-    return bytes.size();
+Json TextColumn(const auto& rows, const auto& of) {
+  Packer bytes;
+  std::size_t end = 0;
+  Json ends = ColumnOf<std::uint32_t>(rows, [&](const auto& row) {
+    const std::string text = Printable(std::invoke(of, row)) + "\n";
+    bytes.Add(text);
+    return end += text.size();
   });
-  return {{"type", "text"}, {"data", Packed(bytes)}, {"ends", std::move(ends)}};
+  return {{"type", "text"}, {"data", bytes.Finish()}, {"ends", std::move(ends)}};
 }
 
-template <class Row, class Of>
-Json DigestColumn(const std::vector<Row>& rows, const Of& of) {
-  std::string bytes;
-  for (const Row& row : rows) bytes += DigestBytes(of(row));
-  return {{"type", "u8"}, {"data", Packed(bytes)}};
+Json DigestColumn(const auto& rows, const auto& of) {
+  Packer bytes;
+  for (const auto& row : rows) bytes.Add(BytesOf(std::invoke(of, row)));
+  return {{"type", "u8"}, {"data", bytes.Finish()}};
 }
 
 // Of each row the place of its run. Rows behind those that are counted are the last run's.
@@ -79,30 +80,30 @@ Json RobotColumn(const PageRun& run) {
 }
 
 Json DecisionsJson(const PageRun& run) {
-  const std::vector<DecisionRow>& rows = run.decisions;
-  const auto of = [](auto member) { return [member](const DecisionRow& row) { return row.*member; }; };
-  const auto ground = [](std::size_t i) { return [i](const DecisionRow& row) { return row.grounds[i]; }; };
+  const auto& rows = run.decisions;
+  using Row = PageDecision;
+  const auto ground = [](std::size_t i) { return [i](const Row& row) { return ToHex(row.grounds[i]); }; };
   return {{"run", RunColumn(run, &PagePart::decisions, rows.size())},
           {"robot", RobotColumn(run)},
-          {"utime", ColumnOf<std::int64_t>(rows, of(&DecisionRow::utime))},
-          {"plan", ColumnOf<std::int64_t>(rows, of(&DecisionRow::plan_id))},
-          {"sequence", ColumnOf<std::int64_t>(rows, of(&DecisionRow::sequence))},
-          {"source", NamesColumn(rows, of(&DecisionRow::source))},
-          {"outcome", NamesColumn(rows, of(&DecisionRow::outcome))},
-          {"cause", NamesColumn(rows, of(&DecisionRow::cause))},
-          {"step", ColumnOf<std::int32_t>(rows, of(&DecisionRow::step))},
-          {"coordinate", ColumnOf<std::int32_t>(rows, of(&DecisionRow::coordinate))},
-          {"obstacle", ColumnOf<std::int32_t>(rows, of(&DecisionRow::obstacle))},
-          {"first", ColumnOf<std::int32_t>(rows, of(&DecisionRow::first_observation))},
-          {"second", ColumnOf<std::int32_t>(rows, of(&DecisionRow::second_observation))},
-          {"margin", ColumnOf<double>(rows, of(&DecisionRow::margin))},
-          {"threshold", ColumnOf<double>(rows, of(&DecisionRow::threshold))},
-          {"elapsed", ColumnOf<float>(rows, of(&DecisionRow::elapsed_us))},
-          {"latency", ColumnOf<float>(rows, of(&DecisionRow::latency_us))},
-          {"message", TextColumn(rows, of(&DecisionRow::message))},
-          {"digest", DigestColumn(rows, of(&DecisionRow::plan_digest))},
-          {"log", NamesColumn(rows, [](const DecisionRow& row) { return row.event.log_file; })},
-          {"event", ColumnOf<std::int64_t>(rows, [](const DecisionRow& row) { return row.event.event_number; })},
+          {"utime", ColumnOf<std::int64_t>(rows, &Row::utime)},
+          {"plan", ColumnOf<std::int64_t>(rows, &Row::plan_id)},
+          {"sequence", ColumnOf<std::int64_t>(rows, &Row::sequence)},
+          {"source", NamesColumn(rows, &Row::source)},
+          {"outcome", NamesColumn(rows, &Row::outcome)},
+          {"cause", NamesColumn(rows, &Row::cause)},
+          {"step", ColumnOf<std::int32_t>(rows, &Row::step)},
+          {"coordinate", ColumnOf<std::int32_t>(rows, &Row::coordinate)},
+          {"obstacle", ColumnOf<std::int32_t>(rows, &Row::obstacle)},
+          {"first", ColumnOf<std::int32_t>(rows, &Row::first_observation)},
+          {"second", ColumnOf<std::int32_t>(rows, &Row::second_observation)},
+          {"margin", ColumnOf<double>(rows, &Row::margin)},
+          {"threshold", ColumnOf<double>(rows, &Row::threshold)},
+          {"elapsed", ColumnOf<float>(rows, &Row::elapsed_us)},
+          {"latency", ColumnOf<float>(rows, &Row::latency_us)},
+          {"message", TextColumn(rows, &Row::message)},
+          {"digest", DigestColumn(rows, &Row::plan_digest)},
+          {"log", NamesColumn(rows, &Row::log_file)},
+          {"event", ColumnOf<std::int64_t>(rows, &Row::event_number)},
           {"config", NamesColumn(rows, ground(0))},
           {"model", NamesColumn(rows, ground(1))},
           {"declaration", NamesColumn(rows, ground(2))},
@@ -119,39 +120,63 @@ Json FiguresJson(const PageRun& run) {
   return all;
 }
 
-Json EventsJson(const std::vector<EventRow>& rows) {
-  return {{"utime", ColumnOf<std::int64_t>(rows, [](const EventRow& row) { return row.utime; })},
-          {"plan", ColumnOf<std::int64_t>(rows, [](const EventRow& row) { return row.plan_id; })},
-          {"kind", NamesColumn(rows, [](const EventRow& row) { return row.kind; })}};
+Json EventsJson(const PageRun& run) {
+  const auto& rows = run.events;
+  return {{"run", RunColumn(run, &PagePart::events, rows.size())},
+          {"utime", ColumnOf<std::int64_t>(rows, &PageEvent::utime)},
+          {"plan", ColumnOf<std::int64_t>(rows, &PageEvent::plan_id)},
+          {"kind", NamesColumn(rows, &PageEvent::kind)}};
 }
 
-Json GapsJson(const std::vector<GapRow>& rows) {
-  return {{"utime", ColumnOf<std::int64_t>(rows, [](const GapRow& row) { return row.utime; })},
-          {"lost", ColumnOf<std::int64_t>(rows, [](const GapRow& row) { return row.lost; })},
-          {"reason", NamesColumn(rows, [](const GapRow& row) { return row.reason; })},
-          {"channel", NamesColumn(rows, [](const GapRow& row) { return row.channel; })},
-          {"source", NamesColumn(rows, [](const GapRow& row) { return row.source; })}};
+Json GapsJson(const PageRun& run) {
+  const auto& rows = run.gaps;
+  return {{"run", RunColumn(run, &PagePart::gaps, rows.size())},
+          {"utime", ColumnOf<std::int64_t>(rows, &PageGap::utime)},
+          {"lost", ColumnOf<std::int64_t>(rows, &PageGap::lost)},
+          {"reason", NamesColumn(rows, &PageGap::reason)},
+          {"channel", NamesColumn(rows, &PageGap::channel)},
+          {"source", NamesColumn(rows, &PageGap::source)}};
 }
 
-Json FaultsJson(const std::vector<PageFault>& rows) {
-  return {{"utime", ColumnOf<std::int64_t>(rows, [](const PageFault& row) { return row.utime; })},
-          {"plan", ColumnOf<std::int64_t>(rows, [](const PageFault& row) { return row.plan_id; })},
-          {"kind", NamesColumn(rows, [](const PageFault& row) { return row.cause; })},
-          {"message", TextColumn(rows, [](const PageFault& row) { return row.message; })}};
+Json FaultsJson(const PageRun& run) {
+  const auto& rows = run.faults;
+  return {{"run", RunColumn(run, &PagePart::faults, rows.size())},
+          {"utime", ColumnOf<std::int64_t>(rows, &PageFault::utime)},
+          {"plan", ColumnOf<std::int64_t>(rows, &PageFault::plan_id)},
+          {"kind", NamesColumn(rows, &PageFault::cause)},
+          {"message", TextColumn(rows, &PageFault::message)}};
 }
 
-Json WithdrawalsJson(const std::vector<PageWithdrawal>& rows) {
-  return {{"utime", ColumnOf<std::int64_t>(rows, [](const PageWithdrawal& row) { return row.utime; })},
-          {"plan", ColumnOf<std::int64_t>(rows, [](const PageWithdrawal& row) { return row.plan_id; })},
-          {"steps", ColumnOf<std::int32_t>(rows, [](const PageWithdrawal& row) { return row.valid_steps; })},
-          {"source", NamesColumn(rows, [](const PageWithdrawal& row) { return row.source; })},
-          {"kind", NamesColumn(rows, [](const PageWithdrawal& row) { return row.cause; })},
-          {"message", TextColumn(rows, [](const PageWithdrawal& row) { return row.message; })}};
+Json WithdrawalsJson(const PageRun& run) {
+  const auto& rows = run.withdrawals;
+  return {{"run", RunColumn(run, &PagePart::withdrawals, rows.size())},
+          {"utime", ColumnOf<std::int64_t>(rows, &PageWithdrawal::utime)},
+          {"plan", ColumnOf<std::int64_t>(rows, &PageWithdrawal::plan_id)},
+          {"steps", ColumnOf<std::int32_t>(rows, &PageWithdrawal::valid_steps)},
+          {"source", NamesColumn(rows, &PageWithdrawal::source)},
+          {"kind", NamesColumn(rows, &PageWithdrawal::cause)},
+          {"message", TextColumn(rows, &PageWithdrawal::message)}};
 }
 
 Json TextsJson(const std::vector<std::string>& texts) {
   Json all = Json::array();
   for (const std::string& text : texts) all.push_back(Printable(text));
+  return all;
+}
+
+// With what the page has not, since there is more than it can hold.
+Json NotesJson(const PageRun& run) {
+  Json all = TextsJson(run.notes);
+  const auto note = [&](const auto& rows, const char* what) {
+    if (rows.left_out > 0)
+      all.push_back(fmt::format("Of {} {} the last {} are on this page.",
+                                rows.left_out + static_cast<std::int64_t>(rows.size()), what, rows.size()));
+  };
+  note(run.decisions, "decisions");
+  note(run.events, "events of robots");
+  note(run.gaps, "gaps");
+  note(run.faults, "faults");
+  note(run.withdrawals, "withdrawals");
   return all;
 }
 
@@ -199,21 +224,17 @@ Json RunsJson(const PageRun& run, bool only_figures) {
 
 Json RunJson(const PageRun& run, bool only_figures) {
   Json json{{"name", Printable(run.name)},
-            {"notes", TextsJson(run.notes)},
+            {"notes", NotesJson(run)},
             {"shadow", Printable(run.shadow)},
             {"tasks", TasksJson(run.tasks)},
             {"damaged_places", run.damage.places},
             {"count", run.decisions.size()},
             {"decisions", only_figures ? FiguresJson(run) : DecisionsJson(run)},
-            {"events", EventsJson(run.events)},
-            {"gaps", GapsJson(run.gaps)},
-            {"faults", FaultsJson(run.faults)},
-            {"withdrawals", WithdrawalsJson(run.withdrawals)}};
-  json["events"]["run"] = RunColumn(run, &PagePart::events, run.events.size());
-  json["gaps"]["run"] = RunColumn(run, &PagePart::gaps, run.gaps.size());
-  json["faults"]["run"] = RunColumn(run, &PagePart::faults, run.faults.size());
-  json["withdrawals"]["run"] = RunColumn(run, &PagePart::withdrawals, run.withdrawals.size());
-  json["runs"] = RunsJson(run, only_figures);
+            {"events", EventsJson(run)},
+            {"gaps", GapsJson(run)},
+            {"faults", FaultsJson(run)},
+            {"withdrawals", WithdrawalsJson(run)},
+            {"runs", RunsJson(run, only_figures)}};
   if (!only_figures) json["drawings"] = DrawingsJson(run);
   return json;
 }

@@ -23,6 +23,8 @@ constexpr int kApplicationId = 0x46524C47;  // "FRLG", so that no other program'
 // With a write-ahead log: the disk need not confirm a transaction before the next begins.
 constexpr const char* kLazily = "PRAGMA synchronous = NORMAL";
 
+constexpr std::size_t kRowsInBlock = 1024;
+
 constexpr Dialect kDialect{.runs = "runs",
                            .run_key = "log_file",
                            .robot = "",
@@ -336,6 +338,24 @@ Rows Database::Read(const std::string& log_file) {
           Select<EventRow>("SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
                            log_file),
           Select<GapRow>("SELECT * FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid", log_file)};
+}
+
+void Database::ReadInBlocks(const std::string& log_file, const std::function<void(const Rows&)>& take) {
+  const auto read = [&](const char* sql, auto rows_of) {
+    Statement select(handle_.get(), sql);
+    Rows block;
+    auto& rows = block.*rows_of;
+    for (select.Bind(log_file); select.Step();) {
+      select.Read(rows.emplace_back());
+      if (rows.size() < kRowsInBlock) continue;
+      take(block);
+      rows.clear();
+    }
+    take(block);
+  };
+  read("SELECT * FROM decisions WHERE log_file = ? ORDER BY event_number", &Rows::decisions);
+  read("SELECT * FROM execution_events WHERE log_file = ? ORDER BY event_number", &Rows::events);
+  read("SELECT * FROM gaps WHERE log_file = ? ORDER BY rowid", &Rows::gaps);
 }
 
 RowCounts Database::Count(const std::string& log_file) {

@@ -7,6 +7,7 @@ since. The event log is always written first, so those rows can be made again. *
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -72,6 +73,9 @@ class Database final {
 
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
+
+  /** The same of one log file, in blocks: all decisions, then all events, then all gaps. */
+  void ReadInBlocks(const std::string& log_file, const std::function<void(const Rows&)>& take);
 
   /** How many rows of one log file there are. @throws DatabaseError. */
   [[nodiscard]] RowCounts Count(const std::string& log_file);

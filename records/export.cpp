@@ -265,7 +265,8 @@ ExportResult ExportRun(const RunLogs& run, const ExportOptions& options, const s
   const std::unique_ptr<Sink> sink = SinkOf(run.robot, options, files);
   if (!run.missing.empty()) {
     Database database(run.database);
-    for (const RunRow& missing : run.missing) TakeRows(database.Read(missing.log_file), *sink);
+    for (const RunRow& missing : run.missing)
+      database.ReadInBlocks(missing.log_file, [&](const Rows& rows) { TakeRows(rows, *sink); });
   }
   if (!run.logs.empty()) ReadLogs(run.logs, options, on_bytes, *sink);
   sink->Finish();

@@ -1,0 +1,82 @@
+/** The recorded course, driven again and again, with a reload of the task before each round: a log of any length, of which
+every decision can be made again. */
+#pragma once
+
+#include <string_view>
+
+#include "lcmtypes/message_fields.h"
+#include "lcmtypes/seal.h"
+#include "records/database.h"
+#include "tests/records/course.h"
+#include "tests/records/logs.h"
+
+namespace forereach {
+
+/** A visitor of lcmtypes/message_fields.h that brings a message of the course to its place in a later round. */
+struct LaterRound {
+  std::int64_t shift_us, sequence;  ///< And how many messages of its stream there were before.
+
+  void operator()(std::string_view name, const std::int64_t& value) const {
+    auto& changed = const_cast<std::int64_t&>(value);
+    if (name == "sequence") changed += sequence;
+    // The course's planner names its plans by the time.
+    if (name.ends_with("utime") || (name.ends_with("plan_id") && value >= 0)) changed += shift_us;
+  }
+  void operator()(std::string_view, const auto&) const {}
+  void Nested(auto&&...) const {}
+  void Code(auto&&...) const {}
+  void Text(auto&&...) const {}
+  void Digest(auto&&...) const {}
+  void Row(auto&&...) const {}
+  void Rows(auto&&...) const {}
+  void List(auto&&...) const {}
+};
+
+/** Writes `rounds` of them, and the rows of a logger's database if there is one. Cost: 3 MB and 97 decisions a round. */
+inline void WriteLongCourse(const std::string& path, std::int64_t rounds, Database* database = nullptr) {
+  const std::vector<LogEvent> course = ReadLog(kCourseLog).events;
+  const std::string file = std::filesystem::path(path).filename();
+  EventLogWriter writer(path);
+  Interpreter interpreter(BusOptions(), file);
+  if (database) database->BeginRun(file, course.front().utime);
+  for (std::int64_t round = 0; round < rounds; ++round) {
+    std::map<Digest, candidate_plan_t> candidates;  // of this round, by the digest in the course
+    Rows rows;
+    for (LogEvent event : course) {
+      LaterRound later{round * 10'000'000, round * std::ranges::count(course, event.channel, &LogEvent::channel)};
+      const auto change = [&](auto message, const auto& more) {
+        if (!message) return false;
+        Fields(*message, later);
+        more(*message);
+        event.data = Encode(*message);
+        return true;
+      };
+      const auto change_only = [&](auto message) { return change(message, [](auto&) {}); };
+      const auto of = [&](const auto& answer) { return candidates.at(GetDigest(answer.plan_digest)); };
+      const auto digest_of = [&](const auto& answer) { return DigestOf(Encode(of(answer))); };
+      // Transitions are sent as they were: decisions name the digest of these bytes.
+      static_cast<void>(
+          change(Decoded<candidate_plan_t>(event.data),
+                 [&](const candidate_plan_t& plan) { candidates[DigestOf(Bytes(event.data))] = plan; }) ||
+          change(Decoded<decision_t>(event.data),
+                 [&](decision_t& decision) { SetDigest(decision.plan_digest, digest_of(decision)); }) ||
+          change(Decoded<certified_plan_t>(event.data),
+                 [&](certified_plan_t& certified) {
+                   certified.plan = of(certified);
+                   SetDigest(certified.plan_digest, digest_of(certified));
+                   SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                 }) ||
+          change(Decoded<certifier_status_t>(event.data), [&](certifier_status_t& status) { status.version += round; }) ||
+          change_only(Decoded<execution_event_t>(event.data)) || change_only(Decoded<robot_state_t>(event.data)) ||
+          change_only(Decoded<obstacles_t>(event.data)) || change_only(Decoded<logger_status_t>(event.data)));
+      event.utime += later.shift_us;
+      event.number = writer.Append(event.utime, event.channel, event.data);
+      if (database) interpreter.Observe(event, rows);
+    }
+    if (database) EXPECT_TRUE(database->Write(rows, file, writer.next_number()));
+    EXPECT_TRUE(writer.Flush());
+  }
+  if (database) database->EndRun(file, course.back().utime);
+}
+
+}  // namespace forereach
