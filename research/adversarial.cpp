@@ -1,6 +1,5 @@
 // The adversarial residual family: targets that agree on all low-speed data, and whose slopes beyond them have no
 // bound. What a declaration is worth that is true, that is kept while the target steepens, that is read off the data.
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -68,40 +67,36 @@ Estimate EstimatedPart(const Scope& scope, double lambda) {
 
 double TruePart(double lambda) { return Escaping(lambda).deployed.maxCoeff() / PointMassSystem().deployed.maxCoeff(); }
 
-void AddOutcomes(const Scope& scope, const Results& results, const std::string& where, const Cell& cell, Table& table) {
+void AddOutcomes(const Results& results, const std::string& where, const Cell& cell, Table& table) {
   const auto row = [&](const char* what, Group group, Statistic statistic) {
-    table.rows.push_back({where + what, {}, OverSeeds(scope, results, cell, group, statistic), 3, ""});
+    table.Add(where + what, results.Mean(cell, group, statistic), 3);
   };
   row("A coverage", Group::kA, Coverage);
   row("A certified", Group::kA, CertificateRate);
   row("C coverage", Group::kC, Coverage);
   row("C certified", Group::kC, CertificateRate);
-  table.rows.push_back(
-      {where + "false certificates, all groups", {}, Exactly(FalseCertificates(scope, results, cell)), 0, ""});
+  table.Add(where + "false certificates, all groups", results.FalseCertificates(cell), 0);
 }
 
-std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
-  Table slopes{
-      "Adversarial residual family: slopes",
-      "r_lambda = [1 + (lambda - 1) SmoothGate((s - 0.9) / 0.14)] r over the speed s, r the knee's: the family is "
-      "ours, "
-      "the paper prints no formula. Noiseless data from below the knee, N = 100, the same for every lambda. Largest "
-      "velocity slope over the deployed matrix's: a proved bound on the true one, and LACKI's estimate from the data.",
-      {}};
+std::vector<Table> FamilyTables(const Results& results) {
+  Table slopes{"Adversarial residual family: slopes",
+               "r_lambda = [1 + (lambda - 1) SmoothGate((s - 0.9) / 0.14)] r over the speed s, r the knee's: the "
+               "family is ours, the paper prints no formula. Noiseless data from below the knee, N = 100, the same for "
+               "every lambda. Largest velocity slope over the deployed matrix's: a proved bound on the true one, and "
+               "LACKI's estimate from the data."};
   Table outcomes{"Adversarial residual family: plans",
                  "The same data. The declaration is one of three: the true slopes, the matrix deployed for lambda = 1, "
-                 "or the estimate. The data refute none of them.",
-                 {}};
-  for (const double lambda : LambdasOf(scope)) {
+                 "or the estimate. The data refute none of them."};
+  for (const double lambda : LambdasOf(results.scope)) {
     const std::string where = "lambda = " + std::to_string(static_cast<int>(lambda)) + ": ";
-    slopes.rows.push_back({where + "true", {}, Exactly(TruePart(lambda)), 3, ""});
+    slopes.Add(where + "true", TruePart(lambda), 3);
     // All targets agree on the data, so this is one figure, compared once.
-    slopes.rows.push_back({where + "estimate", lambda == 1 ? Reference(Mark::kOurs, Paper("slopes")) : Reference(),
-                           EstimatedPart(scope, lambda), 3,
-                           "the paper's residual is flat at every sample, the softplus not quite"});
-    AddOutcomes(scope, results, where + "true, ", TrueCell(lambda), outcomes);
-    AddOutcomes(scope, results, where + "kept, ", KeptCell(lambda), outcomes);
-    AddOutcomes(scope, results, where + "estimate, ", PlugInCell(lambda), outcomes);
+    slopes.Add(where + "estimate", lambda == 1 ? Reference(Mark::kOurs, Paper("slopes")) : Reference(),
+               EstimatedPart(results.scope, lambda), 3,
+               "the paper's residual is flat at every sample, the softplus not quite");
+    AddOutcomes(results, where + "true, ", TrueCell(lambda), outcomes);
+    AddOutcomes(results, where + "kept, ", KeptCell(lambda), outcomes);
+    AddOutcomes(results, where + "estimate, ", PlugInCell(lambda), outcomes);
   }
   return {slopes, outcomes};
 }
@@ -140,8 +135,7 @@ Plot SlopePlot(const Scope& scope) {
   }
   return {"adversarial-slopes",
           "Adversarial family: the true slope grows with lambda, past any bound once declared, while the data and the "
-          "estimates from them "
-          "stay the same. Estimate: mean and one standard deviation over the seeds.",
+          "estimates from them stay the same. Estimate: mean and one standard deviation over the seeds.",
           720, 400, DataBlock("slope", lines) + R"(set logscale xy; set xrange [1:32]; set yrange [1e-4:10]
 set format y '10^{%T}'; set xtics (1, 2, 4, 8, 16, 32)
 set xlabel 'lambda, no unit'; set ylabel 'largest slope of r_v by v, (m/s)/(m/s)'
@@ -152,7 +146,7 @@ plot $slope using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb red title 'true',
 )"};
 }
 
-std::vector<Plot> FamilyPlots(const Scope& scope, const Results&) { return {ProfilePlot(), SlopePlot(scope)}; }
+std::vector<Plot> FamilyPlots(const Results& results) { return {ProfilePlot(), SlopePlot(results.scope)}; }
 
 }  // namespace
 

@@ -1,9 +1,10 @@
 // What CP-SLS-MPC's certificate loses on the plans, by the size of its calibration set and its covariance.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "research/experiment.h"
 #include "research/methods/cp_sls.h"
@@ -37,9 +38,9 @@ struct Pooled {
   std::vector<double> at_cap;              // of the same as drift
 };
 
-Pooled Pool(const Scope& scope, const Results& results, Cell cell) {
+Pooled Pool(const Results& results, Cell cell) {
   Pooled pooled;
-  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed)
+  for (cell.seed = 0; cell.seed < results.scope.seeds; ++cell.seed)
     for (const Tally& tally : results.Of(cell)) {
       const PlanBudgets& of = tally.budgets;
       pooled.plans += tally.plans;
@@ -61,13 +62,13 @@ Estimate Median(std::vector<double> values) {
   if (values.empty()) return {};
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
-  return Exactly(*middle);
+  return *middle;
 }
 
 // What a budget has beside drift and tube; all plans have the same.
 Estimate Alpha(const Pooled& pooled) {
   if (pooled.total.empty()) return {};
-  return Exactly(pooled.total[0] - pooled.drift[0] - pooled.tube[0]);
+  return pooled.total[0] - pooled.drift[0] - pooled.tube[0];
 }
 
 constexpr const char* kWhy = "weights, their bandwidth and the drift rate are ours: cp_sls.h";
@@ -81,13 +82,10 @@ void AddRowsOf(int observations, const Pooled& pooled, std::vector<Row>& rows) {
     if (ours.mean || paper) rows.push_back({"N = " + n + ": " + what, {mark, paper}, ours, decimals, kWhy});
   };
   row("median of the least mass", Mark::kOurs, "mass", Median(pooled.mass), 1);
-  row("starved", is_fixed ? Mark::kExact : Mark::kOurs, "starved",
-      Exactly(static_cast<double>(pooled.starved) / pooled.plans), 3);
-  rows.push_back({"N = " + n + ": budgets below one",
-                  {Mark::kOurs, Paper("budget.nonvacuous")},
-                  Exactly(pooled.meaningful),
-                  0,
-                  kWhy});
+  row("starved", is_fixed ? Mark::kExact : Mark::kOurs, "starved", static_cast<double>(pooled.starved) / pooled.plans,
+      3);
+  rows.push_back(
+      {"N = " + n + ": budgets below one", {Mark::kOurs, Paper("budget.nonvacuous")}, pooled.meaningful, 0, kWhy});
   row("alpha", Mark::kTaken, "alpha", Alpha(pooled), 2);
   row("median drift (TV)", Mark::kOurs, "drift", Median(pooled.drift), 2);
   row("median tube", Mark::kOurs, "tube", Median(pooled.tube), 2);
@@ -95,67 +93,61 @@ void AddRowsOf(int observations, const Pooled& pooled, std::vector<Row>& rows) {
 }
 
 // "at N = 200 the drift is 9.01 above the paper's and the tube 8.76 below"
-std::string Apart(const Scope& scope, const Results& results) {
-  const int observations = VariantSizes(scope).front();
-  const Pooled pooled = Pool(scope, results, BudgetCell(CpSlsMethods().front(), observations));
+std::string Apart(const Results& results) {
+  const int observations = VariantSizes(results.scope).front();
+  const Pooled pooled = Pool(results, BudgetCell(CpSlsMethods().front(), observations));
   const std::string n = std::to_string(observations);
   const auto apart = [&](const char* part, const std::vector<double>& values) {
-    char text[48];
     const double by = Median(values).mean.value_or(NAN) - Paper("budget." + n + "." + part).value;
-    std::snprintf(text, sizeof text, "%.2f %s", std::abs(by), by < 0 ? "below" : "above");
-    return std::string(text);
+    return fmt::format("{:.2f} {}", std::abs(by), by < 0 ? "below" : "above");
   };
   return "at N = " + n + " our drift is " + apart("drift", pooled.drift) + " its own and our tube " +
          apart("tube", pooled.tube);
 }
 
 // What the drift's cap hides, and the choices with which it is not reached.
-Table CapTable(const Scope& scope, const Results& results) {
+Table CapTable(const Results& results) {
   Table table{
       "CP-SLS-MPC, drift and its cap",
       "d_TV is at most one, and eps^ times the distance mostly exceeds that. At the cap the drift is 2 T mass / (1 + "
       "mass), just below 24, whatever eps^ is. So it says nothing that our total lies near the paper's: " +
-          Apart(scope, results) +
-          ". The other rows have other distances or another eps^: over the coordinates alone that the residual "
-          "depends on; the least of the estimated rates.",
+          Apart(results) +
+          ". The other rows have other distances or another eps^: over the coordinates alone that the residual depends "
+          "on; the least of the estimated rates.",
       {}};
   std::vector<Method> methods{CpSlsMethods().front()};
   methods.insert(methods.end(), CpSlsVariants().begin(), CpSlsVariants().end());
   for (const Method& method : methods)
-    for (const int observations : VariantSizes(scope)) {
-      const Pooled pooled = Pool(scope, results, BudgetCell(method, observations));
+    for (const int observations : VariantSizes(results.scope)) {
+      const Pooled pooled = Pool(results, BudgetCell(method, observations));
       const std::string n = std::to_string(observations), where = method.name + ", N = " + n + ": ";
       const auto row = [&](const char* what, const Estimate& ours, int decimals) {
-        table.rows.push_back({where + what, {}, ours, decimals, ""});
+        table.Add(where + what, ours, decimals);
       };
-      row("starved", Exactly(static_cast<double>(pooled.starved) / pooled.plans), 3);
+      row("starved", static_cast<double>(pooled.starved) / pooled.plans, 3);
       row("median part of the weights at the cap", Median(pooled.at_cap), 3);
       row("median drift (TV)", Median(pooled.drift), 2);
       row("median tube", Median(pooled.tube), 2);
       row("median total", Median(pooled.total), 2);
-      row("budgets below one", Exactly(pooled.meaningful), 0);
+      row("budgets below one", pooled.meaningful, 0);
     }
   return table;
 }
 
 // The paper's panels (b) and (d) of its figure of the budget.
-Table OutcomeTable(const Scope& scope, const Results& results) {
+Table OutcomeTable(const Results& results) {
   Table table{"CP-SLS-MPC, recall by N and by group",
-              "Bicycle, noiseless. The paper shows these as a picture. A certificate needs a budget below one.",
-              {}};
+              "Bicycle, noiseless. The paper shows these as a picture. A certificate needs a budget below one."};
   const auto row = [&](const std::string& what, const std::string& key, int observations, Group group,
                        Statistic statistic) {
-    table.rows.push_back({what,
-                          {Mark::kOurs, PaperOrNone(key)},
-                          OverSeeds(scope, results, BudgetCell(CpSlsMethods().front(), observations), group, statistic),
-                          4,
-                          kWhy});
+    table.Add(what, {Mark::kOurs, PaperOrNone(key)},
+              results.Mean(BudgetCell(CpSlsMethods().front(), observations), group, statistic), 4, kWhy);
   };
-  for (const int observations : scope.SizesOf(BicycleSystem())) {
+  for (const int observations : results.scope.SizesOf(BicycleSystem())) {
     const std::string n = std::to_string(observations);
     row("C: recall, N = " + n, "CP-SLS-MPC equations." + n + ".C.recall", observations, Group::kC, Recall);
   }
-  const int at = scope.quick ? 400 : 200;
+  const int at = results.scope.quick ? 400 : 200;
   for (const Group group : kGroups) {
     const std::string where = std::string(1, NameOf(group)) + ", N = " + std::to_string(at) + ": ";
     row(where + "recall", "", at, group, Recall);
@@ -165,35 +157,34 @@ Table OutcomeTable(const Scope& scope, const Results& results) {
   return table;
 }
 
-std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
+std::vector<Table> BudgetTables(const Results& results) {
   Table budget{"CP-SLS-MPC budget",
                "Bicycle, noiseless, local covariance, all groups. Starved: plans with a step of too little weight, "
-               "where the radius is infinite; the floor is 119. The others' budgets, summed over the horizon, by "
-               "their medians; the paper's probability bound is one minus the total.",
+               "where the radius is infinite; the floor is 119. The others' budgets, summed over the horizon, by their "
+               "medians; the paper's probability bound is one minus the total.",
                {}};
   Table plug_ins{
       "CP-SLS-MPC, four covariances",
-      "The same plans, every N. The paper says of its four rows: \"Every tested row is starved or vacuous\".",
-      {}};
+      "The same plans, every N. The paper says of its four rows: \"Every tested row is starved or vacuous\"."};
   for (const Method& method : CpSlsMethods()) {
     int meaningful = 0;
     Pooled pooled;
-    for (const int observations : scope.SizesOf(BicycleSystem())) {
-      pooled = Pool(scope, results, BudgetCell(method, observations));
+    for (const int observations : results.scope.SizesOf(BicycleSystem())) {
+      pooled = Pool(results, BudgetCell(method, observations));
       if (&method == &CpSlsMethods().front()) AddRowsOf(observations, pooled, budget.rows);
       meaningful += pooled.meaningful;
     }
-    plug_ins.rows.push_back({method.name + ": budgets below one", {}, Exactly(meaningful), 0, ""});
-    plug_ins.rows.push_back({method.name + ": median total at the largest N", {}, Median(pooled.total), 2, ""});
+    plug_ins.Add(method.name + ": budgets below one", meaningful, 0);
+    plug_ins.Add(method.name + ": median total at the largest N", Median(pooled.total), 2);
   }
-  return {budget, plug_ins, CapTable(scope, results), OutcomeTable(scope, results)};
+  return {budget, plug_ins, CapTable(results), OutcomeTable(results)};
 }
 
-std::vector<Plot> BudgetPlots(const Scope& scope, const Results& results) {
+std::vector<Plot> BudgetPlots(const Results& results) {
   std::string mass, parts;
-  for (const int observations : scope.SizesOf(BicycleSystem())) {
+  for (const int observations : results.scope.SizesOf(BicycleSystem())) {
     const std::string n = std::to_string(observations);
-    const Pooled pooled = Pool(scope, results, BudgetCell(CpSlsMethods().front(), observations));
+    const Pooled pooled = Pool(results, BudgetCell(CpSlsMethods().front(), observations));
     mass += DataLine({static_cast<double>(observations), *Median(pooled.mass).mean});
     const auto line = [&](const char* whose, double drift, double tube) {
       parts += "\"" + n + "\\n" + whose + "\" " + DataLine({0.1, drift, tube});

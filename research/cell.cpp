@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <utility>
 
 #include "forereach/numerics/text.h"
 #include "forereach/residual/consistency.h"

@@ -1,10 +1,11 @@
 // ForeReach compared with the other methods: coverage without data near the plan, recall with data.
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "research/experiment.h"
 #include "research/methods_plot.h"
@@ -56,9 +57,8 @@ bool IsGlobalByAnotherName(const Method& method, int observations) {
   return method.name == "Regional calibration" && observations == 25;
 }
 
-Point OurPoint(const Scope& scope, const Results& results, const Cell& cell) {
-  return {OverSeeds(scope, results, cell, Group::kB, Coverage).mean,
-          OverSeeds(scope, results, cell, Group::kC, Recall).mean};
+Point OurPoint(const Results& results, const Cell& cell) {
+  return {results.Mean(cell, Group::kB, Coverage).mean, results.Mean(cell, Group::kC, Recall).mean};
 }
 
 // The paper's figure of the bicycle, where it has one.
@@ -70,21 +70,17 @@ std::optional<PaperValue> PaperOf(const Method& method, int observations, const 
 }
 
 std::string InWords(const Point& point) {
-  const auto text = [](std::optional<double> value) {
-    char number[16];
-    std::snprintf(number, sizeof number, "%.3f", value.value_or(0));
-    return std::string(value ? number : "none");
-  };
+  const auto text = [](std::optional<double> value) { return value ? fmt::format("{:.3f}", *value) : "none"; };
   return SideOf(point) + " (" + text(point.coverage) + ", " + text(point.recall) + ")";
 }
 
 // Every method and N by its side, and whether the paper's point is reproduced.
-std::string Sides(const Scope& scope, const Results& results) {
+std::string Sides(const Results& results) {
   int reproduced = 0, all = 0;
   std::string lines;
   for (const Method& method : Methods())
-    for (const int observations : Sizes(scope)) {
-      const Point ours = OurPoint(scope, results, With(method, PaperCell(BicycleSystem(), observations, 0, 0)));
+    for (const int observations : Sizes(results.scope)) {
+      const Point ours = OurPoint(results, With(method, PaperCell(BicycleSystem(), observations, 0, 0)));
       lines.append("\n- ").append(method.name).append(", N = ").append(std::to_string(observations)).append(": ");
       lines += InWords(ours);
       const auto coverage = PaperOf(method, observations, "B", "coverage"),
@@ -99,33 +95,30 @@ std::string Sides(const Scope& scope, const Results& results) {
       }
       lines += ".";
     }
-  char bands[640];
-  std::snprintf(
-      bands, sizeof bands,
-      "Unsound: coverage below %g. Uninformative: recall at most %g. Reproduced: on the paper's side, and coverage "
-      "and recall both within %g of the paper's. These are words for measured figures, as in the paper: only "
-      "ForeReach, Alanwar Alg. 6 and the scalar envelope are sound by a theorem, if the declaration holds. ",
-      1 - kSideBand, kSideBand, kPointBand);
-  return bands + ("Of the " + std::to_string(all) + " points of the paper " + std::to_string(reproduced)) +
-         " are reproduced. In brackets coverage and recall:\n" + lines;
+  return fmt::format(
+      "Unsound: coverage below {:g}. Uninformative: recall at most {:g}. Reproduced: on the paper's side, and coverage "
+      "and recall both within {:g} of the paper's. These are words for measured figures, as in the paper: only "
+      "ForeReach, Alanwar Alg. 6 and the scalar envelope are sound by a theorem, if the declaration holds. Of the {} "
+      "points of the paper {} are reproduced. In brackets coverage and recall:\n{}",
+      1 - kSideBand, kSideBand, kPointBand, all, reproduced, lines);
 }
 
-std::vector<Table> Tables(const Scope& scope, const Results& results) {
+std::vector<Table> Tables(const Results& results) {
   Table bicycle{"Methods, bicycle",
                 "Noiseless. Coverage is the part of the complete tubes that contain every rollout; a method that "
                 "completes no tube has no entry. The methods differ only in their bound on the residual; the tube "
                 "comes from the same propagation.\n\n" +
-                    Sides(scope, results),
+                    Sides(results),
                 {}};
-  Table point_mass{"Methods, point mass", "Noiseless, N = 100.", {}};
+  Table point_mass{"Methods, point mass", "Noiseless, N = 100."};
   for (const Method& method : Methods()) {
     const bool is_fore_reach = &method == &Methods().front();
-    for (const int observations : Sizes(scope)) {
+    for (const int observations : Sizes(results.scope)) {
       const Cell cell = With(method, PaperCell(BicycleSystem(), observations, 0, 0));
       const std::string n = std::to_string(observations), where = method.name + ", N = " + n + ": ";
       const auto row = [&](const char* what, const Reference& reference, Group group, Statistic statistic) {
-        bicycle.rows.push_back({where + what, reference, OverSeeds(scope, results, cell, group, statistic), 4,
-                                WhatIsOurs(method), IsGlobalByAnotherName(method, observations)});
+        bicycle.Add(where + what, reference, results.Mean(cell, group, statistic), 4, WhatIsOurs(method),
+                    IsGlobalByAnotherName(method, observations));
       };
       row("B coverage", {MarkOf(method), PaperOf(method, observations, "B", "coverage")}, Group::kB, Coverage);
       row("C recall", {is_fore_reach ? Mark::kFitted : MarkOf(method), PaperOf(method, observations, "C", "recall")},
@@ -135,11 +128,8 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
     }
     const Cell cell = With(method, PaperCell(PointMassSystem(), 100, 0, 0));
     const auto row = [&](const char* what, const char* key, Group group, Statistic statistic) {
-      point_mass.rows.push_back({method.name + ": " + what,
-                                 {Mark::kOurs, PaperOrNone("point_mass." + method.name + "." + key)},
-                                 OverSeeds(scope, results, cell, group, statistic),
-                                 3,
-                                 WhatIsOurs(method)});
+      point_mass.Add(method.name + ": " + what, {Mark::kOurs, PaperOrNone("point_mass." + method.name + "." + key)},
+                     results.Mean(cell, group, statistic), 3, WhatIsOurs(method));
     };
     row("B coverage", "B.coverage", Group::kB, Coverage);
     row("B certified", "B.certified", Group::kB, CertificateRate);
@@ -151,15 +141,15 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
 
 Estimate AsEstimate(const PaperValue& value) { return {value.value, std::max(value.deviation, 0.0), 1}; }
 
-std::vector<Plot> Plots(const Scope& scope, const Results& results) {
+std::vector<Plot> Plots(const Results& results) {
   std::vector<MethodMarks> all;
   for (const Method& method : Methods()) {
     const auto ours = [&](const Cell& cell, int observations) {
-      return MethodMark{observations, OverSeeds(scope, results, With(method, cell), Group::kB, Coverage),
-                        OverSeeds(scope, results, With(method, cell), Group::kC, Recall)};
+      return MethodMark{observations, results.Mean(With(method, cell), Group::kB, Coverage),
+                        results.Mean(With(method, cell), Group::kC, Recall)};
     };
     MethodMarks marks{method.name, {}, {}, {}, {}};
-    for (const int observations : Sizes(scope)) {
+    for (const int observations : Sizes(results.scope)) {
       marks.bicycle.push_back(ours(PaperCell(BicycleSystem(), observations, 0, 0), observations));
       const auto coverage = PaperOf(method, observations, "B", "coverage"),
                  recall = PaperOf(method, observations, "C", "recall");

@@ -1,7 +1,6 @@
 // Coverage without the theorem: every state of a rollout is located in its slice of the tube, whatever the envelopes
 // say.
 #include <array>
-#include <memory>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -63,26 +62,20 @@ Count CountAll(const Scope& scope, const System& system, double part) {
   return count;
 }
 
-std::vector<Table> Tables(const Scope& scope, const Results&) {
+std::vector<Table> Tables(const Results& results) {
   Table table{
       "Coverage, directly",
       "Everywhere else coverage is decided by envelopes first: a rollout that starts in X0 and whose residuals lie in "
-      "the "
-      "recorded envelopes lies in the tube, by the theorem; only where they do not is each of its states located in "
-      "its "
-      "slice. Here each state of each rollout is located, and neither the theorem nor an envelope is used. A state is "
-      "outside if a direction separates it from the slice, inside if coefficients of the generators lead to it up to "
-      "1e-9 of "
-      "the slice's half-widths, else undecided. Noiseless, the largest N, groups A to C, the rollouts of a plan from "
-      "the "
-      "center of X0, all its corners and points between. The last rows show that the test can fail: the same plans and "
-      "rollouts, the envelope narrowed about its middle.",
+      "the recorded envelopes lies in the tube, by the theorem; only where they do not is each of its states located "
+      "in its slice. Here each state of each rollout is located, and neither the theorem nor an envelope is used. A "
+      "state is outside if a direction separates it from the slice, inside if coefficients of the generators lead to "
+      "it up to 1e-9 of the slice's half-widths, else undecided. Noiseless, the largest N, groups A to C, the rollouts "
+      "of a plan from the center of X0, all its corners and points between. The last rows show that the test can fail: "
+      "the same plans and rollouts, the envelope narrowed about its middle.",
       {}};
   for (const System* system : Systems()) {
-    const auto row = [&](const std::string& what, double value) {
-      table.rows.push_back({system->name + ": " + what, {}, Exactly(value), 0, ""});
-    };
-    const Count count = CountAll(scope, *system, 1);
+    const auto row = [&](const std::string& what, double value) { table.Add(system->name + ": " + what, value, 0); };
+    const Count count = CountAll(results.scope, *system, 1);
     row("rollouts", count.rollouts);
     row("states located", count.states);
     row("rollouts that leave the tube", count.outside);
@@ -93,15 +86,12 @@ std::vector<Table> Tables(const Scope& scope, const Results&) {
     row("the same, directly", std::reduce(count.directly.begin(), count.directly.end()));
     for (const Group group : {Group::kB, Group::kC}) {
       const double complete = count.complete[static_cast<std::size_t>(group)];
-      table.rows.push_back(
-          {system->name + ", " + NameOf(group) + ": coverage, directly",
-           {Mark::kOurs, PaperOrNone(system->name + "." + NameOf(group) + ".coverage")},
-           complete > 0 ? Exactly(count.directly[static_cast<std::size_t>(group)] / complete) : Estimate{},
-           3,
-           ""});
+      table.Add(system->name + ", " + NameOf(group) + ": coverage, directly",
+                {Mark::kOurs, PaperOrNone(system->name + "." + NameOf(group) + ".coverage")},
+                complete > 0 ? Estimate(count.directly[static_cast<std::size_t>(group)] / complete) : Estimate(), 3);
     }
     for (const double part : kNarrowed) {
-      const Count narrowed = CountAll(scope, *system, part);
+      const Count narrowed = CountAll(results.scope, *system, part);
       row("envelope at " + std::to_string(static_cast<int>(100 * part + 0.5)) + " %: tubes that a rollout leaves, of " +
               std::to_string(narrowed.tubes),
           narrowed.left);
@@ -110,12 +100,10 @@ std::vector<Table> Tables(const Scope& scope, const Results&) {
   return {table};
 }
 
-std::vector<Cell> NoCells(const Scope&) { return {}; }
-
 }  // namespace
 
 Experiment DirectCoverage() {
-  return {"coverage", "coverage by locating every state of over 20,000 rollouts", NoCells, Tables};
+  return {"coverage", "coverage by locating every state of over 20,000 rollouts", {}, Tables};
 }
 
 }  // namespace forereach::research

@@ -2,7 +2,6 @@
 // paper's certified matrices.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <map>
 #include <span>
@@ -10,6 +9,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "forereach/declare/slope_bound.h"
 #include "forereach/dynamics/models/residuals.h"
@@ -23,12 +24,6 @@
 namespace forereach::research {
 namespace {
 
-std::string Short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
-
 // ---- incorrect
 
 constexpr double kFactors[] = {1, 1 / 1.5, 0.5, 0.25, 0.1, 1 / 31.710};
@@ -37,7 +32,7 @@ constexpr double kFactors[] = {1, 1 / 1.5, 0.5, 0.25, 0.1, 1 / 31.710};
 Cell Scaled(const System& system, double factor) {
   Cell cell = PaperCell(system, system.sample_sizes.back(), 0, 0);
   cell.layout = Layout::kBelowKnee;
-  if (factor != 1) cell.declared = {"deployed_times_" + Short(factor), factor * system.deployed};
+  if (factor != 1) cell.declared = {"deployed_times_" + fmt::format("{:.4g}", factor), factor * system.deployed};
   return cell;
 }
 
@@ -67,27 +62,21 @@ std::vector<Table> TestTables(const Scope& scope) {
   Table table{
       "Incorrect declarations, pairwise test",
       "For the deployed matrix times each factor: the number of data sets that contradict it, over every N, channel "
-      "and seed of both systems. Below the knee the residual is nearly zero, so data from there contradict no matrix.",
-      {}};
+      "and seed of both systems. Below the knee the residual is nearly zero, so data from there contradict no matrix."};
   for (const double factor : kFactors) {
-    const std::string times = "L times " + Short(factor);
-    table.rows.push_back({times + ": corridor",
-                          factor == 0.5 ? Reference(Mark::kOurs, Paper("incorrect.halved.rejections")) : Reference(),
-                          Exactly(Rejections(scope, Layout::kCorridor, factor)), 0,
-                          "the paper halves another bound, an underestimate that is not in its text"});
-    table.rows.push_back(
-        {times + ": below the knee", {}, Exactly(Rejections(scope, Layout::kBelowKnee, factor)), 0, ""});
+    const std::string times = "L times " + fmt::format("{:.4g}", factor);
+    table.Add(times + ": corridor",
+              factor == 0.5 ? Reference(Mark::kOurs, Paper("incorrect.halved.rejections")) : Reference(),
+              Rejections(scope, Layout::kCorridor, factor), 0,
+              "the paper halves another bound, an underestimate that is not in its text");
+    table.Add(times + ": below the knee", Rejections(scope, Layout::kBelowKnee, factor), 0);
   }
-  table.rows.push_back(
-      {"S under bounded noise, at step",
-       {Mark::kOurs, Paper("incorrect.noisy.step")},
-       {},
-       0,
-       "not reproduced: the paper's plan, data and underestimate are not in its text; `kept` has ours"});
+  table.Add("S under bounded noise, at step", {Mark::kOurs, Paper("incorrect.noisy.step")}, {}, 0,
+            "not reproduced: the paper's plan, data and underestimate are not in its text; `kept` has ours");
   return {table};
 }
 
-std::vector<Table> IncorrectTables(const Scope& scope, const Results& results) {
+std::vector<Table> IncorrectTables(const Results& results) {
   Table table{"Incorrect declarations, plans",
               "Data from below the knee, noiseless, the largest N; the same plans as above. The tubes show errors that "
               "the pairwise test cannot detect: a matrix that is too small gives tubes that the target leaves, and "
@@ -96,14 +85,12 @@ std::vector<Table> IncorrectTables(const Scope& scope, const Results& results) {
   for (const System* system : Systems())
     for (const double factor : kFactors) {
       const Cell cell = Scaled(*system, factor);
-      const std::string where = system->name + ", L times " + Short(factor) + ": ";
-      table.rows.push_back({where + "C coverage", {}, OverSeeds(scope, results, cell, Group::kC, Coverage), 3, ""});
-      table.rows.push_back(
-          {where + "C certified", {}, OverSeeds(scope, results, cell, Group::kC, CertificateRate), 3, ""});
-      table.rows.push_back(
-          {where + "false certificates, all groups", {}, Exactly(FalseCertificates(scope, results, cell)), 0, ""});
+      const std::string where = system->name + ", L times " + fmt::format("{:.4g}", factor) + ": ";
+      table.Add(where + "C coverage", results.Mean(cell, Group::kC, Coverage), 3);
+      table.Add(where + "C certified", results.Mean(cell, Group::kC, CertificateRate), 3);
+      table.Add(where + "false certificates, all groups", results.FalseCertificates(cell), 0);
     }
-  std::vector<Table> tables = TestTables(scope);
+  std::vector<Table> tables = TestTables(results.scope);
   tables.push_back(table);
   return tables;
 }
@@ -225,14 +212,12 @@ std::pair<const char*, const char*> WordsOf(Reading reading) {
   throw std::invalid_argument("boxes: unknown reading");
 }
 
-Table BoxTable(Reading reading, const Scope& scope, const Results& results) {
+Table BoxTable(Reading reading, const Results& results) {
   const bool is_grid = reading == Reading::kGrid;
   const auto [title, held] = WordsOf(reading);
-  Table table{title,
-              std::string("Bicycle, N = 400, noiseless. L bounds the slopes for every ") + held +
-                  ". Slack: the norm of L over the norm of the L for the nominal parameters. Joint: the part of all "
-                  "plans with a complete tube that contains every rollout.",
-              {}};
+  Table table{title, std::string("Bicycle, N = 400, noiseless. L bounds the slopes for every ") + held +
+                         ". Slack: the norm of L over the norm of the L for the nominal parameters. Joint: the part of "
+                         "all plans with a complete tube that contains every rollout."};
   if (is_grid)
     table.about +=
         " These parameters were found among the 63 sets of the six by the paper's three slack ratios, so the ratios "
@@ -247,54 +232,44 @@ Table BoxTable(Reading reading, const Scope& scope, const Results& results) {
     const std::string key = "boxes." + std::to_string(percent) + ".", where = std::to_string(percent) + " %: ";
     const auto row = [&](const char* what, const char* figure, const Estimate& ours, int decimals,
                          Mark mark = Mark::kOurs) {
-      table.rows.push_back({where + what, {mark, PaperOrNone(key + figure)}, ours, decimals, why});
+      table.Add(where + what, {mark, PaperOrNone(key + figure)}, ours, decimals, why);
     };
-    row("slack", "slack", Exactly(cell.declared.matrix.norm() / nominal.norm()), 3,
-        is_grid ? Mark::kFitted : Mark::kOurs);
-    row("slack of the slope by v", "", Exactly(cell.declared.matrix(2, 3) / nominal(2, 3)), 3);
-    row("slack of the slope by delta", "", Exactly(cell.declared.matrix(2, 5) / nominal(2, 5)), 3);
-    row("C: recall", "recall", OverSeeds(scope, results, cell, Group::kC, Recall), 3);
-    row("C: complete", "complete", OverSeeds(scope, results, cell, Group::kC, CompleteRate), 3);
-    row("C: joint", "joint", OverSeeds(scope, results, cell, Group::kC, JointRate), 3);
+    row("slack", "slack", cell.declared.matrix.norm() / nominal.norm(), 3, is_grid ? Mark::kFitted : Mark::kOurs);
+    row("slack of the slope by v", "", cell.declared.matrix(2, 3) / nominal(2, 3), 3);
+    row("slack of the slope by delta", "", cell.declared.matrix(2, 5) / nominal(2, 5), 3);
+    row("C: recall", "recall", results.Mean(cell, Group::kC, Recall), 3);
+    row("C: complete", "complete", results.Mean(cell, Group::kC, CompleteRate), 3);
+    row("C: joint", "joint", results.Mean(cell, Group::kC, JointRate), 3);
     table.rows.back().follows = true;  // from complete, where coverage is one
-    row("B: false certificates", "false_certificates", Exactly(FalseCertificates(scope, results, cell, Group::kB)), 0);
+    row("B: false certificates", "false_certificates", results.FalseCertificates(cell, Group::kB), 0);
   }
   if (is_grid)
-    table.rows.push_back({"sets of parameters, of 63, with each ratio within 2 % of the paper's, on 1000 by 500 cells",
-                          {},
-                          Exactly(SetsWithThePapersSlack()),
-                          0,
-                          ""});
+    table.Add("sets of parameters, of 63, with each ratio within 2 % of the paper's, on 1000 by 500 cells",
+              SetsWithThePapersSlack(), 0);
   return table;
 }
 
-std::vector<Table> BoxTables(const Scope& scope, const Results& results) {
+std::vector<Table> BoxTables(const Results& results) {
   std::vector<Table> tables;
-  for (const Reading reading : kReadings) tables.push_back(BoxTable(reading, scope, results));
+  for (const Reading reading : kReadings) tables.push_back(BoxTable(reading, results));
   return tables;
 }
 
 // ---- norms, grids: no plans
 
-std::vector<Cell> NoCells(const Scope&) { return {}; }
-
-std::vector<Table> NormTables(const Scope&, const Results&) {
+std::vector<Table> NormTables(const Results&) {
   Table table{
       "Norm ratios",
-      "|L_f|_F / |L_r|_F: L_r is the deployed matrix over 1.5, L_f adds the largest |D_z f0| over the domain to it.",
-      {}};
+      "|L_f|_F / |L_r|_F: L_r is the deployed matrix over 1.5, L_f adds the largest |D_z f0| over the domain to it."};
   for (const System* system : Systems())
-    table.rows.push_back({system->name,
-                          {Mark::kExact, Paper("norms." + system->name)},
-                          Exactly(NormRatio(*system, system->deployed / 1.5)),
-                          3,
-                          ""});
+    table.Add(system->name, {Mark::kExact, Paper("norms." + system->name)}, NormRatio(*system, system->deployed / 1.5),
+              3);
   return {table};
 }
 
 double RoundedUp(double x) { return std::ceil(x * 1e9) / 1e9; }
 
-std::vector<Table> GridTables(const Scope&, const Results&) {
+std::vector<Table> GridTables(const Results&) {
   const PointMassGrid point_mass = PaperPointMassGrid(VelocityKnee{0.15});
   const BicycleGrid bicycle = PaperBicycleGrid(HeadingSaturation{0.1, 2.5});
   const Eigen::MatrixXd &of_mass = PointMassSystem().deployed, &of_bicycle = BicycleSystem().deployed;
@@ -312,28 +287,21 @@ std::vector<Table> GridTables(const Scope&, const Results&) {
                                   std::min(of_mass(2, 3), of_mass(3, 2))}},
               of_heading[] = {{"bicycle, heading by v", "by_speed", bicycle.by_speed, of_bicycle(2, 3)},
                               {"bicycle, heading by delta", "by_steering", bicycle.by_steering, of_bicycle(2, 5)}};
-  Table table{
-      "Certified declarations",
-      "L_cert by the paper's fixed grids, rounded upward to nine decimals, as the paper says that it rounds. It "
-      "prints three of the point mass's entries rounded to nearest, below the value: a slip, which its margin "
-      "does not have. Proved bounds, which are slightly lower, are in declare.md. Margin: the least difference "
-      "of a deployed entry and a certified one.",
-      {}};
+  Table table{"Certified declarations",
+              "L_cert by the paper's fixed grids, rounded upward to nine decimals, as the paper says that it rounds. "
+              "It prints three of the point mass's entries rounded to nearest, below the value: a slip, which its "
+              "margin does not have. Proved bounds, which are slightly lower, are in declare.md. Margin: the least "
+              "difference of a deployed entry and a certified one."};
   const auto add = [&](std::span<const Entry> entries, const std::string& system, const char* name) {
     double margin = kInfinity;
     for (const auto& [what, key, certified, deployed] : entries) {
       const std::string of(key);
-      table.rows.push_back({what,
-                            {Mark::kExact, Paper("grids." + of)},
-                            Exactly(RoundedUp(certified)),
-                            9,
-                            "the paper's slip: rounded to nearest, its text says upward"});
-      table.rows.push_back(
-          {std::string(what) + ", deployed", {Mark::kTaken, Paper("deployed." + of)}, Exactly(deployed), 9, ""});
+      table.Add(what, {Mark::kExact, Paper("grids." + of)}, RoundedUp(certified), 9,
+                "the paper's slip: rounded to nearest, its text says upward");
+      table.Add(std::string(what) + ", deployed", {Mark::kTaken, Paper("deployed." + of)}, deployed, 9);
       margin = std::min(margin, deployed - RoundedUp(certified));
     }
-    table.rows.push_back(
-        {std::string(name) + ", margin", {Mark::kExact, Paper("margins." + system)}, Exactly(margin), 9, ""});
+    table.Add(std::string(name) + ", margin", {Mark::kExact, Paper("margins." + system)}, margin, 9);
   };
   add(of_point_mass, "point_mass", "point mass");
   add(of_heading, "bicycle", "bicycle");
@@ -348,12 +316,10 @@ Experiment IncorrectDeclarations() {
 
 Experiment ParameterBoxes() { return {"boxes", "declarations over parameter boxes", BoxCells, BoxTables}; }
 
-Experiment NormRatios() {
-  return {"norms", "the whole dynamics' Lipschitz norm over the residual's", NoCells, NormTables};
-}
+Experiment NormRatios() { return {"norms", "the whole dynamics' Lipschitz norm over the residual's", {}, NormTables}; }
 
 Experiment CertifiedDeclarations() {
-  return {"grids", "the paper's certified declarations by its own grids", NoCells, GridTables};
+  return {"grids", "the paper's certified declarations by its own grids", {}, GridTables};
 }
 
 }  // namespace forereach::research

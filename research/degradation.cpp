@@ -1,9 +1,10 @@
 // Degradation of the nominal model: recall as a smaller part of the model is known.
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "research/experiment.h"
 #include "research/variants.h"
@@ -56,79 +57,68 @@ std::optional<double> Crossing(const std::vector<double>& at, const std::vector<
   return std::nullopt;
 }
 
-std::string Percent(double value) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%.5g %%", value);
-  return text;
-}
+std::string Percent(double value) { return fmt::format("{:.5g} %", value); }
 
-Table ReadingTable(const Scope& scope, const Results& results) {
-  Table table{
-      "Nominal degradation, readings",
-      "C, noiseless, the largest N, " + std::to_string(kPlans) +
-          " plans a seed. What \"degraded\" may mean: the model is (1 - d) f0; or it moves the state by a part "
-          "of what it should, x + (1 - d)(f0 - x); or it is f0, and only L is declared as of one of them. L grows "
-          "by what the model lacks. The paper: " +
-          Percent(Paper("degradation.point_mass").value) + " and " + Percent(Paper("degradation.bicycle").value) + ".",
-      {}};
-  const std::vector<double> percents = CoarsePercents(scope);
+Table ReadingTable(const Results& results) {
+  Table table{"Nominal degradation, readings",
+              "C, noiseless, the largest N, " + std::to_string(kPlans) +
+                  " plans a seed. What \"degraded\" may mean: the model is (1 - d) f0; or it moves the state by a part "
+                  "of what it should, x + (1 - d)(f0 - x); or it is f0, and only L is declared as of one of them. L "
+                  "grows by what the model lacks. The paper: " +
+                  Percent(Paper("degradation.point_mass").value) + " and " +
+                  Percent(Paper("degradation.bicycle").value) + ".",
+              {}};
+  const std::vector<double> percents = CoarsePercents(results.scope);
   for (const System* system : Systems())
     for (const auto& [lacking, name] : kReadings) {
       const std::string where = system->name + ", " + name;
       std::vector<double> recalls;
       std::vector<Row> rows;
       for (const double percent : percents) {
-        const Estimate recall = OverSeeds(scope, results, ReadingCell(*system, lacking, percent), Group::kC, Recall);
+        const Estimate recall = results.Mean(ReadingCell(*system, lacking, percent), Group::kC, Recall);
         recalls.push_back(recall.mean.value_or(0));
         rows.push_back({where + ", d = " + Percent(percent) + ": C recall", {}, recall, 3, ""});
       }
       const std::optional<double> crossing = Crossing(percents, recalls);
-      table.rows.push_back({where + ": tolerated, %", {}, crossing ? Exactly(*crossing) : Estimate{}, 3, ""});
+      table.Add(where + ": tolerated, %", crossing, 3);
       table.rows.insert(table.rows.end(), rows.begin(), rows.end());
     }
   return table;
 }
 
-std::vector<Table> DegradationTables(const Scope& scope, const Results& results) {
-  Table table{"Nominal degradation",
-              "C, noiseless, the largest N. The nominal model is (1 - d) f0, and L grows by d sup |D f0|: at "
-              "d = 1 there is no model, and L is the L_f of the norm ratios. \"Tolerated\": the d at which recall "
-              "comes down to 0.5.",
-              {}};
-  const std::vector<double> percents = PercentsOf(scope);
+std::vector<Table> DegradationTables(const Results& results) {
+  Table table{
+      "Nominal degradation",
+      "C, noiseless, the largest N. The nominal model is (1 - d) f0, and L grows by d sup |D f0|: at d = 1 there is no "
+      "model, and L is the L_f of the norm ratios. \"Tolerated\": the d at which recall comes down to 0.5."};
+  const std::vector<double> percents = PercentsOf(results.scope);
   for (const System* system : Systems()) {
     std::vector<double> recalls;
     std::vector<Row> rows;
     int false_certificates = 0;
     for (const double percent : percents) {
       const Cell cell = DegradedCell(*system, percent);
-      const Estimate recall = OverSeeds(scope, results, cell, Group::kC, Recall);
+      const Estimate recall = results.Mean(cell, Group::kC, Recall);
       recalls.push_back(recall.mean.value_or(0));
-      false_certificates += FalseCertificates(scope, results, cell);
+      false_certificates += results.FalseCertificates(cell);
       rows.push_back({system->name + ", d = " + Percent(percent) + ": C recall", {}, recall, 3, ""});
     }
     const std::optional<double> crossing = Crossing(percents, recalls);
-    table.rows.push_back({system->name + ": tolerated, %",
-                          {Mark::kOurs, Paper("degradation." + system->name)},
-                          crossing ? Exactly(*crossing) : Estimate{},
-                          3,
-                          "the paper does not say what degrades, nor how much of it it declares"});
-    table.rows.push_back({system->name + ": cells of the scan",
-                          {Mark::kOurs, Paper("degradation." + system->name + ".cells")},
-                          Exactly(static_cast<double>(percents.size())),
-                          0,
-                          "the paper does not state its cells"});
-    table.rows.push_back({system->name + ": false certificates, all groups", {}, Exactly(false_certificates), 0, ""});
+    table.Add(system->name + ": tolerated, %", {Mark::kOurs, Paper("degradation." + system->name)}, crossing, 3,
+              "the paper does not say what degrades, nor how much of it it declares");
+    table.Add(system->name + ": cells of the scan", {Mark::kOurs, Paper("degradation." + system->name + ".cells")},
+              static_cast<double>(percents.size()), 0, "the paper does not state its cells");
+    table.Add(system->name + ": false certificates, all groups", false_certificates, 0);
     table.rows.insert(table.rows.end(), rows.begin(), rows.end());
   }
-  return {table, ReadingTable(scope, results)};
+  return {table, ReadingTable(results)};
 }
 
-std::vector<Plot> DegradationPlots(const Scope& scope, const Results& results) {
+std::vector<Plot> DegradationPlots(const Results& results) {
   std::string lines;
-  for (const double percent : PercentsOf(scope)) {
+  for (const double percent : PercentsOf(results.scope)) {
     const auto recall = [&](const System& system) {
-      return OverSeeds(scope, results, DegradedCell(system, percent), Group::kC, Recall);
+      return results.Mean(DegradedCell(system, percent), Group::kC, Recall);
     };
     const Estimate point_mass = recall(PointMassSystem()), bicycle = recall(BicycleSystem());
     lines += DataLine(
@@ -136,12 +126,11 @@ std::vector<Plot> DegradationPlots(const Scope& scope, const Results& results) {
   }
   const std::string paper = DataLine({Paper("degradation.point_mass").value, kReference}) + "\n\n" +
                             DataLine({Paper("degradation.bicycle").value, kReference});
-  return {
-      {"degradation",
-       "Recall of group C against the degradation of the nominal model, mean and one standard deviation over the "
-       "seeds. At "
-       "100 % the nominal model is zero. The paper prints where its recall comes down to the reference, and no spread.",
-       720, 400, DataBlock("recall", lines) + DataBlock("paper", paper) + R"(set yrange [0:1.05]; set xrange [0:100]
+  return {{"degradation",
+           "Recall of group C against the degradation of the nominal model, mean and one standard deviation over the "
+           "seeds. At 100 % the nominal model is zero. The paper prints where its recall comes down to the reference, "
+           "and no spread.",
+           720, 400, DataBlock("recall", lines) + DataBlock("paper", paper) + R"(set yrange [0:1.05]; set xrange [0:100]
 set xlabel 'degradation d, %'; set ylabel 'certified recall, C'
 set key outside top center horizontal maxcols 3
 plot 0.5 with lines dt 2 lc rgb grey title 'half: the paper''s reference', \

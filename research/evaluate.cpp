@@ -1,6 +1,5 @@
 #include "research/evaluate.h"
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 

@@ -18,7 +18,7 @@ std::vector<int> Scope::SizesOf(const System& system) const {
   return {all.front(), all.back()};
 }
 
-Results::Results(const std::vector<Cell>& cells, const std::vector<CellResult>& results) {
+Results::Results(Scope of, const std::vector<Cell>& cells, const std::vector<CellResult>& results) : scope(of) {
   for (std::size_t i = 0; i < cells.size(); ++i) by_key_.emplace(cells[i].key(), results[i]);
 }
 
@@ -46,24 +46,27 @@ std::optional<double> CertificateRate(const Tally& tally) { return Ratio(tally.c
 std::optional<double> FalseSafeRate(const Tally& tally) { return Ratio(tally.false_certificates(), tally.certified); }
 std::optional<double> DomainRate(const Tally& tally) { return Ratio(tally.domain, tally.plans); }
 std::optional<double> SafetyRate(const Tally& tally) { return Ratio(tally.safety, tally.plans); }
-
 std::optional<double> FalsifiedRate(const Tally& tally) { return Ratio(tally.falsified, tally.plans); }
 
-Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group group, Statistic statistic) {
+Estimate OverSeeds(const Scope& scope, const std::function<std::optional<double>(int seed)>& value) {
   std::vector<std::optional<double>> values;
-  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed) values.push_back(statistic(results.Of(cell, group)));
+  for (int seed = 0; seed < scope.seeds; ++seed) values.push_back(value(seed));
   return EstimateOf(values);
 }
 
-int FalseCertificates(const Scope& scope, const Results& results, Cell cell) {
+Estimate Results::Mean(Cell cell, Group group, Statistic statistic) const {
+  return OverSeeds(scope, [&](int seed) { return cell.seed = seed, statistic(Of(cell, group)); });
+}
+
+int Results::FalseCertificates(const Cell& cell) const {
   int count = 0;
-  for (const Group group : kGroups) count += FalseCertificates(scope, results, cell, group);
+  for (const Group group : kGroups) count += FalseCertificates(cell, group);
   return count;
 }
 
-int FalseCertificates(const Scope& scope, const Results& results, Cell cell, Group group) {
+int Results::FalseCertificates(Cell cell, Group group) const {
   int count = 0;
-  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed) count += results.Of(cell, group).false_certificates();
+  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed) count += Of(cell, group).false_certificates();
   return count;
 }
 

@@ -22,31 +22,6 @@ struct Scope {
   [[nodiscard]] std::vector<int> SizesOf(const System& system) const;
 };
 
-/** Finished cells, by their key. */
-class Results final {
- public:
-  Results(const std::vector<Cell>& cells, const std::vector<CellResult>& results);
-
-  /** @throws std::invalid_argument naming the cell if it was not asked for. */
-  [[nodiscard]] const CellResult& Of(const Cell& cell) const;
-  [[nodiscard]] const Tally& Of(const Cell& cell, Group group) const {
-    return Of(cell)[static_cast<std::size_t>(group)];
-  }
-
- private:
-  std::map<std::string, CellResult> by_key_;
-};
-
-struct Experiment {
-  std::string name, about;  ///< A word for the command line, a line for its help
-  std::function<std::vector<Cell>(const Scope&)> cells;
-  std::function<std::vector<Table>(const Scope&, const Results&)> tables;
-  std::function<std::vector<Plot>(const Scope&, const Results&)> plots = {};  ///< May be empty
-};
-
-/** All of them, in the order of the report. */
-[[nodiscard]] std::span<const Experiment> Experiments();
-
 /** @name Of a tally; none where the denominator is zero. */
 ///@{
 using Statistic = std::optional<double> (*)(const Tally&);
@@ -61,17 +36,41 @@ using Statistic = std::optional<double> (*)(const Tally&);
 [[nodiscard]] std::optional<double> FalsifiedRate(const Tally& tally);    ///< F / plans
 ///@}
 
-/** Over the seeds of a scope, whatever the cell's own. */
-[[nodiscard]] Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group group,
-                                 Statistic statistic);
-/** Certificates of plans that are not target-safe, all seeds of the scope together: of every group, or of one. */
-[[nodiscard]] int FalseCertificates(const Scope& scope, const Results& results, Cell cell);
-[[nodiscard]] int FalseCertificates(const Scope& scope, const Results& results, Cell cell, Group group);
+/** Finished cells, by their key, of a scope. */
+struct Results final {
+  Results(Scope of, const std::vector<Cell>& cells, const std::vector<CellResult>& results);
+
+  /** @throws std::invalid_argument naming the cell if it was not asked for. */
+  [[nodiscard]] const CellResult& Of(const Cell& cell) const;
+  [[nodiscard]] const Tally& Of(const Cell& cell, Group group) const {
+    return Of(cell)[static_cast<std::size_t>(group)];
+  }
+  /** Of a statistic over the seeds of the scope, whatever the cell's own. */
+  [[nodiscard]] Estimate Mean(Cell cell, Group group, Statistic statistic) const;
+  /** Certificates of plans that are not target-safe, all seeds of the scope together: of every group, or of one. */
+  [[nodiscard]] int FalseCertificates(const Cell& cell) const;
+  [[nodiscard]] int FalseCertificates(Cell cell, Group group) const;
+
+  const Scope scope;
+
+ private:
+  std::map<std::string, CellResult> by_key_;
+};
+
+struct Experiment {
+  std::string name, about;                               ///< A word for the command line, a line for its help
+  std::function<std::vector<Cell>(const Scope&)> cells;  ///< Empty: it needs none
+  std::function<std::vector<Table>(const Results&)> tables;
+  std::function<std::vector<Plot>(const Results&)> plots = {};  ///< May be empty
+};
+
+/** All of them, in the order of the report. */
+[[nodiscard]] std::span<const Experiment> Experiments();
+
+/** Mean and spread of what each seed of the scope gives. */
+[[nodiscard]] Estimate OverSeeds(const Scope& scope, const std::function<std::optional<double>(int seed)>& value);
 /** The cell with each seed of the scope. */
 void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
-
-/** A count as a figure. */
-[[nodiscard]] inline Estimate Exactly(double value) { return {value, 0, 1}; }
 
 /** @name The experiments, by the quantity that they vary. */
 ///@{

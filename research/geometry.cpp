@@ -1,7 +1,5 @@
 // The paper's four panels: tubes in position space, without data and with them.
 #include <cmath>
-#include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -49,18 +47,13 @@ std::vector<Panel> Panels() {
   return panels;
 }
 
-std::vector<Cell> NoCells(const Scope&) { return {}; }
-
-std::vector<Table> GeometryTables(const Scope&, const Results&) {
-  Table table{
-      "Tube geometry",
-      "One plan a panel, the largest N, seed 0; 1 is yes. In B a plan that global calibration certifies and the "
-      "target spoils, in C one that ForeReach certifies. The paper shows these as pictures.",
-      {}};
+std::vector<Table> GeometryTables(const Results&) {
+  Table table{"Tube geometry",
+              "One plan a panel, the largest N, seed 0; 1 is yes. In B a plan that global calibration certifies and "
+              "the target spoils, in C one that ForeReach certifies. The paper shows these as pictures.",
+              {}};
   for (const Panel& panel : Panels()) {
-    const auto row = [&](const char* what, bool is_so) {
-      table.rows.push_back({panel.name() + ": " + what, {}, Exactly(is_so), 0, ""});
-    };
+    const auto row = [&](const char* what, bool is_so) { table.Add(panel.name() + ": " + what, is_so, 0); };
     row("global calibration certifies", panel.global.decision.outcome == Outcome::kCertified);
     row("its tube contains the target", Cover(panel.global, panel.target) == Membership::kInside);
     row("ForeReach certifies", panel.ours.decision.outcome == Outcome::kCertified);
@@ -106,7 +99,7 @@ std::string Paths(const Rollouts& target) {
   return lines;
 }
 
-std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
+std::vector<Plot> GeometryPlots(const Results&) {
   Plot plot{"geometry",
             "Tubes in position space, metres: left without data near the plan, right with them; above the point mass, "
             "below the bicycle. Numbers are steps, at the center of ForeReach's slices; a cross and D: the tube leaves "
@@ -153,7 +146,7 @@ std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
 }  // namespace
 
 Experiment TubeGeometry() {
-  return {"geometry", "tubes in position space, the paper's four panels", NoCells, GeometryTables, GeometryPlots};
+  return {"geometry", "tubes in position space, the paper's four panels", {}, GeometryTables, GeometryPlots};
 }
 
 }  // namespace forereach::research

@@ -1,9 +1,10 @@
 // What the data leave open: the two systems of Theorems 1 and 2, and the inner bound that every sound tube contains.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "forereach/dynamics/models/residuals.h"
 #include "forereach/residual/observations.h"
@@ -16,8 +17,6 @@
 
 namespace forereach::research {
 namespace {
-
-std::vector<Cell> NoCells(const Scope&) { return {}; }
 
 // A plan in the middle of the corridor among 400 observations, with the target's residual for r0.
 struct Scene {
@@ -46,18 +45,15 @@ const WidthBound& Widest(const std::vector<WidthBound>& bounds) {
 Table PairTable(const Scene& scene) {
   Table table{
       "Information limits, Theorem 1",
-      "Two systems that agree on all 400 observations, r0 +- a phi e_k with a bump at tau = 10 in x, simulated: "
-      "half their distance at tau + 1 is a for every a, so no tube of finite width is sound for both.",
-      {}};
+      "Two systems that agree on all 400 observations, r0 +- a phi e_k with a bump at tau = 10 in x, simulated: half "
+      "their distance at tau + 1 is a for every a, so no tube of finite width is sound for both."};
   const Eigen::MatrixXd projection = scene.system.projection();
   const WidthBound first =
       BoundWidth({scene.rollout, TwiceTheBounds(scene.residual.bounds), scene.data, projection}, 10, 0);
   const Bump bump{scene.rollout.Queries().col(10), first.bump_radius};
   for (const double amplitude : {0.1, 10.0, 1000.0}) {
     const Pair pair = RollOutPair(scene.rollout, bump, 0, amplitude);
-    char text[32];
-    std::snprintf(text, sizeof text, "a = %g: half-width, m", amplitude);
-    table.rows.push_back({text, {}, Exactly(pair.HalfSeparation(projection, 11)), 3, ""});
+    table.Add(fmt::format("a = {:g}: half-width, m", amplitude), pair.HalfSeparation(projection, 11), 3);
   }
   return table;
 }
@@ -70,21 +66,17 @@ Table WidthTable(const Scene& scene) {
   Table table{
       "Information limits, Theorem 2",
       "Bicycle, a plan in the middle of the corridor, v = 12 m/s, 400 observations, r0 the target's residual. The "
-      "class "
-      "(R_max, H_1, H_2) is not in the paper's text; ours is twice what r0 uses. Where a_lin is least, the bound is "
-      "gain^2 / (2 (h_0 + H_2)): at tau = 10, k = 2 all of it is dt v and curvature. H_2 exceeds sup |D^2 r0|, which "
-      "the domain's largest speed makes large; the last two rows say which speed of the plan the paper's figure takes "
-      "then. So the paper's H_2 is of another r0 or a smaller domain, or its plan is faster than 14.75 m/s.",
+      "class (R_max, H_1, H_2) is not in the paper's text; ours is twice what r0 uses. Where a_lin is least, the bound "
+      "is gain^2 / (2 (h_0 + H_2)): at tau = 10, k = 2 all of it is dt v and curvature. H_2 exceeds sup |D^2 r0|, "
+      "which the domain's largest speed makes large; the last two rows say which speed of the plan the paper's figure "
+      "takes then. So the paper's H_2 is of another r0 or a smaller domain, or its plan is faster than 14.75 m/s.",
       {}};
   const std::vector<WidthBound> bounds = scene.Scan(1);
   const WidthBound& widest = Widest(bounds);
   const auto positive = std::ranges::count_if(bounds, [](const WidthBound& b) { return b.half_width > 0; });
   const auto add = [&](const char* what, Mark mark, const char* key, double ours, int decimals) {
-    table.rows.push_back({what,
-                          {mark, PaperOrNone(std::string("width.") + key)},
-                          Exactly(ours),
-                          decimals,
-                          "the paper's class, plan and r0 are not in its text"});
+    table.Add(what, {mark, PaperOrNone(std::string("width.") + key)}, ours, decimals,
+              "the paper's class, plan and r0 are not in its text");
   };
   const auto row = [&](const char* what, const char* key, double ours, int decimals) {
     add(what, Mark::kOurs, key, ours, decimals);
@@ -111,18 +103,15 @@ Table WidthTable(const Scene& scene) {
 }
 
 Table ScanTable(const Scene& scene) {
-  Table table{"Information limits, Theorem 2 by time", "The same: the largest bound over the coordinates.", {}};
+  Table table{"Information limits, Theorem 2 by time", "The same: the largest bound over the coordinates."};
   const std::vector<WidthBound> bounds = scene.Scan(1);
   for (int tau = 0; tau <= scene.system.horizon - 2; ++tau) {
     const WidthBound* best = nullptr;
     for (const WidthBound& bound : bounds)
       if (bound.tau == tau && (!best || bound.half_width > best->half_width)) best = &bound;
     if (best)
-      table.rows.push_back({"tau = " + std::to_string(tau) + ", k = " + std::to_string(best->k) + ": half-width, m",
-                            {},
-                            Exactly(best->half_width),
-                            9,
-                            ""});
+      table.Add("tau = " + std::to_string(tau) + ", k = " + std::to_string(best->k) + ": half-width, m",
+                best->half_width, 9);
   }
   return table;
 }
@@ -174,13 +163,12 @@ Inner InnerBounds(const System& system, int observations, int seed, int plans) {
 }
 
 Table InnerTable(const Scope& scope) {
-  Table table{
-      "Inner bound",
-      "C, noiseless, a few plans a seed, complete tubes. Rollouts of the lower, upper and mixed McShane extensions "
-      "of the data from the center and corners of X0: systems that data and declaration allow, so every sound "
-      "tube contains them. Share: half the spread of their positions at T over the half-width of our tube; 1 "
-      "would mean that no sound tube is narrower.",
-      {}};
+  Table table{"Inner bound",
+              "C, noiseless, a few plans a seed, complete tubes. Rollouts of the lower, upper and mixed McShane "
+              "extensions of the data from the center and corners of X0: systems that data and declaration allow, so "
+              "every sound tube contains them. Share: half the spread of their positions at T over the half-width of "
+              "our tube; 1 would mean that no sound tube is narrower.",
+              {}};
   for (const System* system : Systems())
     for (const int observations : scope.SizesOf(*system)) {
       std::vector<std::optional<double>> shares;
@@ -192,22 +180,19 @@ Table InnerTable(const Scope& scope) {
         tubes += inner.tubes;
       }
       const std::string where = system->name + ", N = " + std::to_string(observations) + ": ";
-      table.rows.push_back({where + "share", {}, EstimateOf(shares), 3, ""});
-      table.rows.push_back(
-          {where + "tubes that miss an extremal state, of " + std::to_string(tubes), {}, Exactly(escapes), 0, ""});
+      table.Add(where + "share", EstimateOf(shares), 3);
+      table.Add(where + "tubes that miss an extremal state, of " + std::to_string(tubes), escapes, 0);
     }
   return table;
 }
 
-std::vector<Table> LimitTables(const Scope& scope, const Results&) {
+std::vector<Table> LimitTables(const Results& results) {
   const Scene scene;
-  return {PairTable(scene), WidthTable(scene), ScanTable(scene), InnerTable(scope), NoiseFloorTable()};
+  return {PairTable(scene), WidthTable(scene), ScanTable(scene), InnerTable(results.scope), NoiseFloorTable()};
 }
 
 }  // namespace
 
-Experiment InformationLimits() {
-  return {"limits", "widths that the data force on every sound tube", NoCells, LimitTables};
-}
+Experiment InformationLimits() { return {"limits", "widths that the data force on every sound tube", {}, LimitTables}; }
 
 }  // namespace forereach::research

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <iterator>
 
+#include <fmt/format.h>
+
 #include "research/labels.h"
 
 namespace forereach::research {
@@ -18,11 +20,7 @@ constexpr double kEndOfCoverage = 1.05, kFirstPlaceOfNone = 1.09, kPlaceOfNone =
 // Ends of both axes.
 constexpr double kLeft = -0.04, kRight = 1.24, kBottom = -0.06, kTop = 1.12;
 
-std::string Screen(double part) {
-  char text[32];
-  std::snprintf(text, sizeof text, "screen %.4f", part);
-  return text;
-}
+std::string Screen(double part) { return fmt::format("screen {:.4f}", part); }
 
 // One of the three frames side by side.
 class Panel final {
@@ -32,8 +30,7 @@ class Panel final {
   // The marks of a method that is drawn as the `method`th. Hollow: the paper's.
   void Add(std::size_t method, const std::vector<MethodMark>& marks, bool is_hollow, const std::string& key) {
     if (marks.empty()) return;
-    const std::string block = "p" + std::to_string(index_) + "s" + std::to_string(series_++),
-                      color = kColors[method % std::size(kColors)];
+    const std::string block = fmt::format("p{}s{}", index_, series_++), color = kColors[method % std::size(kColors)];
     std::string lines;
     bool completes = true;
     for (const MethodMark& mark : marks) {
@@ -62,7 +59,7 @@ class Panel final {
     const std::vector<PixelBox> boxes = PlaceLabels(Frame(), marks_, lines, labels_, kClearance);
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       const PixelBox& box = boxes[i];
-      const std::string block = "p" + std::to_string(index_) + "l" + std::to_string(i);
+      const std::string block = fmt::format("p{}l{}", index_, i);
       std::string line = DataLine({XOf((box.left + box.right) / 2), YOf((box.bottom + box.top) / 2)});
       line.back() = ' ';
       data += DataBlock(block, line + "\"" + labels_[i].text + "\"\n");
@@ -152,22 +149,21 @@ Plot MethodsPlot(const std::vector<MethodMarks>& methods) {
     point_mass.Add(m, methods[m].point_mass, false, methods[m].name);
     point_mass.Add(m, methods[m].papers_point_mass, true, "the paper");
   }
-  return {
-      "methods",
-      "Coverage of complete tubes in group B, which has no data, against recall in group C, which has; mean and one "
-      "standard deviation over the seeds. Filled: ours. Hollow: the paper's; of the point mass it prints both "
-      "figures for ForeReach only. Beside the marks of the bicycle: N. A method that completes no tube in B has no "
-      "coverage and stands in the strip on the right, side by side with the others. At N = 25 regional calibration "
-      "is the global one.",
-      kWidth, kHeight,
-      "set multiplot\n" + Panel::Margins() + "set xrange [" + std::to_string(kLeft) + ":" + std::to_string(kRight) +
-          "]; set yrange [" + std::to_string(kBottom) + ":" + std::to_string(kTop) +
-          "]\nset xtics ('0' 0, '0.2' 0.2, '0.4' 0.4, '0.6' 0.6, '0.8' 0.8, '1' 1, 'none' 1.14); set ytics 0.2\n"
-          "set arrow from 1.05, graph 0 to 1.05, graph 1 nohead dt 2 lc rgb grey\n"
-          "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\nunset key\n" +
-          bicycle.Script() + "unset ylabel\n" + papers.Script() +
-          "set key at screen 0.5, 0.12 center top vertical maxrows 2 width 2\n" + point_mass.Script() +
-          "unset multiplot\n"};
+  return {"methods",
+          "Coverage of complete tubes in group B, which has no data, against recall in group C, which has; mean and "
+          "one standard deviation over the seeds. Filled: ours. Hollow: the paper's; of the point mass it prints both "
+          "figures for ForeReach only. Beside the marks of the bicycle: N. A method that completes no tube in B has no "
+          "coverage and stands in the strip on the right, side by side with the others. At N = 25 regional calibration "
+          "is the global one.",
+          kWidth, kHeight,
+          "set multiplot\n" + Panel::Margins() + "set xrange [" + std::to_string(kLeft) + ":" + std::to_string(kRight) +
+              "]; set yrange [" + std::to_string(kBottom) + ":" + std::to_string(kTop) +
+              "]\nset xtics ('0' 0, '0.2' 0.2, '0.4' 0.4, '0.6' 0.6, '0.8' 0.8, '1' 1, 'none' 1.14); set ytics 0.2\n"
+              "set arrow from 1.05, graph 0 to 1.05, graph 1 nohead dt 2 lc rgb grey\n"
+              "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\nunset key\n" +
+              bicycle.Script() + "unset ylabel\n" + papers.Script() +
+              "set key at screen 0.5, 0.12 center top vertical maxrows 2 width 2\n" + point_mass.Script() +
+              "unset multiplot\n"};
 }
 
 }  // namespace forereach::research

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "forereach/sets/zonogon.h"
 #include "research/evaluate.h"
@@ -81,24 +82,21 @@ NoiseFloor FindNoiseFloor(const System& system, double sigma) {
 }
 
 Table NoiseFloorTable() {
-  Table table{
-      "Noise floor",
-      "Two systems f* +- shift, |shift_k| = sigma in every coordinate, give the same observations under noise of "
-      "at most sigma, and have the same slopes: every sound tube contains both. One plan in the middle of the "
-      "corridor from one state, the largest N. The paper names such a witness and prints no figure of it.",
-      {}};
+  Table table{"Noise floor",
+              "Two systems f* +- shift, |shift_k| = sigma in every coordinate, give the same observations under noise "
+              "of at most sigma, and have the same slopes: every sound tube contains both. One plan in the middle of "
+              "the corridor from one state, the largest N. The paper names such a witness and prints no figure of it."};
   for (const System* system : {&PointMassSystem(), &BicycleSystem()})
     for (const double sigma : {1e-4, 1e-3, 1e-2}) {
       const NoiseFloor floor = FindNoiseFloor(*system, sigma);
-      char text[48];
-      std::snprintf(text, sizeof text, "%s, sigma = %g: ", system->name.c_str(), sigma);
+      const std::string where = fmt::format("{}, sigma = {:g}: ", system->name, sigma);
       const auto row = [&](const char* what, const Estimate& ours, int decimals) {
-        table.rows.push_back({std::string(text) + what, {}, ours, decimals, ""});
+        table.Add(where + what, ours, decimals);
       };
-      row("half the distance at T, m", Exactly(floor.half_distance), 5);
-      row("half-width of the tube at T, m", std::isfinite(floor.half_width) ? Exactly(floor.half_width) : Estimate{},
+      row("half the distance at T, m", floor.half_distance, 5);
+      row("half-width of the tube at T, m", std::isfinite(floor.half_width) ? Estimate(floor.half_width) : Estimate(),
           5);
-      row("states outside the tube", Exactly(floor.escapes), 0);
+      row("states outside the tube", floor.escapes, 0);
     }
   return table;
 }

@@ -24,7 +24,7 @@ std::vector<Cell> Cells(const Scope& scope) {
   return cells;
 }
 
-std::vector<Table> Tables(const Scope& scope, const Results& results) {
+std::vector<Table> Tables(const Results& results) {
   Table table{"Methods, bicycle, sub-Gaussian channel",
               "s = 4.16e-6, cut at sigma = 3 s; " + std::to_string(kPlans) +
                   " plans a group and seed. The paper's figures for the other methods are without noise.",
@@ -33,8 +33,7 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
     for (const int observations : kSizes) {
       const std::string where = method.name + ", N = " + std::to_string(observations) + ": ";
       const auto row = [&](const char* what, Group group, Statistic statistic) {
-        table.rows.push_back(
-            {where + what, {}, OverSeeds(scope, results, NoisyCell(method, observations), group, statistic), 4, ""});
+        table.Add(where + what, results.Mean(NoisyCell(method, observations), group, statistic), 4);
       };
       row("B coverage", Group::kB, Coverage);
       row("C recall", Group::kC, Recall);

@@ -29,18 +29,14 @@ std::vector<Cell> MainCells(const Scope& scope) {
   return cells;
 }
 
-std::vector<Table> MainTables(const Scope& scope, const Results& results) {
-  Table table{"Main results", "Noiseless. Point mass N = 100, bicycle N = 400. Coverage is of complete tubes.", {}};
+std::vector<Table> MainTables(const Results& results) {
+  Table table{"Main results", "Noiseless. Point mass N = 100, bicycle N = 400. Coverage is of complete tubes."};
   for (const System* system : Systems()) {
     const Cell cell = Largest(*system);
     const auto row = [&](const char* what, Mark mark, const char* key, Group group, Statistic statistic,
                          bool follows = false) {
-      table.rows.push_back({system->name + ", " + NameOf(group) + ": " + what,
-                            {mark, PaperOrNone(system->name + "." + key)},
-                            OverSeeds(scope, results, cell, group, statistic),
-                            3,
-                            "",
-                            follows});
+      table.Add(system->name + ", " + NameOf(group) + ": " + what, {mark, PaperOrNone(system->name + "." + key)},
+                results.Mean(cell, group, statistic), 3, "", follows);
     };
     row("coverage", Mark::kOurs, "B.coverage", Group::kB, Coverage);
     row("D", Mark::kFitted, "B.domain", Group::kB, DomainRate);
@@ -50,11 +46,7 @@ std::vector<Table> MainTables(const Scope& scope, const Results& results) {
     row("coverage", Mark::kOurs, "C.coverage", Group::kC, Coverage);
     row("recall", Mark::kFitted, "C.recall", Group::kC, Recall);
     row("recall", Mark::kOurs, "A.recall", Group::kA, Recall);
-    table.rows.push_back({system->name + ": false certificates, all groups",
-                          {},
-                          Exactly(FalseCertificates(scope, results, cell)),
-                          0,
-                          ""});
+    table.Add(system->name + ": false certificates, all groups", results.FalseCertificates(cell), 0);
   }
   return {table};
 }
@@ -67,48 +59,46 @@ std::vector<Cell> RecallCells(const Scope& scope) {
   return cells;
 }
 
-std::vector<Table> RecallTables(const Scope& scope, const Results& results) {
+std::vector<Table> RecallTables(const Results& results) {
   const System& bicycle = BicycleSystem();
   Table quiet{"Recall by N", "Bicycle, noiseless; mean ± sample standard deviation over the seeds.", {}};
   Table noisy{"Recall by N, sub-Gaussian channel",
-              "Bicycle, s = 4.16e-6, cut at sigma = 3 s. The paper: as its noiseless rows.",
-              {}};
-  for (const int observations : scope.SizesOf(bicycle)) {
+              "Bicycle, s = 4.16e-6, cut at sigma = 3 s. The paper: as its noiseless rows."};
+  for (const int observations : results.scope.SizesOf(bicycle)) {
     const std::string n = std::to_string(observations);
     for (const double noise : {0.0, bicycle.noise_scale}) {
       const Cell cell = PaperCell(bicycle, observations, noise, 0);
       std::vector<Row>& rows = (noise == 0 ? quiet : noisy).rows;
       rows.push_back({"C: recall, N = " + n,
                       {Mark::kFitted, Paper("bicycle.C.recall." + n)},
-                      OverSeeds(scope, results, cell, Group::kC, Recall),
+                      results.Mean(cell, Group::kC, Recall),
                       4,
                       ""});
       rows.push_back({"B: coverage, N = " + n,
                       {Mark::kOurs, Paper("bicycle.B.coverage." + n)},
-                      OverSeeds(scope, results, cell, Group::kB, Coverage),
+                      results.Mean(cell, Group::kB, Coverage),
                       4,
                       ""});
-      rows.push_back({"A: recall, N = " + n, {}, OverSeeds(scope, results, cell, Group::kA, Recall), 4, ""});
-      rows.push_back({"B: D, N = " + n, {}, OverSeeds(scope, results, cell, Group::kB, DomainRate), 4, ""});
+      rows.push_back({"A: recall, N = " + n, {}, results.Mean(cell, Group::kA, Recall), 4, ""});
+      rows.push_back({"B: D, N = " + n, {}, results.Mean(cell, Group::kB, DomainRate), 4, ""});
     }
   }
   return {quiet, noisy};
 }
 
-std::vector<Plot> RecallPlots(const Scope& scope, const Results& results) {
+std::vector<Plot> RecallPlots(const Results& results) {
   const System& bicycle = BicycleSystem();
   std::string lines;
-  for (const int observations : scope.SizesOf(bicycle)) {
-    const Estimate ours = OverSeeds(scope, results, PaperCell(bicycle, observations, 0, 0), Group::kC, Recall);
+  for (const int observations : results.scope.SizesOf(bicycle)) {
+    const Estimate ours = results.Mean(PaperCell(bicycle, observations, 0, 0), Group::kC, Recall);
     const PaperValue paper = Paper("bicycle.C.recall." + std::to_string(observations));
     lines += DataLine(
         {static_cast<double>(observations), ours.mean.value_or(NAN), ours.deviation, paper.value, paper.deviation});
   }
-  return {
-      {"recall",
-       "Recall of group C by the number of observations, mean and one standard deviation over the seeds; the paper's "
-       "points are moved a little to the right. The scenarios were fitted to these figures.",
-       720, 440, DataBlock("recall", lines) + R"(set logscale x 2
+  return {{"recall",
+           "Recall of group C by the number of observations, mean and one standard deviation over the seeds; the "
+           "paper's points are moved a little to the right. The scenarios were fitted to these figures.",
+           720, 440, DataBlock("recall", lines) + R"(set logscale x 2
 set xtics (25, 50, 100, 150, 200, 400)
 set xrange [22:450]; set yrange [0:1.05]
 set xlabel 'observations N'; set ylabel 'certified recall, bicycle C'
@@ -123,30 +113,26 @@ plot $recall using ($1*1.03):4 with lines lw 1.4 dt 2 lc rgb grey notitle, \
 // ---- exits
 
 // Of both systems, every N and channel, by group.
-Table FalseByGroup(const Scope& scope, const Results& results) {
-  Table table{"False certificates by group", "Every N, both channels and all seeds of the scope together.", {}};
+Table FalseByGroup(const Results& results) {
+  Table table{"False certificates by group", "Every N, both channels and all seeds of the scope together."};
   for (const System* system : Systems())
     for (const Group group : kGroups) {
       int wrong = 0, certificates = 0;
-      for (const Cell& cell : BothChannels(scope)) {
+      for (const Cell& cell : BothChannels(results.scope)) {
         if (cell.system != system) continue;
         const Tally& tally = results.Of(cell, group);
         wrong += tally.false_certificates(), certificates += tally.certified;
       }
-      table.rows.push_back(
-          {system->name + ", " + NameOf(group) + ": of " + std::to_string(certificates) + " certificates",
-           {},
-           Exactly(wrong),
-           0,
-           ""});
+      table.Add(system->name + ", " + NameOf(group) + ": of " + std::to_string(certificates) + " certificates", wrong,
+                0);
     }
   return table;
 }
 
-std::vector<Table> ExitTables(const Scope& scope, const Results& results) {
+std::vector<Table> ExitTables(const Results& results) {
   double plans = 0, exits = 0, prefixes = 0, complete = 0, covered = 0, undecided = 0, wrong = 0;
   int decisions = 0, rejections = 0, late = 0;
-  for (const Cell& cell : BothChannels(scope)) {
+  for (const Cell& cell : BothChannels(results.scope)) {
     const CellResult& result = results.Of(cell);
     ++decisions;
     rejections += result[0].falsified == result[0].plans;
@@ -159,39 +145,34 @@ std::vector<Table> ExitTables(const Scope& scope, const Results& results) {
   const std::string why = "the paper's queries include systems or layouts that its text does not list";
   return {{"Domain exits and pairwise tests",
            "Both systems, every N, both channels, groups A to C.",
-           {{"plans", {Mark::kOurs, Paper("exits.queries")}, Exactly(plans), 0, why},
-            {"of these D", {Mark::kOurs, Paper("exits.domain")}, Exactly(exits), 0, why},
-            {"D / plans", {Mark::kOurs, Paper("exits.fraction")}, Exactly(exits / plans), 3, why, true},
-            {"D after the horizon", {Mark::kOurs, Paper("exits.after_horizon")}, Exactly(late), 0, why},
-            {"prefixes of D that contain every rollout", {}, Exactly(prefixes), 0, ""},
-            {"complete tubes", {}, Exactly(complete), 0, ""},
-            {"of these contain every rollout", {}, Exactly(covered), 0, ""},
-            {"membership undecided", {}, Exactly(undecided), 0, ""},
-            {"false certificates", {}, Exactly(wrong), 0, ""},
-            {"pairwise tests",
-             {Mark::kOurs, Paper("pairwise.decisions")},
-             Exactly(decisions),
-             0,
-             "this run has fewer cells"},
-            {"of these rejected", {Mark::kOurs, Paper("pairwise.rejections")}, Exactly(rejections), 0, ""}}},
-          FalseByGroup(scope, results)};
+           {{"plans", {Mark::kOurs, Paper("exits.queries")}, plans, 0, why},
+            {"of these D", {Mark::kOurs, Paper("exits.domain")}, exits, 0, why},
+            {"D / plans", {Mark::kOurs, Paper("exits.fraction")}, exits / plans, 3, why, true},
+            {"D after the horizon", {Mark::kOurs, Paper("exits.after_horizon")}, late, 0, why},
+            {"prefixes of D that contain every rollout", {}, prefixes, 0, ""},
+            {"complete tubes", {}, complete, 0, ""},
+            {"of these contain every rollout", {}, covered, 0, ""},
+            {"membership undecided", {}, undecided, 0, ""},
+            {"false certificates", {}, wrong, 0, ""},
+            {"pairwise tests", {Mark::kOurs, Paper("pairwise.decisions")}, decisions, 0, "this run has fewer cells"},
+            {"of these rejected", {Mark::kOurs, Paper("pairwise.rejections")}, rejections, 0, ""}}},
+          FalseByGroup(results)};
 }
 
 // ---- steps
 
-std::vector<Table> StepTables(const Scope& scope, const Results& results) {
+std::vector<Table> StepTables(const Results& results) {
   std::vector<Table> tables;
   for (const int observations : {BicycleSystem().sample_sizes.front(), BicycleSystem().sample_sizes.back()}) {
     Table table{"First abstention, N = " + std::to_string(observations),
                 "Bicycle, noiseless: the part of a group's plans that abstains first at a step. The paper shows these "
-                "as a picture.",
-                {}};
+                "as a picture."};
     for (const Group group : {Group::kB, Group::kC})
       for (const bool is_domain : {true, false})
         for (std::size_t t = 0; t <= static_cast<std::size_t>(BicycleSystem().horizon); ++t) {
           std::vector<std::optional<double>> parts;
           Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
-          for (; cell.seed < scope.seeds; ++cell.seed) {
+          for (; cell.seed < results.scope.seeds; ++cell.seed) {
             const Tally& tally = results.Of(cell, group);
             parts.push_back(static_cast<double>((is_domain ? tally.domain_steps : tally.safety_steps)[t]) /
                             tally.plans);
@@ -199,7 +180,7 @@ std::vector<Table> StepTables(const Scope& scope, const Results& results) {
           const Estimate part = EstimateOf(parts);
           if (*part.mean == 0) continue;
           const std::string what = std::string(1, NameOf(group)) + (is_domain ? ": D at step " : ": S at step ");
-          table.rows.push_back({what + std::to_string(t), {}, part, 4, ""});
+          table.Add(what + std::to_string(t), part, 4);
         }
     tables.push_back(table);
   }
@@ -208,7 +189,7 @@ std::vector<Table> StepTables(const Scope& scope, const Results& results) {
 
 constexpr std::size_t kFirstStepShown = 5;  // Nothing happens before.
 
-std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
+std::vector<Plot> StepPlots(const Results& results) {
   Plot plot{"steps", "The step at which a plan of the bicycle first abstains, noiseless, as a part of its group.", 900,
             400, ""};
   std::string panels;
@@ -217,7 +198,7 @@ std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
     for (std::size_t t = kFirstStepShown; t <= static_cast<std::size_t>(BicycleSystem().horizon); ++t) {
       double exits = 0, unsafe = 0, unsafe_along = 0, plans = 0;
       Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
-      for (; cell.seed < scope.seeds; ++cell.seed) {
+      for (; cell.seed < results.scope.seeds; ++cell.seed) {
         const Tally &b = results.Of(cell, Group::kB), &c = results.Of(cell, Group::kC);
         exits += b.domain_steps[t], unsafe += b.safety_steps[t], unsafe_along += c.safety_steps[t], plans += b.plans;
       }
@@ -226,8 +207,8 @@ std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
     const std::string n = std::to_string(observations);
     plot.script += DataBlock("steps" + n, lines);
     panels += "set title 'N = " + n + "'\nplot $steps" + n +
-              " using 2:xtic(1) lc rgb blue title 'B: leaves the domain (D)', '' using 3 lc rgb orange title "
-              "'B: may touch the obstacle (S)', '' using 4 lc rgb green title 'C: may touch the obstacle (S)'\n";
+              " using 2:xtic(1) lc rgb blue title 'B: leaves the domain (D)', '' using 3 lc rgb orange title 'B: may "
+              "touch the obstacle (S)', '' using 4 lc rgb green title 'C: may touch the obstacle (S)'\n";
   }
   plot.script +=
       "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"

@@ -1,12 +1,11 @@
 #include "research/plans.h"
 
-#include <algorithm>
-#include <cstdio>
 #include <functional>
 #include <optional>
 #include <ostream>
 #include <stdexcept>
-#include <utility>
+
+#include <fmt/format.h>
 
 #include "forereach/numerics/parallel.h"
 #include "forereach/numerics/text.h"
@@ -107,10 +106,8 @@ constexpr Figure kFigures[] = {
 
 std::string Intervals(const std::vector<CellResult>& results, std::ostream& out) {
   std::string text;
-  char row[128];
-  std::snprintf(row, sizeof row, "%-12s%8s%8s%8s  %-18s%8s  %s\n", "", "count", "of", "part", "95 % over plans", "mean",
-                "95 % over seeds");
-  out << row;
+  out << fmt::format("{:<12}{:>8}{:>8}{:>8}  {:<18}{:>8}  {}\n", "", "count", "of", "part", "95 % over plans", "mean",
+                     "95 % over seeds");
   for (std::size_t g = 0; g < std::size(kGroups); ++g)
     for (const Figure& figure : kFigures) {
       int count = 0, of = 0;
@@ -123,26 +120,20 @@ std::string Intervals(const std::vector<CellResult>& results, std::ostream& out)
       const Estimate estimate = EstimateOf(parts);
       const std::optional<Range> plans = WilsonRange(count, of),
                                  seeds = StudentRange(estimate.mean.value_or(0), estimate.deviation, estimate.seeds);
-      const auto low = [](const std::optional<Range>& range) {
-        return range ? std::optional(range->low) : std::nullopt;
-      };
-      const auto high = [](const std::optional<Range>& range) {
-        return range ? std::optional(range->high) : std::nullopt;
+      const auto end = [](const std::optional<Range>& range, double Range::*which) {
+        return range ? std::optional((*range).*which) : std::nullopt;
       };
       Line line;
-      line << NameOf(kGroups[g]) << figure.name << count << of << low(plans) << high(plans) << estimate.seeds
-           << estimate.mean << (estimate.seeds > 1 ? std::optional(estimate.deviation) : std::nullopt) << low(seeds)
-           << high(seeds);
+      line << NameOf(kGroups[g]) << figure.name << count << of << end(plans, &Range::low) << end(plans, &Range::high)
+           << estimate.seeds << estimate.mean << (estimate.seeds > 1 ? std::optional(estimate.deviation) : std::nullopt)
+           << end(seeds, &Range::low) << end(seeds, &Range::high);
       text += line.End();
       const auto shown = [](const std::optional<Range>& range) {
-        char both[32];
-        std::snprintf(both, sizeof both, "%.4f to %.4f", range ? range->low : 0, range ? range->high : 0);
-        return std::string(range ? both : "");
+        return range ? fmt::format("{:.4f} to {:.4f}", range->low, range->high) : "";
       };
       if (of == 0) continue;
-      std::snprintf(row, sizeof row, "%c %-10s%8d%8d%8.4f  %-18s%8.4f  %s\n", NameOf(kGroups[g]), figure.name, count,
-                    of, static_cast<double>(count) / of, shown(plans).c_str(), *estimate.mean, shown(seeds).c_str());
-      out << row;
+      out << fmt::format("{} {:<10}{:>8}{:>8}{:>8.4f}  {:<18}{:>8.4f}  {}\n", NameOf(kGroups[g]), figure.name, count,
+                         of, static_cast<double>(count) / of, shown(plans), *estimate.mean, shown(seeds));
     }
   return text;
 }

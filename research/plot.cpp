@@ -5,8 +5,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <iostream>
+
+#include <fmt/format.h>
 
 #include "research/run_directory.h"
 
@@ -47,11 +48,8 @@ std::string DataBlock(const std::string& name, const std::string& lines) {
 
 std::string DataLine(std::initializer_list<double> numbers) {
   std::string line;
-  for (const double number : numbers) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%s%.6g", line.empty() ? "" : " ", number);
-    line += number == number ? text : " NaN";
-  }
+  for (const double number : numbers)
+    line += number == number ? fmt::format("{}{:.6g}", line.empty() ? "" : " ", number) : " NaN";
   return line + "\n";
 }
 

@@ -1,8 +1,9 @@
 // What of the other methods the paper leaves open: each reading of it that was tried, with coverage and recall.
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "research/experiment.h"
 #include "research/methods/calibration.h"
@@ -24,9 +25,7 @@ struct Family {
 const char* NameOf(Center center) { return center == Center::kMean ? "around the mean" : "around zero"; }
 
 std::string Named(const char* what, double value, Center center) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%s %.4g, %s", what, value, NameOf(center));
-  return text;
+  return fmt::format("{} {:.4g}, {}", what, value, NameOf(center));
 }
 
 Family GlobalReadings() {
@@ -123,14 +122,8 @@ std::vector<Cell> Cells(const Scope& scope) {
   return cells;
 }
 
-std::string Digits(double value) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%.3f", value);
-  return text;
-}
-
-Table TableOf(const Family& family, const Scope& scope, const Results& results) {
-  Table table{family.title, family.about + " The paper's figures, for comparison:", {}};
+Table TableOf(const Family& family, const Results& results) {
+  Table table{family.title, family.about + " The paper's figures, for comparison:"};
   for (const Method& method : family.methods) {
     double squares = 0;
     int count = 0;
@@ -138,10 +131,11 @@ Table TableOf(const Family& family, const Scope& scope, const Results& results) 
     for (const int observations : kSizes) {
       const std::string n = std::to_string(observations);
       const auto row = [&](const char* what, Group group, const char* key, Statistic statistic) {
-        const Estimate ours = OverSeeds(scope, results, ReadingCell(method, observations), group, statistic);
+        const Estimate ours = results.Mean(ReadingCell(method, observations), group, statistic);
         const double paper = Paper(family.of + "." + n + "." + key).value;
         if (&method == &family.methods.front())
-          table.about += std::string(rows.empty() ? " " : ", ") + what + " " + Digits(paper) + " at N = " + n;
+          table.about +=
+              std::string(rows.empty() ? " " : ", ") + what + " " + fmt::format("{:.3f}", paper) + " at N = " + n;
         if (ours.mean) squares += (*ours.mean - paper) * (*ours.mean - paper), ++count;
         rows.push_back({method.name + ", N = " + n + ": " + what, {}, ours, 3, ""});
       };
@@ -149,19 +143,16 @@ Table TableOf(const Family& family, const Scope& scope, const Results& results) 
       row("C recall", Group::kC, "C.recall", Recall);
     }
     table.rows.insert(table.rows.end(), rows.begin(), rows.end());
-    table.rows.push_back({method.name + ": root mean square distance to those of the paper's that it has",
-                          {},
-                          Exactly(std::sqrt(squares / count)),
-                          3,
-                          ""});
+    table.Add(method.name + ": root mean square distance to those of the paper's that it has",
+              std::sqrt(squares / count), 3);
   }
   table.about += ". " + std::to_string(kPlans) + " plans a group and seed. None of these readings is the paper's own.";
   return table;
 }
 
-std::vector<Table> Tables(const Scope& scope, const Results& results) {
+std::vector<Table> Tables(const Results& results) {
   std::vector<Table> tables;
-  for (const Family& family : Families()) tables.push_back(TableOf(family, scope, results));
+  for (const Family& family : Families()) tables.push_back(TableOf(family, results));
   return tables;
 }
 

@@ -16,12 +16,16 @@ const Experiment& ExperimentNamed(const std::string& name) {
   return *found;
 }
 
+std::vector<Cell> CellsOf(const Experiment& experiment, const Scope& scope) {
+  return experiment.cells ? experiment.cells(scope) : std::vector<Cell>();
+}
+
 // Each once, in the order in which they are first asked for.
 std::vector<Cell> CellsOf(const std::vector<const Experiment*>& experiments, const Scope& scope) {
   std::vector<Cell> all;
   std::set<std::string> keys;
   for (const Experiment* experiment : experiments)
-    for (Cell& cell : experiment->cells(scope))
+    for (Cell& cell : CellsOf(*experiment, scope))
       if (keys.insert(cell.key()).second) all.push_back(std::move(cell));
   return all;
 }
@@ -95,25 +99,25 @@ void RunExperiments(const RunOptions& options, std::ostream& out) {
   for (const std::string& name : options.names) experiments.push_back(&ExperimentNamed(name));
   const RunDirectory directory(options.directory, options.effort);
   const std::vector<Cell> cells = CellsOf(experiments, options.scope);
-  const Results results(cells, RunAll(cells, directory, options.threads));
+  const Results results(options.scope, cells, RunAll(cells, directory, options.threads));
 
   const std::filesystem::path report_file = options.report.empty() ? directory.path() / "report.md" : options.report;
   const std::filesystem::path pictures = report_file.parent_path() / "figures";
   std::vector<Table> tables;
   std::string report;
   for (const Experiment* experiment : experiments) {
-    const std::vector<Cell> own = experiment->cells(options.scope);
+    const std::vector<Cell> own = CellsOf(*experiment, options.scope);
     std::vector<CellResult> of_own;
     for (const Cell& cell : own) of_own.push_back(results.Of(cell));
     if (!own.empty()) WriteFile(directory.path() / (experiment->name + ".csv"), ToCsv(own, of_own));
-    for (const Table& table : experiment->tables(options.scope, results)) {
+    for (const Table& table : experiment->tables(results)) {
       const std::string text = std::string(1, '\n').append(ToMarkdown(table));
       out << text << std::flush;
       report += text;
       tables.push_back(table);
     }
     if (!experiment->plots) continue;
-    for (const Plot& plot : experiment->plots(options.scope, results))
+    for (const Plot& plot : experiment->plots(results))
       if (Draw(plot, directory.path() / "plots", pictures))
         report += "\n![" + plot.caption + "](figures/" + plot.name + ".svg)\n\n" + plot.caption + "\n";
   }

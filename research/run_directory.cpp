@@ -1,7 +1,6 @@
 #include "research/run_directory.h"
 
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
@@ -161,9 +160,9 @@ std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirector
 
 std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>& results) {
   std::string text =
-      "system,method,declaration,observations,noise,order,layout,seed,group,plans,safe,certified,certified_safe,"
-      "false_certificates,falsified,domain,safety,vacuous,covered,prefix_covered,undecided,domain_steps,safety_steps,"
-      "recall,recall_low,recall_high,coverage,coverage_low,coverage_high\n";
+      "system,method,declaration,observations,noise,order,layout,seed,group,plans,safe,certified,certified_safe,false_"
+      "certificates,falsified,domain,safety,vacuous,covered,prefix_covered,undecided,domain_steps,safety_steps,recall,"
+      "recall_low,recall_high,coverage,coverage_low,coverage_high\n";
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell& cell = cells[i];
     for (const Tally& tally : results[i]) {

@@ -1,7 +1,6 @@
 #include "research/scenarios.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <vector>

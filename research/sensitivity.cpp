@@ -1,9 +1,10 @@
 // What changes with the representation of sets, the residual's bound and the noise.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "research/evaluate.h"
 #include "research/experiment.h"
@@ -37,56 +38,50 @@ std::optional<double> MeanAreaRatio(const Tally& zonotope, const Tally& box) {
   return sum / count;
 }
 
-Estimate AreaRatio(const Scope& scope, const Results& results, Cell cell, Group group) {
+Estimate AreaRatio(const Results& results, Cell cell, Group group) {
   std::vector<std::optional<double>> ratios;
-  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed)
+  for (cell.seed = 0; cell.seed < results.scope.seeds; ++cell.seed)
     ratios.push_back(MeanAreaRatio(results.Of(cell, group), results.Of(WithOrder(cell, 1), group)));
   return EstimateOf(ratios);
 }
 
 // How much smaller the zonotopes' area is, in per cent: least and most over groups and N.
-void AddReductions(const System& system, const Scope& scope, const Results& results, Table& table) {
+void AddReductions(const System& system, const Results& results, Table& table) {
   double least = kInfinity, most = -kInfinity;
-  for (const int observations : scope.SizesOf(system))
+  for (const int observations : results.scope.SizesOf(system))
     for (const Group group : kGroups)
-      if (const auto ratio = AreaRatio(scope, results, PaperCell(system, observations, 0, 0), group).mean)
+      if (const auto ratio = AreaRatio(results, PaperCell(system, observations, 0, 0), group).mean)
         least = std::min(least, 100 * (1 - *ratio)), most = std::max(most, 100 * (1 - *ratio));
   const std::string why = "scenario bounds are ours, and the paper does not say over which cells and slices it goes";
   const auto row = [&](const char* what, const char* key, double ours) {
-    table.rows.push_back({system.name + ", A to C, every N: " + what,
-                          {Mark::kOurs, PaperOrNone("sets." + system.name + key)},
-                          Exactly(ours),
-                          0,
-                          why});
+    table.Add(system.name + ", A to C, every N: " + what, {Mark::kOurs, PaperOrNone("sets." + system.name + key)}, ours,
+              0, why);
   };
   row("least reduction of the area, %", ".least_reduction", least);
   row("largest, %", ".largest_reduction", most);
 }
 
-std::vector<Table> SetTables(const Scope& scope, const Results& results) {
-  Table table{
-      "Box against zonotope",
-      "Noiseless. Order 1 makes every slice a box, order 5 is the paper's. Areas of P X_T, zonotope over box, of "
-      "the plans that both complete.",
-      {}};
+std::vector<Table> SetTables(const Results& results) {
+  Table table{"Box against zonotope",
+              "Noiseless. Order 1 makes every slice a box, order 5 is the paper's. Areas of P X_T, zonotope over box, "
+              "of the plans that both complete."};
   for (const System* system : Systems()) {
-    for (const int observations : scope.SizesOf(*system)) {
+    for (const int observations : results.scope.SizesOf(*system)) {
       const Cell cell = PaperCell(*system, observations, 0, 0);
       const bool in_paper = observations == system->sample_sizes.back();
       const std::string where = system->name + ", C, N = " + std::to_string(observations) + ": ";
       const auto paper = [&](Mark mark, const std::string& key) {
         return in_paper ? Reference(mark, Paper("sets." + system->name + ".C." + key)) : Reference();
       };
-      table.rows.push_back({where + "area ratio", paper(Mark::kOurs, "area_ratio"),
-                            AreaRatio(scope, results, cell, Group::kC), 3,
-                            "scenario bounds are ours, and the paper does not say which slices it averages"});
+      table.Add(where + "area ratio", paper(Mark::kOurs, "area_ratio"), AreaRatio(results, cell, Group::kC), 3,
+                "scenario bounds are ours, and the paper does not say which slices it averages");
       if (system == &PointMassSystem()) continue;
-      table.rows.push_back({where + "certified, zonotope", paper(Mark::kFitted, "zonotope"),
-                            OverSeeds(scope, results, cell, Group::kC, CertificateRate), 3, ""});
-      table.rows.push_back({where + "certified, box", paper(Mark::kOurs, "box"),
-                            OverSeeds(scope, results, WithOrder(cell, 1), Group::kC, CertificateRate), 3, ""});
+      table.Add(where + "certified, zonotope", paper(Mark::kFitted, "zonotope"),
+                results.Mean(cell, Group::kC, CertificateRate), 3);
+      table.Add(where + "certified, box", paper(Mark::kOurs, "box"),
+                results.Mean(WithOrder(cell, 1), Group::kC, CertificateRate), 3);
     }
-    AddReductions(*system, scope, results, table);
+    AddReductions(*system, results, table);
   }
   return {table};
 }
@@ -108,23 +103,15 @@ std::vector<Cell> ScalarCells(const Scope& scope) {
   return cells;
 }
 
-std::vector<Table> ScalarTables(const Scope& scope, const Results& results) {
+std::vector<Table> ScalarTables(const Results& results) {
   Table table{"Scalar envelope",
               "Bicycle, N = 400, noiseless. Every entry of L is set to the largest entry, so a single number bounds "
-              "the residual.",
-              {}};
+              "the residual."};
   for (const Group group : kGroups) {
     const std::string where(1, NameOf(group));
-    table.rows.push_back({where + ": certified",
-                          {Mark::kOurs, Paper("scalar.certified")},
-                          OverSeeds(scope, results, ScalarCell(), group, CertificateRate),
-                          3,
-                          ""});
-    table.rows.push_back({where + ": D",
-                          {Mark::kOurs, Paper("scalar.domain")},
-                          OverSeeds(scope, results, ScalarCell(), group, DomainRate),
-                          3,
-                          ""});
+    table.Add(where + ": certified", {Mark::kOurs, Paper("scalar.certified")},
+              results.Mean(ScalarCell(), group, CertificateRate), 3);
+    table.Add(where + ": D", {Mark::kOurs, Paper("scalar.domain")}, results.Mean(ScalarCell(), group, DomainRate), 3);
   }
   return {table};
 }
@@ -135,11 +122,7 @@ constexpr double kMultiples[] = {0, 0.33, 1, 3.3};
 constexpr double kCuts[] = {1, 2, 3, 4, 5, 6, 8, 10};  // sigma / s
 constexpr double kWorst = 3.3;                         // in multiples of the median residual
 
-std::string Digits(double value) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
+std::string Digits(double value) { return fmt::format("{:g}", value); }
 
 double MedianOf(const System& system) {
   return &system == &BicycleSystem() ? Paper("median_residual").value : MedianResidual(system);
@@ -160,7 +143,7 @@ std::vector<Cell> NoiseCells(const Scope& scope) {
   return cells;
 }
 
-Table NoiseTable(const System& system, const Scope& scope, const Results& results) {
+Table NoiseTable(const System& system, const Results& results) {
   const bool is_bicycle = &system == &BicycleSystem();
   Table table{is_bicycle ? "Noise" : "Noise, point mass",
               is_bicycle ? "Bicycle, C, N = 400. Noise N(0, s^2) in every state, cut at the declared sigma = 3 s; s in "
@@ -171,33 +154,27 @@ Table NoiseTable(const System& system, const Scope& scope, const Results& result
   for (const double multiple : kMultiples) {
     const Cell cell = NoisyCell(system, multiple);
     const auto paper = is_bicycle ? PaperOrNone("noise.recall." + Digits(multiple)) : std::nullopt;
-    table.rows.push_back({"recall at " + Digits(multiple),
-                          {multiple == 0 ? Mark::kFitted : Mark::kOurs, paper},
-                          OverSeeds(scope, results, cell, Group::kC, Recall),
-                          3,
-                          "the paper does not say what sigma it declares of Gaussian noise: the table of sigma / s"});
-    table.rows.push_back(
-        {"coverage at " + Digits(multiple), {}, OverSeeds(scope, results, cell, Group::kC, Coverage), 3, ""});
+    table.Add("recall at " + Digits(multiple), {multiple == 0 ? Mark::kFitted : Mark::kOurs, paper},
+              results.Mean(cell, Group::kC, Recall), 3,
+              "the paper does not say what sigma it declares of Gaussian noise: the table of sigma / s");
+    table.Add("coverage at " + Digits(multiple), results.Mean(cell, Group::kC, Coverage), 3);
   }
-  table.rows.push_back({"median residual over the data region",
-                        {Mark::kOurs, is_bicycle ? PaperOrNone("median_residual") : std::nullopt},
-                        Exactly(MedianResidual(system)),
-                        7,
-                        "the paper's data region is not in its text"});
+  table.Add("median residual over the data region",
+            {Mark::kOurs, is_bicycle ? PaperOrNone("median_residual") : std::nullopt}, MedianResidual(system), 7,
+            "the paper's data region is not in its text");
   return table;
 }
 
-Table CutTable(const Scope& scope, const Results& results) {
+Table CutTable(const Results& results) {
   Table table{"Noise, by the declared bound",
               "Bicycle, C, N = 400, s = 3.3 median residuals. The noise N(0, s^2) is cut at the declared sigma. The "
               "paper's recall there is " +
-                  Digits(Paper("noise.recall.3.3").value) + ", and it does not say its sigma.",
-              {}};
+                  Digits(Paper("noise.recall.3.3").value) + ", and it does not say its sigma."};
   for (const double cut : kCuts) {
     const Cell cell = NoisyCell(BicycleSystem(), kWorst, cut);
     const std::string where = "sigma / s = " + Digits(cut) + ": ";
-    table.rows.push_back({where + "recall", {}, OverSeeds(scope, results, cell, Group::kC, Recall), 3, ""});
-    table.rows.push_back({where + "F", {}, OverSeeds(scope, results, cell, Group::kC, FalsifiedRate), 3, ""});
+    table.Add(where + "recall", results.Mean(cell, Group::kC, Recall), 3);
+    table.Add(where + "F", results.Mean(cell, Group::kC, FalsifiedRate), 3);
   }
   return table;
 }
@@ -235,28 +212,27 @@ Table PartTable(const Scope& scope) {
   Table table{"Noise in the residual's envelope",
               "Bicycle, sub-Gaussian channel, N = 400: the noise over the width of the heading's envelope, the median "
               "over the steps of certified plans of C. The paper does not say whether its noise term is s, sigma or "
-              "both of the envelope's ends.",
-              {}};
+              "both of the envelope's ends."};
   std::vector<double> parts = NoiseParts(scope);
   if (parts.empty()) return table;
   const auto middle = parts.begin() + static_cast<std::ptrdiff_t>(parts.size() / 2);
   std::ranges::nth_element(parts, middle);
   const std::string why = "scenario bounds and sigma = 3 s are ours";
-  table.rows = {{"s", {Mark::kOurs, Paper("noise.envelope_part")}, Exactly(*middle / kNoiseCut), 5, why},
-                {"sigma", {}, Exactly(*middle), 5, ""},
-                {"2 sigma", {}, Exactly(2 * *middle), 5, ""}};
+  table.rows = {{"s", {Mark::kOurs, Paper("noise.envelope_part")}, *middle / kNoiseCut, 5, why},
+                {"sigma", {}, *middle, 5, ""},
+                {"2 sigma", {}, 2 * *middle, 5, ""}};
   return table;
 }
 
-std::vector<Table> NoiseTables(const Scope& scope, const Results& results) {
-  return {NoiseTable(BicycleSystem(), scope, results), CutTable(scope, results),
-          NoiseTable(PointMassSystem(), scope, results), PartTable(scope)};
+std::vector<Table> NoiseTables(const Results& results) {
+  return {NoiseTable(BicycleSystem(), results), CutTable(results), NoiseTable(PointMassSystem(), results),
+          PartTable(results.scope)};
 }
 
-std::vector<Plot> NoisePlots(const Scope& scope, const Results& results) {
+std::vector<Plot> NoisePlots(const Results& results) {
   std::string ours, paper;
   for (const double multiple : kMultiples) {
-    const Estimate recall = OverSeeds(scope, results, NoisyCell(BicycleSystem(), multiple), Group::kC, Recall);
+    const Estimate recall = results.Mean(NoisyCell(BicycleSystem(), multiple), Group::kC, Recall);
     ours += DataLine({multiple, recall.mean.value_or(NAN), recall.deviation});
   }
   // Without noise it is the recall at N = 400, of which the paper prints the spread.

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <stdexcept>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "research/paper_values.h"
 #include "research/statistics.h"
@@ -13,11 +14,7 @@
 namespace forereach::research {
 namespace {
 
-std::string Fixed(double value, int decimals) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  return text;
-}
+std::string Fixed(double value, int decimals) { return fmt::format("{:.{}f}", value, decimals); }
 
 // "+0.012", "-0.012", and "0.000" for what rounds to it.
 std::string Signed(double value, int decimals) {

@@ -53,6 +53,11 @@ class Reference final {
 
 /** Mean and sample standard deviation over seeds; no value where no seed has one. */
 struct Estimate {
+  Estimate() = default;
+  Estimate(double value) : mean(value), seeds(1) {}                        // NOLINT: a count is a figure,
+  Estimate(std::optional<double> of) : mean(of), seeds(of.has_value()) {}  // NOLINT: and so is one that may lack
+  Estimate(std::optional<double> of, double spread, int of_seeds) : mean(of), deviation(spread), seeds(of_seeds) {}
+
   std::optional<double> mean;
   double deviation = 0;  ///< 0 for a single seed
   int seeds = 0;         ///< That have a value
@@ -84,7 +89,13 @@ enum class Word {
 
 struct Table {
   std::string title, about;
-  std::vector<Row> rows;
+  std::vector<Row> rows{};
+
+  void Add(std::string what, Reference paper, const Estimate& ours, int decimals, std::string reason = "",
+           bool follows = false) {
+    rows.push_back({std::move(what), std::move(paper), ours, decimals, std::move(reason), follows});
+  }
+  void Add(std::string what, const Estimate& ours, int decimals) { Add(std::move(what), {}, ours, decimals); }
 };
 
 /** All rows of a table against the paper at once, but those that follow from others. The chi-square and the sign test

@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
@@ -170,9 +171,7 @@ void Count(const Undeclared& task, const std::vector<Scenario>& obstacles, int n
 }
 
 void AddRows(const std::string& where, const Undeclared& task, const Counts& counts, Table& table) {
-  const auto row = [&](const std::string& what, double ours, int decimals) {
-    table.rows.push_back({where + what, {}, Exactly(ours), decimals, ""});
-  };
+  const auto row = [&](const std::string& what, double ours, int decimals) { table.Add(where + what, ours, decimals); };
   row("contradictions in the data", task.IsContradicted(), 0);
   row("false certificates, of " + std::to_string(counts.tried), counts.certificates, 0);
   if (!counts.factors.empty()) {
@@ -211,25 +210,24 @@ void AddKept(double lambda, Table& table) {
   }
   const std::string where = "lambda = " + std::to_string(static_cast<int>(lambda)) + ": ";
   const auto row = [&](const std::string& what, const Estimate& ours, int decimals) {
-    table.rows.push_back({where + what, {}, ours, decimals, ""});
+    table.Add(where + what, ours, decimals);
   };
-  row("factor for containment", found > 0 ? Exactly(factor) : Estimate{}, 3);
-  row("tubes that are complete at their factor, of " + std::to_string(found), Exactly(complete), 0);
-  row("slope between observations and the target's states", Exactly(empirical), 3);
-  row("contradictions in the data", Exactly(task.IsContradicted()), 0);
-  row("false certificates, of " + std::to_string(kPlans * horizon), Exactly(wrong), 0);
+  row("factor for containment", found > 0 ? Estimate(factor) : Estimate(), 3);
+  row("tubes that are complete at their factor, of " + std::to_string(found), complete, 0);
+  row("slope between observations and the target's states", empirical, 3);
+  row("contradictions in the data", task.IsContradicted(), 0);
+  row("false certificates, of " + std::to_string(kPlans * horizon), wrong, 0);
 }
 
 Table KeptTable(const Scope& scope) {
-  Table table{
-      "Kept declaration: the factor for containment",
-      "The adversarial family, group C, ten plans, noiseless data from below the knee, the declaration of lambda = 1. "
-      "The factor: the least on the declaration with which a plan's tube, as far as it goes, contains the target, by "
-      "bisection; the largest over the plans. The slope: the largest between an observation and a state of the target "
-      "over what the declaration allows. False certificates: the obstacle stands in the target's way at each of the "
-      "steps 1 to 12 in turn. The paper's factor is 31.710, for a plan, data and a family that are not in its text, "
-      "with one false certificate.",
-      {}};
+  Table table{"Kept declaration: the factor for containment",
+              "The adversarial family, group C, ten plans, noiseless data from below the knee, the declaration of "
+              "lambda = 1. The factor: the least on the declaration with which a plan's tube, as far as it goes, "
+              "contains the target, by bisection; the largest over the plans. The slope: the largest between an "
+              "observation and a state of the target over what the declaration allows. False certificates: the "
+              "obstacle stands in the target's way at each of the steps 1 to 12 in turn. The paper's factor is 31.710, "
+              "for a plan, data and a family that are not in its text, with one false certificate.",
+              {}};
   for (const double lambda : LambdasOf(scope)) AddKept(lambda, table);
   return table;
 }
@@ -256,14 +254,13 @@ std::vector<Scenario> Across(const System& system, Scenario scenario) {
 }
 
 Table ThroughTable(const Scope& scope) {
-  Table table{
-      "Kept declaration: plans through the knee",
-      "The adversarial family under the declaration of lambda = 1, with noiseless observations from next to the knee: "
-      "up to 0.6 m/s in each direction, where the knee is at 0.9 m/s. Ten plans start at 0.4 m/s and get 1.5 m/s^2, "
-      "which takes them through the knee. Obstacles of 0.1 m stand at five places across the target's path at each of "
-      "the steps 1 to 12; counted are those that it meets. " +
-          std::string(kFactorAndNoise),
-      {}};
+  Table table{"Kept declaration: plans through the knee",
+              "The adversarial family under the declaration of lambda = 1, with noiseless observations from next to "
+              "the knee: up to 0.6 m/s in each direction, where the knee is at 0.9 m/s. Ten plans start at 0.4 m/s and "
+              "get 1.5 m/s^2, which takes them through the knee. Obstacles of 0.1 m stand at five places across the "
+              "target's path at each of the steps 1 to 12; counted are those that it meets. " +
+                  std::string(kFactorAndNoise),
+              {}};
   for (const double lambda : LambdasOf(scope)) {
     const System system = NextToTheKnee(lambda);
     const Undeclared task{system, PointMassSystem().deployed};
@@ -296,16 +293,12 @@ void AddSmall(const System& system, double part, const Scope& scope, Table& tabl
   Counts counts;
   for (int index = 0; index < (scope.quick ? 10 : kPlansOfSmall); ++index)
     Count(task, ObstaclesOf(system, index), scope.quick ? 1 : kNoisyPlans, counts);
-  char text[64];
-  std::snprintf(text, sizeof text, "%s, L times %.4g: ", system.name.c_str(), part);
-  AddRows(text, task, counts, table);
+  const std::string where = fmt::format("{}, L times {:.4g}: ", system.name, part);
+  AddRows(where, task, counts, table);
   if (counts.factors.empty()) return;
   const double largest = std::ranges::max(counts.factors, {}, &ContainmentFactor::factor).factor;
-  table.rows.push_back({std::string(text) + "part of the deployed matrix that lacks a factor of 31.710",
-                        {},
-                        Exactly(part * largest / Paper("slopes.containment").value),
-                        5,
-                        ""});
+  table.Add(where + "part of the deployed matrix that lacks a factor of 31.710",
+            part * largest / Paper("slopes.containment").value, 5);
 }
 
 Table SmallTable(const Scope& scope) {
@@ -320,17 +313,15 @@ Table SmallTable(const Scope& scope) {
   return table;
 }
 
-std::vector<Cell> NoCells(const Scope&) { return {}; }
-
-std::vector<Table> Tables(const Scope& scope, const Results&) {
-  return {KeptTable(scope), ThroughTable(scope), SmallTable(scope)};
+std::vector<Table> Tables(const Results& results) {
+  return {KeptTable(results.scope), ThroughTable(results.scope), SmallTable(results.scope)};
 }
 
 }  // namespace
 
 Experiment KeptDeclaration() {
-  return {"kept", "too small a declaration, plan by plan: the factor that it lacks, false certificates, noise", NoCells,
-          Tables};
+  return {
+      "kept", "too small a declaration, plan by plan: the factor that it lacks, false certificates, noise", {}, Tables};
 }
 
 }  // namespace forereach::research

@@ -1,6 +1,5 @@
 #include "research/chunks/blocks.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "planner_bridge/reference.h"

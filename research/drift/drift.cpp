@@ -7,7 +7,7 @@
 #include "forereach/dynamics/text_model.h"
 #include "forereach/residual/observations.h"
 #include "identify/smallest_row.h"
-#include "research/drift/markdown.h"
+#include "research/markdown.h"
 #include "research/random.h"
 #include "research/run_directory.h"
 #include "task/model_file.h"
@@ -93,23 +93,15 @@ const Cells kOutcome{"windows",
                      "outside the domain, %"};
 
 Cells Outcome(const Judgement& judged) {
-  const auto number = [](const char* format, std::optional<double> value) {
-    return value ? Text(format, *value) : std::string("none");
-  };
   const int windows = static_cast<int>(judged.windows.size());
   return {std::to_string(windows),
           Percent(judged.complete(), windows),
           Percent(judged.inside(), judged.slices()),
-          number("%.4f", judged.HalfWidth()),
-          number("%.4f", judged.LargestHalfWidth()),
-          number("%.2f", judged.Distance()),
+          Text("%.4f", judged.HalfWidth()),
+          Text("%.4f", judged.LargestHalfWidth()),
+          Text("%.2f", judged.Distance()),
           Text("%.1f", 1000.0 * judged.contradicting / std::max(1, judged.transitions)),
           Percent(judged.outside_domain, judged.outside_domain + judged.transitions)};
-}
-
-Cells Join(Cells first, const Cells& more) {
-  first.insert(first.end(), more.begin(), more.end());
-  return first;
 }
 
 std::string Where(const Eigen::RowVectorXd& z) {
@@ -237,13 +229,12 @@ std::string Limits(const Study& study, const Fitted& ordinary) {
     const Fitted own = AsItIs(study.Make(lateral, kLearnSeed));
     const Learned relearned = Learn(own, {.quantile = 1});
     const Judgement again = Judge(relearned, All(judge), kLong);
-    const auto width = again.HalfWidth();
     const Eigen::VectorXd& w = relearned.problem->declaration.disturbance;
     rows.push_back({Text("%g", lateral), Text("%.1f", LateralIn(judge)),
                     Percent(in_domain.outside_domain, in_domain.outside_domain + in_domain.transitions),
                     Text("%.1f", 1000.0 * beyond.contradicting / std::max(1, beyond.transitions)),
                     Percent(beyond.inside(), beyond.slices()), Text("%.2g", w[kSpeed]), Text("%.2g", w[kOmega]),
-                    Text("%.2g", w[kBeta]), width ? Text("%.3f", *width) : "none"});
+                    Text("%.2g", w[kBeta]), Text("%.3f", again.HalfWidth())});
   }
   return Markdown({"asked, m/s^2", "reached", "outside the domain, %", "contradictions with its domain, per thousand",
                    "inside, %", "relearned: w of v", "of omega", "of beta", "half-width, m"},

@@ -8,7 +8,7 @@
 
 #include "command_line/progress.h"
 #include "research/drift/drift.h"
-#include "research/drift/markdown.h"
+#include "research/markdown.h"
 #include "research/random.h"
 #include "research/run_directory.h"
 #include "task/config.h"
@@ -21,12 +21,6 @@ namespace fs = std::filesystem;
 constexpr const char* kTaskFile = FOREREACH_SOURCE_DIR "/research/drift/drive.yaml";
 constexpr const char* kNominalFile = FOREREACH_SOURCE_DIR "/config/models/single_track.yaml";
 constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
-
-std::string List(const Eigen::VectorXd& numbers) {
-  std::string text;
-  for (const double number : numbers) text += (text.empty() ? "[" : ", ") + Text("%.17g", number);
-  return text + "]";
-}
 
 std::string Read(const char* path) {
   std::ifstream file(path);

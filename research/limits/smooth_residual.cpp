@@ -1,7 +1,5 @@
 #include "research/limits/smooth_residual.h"
 
-#include <cmath>
-
 namespace forereach::research {
 namespace {
 

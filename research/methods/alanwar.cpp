@@ -6,6 +6,7 @@
 
 #include <Eigen/QR>
 
+#include "forereach/numerics/size.h"
 #include "forereach/sets/zonotope.h"
 #include "research/methods/covering.h"
 #include "research/methods/samples.h"
@@ -20,9 +21,8 @@ std::vector<double> FitSlopes(const Eigen::MatrixXd& z, const std::vector<int>& 
   regressors.leftCols(count) = z(Eigen::all, columns);
   regressors.leftCols(count).rowwise() -= regressors.leftCols(count).colwise().mean().eval();
   const Eigen::VectorXd fit = regressors.completeOrthogonalDecomposition().solve(y);
-  std::vector<double> slopes(static_cast<std::size_t>(z.cols()), 0.0);
-  for (std::size_t c = 0; c < columns.size(); ++c)
-    slopes[static_cast<std::size_t>(columns[c])] = fit[static_cast<Eigen::Index>(c)];
+  std::vector<double> slopes(ToSize(z.cols()), 0.0);
+  for (std::size_t c = 0; c < columns.size(); ++c) slopes[ToSize(columns[c])] = fit[static_cast<Eigen::Index>(c)];
   return slopes;
 }
 
@@ -42,14 +42,12 @@ AlanwarEnclosure::AlanwarEnclosure(const Setting& setting) {
     const double sigma = setting.declaration.noise_bound[k];
     for (int i = 0; i < observations.size(); ++i) {
       Interval left = Interval(observations.lower(i, k), observations.upper(i, k)) + Interval(-sigma, sigma);
-      for (const int l : columns)
-        left = left - Interval(row.slopes[static_cast<std::size_t>(l)]) * Interval(observations.z(i, l));
+      for (const int l : columns) left = left - Interval(row.slopes[ToSize(l)]) * Interval(observations.z(i, l));
       row.leftover = {std::min(row.leftover.lower, left.lower), std::max(row.leftover.upper, left.upper)};
     }
     if (!columns.empty()) {
       Eigen::VectorXd weights = Eigen::VectorXd::Zero(lipschitz.cols());
-      for (const int l : columns)
-        weights[l] = AddUp(lipschitz(k, l), std::abs(row.slopes[static_cast<std::size_t>(l)]));
+      for (const int l : columns) weights[l] = AddUp(lipschitz(k, l), std::abs(row.slopes[ToSize(l)]));
       row.covering = CoveringRadiusUpper(box, observations.z, weights);
     }
     rows_.push_back(std::move(row));
@@ -57,7 +55,7 @@ AlanwarEnclosure::AlanwarEnclosure(const Setting& setting) {
 }
 
 void AlanwarEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
-  const auto n = static_cast<std::size_t>(query.slice.dim());
+  const auto n = ToSize(query.slice.dim());
   bounds.capped = false;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const Row& row = rows_[k];

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <functional>
 #include <ostream>
 
 #include "identify/declare_by.h"
+#include "research/markdown.h"
 #include "research/plot.h"
 #include "research/real/study.h"
 #include "research/run_directory.h"
@@ -22,14 +23,6 @@ const std::vector<double> kQuantiles{0.9, 0.95, 0.97, 0.98, 0.985, 0.9875, 0.99,
 constexpr int kSteps = 5;          // of a window
 constexpr double kChosen = 0.985;  // the quantile of every table that does not vary it
 
-std::string Text(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-std::string Text(const char* format, std::optional<double> value) { return value ? Text(format, *value) : "none"; }
-std::string Percent(int part, int whole) { return whole > 0 ? Text("%.2f", 100.0 * part / whole) : "none"; }
-
 // ---- trials
 
 struct Trial {
@@ -42,17 +35,8 @@ struct Trial {
 // What a trial shows, in the order of the CSV's columns.
 struct Field {
   const char* name;
-  std::string (*text)(const Trial&);
+  std::function<std::string(const Trial&)> text;
 };
-
-template <int k>
-std::string Disturbance(const Trial& trial) {
-  return Text("%.4g", trial.learned.problem->declaration.disturbance[k]);
-}
-template <int k>
-std::string Growth(const Trial& trial) {
-  return trial.learned.growth.size() > k ? Text("%.4g", trial.learned.growth[k]) : "0";
-}
 
 const Field kLearnedFrom{"learned from", [](const Trial&t) { return t.learned_from; }},
     kJudgedBy{"judged by", [](const Trial&t) { return t.judged_by; }},
@@ -72,31 +56,34 @@ const Field kLearnedFrom{"learned from", [](const Trial&t) { return t.learned_fr
     kHalfWidth{"half-width, m", [](const Trial&t) { return Text("%.3f", t.judged.HalfWidth()); }},
     kDistance{"driven, m", [](const Trial&t) { return Text("%.2f", t.judged.Distance()); }},
     kContradicting{"contradictions, per thousand", [](const Trial&t) {
-                     return t.judged.transitions == 0
-                                ? "none"
-                                : Text("%.1f", 1000.0 * t.judged.contradicting / t.judged.transitions);
+                     const double all = t.judged.transitions;
+                     return Text("%.1f", all > 0 ? std::optional(1000.0 * t.judged.contradicting / all) : std::nullopt);
                    }};
 const std::vector<Field> kOutcome{kJudged,   kCovered, kWindows,   kComplete,
                                   kDistance, kInside,  kHalfWidth, kContradicting};
 
+constexpr std::pair<const char*, Eigen::Index> kWithDisturbance[] = {
+    {"w of x", 0}, {"w of yaw", 2}, {"w of v", 3}, {"w of r", 4}};
+constexpr std::pair<const char*, Eigen::Index> kWithGrowth[] = {
+    {"growth of x", 0}, {"growth of yaw", 2}, {"growth of v", 3}, {"growth of r", 4}};
+
 std::vector<Field> AllFields() {
-  std::vector<Field> all{{"table", [](const Trial& t) { return t.table; }},
-                         kLearnedFrom,
-                         kJudgedBy,
-                         kWay,
-                         kCount,
-                         kQuantile,
-                         kLeftOut,
-                         kLength};
-  all.insert(all.end(), kOutcome.begin(), kOutcome.end());
-  all.insert(all.end(), {{"w of x", Disturbance<0>},
-                         {"w of yaw", Disturbance<2>},
-                         {"w of v", Disturbance<3>},
-                         {"w of r", Disturbance<4>},
-                         {"growth of x", Growth<0>},
-                         {"growth of yaw", Growth<2>},
-                         {"growth of v", Growth<3>},
-                         {"growth of r", Growth<4>}});
+  std::vector<Field> all = Join({{"table", [](const Trial& t) { return t.table; }},
+                                 kLearnedFrom,
+                                 kJudgedBy,
+                                 kWay,
+                                 kCount,
+                                 kQuantile,
+                                 kLeftOut,
+                                 kLength},
+                                kOutcome);
+  for (const auto& [name, k] : kWithDisturbance)
+    all.push_back(
+        {name, [k = k](const Trial& t) { return Text("%.4g", t.learned.problem->declaration.disturbance[k]); }});
+  for (const auto& [name, k] : kWithGrowth)
+    all.push_back({name, [k = k](const Trial& t) {
+                     return t.learned.growth.size() > k ? Text("%.4g", t.learned.growth[k]) : "0";
+                   }});
   return all;
 }
 
@@ -112,17 +99,16 @@ std::string Csv(const std::vector<Trial>& trials) {
   return text;
 }
 
-std::string Markdown(const std::vector<Trial>& trials, const std::string& table, const std::vector<Field>& fields) {
-  std::string text = "\n|", rule = "|";
-  for (const Field& field : fields) text += std::string(" ") + field.name + " |", rule += "---|";
-  text += "\n" + rule + "\n";
-  for (const Trial& trial : trials) {
-    if (trial.table != table) continue;
-    text += "|";
-    for (const Field& field : fields) text.append(" ").append(field.text(trial)).append(" |");
-    text += "\n";
-  }
-  return text;
+std::string TableOf(const std::vector<Trial>& trials, const std::string& table, const std::vector<Field>& fields) {
+  const auto cells = [&](auto&& of) {
+    Cells all;
+    std::ranges::transform(fields, std::back_inserter(all), of);
+    return all;
+  };
+  std::vector<Cells> rows;
+  for (const Trial& trial : trials)
+    if (trial.table == table) rows.push_back(cells([&](const Field& field) { return field.text(trial); }));
+  return Markdown(cells([](const Field& field) { return field.name; }), rows);
 }
 
 // ---- the study
@@ -238,52 +224,45 @@ std::string AboutData(const Study& study) {
 }
 
 std::string AboutFit(const Learned& learned, const Fit& fit) {
-  std::string text =
-      "\n| state | rms before the fit | after | largest after | state error | w, not hasty | growth "
-      "|\n|---|---|---|---|---|---|---|\n";
+  std::vector<Cells> rows;
   const Problem& problem = *learned.problem;
   for (Eigen::Index k = 0; k < 5; ++k) {
     const auto rms = [&](const Eigen::MatrixXd& errors) {
-      return Text("%.4f", std::sqrt(errors.col(k).squaredNorm() / static_cast<double>(errors.rows())));
+      return std::sqrt(errors.col(k).squaredNorm() / static_cast<double>(errors.rows()));
     };
-    text += "| " + problem.model->state_names()[static_cast<std::size_t>(k)] + " | " + rms(fit.before) + " | " +
-            rms(fit.after) + " | " + Text("%.4f", fit.after.col(k).cwiseAbs().maxCoeff()) + " | " +
-            Text("%.4f", learned.state_error[k]) + " | " + Text("%.4f", problem.declaration.disturbance[k]) + " | " +
-            Text("%.4f", learned.growth[k]) + " |\n";
+    rows.push_back({problem.model->state_names()[static_cast<std::size_t>(k)]});
+    for (const double value : {rms(fit.before), rms(fit.after), fit.after.col(k).cwiseAbs().maxCoeff(),
+                               learned.state_error[k], problem.declaration.disturbance[k], learned.growth[k]})
+      rows.back().push_back(Text("%.4f", value));
   }
-  return text;
-}
-
-std::vector<Field> With(std::vector<Field> first, const std::vector<Field>& more) {
-  first.insert(first.end(), more.begin(), more.end());
-  return first;
+  return Markdown({"state", "rms before the fit", "after", "largest after", "state error", "w, not hasty", "growth"},
+                  rows);
 }
 
 std::string Hidden(const Study& study) {
-  std::string text = "\n| state | drive | yaw, % | v, % | r, % |\n|---|---|---|---|---|\n";
+  std::vector<Cells> rows;
   for (std::size_t i = 0; i < study.hidden.front().second.size(); ++i)
     for (const auto& [drive, states] : study.hidden) {
-      const auto left = [&](Eigen::Index k) { return Text("%.1f", 100 * states[i].left[k]); };
-      text += "| " + states[i].name + " | " + drive + " | " + left(2) + " | " + left(3) + " | " + left(4) + " |\n";
+      rows.push_back({states[i].name, drive});
+      for (const Eigen::Index k : {2, 3, 4}) rows.back().push_back(Text("%.1f", 100 * states[i].left[k]));
     }
-  return text;
+  return Markdown({"state", "drive", "yaw, %", "v, %", "r, %"}, rows);
 }
 
 std::string Report(const Study& study, const Learned& all, const Fit& fit, const RealOptions& options) {
-  const std::vector<Field> outcome = With({kLearnedFrom, kJudgedBy, kWay}, kOutcome);
+  const std::vector<Field> outcome = Join({kLearnedFrom, kJudgedBy, kWay}, kOutcome);
   return "# A real car\n\nMade by `" + options.command + "`.\n\n" + AboutData(study) +
          "\nA declaration that was learned from data is an assumption. These tables say how it fared on other data of "
          "the\nsame car, and nothing about data that nobody has.\n\n"
          "## Each drive left out\nThe quantile is " +
          Text("%g", kChosen) +
-         ". Judged by the drive that it was learned from, a declaration is the best that these states "
-         "allow.\n" +
-         Markdown(study.trials, "leave one out", outcome) +
-         (study.others.empty() ? "" : "\n## Other drives\n" + Markdown(study.trials, "others", outcome)) +
+         ". Judged by the drive that it was learned from, a declaration is the best that these states allow.\n" +
+         TableOf(study.trials, "leave one out", outcome) +
+         (study.others.empty() ? "" : "\n## Other drives\n" + TableOf(study.trials, "others", outcome)) +
          "\n## Against the quantile\nOf all drives together, each left out in its turn; w grows.\n" +
-         Markdown(study.trials, "quantile", With({kQuantile}, kOutcome)) +
+         TableOf(study.trials, "quantile", Join({kQuantile}, kOutcome)) +
          "\nOf each drive, learned from it and judged by it; w grows.\n" +
-         Markdown(study.trials, "itself", With({kJudgedBy, kQuantile}, kOutcome)) +
+         TableOf(study.trials, "itself", Join({kJudgedBy, kQuantile}, kOutcome)) +
          "\n## Hidden states\nWhat the best fit to a drive leaves of its errors, where a line in a further state is "
          "taken off them.\n" +
          Hidden(study) + "\n## One-step errors\nOf all drives, in m, rad, m/s, rad/s; w grows.\n" + AboutFit(all, fit);
@@ -307,12 +286,10 @@ Plot TradeOff(const Study& study) {
               "set y2label 'contradictions, per thousand'\nset y2tics\nset y2range [0:*]\n"
               "set offsets graph 0.05, graph 0.1, 0, graph 0.1\n"
               "set arrow from 0.25,graph 0 to 0.25,graph 1 nohead dt 2 lc rgb grey\n"
-              "plot 99 lc rgb grey dt 2 title 'goal: 99 %, 0.25 m', "
-              "$left using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb blue title 'inside', "
-              "$left using 1:2:($4 == 0.98 || $4 == 0.9875 || $4 == 0.99 ? '' : sprintf('%g', $4)) with labels left "
-              "offset 0.6,-0.7 "
-              "font ',9' textcolor rgb '#666666' notitle, "
-              "$left using 1:3 axes x1y2 with linespoints pt 5 ps 0.6 lw 2 lc rgb red title 'contradictions'\n"};
+              "plot 99 lc rgb grey dt 2 title 'goal: 99 %, 0.25 m', $left using 1:2 with linespoints pt 7 ps 0.6 lw 2 "
+              "lc rgb blue title 'inside', $left using 1:2:($4 == 0.98 || $4 == 0.9875 || $4 == 0.99 ? '' : "
+              "sprintf('%g', $4)) with labels left offset 0.6,-0.7 font ',9' textcolor rgb '#666666' notitle, $left "
+              "using 1:3 axes x1y2 with linespoints pt 5 ps 0.6 lw 2 lc rgb red title 'contradictions'\n"};
 }
 
 Plot Tubes(const Trial& trial) {
@@ -329,17 +306,11 @@ Plot Tubes(const Trial& trial) {
           720, 560,
           DataBlock("boxes", boxes) + DataBlock("path", path) +
               "set size ratio -1\nset xlabel 'x, m'\nset ylabel 'y, m'\nset key bottom left\n"
-              "plot $boxes using 1:2:3:4 with boxxyerror lc rgb blue title 'slices of the tubes', "
-              "$path using 1:2 with linespoints pt 7 ps 0.4 lc rgb 'black' title 'recorded'\n"};
+              "plot $boxes using 1:2:3:4 with boxxyerror lc rgb blue title 'slices of the tubes', $path using 1:2 with "
+              "linespoints pt 7 ps 0.4 lc rgb 'black' title 'recorded'\n"};
 }
 
 // ---- the task
-
-std::string List(const Eigen::VectorXd& numbers) {
-  std::string text;
-  for (const double number : numbers) text += (text.empty() ? "[" : ", ") + Text("%.17g", number);
-  return text + "]";
-}
 
 std::string Task(const Learned& learned, const Fit& fit) {
   const Problem& problem = *learned.problem;

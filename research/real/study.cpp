@@ -9,7 +9,6 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/dynamics/text_model.h"
-#include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/growing_disturbance.h"

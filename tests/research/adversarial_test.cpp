@@ -11,7 +11,7 @@ TEST(AdversarialFamily, TheTrueDeclarationIsSoundAndTheOthersAreNot) {
   const std::vector<Cell> cells = experiment.cells(scope);
   std::vector<CellResult> results;
   for (const Cell& cell : cells) results.push_back(RunCell(cell, {30, 24}));
-  const std::vector<Table> tables = experiment.tables(scope, Results(cells, results));
+  const std::vector<Table> tables = experiment.tables(Results(scope, cells, results));
   const auto figure = [&](std::size_t table, const std::string& what) {
     return std::ranges::find(tables[table].rows, what, &Row::what)->ours.mean;
   };

@@ -29,7 +29,7 @@ TEST_F(RunTest, QuickFiguresThatNoSoundMethodMisses) {
   const auto estimate = [&](const Cell& cell, Group group, Statistic statistic) {
     std::vector<Cell> cells;
     AddSeeds(scope, cell, cells);
-    return *OverSeeds(scope, Results(cells, RunAll(cells, directory, 1)), cell, group, statistic).mean;
+    return *Results(scope, cells, RunAll(cells, directory, 1)).Mean(cell, group, statistic).mean;
   };
   const Cell bicycle = PaperCell(BicycleSystem(), 400, 0, 0), point_mass = PaperCell(PointMassSystem(), 100, 0, 0);
   EXPECT_EQ(estimate(bicycle, Group::kB, CertificateRate), 0);
@@ -44,8 +44,7 @@ TEST_F(RunTest, QuickBaselinesFallOnTheirSides) {
   const auto estimate = [&](const char* method, int observations, Group group, Statistic statistic) {
     Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
     cell.method = *std::ranges::find(Methods(), method, &Method::name);
-    const Results results({cell}, RunAll({cell}, directory, 1));
-    return OverSeeds(scope, results, cell, group, statistic).mean;
+    return Results(scope, {cell}, RunAll({cell}, directory, 1)).Mean(cell, group, statistic).mean;
   };
   // Unsound where there are no data, and of use where there are.
   for (const char* method : {"Global calibration", "Plug-in Gaussian"}) {
