@@ -120,7 +120,8 @@ int WritePage(const ReportArguments& options) {
   const ReportOptions& report = options.report;
   const PageRun run = GatherRuns(options, report.logs, {});
   std::optional<PageRun> before;
-  if (!options.before.empty()) before = GatherRuns(options, {options.before}, {.certified = 0, .abstained = 0, .bytes = 0});
+  if (!options.before.empty())
+    before = GatherRuns(options, {options.before}, {.certified = 0, .abstained = 0, .bytes = 0});
   WriteNewFile(options.out, PageHtml(run, before ? &*before : nullptr), options.force);
   std::cout << options.out << ": " << run.decisions.size() << " decisions, " << run.details.size()
             << " with their tube or why there is none";

@@ -52,7 +52,9 @@ std::string PageDocument::Html(nlohmann::json data) const {
   html.append("</head>\n").append(body.text);
   html += "<script type=\"application/json\" id=\"data\">" + ForPage(data) + "</script>\n";
   for (const auto& column : columns)
-    html.append("<script type=\"text/plain\" class=\"column\">").append(column.begin(), column.end()).append("</script>\n");
+    html.append("<script type=\"text/plain\" class=\"column\">")
+        .append(column.begin(), column.end())
+        .append("</script>\n");
   for (const PageAsset* script : scripts) html.append("<script>").append(script->text).append("</script>\n");
   return html + "</body>\n</html>\n";
 }

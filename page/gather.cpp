@@ -56,8 +56,7 @@ std::string ReplayCommandOf(const Logs& logs, const std::string& config, const L
 void TakeRows(const Rows& rows, const PageBounds& bounds, PageRun& run) {
   run.decisions.insert(run.decisions.end(), rows.decisions.begin(), rows.decisions.end());
   for (const EventRow& row : rows.events) run.events.push_back({row.utime, row.plan_id, row.kind});
-  for (const GapRow& row : rows.gaps)
-    run.gaps.push_back({row.utime, row.lost, row.reason, row.channel, row.source});
+  for (const GapRow& row : rows.gaps) run.gaps.push_back({row.utime, row.lost, row.reason, row.channel, row.source});
   run.decisions.KeepLast(bounds.decisions);
   run.events.KeepLast(bounds.events);
   run.gaps.KeepLast(bounds.others);
@@ -99,7 +98,7 @@ class RowReader final : public TimelineUser {
   const BusOptions channels_;
   const bool makes_rows_;
   const PageBounds& bounds_;
-  Interpreter interpreter_;  // the timeline has looked at the key
+  Interpreter interpreter_;                                     // the timeline has looked at the key
   std::optional<std::pair<std::int64_t, std::int16_t>> fault_;  // the last one
   PageRun& run_;
 };
@@ -338,7 +337,7 @@ void KeepLastOf(const std::vector<PagePass*>& passes, std::size_t most, const Of
 void KeepLast(const std::vector<PagePass*>& passes, const PageBounds& bounds) {
   const auto rows = [&](auto member, std::size_t most) {
     KeepLastOf(
-        passes, most, [member](PagePass& pass) -> auto& { return pass.rows.*member; },
+        passes, most, [member](PagePass & pass) -> auto& { return pass.rows.*member; },
         [](const auto& row) { return std::optional(row.utime); });
   };
   rows(&PageRun::decisions, bounds.decisions);
@@ -348,7 +347,7 @@ void KeepLast(const std::vector<PagePass*>& passes, const PageBounds& bounds) {
   rows(&PageRun::withdrawals, bounds.others);
   for (const auto& [is_certified, most] : {std::pair(true, bounds.certified), {false, bounds.abstained}})
     KeepLastOf(
-        passes, most, [](PagePass& pass) -> auto& { return pass.cases.entries(); },
+        passes, most, [](PagePass & pass) -> auto& { return pass.cases.entries(); },
         [is_certified = is_certified](const auto& entry) {
           const decision_t& decision = entry.second.recorded.decision;
           return (decision.outcome == decision_t::CERTIFIED) == is_certified ? std::optional(decision.utime)
@@ -394,8 +393,8 @@ std::string EventName(const PageDecision& decision) {
   return fmt::format("{} event {}", decision.log_file, decision.event_number);
 }
 
-PageRun GatherDetails(PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions,
-                      std::size_t bytes, unsigned threads) {
+PageRun GatherDetails(PagePass& pass, const PageRun& page, const std::vector<std::size_t>& decisions, std::size_t bytes,
+                      unsigned threads) {
   PageRun made;
   made.tasks = page.tasks;  // so that their places are the page's
   std::map<std::string, std::size_t> wanted;

@@ -130,12 +130,10 @@ Json EventsJson(const PageRun& run) {
 
 Json GapsJson(const PageRun& run) {
   const auto& rows = run.gaps;
-  return {{"run", RunColumn(run, &PagePart::gaps, rows.size())},
-          {"utime", ColumnOf<std::int64_t>(rows, &PageGap::utime)},
-          {"lost", ColumnOf<std::int64_t>(rows, &PageGap::lost)},
-          {"reason", NamesColumn(rows, &PageGap::reason)},
-          {"channel", NamesColumn(rows, &PageGap::channel)},
-          {"source", NamesColumn(rows, &PageGap::source)}};
+  return {
+      {"run", RunColumn(run, &PagePart::gaps, rows.size())},  {"utime", ColumnOf<std::int64_t>(rows, &PageGap::utime)},
+      {"lost", ColumnOf<std::int64_t>(rows, &PageGap::lost)}, {"reason", NamesColumn(rows, &PageGap::reason)},
+      {"channel", NamesColumn(rows, &PageGap::channel)},      {"source", NamesColumn(rows, &PageGap::source)}};
 }
 
 Json FaultsJson(const PageRun& run) {

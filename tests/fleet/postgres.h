@@ -77,7 +77,10 @@ class Postgres final {
 
  private:
   static std::string AsUser() {
-    return geteuid() == 0 ? "/usr/bin/setpriv --reuid nobody --regid nogroup --clear-groups --pdeathsig KILL -- " : "";
+    // It may read what root may: in some containers nobody else may even read /.
+    return geteuid() == 0 ? "/usr/bin/setpriv --reuid nobody --regid nogroup --clear-groups --pdeathsig KILL "
+                            "--inh-caps +dac_read_search --ambient-caps +dac_read_search -- "
+                          : "";
   }
 
   const ScratchDirectory scratch_;

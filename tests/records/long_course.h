@@ -1,5 +1,5 @@
-/** The recorded course, driven again and again, with a reload of the task before each round: a log of any length, of which
-every decision can be made again. */
+/** The recorded course, driven again and again, with a reload of the task before each round: a log of any length, of
+which every decision can be made again. */
 #pragma once
 
 #include <string_view>
@@ -32,7 +32,8 @@ struct LaterRound {
   void List(auto&&...) const {}
 };
 
-/** Writes `rounds` of them, and the rows of a logger's database if there is one. Cost: 3 MB and 97 decisions a round. */
+/** Writes `rounds` of them, and the rows of a logger's database if there is one. Cost: 3 MB and 97 decisions a round.
+ */
 inline void WriteLongCourse(const std::string& path, std::int64_t rounds, Database* database = nullptr) {
   const std::vector<LogEvent> course = ReadLog(kCourseLog).events;
   const std::string file = std::filesystem::path(path).filename();
@@ -66,7 +67,8 @@ inline void WriteLongCourse(const std::string& path, std::int64_t rounds, Databa
                    SetDigest(certified.plan_digest, digest_of(certified));
                    SetDigest(certified.certificate_digest, CertificateDigest(certified));
                  }) ||
-          change(Decoded<certifier_status_t>(event.data), [&](certifier_status_t& status) { status.version += round; }) ||
+          change(Decoded<certifier_status_t>(event.data),
+                 [&](certifier_status_t& status) { status.version += round; }) ||
           change_only(Decoded<execution_event_t>(event.data)) || change_only(Decoded<robot_state_t>(event.data)) ||
           change_only(Decoded<obstacles_t>(event.data)) || change_only(Decoded<logger_status_t>(event.data)));
       event.utime += later.shift_us;
