@@ -119,6 +119,8 @@ std::string ParametersOf(const std::string& address) {
   std::string parameters = "connect_timeout='10' tcp_user_timeout='30000' application_name='forereach'";
   for (const PQconninfoOption* option = options.get(); option->keyword; ++option) {
     if (!option->val) continue;
+    if (std::string_view(option->keyword).ends_with("password"))
+      throw StoreError("--database: everyone on this machine can read a password there: write it into ~/.pgpass");
     parameters += fmt::format(" {}='", option->keyword);
     for (const char c : std::string_view(option->val)) {
       if (c == '\'' || c == '\\') parameters += '\\';

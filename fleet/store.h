@@ -40,8 +40,8 @@ class StoreAway : public StoreError {
 class Store final {
  public:
   /** Speaks to no server yet: each call below connects if it has to, and makes the tables if there are none.
-  @param address postgresql://..., with libpq's parameters. It is shown nowhere, since it may have a password.
-  @throws StoreError if it is no such address. */
+  @param address postgresql://..., with libpq's parameters. It is shown nowhere.
+  @throws StoreError if it is no such address, or has a password, which the command line would show to everyone. */
   explicit Store(const std::string& address);
   ~Store();
   Store(const Store&) = delete;

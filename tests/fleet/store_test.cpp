@@ -62,9 +62,17 @@ TEST(Store, TakesNoOtherAddressThanAServers) {
         << address;
 }
 
+TEST(Store, TakesNoPasswordThatACommandLineShows) {
+  for (const std::string address : {"postgresql://user:hunter2@/fleet", "postgresql:///fleet?password=hunter2",
+                                    "postgresql:///a?sslpassword=hunter2"})
+    EXPECT_THAT(Thrown<StoreError>([&] { Store store(address); }),
+                AllOf(HasSubstr("~/.pgpass"), Not(HasSubstr("hunter2"))))
+        << address;
+}
+
 TEST(Store, SaysThatNoServerIsThere) {
   const ScratchDirectory scratch;
-  Store store("postgresql://user:hunter2@/fleet?host=" + scratch.path());
+  Store store("postgresql://user@/fleet?host=" + scratch.path());
   for (int i = 0; i < 2; ++i)
     EXPECT_EQ(Thrown<StoreAway>([&] { static_cast<void>(store.Runs("r1")); }), "the store: no server answers there");
 }
