@@ -114,9 +114,7 @@ void RunReduction(State& state, const Midway& midway) {
     for (int k = 0; k < full.dim(); ++k) full.AppendAxis(k, 0.01);
   for (auto _ : state) {
     Zonotope set = full;  // the copy is part of the time
-    ColumnScores scores;
-    ScoreColumns(set, scores);
-    AppendAndReduce(set, scores, kNone.data(), kNone.data(), midway.task.problem->zonotope_order);
+    AppendAndReduce(set, kNone.data(), kNone.data(), midway.task.problem->zonotope_order);
     benchmark::DoNotOptimize(set);
   }
 }

@@ -253,7 +253,10 @@ std::optional<PlainZonotope> Straightforward::Step(const PlainZonotope& slice, c
 
   VectorXd from_below, from_above;
   Envelope(query, from_below, from_above);
-  const VectorXd middle = (from_above + from_below) / 2, half_width = (from_above - from_below) / 2;
+  const VectorXd middle = (from_above + from_below) / 2;
+  VectorXd half_width = (from_above - from_below) / 2;
+  for (double& h : half_width)
+    if (h < 10 * kRounding) h = 0;  // exactly, but for the rounding of residuals
   const MatrixXd generators = ConcatenateColumns(model_.jacobian(query.center) * query.generators,
                                                  remainder.asDiagonal(), half_width.asDiagonal());
   return PlainZonotope{model_.value(query.center) + middle,

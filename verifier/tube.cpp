@@ -24,6 +24,10 @@ Real Around(const Real& center, const Real& radius) { return Real::FromTo(center
 
 double UlpOf(double x) { return std::nextafter(std::abs(x), kNone) - std::abs(x); }
 
+// Up to this part of the domain's width, an axis of the residual is of the size of rounding errors, and counts as
+// slack.
+constexpr double kNegligible = 0x1p-41;
+
 // By how much the record of an angle may be off: two units in the last place of 2 pi, or one of its own.
 constexpr double kAngleUnit = 0x1p-49;
 // More than the certifier rounds the rate that a transition shows.
@@ -743,6 +747,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   std::vector<Real> slack(ToSize(n));
   Slice next = Image(query, offset, slack);
   const Real half(0.5);
+  const Box& domain = problem_.domain.state;
   for (int k = 0; k < n; ++k) {  // diag(q)
     const auto& [lower, upper] = step.remainder[ToSize(k)];
     next.center[ToSize(k)] += half * (lower + upper);
@@ -753,9 +758,11 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real h =
-            half * abs(upper - lower) + unexpected[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
-        !h.IsZero())
+    const Real h =
+        half * abs(upper - lower) + unexpected[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
+    if (CertainlyAtMost(h, Real(kNegligible) * (Real(domain.upper()[k]) - Real(domain.lower()[k]))))
+      slack[ToSize(k)] += h;
+    else
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }

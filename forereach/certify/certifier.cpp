@@ -258,7 +258,9 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       violation_(observed_->violation()),
       propagator_(*problem_->model, problem_->domain, observed_->residual(), problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing,
-                  ActedInputs(problem_->declaration), problem_->declaration.growing) {
+                  ActedInputs(problem_->declaration), problem_->declaration.growing,
+                  // The slope of an affine row ties its columns to others.
+                  problem_->declaration.affine.rows.empty() ? safety_.placement().SeparableStates() : 0) {
   TestRates();
 }
 
@@ -269,7 +271,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       rates_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing, {},
-                  problem_->declaration.growing) {
+                  problem_->declaration.growing, safety_.placement().SeparableStates()) {
   forereach::Require(problem_->declaration.input_error.isZero(0),
                      "declaration: input_error counts by lipschitz, which does not bound a residual of another kind");
 }

@@ -16,6 +16,7 @@
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/obstacle_index.h"
+#include "forereach/safety/standing_cores.h"
 
 namespace forereach {
 namespace {
@@ -436,21 +437,43 @@ class SafetyTest::Judgement {
   [[nodiscard]] const Obstacle& obstacle(int o) const { return obstacles_[ToSize(o)]; }
 
   void SeeAll() noexcept {
+    if (is_at_frame()) {
+      EncloseHulls();
+      const auto units = std::span(hulls_).first(ToSize(units_ - first_));
+      cores_.Take(obstacles_.all(), test_.placement_.dim(), test_.placement_.reach(),
+                  bounds_.size() / units.size() / kLaneCount * kLaneCount);
+      cores_.Bound(units, bounds_.data(), test_.instructions_);
+    }
     for (int t = first_; t < units_ && touched_ == units_; ++t) {
+      std::span<double> cores(BoundsOf(t), cores_.size());
+      const bool all_proven = std::ranges::find(cores, -kInfinity) == cores.end();
+      if (all_proven && cores.size() == obstacles_.size()) continue;
       unit_.Enter(t);
       unit_.EncloseHulls();
-      for (int o = 0; o < static_cast<int>(obstacles_.size()) && touched_ == units_; ++o) See(t, o);
+      for (std::size_t o = all_proven ? cores.size() : 0; o < obstacles_.size() && touched_ == units_; ++o) {
+        if (o < cores.size()) {
+          if (cores[o] > -kInfinity) continue;
+          cores[o] = kInfinity;  // seen now, and not again
+        }
+        See(t, static_cast<int>(o));
+      }
     }
   }
+  // Of the cores in unit t.
+  [[nodiscard]] double* BoundsOf(int t) noexcept { return bounds_.data() + ToSize(t - first_) * cores_.stride(); }
 
-  // What moves or has no end in each unit; what stands where the index finds it near.
-  void SeeNear(const ObstacleIndex& index) noexcept {
+  void EncloseHulls() noexcept {
     for (int t = first_; t < units_; ++t) {
       unit_.Enter(t);
       unit_.EncloseHulls();
       hulls_[ToSize(t - first_)] = unit_.hull();
       poses_[ToSize(t - first_)].frame = unit_.first_hull();
     }
+  }
+
+  // What moves or has no end in each unit; what stands where the index finds it near.
+  void SeeNear(const ObstacleIndex& index) noexcept {
+    EncloseHulls();
     if (has_boxes()) EncloseBodies();
     SeeNear(index, first_, units_);
     if (!index.everywhere().empty()) SeeEverywhere(index);
@@ -834,7 +857,24 @@ class SafetyTest::Judgement {
     return least;
   }
 
+  // The nearest by its hull first: it leaves few of the others.
+  void ConsiderCores() noexcept {
+    const std::span all(bounds_.data(), BoundsOf(units_));
+    const auto consider = [&](const double* bound) {
+      const auto place = bound - all.data(), count = static_cast<std::ptrdiff_t>(cores_.stride());
+      const int t = first_ + static_cast<int>(place / count);
+      unit_.Enter(t);
+      unit_.EncloseHulls();
+      Look(t, static_cast<int>(place % count));
+    };
+    const double* const least = std::ranges::min_element(all).base();
+    if (*least < kInfinity) consider(least);
+    for (const double& bound : all)
+      if (bound <= closest_.clearance && &bound != least && bound < kInfinity) consider(&bound);
+  }
+
   void FindClosest() noexcept {
+    if (cores_.size() > 0) ConsiderCores();
     const Pair* const least = ConsiderLeast();
     const ObstacleIndex* const index = obstacles_.index();
     if (nearest_.left_out() > closest_.clearance)
@@ -852,20 +892,21 @@ class SafetyTest::Judgement {
 
   // At those for which there was no room.
   void LookAgain() noexcept {
-    const auto look = [&](int t, int o) {
-      const Encounter& meeting = unit_.MeetIn(obstacle(o));
-      if (meeting.is_there) ConsiderIfCloser(unit_.ByHulls(obstacle(o), meeting), t, o);
-    };
     for (int t = first_; t < units_; ++t) {
       unit_.Enter(t);
       unit_.EncloseHulls();
       if (const ObstacleIndex* const index = obstacles_.index()) {
         for (std::size_t i = 0; i < index->everywhere().size(); ++i)
-          if (!IsFurther(i, WithTolerance(*index, closest_.clearance))) look(t, index->everywhere()[i]);
+          if (!IsFurther(i, WithTolerance(*index, closest_.clearance))) Look(t, index->everywhere()[i]);
         continue;
       }
-      for (int o = 0; o < static_cast<int>(obstacles_.size()); ++o) look(t, o);
+      for (int o = static_cast<int>(cores_.size()); o < static_cast<int>(obstacles_.size()); ++o) Look(t, o);
     }
+  }
+  // @pre unit t is entered, with its hulls.
+  void Look(int t, int o) noexcept {
+    const Encounter& meeting = unit_.MeetIn(obstacle(o));
+    if (meeting.is_there) ConsiderIfCloser(unit_.ByHulls(obstacle(o), meeting), t, o);
   }
 
   const SafetyTest& test_;
@@ -883,7 +924,10 @@ class SafetyTest::Judgement {
   std::array<Hull, HullTree::kMost> tight_bodies_;  // likewise, where has_body_
   std::array<bool, HullTree::kMost> has_body_{};
   std::array<Placement::Pose, HullTree::kMost> poses_;  // at the samples; without boxes only the frame's hulls
-  std::array<double, 4096> bounds_;  // ClearanceOfAll, of the first that move or have no end; others are seen always
+  // With an index ClearanceOfAll, of the first that move or have no end; others are seen always. Without, of each core
+  // in each unit.
+  std::array<double, 4096> bounds_;
+  StandingCores cores_;
   Outline outline_;
   double farthest_ = kInfinity;  // of the closest pair
   HullTree tree_;

@@ -6,7 +6,6 @@ rounding.h bounds the error of each number, once for the whole domain. */
 #include <array>
 
 #include "forereach/dynamics/program.h"
-#include "forereach/sets/order_reduction.h"
 
 namespace forereach {
 
@@ -44,7 +43,6 @@ struct Remainder {
 /** Sums over the generators of an image, computed with the image and used by the next step. */
 struct ImageSums {
   std::array<double, kMaxStates> row;  ///< sum_j |(J G)_kj|, in plain arithmetic
-  ColumnScores scores;
 };
 
 }  // namespace forereach

@@ -75,32 +75,25 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
   std::array<Lanes, ToSize(kProgram.num_first)> factors;
   for (std::size_t e = 0; e < ToSize(kProgram.num_first); ++e) factors[e] = AllLanes(expansion.jacobian[e]);
   Lanes row_sums[sizeof...(K)] = {(static_cast<void>(K), AllLanes(0))...};
-  ColumnScores::Writer scores(sums.scores);
   const std::size_t size = slice.padded_size();
   for (std::size_t j = 0; j < size; j += kLaneCount) {
     // Reads every row before it writes any: an output may depend on several rows.
     const Lanes columns[] = {LoadLanes(slice.padded_row(static_cast<int>(K)).data() + j)...};
-    Lanes column_sum = AllLanes(0), largest = AllLanes(0);
     const auto row = [&]<std::size_t Row>(std::integral_constant<std::size_t, Row>) __attribute__((always_inline)) {
-      const Lanes image = RowImage<kProgram, Row>(columns, factors.data()), absolute = Abs(image);
+      const Lanes image = RowImage<kProgram, Row>(columns, factors.data());
       StoreLanes(image, next.mutable_row(static_cast<int>(Row)) + j);
-      row_sums[Row] += absolute;
-      column_sum = Row == 0 ? absolute : column_sum + absolute;
-      largest = Row == 0 ? absolute : Max(largest, absolute);
+      row_sums[Row] += Abs(image);
     };
     (row(std::integral_constant<std::size_t, K>()), ...);
-    scores.Add(j, column_sum, largest);
   }
-  scores.Finish(ToSize(slice.num_generators()));
   StoreSums(row_sums, sums.row.data());
 }
 
 /** (|J| s)_k + image_k in plain arithmetic. The exact value is at most 1 + 2^-44 times the result. */
 template <const Program& kProgram, std::size_t K>
 FOREREACH_INLINE double RowSlack(const Expansion& expansion, const StepError& error, const Zonotope& slice) {
-  if constexpr (!kCountsRounding) return 0;
   constexpr RowSpan kRow = RowOf(kProgram, static_cast<int>(K));
-  double slack = error.image[K];
+  double slack = kCountsRounding ? error.image[K] : 0;
   const auto add = [&]<std::size_t E>(std::integral_constant<std::size_t, E>) __attribute__((always_inline)) {
     constexpr Program::First entry = kProgram.jacobian[ToSize(kRow.first) + E];
     const double s = slice.slack(entry.column);
@@ -144,12 +137,10 @@ FOREREACH_INLINE void MapByRows(const Program& program, const RowSpan* rows, con
   next.Reset(slice.dim(), slice.num_generators());
   Lanes row_sums[PaddedToLanes(kMaxStates)];
   for (Lanes& sum : row_sums) sum = AllLanes(0);
-  ColumnScores::Writer scores(sums.scores);
   const std::size_t size = slice.padded_size();
   for (std::size_t j = 0; j < size; j += kLaneCount) {
     Lanes columns[kMaxStates];
     for (std::size_t k = 0; k < states; ++k) columns[k] = LoadLanes(slice.padded_row(static_cast<int>(k)).data() + j);
-    Lanes column_sum = AllLanes(0), largest = AllLanes(0);
     for (std::size_t k = 0; k < states; ++k) {
       Lanes image = AllLanes(0);
       for (int i = 0; i < rows[k].count; ++i) {
@@ -159,20 +150,15 @@ FOREREACH_INLINE void MapByRows(const Program& program, const RowSpan* rows, con
         const Lanes product = entry.is_one ? column : AllLanes(expansion.jacobian[e]) * column;
         image = i == 0 ? product : image + product;
       }
-      const Lanes absolute = Abs(image);
       StoreLanes(image, next.mutable_row(static_cast<int>(k)) + j);
-      row_sums[k] += absolute;
-      column_sum = k == 0 ? absolute : column_sum + absolute;
-      largest = k == 0 ? absolute : Max(largest, absolute);
+      row_sums[k] += Abs(image);
     }
-    scores.Add(j, column_sum, largest);
   }
-  scores.Finish(ToSize(slice.num_generators()));
   for (std::size_t k = 0; k < states; k += kLaneCount)
     StoreLanes(SumEach(row_sums[k], row_sums[k + 1], row_sums[k + 2], row_sums[k + 3]), sums.row.data() + k);
   for (std::size_t k = 0; k < states; ++k) {
     double slack = kCountsRounding ? error.image[k] : 0;
-    for (int i = 0; kCountsRounding && i < rows[k].count; ++i) {
+    for (int i = 0; i < rows[k].count; ++i) {
       const auto e = ToSize(rows[k].first + i);
       const Program::First& entry = program.jacobian[e];
       const double s = slice.slack(entry.column);

@@ -6,6 +6,7 @@
 
 #include "forereach/numerics/size.h"
 #include "forereach/residual/lipschitz_row.h"
+#include "forereach/sets/order_reduction.h"
 
 namespace forereach {
 namespace {
@@ -16,6 +17,10 @@ constexpr double kRelative = 0x1p-43, kSmallest = 0x1p-1050;
 // The plain expansion is used where its error, in the units of the state, is negligible everywhere in the domain.
 constexpr double kLargestError = 1e-6;
 
+// An axis of the residual up to this part of half the domain is of the size of rounding errors: what is left of bounds
+// that data determine. It is no generator, which would displace another in the reduction.
+constexpr double kNegligible = 0x1p-40;
+
 bool IsNegligible(const StepError& error) {
   const auto all_small = [](const auto& errors) {
     return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; });
@@ -23,12 +28,27 @@ bool IsNegligible(const StepError& error) {
   return all_small(error.value) && all_small(error.image) && all_small(error.remainder);
 }
 
+// The axes k with J e_k = e_k everywhere, a bit for each.
+unsigned LastingAxes(const Program& program) {
+  unsigned lasting = (1u << program.states) - 1;
+  std::array<int, kMaxStates> entries{};
+  for (int e = 0; e < program.num_first; ++e) {
+    const Program::First& entry = program.jacobian[ToSize(e)];
+    if (entry.column >= program.states) continue;
+    if (++entries[ToSize(entry.column)] > 1 || entry.row != entry.column || !entry.is_one)
+      lasting &= ~(1u << entry.column);
+  }
+  for (int k = 0; k < program.states; ++k)
+    if (entries[ToSize(k)] == 0) lasting &= ~(1u << k);
+  return lasting;
+}
+
 }  // namespace
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
                        InstructionSet instructions, const StepTiming& timing, ActedInputs inputs,
-                       std::shared_ptr<const GrowingDisturbance> growing)
+                       std::shared_ptr<const GrowingDisturbance> growing, unsigned separable)
     : model_(model),
       domain_(domain, inputs.error),
       residual_(residual),
@@ -48,6 +68,8 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
   for (std::size_t l = 0; l < ToSize(domain.state.dim()); ++l) half_width[l] = box[l].HalfWidthUpper();
   error_ = BoundStepError(model.program(), model.BoundError(box), half_width);
   plain_ = IsNegligible(error_);
+  lasting_ = LastingAxes(model.program()) & separable;
+  for (std::size_t k = 0; k < ToSize(model.num_states()); ++k) negligible_[k] = kNegligible * half_width[k];
 }
 
 void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept {
@@ -130,10 +152,11 @@ struct Surroundings {
 
 // Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
 // no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
+// @param negligible up to this length, an axis of the residual is of the size of rounding errors: part of the slack.
 // @param box_half_width is set to half the residual's width plus the disturbance: one axis for both.
 FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const StepError& error, const StepRecord& record,
-                           const ImageSums& sums, const double* disturbance, Zonotope& next, double* box_half_width,
-                           double* next_half_width) noexcept {
+                           const ImageSums& sums, const double* disturbance, const double* negligible, Zonotope& next,
+                           double* box_half_width, double* next_half_width) noexcept {
   // With room for what the reduction, which comes later, adds by its own inflation: docs/soundness.md, 2.
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
   return HoldsForFirst(
@@ -141,15 +164,17 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
         const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
         const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
         const Lanes disturbed = LoadLanes(disturbance + k);
-        const Lanes half = (upper - lower) * AllLanes(0.5) + disturbed;
+        const Lanes width = (upper - lower) * AllLanes(0.5) + disturbed;
+        const LaneMask is_axis = width > LoadLanes(negligible + k);
+        const Lanes half = is_axis ? width : AllLanes(0);
         const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
         const Lanes added = Abs(lower) + Abs(upper) + Abs(moved) + disturbed;
         // docs/soundness.md, 3.7. Where nothing is added to f0(c), nothing is rounded.
         const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kSmallest);
-        Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
-                       (added > AllLanes(0) ? rounding : AllLanes(0))) *
-                      AllLanes(1 + kRelative);
-        if constexpr (!kCountsRounding) slack = AllLanes(0);
+        Lanes slack = LoadLanes(next.mutable_slacks() + k) + (is_axis ? AllLanes(0) : width);
+        if constexpr (kCountsRounding)
+          slack = (slack + (LoadLanes(&error.value[k]) + (added > AllLanes(0) ? rounding : AllLanes(0)))) *
+                  AllLanes(1 + kRelative);
         const Lanes hull =
             (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
         StoreLanes(half, box_half_width + k);
@@ -182,7 +207,6 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
     next.mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
     sums.row[ToSize(k)] = spread;
   }
-  ScoreColumns(next, sums.scores);
 }
 
 // Why the successor could not be joined. An inverted envelope is a contradiction: its ends are bounds in real
@@ -292,9 +316,11 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   std::array<double, kMaxStates> box_half_width;
   const double* added = is_punctual ? disturbance : offset.half_width.data();
-  if (!Join(n, expansion, error, record, sums, added, next, box_half_width.data(), next_half_width))
+  if (!Join(n, expansion, error, record, sums, added, negligible_.data(), next, box_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
-  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), box_half_width.data(), order_, instructions_);
+  next.axes_in_slack() = slice.axes_in_slack();
+  const unsigned lasting = is_punctual && !record.envelope.has_slope ? lasting_ : 0;
+  AppendAndReduce(next, record.remainder.half_width.data(), box_half_width.data(), order_, lasting, instructions_);
   if (!is_punctual) StepOffsets::Append(offset, next, next_half_width);
   return {};
 }

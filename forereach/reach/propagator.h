@@ -54,11 +54,13 @@ class Propagator final {
   slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
   @param disturbance w^, n entries or none. @param instructions changes the computing time only. @param inputs how far
   those that act may be off. @param growing what w^ has beyond that (Declaration::growing), or null.
+  @param separable a bit for each state that may be apart from others: where every step maps e_k to itself, generators
+  along it become slack (AppendAndReduce).
   @throws std::invalid_argument as StepOffsets. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
              const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
              InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {}, ActedInputs inputs = {},
-             std::shared_ptr<const GrowingDisturbance> growing = {});
+             std::shared_ptr<const GrowingDisturbance> growing = {}, unsigned separable = ~0u);
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
@@ -111,6 +113,8 @@ class Propagator final {
   InstructionSet instructions_;
   StepError error_;
   bool plain_;
+  unsigned lasting_;  // axes that the slack holds (AppendAndReduce)
+  std::array<double, kMaxStates> negligible_{};
 };
 
 }  // namespace forereach

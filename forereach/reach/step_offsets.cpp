@@ -10,7 +10,6 @@
 #include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
-#include "forereach/sets/order_reduction.h"
 #include "forereach/sets/zonotope.h"
 
 namespace forereach {
@@ -33,7 +32,6 @@ constexpr double kSumRelative = 0x1p-46;
 // Subtracts `column` from the last generator of an image, and sets its sums anew: docs/soundness.md, 3.15.
 FOREREACH_INLINE void SubtractFromLast(const double* column, Zonotope& image, ImageSums& sums) {
   const std::size_t n = ToSize(image.dim()), last = ToSize(image.num_generators()) - 1;
-  Lanes column_sum = AllLanes(0), largest = AllLanes(0);
   for (std::size_t k = 0; k < n; k += kLaneCount) {
     const auto at = [&](std::size_t i) __attribute__((always_inline))->double& {
       return image.mutable_row(static_cast<int>(std::min(k + i, n - 1)))[last];
@@ -43,11 +41,8 @@ FOREREACH_INLINE void SubtractFromLast(const double* column, Zonotope& image, Im
     const Lanes sum = LoadLanes(&sums.row[k]);
     StoreLanes(((sum - Abs(entries)) + after) + AllLanes(kSumRelative) * sum, &sums.row[k]);
     StoreLanes(LoadLanes(image.slacks() + k) + AllLanes(2 * kUnitRoundoff) * after, image.mutable_slacks() + k);
-    column_sum += after;
-    largest = Max(largest, after);
     for (std::size_t i = 0; i < std::min(kLaneCount, n - k); ++i) at(i) = moved[i];
   }
-  sums.scores.Rewrite(last, Sum(column_sum), std::max({largest[0], largest[1], largest[2], largest[3]}));
 }
 
 }  // namespace

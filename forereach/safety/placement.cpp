@@ -272,6 +272,16 @@ void Placement::Observe(const Zonotope& slice, std::span<const double> half_widt
       OverSlice(sample, i);
 }
 
+unsigned Placement::SeparableStates() const {
+  if (expressions_) return 0;
+  unsigned seen = heading_ >= 0 ? 1u << heading_ : 0, twice = seen;
+  for (const MatrixEntry& entry : projection_.entries()) {
+    twice |= seen & 1u << entry.column;
+    seen |= 1u << entry.column;
+  }
+  return ~twice;
+}
+
 // The slack of the image, and the errors of center, generators, their sum and the slack itself.
 double Placement::Slack(const Sample& sample, std::size_t i, std::size_t k) const noexcept {
   const Sample::Point& point = sample.points[i];
@@ -329,9 +339,10 @@ void Placement::EncloseAtExpressions(const Sample& sample, std::size_t i, Zonoto
       StoreLanes(sum, place.mutable_row(k) + j);
     }
     place.mutable_center(k) = sample.points[i].offset[ToSize(k)];
-    place.mutable_slack(k) = Slack(sample, i, ToSize(k));
+    place.mutable_slack(k) = 0;
   }
-  for (int k = 0; k < dim(); ++k) place.AppendAxis(k, sample.points[i].spread[ToSize(k)]);
+  for (int k = 0; k < dim(); ++k)
+    place.AppendAxis(k, AddUp(sample.points[i].spread[ToSize(k)], Slack(sample, i, ToSize(k))));
 }
 
 namespace {
@@ -421,9 +432,9 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
         StoreLanes(sum, place.mutable_row(k) + j);
       }
       place.mutable_center(k) = sample.center[row] + point.offset[row];
-      place.mutable_slack(k) = Slack(sample, i, row);
+      place.mutable_slack(k) = 0;
     }
-    for (int k = 0; k < dim(); ++k) place.AppendAxis(k, point.spread[ToSize(k)]);
+    for (int k = 0; k < dim(); ++k) place.AppendAxis(k, AddUp(point.spread[ToSize(k)], Slack(sample, i, ToSize(k))));
   }
 }
 

@@ -116,6 +116,10 @@ class Placement final {
   [[nodiscard]] double SupportUpper(const Sample& sample, const Part& part, const Eigen::Vector3d& d,
                                     InstructionSet instructions = BestInstructionSet()) const noexcept;
 
+  /** A bit for each state that moves at most one coordinate of every place: what of a slice is along its axis may be
+  slack, and no place gets larger. */
+  [[nodiscard]] unsigned SeparableStates() const;
+
   /** Sets places[i] to a zonotope that contains g_i(X) + [-e, e] for each point i. @param places num_points() sets.
   Cost O(m) for m generators for each point. @pre X has at most
   kMaxGenerators - p generators. */

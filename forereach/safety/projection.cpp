@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "forereach/numerics/size.h"
 #include "forereach/sets/zonotope.h"
@@ -25,6 +26,15 @@ Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(sta
 void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
   constexpr double kMargin = 0x1p-47;  // above the rounding of both sums: docs/soundness.md, 2
   hull = {};
+  if (copies_) {
+    for (const auto& [row, column, one] : entries_) {
+      const double center = slice.center(column), reach = half_width[ToSize(column)];
+      hull.center[ToSize(row)] = center;
+      hull.half_width[ToSize(row)] =
+          reach + (RoundingError(kMargin, std::abs(center) + reach) + std::numeric_limits<double>::min());
+    }
+    return;
+  }
   std::array<double, kMaxSafetyDim> size{};
   for (const MatrixEntry& entry : entries_) {
     const auto k = ToSize(entry.row), l = ToSize(entry.column);
@@ -39,13 +49,17 @@ void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half
 
 void Projection::Enclose(const Zonotope& slice, std::span<const double> half_width,
                          Zonotope& projected) const noexcept {
-  if (!copies_) return EncloseLinearImage(entries_, slice, half_width, dim_, projected);
-  projected.Reset(dim_, slice.num_generators());
-  for (const auto& [row, column, one] : entries_) {
-    std::ranges::copy(slice.padded_row(column), projected.mutable_row(row));
-    projected.mutable_center(row) = slice.center(column);
-    projected.mutable_slack(row) = slice.slack(column);
+  if (copies_) {
+    projected.Reset(dim_, slice.num_generators());
+    for (const auto& [row, column, one] : entries_) {
+      std::ranges::copy(slice.padded_row(column), projected.mutable_row(row));
+      projected.mutable_center(row) = slice.center(column);
+      projected.mutable_slack(row) = slice.slack(column);
+    }
+  } else {
+    EncloseLinearImage(entries_, slice, half_width, dim_, projected);
   }
+  for (int k = 0; k < dim_; ++k) projected.AppendAxis(k, std::exchange(projected.mutable_slack(k), 0));
 }
 
 }  // namespace forereach

@@ -23,7 +23,8 @@ class Projection final {
   void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
 
   /** Sets `projected` to a zonotope that contains P X. It equals P X if each row of P copies a coordinate.
-  @param half_width as in EncloseHull. Cost O(nonzeros of P * generators). */
+  Its slack is zero: that of X is generators here, so that a search for a direction sees it. @param half_width as in
+  EncloseHull. Cost O(nonzeros of P * generators). @pre X has at most kMaxGenerators - p generators. */
   void Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope& projected) const noexcept;
 
  private:

@@ -10,22 +10,49 @@
 
 namespace forereach {
 
-// Plain arithmetic: scores only choose which columns stay, and every choice is sound (docs/soundness.md, 3.8).
-void ScoreColumns(const Zonotope& set, ColumnScores& scores) noexcept {
-  ColumnScores::Writer writer(scores);
-  for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
-    Lanes sum = AllLanes(0), largest = AllLanes(0);
-    for (int k = 0; k < set.dim(); ++k) {
-      const Lanes size = Abs(LoadLanes(&set.padded_row(k)[j]));
-      sum += size;
-      largest = Max(largest, size);
-    }
-    writer.Add(j, sum, largest);
-  }
-  writer.Finish(ToSize(set.num_generators()));
-}
-
 namespace {
+
+// The scores |g|_1 - |g|_inf of all columns, Eq. (order-reduction), in plain arithmetic: they only choose which columns
+// stay, and every choice is sound (docs/soundness.md, 3.8). The last bits of a score hold the column's index, so no two
+// are equal, and of two equal values the earlier column's score is larger. Zero columns have score -1.
+struct ColumnScores {
+  static constexpr std::size_t kBlock = 8 * kLaneCount;
+
+  int num_nonzero;
+  // One for each column, padded with infinity to a multiple of kBlock.
+  alignas(32) std::array<double, (kMaxGenerators + kBlock - 1) / kBlock * kBlock> scores;
+
+  FOREREACH_INLINE void Compute(const Zonotope& set, std::size_t n) {
+    LaneMask nonzero{}, index{kMaxGenerators, kMaxGenerators - 1, kMaxGenerators - 2, kMaxGenerators - 3};
+    std::size_t j = 0;
+    for (; j < set.padded_size(); j += kLaneCount, index -= LaneMask{4, 4, 4, 4}) {
+      Lanes sum = AllLanes(0), largest = AllLanes(0);
+      for (std::size_t k = 0; k < n; ++k) {
+        const Lanes size = Abs(LoadLanes(&set.padded_row(static_cast<int>(k))[j]));
+        sum += size;
+        largest = Max(largest, size);
+      }
+      const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so changing its bits cannot give NaN
+      const LaneMask bits = (Bits(score) & ~LaneMask{127, 127, 127, 127}) | index;
+      StoreLanes(largest > AllLanes(0) ? FromBits(bits) : AllLanes(-1), &scores[j]);
+      nonzero -= largest > AllLanes(0);
+    }
+    num_nonzero = static_cast<int>((nonzero[0] + nonzero[1]) + (nonzero[2] + nonzero[3]));
+    if (const std::size_t rest = ToSize(set.num_generators()) % kLaneCount; rest > 0)
+      StoreLanes(FirstLanes(LoadLanes(&scores[j - kLaneCount]), rest, kInfinity), &scores[j - kLaneCount]);
+    for (; j % kBlock != 0; j += kLaneCount) StoreLanes(AllLanes(kInfinity), &scores[j]);
+  }
+};
+
+FOREREACH_INLINE int NumNonzero(const Zonotope& set, std::size_t n) {
+  LaneMask count{};
+  for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
+    Lanes largest = Abs(LoadLanes(&set.padded_row(0)[j]));
+    for (std::size_t k = 1; k < n; ++k) largest = Max(largest, Abs(LoadLanes(&set.padded_row(static_cast<int>(k))[j])));
+    count -= largest > AllLanes(0);
+  }
+  return static_cast<int>((count[0] + count[1]) + (count[2] + count[3]));
+}
 
 // Four lists of eight numbers, one in each lane.
 using Lists = std::array<Lanes, 8>;
@@ -147,7 +174,7 @@ struct Axes {
   }
   [[nodiscard]] int size() const { return std::popcount(which); }
 
-  // Adds all but the first `stay` to `boxed`, and says how many of those that stay are left to find.
+  // Leaves the first `stay`, adds the others to `boxed`, and says how many of those that stay are left to find.
   FOREREACH_INLINE int Box(int stay, Lengths& boxed) {
     for (unsigned rest = which; rest != 0; rest &= rest - 1) {
       if (stay > 0) {
@@ -160,9 +187,15 @@ struct Axes {
     }
     return stay;
   }
-  // Writes them into columns of zeros and returns the column after them.
-  FOREREACH_INLINE int Write(Zonotope& set, int column) const {
-    for (unsigned rest = which; rest != 0; rest &= rest - 1) {
+  // Writes them into columns of zeros, those that last to the slack, and returns the column after them.
+  FOREREACH_INLINE int Write(Zonotope& set, unsigned lasting, int column) const {
+    for (unsigned rest = which & lasting; rest != 0; rest &= rest - 1) {
+      const int k = std::countr_zero(rest);
+      double& slack = set.mutable_slack(k);
+      slack = (slack + lengths[k]) * (1 + 4 * kUnitRoundoff);
+      set.axes_in_slack().Append(k);
+    }
+    for (unsigned rest = which & ~lasting; rest != 0; rest &= rest - 1) {
       const int k = std::countr_zero(rest);
       set.mutable_row(k)[column++] = lengths[k];
     }
@@ -170,48 +203,68 @@ struct Axes {
   }
 };
 
+// Of the axes in the slack only the first `stay` count from now on; the others are part of the box, which stays where
+// it is. Returns a bit for each axis that has one among these.
+FOREREACH_INLINE unsigned BoxAxes(AxesInSlack& held, int stay, unsigned lasting) {
+  unsigned boxed = 0;
+  if (stay < held.count)
+    for (unsigned rest = lasting; rest != 0; rest &= rest - 1)
+      if (const int k = std::countr_zero(rest); held.last[ToSize(k)] > stay) boxed |= 1u << k;
+  held.count = stay;
+  return boxed;
+}
+
 // kDim: the set's, or 0.
 template <int kDim>
-FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& scores, const double* first,
-                                           const double* second, int order) {
+FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const double* first, const double* second, int order,
+                                           unsigned lasting) {
   const std::size_t n = ToSize(kDim > 0 ? kDim : set.dim());
   const int count = set.num_generators(), most = order * static_cast<int>(n), keep = most - static_cast<int>(n);
+  AxesInSlack& held = set.axes_in_slack();
   Axes early = Axes::Nonzero(first, n), late = Axes::Nonzero(second, n);
   const int axes = early.size() + late.size();
-  int left = count, stay = axes;  // columns and axes that are not boxed
-  if (count + axes > most) {
-    left = scores.num_nonzero();
-    if (left + axes > most) {
-      left = std::min(keep, left);
-      // The score of an axis-aligned generator is 0, and the new ones come last: what stays are the first of them.
-      stay = std::min(keep - left, axes);
-    }
+  if (count + held.count + axes <= most) {
+    set.Extend<kDim>(count + std::popcount(early.which & ~lasting) + std::popcount(late.which & ~lasting));
+    late.Write(set, lasting, early.Write(set, lasting, count));
+    return;
+  }
+  // Columns, axes in the slack and new ones that are not boxed.
+  int left = count, stay_held = held.count, stay = axes;
+  ColumnScores scores;
+  if (count > keep || NumNonzero(set, n) < count) {
+    scores.Compute(set, n);
+    left = scores.num_nonzero;
+  }
+  if (left + held.count + axes > most) {
+    left = std::min(keep, left);
+    // The score of an axis is 0, and the new ones come last: what stays are the first of them.
+    stay_held = std::min(keep - left, held.count);
+    stay = std::min(keep - left - stay_held, axes);
   }
   Lengths boxed;
-  if (stay == 0) {  // as most often: all of them
-    for (std::size_t k = 0; k < n; k += kLaneCount)
-      StoreLanes((AllLanes(0) + LoadLanes(first + k)) + LoadLanes(second + k), &boxed[k]);
-    early.which = late.which = 0;
-  } else {
-    for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
-    if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
-  }
+  for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
+  if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
   const Lanes inflation = AllLanes(1 + (2.0 * count + 8) * kUnitRoundoff);
   if (left < count)
-    Drop(set, n, ToSize(count - left), scores.data(), inflation, boxed);
+    Drop(set, n, ToSize(count - left), scores.scores.data(), inflation, boxed);
   else
     for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(LoadLanes(&boxed[k]) * inflation, &boxed[k]);
-  const Axes box = Axes::Nonzero(boxed.data(), n);
-  set.Resize<kDim>(left, left + stay + box.size());
-  box.Write(set, late.Write(set, early.Write(set, left)));
+  const unsigned boxed_before = BoxAxes(held, stay_held, lasting);
+  Axes box = Axes::Nonzero(boxed.data(), n);
+  box.which |= boxed_before;
+  const unsigned columns = ~lasting;
+  if (left < count) set.Truncate<kDim>(left);
+  set.Extend<kDim>(left + std::popcount(early.which & columns) + std::popcount(late.which & columns) +
+                   std::popcount(box.which & columns));
+  box.Write(set, lasting, late.Write(set, lasting, early.Write(set, lasting, left)));
 }
 
 }  // namespace
 
-void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second, int order,
+void AppendAndReduce(Zonotope& set, const double* first, const double* second, int order, unsigned lasting,
                      InstructionSet instructions) noexcept {
   const auto reduce = [&]<int kDim>() {
-    Dispatch<&AppendAndReduceLanes<kDim>>(instructions, set, scores, first, second, order);
+    Dispatch<&AppendAndReduceLanes<kDim>>(instructions, set, first, second, order, lasting);
   };
   switch (set.dim()) {
     case 4: return reduce.operator()<4>();

@@ -5,6 +5,8 @@
 #include "forereach/safety/placement.h"
 #include "forereach/safety/projection.h"
 #include "forereach/safety/separation.h"
+#include "forereach/safety/standing_cores.h"
+#include "tests/oracle/traced_random.h"
 
 namespace forereach::safety_test {
 
@@ -45,6 +47,50 @@ TEST(Obstacle, HasTheHullAndRadiusOfItsKind) {
   EXPECT_EQ(Obstacle::AxisBox(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1)).hull().size(), 2u);
   EXPECT_TRUE(Obstacle::HalfSpace(Vector3d(0, 0, 1), 2).hull().empty());
   EXPECT_EQ(Obstacle::Circle(Point(1, 2), 3).hull(), std::vector{Vector3d(1, 2, 0)});
+}
+
+TEST(StandingCores, BoundWhatSeparateHullsBoundsOneByOne) {
+  TracedRandom random(316);
+  int proven = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const int dim = random.Integer(1, 3), count = random.Integer(1, 70), most = random.Integer(1, 80);
+    const double added = random.Coin() ? 0 : random.Uniform(0, 1);
+    std::vector<Obstacle> obstacles;
+    for (int o = 0; o < count; ++o) {
+      const Eigen::VectorXd corner = 4 * random.Matrix(dim, 1), side = random.Matrix(dim, 1).cwiseAbs();
+      obstacles.push_back(dim == 2 && random.Coin() ? Obstacle::Circle(corner, random.Uniform(0, 1))
+                                                    : Obstacle::AxisBox(corner, corner + side));
+    }
+    const int end = random.Integer(0, 2 * count);
+    if (end < count) obstacles[ToSize(end)] = Obstacle::HalfSpace(Eigen::VectorXd::Ones(dim), 9);
+    StandingCores cores;
+    cores.Take(obstacles, dim, added, ToSize(most));
+    ASSERT_EQ(cores.size(), ToSize(std::min({count, end, most, 64})));
+    std::array<Hull, 3> hulls{};
+    for (Hull& hull : hulls)
+      for (std::size_t k = 0; k < ToSize(dim); ++k)
+        hull.center[k] = random.Uniform(-4, 4), hull.half_width[k] = random.Uniform(0, 0.5);
+    if (random.Coin(0.1)) hulls[1].half_width[0] = kNan;
+    std::vector<double> bounds(hulls.size() * cores.stride(), 0);
+    for (const InstructionSet instructions : {InstructionSet::kBaseline, BestInstructionSet()}) {
+      cores.Bound(hulls, bounds.data(), instructions);
+      for (std::size_t h = 0; h < hulls.size(); ++h)
+        for (std::size_t o = 0; o < cores.stride(); ++o) {
+          const double bound = bounds[h * cores.stride() + o];
+          if (o >= cores.size()) {
+            ASSERT_EQ(bound, kInfinity);
+            continue;
+          }
+          const Separation one = SeparateHulls(hulls[h], obstacles[o], added);
+          ASSERT_EQ(bound > -kInfinity, one.IsProven());
+          if (!one.IsProven()) continue;
+          ASSERT_LE(bound, one.clearance());
+          ASSERT_GE(bound, one.clearance() - 8 * kUnitRoundoff * one.distance);
+          ++proven;
+        }
+    }
+  }
+  EXPECT_GT(proven, 10000);
 }
 
 TEST(Obstacle, ApproximateDistanceIsNegativeInside) {

@@ -157,6 +157,53 @@ TEST(ReduceOrder, ChangesNothingUpToOrderTimesDimension) {
   }
 }
 
+// Steps whose map J has J e_k = e_k for some k: the slack holds the columns along these, and all sets are those of
+// columns that are kept apart.
+TEST(ReduceOrder, AxesInTheSlackAreTheSameSetAsColumns) {
+  TracedRandom random(315);
+  int held = 0, dropped = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = random.Integer(2, 6), order = random.Integer(2, 5);
+    unsigned lasting = 0;
+    for (int k = 0; k < n; ++k) lasting |= random.Coin() ? 1u << k : 0;
+    const bool has_rests = random.Coin();  // some steps have nothing to add along an axis
+    Eigen::MatrixXd columns = random.Matrix(n, random.Integer(1, n));
+    Zonotope set(Eigen::VectorXd::Zero(n), columns);
+    for (int step = 0; step < 15; ++step) {
+      std::array<std::array<double, kMaxStates>, 2> lengths{};
+      for (int which = 0; which < 2; ++which)
+        for (int k = 0; k < n; ++k) {
+          if (has_rests && random.Coin(0.3)) continue;
+          const double length = random.Uniform(0.01, 1);
+          lengths[ToSize(which)][ToSize(k)] = length;
+          columns.conservativeResize(n, columns.cols() + 1);
+          columns.rightCols(1) = length * Eigen::VectorXd::Unit(n, k);
+        }
+      const Eigen::Index before = columns.cols();
+      columns = Reduced(columns, order);
+      dropped += static_cast<int>(before - columns.cols());
+      AppendAndReduce(set, lengths[0].data(), lengths[1].data(), order, lasting);
+      ASSERT_EQ(set.num_generators() + set.axes_in_slack().count, columns.cols()) << "step " << step;
+      held += set.axes_in_slack().count;
+      for (int probe = 0; probe < 5; ++probe) {
+        const Eigen::VectorXd d = random.Matrix(n, 1);
+        const double support = (d.transpose() * columns).cwiseAbs().sum();
+        ASSERT_NEAR(set.SupportUpper({d.data(), ToSize(n)}), support, 1e-12 * support) << "step " << step;
+      }
+      Eigen::MatrixXd map = random.Matrix(n, n);
+      for (int k = 0; k < n; ++k)
+        if (lasting >> k & 1) map.col(k) = Eigen::VectorXd::Unit(n, k);
+      columns = (map * columns).eval();
+      const ZonotopeArrays slice = set;
+      set = Zonotope(set.CenterVector(), map * set.GeneratorMatrix().leftCols(set.num_generators()));
+      set.axes_in_slack() = slice.axes_in_slack();
+      for (int k = 0; k < n; ++k) set.mutable_slack(k) = slice.slacks()[k];
+    }
+  }
+  EXPECT_GT(held, 1000);
+  EXPECT_GT(dropped, 1000);
+}
+
 TEST(LinearMap, RowsThatCopyACoordinateAreExact) {
   TracedRandom random(314);
   const Zonotope set = random.AnyZonotope(4, 9);

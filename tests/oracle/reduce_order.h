@@ -8,9 +8,7 @@ namespace forereach {
 /** AppendAndReduce without generators to append: the reduction of the order alone. */
 inline void ReduceOrder(Zonotope& set, int order) noexcept {
   constexpr std::array<double, kMaxStates> kNone{};
-  ColumnScores scores;
-  ScoreColumns(set, scores);
-  AppendAndReduce(set, scores, kNone.data(), kNone.data(), order);
+  AppendAndReduce(set, kNone.data(), kNone.data(), order);
 }
 
 }  // namespace forereach

@@ -396,14 +396,16 @@ TEST(HandMade, AClaimThatOnlyATighterRemainderShowsIsRefuted) {
 
 TEST(HandMade, CloseChoicesOfTheReductionAreTold) {
   const auto problem = Halves();
-  problem->zonotope_order = 2;  // of the 8 columns and 4 of the envelope, 4 are kept
+  problem->zonotope_order =
+      2;  // of the 12 columns 4 are kept; the envelope's are as small as rounding and do not count
   Certificate certificate = OneStep();
   certificate.slices.clear();
-  certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::MatrixXd(4, 8)};
-  for (int j = 0; j < 8; ++j) certificate.initial_set.generators.col(j) << 0, 0, 0x1p-6 * (j + 1), 0x1p-8 * (j + 1);
+  certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::MatrixXd(4, 12)};
+  for (int j = 0; j < 12; ++j) certificate.initial_set.generators.col(j) << 0, 0, 0x1p-6 * (j + 1), 0x1p-8 * (j + 1);
   const Verifier verifier(problem, Method::kPaper);
-  EXPECT_FIELDS(verifier.Derive(certificate), (ambiguity, 0), (slices[1].columns.size(), 8u));
-  certificate.initial_set.generators.col(3) = certificate.initial_set.generators.col(4) * (1 + 0x1p-50);
+  EXPECT_FIELDS(verifier.Derive(certificate), (ambiguity, 0), (slices[1].num_slack, 4u),
+                (slices[1].columns.size(), 12u));
+  certificate.initial_set.generators.col(7) = certificate.initial_set.generators.col(8) * (1 + 0x1p-50);
   EXPECT_GT(verifier.Derive(certificate).ambiguity, 0);
 }
 
