@@ -92,6 +92,7 @@ bool PlannerNode::IsAtGoal(const robot_state_t& state) const {
 
 // Updates the earlier plans from the state: the executing plan, and the starts that have passed.
 void PlannerNode::Follow(const robot_state_t& state) {
+  Estimate(state);
   last_state_ = state;
   finished_ = state.mode == robot_state_t::FINISHED;
   arrived_ = arrived_ || IsAtGoal(state);
@@ -102,6 +103,32 @@ void PlannerNode::Follow(const robot_state_t& state) {
   else if (!round_ && !waiting_start_)
     plans_.clear();
   std::erase_if(withdrawn_, [this](const auto& withdrawn) { return !plans_.contains(withdrawn.first); });
+}
+
+// The state that the controls make of the estimate before, moved into measured +- error. So the errors of earlier
+// measurements count, too: the true state has been in all of these sets.
+void PlannerNode::Estimate(const robot_state_t& state) {
+  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
+  const bool is_next = last_state_.num_states > 0 && state.utime - last_state_.utime == period_us_;
+  const bool moved = last_state_.mode == robot_state_t::EXECUTING;
+  const auto plan = moved ? plans_.find(last_state_.executing_plan_id) : plans_.end();
+  const std::int64_t step = last_state_.executing_step;
+  if (!is_next || (moved && (plan == plans_.end() || step < 0 || step >= plan->second.num_steps))) {
+    estimate_ = measured;
+    return;
+  }
+  if (moved) Advance(plan->second, step, estimate_);
+  Eigen::VectorXd off = estimate_ - measured;
+  for (const int k : config_.problem->model->angles()) off[k] = std::remainder(off[k], 2 * std::numbers::pi);
+  const Eigen::VectorXd error = ErrorOf(state);
+  estimate_ = measured + off.cwiseMax(-error).cwiseMin(error);
+}
+
+void PlannerNode::Advance(const candidate_plan_t& plan, std::int64_t step, Eigen::VectorXd& x) const {
+  const auto n = static_cast<std::size_t>(x.size()), m = static_cast<std::size_t>(plan.num_inputs);
+  std::array<double, kMaxVariables> z;
+  std::copy_n(plan.control[step], m, std::copy_n(x.data(), n, z.begin()));
+  residual_.Predict({z.data(), n + m}, {x.data(), n});
 }
 
 // For how long it has stood at this place, if it stands. One that moves may still get away.
@@ -133,21 +160,17 @@ bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
           state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps);
 }
 
-// Simulates from the measured state through the controls that will be applied before the start. A plan that starts
+// Simulates from the estimate through the controls that will be applied before the start. A plan that starts
 // where the executing one ends takes over before the robot holds still. An angle gets the turns that bring it nearest
 // to the middle of the domain.
 std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state, std::int64_t lead_steps) const {
-  const std::size_t n = static_cast<std::size_t>(state.num_states);
-  Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
+  Eigen::VectorXd x = estimate_;
   const bool executing = state.mode == robot_state_t::EXECUTING;
   const candidate_plan_t* plan = executing ? &plans_.at(state.executing_plan_id) : nullptr;
   const std::int64_t first = state.executing_step, start = first + lead_steps;
-  for (std::int64_t step = first; executing && step < std::min<std::int64_t>(start, plan->num_steps); ++step) {
-    std::array<double, kMaxVariables> z;
-    std::copy_n(plan->control[step], plan->num_inputs, std::copy_n(x.data(), n, z.begin()));
-    residual_.Predict({z.data(), n + static_cast<std::size_t>(plan->num_inputs)}, {x.data(), n});
-  }
-  if (!executing || start > plan->num_steps) proposer_->motion().Hold({x.data(), n});
+  for (std::int64_t step = first; executing && step < std::min<std::int64_t>(start, plan->num_steps); ++step)
+    Advance(*plan, step, x);
+  if (!executing || start > plan->num_steps) proposer_->motion().Hold({x.data(), static_cast<std::size_t>(x.size())});
   for (const int k : config_.problem->model->angles()) {  // room to turn either way
     const Box& domain = config_.problem->domain.state;
     const double middle = domain.lower()[k] / 2 + domain.upper()[k] / 2;
@@ -157,12 +180,17 @@ std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& st
   return x;
 }
 
+Eigen::VectorXd PlannerNode::ErrorOf(const robot_state_t& state) const {
+  if (state.num_state_errors > 0) return Eigen::Map<const Eigen::VectorXd>(state.state_error, state.num_states);
+  Eigen::VectorXd error(state.num_states);
+  for (Eigen::Index k = 0; k < error.size(); ++k) error[k] = config_.problem->declaration.VariableError(k);
+  return error;
+}
+
 // By what a guard asks for: all of the measured state at the start, +- its error, inside X0.
 Eigen::VectorXd PlannerNode::HalfWidthFor(const robot_state_t& state) const {
-  Eigen::VectorXd half_width = half_width_;
-  for (Eigen::Index k = 0; k < half_width.size(); ++k)
-    half_width[k] = AddUp(half_width[k], state.num_state_errors > 0 ? state.state_error[k]
-                                                                    : config_.problem->declaration.VariableError(k));
+  Eigen::VectorXd half_width = ErrorOf(state);
+  for (Eigen::Index k = 0; k < half_width.size(); ++k) half_width[k] = AddUp(half_width_[k], half_width[k]);
   return half_width;
 }
 

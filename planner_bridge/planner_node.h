@@ -1,7 +1,8 @@
 /** The planner's node: it receives robot states, decisions and withdrawals, and sends candidates.
 
 A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
-the state that the executing plan will have reached by then. A round begins while the robot holds still, or when that
+the state that the executing plan will have reached by then, as predicted from an estimate of the state: the errors of
+single measurements count for less in it. A round begins while the robot holds still, or when that
 start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
 start. A round sends one candidate or batch at a time and waits for its decision (with planner.policy_samples what one
 search gives is sent in batches, one after the other):
@@ -129,6 +130,9 @@ class PlannerNode final : public Node {
   void SendNext(std::int64_t now_us);
   [[nodiscard]] int MostCandidates() const;
   void Follow(const robot_state_t& state);
+  void Estimate(const robot_state_t& state);
+  void Advance(const candidate_plan_t& plan, std::int64_t step, Eigen::VectorXd& x) const;
+  [[nodiscard]] Eigen::VectorXd ErrorOf(const robot_state_t& state) const;
   [[nodiscard]] Eigen::VectorXd HalfWidthFor(const robot_state_t& state) const;
   void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
@@ -159,6 +163,7 @@ class PlannerNode final : public Node {
   std::optional<std::int64_t> waiting_start_;       // start of a certified plan that has not begun yet
   std::int64_t waiting_plan_ = -1;                  // its plan_id
   robot_state_t last_state_{};                      // of the robot, the newest; num_states 0: none yet
+  Eigen::VectorXd estimate_;                        // of its true state then
   std::map<std::int64_t, int> withdrawn_;           // valid_steps, of plans in plans_
   ObstaclesInForce obstacles_;
   PlannerMessages messages_;

@@ -164,6 +164,51 @@ TEST_F(PlannerNodeTest, TheX0OfACandidateIsWidenedByTheStateError) {
   EXPECT_EQ(candidates_.size(), before) << "a state with such an error is none";
 }
 
+// Each measured state +- error contains the true one.
+TEST_F(PlannerNodeTest, PredictsTheStartFromWhatAllMeasurementsLeave) {
+  Problem& problem = Own(config_.problem);
+  problem.declaration.state_error = Vec({0.03, 0.03, 0, 0, 0, 0});
+  problem.declaration.given_are_exact = true;
+  config_.planner.candidates = 1;
+  Start(config_);
+  const auto starts_from = [this, begin = now_](double x, std::int64_t sequence) {
+    now_ = begin + sequence * kPeriod;
+    Tell(Standing(x, 0, sequence));
+    const double center = candidates_.back().initial_center[0];
+    AbstainS();
+    Run(1);
+    return center;
+  };
+  EXPECT_EQ(starts_from(0.03, 0), 0.03);
+  EXPECT_DOUBLE_EQ(starts_from(-0.01, 1), 0.02);
+  EXPECT_DOUBLE_EQ(starts_from(0.01, 2), 0.02) << "nothing new";
+  EXPECT_DOUBLE_EQ(starts_from(0.06, 3), 0.03);
+  EXPECT_EQ(candidates_.size(), 4u);
+  EXPECT_EQ(starts_from(0.01, 5), 0.01) << "of the time between nothing is known";
+}
+
+TEST_F(PlannerNodeTest, APlanMovesTheEstimateAlong) {
+  Problem& problem = Own(config_.problem);
+  problem.declaration.state_error = Vec({0.03, 0.03, 0, 0.02, 0, 0});
+  problem.declaration.given_are_exact = true;
+  Start(config_);
+  Tell(Standing());
+  Certify();
+  const candidate_plan_t first = candidates_.back();
+  const auto say = [&](int step, double x) {
+    now_ = first.start_utime + step * kPeriod;
+    robot_state_t state = Executing(first, step);
+    state.state[0] += x;
+    Tell(state);
+  };
+  say(DueStep(first) - 1, 0.025);
+  ASSERT_EQ(candidates_.size(), 1u);
+  say(DueStep(first), -0.025);
+  ASSERT_EQ(candidates_.size(), 2u);
+  const double planned = Executing(first, first.progress_steps).state[0];
+  EXPECT_NEAR(candidates_.back().initial_center[0], planned + 0.005, 1e-9);
+}
+
 TEST_F(PlannerNodeTest, ACandidateHasEveryFieldSet) {
   const robot_state_t state = Standing();
   Tell(state);
