@@ -328,7 +328,8 @@ void Watcher::Draw(const Decided& decided, PageDetail& detail) {
     const Plan plan = PlanOf(judged.candidate, judged.schedule);
     const Zonotope initial_set = InitialSetOf(*candidate);
     certifier_->Require(plan, initial_set, *decided.obstacles);
-    const Decision again = certifier_->Certify(plan, initial_set, *decided.obstacles, *tube_);
+    const Decision again = CertifyInPieces(*certifier_, plan, initial_set, *decided.obstacles,
+                                           MostPieces(decision.outcome, task_.gate), *tube_);
     Describe(*certifier_, judged, again, *tube_, *decided.obstacles, detail);
   } catch (const std::invalid_argument& error) {
     detail.missing = std::string("it cannot be judged again: ") + error.what();

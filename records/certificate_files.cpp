@@ -67,6 +67,28 @@ verifier::Certificate CertificateOf(const candidate_plan_t& plan, const Basis& b
   return certificate;
 }
 
+// Where X_0 was cut, if its certifier has certified it in pieces: it is certified again. What comes out proves nothing.
+std::vector<PieceCut> CutsOf(const candidate_plan_t& candidate, const Basis& basis, CaseCertifier& certifiers) {
+  const int most = basis.task->gate.max_pieces;
+  if (most < 2) return {};
+  const Certifier& certifier = certifiers.At(basis);
+  const Plan plan = PlanOf(candidate, ScheduleOf(candidate, basis.task->gate));
+  const auto tube = std::make_unique<Tube>();
+  const auto pieces = std::make_unique<Pieces>();
+  try {
+    const Zonotope initial_set = InitialSetOf(candidate);
+    certifier.Require(plan, initial_set, *basis.obstacles);
+    const Decision whole = certifier.Certify(plan, initial_set, *basis.obstacles, *tube);
+    const auto goes_on = [] { return true; };
+    const Decision in_pieces =
+        pieces->Certify(certifier, plan, initial_set, *basis.obstacles, whole, most, goes_on, *tube);
+    if (in_pieces.outcome != Outcome::kCertified) return {};
+  } catch (const std::invalid_argument&) {
+    return {};
+  }
+  return {pieces->cuts().begin(), pieces->cuts().end()};
+}
+
 // Hands on the certificates of a timeline, each when no decision on it is expected any more.
 class CertificateReader final : public TimelineUser {
  public:
@@ -109,6 +131,7 @@ class CertificateReader final : public TimelineUser {
     certificate.missing = WhyNotJudged(certified.plan, task);
     if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified.plan, recorded.basis);
+    certificate.certificate.cuts = CutsOf(certified.plan, recorded.basis, certifiers_);
     const int n = certified.plan.num_states;
     for (int t = 0; t <= certified.plan.num_steps; ++t) {
       verifier::RecordedSlice& slice = certificate.certificate.slices.emplace_back();
@@ -324,21 +347,24 @@ class CertificateReader final : public TimelineUser {
     const auto sentence = [&](int t, int part) {
       return ExplainCertificate(problem, {t, decision.obstacle, part, clearance}, certificate.certificate.obstacles);
     };
+    const auto& cuts = certificate.certificate.cuts;
+    const std::string how = cuts.empty() ? "" : CertifiedInPieces(static_cast<int>(cuts.size() + 1) / 2);
     const auto is = [&](const std::string& expected) {
       const auto fits = [&](const std::string& text) { return found == text.substr(0, sizeof decision.message - 1); };
-      return fits(expected) || fits(expected + kCapped);
+      return fits(expected + how) || fits(expected + kCapped + how);
     };
     for (int t = 0; t <= steps; ++t)
       for (int part = -1; part < static_cast<int>(problem.body.parts.size()); ++part)
         if (is(sentence(t, part))) return;
     certificate.Compare(kAltered + std::string("its decision's message"),
-                        sentence(0, -1) + (decision.obstacle < 0 ? "" : ", or another step"), found);
+                        sentence(0, -1) + how + (decision.obstacle < 0 ? "" : ", or another step"), found);
   }
 
   const std::vector<DecisionRow>* const rows_;
   const std::function<void(std::int64_t)>& on_bytes_;
   CertificateUser& user_;
   BesideCertificates beside_;
+  CaseCertifier certifiers_;
   std::deque<Open> open_;
   std::map<Digest, Decided> decided_;      // by plan
   std::deque<Digest> order_;               // of these plans

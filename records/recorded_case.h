@@ -9,7 +9,7 @@
 
 #include "certifier/gate/candidate_message.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certify/certifier.h"
+#include "forereach/certify/pieces.h"
 #include "forereach/numerics/parallel.h"
 #include "records/timeline.h"
 
@@ -54,6 +54,33 @@ struct JudgedCandidate {
   }
 };
 
+/** A certifier that knows what the one of a case knew. It learns from case to case, so give it them in order. */
+class CaseCertifier final {
+ public:
+  const Certifier& At(const Basis& basis) {
+    if (!certifier_ || task_ != basis.task || begin_ != basis.learned_begin || known_ > basis.learned_end) {
+      certifier_ = std::make_unique<Certifier>(basis.task->problem);
+      task_ = basis.task;
+      begin_ = known_ = basis.learned_begin;
+    }
+    for (; known_ < basis.learned_end; ++known_) {
+      const ExecutedTransition& transition = (*basis.learned)[known_];
+      static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
+    }
+    return *certifier_;
+  }
+
+ private:
+  std::unique_ptr<Certifier> certifier_;
+  const Config* task_ = nullptr;       // the certifier's
+  std::size_t begin_ = 0, known_ = 0;  // what it has learned
+};
+
+/** How many pieces of X_0 (forereach/certify/pieces.h) a decision may have taken: an abstention S is of the whole. */
+[[nodiscard]] inline int MostPieces(int outcome, const GateOptions& gate) {
+  return outcome == decision_t::ABSTAIN_SAFETY ? 1 : gate.max_pieces;
+}
+
 /** Certifies the candidates of cases again, each with what the certifier knew, on several threads. What is found does
 not depend on their number. In the order of the log each thread's certifier learns from case to case; another order is
 as good, and slower. */
@@ -82,7 +109,7 @@ class CaseJudge {
                       [&](std::size_t i, std::size_t thread) {
                         const auto& [judged, basis] = waiting_[i];
                         const Plan plan = PlanOf(judged.candidate, judged.schedule);
-                        const Certifier& certifier = followers_[thread].At(basis);
+                        const Certifier& certifier = followers_[thread].certifier.At(basis);
                         Zonotope initial_set;
                         try {
                           initial_set = InitialSetOf(judged.candidate);
@@ -92,7 +119,10 @@ class CaseJudge {
                           return;
                         }
                         Tube& tube = followers_[thread].tube;
-                        Look(judged, certifier, certifier.Certify(plan, initial_set, *basis.obstacles, tube), tube);
+                        Look(judged, certifier,
+                             CertifyInPieces(certifier, plan, initial_set, *basis.obstacles,
+                                             MostPieces(judged.outcome, basis.task->gate), tube),
+                             tube);
                       });
     for (std::size_t i = 0; i < waiting_.size(); ++i)
       refusals[i].empty() ? Take(waiting_[i].judged) : Refuse(waiting_[i].judged, refusals[i]);
@@ -108,25 +138,9 @@ class CaseJudge {
   /** The same, after the calls of Look for it and others. Take and Refuse are called in the order of Put. */
   virtual void Take(const JudgedCandidate& judged) = 0;
 
-  // A thread's certifier, as the one of the log was.
   struct Follower {
     Tube tube;
-    std::unique_ptr<Certifier> certifier;
-    const Config* task = nullptr;      // the certifier's
-    std::size_t begin = 0, known = 0;  // what it has learned
-
-    const Certifier& At(const Basis& basis) {
-      if (!certifier || task != basis.task || begin != basis.learned_begin || known > basis.learned_end) {
-        certifier = std::make_unique<Certifier>(basis.task->problem);
-        task = basis.task;
-        begin = known = basis.learned_begin;
-      }
-      for (; known < basis.learned_end; ++known) {
-        const ExecutedTransition& transition = (*basis.learned)[known];
-        static_cast<void>(certifier->Learn(transition.z, transition.next, transition.longer));
-      }
-      return *certifier;
-    }
+    CaseCertifier certifier;
   };
 
   struct Waiting {

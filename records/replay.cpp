@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "bus/bus_options.h"
+#include "certifier/gate/stamp.h"
 #include "forereach/advice_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
@@ -80,7 +81,7 @@ class Replayer final : public GateFollower {
       Show(recorded.event, "recorded", decision, ", which depends on the moment");
       return;
     }
-    const decision_t again = gate().Decide(bytes, decision.utime).decision;
+    const decision_t again = DecideAgain(bytes, decision);
     std::string difference = Difference(decision, again);
     if (!difference.empty() && recorded.basis.grounds.observations != GroundsOf(decision).observations)
       difference += "; transitions that had been learned are not in the log, which begins later or lacks messages";
@@ -134,6 +135,15 @@ class Replayer final : public GateFollower {
   void Pass(const RecordedDecision& recorded) {
     if (recorded.candidate && recorded.is_of_known_task)
       static_cast<void>(gate().Refuse(recorded.candidate->bytes, recorded.decision.utime, decision_t::CAUSE_FAULT, ""));
+  }
+
+  // How much time there was for pieces is not in the log. An abstention says that it was not enough.
+  [[nodiscard]] decision_t DecideAgain(Bytes bytes, const decision_t& recorded) {
+    if (recorded.outcome != decision_t::ABSTAIN_SAFETY || gate().options().max_pieces == 1)
+      return gate().Decide(bytes, recorded.utime).decision;
+    std::int64_t now = recorded.utime;
+    const std::int64_t late = recorded.utime + Microseconds(gate().options().decision_budget_ms) / 2 + 1;
+    return gate().Decide(bytes, [&] { return std::exchange(now, late); }).decision;
   }
 
   void CheckSeal(const RecordedPlan& recorded, const Upheld& upheld) {

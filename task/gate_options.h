@@ -26,6 +26,7 @@ struct GateOptions {
   double max_ahead_ms = 50;
   double certificate_lifetime_ms = 2000;
   double decision_budget_ms = 5;  ///< A candidate that starts sooner is answered ABSTAIN_DEADLINE.
+  int max_pieces = 1;             ///< Of X_0, where its tube is too wide (forereach/certify/pieces.h); 1: it is whole.
   int queue = 64;
   bool shadow = false;             ///< Decides, but sends no certified plan.
   bool advises = false;            ///< Says after an abstention what would have helped.

@@ -53,6 +53,9 @@ std::vector<Key> GateKeys() {
       gate.Number("decision_budget_ms", "ms", Between(0, kHourMs), &GateOptions::decision_budget_ms,
                   "For a decision and its transport to the robot. A candidate that starts sooner is answered "
                   "ABSTAIN_DEADLINE without being certified."),
+      gate.Integer("max_pieces", Between(1, 64), &GateOptions::max_pieces,
+                   "Above 1, an abstention S is tried again with X0 in pieces, at most so many, while less than half "
+                   "of decision_budget_ms is spent: a tube from a piece is narrower."),
       gate.Integer("queue", Between(1, 65536), &GateOptions::queue,
                    "Waiting candidates at most. Above it the oldest is rejected."),
       gate.Word<bool>("mode", {{"enforce", false}, {"shadow", true}}, &GateOptions::shadow,

@@ -58,7 +58,7 @@ std::vector<Real> Axis(int dim, int k, const Real& length) {
   return column;
 }
 
-Slice SliceOf(const InitialSet& set) {
+Slice WholeOf(const InitialSet& set) {
   Slice slice;
   if (set.lower.size() > 0) {
     const int n = static_cast<int>(set.lower.size());
@@ -73,6 +73,21 @@ Slice SliceOf(const InitialSet& set) {
   for (const auto column : set.generators.colwise()) slice.columns.emplace_back(column.begin(), column.end());
   std::erase_if(slice.columns, IsZeroColumn);
   return slice;
+}
+
+// What `set` says beside its `from` and `to`, then these.
+Slice PieceOf(const InitialSet& set) {
+  const Slice whole = WholeOf(set);
+  if (set.from.size() == 0) return whole;
+  Slice piece;
+  for (int k = 0; k < whole.dim(); ++k) {
+    const Real &c = whole.center[ToSize(k)], r = whole.HalfWidth(k), half(0.5);
+    const Real lower = max(c - r, Real(set.from[k])), upper = max(lower, min(c + r, Real(set.to[k])));
+    piece.center.push_back(half * (lower + upper));
+    if (const Real width = half * (upper - lower); !width.IsZero())
+      piece.columns.push_back(Axis(whole.dim(), k, width));
+  }
+  return piece;
 }
 
 // A certifier writes what it adds for rounding behind all else: tiny columns along the axes, one each at most, in
@@ -666,7 +681,7 @@ double TubeMaker::RemainderRounding() const {
 
 Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const {
   Tube tube;
-  tube.slices.push_back(SliceOf(initial_set));
+  tube.slices.push_back(PieceOf(initial_set));
   Affine affine{problem_.declaration.affine.columns, {}};
   tube.failure = MakeAffine(options.known, affine);
   for (int t = 0, steps = static_cast<int>(controls.cols()); t < steps && !tube.failure; ++t) {

@@ -55,6 +55,7 @@ struct InitialSet {
   Eigen::VectorXd lower, upper;  ///< If these have entries: the box [lower, upper].
   Eigen::VectorXd center;        ///< Otherwise: the zonotope <center, generators>.
   Eigen::MatrixXd generators;
+  Eigen::VectorXd from, to;  ///< If these have entries: a box around the part of its hull that is within.
 };
 
 struct Bounds {

@@ -68,6 +68,32 @@ const char* FindMisfit(const Schedule& schedule, const std::vector<Obstacle>& ob
   return moves && step < 1 ? "there is a schedule, since an obstacle moves" : nullptr;
 }
 
+// The pieces that the cuts leave of the initial set; none if they are no tree of closed parts.
+std::vector<InitialSet> PiecesOf(const Certificate& certificate, int n) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  InitialSet whole = certificate.initial_set;
+  if (certificate.cuts.empty()) return {whole};
+  whole.from = Eigen::VectorXd::Constant(n, -kInfinity);
+  whole.to = Eigen::VectorXd::Constant(n, kInfinity);
+  std::vector<InitialSet> parts{whole}, pieces;
+  for (const auto& [state, at] : certificate.cuts) {
+    if (parts.empty()) return {};
+    InitialSet lower = parts.back();
+    parts.pop_back();
+    if (state < 0) {
+      pieces.push_back(std::move(lower));
+      continue;
+    }
+    if (state >= n || !(lower.from[state] <= at && at <= lower.to[state])) return {};
+    InitialSet upper = lower;
+    lower.to[state] = upper.from[state] = at;
+    parts.push_back(std::move(upper));
+    parts.push_back(std::move(lower));
+  }
+  if (!parts.empty()) pieces.clear();
+  return pieces;
+}
+
 // What does not fit before anything is derived.
 std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& certificate) {
   const auto misfit = [](const std::string& what) { return Failure{-1, what, "", ""}; };
@@ -160,6 +186,17 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
     return {Status::kCannotVerify,
             {-1, "cannot verify: a limit, place or disturbance is no expression" + reason_, "", ""}};
   if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
+  const std::vector<InitialSet> pieces = PiecesOf(certificate, problem_->model->num_states());
+  if (pieces.empty()) return {Status::kRefuted, {-1, "the pieces of the initial set cover it", "", ""}};
+  Certificate piece = certificate;
+  for (const InitialSet& set : pieces) {
+    piece.initial_set = set;
+    if (Verdict verdict = VerifyWhole(piece); verdict.status != Status::kConfirmed) return verdict;
+  }
+  return {Status::kConfirmed, {}};
+}
+
+Verdict Verifier::VerifyWhole(const Certificate& certificate) const {
   std::optional<Failure> failure;
   for (const int bits : kBits) {
     const Precision precision(bits);

@@ -14,6 +14,7 @@ Refuted: one of these is false. */
 
 #include <Eigen/Core>
 
+#include "forereach/certify/piece_cut.h"
 #include "forereach/certify/problem.h"
 #include "verifier/answer.h"
 #include "verifier/equations.h"
@@ -50,6 +51,9 @@ struct Certificate {
   step `first_step`, nor that the plan ends at rest. */
   bool is_remainder = false;
   int first_step = 0;
+  /** The pieces of initial_set, as the certifier cut them; none: it is whole. The claims then are those of the tubes
+  from all pieces together. That these cover the set is the verifier's to see. */
+  std::vector<PieceCut> cuts;
 };
 
 enum class Status { kConfirmed, kRefuted, kCannotVerify };
@@ -78,6 +82,7 @@ class Verifier final {
   [[nodiscard]] Tube Derive(const Certificate& certificate) const;
 
  private:
+  [[nodiscard]] Verdict VerifyWhole(const Certificate& certificate) const;
   [[nodiscard]] std::optional<Failure> Check(const TubeMaker& maker, const Certificate& certificate) const;
   [[nodiscard]] const TubeMaker& MakerOf(int bits) const;
 

@@ -51,7 +51,8 @@ Gate::Gate(const Config& config)
       grounds_(config.grounds),
       transitions_(config.grounds.observations),
       obstacles_(config),
-      sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)) {}
+      sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)),
+      pieces_(config.gate.max_pieces > 1 ? std::make_unique<Pieces>() : nullptr) {}
 
 void Gate::Inherit(const Gate& before) {
   obstacles_.Inherit(before.obstacles_);
@@ -152,7 +153,7 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
       SetText(decision.message,
               (rejection->outcome == decision_t::REJECTED ? "rejected: " : "abstained: ") + rejection->why);
     } else {
-      Certify(candidate, initial_set, answer);
+      Certify(candidate, initial_set, clock, answer);
       DropIfLate(answer, clock());
     }
   } catch (const std::exception& error) {
@@ -264,12 +265,28 @@ std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candi
                    decision_t::ABSTAIN_DEADLINE};
 }
 
-void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer) {
+void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, const TimeSource& clock,
+                   GateAnswer& answer) {
   const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
   certifier_.Require(plan, initial_set, obstacles_.indexed());
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
-
+  Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
   decision_t& decision = answer.decision;
+  std::string how;
+  if (pieces_ && verdict.outcome == Outcome::kSafety) {
+    const std::int64_t deadline = decision.utime + Microseconds(options_.decision_budget_ms) / 2;
+    std::int64_t last = decision.utime, longest = 0;
+    const auto goes_on = [&] {
+      const std::int64_t now = clock();
+      longest = std::max(longest, now - std::exchange(last, now));
+      return now + longest <= deadline;
+    };
+    const Decision in_pieces = pieces_->Certify(certifier_, plan, initial_set, obstacles_.indexed(), verdict,
+                                                options_.max_pieces, goes_on, tube_);
+    const bool is_certified = in_pieces.outcome == Outcome::kCertified;
+    how = is_certified ? CertifiedInPieces(pieces_->count()) : AlsoInPieces(pieces_->trials());
+    if (is_certified) verdict = in_pieces;
+  }
+
   decision.outcome = static_cast<std::int16_t>(verdict.outcome);
   decision.cause = static_cast<std::int16_t>(verdict.cause);
   decision.step = static_cast<std::int16_t>(verdict.step);
@@ -279,7 +296,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   decision.second_observation = verdict.second_observation;
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
-  const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, tube_);
+  const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, tube_) + how;
   SetText(decision.message, sentence);
   if (verdict.outcome != Outcome::kCertified) return;
   if (!options_.shadow) return Attest(candidate, decision, answer.certified.emplace());
@@ -296,7 +313,13 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.indexed());
-    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), tube_, first_step);
+    const Standing whole =
+        forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), tube_, first_step);
+    if (!pieces_ || whole.verdict.outcome != Outcome::kSafety) return whole;
+    const Decision in_pieces = pieces_->Certify(
+        certifier_, plan, initial_set, obstacles_.indexed(), whole.verdict, options_.max_pieces, [] { return true; },
+        tube_, first_step);
+    return in_pieces.outcome == Outcome::kCertified ? Standing{plan.num_steps, in_pieces} : whole;
   } catch (const std::exception&) {
     return {};
   }

@@ -9,6 +9,7 @@ not, the caller calls Refuse. */
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ not, the caller calls Refuse. */
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/pieces.h"
 #include "forereach/certify/standing.h"
 #include "forereach/certify/way_clear.h"
 #include "forereach/decision_t.hpp"
@@ -56,21 +58,25 @@ class Gate final {
   [[nodiscard]] std::string WhyObstaclesUnknown(std::int64_t now_us) const { return obstacles_.WhyUnknown(now_us); }
   /** Stamp and arrival of the obstacles in force; nothing if none were received. */
   [[nodiscard]] const std::optional<Arrival>& obstacles_arrival() const { return obstacles_.arrival(); }
-  /** The tube of the last plan that reached the certifier. */
+  /** The tube of the last plan that reached the certifier; boxes around its slices, if it was certified in pieces. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
   /** Decides on one candidate, or on one of a batch (lcmtypes/candidate_batch.h): the first that is certified by half
   of gate.decision_budget_ms, otherwise candidate 0. It is then decided on as if it was sent alone; the message says
   which one of how many it is and, if none is certified, counts the causes. A batch with a candidate that is refused for
   its sizes or numbers, or whose plan_id was used, is answered by the refusal of the first such candidate. Never throws:
-  an exception becomes a rejection. The caller sets elapsed_us; all other fields of both messages are complete. Reads
-  the clock twice, of a batch more often. The first reading is the decision's utime. By the second, a certificate that
-  took longer than gate.decision_budget_ms is dropped. */
+  an exception becomes a rejection. The caller sets elapsed_us; all other fields of both messages are complete. With
+  gate.max_pieces, what gets S is tried again in pieces of X_0 (certify/pieces.h); no call of Certify begins that, if
+  it takes as long as the longest so far, ends after half of gate.decision_budget_ms. The message says what it took.
+  Reads the clock twice, of a batch and for pieces more often. The first reading is the decision's utime. By the last, a
+  certificate that took longer than gate.decision_budget_ms is dropped. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, const TimeSource& clock) noexcept;
-  /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
+  /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time: all pieces are
+  tried. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** JudgeAgain (standing.h) under what is in force now. Outcome kNone: the plan cannot be judged under this task.
+  /** JudgeAgain (standing.h) under what is in force now; what gets S is tried again in pieces, however long that takes,
+  and stands whole if these are certified. Outcome kNone: the plan cannot be judged under this task.
   @param plan a candidate that this gate or one before a reload has certified. @param upheld what its certified plan
   says that the guard upholds; if less than this task's certificates rest on, the plan cannot be judged.
   @param first_step 0..num_steps. */
@@ -159,7 +165,8 @@ class Gate final {
   [[nodiscard]] std::optional<Rejection> CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const;
   [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate, std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const;
-  void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);
+  void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, const TimeSource& clock,
+               GateAnswer& answer);
   void DropIfLate(GateAnswer& answer, std::int64_t now_us) const;
   /** Sets all fields of a message of zeros, and its seal. */
   void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
@@ -176,6 +183,7 @@ class Gate final {
   std::int64_t decisions_ = 0, certificates_ = 0;
   certifier_status_t counts_{};
   Tube tube_;
+  std::unique_ptr<Pieces> pieces_;  ///< With gate.max_pieces above 1.
 };
 
 }  // namespace forereach

@@ -149,6 +149,9 @@ std::string ExplainCertificate(const Problem& problem, const ClosestApproach& cl
          NameOf(obstacles, closest.obstacle) + limits;
 }
 
+std::string CertifiedInPieces(int pieces) { return "; X0 in " + std::to_string(pieces) + " pieces"; }
+std::string AlsoInPieces(int trials) { return "; so after " + std::to_string(trials) + " trials with X0 in pieces"; }
+
 const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }
 
 std::string Explain(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles) {

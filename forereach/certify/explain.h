@@ -40,6 +40,11 @@ the limits hold at the sample instants, if there are any. */
 /** "all_times" or "samples": when a decision of the problem holds. */
 [[nodiscard]] const char* HoldsName(const Problem& problem);
 
+/** Appended to the sentence where an abstention S was tried again in pieces (pieces.h): how many were certified or, of
+one that stays, how many calls of Certify were made. */
+[[nodiscard]] std::string CertifiedInPieces(int pieces);
+[[nodiscard]] std::string AlsoInPieces(int trials);
+
 /** Appended to the sentence if Decision::capped. */
 inline constexpr const char* kCapped = "; a search met max_leaf_visits";
 

@@ -36,6 +36,7 @@ class Tube final {
 
  private:
   friend class Certifier;
+  friend class Pieces;
   friend class SafetyTest;
   std::vector<Zonotope> slices_;
   std::vector<StepRecord> steps_;

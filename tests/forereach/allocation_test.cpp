@@ -6,7 +6,9 @@
 
 #include "forereach/certify/batch.h"
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/pieces.h"
 #include "forereach/safety/obstacle_index.h"
+#include "tests/gap.h"
 #include "tests/sanitized.h"
 #include "tests/worlds.h"
 
@@ -75,6 +77,20 @@ struct Allocation : testing::Test {
   Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(2, 12);
   Tube tube_;
 };
+
+TEST_F(Allocation, CertifyingInPiecesAllocatesNothing) {
+  const Plan plan{controls_.data(), 2, 12, 2};
+  const Zonotope start = Zonotope::FromBox(Vec({0, 0, 0, 10, 0, 0.1}), Vec({0.1, 0.1, 0.02, 0.4, 0.02, 0.02}));
+  const Obstacle obstacle = JustTouched(*certifier_, plan, start);
+  const ObstacleView view(std::span(&obstacle, 1));
+  const Decision whole = certifier_->Certify(plan, start, view, tube_);
+  Pieces pieces;
+  const std::function<bool()> goes_on = [] { return true; };
+  const long before = allocations;
+  const Decision decision = pieces.Certify(*certifier_, plan, start, view, whole, Pieces::kMost, goes_on, tube_);
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(decision.outcome, Outcome::kCertified);
+}
 
 TEST_F(Allocation, TheCounterSeesAllocations) {
   const long before = allocations;

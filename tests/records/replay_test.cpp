@@ -7,6 +7,7 @@
 #include "lcmtypes/seal.h"
 #include "records/record_reader.h"
 #include "records/result_json.h"
+#include "tests/certifier/gap_task.h"
 #include "tests/certifier/small_task.h"
 #include "tests/cli/program.h"
 #include "tests/records/course.h"
@@ -95,6 +96,22 @@ class ReplayTest : public testing::Test {
   const ScratchDirectory scratch_;
   int logs_ = 0;
 };
+
+TEST_F(ReplayTest, WhatThereWasTimeForIsDecidedAgain) {
+  const ScratchDirectory scratch;
+  const Config config = GapTask(scratch);
+  const std::string path = NewLog();
+  EventLogWriter log(path);
+  LoggedGate logged{config, log};
+  logged.Decide(GapCandidate(config, 1, kNow), decision_t::CERTIFIED);
+  std::int64_t now = kNow - 700;  // time for two trials
+  const candidate_plan_t late = GapCandidate(config, 2, kNow);
+  const decision_t decision = logged.gate.Decide(Encode(late), [&] { return now += 700; }).decision;
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_OBSTACLE);
+  logged.Log(late, decision);
+  ASSERT_TRUE(log.Flush());
+  ExpectAgreed(path, config, 2);
+}
 
 TEST_F(ReplayTest, TheDecisionOnABatchIsThatOnItsCandidateAlone) {
   const std::string path = NewLog();

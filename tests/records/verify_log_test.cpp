@@ -9,12 +9,14 @@
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/text.h"
 #include "lcmtypes/seal.h"
+#include "tests/certifier/gap_task.h"
 #include "tests/cli/program.h"
 #include "tests/messages.h"
 #include "tests/records/certificates.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
+#include "tests/verifier/is_confirmed.h"
 
 namespace forereach::verify_log_test {
 
@@ -169,6 +171,51 @@ TEST(VerifyLog, DamageIsNoticed) {
   log.close();
   EXPECT_TRUE(std::ranges::any_of(ReadCertificates(scratch / "damaged.lcmlog", kCourseTask).certificates,
                                   [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
+}
+
+// ---- A plan that was certified in pieces of X0.
+
+TEST(VerifyLog, APlanThatWasCertifiedInPiecesIsConfirmedInThese) {
+  const ScratchDirectory scratch;
+  const Config task = GapTask(scratch);
+  const auto bytes = Encode(GapCandidate(task, 1, kStart));
+  GateAnswer answer = Gate(task).Decide(bytes, kStart);
+  ASSERT_TRUE(answer.certified);
+  const auto recorded = [&](const std::string& message) {
+    std::filesystem::remove(scratch / "log.lcmlog");
+    EventLogWriter writer(scratch / "log.lcmlog");
+    writer.Append(kStart, task.bus.candidate, bytes);
+    SetText(answer.decision.message, message);
+    writer.Append(kStart + 1, task.bus.decision, Encode(answer.decision));
+    writer.Append(kStart + 2, task.bus.certified, Encode(*answer.certified));
+    EXPECT_TRUE(writer.Flush());
+    return ReadCertificates(scratch / "log.lcmlog", scratch / "gap.yaml");
+  };
+  const std::string message = GetText(answer.decision.message), pieces = message.substr(message.rfind(';'));
+  const CertificateFile honest = recorded(message);
+  ASSERT_EQ(honest.certificates.size(), 1u);
+  EXPECT_TRUE(honest.certificates[0].mismatches.empty());
+  EXPECT_TRUE(IsConfirmed(Judge(honest, 0)));
+  ExpectMismatch(recorded(Replaced(message, pieces, "")), HasSubstr("message"));
+  ExpectMismatch(recorded(Replaced(message, pieces, "; X0 in 1 pieces")), HasSubstr("message"));
+
+  verifier::Certificate certificate = honest.certificates[0].certificate;
+  const auto judge = [&](const std::function<void(std::vector<PieceCut>&)>& change) {
+    verifier::Certificate changed = certificate;
+    change(changed.cuts);
+    return verifier::Verifier(task.problem, verifier::MethodOf(*task.problem)).Verify(changed);
+  };
+  EXPECT_TRUE(IsConfirmed(judge([](auto&) {})));
+  EXPECT_EQ(judge([](auto& cuts) { cuts.clear(); }).status, Status::kRefuted) << "the whole may touch";
+  for (const auto& change : std::vector<std::function<void(std::vector<PieceCut>&)>>{
+           [](auto& cuts) { cuts.pop_back(); }, [](auto& cuts) { cuts.push_back({}); },
+           [](auto& cuts) { cuts[0].state = 6; }, [](auto& cuts) { cuts[0].at = std::nan(""); },
+           [](auto& cuts) { cuts.insert(cuts.begin(), PieceCut{}); }}) {
+    const Verdict verdict = judge(change);
+    EXPECT_EQ(verdict.status, Status::kRefuted);
+    EXPECT_EQ(verdict.failure.what, "the pieces of the initial set cover it");
+  }
+  EXPECT_EQ(judge([](auto& cuts) { cuts = {{3, 1e9}, {}, {}}; }).status, Status::kRefuted) << "one has all of it";
 }
 
 // ---- Obstacles that come by the bus.
