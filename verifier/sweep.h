@@ -6,8 +6,8 @@ theta = c_h and r the half-width of the slice in h, every direction d has an ang
 
     d . g_q(x) = d . (P c + R(theta) q) + d . (P + R'(theta) q e_h^T) D b - 1/2 (D b)_h^2 d . R(xi) q,
 
-by Taylor's theorem for d . R(.) q, whose second derivative is its negative. (D b)_h^2 lies in [0, r^2]. And always
-|g_q(x) - P x| <= |q|, which is tighter where r is large.
+by Taylor's theorem for d . R(.) q, whose second derivative is its negative. (D b)_h^2 lies in [0, r^2]. Where r is
+large, these are tighter: always |g_q(x) - P x| <= |q|, and |g_q(x) - P x - R(theta) q| <= |q| r.
 
 A point at expressions is at g(c) + Dg(c) D b, each coordinate within its bend (functions.h). A coordinate without a
 finite bend is anywhere in its range over the slice's hull. */
@@ -125,8 +125,9 @@ class Sweep final {
 /** Sets each of which contains all that `part` of the body sweeps: over the slice `first` or, with `last`, from one
 sample to the next, where Problem::between widens the hull by [-e, e], e_k = acceleration_k period^2 / 8, and the place
 of q by a ball of |q| (turn_rate^2 + turn_acceleration) period^2 / 8. One set is by Taylor's theorem. A part that turns
-has another before it, of P X and a ball of the largest |q|. None if an expression has no finite bound. @param places
-the expressions of a part that stands at some, one point after the other. @pre a Certifier accepts the problem. */
+has two others, before it of P X and a ball of the largest |q|, after it of P X + R(theta) q and balls of |q| r. None if
+an expression has no finite bound. @param places the expressions of a part that stands at some, one point after the
+other. @pre a Certifier accepts the problem. */
 [[nodiscard]] std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Frame& first,
                                           const Frame* last, const Functions* places = nullptr);
 
