@@ -1,10 +1,7 @@
 #include "advise/abstentions.h"
 
 #include <algorithm>
-#include <iterator>
-#include <map>
 #include <stdexcept>
-#include <tuple>
 
 #include <nlohmann/json.hpp>
 
@@ -29,7 +26,6 @@ void Fill(const RecordedCase& recorded, RecordedAbstention& abstention) try {
   judged.controls.resize(plan.num_inputs, plan.num_steps);
   for (int t = 0; t < plan.num_steps; ++t)
     judged.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.input(t).data(), plan.num_inputs);
-  judged.obstacles = *recorded.basis.obstacles;
   judged.progress_steps = recorded.candidate->progress_steps;
 } catch (const std::invalid_argument& error) {
   abstention.missing = std::string("its initial set: ") + error.what();
@@ -55,12 +51,15 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
   const decision_t& decision = recorded.decision;
   const std::size_t waiting = recorded.candidate && waiting_ > 0 ? waiting_-- : 0;
   if (decision.outcome == decision_t::CERTIFIED) {
-    ++certified_;
+    ++read_.certified;
     return;
   }
-  if (all_.size() == most_) all_.pop_front(), bases_.pop_front();
-  RecordedAbstention& abstention = all_.emplace_back();
-  bases_.push_back(recorded.basis);
+  if (read_.all.size() == most_) {
+    read_.all.pop_front();
+    ++read_.left_out;
+  }
+  RecordedAbstention& abstention = read_.all.emplace_back();
+  abstention.basis = recorded.basis;
   abstention.event = recorded.event;
   abstention.name = recorded.event + ", plan " + std::to_string(decision.plan_id) + " of " + GetText(decision.source);
   abstention.message = GetText(decision.message);
@@ -81,31 +80,17 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
   if (abstention.missing.empty()) Fill(judged, abstention);
 }
 
-std::vector<std::int64_t> AbstentionReader::Times() const {
-  std::vector<std::int64_t> times;
-  for (const RecordedAbstention& each : all_) times.push_back(each.decision.utime);
-  return times;
-}
-
-void AbstentionReader::KeepFrom(std::int64_t utime) {
-  for (std::size_t i = all_.size(); i-- > 0;)
-    if (all_[i].decision.utime < utime) {
-      all_.erase(all_.begin() + static_cast<std::ptrdiff_t>(i));
-      bases_.erase(bases_.begin() + static_cast<std::ptrdiff_t>(i));
-    }
-}
-
 Abstentions AbstentionReader::Finish(std::vector<std::shared_ptr<const Config>> tasks) {
-  std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    const Basis& basis = bases_[i];
-    if (all_[i].judged.controls.size() == 0) continue;
-    auto& problem = problems[{basis.task, basis.learned_begin, basis.learned_end}];
-    if (!problem) problem = basis.problem();
-    all_[i].judged.problem = problem;
-  }
-  return {
-      std::move(tasks), {std::make_move_iterator(all_.begin()), std::make_move_iterator(all_.end())}, certified_, {}};
+  read_.tasks = std::move(tasks);
+  return std::move(read_);
+}
+
+Case RecordedAbstention::Judged() const {
+  Case made = judged;
+  if (!basis.task) return made;
+  made.problem = basis.problem();
+  made.obstacles = *basis.obstacles;
+  return made;
 }
 
 Abstentions AbstentionOf(const std::string& path, const std::string& config_path) try {
@@ -143,11 +128,11 @@ Abstentions AbstentionOf(const std::string& path, const std::string& config_path
   throw ConfigError(path + ": it " + DescribeJsonError(error));
 }
 
-Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files) {
+Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files, std::size_t most) {
   LogTasks of_run = tasks.Of(run.logs);
   if (!of_run.has_decisions() && tasks.is_many()) return {};
   of_run.RequirePlans();
-  AbstentionReader reader;
+  AbstentionReader reader(most);
   Timeline timeline(of_run, {&reader});
   timeline.Read(run.logs, names_files);
   Abstentions read = reader.Finish(of_run.found());

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -26,8 +25,10 @@ struct RecordedAbstention {
   std::string message;                  ///< The recorded sentence.
   std::int16_t outcome = 0, cause = 0;  ///< As in decision_t.
   const Config* task = nullptr;
-  /** What it was judged by. No problem: it was answered without a judgement. */
+  /** What it was judged by; without controls it was answered without a judgement. Of one of a log, Judged() has
+  problem and obstacles, which are made of `basis` when they are needed. */
   Case judged;
+  Basis basis;
   std::string missing;  ///< Why it cannot be judged again; empty if it can, or was never judged.
   /** How many candidates of the log waited when it was answered, with itself. */
   std::size_t waiting = 0;
@@ -35,12 +36,17 @@ struct RecordedAbstention {
   std::shared_ptr<const std::pair<std::vector<std::uint8_t>, std::int64_t>> last_obstacles;
   decision_t decision{};         ///< Zeros if it was read from a decision's document.
   candidate_plan_t candidate{};  ///< Zeros likewise.
+
+  [[nodiscard]] bool was_judged() const { return judged.controls.size() > 0; }
+  /** @pre was_judged(). Cost: a copy of the problem, if something was learned. */
+  [[nodiscard]] Case Judged() const;
 };
 
 /** Those of one run. */
 struct Abstentions {
   std::vector<std::shared_ptr<const Config>> tasks;
-  std::vector<RecordedAbstention> all;  ///< Abstentions and rejections, in the order of the log.
+  std::deque<RecordedAbstention> all;   ///< Abstentions and rejections, in the order of the log.
+  std::int64_t left_out = 0;            ///< So many before them.
   std::int64_t certified = 0;
   PassedOver passed_over{};
 };
@@ -53,7 +59,7 @@ struct Abstentions {
 /** Collects the last `most` of a timeline. */
 class AbstentionReader final : public TimelineUser {
  public:
-  explicit AbstentionReader(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_(most) {}
+  explicit AbstentionReader(std::size_t most) : most_(most) {}
 
   void OnEvent(const LogEvent& event) override;
   void OnStart(const Config& task) override;
@@ -62,24 +68,20 @@ class AbstentionReader final : public TimelineUser {
   /** @param tasks those of the timeline. The result has nothing of what was passed over. */
   [[nodiscard]] Abstentions Finish(std::vector<std::shared_ptr<const Config>> tasks);
 
-  /** When they were decided. */
-  [[nodiscard]] std::vector<std::int64_t> Times() const;
-  /** Forgets those that were decided before. */
-  void KeepFrom(std::int64_t utime);
+  /** Those so far. */
+  [[nodiscard]] std::deque<RecordedAbstention>& all() { return read_.all; }
 
  private:
   const std::size_t most_;
   BusOptions channels_;
   std::size_t waiting_ = 0;
   std::shared_ptr<const std::pair<std::vector<std::uint8_t>, std::int64_t>> last_obstacles_;
-  std::deque<RecordedAbstention> all_;
-  std::deque<Basis> bases_;  // of each
-  std::int64_t certified_ = 0;
+  Abstentions read_;
 };
 
-/** Those of a run's logs.
+/** The last `most` of a run's logs.
 @param names_files whether events are named with their log.
 @throws BadInput for logs that cannot be read, or without their task. */
-[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files);
+[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files, std::size_t most);
 
 }  // namespace forereach

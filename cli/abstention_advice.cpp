@@ -38,11 +38,12 @@ namespace {
 
 AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
   if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
-  if (!abstention.judged.problem) return {{}, RemedyFor(abstention), {}};
+  if (!abstention.was_judged()) return {{}, RemedyFor(abstention), {}};
   try {
-    const Certifier certifier(abstention.judged.problem);
-    const Case& judged = abstention.judged;
+    const Case judged = abstention.Judged();
+    const Certifier certifier(judged.problem);
     AbstentionAdvice advice{Advise(judged, certifier, {.tails = tails}), {}, {}};
+    for (Advice& each : advice.advices) each.after.clear();  // each has a problem of its own
     Tube tube;
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)

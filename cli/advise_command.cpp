@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "cli/abstention_advice.h"
@@ -28,6 +29,8 @@ struct AdviseArguments {
   std::optional<double> seconds;
 };
 
+constexpr std::size_t kMostExamined = 3000;  // of a run
+
 // Of one decision, or of runs: their logs, abstentions and advice.
 struct Advised {
   NamedRuns named;
@@ -46,7 +49,7 @@ struct Advised {
 std::vector<std::pair<std::string, int>> PlacesOf(const Advised& all) {
   struct OfTask {
     const Config* task;
-    std::vector<Case> cases;
+    std::vector<const RecordedAbstention*> abstentions;
     std::vector<Eigen::VectorXd> places;
   };
   std::vector<OfTask> tasks;
@@ -55,14 +58,20 @@ std::vector<std::pair<std::string, int>> PlacesOf(const Advised& all) {
     auto of_task =
         std::ranges::find_if(tasks, [&](const OfTask& each) { return each.task->grounds == abstention.task->grounds; });
     if (of_task == tasks.end()) of_task = tasks.insert(tasks.end(), OfTask{abstention.task, {}, {}});
-    of_task->cases.push_back(abstention.judged);
+    of_task->abstentions.push_back(&abstention);
     for (const Advice& each : advice.advices)
       if (each.change == Change::kObservation) of_task->places.push_back(each.place);
   });
   std::vector<std::pair<std::string, int>> lines;
-  for (auto& [task, cases, places] : tasks) {
-    if (places.empty() || cases.size() < 2) continue;
-    for (Case& each : cases) each.problem = cases.back().problem;
+  for (const auto& [task, abstentions, places] : tasks) {
+    if (places.empty() || abstentions.size() < 2) continue;
+    const auto problem = abstentions.back()->Judged().problem;
+    std::vector<Case> cases;
+    for (const RecordedAbstention* each : abstentions) {
+      cases.push_back(each->judged);
+      cases.back().problem = problem;
+      if (each->basis.obstacles) cases.back().obstacles = *each->basis.obstacles;
+    }
     for (const Place& place : RankPlaces(cases, places)) {
       if (place.turned == 0) break;
       lines.emplace_back(DescribePlace(*task->problem, place.z), place.turned);
@@ -151,12 +160,17 @@ Advised AdviseRuns(const AdviseArguments& options) {
   const RunTasks tasks(options.config, options.key, named.is_many);
   auto read = ForEachRun<Abstentions>(named, options.jobs, "read", [&](const RunLogs& run, RunWork&) {
     if (run.logs.empty()) return Abstentions{};
-    Abstentions of_run = ReadAbstentions(run, tasks, named.is_many || run.logs.size() > 1);
+    Abstentions of_run = ReadAbstentions(run, tasks, named.is_many || run.logs.size() > 1, kMostExamined);
     for (RecordedAbstention& each : of_run.all)
       if (named.is_many) each.name = run.robot + ": " + each.name;
     return of_run;
   });
   for (auto& of_run : read) all.runs.push_back(of_run ? std::move(*of_run) : Abstentions{});
+  std::int64_t count = 0, left_out = 0;
+  for (const Abstentions& run : all.runs) count += std::ssize(run.all), left_out += run.left_out;
+  if (left_out > 0)
+    named.missing.push_back(fmt::format("of {} abstentions and rejections the last {} of each run are examined",
+                                        count + left_out, kMostExamined));
   if (std::ranges::all_of(all.runs, [](const Abstentions& run) { return run.tasks.empty(); }))
     throw ConfigError(options.files[0] + ": " + (named.missing.empty() ? "no decisions" : named.missing[0]));
   all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity));

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -43,12 +42,14 @@ void KeepLast(const std::vector<std::unique_ptr<PageRead>>& read, const PageBoun
   std::vector<std::int64_t> times;
   for (const auto& each : read) {
     passes.push_back(each.get());
-    if (each) std::ranges::copy(each->abstentions.Times(), std::back_inserter(times));
+    if (each)
+      for (const RecordedAbstention& abstention : each->abstentions.all()) times.push_back(abstention.decision.utime);
   }
   KeepLast(passes, bounds);
   const std::int64_t begin = BeginOfLast(std::move(times), kMostAdvised);
   for (const auto& each : read)
-    if (each) each->abstentions.KeepFrom(begin);
+    if (each)
+      std::erase_if(each->abstentions.all(), [&](const auto& abstention) { return abstention.decision.utime < begin; });
 }
 
 // The advice on the last decisions that are no certificates. Without a log or its task, there is none.

@@ -137,24 +137,30 @@ class Verifying final : public CertificateUser {
   struct Known {
     std::shared_ptr<const Problem> problem;
     std::unique_ptr<verifier::Verifier> verifier;
-    std::shared_ptr<const std::vector<ExecutedTransition>> learned;  // for what waits; null: nothing does
+    decltype(Basis::learned) learned;  // since the last start or reload
+    bool is_waited_for = false;
   };
 
   verifier::Verifier& VerifierOf(const Basis& basis) {
     Known& known = known_[basis.task->problem.get()];
+    if (known.learned && known.learned != basis.learned && !known.learned->empty()) {
+      VerifyWaiting();
+      known.verifier.reset();  // it forgets what was learned before
+    }
     if (!known.verifier) {
       RequireAcceptable(*basis.task);
       known.problem = basis.task->problem;
       known.verifier = std::make_unique<verifier::Verifier>(known.problem, verifier::MethodOf(*known.problem));
     }
     known.learned = basis.learned;
+    known.is_waited_for = known.learned != nullptr;  // a document has nothing learned
     return *known.verifier;
   }
 
   void VerifyWaiting() {
     for (auto& [of, known] : known_)
-      if (const auto learned = std::exchange(known.learned, nullptr))
-        known.verifier->Learn(WithLearned(known.problem, *learned)->transitions);
+      if (std::exchange(known.is_waited_for, false))
+        known.verifier->Learn(WithLearned(known.problem, *known.learned)->transitions);
     ForEachInParallel(waiting_.size(), threads_, [&](std::size_t i, std::size_t) {
       auto& [recorded, number, verifier, verdict] = waiting_[i];
       verdict = verifier ? verifier->Verify(recorded.certificate)

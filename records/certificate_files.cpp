@@ -48,7 +48,7 @@ BesideCertificates FromDecision(const std::string& path, const nlohmann::json& d
 
 verifier::KnownRows KnownRowsOf(const Basis& basis) {
   const int base = basis.task->problem->transitions.size();
-  return {base, base + static_cast<int>(basis.learned_begin), base + static_cast<int>(basis.learned_end)};
+  return {base, base, base + static_cast<int>(basis.num_learned)};
 }
 
 RecordedCertificate Missing(std::string name, std::string why) { return {std::move(name), {}, std::move(why), {}}; }
@@ -92,10 +92,10 @@ std::vector<PieceCut> CutsOf(const candidate_plan_t& candidate, const Basis& bas
 // Hands on the certificates of a timeline, each when no decision on it is expected any more.
 class CertificateReader final : public TimelineUser {
  public:
-  // @param rows of a database, or null.
-  CertificateReader(const std::vector<DecisionRow>* rows, const std::function<void(std::int64_t)>& on_bytes,
+  // @param has_rows whether CheckRows is called with those of a database.
+  CertificateReader(bool has_rows, const std::function<void(std::int64_t)>& on_bytes,
                     CertificateUser& user)
-      : rows_(rows), on_bytes_(on_bytes), user_(user) {}
+      : has_rows_(has_rows), on_bytes_(on_bytes), user_(user) {}
 
   void OnEvent(const LogEvent& event) override {
     if (on_bytes_) on_bytes_(RecordBytes(event));
@@ -111,7 +111,7 @@ class CertificateReader final : public TimelineUser {
       // A candidate that comes twice is rejected the second time: the certificate is the first's.
       if (decided.certified.size() == kMostDecisions) decided.certified.pop_front();
       decided.certified.push_back(decision);
-      if (rows_) in_log_.insert_or_assign(ToHex(plan), GroundsOf(decision));
+      if (has_rows_) in_log_.insert_or_assign(ToHex(plan), GroundsOf(decision));
       for (Open& open : open_)
         if (open.plan == plan) {
           decided.has_plan = true;
@@ -191,10 +191,35 @@ class CertificateReader final : public TimelineUser {
     CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(withdrawal));
   }
 
-  BesideCertificates Finish(const Timeline& timeline, const std::string& log) {
+  void End() {
     while (!open_.empty()) HandOn();
     while (!order_.empty()) Forget();
-    if (rows_) CheckRows(*rows_);
+  }
+
+  // The rows of a database say what the log says. Call it after End, with those of all logs.
+  void CheckRows(const std::vector<DecisionRow>& rows) {
+    for (const DecisionRow& row : rows) {
+      if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
+      RecordedCertificate certificate;
+      certificate.name = fmt::format("{} event {} in the database", row.event.log_file, row.event.event_number);
+      const auto decision = in_log_.find(row.plan_digest);
+      if (decision == in_log_.end()) {
+        certificate.missing = "the log has no such certificate";
+      } else {
+        for (std::size_t i = 0; i < kGrounds.size(); ++i)
+          certificate.Compare(DigestOfInput(kGrounds[i].name), ToHex(decision->second.*kGrounds[i].member),
+                              row.grounds[i]);
+        if (!certificate.mismatches.empty()) certificate.missing = "the row disagrees with the log";
+        in_log_.erase(decision);
+      }
+      if (!certificate.missing.empty()) user_.OnCertificate(std::move(certificate), nullptr);
+    }
+  }
+
+  BesideCertificates Finish(const Timeline& timeline, const std::string& log) {
+    for (const auto& [digest, grounds] : in_log_)
+      user_.OnCertificate(Missing("plan with digest " + digest, "certified in the log, but not in the database"),
+                          nullptr);
     if (const std::int64_t places = timeline.damage().places; places > 0)
       user_.OnCertificate(Missing(log, fmt::format("the log is damaged in {} places", places)), nullptr);
     beside_.passed_over = timeline.passed_over();
@@ -256,29 +281,6 @@ class CertificateReader final : public TimelineUser {
     for (const auto& [name, digest] : kGrounds)
       certificate.Compare(DigestOfInput(name) + (digest == &Grounds::obstacles ? " in force" : ""),
                           ToHex(expected.*digest), ToHex(found.*digest));
-  }
-
-  // The rows of a database say what the log says.
-  void CheckRows(const std::vector<DecisionRow>& rows) {
-    for (const DecisionRow& row : rows) {
-      if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
-      RecordedCertificate certificate;
-      certificate.name = fmt::format("{} event {} in the database", row.event.log_file, row.event.event_number);
-      const auto decision = in_log_.find(row.plan_digest);
-      if (decision == in_log_.end()) {
-        certificate.missing = "the log has no such certificate";
-      } else {
-        for (std::size_t i = 0; i < kGrounds.size(); ++i)
-          certificate.Compare(DigestOfInput(kGrounds[i].name), ToHex(decision->second.*kGrounds[i].member),
-                              row.grounds[i]);
-        if (!certificate.mismatches.empty()) certificate.missing = "the row disagrees with the log";
-        in_log_.erase(decision);
-      }
-      if (!certificate.missing.empty()) user_.OnCertificate(std::move(certificate), nullptr);
-    }
-    for (const auto& [digest, grounds] : in_log_)
-      user_.OnCertificate(Missing("plan with digest " + digest, "certified in the log, but not in the database"),
-                          nullptr);
   }
 
   // The decision that goes with a certified plan: it names the same inputs, and its numbers and its sentence follow
@@ -360,7 +362,7 @@ class CertificateReader final : public TimelineUser {
                         sentence(0, -1) + how + (decision.obstacle < 0 ? "" : ", or another step"), found);
   }
 
-  const std::vector<DecisionRow>* const rows_;
+  const bool has_rows_;
   const std::function<void(std::int64_t)>& on_bytes_;
   CertificateUser& user_;
   BesideCertificates beside_;
@@ -376,20 +378,24 @@ class CertificateReader final : public TimelineUser {
 
 BesideCertificates ReadRun(const RunLogs& run, const RunTasks& tasks, bool is_many, CertificateUser& user,
                            const std::function<void(std::int64_t)>& on_bytes) {
-  std::vector<DecisionRow> rows;
-  if (!run.database.empty()) {
-    Database database(run.database);
-    for (const std::string& log : run.logs)
-      std::ranges::move(database.Read(std::filesystem::path(log).filename().string()).decisions,
-                        std::back_inserter(rows));
-  }
   if (is_many && run.logs.empty()) return {};
+  std::optional<Database> database;
+  if (!run.database.empty()) database.emplace(run.database);
+  const auto file_of = [](const std::string& log) { return std::filesystem::path(log).filename().string(); };
   LogTasks of_run = tasks.Of(run.logs);
-  if (is_many && !of_run.has_decisions() && rows.empty()) return {};
+  if (is_many && !of_run.has_decisions() &&
+      (!database || std::ranges::all_of(run.logs, [&](const std::string& log) {
+        return database->Count(file_of(log)).decisions == 0;
+      })))
+    return {};
   if (!is_many) of_run.RequirePlans();
-  CertificateReader reader(run.database.empty() ? nullptr : &rows, on_bytes, user);
+  CertificateReader reader(database.has_value(), on_bytes, user);
   Timeline timeline(of_run, {&reader});
   timeline.Read(run.logs, is_many || run.logs.size() > 1);
+  reader.End();
+  if (database)
+    for (const std::string& log : run.logs)
+      database->ReadInBlocks(file_of(log), [&](const Rows& rows) { reader.CheckRows(rows.decisions); });
   return reader.Finish(timeline, run.logs.front());
 }
 

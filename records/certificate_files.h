@@ -43,7 +43,8 @@ BesideCertificates ReadCertificates(const std::string& path, const std::string& 
                                     CertificateUser& user);
 
 /** The same for one of several runs: nothing if nothing was decided in it. Rows of its database have to say what the
-logs say. Memory: that of kPlansTogether plans, the run's learned transitions, and the database's rows.
+logs say. Memory: that of kPlansTogether plans, the run's learned transitions, and 350 bytes a certificate if there is a
+database.
 @param is_many whether events are named with their log, and a run without decisions is none to speak of.
 @param on_bytes is told of the bytes of each event; may be empty. @throws BadInput as above. */
 BesideCertificates ReadRun(const RunLogs& run, const RunTasks& tasks, bool is_many, CertificateUser& user,

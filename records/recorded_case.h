@@ -58,13 +58,14 @@ struct JudgedCandidate {
 class CaseCertifier final {
  public:
   const Certifier& At(const Basis& basis) {
-    if (!certifier_ || task_ != basis.task || begin_ != basis.learned_begin || known_ > basis.learned_end) {
+    if (!certifier_ || task_ != basis.task || learned_ != basis.learned || known_ > basis.num_learned) {
       certifier_ = std::make_unique<Certifier>(basis.task->problem);
       task_ = basis.task;
-      begin_ = known_ = basis.learned_begin;
+      learned_ = basis.learned;
+      known_ = 0;
     }
-    for (; known_ < basis.learned_end; ++known_) {
-      const ExecutedTransition& transition = (*basis.learned)[known_];
+    for (; known_ < basis.num_learned; ++known_) {
+      const ExecutedTransition& transition = (*learned_)[known_];
       static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
     }
     return *certifier_;
@@ -73,7 +74,8 @@ class CaseCertifier final {
  private:
   std::unique_ptr<Certifier> certifier_;
   const Config* task_ = nullptr;       // the certifier's
-  std::size_t begin_ = 0, known_ = 0;  // what it has learned
+  decltype(Basis::learned) learned_;  // of these it knows the first ones
+  std::size_t known_ = 0;
 };
 
 /** How many pieces of X_0 (forereach/certify/pieces.h) a decision may have taken: an abstention S is of the whole. */

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <deque>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -30,6 +31,24 @@ namespace {
 
 constexpr double kBetweenBodies = 4;  // metres of the path from one drawn body to the next
 
+// At most kMost of what is added, at even distances.
+template <class What>
+struct Thinned {
+  static constexpr std::size_t kMost = 1 << 15;
+
+  void Add(What what) {
+    if (count++ % stride != 0) return;
+    all.push_back(std::move(what));
+    if (all.size() < kMost) return;
+    for (std::size_t i = 0; i < kMost / 2; ++i) all[i] = std::move(all[2 * i]);
+    all.resize(kMost / 2);
+    stride *= 2;
+  }
+
+  std::vector<What> all;
+  std::size_t count = 0, stride = 1;
+};
+
 class PictureMaker final : public TimelineUser, CaseJudge {
  public:
   explicit PictureMaker(const BusOptions& channels) : CaseJudge(AllCores()), channels_(channels) {}
@@ -45,14 +64,20 @@ class PictureMaker final : public TimelineUser, CaseJudge {
     const decision_t& decision = recorded.decision;
     const bool is_drawn = decision.outcome == decision_t::CERTIFIED || decision.outcome == decision_t::ABSTAIN_SAFETY;
     if (!recorded.candidate || !is_drawn) return;
-    const RecordedCase judged = CaseOf(recorded);
+    RecordedCase judged = CaseOf(recorded);
     if (!judged.candidate) return;
     if (!judged.missing.empty()) {
       ++result_.disagreements;
       return;
     }
-    outlines_.emplace_back();
-    Put(judged, outlines_.size() - 1);
+    const bool is_certified = decision.outcome == decision_t::CERTIFIED;
+    std::deque<RecordedCase>& kind = is_certified ? certified_ : abstained_;
+    if (is_certified) executed_.try_emplace(decision.plan_id);
+    kind.push_back(std::move(judged));
+    if (kind.size() <= LogPicture::kMostTubes) return;
+    if (is_certified) executed_.erase(kind.front().decision.plan_id);
+    kind.pop_front();
+    ++result_.earlier;
   }
 
   void OnEvent(const LogEvent& event) override {
@@ -65,15 +90,22 @@ class PictureMaker final : public TimelineUser, CaseJudge {
 
   // @param last whose goal is drawn.
   LogPicture Finish(const Timeline& timeline, const Config& last) {
+    outlines_.resize(certified_.size() + abstained_.size());
+    std::size_t place = 0;
+    for (std::deque<RecordedCase>* kind : {&certified_, &abstained_})
+      for (; !kind->empty(); kind->pop_front()) Put(kind->front(), place++);
     CertifyAgain();
     Picture& picture = result_.picture;
+    picture.path = std::move(path_.all);
+    picture.stops = std::move(stops_.all);
+    for (auto& body : bodies_.all) std::ranges::move(body, std::back_inserter(picture.bodies));
     const std::vector<double>& goal = last.planner.goal;
     if (goal.size() == 2) picture.goal = Picture::Circle{{goal[0], goal[1]}, last.planner.goal_radius};
     for (auto& [plan_id, tube] : tubes_)
       for (std::size_t t = 0; t < tube.size(); ++t)
         std::ranges::move(tube[t],
-                          std::back_inserter(executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed
-                                                                                                : picture.certified));
+                          std::back_inserter(executed_[plan_id].contains(static_cast<int>(t)) ? picture.executed
+                                                                                              : picture.certified));
     picture.obstacles = timeline.logged_obstacles();
     return std::move(result_);
   }
@@ -112,34 +144,35 @@ class PictureMaker final : public TimelineUser, CaseJudge {
   void AddState(const robot_state_t& message) {
     const auto position = PositionOf(message.state, message.num_states);
     if (!position) return;
-    Picture& picture = result_.picture;
-    picture.path.push_back(*position);
+    path_.Add(*position);
     if (last_body_ && (*position - *last_body_).norm() < kBetweenBodies) return;
     last_body_ = position;
-    std::ranges::move(BodyAt(*now_->problem, Eigen::Map<const Eigen::VectorXd>(message.state, message.num_states)),
-                      std::back_inserter(picture.bodies));
+    bodies_.Add(BodyAt(*now_->problem, Eigen::Map<const Eigen::VectorXd>(message.state, message.num_states)));
   }
 
   void AddExecution(const execution_event_t& event) {
     if (event.kind == execution_event_t::STARTED || event.kind == execution_event_t::STEP_INSIDE ||
         event.kind == execution_event_t::STEP_CONSISTENT)
-      executed_.insert({event.plan_id, event.step});
+      if (const auto plan = executed_.find(event.plan_id); plan != executed_.end()) plan->second.insert(event.step);
     if (event.kind == execution_event_t::GOAL_REACHED) arrived_ = true;
     const bool stops = event.kind == execution_event_t::STANDING || event.kind == execution_event_t::STEP_OUTSIDE ||
                        event.kind == execution_event_t::OFF_SCHEDULE ||
                        event.kind == execution_event_t::EMERGENCY_STOP ||
                        (event.kind == execution_event_t::ERROR_STOP && event.plan_id >= 0);
     const auto position = PositionOf(event.state, event.num_states);
-    if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
+    if (stops && !arrived_ && position) stops_.Add(*position);
   }
 
   const Config* now_ = nullptr;  // the task in force
   const BusOptions channels_;
-  std::vector<std::vector<std::vector<Picture::Polygon>>> outlines_;  // of each decision, while it is judged again
+  std::vector<std::vector<std::vector<Picture::Polygon>>> outlines_;  // of each case
   // Of certified plans, by plan_id: the polygons of each step.
   std::map<std::int64_t, std::vector<std::vector<Picture::Polygon>>> tubes_;
   std::optional<Eigen::Vector2d> last_body_;         // where one was drawn
-  std::set<std::pair<std::int64_t, int>> executed_;  // plan_id and step
+  std::map<std::int64_t, std::set<int>> executed_;  // of certified plans that may be drawn, by plan_id: the steps
+  std::deque<RecordedCase> certified_, abstained_;  // that may be drawn
+  Thinned<Eigen::Vector2d> path_, stops_;
+  Thinned<std::vector<Picture::Polygon>> bodies_;
   bool arrived_ = false;
   LogPicture result_;
 };
@@ -241,6 +274,7 @@ bool Report(const ReportOptions& options, std::ostream& out) {
     json["logs"] = logs;
     json["pictures"] = files;
     json["tubes_left_out"] = drawn.disagreements;
+    if (drawn.earlier > 0) json["earlier_tubes_left_out"] = drawn.earlier;
     if (named.is_many) json["missing"] = named.missing;
     out << JsonText(json, 2) << "\n";
     return is_whole;
@@ -251,6 +285,9 @@ bool Report(const ReportOptions& options, std::ostream& out) {
   if (drawn.disagreements > 0)
     out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out",
                        drawn.disagreements);
+  if (drawn.earlier > 0)
+    out << fmt::format("{:<26}{} before the last {} of their kind\n", "tubes not drawn", drawn.earlier,
+                       LogPicture::kMostTubes);
   return is_whole;
 }
 

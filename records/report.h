@@ -1,6 +1,7 @@
 /** The output of `forereach report` for a recorded run: its numbers, and a picture with recomputed tubes. */
 #pragma once
 
+#include <cstdint>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -16,11 +17,14 @@ struct LogPicture {
   Picture picture;
   /** Plans whose recomputed outcome or step differs from the recorded one. Their tubes are not drawn. */
   int disagreements = 0;
+  /** Tubes of certificates, and of abstentions, that are not drawn since so many of their kind follow. */
+  static constexpr std::size_t kMostTubes = 1000;
+  std::int64_t earlier = 0;
 };
 
 /** Certifies the candidates of consecutive logs again, under the obstacles of their decisions. The picture has the
-tubes of certified plans and of abstentions S, the measured path, stops, goal, and the obstacles at the end; it has no
-title and no key numbers. Cost: one certify call for each plan.
+tubes of the last certified plans and abstentions S, the measured path, stops, goal, and the obstacles at the end; it has no
+title and no key numbers. Cost: one certify call for each plan that is drawn.
 @param task decisions of any config digest count as its.
 @throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
 [[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& task);

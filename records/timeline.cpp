@@ -47,7 +47,7 @@ std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>&
 }
 
 std::shared_ptr<const Problem> Basis::problem() const {
-  return WithLearned(task->problem, std::span(*learned).subspan(learned_begin, learned_end - learned_begin));
+  return WithLearned(task->problem, std::span(*learned).first(num_learned));
 }
 
 Timeline::Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users)
@@ -157,7 +157,7 @@ void Timeline::Follow(ObstaclesInForce obstacles) {
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = all_logged_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
-  learned_begin_ = LearnedUnder(*now_)->size();
+  learned_ = std::make_shared<std::vector<ExecutedTransition>>();
 }
 
 // A decision may tell of a reload before a heartbeat does.
@@ -193,12 +193,6 @@ void Timeline::TakeTransition(const LogEvent& event) {
       {place_, std::move(transition), {event.message().begin(), event.message().end()}, logged_observations_});
 }
 
-std::shared_ptr<std::vector<ExecutedTransition>>& Timeline::LearnedUnder(const Config& task) {
-  auto& learned = learned_[&task];
-  if (!learned) learned = std::make_shared<std::vector<ExecutedTransition>>();
-  return learned;
-}
-
 void Timeline::TakeNextObstacles() {
   const ObstaclesChange change = std::move(obstacles_ahead_.front());
   obstacles_ahead_.pop_front();
@@ -212,16 +206,16 @@ void Timeline::LearnNext() {
   transitions_ahead_.pop_front();
   observations_digest_ = next.after;
   Tell(&TimelineUser::OnTransition, next.transition, next.bytes);
-  LearnedUnder(*now_)->push_back(std::move(next.transition));
+  learned_->push_back(std::move(next.transition));
 }
 
 // ---- Decisions.
 
-Basis Timeline::Current() {
+Basis Timeline::Current() const {
   Grounds grounds = now_->grounds;
   grounds.observations = observations_digest_;
   grounds.obstacles = obstacles_digest_;
-  return {now_, grounds, obstacles_, LearnedUnder(*now_), learned_begin_, LearnedUnder(*now_)->size()};
+  return {now_, grounds, obstacles_, learned_, learned_->size()};
 }
 
 Basis Timeline::Advance(const Grounds& named, std::int64_t candidate_place) {

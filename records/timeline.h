@@ -51,10 +51,10 @@ struct Basis {
   const Config* task = nullptr;
   Grounds grounds;  ///< The digests of these inputs. The decision's message has the digests that it names.
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
-  /** All transitions that are learned under the task, in the order of the log; at that time [learned_begin,
-  learned_end) of them were. */
+  /** What is learned between the last start or reload and the next, in the order of the log, of which the first
+  num_learned were at that time. */
   std::shared_ptr<const std::vector<ExecutedTransition>> learned;
-  std::size_t learned_begin = 0, learned_end = 0;
+  std::size_t num_learned = 0;
 
   /** What was known at that time: the task's problem with these transitions behind its own. */
   [[nodiscard]] std::shared_ptr<const Problem> problem() const;
@@ -147,8 +147,6 @@ class Timeline final {
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
   [[nodiscard]] PassedOver passed_over() const { return {authenticator_.refusals(), undecodable_}; }
   [[nodiscard]] std::int64_t candidates() const { return candidates_; }
-  /** All transitions that were learned under a task, in the order of the log. */
-  [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) { return *LearnedUnder(task); }
   /** The obstacles in force after everything that was logged. */
   [[nodiscard]] const std::vector<Obstacle>& logged_obstacles() const { return logged_obstacles_.all(); }
 
@@ -195,8 +193,7 @@ class Timeline final {
 
   /** @param candidate_place -1 if the log has no candidate: without a state of these digests nothing advances. */
   [[nodiscard]] Basis Advance(const Grounds& named, std::int64_t candidate_place);
-  [[nodiscard]] Basis Current();
-  [[nodiscard]] std::shared_ptr<std::vector<ExecutedTransition>>& LearnedUnder(const Config& task);
+  [[nodiscard]] Basis Current() const;
   void TakeNextObstacles();
   void LearnNext();
 
@@ -230,14 +227,13 @@ class Timeline final {
   // State at the last decision, and by everything that was logged; what lies between the two.
   std::shared_ptr<const std::vector<Obstacle>> obstacles_;
   Digest obstacles_digest_{}, observations_digest_{};
-  std::size_t learned_begin_ = 0;
+  std::shared_ptr<std::vector<ExecutedTransition>> learned_;
   ObstaclesInForce logged_obstacles_;
   std::shared_ptr<const std::vector<Obstacle>> all_logged_;  // of these
   SoleSender transition_sender_;
   Digest logged_observations_{};
   std::deque<ObstaclesChange> obstacles_ahead_;
   std::deque<Transition> transitions_ahead_;
-  std::map<const Config*, std::shared_ptr<std::vector<ExecutedTransition>>> learned_;
 };
 
 }  // namespace forereach
