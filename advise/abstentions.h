@@ -45,8 +45,8 @@ struct RecordedAbstention {
 /** Those of one run. */
 struct Abstentions {
   std::vector<std::shared_ptr<const Config>> tasks;
-  std::deque<RecordedAbstention> all;   ///< Abstentions and rejections, in the order of the log.
-  std::int64_t left_out = 0;            ///< So many before them.
+  std::deque<RecordedAbstention> all;  ///< Abstentions and rejections, in the order of the log.
+  std::int64_t left_out = 0;           ///< So many before them.
   std::int64_t certified = 0;
   PassedOver passed_over{};
 };
@@ -82,6 +82,7 @@ class AbstentionReader final : public TimelineUser {
 /** The last `most` of a run's logs.
 @param names_files whether events are named with their log.
 @throws BadInput for logs that cannot be read, or without their task. */
-[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files, std::size_t most);
+[[nodiscard]] Abstentions ReadAbstentions(const RunLogs& run, const RunTasks& tasks, bool names_files,
+                                          std::size_t most);
 
 }  // namespace forereach

@@ -93,8 +93,7 @@ std::vector<PieceCut> CutsOf(const candidate_plan_t& candidate, const Basis& bas
 class CertificateReader final : public TimelineUser {
  public:
   // @param has_rows whether CheckRows is called with those of a database.
-  CertificateReader(bool has_rows, const std::function<void(std::int64_t)>& on_bytes,
-                    CertificateUser& user)
+  CertificateReader(bool has_rows, const std::function<void(std::int64_t)>& on_bytes, CertificateUser& user)
       : has_rows_(has_rows), on_bytes_(on_bytes), user_(user) {}
 
   void OnEvent(const LogEvent& event) override {
@@ -383,8 +382,7 @@ BesideCertificates ReadRun(const RunLogs& run, const RunTasks& tasks, bool is_ma
   if (!run.database.empty()) database.emplace(run.database);
   const auto file_of = [](const std::string& log) { return std::filesystem::path(log).filename().string(); };
   LogTasks of_run = tasks.Of(run.logs);
-  if (is_many && !of_run.has_decisions() &&
-      (!database || std::ranges::all_of(run.logs, [&](const std::string& log) {
+  if (is_many && !of_run.has_decisions() && (!database || std::ranges::all_of(run.logs, [&](const std::string& log) {
         return database->Count(file_of(log)).decisions == 0;
       })))
     return {};

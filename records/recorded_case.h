@@ -73,7 +73,7 @@ class CaseCertifier final {
 
  private:
   std::unique_ptr<Certifier> certifier_;
-  const Config* task_ = nullptr;       // the certifier's
+  const Config* task_ = nullptr;      // the certifier's
   decltype(Basis::learned) learned_;  // of these it knows the first ones
   std::size_t known_ = 0;
 };

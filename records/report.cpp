@@ -168,7 +168,7 @@ class PictureMaker final : public TimelineUser, CaseJudge {
   std::vector<std::vector<std::vector<Picture::Polygon>>> outlines_;  // of each case
   // Of certified plans, by plan_id: the polygons of each step.
   std::map<std::int64_t, std::vector<std::vector<Picture::Polygon>>> tubes_;
-  std::optional<Eigen::Vector2d> last_body_;         // where one was drawn
+  std::optional<Eigen::Vector2d> last_body_;        // where one was drawn
   std::map<std::int64_t, std::set<int>> executed_;  // of certified plans that may be drawn, by plan_id: the steps
   std::deque<RecordedCase> certified_, abstained_;  // that may be drawn
   Thinned<Eigen::Vector2d> path_, stops_;

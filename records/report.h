@@ -23,8 +23,8 @@ struct LogPicture {
 };
 
 /** Certifies the candidates of consecutive logs again, under the obstacles of their decisions. The picture has the
-tubes of the last certified plans and abstentions S, the measured path, stops, goal, and the obstacles at the end; it has no
-title and no key numbers. Cost: one certify call for each plan that is drawn.
+tubes of the last certified plans and abstentions S, the measured path, stops, goal, and the obstacles at the end; it
+has no title and no key numbers. Cost: one certify call for each plan that is drawn.
 @param task decisions of any config digest count as its.
 @throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
 [[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& task);
