@@ -14,6 +14,7 @@ H, it is the box of their ranges. */
 
 #include "forereach/dynamics/text_enclosure.h"
 #include "forereach/numerics/instruction_set.h"
+#include "forereach/numerics/lanes.h"
 #include "forereach/safety/body.h"
 #include "forereach/safety/projection.h"
 
