@@ -109,7 +109,7 @@ class Report:
                      ratio(self.cpu(f"{plain}/{scenario}/400"), self.cpu(f"certify/{scenario}/400")), least, then)
             for scenario, matrices, loops, then in (
                 ("bicycle", 85, 52, "expansion, remainder and image in one call, sine and cosine inline"),
-                ("point_mass", 150, 80, "no nodes where the last search's second best is too far"))
+                ("point_mass", 150, 80, "fewer nodes, by the last search's second best"))
             for plain, spelling, least in (("straightforward", "", matrices),
                                            ("straightforward_loops", " by loops", loops))
         ] + [
