@@ -122,6 +122,9 @@ class Report:
             at_most("the same, abstentions", self.bus_data["abstained"]["ratio_p99"], 1.2),
             at_most("dense declaration, N = 400, microseconds", self.cpu("certify/dense/400"), 100),
             at_least(f"batch on {threads} cores over one core", scaling, 0.9 * threads),
+            at_most("bicycle by Runge-Kutta as text: time over the compiled Euler step", self.beside_compiled("bicycle_rk4"), 6.8),
+            at_most("quadrotor by Runge-Kutta, 20 steps: time over 12 of the compiled bicycle",
+                    self.beside_compiled("quadrotor_rk4_20_steps"), 110),
         ]
         return table(["", "asked", "measured", ""], rows)
 
@@ -256,6 +259,9 @@ class Report:
             if benchmark := self.benchmarks.get("world/" + name):
                 rows.append([label, number(benchmark.cpu), f"{benchmark.cpu / point.cpu:.2f}"])
         return table(["", "us", "beside the point"], rows)
+
+    def beside_compiled(self, name):
+        return ratio(self.cpu("model/" + name), self.cpu("model/bicycle_compiled"))
 
     def models(self):
         compiled = self.benchmarks.get("model/bicycle_compiled")

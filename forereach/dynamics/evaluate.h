@@ -16,7 +16,7 @@ FOREREACH_ARITHMETIC_BEGIN
 
 /** Room for the values of `count` nodes on the stack of the calling function: a step has no heap. A draft has at most
 ProgramDraft::kMaxOperations nodes. */
-#define FOREREACH_ON_STACK(T, count) static_cast<T*>(__builtin_alloca_with_align(sizeof(T) * ToSize(count), 128))
+#define FOREREACH_ON_STACK(T, count) static_cast<T*>(__builtin_alloca_with_align(sizeof(T) * ToSize(count), 512))
 
 namespace forereach {
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "forereach/numerics/size.h"
@@ -24,6 +25,28 @@ void NominalModel::Linearize(std::span<const double> z, Linearization& out) cons
   std::array<Interval, kMaxVariables> point;
   std::ranges::copy(z, point.begin());
   LinearizeOver({point.data(), z.size()}, out);
+}
+
+void NominalModel::EncloseExpansion(std::span<const Interval> point, std::span<const Interval> box, Expansion& out,
+                                    ExpansionError& error) const noexcept {
+  Linearization linear;
+  LinearizeOver(point, linear);
+  for (std::size_t k = 0; k < ToSize(num_states()); ++k) {
+    out.value[k] = linear.value[k].Middle();
+    error.value[k] = linear.value[k].DistanceUpper(out.value[k]);
+  }
+  for (std::size_t e = 0; e < ToSize(linear.count); ++e) {
+    out.jacobian[e] = linear.entries[e].value.Middle();
+    error.jacobian[e] = linear.entries[e].value.DistanceUpper(out.jacobian[e]);
+    error.jacobian_size[e] = std::abs(out.jacobian[e]);
+  }
+  HessianEnclosure hessian;
+  EncloseHessian(box, hessian);
+  for (std::size_t e = 0; e < ToSize(hessian.count); ++e) {
+    const Interval& range = hessian.entries[e].second_derivative;
+    out.hessian[e] = {range.lower, range.upper};
+    error.hessian[e] = 0;
+  }
 }
 
 bool NominalModel::IsAngle(int state) const { return std::ranges::binary_search(names_.angles, state); }

@@ -109,6 +109,12 @@ class NominalModel {
   the tangent. */
   virtual void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept = 0;
 
+  /** Both at once, as a certify step uses them where Expand has no bound: sets middles of the enclosures of f0(z) and
+  D f0(z) for z in `point`, with their distances as errors, and the ranges of the second derivatives over `box`, which
+  contains `point`. An error that is infinite or NaN: no bound. */
+  virtual void EncloseExpansion(std::span<const Interval> point, std::span<const Interval> box, Expansion& out,
+                                ExpansionError& error) const noexcept;
+
   /** Bounds the error of Expand over a domain of d_z ranges; see rounding.h. Entries are infinite where there is no
   bound: a step then uses the two functions above. Cost O(operations), once for each task. */
   [[nodiscard]] virtual ExpansionError BoundError(std::span<const Interval> domain) const = 0;

@@ -179,7 +179,8 @@ class Analysis {
 ExpansionError ExpansionError::None(const Program& program) {
   ExpansionError error;
   std::fill_n(error.value.begin(), program.states, kInfinity);
-  std::fill_n(error.jacobian.begin(), program.num_first, kInfinity);
+  for (auto* of_first : {&error.jacobian, &error.jacobian_size})
+    std::fill_n(of_first->begin(), program.num_first, kInfinity);
   std::fill_n(error.hessian.begin(), program.num_second, kInfinity);
   return error;
 }
@@ -198,10 +199,13 @@ ExpansionError BoundExpansionError(const Program& program, std::span<const doubl
   return error;
 }
 
-StepError BoundStepError(const Program& program, const ExpansionError& error,
-                         std::span<const double> half_width) noexcept {
+// Inlined operations: each step by intervals calls it.
+[[gnu::flatten]] StepError BoundStepError(const Program& program, const ExpansionError& error,
+                                          std::span<const double> half_width) noexcept {
   constexpr double kUnderflow = 0x1p-1050;
-  StepError step{.value = error.value};
+  const double of_exact = MulUp(1 + 0x1p-44, kUnderflow);
+  StepError step;  // its lists are long: only what the program lists is set
+  step.value = error.value;
   std::array<int, kMaxStates> entries{};
   std::array<bool, kMaxStates> copies{};
   const auto is_state = [&](const Program::First& entry) { return entry.column < program.states; };
@@ -220,6 +224,8 @@ StepError BoundStepError(const Program& program, const ExpansionError& error,
     step.image[k] = AddUp(AddUp(step.image[k], MulUp(off, half_width[ToSize(entry.column)])), kUnderflow);
   }
   for (std::size_t e = 0; e < ToSize(program.num_second); ++e) {
+    step.remainder[e] = of_exact;
+    if (error.hessian[e] == 0) continue;
     const Program::Second& entry = program.hessian[e];
     const double product = MulUp(half_width[ToSize(entry.row)], half_width[ToSize(entry.column)]);
     step.remainder[e] = MulUp(1 + 0x1p-44, AddUp(MulUp(error.hessian[e], product), kUnderflow));

@@ -12,18 +12,19 @@ namespace forereach {
 /** For every z in the domain and every box inside it:
     |Expansion.value_k - f0_k(z)| <= value_k,   |Expansion.jacobian_e - D f0(z)_e| <= jacobian_e,
 and each end of Expansion.hessian_e lies at most hessian_e inside the true range. An entry is infinite if there is no
-bound. */
+bound. Only as many entries as the program lists are set: to clear the rest took a third of a small step. */
 struct ExpansionError {
   std::array<double, kMaxStates> value{};
-  std::array<double, Program::kMaxFirst> jacobian{};
-  std::array<double, Program::kMaxSecond> hessian{};
-  std::array<double, Program::kMaxFirst> jacobian_size{};  ///< upper bounds on |Expansion.jacobian_e|
+  std::array<double, Program::kMaxFirst> jacobian;
+  std::array<double, Program::kMaxSecond> hessian;
+  std::array<double, Program::kMaxFirst> jacobian_size;  ///< upper bounds on |Expansion.jacobian_e|
 
   /** No bound on anything. */
   [[nodiscard]] static ExpansionError None(const Program& program);
 };
 
-/** The contributions of rounding to a step's slack and remainder that do not depend on the slice. */
+/** The contributions of rounding to a step's slack and remainder that do not depend on the slice, set as far as
+those above. */
 struct StepError {
   std::array<double, kMaxStates> value{};  ///< as in ExpansionError
   /** For every slice whose hull has at most these half-widths r, every J' within `jacobian` of J, and |b|_inf <= 1:
@@ -32,7 +33,7 @@ struct StepError {
   std::array<double, kMaxStates> image{};
   /** For the term of each second derivative in the remainder: hessian_e r_i r_l, plus the error by underflow, plus
   2^-44 of both for the sum. */
-  std::array<double, Program::kMaxSecond> remainder{};
+  std::array<double, Program::kMaxSecond> remainder;
 };
 
 /** The errors of a step for slices whose hull has half-widths of at most r, rounded up.

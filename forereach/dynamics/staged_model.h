@@ -5,11 +5,7 @@
                x+ = x + dt/6 (k_1 + 2 k_2 + 2 k_3 + k_4).
 
 The successor as one program would have the derivatives of each stage written out in those of the stages before. Here
-they are numbers instead. With F and F_j the first and second derivatives of f at a stage's argument x_s,
-
-    D k = F D x_s,    D^2 k_j = sum_l F_jl D^2 x_s,l + (D x_s)^T F_j (D x_s),
-
-by intervals: for value and Jacobian mostly at a point, for the Hessians over a box. docs/soundness.md, 3.2. */
+they are numbers, by intervals (nested_program.h, chain_rule.h). docs/soundness.md, 3.3. */
 #pragma once
 
 #include <memory>
@@ -28,6 +24,8 @@ class StagedModel final : public InterpretedModel {
   void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept override;
   void LinearizeOver(std::span<const Interval> box, Linearization& out) const noexcept override;
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept override;
+  void EncloseExpansion(std::span<const Interval> point, std::span<const Interval> box, Expansion& out,
+                        ExpansionError& error) const noexcept override;
   /** Infinite: a step uses the enclosures above. */
   [[nodiscard]] ExpansionError BoundError(std::span<const Interval> domain) const override;
   /** No number. */

@@ -21,11 +21,12 @@ constexpr double kLargestError = 1e-6;
 // that data determine. It is no generator, which would displace another in the reduction.
 constexpr double kNegligible = 0x1p-40;
 
-bool IsNegligible(const StepError& error) {
-  const auto all_small = [](const auto& errors) {
-    return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; });
+bool IsNegligible(const Program& program, const StepError& error) {
+  const auto all_small = [](const auto& errors, int count) {
+    return std::ranges::all_of(std::span(errors).first(ToSize(count)), [](double e) { return e <= kLargestError; });
   };
-  return all_small(error.value) && all_small(error.image) && all_small(error.remainder);
+  return all_small(error.value, program.states) && all_small(error.image, program.states) &&
+         all_small(error.remainder, program.num_second);
 }
 
 // The axes k with J e_k = e_k everywhere, a bit for each.
@@ -67,7 +68,7 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
   std::vector<double> half_width(box.size(), 0.0);
   for (std::size_t l = 0; l < ToSize(domain.state.dim()); ++l) half_width[l] = box[l].HalfWidthUpper();
   error_ = BoundStepError(model.program(), model.BoundError(box), half_width);
-  plain_ = IsNegligible(error_);
+  plain_ = IsNegligible(model.program(), error_);
   lasting_ = LastingAxes(model.program()) & separable;
   for (std::size_t k = 0; k < ToSize(model.num_states()); ++k) negligible_[k] = kNegligible * half_width[k];
 }
@@ -80,30 +81,6 @@ void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept 
     Lanes sum = AllLanes(0);
     for (std::size_t j = 0; j < row.size(); j += kLaneCount) sum += Abs(LoadLanes(&row[j]));
     half_width[k] = (Sum(sum) + slice.slack(k)) * inflation;
-  }
-}
-
-void Propagator::ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull,
-                                   Expansion& expansion, ExpansionError& error) const noexcept {
-  Linearization nominal;
-  model_.Linearize(center, nominal);
-  for (std::size_t k = 0; k < ToSize(model_.num_states()); ++k) {
-    expansion.value[k] = nominal.value[k].Middle();
-    error.value[k] = nominal.value[k].DistanceUpper(expansion.value[k]);
-  }
-  for (std::size_t e = 0; e < ToSize(nominal.count); ++e) {
-    expansion.jacobian[e] = nominal.entries[e].value.Middle();
-    error.jacobian[e] = nominal.entries[e].value.DistanceUpper(expansion.jacobian[e]);
-    error.jacobian_size[e] = std::abs(expansion.jacobian[e]);
-  }
-  HessianEnclosure hessian;
-  std::array<Interval, kMaxVariables> box;
-  for (std::size_t l = 0; l < hull.size(); ++l) box[l] = Interval(NextDown(hull[l].lower), NextUp(hull[l].upper));
-  model_.EncloseHessian({box.data(), hull.size()}, hessian);
-  for (std::size_t e = 0; e < ToSize(hessian.count); ++e) {
-    const Interval& range = hessian.entries[e].second_derivative;
-    expansion.hessian[e] = {range.lower, range.upper};
-    error.hessian[e] = 0;
   }
 }
 
@@ -265,9 +242,14 @@ StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const do
                                        std::span<const double> center, std::span<const PlainInterval> hull,
                                        StepRecord& record, Zonotope& next, double* next_half_width,
                                        bool is_first) const noexcept {
+  std::array<Interval, kMaxVariables> point, box;
+  for (std::size_t l = 0; l < hull.size(); ++l) {
+    point[l] = center[l];
+    box[l] = Interval(NextDown(hull[l].lower), NextUp(hull[l].upper));
+  }
   Expansion expansion;
   ExpansionError error;
-  ExpandByIntervals(center, hull, expansion, error);
+  model_.EncloseExpansion({point.data(), hull.size()}, {box.data(), hull.size()}, expansion, error);
   std::array<double, kMaxVariables> half_width{};
   std::copy_n(record.half_width.begin(), slice.dim(), half_width.begin());
   return Advance<0>(slice, input, hull, expansion, BoundStepError(model_.program(), error, half_width), record, next,

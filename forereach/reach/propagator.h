@@ -76,8 +76,6 @@ class Propagator final {
   static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
 
  private:
-  void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
-                         ExpansionError& error) const noexcept;
   [[nodiscard, gnu::noinline]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
                                                           std::span<const double> center,
                                                           std::span<const PlainInterval> hull, StepRecord& record,

@@ -4,22 +4,10 @@
 
 #include "tests/test.h"
 
-#include "forereach/dynamics/evaluate.h"
 #include "forereach/dynamics/program_model.h"
 #include "tests/oracle/exact.h"
+#include "tests/oracle/in_reals.h"
 #include "tests/oracle/traced_random.h"
-
-// What Evaluate needs of a scalar type besides the functions of exact.h.
-namespace forereach::exact {
-
-Real sqr(const Real& x) { return x * x; }
-Real step(const Real& x) { return x > Real(0) ? 1 : 0; }
-Real sign(const Real& x) { return x > Real(0) ? 1 : x < Real(0) ? -1 : 0; }
-Real kink(const Real& /*x*/) { return 0; }
-Real cut(const Real& /*y*/, const Real& /*x*/) { return 0; }
-Real TanCurvature(const Real& t) { return Real(2) * t * (Real(1) + t * t); }
-
-}  // namespace forereach::exact
 
 namespace forereach::rounding_oracle_test {
 
@@ -96,13 +84,6 @@ std::shared_ptr<const ProgramModel> Model() {
                                               ModelNames{"functions", names, {}, {}, {}});
 }
 
-std::vector<Real> InReals(const Program& program, std::span<const Real> z) {
-  const std::vector<unsigned char> all(static_cast<std::size_t>(program.size), 1);
-  std::vector<Real> values(all.size());
-  Evaluate<Real, double>(program, all, {}, z, values);
-  return values;
-}
-
 double PointIn(Random& random, const Interval& x) {
   return random.Coin()   ? std::clamp(random.Uniform(x.lower, x.upper), x.lower, x.upper)
          : random.Coin() ? x.lower
@@ -143,7 +124,7 @@ TYPED_TEST(RoundingOf, ElementaryFunctionsIsBounded) {
     const auto inside = [](const Real& exact, double lower, double upper, double bound) {
       return Real(lower) - Real(bound) <= exact && exact <= Real(upper) + Real(bound);
     };
-    const std::vector<Real> at_center = InReals(program, std::vector<Real>(any.center.begin(), any.center.end()));
+    const std::vector<Real> at_center = InReals(program, {}, std::vector<Real>(any.center.begin(), any.center.end()));
     for (int k = 0; k < program.states; ++k) {
       const Real& exact = at_center[static_cast<std::size_t>(program.value[k])];
       ASSERT_LT(error.value[k], 1e-5) << "output " << k;
@@ -159,7 +140,7 @@ TYPED_TEST(RoundingOf, ElementaryFunctionsIsBounded) {
     for (int sample = 0; sample < 4; ++sample) {
       std::vector<Real> z;
       for (const Interval& side : any.box) z.emplace_back(PointIn(random, side));
-      const std::vector<Real> values = InReals(program, z);
+      const std::vector<Real> values = InReals(program, {}, z);
       for (int e = 0; e < program.num_second; ++e) {
         ASSERT_LT(error.hessian[e], kInfinity);
         ASSERT_TRUE(inside(values[static_cast<std::size_t>(program.hessian[e].node)], plain.hessian[e].lower,

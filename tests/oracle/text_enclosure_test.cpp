@@ -80,7 +80,7 @@ Enclosed AnyEnclosed(Random& random, const TextEnclosure& enclosure) {
 }
 
 // A point of the slice, often a corner.
-std::vector<Real> PointOf(Random& random, const Zonotope& slice) {
+std::vector<Real> StateOf(Random& random, const Zonotope& slice) {
   std::vector<Real> x(slice.center().begin(), slice.center().end());
   const auto weight = [&] { return random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1); };
   for (int j = 0; j < slice.num_generators(); ++j) {
@@ -105,7 +105,7 @@ TEST(TextEnclosure, ContainsTheValueAtEveryPoint) {
   for (TracedRandom random(7201); random.Again(3000);) {
     const Enclosed enclosed = AnyEnclosed(random, enclosure);
     for (int sample = 0; sample < 4; ++sample) {
-      std::vector<Real> at = PointOf(random, enclosed.slice);
+      std::vector<Real> at = StateOf(random, enclosed.slice);
       const std::vector<Real> x = at;
       at.emplace_back(enclosed.input[0]);
       at.emplace_back(0.75);
