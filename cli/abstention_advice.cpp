@@ -32,26 +32,30 @@ void to_json(nlohmann::json& json, const AbstentionAdvice& advice) {
   json = {{"advice", advice.advices}};
   if (!advice.missing.empty()) json["missing"] = advice.missing;
   if (advice.remedy) json["remedy"] = *advice.remedy;
+  if (const auto& inner = advice.inner)
+    json["inner"] = {
+        {"step", inner->step}, {"half_width", inner->half_width}, {"least", inner->least}, {"contact", inner->contact}};
 }
 
 namespace {
 
-AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
-  if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
-  if (!abstention.was_judged()) return {{}, RemedyFor(abstention), {}};
+AbstentionAdvice AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails, bool with_inner) {
+  if (!abstention.missing.empty()) return {{}, {}, abstention.missing, {}};
+  if (!abstention.was_judged()) return {{}, RemedyFor(abstention), {}, {}};
   try {
     const Case judged = abstention.Judged();
     const Certifier certifier(judged.problem);
-    AbstentionAdvice advice{Advise(judged, certifier, {.tails = tails}), {}, {}};
+    AbstentionAdvice advice{Advise(judged, certifier, {.tails = tails}), {}, {}, {}};
     for (Advice& each : advice.advices) each.after.clear();  // each has a problem of its own
     Tube tube;
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
       advice.missing =
           "judged again by what is recorded: " + Explain(again, *judged.problem, judged.obstacles, judged.plan(), tube);
+    if (with_inner) advice.inner = BoundFromWithin(judged, certifier, tube);
     return advice;
   } catch (const std::invalid_argument& error) {
-    return {{}, {}, std::string("it cannot be judged again: ") + error.what()};
+    return {{}, {}, std::string("it cannot be judged again: ") + error.what(), {}};
   }
 }
 
@@ -87,13 +91,14 @@ std::vector<AdviceGroup> GroupsOf(const AbstentionAdvice& advice) {
   std::vector<AdviceGroup> groups;
   if (const auto& remedy = advice.remedy)
     groups.push_back({remedy->turns ? "it would be judged" : "it might be judged", false, {remedy->what}});
+  if (advice.inner) groups.push_back({"the inner bound", false, {Describe(*advice.inner)}});
   for (AdviceGroup* group : {&enough, &others, &not_enough})
     if (!group->clauses.empty()) groups.push_back(std::move(*group));
   return groups;
 }
 
 std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
-                                                     double seconds) {
+                                                     double seconds, bool with_inner) {
   std::vector<std::vector<AbstentionAdvice>> advised(runs.size());
   std::vector<std::pair<std::size_t, std::size_t>> work;  // run, abstention
   std::map<const Config*, BrakingTails> tails;
@@ -114,7 +119,7 @@ std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentio
       advised[run][i].missing = fmt::format(
           "not searched within {:g} s: `forereach advise` searches all, or write a longer --advice-seconds", seconds);
     else
-      advised[run][i] = AdviceFor(abstention, tails.at(abstention.task));
+      advised[run][i] = AdviceFor(abstention, tails.at(abstention.task), with_inner);
     progress.Advance();
   });
   return advised;

@@ -10,14 +10,16 @@
 #include "advise/abstentions.h"
 #include "advise/advice.h"
 #include "advise/gate_advice.h"
+#include "cli/inner_bound.h"
 
 namespace forereach {
 
 /** Of one abstention. */
 struct AbstentionAdvice {
-  std::vector<Advice> advices;   ///< None if it was answered without a judgement.
-  std::optional<Remedy> remedy;  ///< Only then.
-  std::string missing;           ///< Why there is none, or how a judgement by what is recorded differs.
+  std::vector<Advice> advices;           ///< None if it was answered without a judgement.
+  std::optional<Remedy> remedy;          ///< Only then.
+  std::string missing;                   ///< Why there is none, or how a judgement by what is recorded differs.
+  std::optional<InnerBound> inner = {};  ///< If it was asked for.
 
   [[nodiscard]] bool turned() const;
 };
@@ -37,8 +39,8 @@ void to_json(nlohmann::json& json, const AbstentionAdvice& advice);
 
 /** What would have turned the abstentions of several runs, on `jobs` threads in all and with a progress bar.
 @param seconds after this time no further one is begun, but for the first; the others have `missing`. Those that missed
-by least come first. */
+by least come first. @param with_inner asks for the inner bound of what was judged. */
 [[nodiscard]] std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
-                                                                   double seconds);
+                                                                   double seconds, bool with_inner = false);
 
 }  // namespace forereach

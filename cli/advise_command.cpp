@@ -24,7 +24,7 @@ struct AdviseArguments {
   std::vector<std::string> files;
   std::string config;
   LogKey key;
-  bool json = false, all = false;
+  bool json = false, all = false, inner = false;
   unsigned jobs = AllCores();
   std::optional<double> seconds;
 };
@@ -173,14 +173,14 @@ Advised AdviseRuns(const AdviseArguments& options) {
                                         count + left_out, kMostExamined));
   if (std::ranges::all_of(all.runs, [](const Abstentions& run) { return run.tasks.empty(); }))
     throw ConfigError(options.files[0] + ": " + (named.missing.empty() ? "no decisions" : named.missing[0]));
-  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity));
+  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity), options.inner);
   return all;
 }
 
 Advised AdviseDecision(const AdviseArguments& options) {
   Advised all;
   all.runs.push_back(AbstentionOf(options.files[0], options.config));
-  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity));
+  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity), options.inner);
   return all;
 }
 
@@ -218,6 +218,8 @@ Command AdviseCommand() {
                    "How long to search, the abstentions that missed by least first; the others are said not to be "
                    "searched. By default all are",
                    NumberRange{0, 86400}},
+                  {"--inner", &options->inner, "",
+                   "Also how wide every sound tube is, and whether a system that agrees with all data touches"},
                   {"--all", &options->all, "", "Show every change, not the first of each kind alone"},
                   JobsOption(options->jobs),
                   JsonFlag(options->json)},

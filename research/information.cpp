@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/extremal.h"
 #include "forereach/dynamics/models/residuals.h"
 #include "forereach/residual/observations.h"
 #include "forereach/sets/zonogon.h"
 #include "research/evaluate.h"
 #include "research/experiment.h"
-#include "research/limits/extremal.h"
 #include "research/limits/width_bound.h"
 #include "research/noise_floor.h"
 

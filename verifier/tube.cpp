@@ -695,6 +695,72 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
   return tube;
 }
 
+// Whether every lower end of an observed residual is at most every upper end and what the slopes allow between them:
+// then the extensions agree with all of these. Doubles decide where they can.
+bool TubeMaker::CanExtend(const std::vector<int>& rows) const {
+  const Eigen::MatrixXd &z = problem_.transitions.z, &L = problem_.declaration.lipschitz;
+  for (Eigen::Index k = 0; k < L.rows(); ++k) {
+    const RoughResiduals& rough = rough_residuals_[ToSize(k)];
+    for (const int i : rows)
+      for (const int j : rows) {
+        const std::size_t a = ToSize(i), b = ToSize(j);
+        double reach = rough.upper[b] - 0x1p-36 * (rough.scale[a] + rough.scale[b]) -
+                       0x1p-50 * (std::abs(rough.lower[a]) + std::abs(rough.upper[b]));
+        for (Eigen::Index l = 0; l < L.cols(); ++l)
+          if (L(k, l) > 0) reach += L(k, l) * std::abs(z(i, l) - z(j, l));
+        if (rough.lower[a] <= reach) continue;
+        Real exact = residuals_[b][ToSize(k)].upper;
+        for (Eigen::Index l = 0; l < L.cols(); ++l)
+          if (L(k, l) > 0) exact += Real(L(k, l)) * abs(Real(z(i, l)) - Real(z(j, l)));
+        if (!CertainlyAtMost(residuals_[a][ToSize(k)].lower, exact)) return false;
+      }
+  }
+  return true;
+}
+
+Real TubeMaker::Extension(const std::vector<int>& rows, int k, bool upper, const std::vector<Real>& z) const {
+  const Eigen::MatrixXd& L = problem_.declaration.lipschitz;
+  std::optional<Real> best;
+  for (const int i : rows) {
+    Real away;
+    for (Eigen::Index l = 0; l < L.cols(); ++l)
+      if (L(k, l) > 0) away += Real(L(k, l)) * abs(z[ToSize(l)] - Real(problem_.transitions.z(i, l)));
+    const auto& [below, above] = residuals_[ToSize(i)][ToSize(k)];
+    const Real value = upper ? above + away : below - away;
+    best = !best ? value : upper ? min(*best, value) : max(*best, value);
+  }
+  return best.value_or(Real::Everything());
+}
+
+std::optional<Tube> TubeMaker::Follow(const InitialSet& start, const Eigen::MatrixXd& controls,
+                                      const std::vector<bool>& upper, const KnownRows& known) const {
+  const Declaration& declaration = problem_.declaration;
+  const int n = problem_.model->num_states();
+  if (!declaration.affine.rows.empty() || !declaration.regions.empty() || declaration.HasErrorInZ() || growing_ ||
+      !equations_.IsExact() || problem_.timing.error > 0 || !problem_.transitions.longer.isZero(0) ||
+      std::ssize(upper) != n)
+    return std::nullopt;
+  std::vector<int> rows;
+  for (int i = 0; i < problem_.transitions.size(); ++i)
+    if (known.Contains(i)) rows.push_back(i);
+  if (rows.empty() || !CanExtend(rows)) return std::nullopt;
+  Tube motion;
+  motion.slices.push_back(WholeOf(start));
+  if (!motion.slices[0].columns.empty()) return std::nullopt;
+  for (Eigen::Index t = 0; t < controls.cols(); ++t) {
+    std::vector<Real> z = motion.slices.back().center;
+    for (const double u : controls.col(t)) z.emplace_back(u);
+    std::vector<Real> next = equations_.Value(z);
+    for (int k = 0; k < n; ++k) {
+      const Real by = Extension(rows, k, upper[ToSize(k)], z), &w = disturbance_[ToSize(k)];
+      next[ToSize(k)] += upper[ToSize(k)] ? by + w : by - w;
+      if (!next[ToSize(k)].IsFinite()) return motion;
+    }
+    motion.slices.push_back({std::move(next), {}});
+  }
+  return motion;
+}
+
 std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& affine) const {
   const Transitions& data = problem_.transitions;
   affine.rows.resize(ToSize(problem_.model->num_states()));

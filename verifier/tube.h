@@ -119,6 +119,11 @@ class TubeMaker final {
   [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls,
                           const TubeOptions& options) const;
 
+  /** The motion of Verifier::FindContact, as slices that are points up to 2^-200 or so. Nothing if it is not followed,
+  or the residual does not provably agree with the data. */
+  [[nodiscard]] std::optional<Tube> Follow(const InitialSet& start, const Eigen::MatrixXd& controls,
+                                           const std::vector<bool>& upper, const KnownRows& known) const;
+
   /** A known transition in which a state changes faster than is declared, by more than the certifier's rounding. */
   [[nodiscard]] std::optional<Failure> FindTooFast(const KnownRows& known) const;
 
@@ -127,6 +132,8 @@ class TubeMaker final {
   struct Row;
   struct Affine;
 
+  [[nodiscard]] bool CanExtend(const std::vector<int>& rows) const;
+  [[nodiscard]] Real Extension(const std::vector<int>& rows, int k, bool upper, const std::vector<Real>& z) const;
   [[nodiscard]] std::optional<Failure> WhyTooFast(int i) const;
   [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,

@@ -207,6 +207,20 @@ Verdict Verifier::VerifyWhole(const Certificate& certificate) const {
   return {Status::kCannotVerify, *failure};
 }
 
+std::optional<Failure> Verifier::FindContact(const Certificate& claimed, const std::vector<bool>& upper) const {
+  if (!equations_ || !functions_ || FindMisfit(*problem_, claimed)) return std::nullopt;
+  const Precision precision(kBits[0]);
+  const auto motion = MakerOf(kBits[0]).Follow(claimed.initial_set, claimed.controls, upper, claimed.known);
+  if (!motion) return std::nullopt;
+  Problem at_samples = *problem_;
+  at_samples.between.reset();
+  Certificate of_motion = claimed;
+  of_motion.is_remainder = true;  // nothing is claimed of its end
+  std::optional<Failure> failure = FindFalseClaim(at_samples, of_motion, *functions_, *motion);
+  if (failure && !failure->certain) failure.reset();
+  return failure;
+}
+
 // The certifier's own rules first. Where these leave a choice, its rounding may have taken it otherwise. What proves
 // the claims as well is a tube that follows the record from slice to slice; and, if they fail by no more than the
 // choice may matter, tubes that need none: never reduced, and with a tighter remainder.

@@ -4,6 +4,7 @@
 #include "certifier/gate/gate.h"
 #include "cli/abstention_advice.h"
 #include "forereach/obstacles_t.hpp"
+#include "tests/certifier/gap_task.h"
 #include "tests/cli/program.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
@@ -31,6 +32,24 @@ TEST_F(AdviseTest, NamesTheLeastDistanceToTheObstacle) {
 TEST_F(AdviseTest, PrintsWhatItsDocumentShows) {
   const std::string text = AdviseOn("bicycle.yaml", "bicycle_safety.csv").text;
   EXPECT_THAT(Read(FOREREACH_SOURCE_DIR "/docs/advise.md"), HasSubstr("decision.json" + text.substr(text.find('\n'))));
+}
+
+TEST_F(AdviseTest, SaysWhereNoSoundMethodCouldCertify) {
+  const std::string text = AdviseOn("bicycle.yaml", "bicycle_safety.csv", " --inner").text;
+  EXPECT_THAT(text, ContainsRegex("the inner bound\n *half-width at step 12: [0-9.]+ m; no sound tube is below"));
+  EXPECT_THAT(text, ContainsRegex("no sound method could certify this with these data: of a system that agrees with "
+                                  "all of them, at step [0-9]+ it is not so that the slice keeps clear of obstacle 0"));
+}
+
+// The tube from X0 just may touch: pieces of X0 are certified, so no motion can.
+TEST_F(AdviseTest, SaysNothingOfTheKindWhereOneDoes) {
+  GapTask(scratch_);
+  const std::string decision = scratch_ / "decision.json";
+  Forereach("certify --json --config " + (scratch_ / "gap.yaml") + " --plan config/plans/bicycle_certified.csv > " +
+            decision);
+  const std::string text = Forereach("advise --inner " + decision + " 2>&1").text;
+  EXPECT_THAT(text, HasSubstr("no sound tube is below"));
+  EXPECT_THAT(text, Not(HasSubstr("no sound method")));
 }
 
 TEST_F(AdviseTest, NamesTheBoundOfTheDomain) {

@@ -1,5 +1,5 @@
 // The extremal residuals are admissible, and every tube of the certifier contains their rollouts.
-#include "research/limits/extremal.h"
+#include "forereach/certify/extremal.h"
 
 #include "tests/test.h"
 

@@ -1,10 +1,10 @@
-#include "research/limits/extremal.h"
+#include "forereach/certify/extremal.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace forereach::research {
+namespace forereach {
 
 ExtremalResiduals::ExtremalResiduals(const Declaration& declaration, const Observations& observations)
     : declaration_(declaration), observations_(observations), constant_(observations.num_states()) {
@@ -14,6 +14,12 @@ ExtremalResiduals::ExtremalResiduals(const Declaration& declaration, const Obser
         ((observations.lower.col(k).maxCoeff() - sigma) + (observations.upper.col(k).minCoeff() + sigma)) / 2;
     if (declaration.lipschitz.row(k).maxCoeff() > 0) varying_.push_back(k);
   }
+}
+
+std::vector<bool> ExtremalResiduals::UpperOf(int choice) const {
+  std::vector<bool> upper(static_cast<std::size_t>(observations_.num_states()));
+  for (std::size_t j = 0; j < varying_.size(); ++j) upper[static_cast<std::size_t>(varying_[j])] = choice >> j & 1;
+  return upper;
 }
 
 void ExtremalResiduals::Evaluate(int choice, const Eigen::VectorXd& z, std::vector<long double>& residual) const {
@@ -76,4 +82,4 @@ Eigen::MatrixXd CornersOf(const Eigen::VectorXd& center, const Eigen::VectorXd& 
   return states;
 }
 
-}  // namespace forereach::research
+}  // namespace forereach

@@ -10,14 +10,14 @@ the middle of what the observations leave. */
 
 #include <vector>
 
-#include <Eigen/Core>
+#include "forereach/sets/eigen.h"
 
 #include "forereach/certify/decision.h"
 #include "forereach/dynamics/model.h"
 #include "forereach/residual/declaration.h"
 #include "forereach/residual/observations.h"
 
-namespace forereach::research {
+namespace forereach {
 
 class ExtremalResiduals {
  public:
@@ -25,6 +25,9 @@ class ExtremalResiduals {
 
   /** 2^a. @pre a < 31 */
   [[nodiscard]] int count() const { return 1 << varying_.size(); }
+
+  /** Of each coordinate, whether choice c takes the upper extension. A constant coordinate: false. */
+  [[nodiscard]] std::vector<bool> UpperOf(int choice) const;
 
   /** r_k(z) of choice c in 0 .. count() - 1, in extended precision: bit j of c is 1 where the j-th coordinate that is
   not constant takes its upper extension. Choice 0 is the lower of all, count() - 1 the upper. Cost O(N a). */
@@ -49,4 +52,4 @@ column each; choice by choice. They are computed in double, each step rounded: t
 /** The center and corners of a box as columns, n-by-(1 + 2^w) with w half-widths that are not zero. */
 [[nodiscard]] Eigen::MatrixXd CornersOf(const Eigen::VectorXd& center, const Eigen::VectorXd& half_width);
 
-}  // namespace forereach::research
+}  // namespace forereach
