@@ -411,7 +411,7 @@ class Examination final {
     }
     ExamineEnd(decision, tube);
     ExamineSmoothing(decision, plan, tube);
-    ExamineRest(tube);
+    ExamineRest(*certifier, plan);
     ExamineLimits(plan, initial_set);
     ExamineStart(*certifier, initial_set);
     ExamineCoverage(tube);
@@ -532,15 +532,29 @@ class Examination final {
                             ", from a declaration that is too wide, or from data that are too far away";
   }
 
-  void ExamineRest(const Tube& tube) {
+  // From task.initial_set, or the planner's X0 where that is wider.
+  void ExamineRest(const Certifier& certifier, const Plan& plan) {
+    if (config_.problem->rest.empty()) return;
+    const Box& given = config_.initial_set;
+    const std::vector<double>& of_planner = config_.planner.initial_half_width;
+    Eigen::VectorXd center = (given.lower() + given.upper()) / 2, most = (given.upper() - given.lower()) / 2;
+    std::string from;
+    for (Eigen::Index k = 0; !config_.planner.goal.empty() && k < std::min(most.size(), std::ssize(of_planner)); ++k) {
+      const double half = of_planner[ToSize(k)] + config_.problem->declaration.VariableError(static_cast<int>(k));
+      if (half > most[k] * (1 + 1e-9)) from = " from planner.initial_half_width and declaration.state_error";
+      most[k] = std::max(most[k], half);
+    }
+    Tube tube;
+    static_cast<void>(certifier.Certify(plan, Zonotope::Enclose(Box(center - most, center + most)), {}, tube));
     for (const RestBound& bound : config_.problem->rest) {
       const std::string name = result_.states[ToSize(bound.coordinate)];
       for (int t = 0; t <= tube.length(); ++t) {
-        const double half = result_.half_widths[ToSize(t)][ToSize(bound.coordinate)];
+        const double half = tube.slice(t).HalfWidthUpper(bound.coordinate);
         if (half <= bound.tolerance) continue;
         Add("task.rest",
-            name + " is known only up to " + Up(half) + " after " + Count(t, "step") + ", and standing is at most " +
-                ToText(bound.tolerance) + ": a plan of that length does not provably end at rest",
+            name + " is known only up to " + Up(half) + " after " + Count(t, "step") + from +
+                ", and standing is at most " + ToText(bound.tolerance) +
+                ": a plan of that length does not provably end at rest",
             "raise the bound of " + name + ", if the robot's brakes take up what is left; or make the tube narrower",
             t > StepsThatCount());
         break;

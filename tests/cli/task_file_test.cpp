@@ -502,6 +502,13 @@ TEST_F(CheckTest, FindsABoundOfRestThatIsSmallerThanTheTube) {
   };
   EXPECT_THAT(with("0.099"), Exits(1, task_ + ":20: task.rest: vx is known only up to"));
   EXPECT_THAT(with("5"), Exits(0));
+  const auto planned = [&](const std::string& half_width) {
+    return with("5}\nplanner: {goal: [8, 0], goal_radius: 0.5, initial_half_width: [0.1, 0.1, " + half_width +
+                ", 0.1]");
+  };
+  EXPECT_THAT(planned("5.1"),
+              Exits(1, "vx is known only up to 5.1 after 0 steps from planner.initial_half_width and "));
+  EXPECT_THAT(planned("0.1"), Exits(0));
 }
 
 // The table is that of `certify` where there are no obstacles.
