@@ -5,8 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "tests/test.h"
-
 #include <fmt/format.h>
 
 #include "forereach/dynamics/models/named_residuals.h"
@@ -41,8 +39,7 @@ TEST_F(LoadConfig, ReadsWhatIsRequired) {
   EXPECT_EQ(Eigen::VectorXd(problem.transitions.z.row(1)), Numbers({1, 2, 2, 0.5, 0, -0.5}));
   EXPECT_EQ(Eigen::VectorXd(problem.transitions.x_next.row(1)), Numbers({1.3, 2.07, 2, 0.42}));
   EXPECT_EQ(problem.projection, Eigen::MatrixXd::Identity(2, 4));
-  ASSERT_EQ(config.obstacles.size(), 1u);
-  EXPECT_FIELDS(config.obstacles[0], (kind(), Obstacle::Kind::kCircle), (radius(), 0.8));
+  EXPECT_FIELDS(Only(config.obstacles), (kind(), Obstacle::Kind::kCircle), (radius(), 0.8));
   EXPECT_LE(config.initial_set.lower()[2], 0.9);
   EXPECT_GE(config.initial_set.upper()[2], 1.1);
   EXPECT_NEAR(config.initial_set.upper()[2], 1.1, 1e-15);
@@ -125,8 +122,7 @@ TEST_F(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
   EXPECT_THAT(error("vy: [-1, 1]", "speed: [-1, 1]"), HasSubstr("declaration.regions[0].in.speed: unknown key"));
   EXPECT_THAT(error("{vy: [-1, 1], vx: [0, 0.5]}", "{}"), HasSubstr("declaration.regions[0].in: names no state"));
   EXPECT_THAT(error(", lipschitz: {vx: {vy: 0.01}}", ""), HasSubstr("declaration.regions[0].lipschitz: missing"));
-  const std::string many = Replaced(good, "vx: [0, 0.5]", "px: [0, 1], py: [0, 1], vx: [0, 0.5]");
-  EXPECT_THAT(files_.Error(text(many)),
+  EXPECT_THAT(files_.Error(text(Replaced(good, "vx: [0, 0.5]", "px: [0, 1], py: [0, 1], vx: [0, 0.5]"))),
               HasSubstr("declaration.regions: cut 4 variables and 3 x 3 x 3 x 3 = 81 cells, has to be at most 3"));
   std::string fine;
   for (int i = 1; i <= 33; ++i)
@@ -498,8 +494,7 @@ TEST_F(LoadConfig, ReadsResidualsAsText) {
   EXPECT_EQ(residual.names.parameters, (Parameters{{"dt", 0.15, 0.15}, {"c", 0.1, 0.2}, {"k", 3, 3}}));
   EXPECT_EQ(residual.names.states, config.problem->model->state_names());
   EXPECT_EQ(residual.names.inputs, config.problem->model->input_names());
-  ASSERT_EQ(residual.names.definitions.size(), 1u);
-  EXPECT_EQ(residual.names.definitions[0].value.text, "hypot(vx, vy)");
+  EXPECT_EQ(Only(residual.names.definitions).value.text, "hypot(vx, vy)");
   std::vector<std::string> values;
   for (const ExpressionText& value : residual.values) values.push_back(value.text);
   EXPECT_EQ(values, (std::vector<std::string>{"k*ax", "0", "0", "-dt*c*vy*size"}));
@@ -514,10 +509,8 @@ TEST_F(LoadConfig, ReadsBallsAndInequalities) {
                                              "    - {coefficients: {ay: 2, vx: 1}, bound: 3}\n"
                                              "  input: {lower"));
   const Domain& domain = config.problem->domain;
-  ASSERT_EQ(domain.balls.size(), 1u);
-  EXPECT_FIELDS(domain.balls[0], (coordinates, (std::vector<int>{3, 4})), (center, Numbers({0.5, 0})), (radius, 2));
-  ASSERT_EQ(domain.inequalities.size(), 1u);
-  EXPECT_FIELDS(domain.inequalities[0], (coefficients, Numbers({0, 0, 1, 0, 0, 2})), (bound, 3));
+  EXPECT_FIELDS(Only(domain.balls), (coordinates, (std::vector<int>{3, 4})), (center, Numbers({0.5, 0})), (radius, 2));
+  EXPECT_FIELDS(Only(domain.inequalities), (coefficients, Numbers({0, 0, 1, 0, 0, 2})), (bound, 3));
 }
 
 TEST_F(LoadConfig, ReadsEveryObstacle) {

@@ -3,10 +3,7 @@
 
 #include <bit>
 
-#include "tests/test.h"
-
 #include "forereach/dynamics/models/named_models.h"
-#include "task/config.h"
 #include "tests/task/task_files.h"
 
 namespace forereach::csv_test {

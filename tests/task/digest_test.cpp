@@ -1,8 +1,6 @@
 // Digests: the same for the same data however it is written, another for other data.
 #include "task/canonical.h"
 
-#include "tests/test.h"
-
 #include "forereach/dynamics/models/named_models.h"
 #include "tests/task/task_files.h"
 

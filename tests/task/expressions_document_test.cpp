@@ -1,8 +1,6 @@
 // docs/expressions.md is true: its models load, its expressions have their values, its errors are what is said.
 #include <regex>
 
-#include "tests/test.h"
-
 #include "command_line/nearest.h"
 #include "forereach/dynamics/equations_header.h"
 #include "forereach/dynamics/expression.h"

@@ -10,10 +10,7 @@
 #include <cstdio>
 #include <mutex>
 
-#include "tests/test.h"
-
 #include "bus/reloading.h"
-#include "task/config.h"
 #include "task/csv.h"
 #include "tests/task/task_files.h"
 
@@ -74,7 +71,7 @@ TEST_F(FilesTest, AsTransitionsAreRefusedWithTheLineThatNamesThem) {
   TaskFiles files;
   ForEachStrangeFile([&](const std::string& path, const char* what) {
     const std::string error = files.ErrorWith("transitions: steps.csv", "transitions: " + path);
-    EXPECT_THAT(error, StartsWith("task.yaml:12: transitions: " + path + ": " + what));
+    EXPECT_THAT(error, StartsWith("12: transitions: " + path + ": " + what));
   });
 }
 

@@ -1,8 +1,6 @@
 // The models in config/models: each is there, says where it comes from, and has the values that other code computes.
 #include <Eigen/Dense>
 
-#include "tests/test.h"
-
 #include "forereach/numerics/size.h"
 #include "tests/paths.h"
 #include "tests/task/task_files.h"

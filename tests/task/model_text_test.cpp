@@ -1,5 +1,4 @@
 // Models as text in task files: what they mean, and what is said of those that mean nothing.
-#include "tests/test.h"
 
 #include "forereach/dynamics/expression.h"
 #include "task/canonical.h"
@@ -80,30 +79,27 @@ TEST_F(ModelTextTest, RatesNeedAnIntegrator) {
   EXPECT_EQ(Load(Replaced(rates, "rk4", "midpoint")).problem->model->text()->integrator,
             ModelText::Integrator::kMidpoint);
   EXPECT_EQ(Load(Replaced(rates, "rk4", "euler")).problem->model->text()->integrator, ModelText::Integrator::kEuler);
-  EXPECT_EQ(Error(Replaced(rates, "rk4", "rk5")), "task.yaml:5: model.integrator: rk5 is not known; did you mean rk4?");
+  EXPECT_EQ(Error(Replaced(rates, "rk4", "rk5")), "5: model.integrator: rk5 is not known; did you mean rk4?");
   EXPECT_EQ(Error(Replaced(rates, "  integrator: rk4\n", "")),
-            "task.yaml:2: model.integrator: missing: how the rates give the next state, one of euler, midpoint, rk4");
+            "2: model.integrator: missing: how the rates give the next state, one of euler, midpoint, rk4");
   EXPECT_EQ(Error(std::string(kModel) + "  integrator: rk4\n"),
-            "task.yaml:13: model.integrator: is for model.rate; model.next is the next state itself");
+            "13: model.integrator: is for model.rate; model.next is the next state itself");
   EXPECT_EQ(Error(std::string(kModel) + "  rate: {px: 1}\n  integrator: rk4\n"),
-            "task.yaml:2: model: has both next and rate; delete one of them");
+            "2: model: has both next and rate; delete one of them");
 }
 
 TEST_F(ModelTextTest, ErrorsInExpressionsNameLineAndColumn) {
-  EXPECT_EQ(ErrorWith("vx + dt*(ax", "vx + dt*(axx"),
-            "task.yaml:11:18: axx is not a name that is known here; did you mean ax?");
-  EXPECT_EQ(ErrorWith("dt*dt/2", "dtt*dt/2"), "task.yaml:6:11: dtt is not a name that is known here; did you mean dt?");
-  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*sn(ax)"),
-            "task.yaml:11:17: sn is not a function; did you mean sin?");
-  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*sin(ax, vx)"),
-            "task.yaml:11:17: sin has more arguments, has to have 1");
-  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*(ax"), "task.yaml:11:17: ( has no )");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax", "vx + dt*(axx"), "11:18: axx is not a name that is known here; did you mean ax?");
+  EXPECT_EQ(ErrorWith("dt*dt/2", "dtt*dt/2"), "6:11: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*sn(ax)"), "11:17: sn is not a function; did you mean sin?");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*sin(ax, vx)"), "11:17: sin has more arguments, has to have 1");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*(ax"), "11:17: ( has no )");
   // A definition is known behind it only.
   EXPECT_EQ(ErrorWith("half: dt*dt/2", "half: loss"),
-            "task.yaml:6:11: loss is not a name that is known here; did you mean mass?");
-  EXPECT_EQ(ErrorWith("half: dt*dt/2", "half: acceleration"),
-            "task.yaml:6:11: acceleration is not a name that is known here; known here: px, py, vx, vy, ax, ay, dt, "
-            "drag, mass, pi");
+            "6:11: loss is not a name that is known here; did you mean mass?");
+  EXPECT_EQ(
+      ErrorWith("half: dt*dt/2", "half: acceleration"),
+      "6:11: acceleration is not a name that is known here; known here: px, py, vx, vy, ax, ay, dt, drag, mass, pi");
 }
 
 // A hostile file costs neither minutes nor a message of its own size.
@@ -112,7 +108,7 @@ TEST_F(ModelTextTest, AnUnknownNameAmongManyIsAnsweredInShort) {
   for (int i = 0; i < 900; ++i) parameters += ", " + std::string(60, 'p') + std::to_string(i) + ": 1";
   const std::string model = Replaced(kModel, "drag: 0.5", parameters);
   const std::string error = Error(Replaced(model, "dt*dt/2", std::string(60000, 'z')));
-  EXPECT_THAT(error, AllOf(StartsWith("task.yaml:6:11: " + std::string(60, 'z') + "... is not a name that is known"),
+  EXPECT_THAT(error, AllOf(StartsWith("6:11: " + std::string(60, 'z') + "... is not a name that is known"),
                            HasSubstr("known here: px, py, vx, vy, ax, ay, dt, drag, "), HasSubstr(" more")));
   EXPECT_LT(error.size(), 8000u);
   EXPECT_THAT(Error(Replaced(model, "dt*dt/2", std::string(61, 'p') + "17")),
@@ -122,18 +118,16 @@ TEST_F(ModelTextTest, AnUnknownNameAmongManyIsAnsweredInShort) {
 TEST_F(ModelTextTest, PlacesAreRightHoweverYamlWritesAText) {
   const std::string line = "    vx: vx + dt*(ax - loss*vx)\n";
   const auto error = [&](const std::string& other) { return ErrorWith(line, other); };
-  EXPECT_EQ(error("    vx: \"vx + dtt\"\n"), "task.yaml:11:15: dtt is not a name that is known here; did you mean dt?");
-  EXPECT_EQ(error("    vx: 'vx + dtt'\n"), "task.yaml:11:15: dtt is not a name that is known here; did you mean dt?");
-  EXPECT_EQ(error("    vx: vx\n      + dtt\n"),
-            "task.yaml:12:9: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: \"vx + dtt\"\n"), "11:15: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: 'vx + dtt'\n"), "11:15: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: vx\n      + dtt\n"), "12:9: dtt is not a name that is known here; did you mean dt?");
   EXPECT_EQ(error("    vx: |\n      vx\n        + dtt\n"),
-            "task.yaml:13:11: dtt is not a name that is known here; did you mean dt?");
+            "13:11: dtt is not a name that is known here; did you mean dt?");
   EXPECT_EQ(error("    vx: >-\n      vx +\n\n      dtt\n"),
-            "task.yaml:14:7: dtt is not a name that is known here; did you mean dt?");
-  EXPECT_EQ(error("    vx: |\n      vx +\n"), "task.yaml:12:11: expected a number, a name or (, found the end");
+            "14:7: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: |\n      vx +\n"), "12:11: expected a number, a name or (, found the end");
   // Behind an escape the place of the whole text is given.
-  EXPECT_EQ(error("    vx: \"vx\\t+ dtt\"\n"),
-            "task.yaml:11:14: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: \"vx\\t+ dtt\"\n"), "11:14: dtt is not a name that is known here; did you mean dt?");
   EXPECT_EQ(error("    vx: 0\n"), "");
   EXPECT_EQ(error("    vx: |\n      vx\n        + dt*(\n        ax)\n"), "");
 }
@@ -144,46 +138,45 @@ TEST_F(ModelTextTest, FunctionsForResidualsAreRefusedWithTheirPlace) {
   const std::string model = Replaced(kModel, "    half: dt*dt/2\n", soft);
   EXPECT_EQ(files_.Error(model + WithoutModel() + "residual: {add: {vx: 0.01*soft}}\n"), "");
   EXPECT_EQ(Error(Replaced(model, "half: dt*dt/2\n", "half: dt*dt/2 + 0*soft\n")),
-            "task.yaml:6:16: softplus and smooth_gate are for residuals and the planner's laws: the model, limits and "
-            "places need derivatives");
+            "6:16: softplus and smooth_gate are for residuals and the planner's laws: the model, limits and places "
+            "need derivatives");
 }
 
 TEST_F(ModelTextTest, ACommaInsideBracesEndsAnExpression) {
   const std::string next = "  next:\n    px: px + dt*vx + half*ax\n";
   const std::string flow = std::string(kModel).substr(0, std::string(kModel).find("  next:"));
   EXPECT_EQ(Error(flow + "  next: {px: hypot(px, vx), py: py, vx: vx, vy: vy}\n"),
-            "task.yaml:8: model.next.vx): unknown key; put an expression with a comma inside { } into quotes; did you "
-            "mean vx?");
+            "8: model.next.vx): unknown key; put an expression with a comma inside { } into quotes; did you mean vx?");
   EXPECT_EQ(Error(flow + "  next: {px: \"hypot(px, vx)\", py: py, vx: vx, vy: vy}\n"), "");
 }
 
 TEST_F(ModelTextTest, RefusesNamesThatAreNoNamesOrAreTaken) {
   EXPECT_EQ(ErrorWith("{px: m,", "{p-x: m,"),
-            "task.yaml:2: model.states.p-x: is not a name; a name has letters, digits and underscores, and does not "
-            "begin with a digit");
+            "2: model.states.p-x: is not a name; a name has letters, digits and underscores, and does not begin with a "
+            "digit");
   EXPECT_EQ(ErrorWith("drag: 0.5", "sin: 0.5"),
-            "task.yaml:4: model.parameters.sin: sin is a function of the language; choose another name");
+            "4: model.parameters.sin: sin is a function of the language; choose another name");
   EXPECT_EQ(ErrorWith("drag: 0.5", "pi: 3"),
-            "task.yaml:4: model.parameters.pi: pi is a number of the language; choose another name");
+            "4: model.parameters.pi: pi is a number of the language; choose another name");
   EXPECT_EQ(ErrorWith("drag: 0.5", "px: 0.5"),
-            "task.yaml:4: model.parameters.px: is a name of model.states already; choose another name");
+            "4: model.parameters.px: is a name of model.states already; choose another name");
   EXPECT_EQ(ErrorWith("{ax: m/s^2, ay", "{vx: m/s^2, ay"),
-            "task.yaml:3: model.inputs.vx: is a name of model.states already; choose another name");
+            "3: model.inputs.vx: is a name of model.states already; choose another name");
   EXPECT_EQ(ErrorWith("    half: dt*dt/2", "    drag: dt*dt/2"),
-            "task.yaml:6: model.let.drag: is a name of model.parameters already; choose another name");
+            "6: model.let.drag: is a name of model.parameters already; choose another name");
   EXPECT_EQ(ErrorWith("{ax: m/s^2, ay", "{px_next: m/s^2, ay"),
-            "task.yaml:3: model.inputs.px_next: is the column of the state px after a step; choose another name");
+            "3: model.inputs.px_next: is the column of the state px after a step; choose another name");
   EXPECT_EQ(ErrorWith("{px: m,", "{px: m, px: m,"),
-            "task.yaml:2: model.states.px: duplicate key, first in line 2; delete one of them");
+            "2: model.states.px: duplicate key, first in line 2; delete one of them");
   const std::string longest(64, 'a');
   EXPECT_EQ(ErrorWith("drag: 0.5", "drag: 0.5, " + longest + ": 1"), "");
   EXPECT_EQ(ErrorWith("drag: 0.5", "drag: 0.5, a" + longest + ": 1"),
-            "task.yaml:4: model.parameters." + longest + ": ...: the name has 65 letters, at most 64 are allowed");
+            "4: model.parameters." + longest + ": ...: the name has 65 letters, at most 64 are allowed");
 }
 
 // They are written into headers and new tasks, as comments.
 TEST_F(ModelTextTest, UnitsAreOneShortLine) {
-  const std::string error = "task.yaml:2: model.states.px: a unit has at most 64 bytes and no control characters";
+  const std::string error = "2: model.states.px: a unit has at most 64 bytes and no control characters";
   EXPECT_EQ(ErrorWith("px: m,", "px: \"m\\nx\","), error);
   EXPECT_EQ(ErrorWith("px: m,", "px: \"m\\r\","), error);
   EXPECT_EQ(ErrorWith("px: m,", "px: " + std::string(65, 'm') + ","), error);
@@ -202,54 +195,48 @@ TEST_F(ModelTextTest, ExpressionsAreBoundedInAll) {
   constexpr std::size_t kMost = kLargestExpressions / kLargestExpression;
   EXPECT_EQ(with(kMost - 1), "");
   EXPECT_THAT(with(kMost + 1),
-              AllOf(StartsWith("task.yaml:23: model.let.d16: the expressions of this file, up to this one, have "),
+              AllOf(StartsWith("23: model.let.d16: the expressions of this file, up to this one, have "),
                     HasSubstr(" bytes, at most 1048576 are allowed")));
 }
 
 TEST_F(ModelTextTest, EachStateHasItsEquation) {
   EXPECT_EQ(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", ""),
-            "task.yaml:9: model.next.vx: missing: each state needs its equation");
-  EXPECT_EQ(ErrorWith("    vx: vx +", "    vz: vx +"), "task.yaml:11: model.next.vz: unknown key; did you mean vx?");
+            "9: model.next.vx: missing: each state needs its equation");
+  EXPECT_EQ(ErrorWith("    vx: vx +", "    vz: vx +"), "11: model.next.vz: unknown key; did you mean vx?");
   EXPECT_EQ(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", "    vx: [1, 2]\n"),
-            "task.yaml:11: model.next.vx: a list is not an expression");
+            "11: model.next.vx: a list is not an expression");
   EXPECT_THAT(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", "    vx:\n"),
               HasSubstr("model.next.vx: nothing is not an expression"));
 }
 
 TEST_F(ModelTextTest, NamesARequiredKeyThatIsMissing) {
-  EXPECT_EQ(ErrorWith("dt: 0.15, ", ""), "task.yaml:4: model.parameters.dt: missing: the step of the model, in s");
+  EXPECT_EQ(ErrorWith("dt: 0.15, ", ""), "4: model.parameters.dt: missing: the step of the model, in s");
   EXPECT_EQ(ErrorWith("  parameters: {dt: 0.15, drag: 0.5, mass: [1, 1.2]}\n", ""),
-            "task.yaml:2: model.parameters.dt: missing: the step of the model, in s");
+            "2: model.parameters.dt: missing: the step of the model, in s");
   EXPECT_EQ(ErrorWith("  inputs: {ax: m/s^2, ay: m/s^2}\n", ""),
-            "task.yaml:2: model.inputs: missing: a model as text needs this key");
-  EXPECT_EQ(ErrorWith("{ax: m/s^2, ay: m/s^2}", "{}"),
-            "task.yaml:3: model.inputs: has 0 entries, which is outside [1, 8]");
-  EXPECT_EQ(Error("model: {dt: 0.15}\n"),
-            "task.yaml:1: model: has no model: write name, file, or states with their equations");
-  EXPECT_EQ(Error("model: {name: point_mass}\n"),
-            "task.yaml:1: model.dt: missing: The time from one control to the next.");
+            "2: model.inputs: missing: a model as text needs this key");
+  EXPECT_EQ(ErrorWith("{ax: m/s^2, ay: m/s^2}", "{}"), "3: model.inputs: has 0 entries, which is outside [1, 8]");
+  EXPECT_EQ(Error("model: {dt: 0.15}\n"), "1: model: has no model: write name, file, or states with their equations");
+  EXPECT_EQ(Error("model: {name: point_mass}\n"), "1: model.dt: missing: The time from one control to the next.");
 }
 
 TEST_F(ModelTextTest, TheStepIsOneNumberInItsRange) {
   const auto error = [&](const std::string& step) { return ErrorWith("dt: 0.15", "dt: " + step); };
   EXPECT_EQ(error("60"), "");
-  EXPECT_EQ(error("60.001"), "task.yaml:4: model.parameters.dt: 60.001 is outside (0, 60], its unit is s");
+  EXPECT_EQ(error("60.001"), "4: model.parameters.dt: 60.001 is outside (0, 60], its unit is s");
   EXPECT_EQ(error("1e-300"), "");
-  EXPECT_EQ(error("0"), "task.yaml:4: model.parameters.dt: 0 is outside (0, 60], its unit is s");
-  EXPECT_EQ(error("-0.1"), "task.yaml:4: model.parameters.dt: -0.1 is outside (0, 60], its unit is s");
-  EXPECT_EQ(error("[0.1, 0.2]"),
-            "task.yaml:4: model.parameters.dt: is a list, has to be one number: the step is exact");
+  EXPECT_EQ(error("0"), "4: model.parameters.dt: 0 is outside (0, 60], its unit is s");
+  EXPECT_EQ(error("-0.1"), "4: model.parameters.dt: -0.1 is outside (0, 60], its unit is s");
+  EXPECT_EQ(error("[0.1, 0.2]"), "4: model.parameters.dt: is a list, has to be one number: the step is exact");
 }
 
 TEST_F(ModelTextTest, ParametersAreNumbersOrRanges) {
   const auto error = [&](const std::string& mass) { return ErrorWith("mass: [1, 1.2]", "mass: " + mass); };
   EXPECT_EQ(error("[1, 1]"), "");
-  EXPECT_EQ(error("[1, 0.9]"),
-            "task.yaml:4: model.parameters.mass[1]: 0.9 is outside [1, inf), below model.parameters.mass[0]");
-  EXPECT_EQ(error("[1, 2, 3]"), "task.yaml:4: model.parameters.mass: has 3 entries, which is outside [2, 2]");
-  EXPECT_EQ(error(".inf"),
-            "task.yaml:4: model.parameters.mass: .inf is not a finite number; write a number in (-inf, inf)");
-  EXPECT_EQ(error("heavy"), "task.yaml:4: model.parameters.mass: heavy is not a number; write a number in (-inf, inf)");
+  EXPECT_EQ(error("[1, 0.9]"), "4: model.parameters.mass[1]: 0.9 is outside [1, inf), below model.parameters.mass[0]");
+  EXPECT_EQ(error("[1, 2, 3]"), "4: model.parameters.mass: has 3 entries, which is outside [2, 2]");
+  EXPECT_EQ(error(".inf"), "4: model.parameters.mass: .inf is not a finite number; write a number in (-inf, inf)");
+  EXPECT_EQ(error("heavy"), "4: model.parameters.mass: heavy is not a number; write a number in (-inf, inf)");
 }
 
 std::string ManyStates(int count) {
@@ -264,17 +251,16 @@ std::string ManyStates(int count) {
 
 TEST_F(ModelTextTest, AtMostSixteenStates) {
   EXPECT_THAT(Error(ManyStates(16)), HasSubstr("domain.state.lower: has 4 entries, has to have 16"));
-  EXPECT_EQ(Error(ManyStates(17)), "task.yaml:1: model.states: has 17 entries, which is outside [1, 16]");
+  EXPECT_EQ(Error(ManyStates(17)), "1: model.states: has 17 entries, which is outside [1, 16]");
 }
 
 TEST_F(ModelTextTest, RefusesKeysOfTwoFormsOfAModel) {
-  EXPECT_EQ(Error(std::string(kModel) + "  dt: 0.15\n"),
-            "task.yaml:13: model.dt: is model.parameters.dt of a model as text");
+  EXPECT_EQ(Error(std::string(kModel) + "  dt: 0.15\n"), "13: model.dt: is model.parameters.dt of a model as text");
   EXPECT_EQ(Error(std::string(kModel) + "  name: point_mass\n  dt: 0.15\n"),
-            "task.yaml:2: model.states: is for a model as text, this one has a name");
-  EXPECT_EQ(Error(std::string(kModel) + "  wheelbase: 1\n"), "task.yaml:13: model.wheelbase: is for kinematic_bicycle");
+            "2: model.states: is for a model as text, this one has a name");
+  EXPECT_EQ(Error(std::string(kModel) + "  wheelbase: 1\n"), "13: model.wheelbase: is for kinematic_bicycle");
   EXPECT_EQ(Error("model: {file: drag.yaml, states: {x: m}}\n"),
-            "task.yaml:1: model.states: stands in the model file, not beside its name");
+            "1: model.states: stands in the model file, not beside its name");
 }
 
 struct ModelFileTest : ModelTextTest {
@@ -293,9 +279,9 @@ TEST_F(ModelFileTest, TheTaskReplacesParameters) {
   const std::vector<ModelText::Parameter> expected{{"dt", 0.2, 0.2}, {"drag", 0, 1}, {"mass", 2, 2}};
   EXPECT_EQ(config.problem->model->text()->parameters, expected);
   EXPECT_EQ(Error("model: {file: drag.yaml, parameters: {mas: 2}}\n"),
-            "task.yaml:1: model.parameters.mas: is not a parameter of drag.yaml; did you mean mass?");
+            "1: model.parameters.mas: is not a parameter of drag.yaml; did you mean mass?");
   EXPECT_EQ(Error("model: {file: drag.yaml, parameters: {dt: 61}}\n"),
-            "task.yaml:1: model.parameters.dt: 61 is outside (0, 60], its unit is s");
+            "1: model.parameters.dt: 61 is outside (0, 60], its unit is s");
 }
 
 TEST_F(ModelFileTest, ChangesTheDigestOfTheTaskWithItsBytes) {
@@ -310,7 +296,7 @@ TEST_F(ModelFileTest, ErrorsNameTheFileThatIsWrong) {
   const std::string path = files_.directory() / "", directory = path.substr(0, path.size() - 1);
   EXPECT_THAT(
       Error("model: {file: drg.yaml}\n"),
-      AllOf(StartsWith("task.yaml:1: model.file: drg.yaml is not in " + directory + " nor in /"),
+      AllOf(StartsWith("1: model.file: drg.yaml is not in " + directory + " nor in /"),
             HasSubstr("/share/forereach/config (which does not exist)"), HasSubstr("; did you mean drag.yaml?")));
   files_.directory().Write("drag.yaml", Replaced(kModel, "vx + dt*(ax", "vx + dt*(axx"));
   EXPECT_EQ(Error("model: {file: drag.yaml}\n"),
@@ -364,18 +350,16 @@ TEST_F(AnglesTest, AreStatesThatTheEquationsDoNotTellApart) {
   EXPECT_NE(config.grounds.model, none.grounds.model);
   EXPECT_EQ(files_.Load(Turning("  angles: []\n"), kNoTurn).grounds.model, none.grounds.model);
   EXPECT_EQ(Error(Turning("  angles: [thetta]\n")),
-            "task.yaml:6: model.angles[0]: thetta is not a coordinate; did you mean theta?");
+            "6: model.angles[0]: thetta is not a coordinate; did you mean theta?");
   EXPECT_THAT(Error(Turning("  angles: [v]\n")),
-              StartsWith("task.yaml:5:13: angles: v: the equation of x is not seen to be the same after a turn of it "
-                         "by 2 pi"));
+              StartsWith("5:13: angles: v: the equation of x is not seen to be the same after a turn of it by 2 pi"));
   EXPECT_THAT(Error(Turning("  angles: [omega]\n")), HasSubstr("model.angles[0]: omega is not a coordinate"));
 }
 
 TEST_F(AnglesTest, AreNotCoordinatesOfObstacles) {
   EXPECT_EQ(
       Error(Turning("  angles: [theta, x]\n")),
-      "task.yaml:14: task.projection: depends on x, which is one of model.angles: how often an angle has turned is "
-      "not known");
+      "14: task.projection: depends on x, which is one of model.angles: how often an angle has turned is not known");
 }
 
 TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
@@ -383,10 +367,9 @@ TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
     return Turning("  angles: [theta]\n") + "  limits: [{name: wall, that: " + that + ", at_most: 2}]\n";
   };
   EXPECT_EQ(Error(with("v*cos(theta)")), "");
-  EXPECT_EQ(
-      Error(with("x + theta")),
-      "task.yaml:17:31: limits: wall is not seen to be the same after a turn of the angle theta by 2 pi: write it "
-      "with sin, cos or tan of it");
+  EXPECT_EQ(Error(with("x + theta")),
+            "17:31: limits: wall is not seen to be the same after a turn of the angle theta by 2 pi: write it with "
+            "sin, cos or tan of it");
 }
 
 // The line of the file, not the row from 0.
@@ -416,8 +399,8 @@ TEST_F(AnglesTest, AResidualIsTheSameAfterATurn) {
     EXPECT_EQ(Error(beyond("0.1*theta", "3.14")), "");
     EXPECT_EQ(Error(beyond("0.1*sin(theta)", "3.15")), "");
     EXPECT_THAT(Error(beyond("0.1*theta", "3.15")),
-                MatchesRegex("task.yaml:17:[0-9]+: the residual of v is not seen to be the same after a turn of the "
-                             "angle theta by 2 pi: write it with sin, cos or tan of it"));
+                MatchesRegex("17:[0-9]+: the residual of v is not seen to be the same after a turn of the angle theta "
+                             "by 2 pi: write it with sin, cos or tan of it"));
   }
 }
 
@@ -428,8 +411,8 @@ TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
   };
   EXPECT_EQ(Error(with("y + sin(theta)")), "");
   EXPECT_EQ(Error(with("y + theta")),
-            "task.yaml:14:38: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
-            "2 pi: write it with sin, cos or tan of it");
+            "14:38: body: the place y + theta is not seen to be the same after a turn of the angle theta by 2 pi: "
+            "write it with sin, cos or tan of it");
 }
 
 TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {
@@ -442,16 +425,15 @@ TEST_F(AnglesTest, ACompiledModelTakesAnglesToo) {
   const auto task = [](const std::string& model) { return TaskFor(model, 6, 2, "x, y"); };
   const std::string columns =
       "x,y,theta,v,a,delta,jerk,steer_rate,x_next,y_next,theta_next,v_next,a_next,delta_next\n0,0,0,0,0,0,0,0,0,0,-6.2,"
-      "0,"
-      "0,0\n";
+      "0,0,0\n";
   const auto model = [](const std::string& angles) {
     return "model: {name: kinematic_bicycle, dt: 0.1, wheelbase: 2, angles: [" + angles + "]}\n";
   };
   EXPECT_EQ(files_.Load(task(model("theta")), columns).problem->model->angles(), std::vector<int>{2});
-  EXPECT_EQ(Error(task(model("teta")), columns), "task.yaml:1: model.angles: teta is no state; did you mean theta?");
+  EXPECT_EQ(Error(task(model("teta")), columns), "1: model.angles: teta is no state; did you mean theta?");
   EXPECT_THAT(Error(task(model("v")), columns), HasSubstr("angles: v: the equation of x"));
   EXPECT_EQ(Error(TaskFor("model: {name: point_mass, dt: 0.1, angles: [px]}\n", 4, 2, "px, py")),
-            "task.yaml:1: model.angles: no state of point_mass is an angle");
+            "1: model.angles: no state of point_mass is an angle");
 }
 
 TEST_F(AnglesTest, OfAModelFileMayBeReplaced) {
@@ -466,7 +448,7 @@ TEST_F(AnglesTest, OfAModelFileMayBeReplaced) {
   EXPECT_EQ(load("").problem->model->angles(), std::vector<int>{2});
   EXPECT_TRUE(load(", angles: []").problem->model->angles().empty());
   EXPECT_THAT(Error(TaskFor("model: {file: model.yaml, angles: [u]}\n", 3, 1, "x, y"), steps),
-              HasSubstr("task.yaml:1: model.angles: u is no state"));
+              HasSubstr("1: model.angles: u is no state"));
 }
 
 }  // namespace forereach::model_text_test

@@ -1,11 +1,9 @@
 // The tasks in config/ have the described outcomes, and the README there agrees with the code.
-#include "tests/test.h"
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
 #include "forereach/dynamics/text_model.h"
 #include "simulator/target.h"
-#include "task/config.h"
 #include "task/schema.h"
 #include "tests/paths.h"
 #include "tests/task/task_files.h"
@@ -168,8 +166,7 @@ TEST(Shipped, AnArmReachesPastAPost) {
   EXPECT_EQ(reaches.outcome, Outcome::kCertified) << Explain(reaches, *config.problem);
   EXPECT_FIELDS(reaches, (obstacle, 0), (part, 1));
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(1.02, 1.13), 0.08)};
-  const Decision touches = Decide(config, plan);
-  EXPECT_FIELDS(touches, (cause, Cause::kObstacle), (part, 1));
+  EXPECT_FIELDS(Decide(config, plan), (cause, Cause::kObstacle), (part, 1));
 }
 
 // What a robot on the bus drives has to end standing; coasting does not, standing still does.
@@ -208,7 +205,7 @@ TEST(Shipped, TheReadmesErrorsAreThoseItQuotes) {
   for (const std::string& error : {files.Error(Replaced(task, "vx: {vx: 0.02", "vx: {vx: -0.02"), steps),
                                    files.Error(Replaced(task, "{lower: [-1, -1]", "{lower: [-1]"), steps),
                                    files.Error(task, Replaced(steps, "1,2,2.0,", "1,2,3.5,"))})
-    EXPECT_THAT(readme, HasSubstr("\n" + error + "\n"));
+    EXPECT_THAT(readme, AnyOf(HasSubstr("\n" + error + "\n"), HasSubstr("\ntask.yaml:" + error + "\n")));
 }
 
 }  // namespace forereach::shipped_test

@@ -3,7 +3,6 @@
 
 #include "task/config.h"
 #include "tests/library_texts.h"
-#include "tests/test.h"
 
 namespace forereach {
 
@@ -57,11 +56,12 @@ class TaskFiles {
     directory_.Write("steps.csv", transitions);
     return LoadConfig(directory_.Write("task.yaml", task));
   }
-  /** What LoadConfig says, with the directory cut off; empty if it accepts the file. */
+  /** What LoadConfig says, without "task.yaml:" if it is of that file; empty if it accepts the file. */
   std::string Error(const std::string& task, const std::string& transitions = kTransitions) const {
     std::string error = directory_.Cut(Thrown<ConfigError>([&] { (void)Load(task, transitions); }));
     ExpectNoTextOfALibrary(error);
-    return error;
+    EXPECT_THAT(error, Not(ContainsRegex("^[0-9 ]"))) << "it names a file";
+    return error.starts_with("task.yaml:") ? error.substr(10) : error;
   }
   /** The error of the good task file with `to` in the place of `from`. */
   std::string ErrorWith(const std::string& from, const std::string& to) const {
