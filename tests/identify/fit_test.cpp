@@ -22,12 +22,12 @@ ModelText Pendulum(double length, double damping, double unused = 1) {
           .integrator = ModelText::Integrator::kRk4};
 }
 
-Transitions Drive(const ModelText& truth, unsigned seed, double noise) {
+Transitions Drive(const ModelText& truth, unsigned seed, double noise, Eigen::Index count = 300) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
   const auto model = MakeTextModel(truth);
-  Transitions data{Eigen::MatrixXd(300, 3), Eigen::MatrixXd(300, 2)};
-  for (Eigen::Index i = 0; i < 300; ++i) {
+  Transitions data{Eigen::MatrixXd(count, 3), Eigen::MatrixXd(count, 2)};
+  for (Eigen::Index i = 0; i < count; ++i) {
     Eigen::Vector3d z(2 * uniform(random), 3 * uniform(random), uniform(random));
     Eigen::Vector2d next;
     model->Evaluate({z.data(), 3}, {next.data(), 2});
@@ -237,7 +237,7 @@ TEST(FitDeviation, AgreesWithAJackknife) {
   const unsigned seed = SeedOf(12);
   SCOPED_TRACE("seed " + std::to_string(seed));
   const ModelText start = Pendulum(1.2, 0.1);
-  Transitions all = Drive(Pendulum(0.8, 0.3), seed, 0);
+  Transitions all = Drive(Pendulum(0.8, 0.3), seed, 0, 150);
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (Eigen::Index i = 0; i < all.x_next.rows(); ++i)

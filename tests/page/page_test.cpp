@@ -1,4 +1,3 @@
-#include "tests/test.h"
 
 #include "forereach/numerics/parallel.h"
 #include "page/columns.h"
@@ -6,7 +5,6 @@
 #include "page/gather.h"
 #include "page/write.h"
 #include "records/database.h"
-#include "records/interpreter.h"
 #include "tests/cli/program.h"
 #include "tests/records/course.h"
 #include "tests/records/logs.h"
@@ -309,9 +307,10 @@ TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
 }
 
 TEST_F(ManyRunsTest, APageMadeOnOneCoreIsTheSame) {
-  const Output first = Report("first.html", "--advice-seconds 1000");
-  EXPECT_THAT(first, Exits(0, std::to_string(2 * kCourseDecisions) + " decisions", ", 2 runs",
-                           "two.lcmlog: is no LCM event log"));
+  for (const char* log : {"night/a/one.lcmlog", "night/b/one.lcmlog"})  // the first quarter, as the search takes long
+    std::filesystem::resize_file(directory_ / log, std::filesystem::file_size(kCourseLog) / 4);
+  EXPECT_THAT(Report("first.html", "--advice-seconds 1000"),
+              Exits(0, "50 decisions", ", 2 runs", "two.lcmlog: is no LCM event log"));
   EXPECT_EQ(Report("fresh.html", "--advice-seconds 1000 --jobs 1").code, 0);
   EXPECT_EQ(Read(directory_ / "first.html"), Read(directory_ / "fresh.html"));
 }
@@ -319,7 +318,7 @@ TEST_F(ManyRunsTest, APageMadeOnOneCoreIsTheSame) {
 TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
   const ScratchDirectory directory;
   const std::string page = directory / "a page.html",
-                    report = "report '" + kCourseLog + "' --config '" + kCourseTask + "' --out '";
+                    report = "report --advice-seconds 0 '" + kCourseLog + "' --config '" + kCourseTask + "' --out '";
   EXPECT_THAT(Forereach(report + page + "' 2>&1"), Exits(0, std::to_string(kCourseDecisions) + " decisions"));
   EXPECT_THAT(Read(page), StartsWith("<!DOCTYPE html>"));
   directory.Write("a page.html", "mine");
@@ -372,9 +371,8 @@ TEST(WriteTest, ALogNamedLikeAKeyIsWritten) {
 }
 
 TEST(WriteTest, PolicyForbidsRequests) {
-  const std::string html = PageHtml({});
-  EXPECT_THAT(html, AllOf(HasSubstr("default-src 'none'"), HasSubstr("script-src 'sha256-"),
-                          Not(HasSubstr("unsafe-inline")), Not(HasSubstr(" src=\"http"))));
+  EXPECT_THAT(PageHtml({}), AllOf(HasSubstr("default-src 'none'"), HasSubstr("script-src 'sha256-"),
+                                  Not(HasSubstr("unsafe-inline")), Not(HasSubstr(" src=\"http"))));
 }
 
 // A browser keeps other characters in texts twice as large, and takes twice as long over what is next to them.
