@@ -195,11 +195,12 @@ void NestedProgram::Arrange(const Program& program, std::span<const unsigned cha
       const auto i = ToSize(one.node);
       const Operation& n = program.nodes[i];
       const auto place_of = [&](int node) { return nested ? PairPlace(node) : OuterPlace(node); };
-      Operands& operands = operands_.emplace_back(place_of(n.a), -1);
+      int other = -1;
       if (n.op != Op::kSin)
-        operands.b = place_of(n.has_second() ? n.b : n.a);
+        other = place_of(n.has_second() ? n.b : n.a);
       else if (tangent[i] >= 0)
-        operands.b = place_[ToSize(tangent[i])] = Take(width);
+        other = place_[ToSize(tangent[i])] = Take(width);
+      operands_.push_back({place_of(n.a), other});
     }
     if (!nested && (end - first) % 2 != 0) {  // the last one once more
       operands_.push_back(operands_.back());
