@@ -21,8 +21,8 @@ TEST_F(ErrorTest, AnUnknownKeyIsAnErrorThatSuggestsTheNearest) {
   EXPECT_EQ(After("planer: {}\n"), "20: planer: unknown key; did you mean planner?");
   EXPECT_EQ(After("gate: {colour: 3}\n"),
             "20: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
-            "decision_budget_ms, queue, mode, advice, arming, robot_timeout_ms, max_clock_jump_ms, max_clock_error_ms, "
-            "obstacles, obstacles_timeout_ms, obstacles_lost_ms, learn, require_stop, state");
+            "decision_budget_ms, max_pieces, queue, mode, advice, arming, robot_timeout_ms, max_clock_jump_ms, "
+            "max_clock_error_ms, obstacles, obstacles_timeout_ms, obstacles_lost_ms, learn, require_stop, state");
   EXPECT_EQ(With("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
             "9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");
   EXPECT_EQ(With("{vx: 0.1, vy", "{vx: 0.1, v_y"), "9: declaration.lipschitz.vx.v_y: unknown key; did you mean vy?");
