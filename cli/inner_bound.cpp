@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include "forereach/certify/extremal.h"
 #include "forereach/numerics/text.h"
