@@ -60,7 +60,7 @@ void AddAdvice(const ReportArguments& options, const std::vector<std::unique_ptr
   for (std::size_t run = 0; run < read.size(); ++run) {
     if (chosen[run].empty()) continue;
     std::map<std::string, std::size_t> row_of;  // by the event's name
-    for (const std::size_t row : chosen[run]) row_of.emplace(EventName(page.decisions[row]), row);
+    for (const std::size_t row : chosen[run]) row_of.emplace(EventNameOf(page.decisions[row]), row);
     runs[run] = read[run]->abstentions.Finish(read[run]->tasks);
     std::erase_if(runs[run].all, [&](const RecordedAbstention& each) { return !row_of.contains(each.event); });
     for (const RecordedAbstention& each : runs[run].all) rows[run].push_back(row_of.at(each.event));

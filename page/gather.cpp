@@ -389,7 +389,7 @@ std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::si
   return LastDecisions(page, most, [](const PageDecision& row) { return !IsCertified(row); });
 }
 
-std::string EventName(const PageDecision& decision) {
+std::string EventNameOf(const PageDecision& decision) {
   return fmt::format("{} event {}", decision.log_file, decision.event_number);
 }
 
@@ -398,7 +398,7 @@ PageRun GatherDetails(PagePass& pass, const PageRun& page, const std::vector<std
   PageRun made;
   made.tasks = page.tasks;  // so that their places are the page's
   std::map<std::string, std::size_t> wanted;
-  for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i]), i);
+  for (const std::size_t i : decisions) wanted.emplace(EventNameOf(page.decisions[i]), i);
   DetailMaker maker(bytes, threads, made);
   auto& entries = pass.cases.entries();
   for (auto entry = entries.begin(); entry != entries.end(); entry = entries.erase(entry))

@@ -98,7 +98,7 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& bytes);
 [[nodiscard]] std::vector<std::vector<std::size_t>> ChooseAdvised(const PageRun& page, std::size_t most);
 
 /** Names the event of a decision as a Timeline does that names files. */
-[[nodiscard]] std::string EventName(const PageDecision& decision);
+[[nodiscard]] std::string EventNameOf(const PageDecision& decision);
 
 /** When the last `most` of these times begin; the least number if there are no more. */
 [[nodiscard]] std::int64_t BeginOfLast(std::vector<std::int64_t> times, std::size_t most);

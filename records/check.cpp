@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -26,7 +27,79 @@ namespace {
 
 constexpr std::size_t kMaxListed = 20;
 
-enum class Seen : std::uint8_t { kNot, kOther, kSame };
+constexpr std::int64_t kBlock = EventNumbers::kBlock;
+
+// The rows of one log file in a database, of which those around one event are in the memory.
+class RecordedRows {
+ public:
+  RecordedRows(Database& database, std::string log_file) : database_(database), log_file_(std::move(log_file)) {}
+
+  // Those of the events around this one.
+  const Rows& Around(std::int64_t number) {
+    if (std::exchange(block_, number / kBlock) != number / kBlock) {
+      const std::int64_t first = *block_ * kBlock;
+      rows_ = database_.ReadRange(log_file_, *block_ > 0 ? first : first - (kBlock - 1),
+                                  *block_ < 0 ? first : first + (kBlock - 1));
+      references_.clear();
+      for (const auto& row : rows_.decisions) references_.emplace(row.event.event_number, row.event.digest);
+      for (const auto& row : rows_.events) references_.emplace(row.event.event_number, row.event.digest);
+      for (const auto& row : rows_.gaps) references_.emplace(row.event.event_number, row.event.digest);
+    }
+    return rows_;
+  }
+  // The digests with this number, or all of this block.
+  const std::set<std::pair<std::int64_t, std::string>>& ReferencesAround(std::int64_t number) {
+    static_cast<void>(Around(number));
+    return references_;
+  }
+  // Calls `visit` with an event of each block that has some, in their order.
+  void ForEachBlock(const std::function<void(std::int64_t)>& visit) {
+    for (const std::int64_t block : database_.EventBlocks(log_file_, kBlock)) visit(block * kBlock);
+  }
+
+ private:
+  Database& database_;
+  const std::string log_file_;
+  std::optional<std::int64_t> block_;
+  Rows rows_;
+  std::set<std::pair<std::int64_t, std::string>> references_;
+};
+
+// Which events of rows a log has.
+class ReferenceCheck {
+ public:
+  explicit ReferenceCheck(RecordedRows& recorded) : recorded_(recorded) {}
+
+  void Take(const LogEvent& event) {
+    const auto& all = recorded_.ReferencesAround(event.number);
+    auto reference = all.lower_bound({event.number, ""});
+    if (reference == all.end() || reference->first != event.number) return;
+    const std::string digest = ToHex(DigestOf(event));
+    for (std::size_t place = 0; reference != all.end() && reference->first == event.number; ++reference, ++place) {
+      if (same_.size() <= place) same_.resize(place + 1), other_.resize(place + 1);
+      (reference->second == digest ? same_ : other_)[place].Insert(event.number);
+    }
+  }
+
+  void Finish(LogCheck& check) {
+    recorded_.ForEachBlock([&](std::int64_t around) {
+      std::optional<std::int64_t> last;
+      std::size_t place = 0;
+      for (const auto& [number, digest] : recorded_.ReferencesAround(around)) {
+        place = std::exchange(last, number) == number ? place + 1 : 0;
+        const bool was_read = place < same_.size();
+        if (was_read && same_[place].Contains(number))
+          ++check.whole;
+        else
+          (was_read && other_[place].Contains(number) ? check.changed : check.missing).push_back(number);
+      }
+    });
+  }
+
+ private:
+  RecordedRows& recorded_;
+  std::vector<EventNumbers> same_, other_;  // of the first reference of each number, of the second, ...
+};
 
 // What a log file leaves to the next one of its run.
 struct RowState {
@@ -46,7 +119,7 @@ class DirectoryCheck {
       checks.push_back({.log_file = log,
                         .log = directory_.Bytes(log) ? LogCheck::Log::kUnknown : LogCheck::Log::kMissing,
                         .ended = false,
-                        .missing = EventsOf(database_.References(log))});
+                        .missing = EventsOf(log)});
     for (const std::string& log : directory_.Logs())
       if (std::ranges::find(checks, log, &LogCheck::log_file) == checks.end())
         checks.push_back({.log_file = log, .log = LogCheck::Log::kUnknown, .ended = false});
@@ -54,10 +127,11 @@ class DirectoryCheck {
   }
 
  private:
-  static std::vector<std::int64_t> EventsOf(const std::vector<LogReference>& references) {
-    std::vector<std::int64_t> events;
-    for (const LogReference& reference : references) events.push_back(reference.event_number);
-    return events;
+  std::vector<std::int64_t> EventsOf(const std::string& log) {
+    RecordedRows recorded(database_, log);
+    LogCheck check;
+    ReferenceCheck(recorded).Finish(check);
+    return check.missing;
   }
 
   LogCheck Check(const RunRow& run) {
@@ -66,48 +140,36 @@ class DirectoryCheck {
     check.ended = run.end_utime.has_value();
     for (const std::string& task : database_.ConfigDigests(run.log_file))
       std::ranges::move(kept_.FindDamage(task), std::back_inserter(check.damaged_tasks));
-    const std::vector<LogReference> references = database_.References(run.log_file);
-    std::vector<Seen> seen(references.size(), Seen::kNot);
+    RecordedRows recorded(database_, run.log_file);
+    ReferenceCheck references(recorded);
     const bool is_there = directory_.Bytes(run.log_file).has_value();
     std::optional<Interpreter> interpreter;
-    Rows derived;
-    const Rows recorded = is_there ? database_.Read(run.log_file) : Rows();
     RowGrounds grounds = GroundsOf(run);
+    RowComparison comparison(grounds);
     if (is_there) {
       const BusOptions channels = ChannelsOf(run, check);
       interpreter = InterpreterOf(run, channels, grounds);
       grounds.misses_candidates = grounds.lossy.contains(channels.candidate);
       EventLogReader reader(directory_.PathOf(run.log_file));
       ForEachEvent(reader, [&](const LogEvent& event) {
-        Compare(event, references, seen);
+        references.Take(event);
+        Rows derived;
         interpreter->Observe(event, derived);
+        if (!derived.empty()) comparison.Take(derived, recorded.Around(event.number));
       });
       check.damage = reader.damage();
       check.cut_bytes = reader.size() - reader.offset();
     } else {
       check.log = run.log_deleted_utime ? LogCheck::Log::kDeleted : LogCheck::Log::kMissing;
     }
-    for (std::size_t i = 0; i < references.size(); ++i)
-      if (seen[i] == Seen::kSame)
-        ++check.whole;
-      else
-        (seen[i] == Seen::kOther ? check.changed : check.missing).push_back(references[i].event_number);
+    references.Finish(check);
     if (!is_there) return check;
     grounds.knows_order &= check.damage.places == 0 && check.changed.empty() && check.missing.empty();
     for (const auto* events : {&check.changed, &check.missing}) grounds.damaged.insert(events->begin(), events->end());
-    check.rows = CompareRows(recorded, derived, grounds);
+    recorded.ForEachBlock([&](std::int64_t around) { comparison.TakeRecorded(recorded.Around(around)); });
+    check.rows = comparison.Finish();
     if (grounds.knows_order) states_.emplace(run.log_file, RowState{*std::move(interpreter), grounds.lossy});
     return check;
-  }
-
-  static void Compare(const LogEvent& event, const std::vector<LogReference>& references, std::vector<Seen>& seen) {
-    auto row = std::ranges::lower_bound(references, event.number, {}, &LogReference::event_number);
-    if (row == references.end() || row->event_number != event.number) return;
-    const std::string digest = ToHex(DigestOf(event));
-    for (; row != references.end() && row->event_number == event.number; ++row) {
-      Seen& found = seen[static_cast<std::size_t>(row - references.begin())];
-      found = std::max(found, row->digest == digest ? Seen::kSame : Seen::kOther);
-    }
   }
 
   // A logger that starts again knows less of the files before than the one that was killed.

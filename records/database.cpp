@@ -295,13 +295,23 @@ std::vector<RunRow> Database::Runs() {
   return runs;
 }
 
-std::vector<LogReference> Database::References(const std::string& log_file) {
-  return Select<LogReference>(R"sql(
-      SELECT log_file, event_number, event_digest FROM decisions WHERE log_file = ?1
-      UNION SELECT log_file, event_number, event_digest FROM execution_events WHERE log_file = ?1
-      UNION SELECT log_file, event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
-      ORDER BY event_number)sql",
-                              log_file);
+Rows Database::ReadRange(const std::string& log_file, std::int64_t first, std::int64_t last) {
+  const auto sql = [](const char* table) {
+    return fmt::format("SELECT * FROM {} WHERE log_file = ? AND event_number BETWEEN ? AND ? ORDER BY event_number",
+                       table);
+  };
+  return {Select<DecisionRow>(sql("decisions").c_str(), log_file, first, last),
+          Select<EventRow>(sql("execution_events").c_str(), log_file, first, last),
+          Select<GapRow>(sql("gaps").c_str(), log_file, first, last)};
+}
+
+std::vector<std::int64_t> Database::EventBlocks(const std::string& log_file, std::int64_t size) {
+  return Select<std::int64_t>(R"sql(
+      SELECT DISTINCT event_number / ?2 AS block FROM decisions WHERE log_file = ?1
+      UNION SELECT DISTINCT event_number / ?2 FROM execution_events WHERE log_file = ?1
+      UNION SELECT DISTINCT event_number / ?2 FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
+      ORDER BY block)sql",
+                              log_file, size);
 }
 
 std::vector<std::string> Database::LogsWithoutRun() {

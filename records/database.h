@@ -84,9 +84,10 @@ class Database final {
   marks behind them. Another program may be writing. @throws DatabaseError. */
   [[nodiscard]] Rows ReadNext(RowMarks& marks, int most);
 
-  /** The events from which rows of one log file were made, by number. An event appears twice if two of its rows have
-  different digests. @throws DatabaseError. */
-  [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
+  /** The rows of one log file whose events have numbers from `first` to `last`. @throws DatabaseError. */
+  [[nodiscard]] Rows ReadRange(const std::string& log_file, std::int64_t first, std::int64_t last);
+  /** The numbers of those events, each divided by `size` towards zero; sorted. @throws DatabaseError. */
+  [[nodiscard]] std::vector<std::int64_t> EventBlocks(const std::string& log_file, std::int64_t size);
 
   /** The log files of rows that no run has. @throws DatabaseError. */
   [[nodiscard]] std::vector<std::string> LogsWithoutRun();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -36,57 +35,65 @@ std::string DescribeDifference(const Cells& recorded, const Cells& derived) {
   return text;
 }
 
-class RowComparison {
- public:
-  explicit RowComparison(const RowGrounds& grounds) : grounds_(grounds) {}
-
-  // An event has at most one row of a table.
-  template <class Row>
-  void Compare(const char* table, const std::vector<Row>& recorded, const std::vector<Row>& derived) {
-    std::map<std::int64_t, const Row*> missing;
-    for (const Row& row : derived)
-      if (IsCompared(row)) missing[row.event.event_number] = &row;
-    for (const Row& row : recorded) {
-      if (!IsCompared(row)) continue;
-      const std::int64_t event = row.event.event_number;
-      const auto again = missing.extract(event);
-      const std::string how = again ? DescribeDifference(CellsOfRow(row), CellsOfRow(Adjusted(*again.mapped(), row)))
-                                    : "no such row follows from it";
-      if (!how.empty()) Say(table, event, how);
-    }
-    for (const auto& [event, row] : missing)
-      if (event < grounds_.end) Say(table, event, "its row is missing");
-  }
-
-  std::vector<std::string> sentences;
-
- private:
-  void Say(const char* table, std::int64_t event, const std::string& what) {
-    sentences.push_back(fmt::format("{}, event {}: {}", table, event, what));
-  }
-
-  [[nodiscard]] bool IsCompared(const auto& row) const {
-    return row.event.event_number >= 0 && !grounds_.damaged.contains(row.event.event_number);
-  }
-
-  // What is derived, with what does not follow from the log as it is recorded.
-  [[nodiscard]] DecisionRow Adjusted(DecisionRow derived, const DecisionRow& recorded) const {
-    if (std::isnan(derived.latency_us) && (!grounds_.knows_order || grounds_.misses_candidates))
-      derived.latency_us = recorded.latency_us;
-    return derived;
-  }
-  [[nodiscard]] static const EventRow& Adjusted(const EventRow& derived, const EventRow&) { return derived; }
-
-  const RowGrounds& grounds_;
-};
+// What is derived, with what does not follow from the log if the order of its messages is not known.
+EventRow Adjusted(EventRow derived, const EventRow&) { return derived; }
+DecisionRow Adjusted(DecisionRow derived, const DecisionRow& recorded) {
+  if (std::isnan(derived.latency_us)) derived.latency_us = recorded.latency_us;
+  return derived;
+}
 
 }  // namespace
 
-std::vector<std::string> CompareRows(const Rows& recorded, const Rows& derived, const RowGrounds& grounds) {
-  RowComparison comparison(grounds);
-  comparison.Compare("decisions", recorded.decisions, derived.decisions);
-  comparison.Compare("execution_events", recorded.events, derived.events);
-  return std::move(comparison.sentences);
+// An event has at most one row of a table; of several events with one number the last one counts.
+template <class Row>
+void RowComparison::Compare(Table& table, const std::vector<Row>& derived, const std::vector<Row>& recorded) {
+  const auto number_of = [](const Row& row) { return row.event.event_number; };
+  for (const Row& row : derived) {
+    const std::int64_t event = number_of(row);
+    if (event < 0) continue;
+    table.derived.Insert(event);
+    table.differences.erase(event);
+    const auto found = std::ranges::lower_bound(recorded, event, {}, number_of);
+    if (found == recorded.end() || number_of(*found) != event) {
+      table.unrecorded.insert(event);
+      continue;
+    }
+    Difference difference{DescribeDifference(CellsOfRow(*found), CellsOfRow(row)),
+                          DescribeDifference(CellsOfRow(*found), CellsOfRow(Adjusted(row, *found)))};
+    if (grounds_.misses_candidates) difference.known_order = difference.unknown_order;
+    if (!difference.known_order.empty()) table.differences.emplace(event, std::move(difference));
+  }
+}
+
+void RowComparison::Take(const Rows& derived, const Rows& recorded) {
+  Compare(decisions_, derived.decisions, recorded.decisions);
+  Compare(events_, derived.events, recorded.events);
+}
+
+void RowComparison::TakeRecorded(const Rows& recorded) {
+  const auto take = [](Table& table, const auto& rows) {
+    const std::string none = "no such row follows from it";
+    for (const auto& row : rows)
+      if (const std::int64_t event = row.event.event_number; event >= 0 && !table.derived.Contains(event))
+        table.differences.emplace(event, Difference{none, none});
+  };
+  take(decisions_, recorded.decisions);
+  take(events_, recorded.events);
+}
+
+std::vector<std::string> RowComparison::Finish() const {
+  std::vector<std::string> sentences;
+  for (const auto& [name, table] : {std::pair("decisions", &decisions_), {"execution_events", &events_}}) {
+    const auto say = [&, name = name](std::int64_t event, const std::string& what) {
+      if (!what.empty() && !grounds_.damaged.contains(event))
+        sentences.push_back(fmt::format("{}, event {}: {}", name, event, what));
+    };
+    for (const auto& [event, how] : table->differences)
+      say(event, grounds_.knows_order ? how.known_order : how.unknown_order);
+    for (const std::int64_t event : table->unrecorded)
+      if (event < grounds_.end) say(event, "its row is missing");
+  }
+  return sentences;
 }
 
 }  // namespace forereach

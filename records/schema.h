@@ -104,8 +104,6 @@ auto ColumnsOf(auto& row) {
   else if constexpr (std::is_same_v<Row, RunRow>)
     return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.recovered, row.continues,
                     row.log_deleted_utime, row.robot);
-  else if constexpr (std::is_same_v<Row, LogReference>)
-    return std::tie(row.log_file, row.event_number, row.digest);
   else if constexpr (std::is_same_v<Row, std::pair<std::string, std::int64_t>>)
     return std::tie(row.first, row.second);
   else

@@ -6,8 +6,8 @@
 #include "page/write.h"
 #include "records/database.h"
 #include "tests/cli/program.h"
-#include "tests/records/course.h"
 #include "tests/records/logs.h"
+#include "tests/records/long_course.h"
 #include "tests/tries.h"
 
 namespace forereach::page_test {
@@ -17,19 +17,23 @@ const std::string kTask = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
 // As `forereach report --out` gathers a page, run by run.
 PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
-                   const DetailBounds& bounds) {
+                   const PageBounds& bounds) {
   const unsigned threads = AllCores();
   NamedRuns named = RunsNamedBy(inputs, threads);
   const PageTasks tasks{config, key, RunTasks(config, key, named.is_many)};
   PageRun page = EmptyPage(inputs);
   std::deque<PagePass> passes;
+  std::vector<PagePass*> all;
   for (const RunLogs& run : named.runs) try {
-      AddRows(page, GatherRows(run, tasks, passes.emplace_back(bounds)));
+      ReadPass(run, tasks, bounds, passes.emplace_back(bounds));
+      all.push_back(&passes.back());
+      if (named.is_many) KeepLast(all, bounds);
     } catch (const BadInput& error) {
       passes.pop_back();
       if (!named.is_many) throw;
       named.missing.emplace_back(error.what());
     }
+  for (PagePass& pass : passes) AddRows(page, std::move(pass.rows));
   AddMissing(page, named);
   std::size_t bytes = bounds.bytes;
   const auto chosen = ChooseDetails(page, bounds);
@@ -129,7 +133,7 @@ TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
   const PageRun run = GatherPage({kCourseLog}, kCourseTask, {}, {});
   ASSERT_GT(run.decisions.size(), 20u);
   std::size_t judged = 0;
-  for (const DecisionRow& row : run.decisions)
+  for (const PageDecision& row : run.decisions)
     judged += row.outcome == "certified" || row.outcome.starts_with("abstain_");
   EXPECT_EQ(run.details.size(), judged);
   std::size_t executed = 0;
@@ -155,6 +159,26 @@ TEST(GatherTest, DrawsNoMoreThanItsBounds) {
     EXPECT_THAT(detail.missing, HasSubstr("reached their bound"));
     EXPECT_EQ(detail.svg, "");
   }
+}
+
+// Two runs of the course, each in three rounds.
+TEST(GatherTest, HoldsTheLastRowsByTime) {
+  const ScratchDirectory scratch;
+  for (const char* name : {"a", "b"}) {
+    std::filesystem::create_directory(scratch / name);
+    WriteLongCourse(scratch / name + "/events.lcmlog", *name == 'a' ? 3 : 2);
+  }
+  const PageRun page = GatherPage({scratch / "a", scratch / "b"}, kCourseTask, {},
+                                  {.decisions = 100, .events = 20, .certified = 4, .abstained = 5});
+  const std::int64_t all = 5 * kCourseDecisions;
+  EXPECT_EQ(page.decisions.left_out + std::ssize(page.decisions), all);
+  EXPECT_GE(page.decisions.size(), 100u);
+  EXPECT_LE(page.decisions.size(), 103u) << "and what was decided at the same time as the first of them";
+  EXPECT_EQ(page.parts[0].decisions + page.parts[1].decisions, page.decisions.size());
+  EXPECT_GT(page.parts[0].decisions, page.parts[1].decisions) << "it lasts longer";
+  EXPECT_EQ(page.details.size(), 9u);
+  for (const PageDetail& detail : page.details) EXPECT_EQ(detail.missing, "");
+  EXPECT_THAT(PageHtml(page), HasSubstr("Of " + std::to_string(all) + " decisions the last "));
 }
 
 // A car of the demo stands for three steps.
@@ -262,8 +286,9 @@ TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
 
 TEST_F(DirectoryTest, WithoutADatabaseItReadsTheLogs) {
   std::filesystem::remove(directory_ / "decisions.sqlite");
-  EXPECT_EQ(GatherPage({directory_.path()}, kCourseTask, {}, {0, 0, 0}).decisions.size(),
-            std::size_t{kCourseDecisions});
+  EXPECT_EQ(
+      GatherPage({directory_.path()}, kCourseTask, {}, {.certified = 0, .abstained = 0, .bytes = 0}).decisions.size(),
+      std::size_t{kCourseDecisions});
   std::filesystem::remove(log_);
   EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kCourseTask, {}, {})), BadInput);
 }
@@ -330,10 +355,10 @@ TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
 }
 
 TEST(WriteTest, TextsOfARunCannotOpenATag) {
-  PageRun run = GatherPage({kCourseLog}, kCourseTask, {}, {0, 0, 0});
+  PageRun run = GatherPage({kCourseLog}, kCourseTask, {}, {.certified = 0, .abstained = 0, .bytes = 0});
   const std::string plain = PageHtml(run);
   const auto tags = [](const std::string& html) { return std::ranges::count(html, '<'); };
-  for (DecisionRow& row : run.decisions) row.source = row.cause = "</script><!--<b>";
+  for (PageDecision& row : run.decisions) row.source = row.cause = "</script><!--<b>";
   run.name = run.shadow = run.notes.emplace_back("<script>");
   run.faults.push_back({1, 1, "<i>", "<i>"});
   const std::string html = PageHtml(run);
@@ -353,12 +378,12 @@ TEST(GatherTest, APageOfAShadowSaysSoAndWhatHappened) {
     }
     return event.channel != "PLAN_CERTIFIED";
   });
-  const std::string shadow = GatherPage({log}, kTask, {}, {0, 0, 0}).shadow;
+  const std::string shadow = GatherPage({log}, kTask, {}, {.certified = 0, .abstained = 0, .bytes = 0}).shadow;
   EXPECT_THAT(shadow, testing::StartsWith("Shadow mode: the gate certified nothing, and the robot did not obey it. It "
                                           "would have certified " +
                                           std::to_string(kCourseCertified) + " plans"));
   EXPECT_THAT(shadow, testing::ContainsRegex("the robot drove [1-9][0-9]*, left a slice of 0 and had 0 contacts"));
-  EXPECT_EQ(GatherPage({kLog}, kTask, {}, {0, 0, 0}).shadow, "");
+  EXPECT_EQ(GatherPage({kLog}, kTask, {}, {.certified = 0, .abstained = 0, .bytes = 0}).shadow, "");
   const Output printed = Forereach("report '" + log + "' --config '" + kTask + "'");
   EXPECT_THAT(printed.text, testing::StartsWith("SHADOW"));
   EXPECT_THAT(printed.text, testing::ContainsRegex("driven [1-9][0-9]*: 0 left a slice \\(0 of [1-9][0-9]* states\\)"));
@@ -377,7 +402,8 @@ TEST(WriteTest, PolicyForbidsRequests) {
 
 // A browser keeps other characters in texts twice as large, and takes twice as long over what is next to them.
 TEST(WriteTest, APageIsOfAsciiWhereItsTextsAre) {
-  const std::string html = PageHtml(GatherPage({kCourseLog}, kCourseTask, {}, {0, 0, 0}));
+  const std::string html =
+      PageHtml(GatherPage({kCourseLog}, kCourseTask, {}, {.certified = 0, .abstained = 0, .bytes = 0}));
   EXPECT_TRUE(std::ranges::all_of(html, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
 }
 

@@ -56,7 +56,7 @@ PageRun Many(int count) {
     }
     row.message =
         row.outcome + " at step " + std::to_string(row.step) + ", margin " + std::to_string(row.margin) + " m";
-    run.decisions.push_back(row);
+    run.decisions.emplace_back(row);
   }
   return run;
 }
@@ -69,24 +69,23 @@ PageRun Hostile() {
   PageRun run = Many(20);
   run.name = evil;
   run.notes = {evil};
-  for (DecisionRow& row : run.decisions) {
+  for (PageDecision& row : run.decisions) {
     row.source = evil, row.message = evil, row.outcome = evil, row.cause = "__proto__";
-    row.event.log_file = evil, row.plan_digest = evil;
-    for (std::string& digest : row.grounds) digest = evil;
+    row.log_file = evil;
   }
-  const auto at = [&](std::size_t i) -> DecisionRow& { return run.decisions[i]; };
+  const auto at = [&](std::size_t i) -> PageDecision& { return run.decisions[i]; };
   at(0).utime = at(0).plan_id = std::numeric_limits<std::int64_t>::min();
-  at(1).utime = at(1).plan_id = at(1).event.event_number = std::numeric_limits<std::int64_t>::max();
-  at(2).margin = infinity, at(2).threshold = -infinity, at(2).elapsed_us = infinity;
-  at(3).margin = at(3).latency_us = std::nan("");
+  at(1).utime = at(1).plan_id = at(1).event_number = std::numeric_limits<std::int64_t>::max();
+  at(2).margin = infinity, at(2).threshold = -infinity, at(2).elapsed_us = std::numeric_limits<float>::infinity();
+  at(3).margin = at(3).latency_us = std::nanf("");
   at(4).step = std::numeric_limits<int>::max(), at(4).outcome = "abstain_safety";
   at(5).outcome = "constructor", at(5).coordinate = 77;
   at(6).obstacle = std::numeric_limits<int>::min(), at(6).step = std::numeric_limits<int>::min();
-  run.faults = {{std::numeric_limits<std::int64_t>::min(), 3, evil, evil}};
-  run.withdrawals = {{0, -1, evil, evil, evil, 7}};
-  run.gaps = {{{evil, 1, evil}, evil, evil, 0, 9, std::numeric_limits<std::int64_t>::max(), -1, evil}};
-  run.events = {{{evil, 2, evil}, 5, 6, 7, evil, evil, -1, -1, {}, infinity}};
-  run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil, 2}};
+  run.faults.push_back({std::numeric_limits<std::int64_t>::min(), 3, evil, evil});
+  run.withdrawals.push_back({0, -1, evil, evil, evil, 7});
+  run.gaps.push_back({-1, std::numeric_limits<std::int64_t>::max(), evil, evil, evil});
+  run.events.push_back({5, 7, evil});
+  run.tasks = {{ToHex(at(0).grounds[0]), evil, {evil}, {evil}, evil, 2}};
   run.parts = {{evil, {{evil, evil}}, run.decisions.size()}};
   PageDetail detail{.decision = 4, .task = 0};
   detail.start_utime = detail.step_us = std::numeric_limits<std::int64_t>::max();

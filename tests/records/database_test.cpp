@@ -103,17 +103,18 @@ TEST_F(DatabaseTest, MarksDeletedLogsAndWhatContinuesWhat) {
   EXPECT_FIELDS(runs[1], (continues, "a.lcmlog"), (log_deleted_utime, std::nullopt));
 }
 
-TEST_F(DatabaseTest, ReferencesAreThoseOfAllTables) {
+TEST_F(DatabaseTest, ReadsTheRowsOfSomeEvents) {
   Rows rows = SampleRows();
   rows.gaps.push_back(rows.gaps[0]);
   rows.gaps[1].event = {"a.lcmlog", -1, ""};
   rows.decisions[0].event = {"a.lcmlog", 9, "f9"};  // the event of the gap
   ASSERT_TRUE(database_.Write(rows, "a.lcmlog", 10));
-  const std::vector<LogReference> references = database_.References("a.lcmlog");
-  ASSERT_EQ(references.size(), 2u) << "an event once, a gap without event not at all";
-  EXPECT_FIELDS(references[0], (event_number, 8), (digest, "e8"));
-  EXPECT_FIELDS(references[1], (event_number, 9), (digest, "f9"));
-  EXPECT_TRUE(database_.References("b.lcmlog").empty());
+  EXPECT_EQ(database_.ReadRange("a.lcmlog", 0, 9).size(), 3u) << "a gap without event is of none";
+  EXPECT_EQ(database_.ReadRange("a.lcmlog", 0, 8).events.size(), 1u);
+  EXPECT_TRUE(database_.ReadRange("a.lcmlog", 0, 8).decisions.empty());
+  EXPECT_TRUE(database_.ReadRange("b.lcmlog", 0, 9).empty());
+  EXPECT_THAT(database_.EventBlocks("a.lcmlog", 9), ElementsAre(0, 1));
+  EXPECT_THAT(database_.EventBlocks("b.lcmlog", 9), IsEmpty());
 }
 
 TEST(Database, RefusesAnotherSchema) {
