@@ -1,6 +1,7 @@
 #include "advise/abstentions.h"
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
@@ -54,11 +55,14 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
     ++read_.certified;
     return;
   }
-  if (read_.all.size() == most_) {
-    read_.all.pop_front();
+  if (all_.size() < most_) {
+    all_.emplace_back();
+  } else {
+    all_.splice(all_.end(), all_, all_.begin());  // its place is used again
+    all_.back() = {};
     ++read_.left_out;
   }
-  RecordedAbstention& abstention = read_.all.emplace_back();
+  RecordedAbstention& abstention = all_.back();
   abstention.basis = recorded.basis;
   abstention.event = recorded.event;
   abstention.name = recorded.event + ", plan " + std::to_string(decision.plan_id) + " of " + GetText(decision.source);
@@ -82,6 +86,8 @@ void AbstentionReader::OnDecision(const RecordedDecision& recorded) {
 
 Abstentions AbstentionReader::Finish(std::vector<std::shared_ptr<const Config>> tasks) {
   read_.tasks = std::move(tasks);
+  std::ranges::move(all_, std::back_inserter(read_.all));
+  all_.clear();
   return std::move(read_);
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <list>
 #include <memory>
 #include <string>
 #include <utility>
@@ -69,7 +70,7 @@ class AbstentionReader final : public TimelineUser {
   [[nodiscard]] Abstentions Finish(std::vector<std::shared_ptr<const Config>> tasks);
 
   /** Those so far. */
-  [[nodiscard]] std::deque<RecordedAbstention>& all() { return read_.all; }
+  [[nodiscard]] std::list<RecordedAbstention>& all() { return all_; }
 
  private:
   const std::size_t most_;
@@ -77,6 +78,7 @@ class AbstentionReader final : public TimelineUser {
   std::size_t waiting_ = 0;
   std::shared_ptr<const std::pair<std::vector<std::uint8_t>, std::int64_t>> last_obstacles_;
   Abstentions read_;
+  std::list<RecordedAbstention> all_;
 };
 
 /** The last `most` of a run's logs.

@@ -259,12 +259,19 @@ void LastCases::OnDecision(const RecordedDecision& recorded) {
     return;
   std::deque<std::int64_t>& kind = is_certified ? certified_ : abstained_;
   kind.push_back(next_);
+  // The oldest one's place is used again: rows that lie between freed places would keep the memory from being used.
+  if (kind.size() > (is_certified ? bounds_.certified : bounds_.abstained)) {
+    if (auto oldest = entries_.extract(kind.front())) {
+      oldest.key() = next_;
+      oldest.mapped() = {};
+      entries_.insert(std::move(oldest));
+    }
+    kind.pop_front();
+    if (kind.empty()) return;
+  }
   Entry& entry = entries_[next_++];
   entry.recorded = CaseOf(recorded);
   if (is_certified && entry.recorded.missing.empty()) executing_[entry.recorded.candidate->plan_id] = next_ - 1;
-  if (kind.size() <= (is_certified ? bounds_.certified : bounds_.abstained)) return;
-  entries_.erase(kind.front());
-  kind.pop_front();
 }
 
 void LastCases::OnEvent(const LogEvent& event) {
