@@ -20,7 +20,7 @@ namespace forereach {
 /** Bounds on one page, so that it does not grow with the logs. */
 struct PageBounds {
   /** Of the rows the last ones by time; of gaps, faults and withdrawals so many each. */
-  std::size_t decisions = 100'000, events = 300'000, others = 20'000;
+  std::size_t decisions = 60'000, events = 200'000, others = 20'000;
   /** Drawn are the last certified plans, and the last abstentions. */
   std::size_t certified = 2000, abstained = 2000;
   /** Of all drawings, before they are packed. */
