@@ -195,8 +195,8 @@ TEST_F(AdviseTest, AfterItsTimeOnlyWhatMissedByLeastIsSearched) {
   const std::string log = kCourseLog;
   const RunTasks tasks(kCourseTask, {}, false);
   std::vector<Abstentions> runs(1);
-  runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false);
-  std::vector<RecordedAbstention>& all = runs[0].all;
+  runs[0] = ReadAbstentions({"", {log}, "", {}}, tasks, false, 1000);
+  std::deque<RecordedAbstention>& all = runs[0].all;
   std::erase_if(all, [](const RecordedAbstention& each) { return each.outcome != decision_t::ABSTAIN_SAFETY; });
   ASSERT_GE(all.size(), 3u);
   all.resize(3);
