@@ -67,9 +67,11 @@ std::optional<InnerBound> BoundFromWithin(const Case& judged, const Certifier& c
   Eigen::VectorXd half_width(center.size());
   for (Eigen::Index k = 0; k < center.size(); ++k)
     half_width[k] = judged.initial_set.Hull(static_cast<int>(k)).upper - center[k];
+  // The corners of its hull are states of X0 only if X0 is a box.
+  const bool is_box = ((judged.initial_set.GeneratorMatrix().array() != 0).colwise().count().array() <= 1).all();
   const auto varying = (declaration.lipschitz.array() > 0).rowwise().any().count();
   const Eigen::Index wide = (half_width.array() > 0).count();
-  if (!declaration.affine.rows.empty() || !declaration.regions.empty() || declaration.HasErrorInZ() ||
+  if (!is_box || !declaration.affine.rows.empty() || !declaration.regions.empty() || declaration.HasErrorInZ() ||
       problem.projection.rows() != 2 || certifier.violation() || tube.length() == 0 ||
       problem.transitions.size() > kMostInnerObservations || std::max(varying, wide) > kMostInnerCoordinates)
     return std::nullopt;

@@ -72,10 +72,14 @@ void RowComparison::Take(const Rows& derived, const Rows& recorded) {
 
 void RowComparison::TakeRecorded(const Rows& recorded) {
   const auto take = [](Table& table, const auto& rows) {
-    const std::string none = "no such row follows from it";
-    for (const auto& row : rows)
-      if (const std::int64_t event = row.event.event_number; event >= 0 && !table.derived.Contains(event))
-        table.differences.emplace(event, Difference{none, none});
+    const std::string none = "no such row follows from it", second = "it has a second row";
+    std::int64_t before = -1;
+    for (const auto& row : rows) {
+      const std::int64_t event = row.event.event_number;
+      if (event < 0) continue;
+      if (!table.derived.Contains(event)) table.differences.emplace(event, Difference{none, none});
+      if (event == std::exchange(before, event)) table.differences.insert_or_assign(event, Difference{second, second});
+    }
   };
   take(decisions_, recorded.decisions);
   take(events_, recorded.events);

@@ -208,15 +208,14 @@ Verdict Verifier::VerifyWhole(const Certificate& certificate) const {
 }
 
 std::optional<Failure> Verifier::FindContact(const Certificate& claimed, const std::vector<bool>& upper) const {
-  if (!equations_ || !functions_ || FindMisfit(*problem_, claimed)) return std::nullopt;
+  // Bounds on what happens between samples may rule the motion out.
+  if (!equations_ || !functions_ || problem_->between || FindMisfit(*problem_, claimed)) return std::nullopt;
   const Precision precision(kBits[0]);
   const auto motion = MakerOf(kBits[0]).Follow(claimed.initial_set, claimed.controls, upper, claimed.known);
   if (!motion) return std::nullopt;
-  Problem at_samples = *problem_;
-  at_samples.between.reset();
   Certificate of_motion = claimed;
   of_motion.is_remainder = true;  // nothing is claimed of its end
-  std::optional<Failure> failure = FindFalseClaim(at_samples, of_motion, *functions_, *motion);
+  std::optional<Failure> failure = FindFalseClaim(*problem_, of_motion, *functions_, *motion);
   if (failure && !failure->certain) failure.reset();
   return failure;
 }

@@ -82,7 +82,7 @@ class Verifier final {
   each coordinate takes its upper or its lower extension of them (McShane's, forereach/certify/extremal.h), and the
   disturbance its upper or lower bound. @return what the motion provably breaks of what a certificate claims of
   obstacles and limits at the samples, so that no sound method certifies this plan; nothing if it is not proven. Rows
-  that are affine, regions, errors of records and bounds that grow are not followed.
+  that are affine, regions, errors of records, bounds that grow and bounds between samples are not followed.
   @param claimed its initial set is a point of X_0; it has no slices. @param upper n entries. Cost O(N^2 n) in doubles,
   and O(T N n) in 256 bits. */
   [[nodiscard]] std::optional<Failure> FindContact(const Certificate& claimed, const std::vector<bool>& upper) const;

@@ -1,6 +1,7 @@
 #include "certifier/gate/gate.h"
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <map>
 #include <span>
@@ -316,9 +317,12 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
     const Standing whole =
         forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.indexed(), tube_, first_step);
     if (!pieces_ || whole.verdict.outcome != Outcome::kSafety) return whole;
+    // A withdrawal waits for it no longer than a plan waits for its decision.
+    const auto end =
+        std::chrono::steady_clock::now() + std::chrono::microseconds(Microseconds(options_.decision_budget_ms));
     const Decision in_pieces = pieces_->Certify(
-        certifier_, plan, initial_set, obstacles_.indexed(), whole.verdict, options_.max_pieces, [] { return true; },
-        tube_, first_step);
+        certifier_, plan, initial_set, obstacles_.indexed(), whole.verdict, options_.max_pieces,
+        [&] { return std::chrono::steady_clock::now() < end; }, tube_, first_step);
     return in_pieces.outcome == Outcome::kCertified ? Standing{plan.num_steps, in_pieces} : whole;
   } catch (const std::exception&) {
     return {};

@@ -136,4 +136,10 @@ TEST_F(ContactTest, OfASampleCountsNotOfTheWayBetween) {
   EXPECT_FALSE(Touches(7)) << "the bounds allow a bulge that this motion need not have";
 }
 
+TEST_F(ContactTest, IsNotSaidWhereBoundsBetweenSamplesMayRuleItsMotionOut) {
+  ASSERT_TRUE(Touches(6 - kHair));
+  problem_.between = Between{.acceleration = Eigen::Vector2d(100, 100), .period = 0.5};
+  EXPECT_FALSE(Touches(6 - kHair));
+}
+
 }  // namespace forereach::contact_test
