@@ -74,13 +74,15 @@ void Turn(const Interval& x, double center, double s, double c, double size, dou
 void Turn(const double* angle, double* sine, double* tangent) noexcept {
   double* const cosine = sine + kLaneCount;
   const Interval inner = LoadInterval(angle), outer = LoadInterval(angle + 2);
-  const double size = std::max(inner.Magnitude(), outer.Magnitude());
-  if (!(size <= 0x1p20)) {
+  if (BitsOf(Abs(LoadLanes(angle)) <= AllLanes(0x1p20)) != 15) {  // also where one of four is no number
     std::fill_n(sine, 2 * kLaneCount, 1.0);
     if (tangent != nullptr) std::fill_n(tangent, kLaneCount, kInfinity);
     return;
   }
-  const double center = std::clamp(inner.Middle(), outer.lower, outer.upper);
+  const double size = std::max(inner.Magnitude(), outer.Magnitude());
+  // In both; in the inner one also where the outer one has no bound, and may be anything.
+  const double center =
+      std::clamp(std::clamp(inner.Middle(), outer.lower, std::max(outer.lower, outer.upper)), inner.lower, inner.upper);
   const double s = std::sin(center), c = std::cos(center);
   Turn(inner, center, s, c, size, sine, cosine, tangent);
   Turn(outer, center, s, c, size, sine + 2, cosine + 2, tangent == nullptr ? nullptr : tangent + 2);

@@ -203,4 +203,19 @@ TEST(NestedProgram, SaysOverWhichBoxItHasNoBound) {
   EXPECT_EQ(evaluate("x + 1e91", 1, 1, true), std::pair(false, false));
 }
 
+// The outer box of w exp(1000 w) has one end that is a number, and is none: it chooses no center for the inner one's
+// sine.
+TEST(NestedProgram, KnowsTheSineOverTheInnerBoxWhereTheOuterOneHasNoBound) {
+  const std::string w = "max((x - 1)*4503599627370496, 0)";
+  const Rates rates(
+      TextModel({{"x", "sin(8.9*(" + w + "*exp(1000*" + w + ")) + p)"}}, {}, {{"dt", 0.1, 0.1}, {"p", 0, 1.9}}));
+  const NestedProgram nested(rates.draft.View(), rates.parameters);
+  std::vector<double> values(nested.size());
+  StoreLanes(PairOf(1, {1, std::nextafter(1.0, 2.0)}), values.data());
+  nested.Begin(values.data());
+  EXPECT_FALSE(nested.Evaluate(true, values.data()).outer);
+  const Interval sine = LoadInterval(&values[static_cast<std::size_t>(nested.PairPlace(rates.draft.View().value[0]))]);
+  EXPECT_FIELDS(sine, (Contains(1), true), (Contains(0), true));
+}
+
 }  // namespace forereach::nested_program_test
