@@ -23,7 +23,7 @@ inline Config GapTask(const ScratchDirectory& directory, const std::string& gate
   const Eigen::MatrixXd controls = Eigen::Vector2d(0.2, 0.02).replicate(1, 12);
   const Obstacle circle =
       JustTouched(Certifier(config.problem), {controls.data(), 2, 12, 2}, Zonotope::Enclose(config.initial_set));
-  const Eigen::Vector3d at = circle.points()[0];
+  const Eigen::VectorXd at = circle.points()[0];
   return LoadConfig(directory.Write(
       name + ".yaml", Replaced(Replaced(text, "gate: {obstacles: task", "gate: {obstacles: task" + gate), "[11.4, 7.4]",
                                "[" + ToText(at[0]) + ", " + ToText(at[1]) + "]")));
