@@ -18,8 +18,8 @@ struct InnerBound {
 
 /** By rollouts of the extremal residuals (forereach/certify/extremal.h) from the center and the corners of X_0. `least`
 is true up to the rounding of these; the contact is confirmed by the verifier in 256 bits.
-@param tube of Certify for the case. Nothing if rows are affine, regions or an error in z are declared, p is not 2, or
-it would take long: more than kMostInnerObservations, or six varying coordinates or states with a width. */
+@param tube of Certify for the case. Nothing if X_0 is no box, rows are affine, regions or an error in z are declared, p
+is not 2, or it would take long: more than kMostInnerObservations, or six varying coordinates or states with a width. */
 [[nodiscard]] std::optional<InnerBound> BoundFromWithin(const Case& judged, const Certifier& certifier,
                                                         const Tube& tube);
 

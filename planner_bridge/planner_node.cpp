@@ -105,8 +105,8 @@ void PlannerNode::Follow(const robot_state_t& state) {
   std::erase_if(withdrawn_, [this](const auto& withdrawn) { return !plans_.contains(withdrawn.first); });
 }
 
-// The state that the controls make of the estimate before, moved into measured +- error. So the errors of earlier
-// measurements count, too: the true state has been in all of these sets.
+// The state that the controls make of the estimate before, moved into measured +- error. So earlier measurements count,
+// too. It proves nothing of the true state: a guard compares measured +- error with X0 when a plan starts.
 void PlannerNode::Estimate(const robot_state_t& state) {
   const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
   const bool is_next = last_state_.num_states > 0 && state.utime - last_state_.utime == period_us_;

@@ -75,8 +75,9 @@ class Gate final {
   tried. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** JudgeAgain (standing.h) under what is in force now; what gets S is tried again in pieces, however long that takes,
-  and stands whole if these are certified. Outcome kNone: the plan cannot be judged under this task.
+  /** JudgeAgain (standing.h) under what is in force now; what gets S is tried again in pieces, until
+  gate.decision_budget_ms is over by this machine's clock, and stands whole if these are certified. Outcome kNone: the
+  plan cannot be judged under this task.
   @param plan a candidate that this gate or one before a reload has certified. @param upheld what its certified plan
   says that the guard upholds; if less than this task's certificates rest on, the plan cannot be judged.
   @param first_step 0..num_steps. */

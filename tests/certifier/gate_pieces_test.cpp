@@ -77,7 +77,9 @@ TEST_F(GatePiecesTest, WhatWasCertifiedInPiecesStandsWhenItIsJudgedAgain) {
     EXPECT_EQ(standing.verdict.outcome, Outcome::kCertified) << first;
     EXPECT_EQ(standing.steps, 12) << first;
   }
-  Gate whole(GapTask(scratch_, "", "whole"));
+  Gate whole(GapTask(scratch_, "", "whole")),
+      hurried(GapTask(scratch_, ", max_pieces: 16, decision_budget_ms: 0.001", "hurried"));
+  EXPECT_EQ(hurried.JudgeAgain(answer.certified->plan, upheld, 0).verdict.outcome, Outcome::kSafety);
   EXPECT_EQ(whole.JudgeAgain(answer.certified->plan, upheld, 0).verdict.outcome, Outcome::kSafety);
 }
 

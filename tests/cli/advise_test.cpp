@@ -52,6 +52,26 @@ TEST_F(AdviseTest, SaysNothingOfTheKindWhereOneDoes) {
   EXPECT_THAT(text, Not(HasSubstr("no sound method")));
 }
 
+// The corners of the hull of another set may be no states of it.
+TEST_F(AdviseTest, TheInnerBoundIsOfABoxOnly) {
+  const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+  Case judged{.problem = config.problem,
+              .controls = LoadPlan(FOREREACH_SOURCE_DIR "/config/plans/bicycle_safety.csv", *config.problem->model),
+              .initial_set = Zonotope::Enclose(config.initial_set),
+              .obstacles = config.obstacles};
+  const Certifier certifier(config.problem);
+  const auto bound = [&] {
+    Tube tube;
+    static_cast<void>(certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube));
+    return BoundFromWithin(judged, certifier, tube);
+  };
+  EXPECT_TRUE(bound());
+  Eigen::MatrixXd generators = judged.initial_set.GeneratorMatrix();
+  generators(1, 0) = generators(0, 0);
+  judged.initial_set = Zonotope(judged.initial_set.CenterVector(), generators);
+  EXPECT_FALSE(bound());
+}
+
 TEST_F(AdviseTest, NamesTheBoundOfTheDomain) {
   EXPECT_THAT(AdviseOn("bicycle.yaml", "bicycle_domain.csv").text,
               HasSubstr("if the domain, and with it the declaration, reached farther: a to 4.41"));

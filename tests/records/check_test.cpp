@@ -1,4 +1,5 @@
 #include "records/check.h"
+#include "records/row_check.h"
 
 #include <cctype>
 
@@ -214,6 +215,17 @@ TEST_F(RowsTest, AnAddedRowIsSeen) {
                     .empty(),
                 !Sql("SELECT 1 FROM " + table + " WHERE event_number = " + row[1]).empty())
           << table << " " << row[1];
+}
+
+// Of a database that does not keep its rows unique, as one that was altered byte by byte.
+TEST(RowComparison, ASecondRowOfAnEventIsSeen) {
+  Rows rows;
+  for (const std::int64_t event : {7, 8, 8, 9}) rows.decisions.push_back({.event = {"a.lcmlog", event, ""}});
+  RowGrounds grounds;
+  RowComparison comparison(grounds);
+  comparison.Take({.decisions = {rows.decisions[0], rows.decisions[1], rows.decisions[3]}}, rows);
+  comparison.TakeRecorded(rows);
+  EXPECT_THAT(comparison.Finish(), ElementsAre("decisions, event 8: it has a second row"));
 }
 
 TEST_F(RowsTest, TheSentenceNamesTableEventAndColumn) {
