@@ -77,10 +77,7 @@ class Postgres final {
 
  private:
   static std::string AsUser() {
-    // It may read what root may: in some containers nobody else may even read /.
-    return geteuid() == 0 ? "/usr/bin/setpriv --reuid nobody --regid nogroup --clear-groups --pdeathsig KILL "
-                            "--inh-caps +dac_read_search --ambient-caps +dac_read_search -- "
-                          : "";
+    return geteuid() == 0 ? FOREREACH_SOURCE_DIR "/tests/fleet/as_nobody " : "";
   }
 
   const ScratchDirectory scratch_;

@@ -86,7 +86,8 @@ struct HostileLog : testing::Test {
       log.bytes.insert(log.bytes.end(), begin, whole.begin() + reader.offset());
       ends_[start] = std::ssize(log.bytes);
     }
-    for (std::int64_t at = 0; at < std::ssize(log.bytes); ++at) log.origin.push_back(at);
+    log.origin.resize(log.bytes.size());
+    std::iota(log.origin.begin(), log.origin.end(), 0);
     return log;
   }
 
@@ -133,15 +134,13 @@ struct HostileLog : testing::Test {
   /** Where undamaged records begin. */
   [[nodiscard]] std::vector<std::int64_t> Undamaged(const Damaged& log) const {
     std::vector<std::int64_t> starts;
-    for (std::int64_t at = 0; at < std::ssize(log.bytes); ++at) {
-      const auto record = ends_.find(log.origin[static_cast<std::size_t>(at)]);
-      if (record == ends_.end()) continue;
-      std::int64_t size = 0;
-      const std::int64_t bytes = record->second - record->first;
-      while (size < bytes && at + size < std::ssize(log.bytes) &&
-             log.origin[static_cast<std::size_t>(at + size)] == record->first + size)
-        ++size;
-      if (size == bytes) starts.push_back(at);
+    const std::vector<std::int64_t>& origin = log.origin;
+    for (auto begin = origin.begin(), end = begin; begin != origin.end(); begin = end) {
+      end = std::adjacent_find(begin, origin.end(), [](std::int64_t a, std::int64_t b) { return b != a + 1; });
+      if (end != origin.end()) ++end;
+      const std::int64_t first = *begin, last = first + (end - begin);  // of one piece in the undamaged log, too
+      for (auto record = ends_.lower_bound(first); record != ends_.end() && record->second <= last; ++record)
+        starts.push_back(begin - origin.begin() + record->first - first);
     }
     return starts;
   }
