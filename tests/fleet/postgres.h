@@ -76,9 +76,7 @@ class Postgres final {
   }
 
  private:
-  static std::string AsUser() {
-    return geteuid() == 0 ? FOREREACH_SOURCE_DIR "/tests/fleet/as_nobody " : "";
-  }
+  static std::string AsUser() { return geteuid() == 0 ? FOREREACH_SOURCE_DIR "/tests/fleet/as_nobody " : ""; }
 
   const ScratchDirectory scratch_;
   const std::string folder_ = scratch_ / "server";

@@ -20,7 +20,9 @@ std::string CodeOf(const std::string& text) {
     } else if (rest.starts_with("//") || rest.starts_with("#include")) {
       at = std::min(text.find('\n', at), text.size());
     } else {
-      code += text[at++];
+      const std::size_t end = std::min(text.find_first_of("/#", at + 1), text.size());
+      code.append(text, at, end - at);
+      at = end;
     }
   }
   return code;
