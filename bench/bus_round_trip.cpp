@@ -5,26 +5,16 @@
 // then the other, and so on, so both see the same machine. Two questions: a plan that is certified (the answer is
 // decision_t and certified_plan_t) and one that is not (decision_t alone).
 #include <chrono>
-#include <csignal>
-#include <cstdio>
-#include <functional>
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <fcntl.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "bench/candidates.h"
 #include "bench/latencies.h"
-#include "bus/node.h"
+#include "bench/measurement.h"
 #include "certifier/process/certifier_node.h"
-#include "command_line/command_line.h"
 
 namespace forereach::bench {
 namespace {
@@ -56,39 +46,6 @@ class EchoNode final : public Node {
   const bool certifies_;
   std::vector<std::vector<std::uint8_t>> waiting_;
   const std::vector<std::uint8_t> certified_ = Encode(certified_plan_t{}), decision_ = Encode(decision_t{});
-};
-
-using MakeNode = std::function<std::unique_ptr<Node>(Bus& bus)>;
-
-// A child process that runs a node until this object goes.
-class Answerer {
- public:
-  Answerer(const std::string& url, const MakeNode& make) : process_(fork()) {
-    if (process_ < 0) throw std::runtime_error("fork failed");
-    if (process_ == 0) Run(url, make);
-  }
-  ~Answerer() {
-    kill(process_, SIGTERM);
-    waitpid(process_, nullptr, 0);
-  }
-  Answerer(const Answerer&) = delete;
-  Answerer& operator=(const Answerer&) = delete;
-
- private:
-  [[noreturn]] static void Run(const std::string& url, const MakeNode& make) {
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
-    dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);  // standard output is the measurement's
-    try {
-      const std::unique_ptr<Bus> bus = OpenBus(url);
-      const std::unique_ptr<Node> node = make(*bus);
-      RunNode(*node, *bus);
-    } catch (const std::exception& error) {
-      std::fprintf(stderr, "bus_round_trip: %s\n", error.what());
-    }
-    _exit(0);
-  }
-
-  pid_t process_;
 };
 
 // The asking end of one bus.
@@ -141,10 +98,6 @@ class Asker {
   std::unique_ptr<Bus> bus_;
 };
 
-std::string PortUrl(int offset) {
-  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 4 + offset) % 20'000) + "?ttl=0";
-}
-
 struct Results {
   Latencies echo, certifier, gate;
   int lost = 0, unexpected = 0;
@@ -166,9 +119,9 @@ void Alternate(int rounds, candidate_plan_t& candidate, Asker& echo, Asker& cert
 nlohmann::json Compare(const Task& task, bool certifies, int rounds, int ports) {
   const Config config = MakeConfig(task);
   const std::string echo_url = PortUrl(ports), gate_url = PortUrl(ports + 1);
-  const Answerer echo_process(echo_url,
-                              [&](Bus& bus) { return std::make_unique<EchoNode>(config.bus, bus, certifies); });
-  const Answerer gate_process(gate_url, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
+  const Child echo_process(echo_url, false,
+                           [&](Bus& bus) { return std::make_unique<EchoNode>(config.bus, bus, certifies); });
+  const Child gate_process(gate_url, false, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
 
   const std::int16_t expected = certifies ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY;
   Asker echo(echo_url, config.bus, 0), certifier(gate_url, config.bus, expected);
@@ -200,19 +153,11 @@ int main(int argc, char** argv) {
   const Command program{.name = "bus_round_trip",
                         .purpose = "Round trips on the bus, by a bare echo and by the certifier: percentiles as JSON",
                         .options = {{"--rounds", &rounds, "", "round trips of each kind", NumberRange{1, 10'000'000}}}};
-  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
-  try {
-    const nlohmann::json certified = Compare(MakeTask(Scenario::kBicycle, kObservations), true, rounds, 0);
-    const nlohmann::json abstained = Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2);
-    std::cout << nlohmann::json{{"candidate_bytes", EncodedSize<candidate_plan_t>()},
-                                {"decision_bytes", EncodedSize<decision_t>()},
-                                {"certified_bytes", EncodedSize<certified_plan_t>()},
-                                {"certified", certified},
-                                {"abstained", abstained}}
-                     .dump(2)
-              << std::endl;
-  } catch (const std::exception& error) {
-    std::cerr << "bus_round_trip: " << error.what() << "\n";
-    return 1;
-  }
+  return Print(program, argc, argv, [&]() -> nlohmann::json {
+    return {{"candidate_bytes", EncodedSize<candidate_plan_t>()},
+            {"decision_bytes", EncodedSize<decision_t>()},
+            {"certified_bytes", EncodedSize<certified_plan_t>()},
+            {"certified", Compare(MakeTask(Scenario::kBicycle, kObservations), true, rounds, 0)},
+            {"abstained", Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2)}};
+  });
 }

@@ -6,12 +6,10 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <optional>
 #include <random>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -39,6 +37,12 @@ constexpr int kBatch = 10'000;
 constexpr int kLargestDense = 10'000;
 
 using benchmark::State;
+
+// One benchmark, in microseconds.
+template <class Run>
+benchmark::internal::Benchmark* Register(const std::string& name, const Run& run) {
+  return benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMicrosecond);
+}
 
 PlainModel PlainModelOf(Scenario scenario) {
   return scenario == Scenario::kPointMass ? PlainPointMass(0.15) : PlainBicycle(0.1, 2.5);
@@ -97,51 +101,48 @@ void RunChunks(State& state, bool kin, unsigned threads) {
 
 void RegisterCertify(Scenario scenario, int observations) {
   const std::string suffix = NameOf(scenario, observations);
-  benchmark::RegisterBenchmark(std::string("certify/").append(suffix).c_str(), [=](State& state) {
+  Register("certify/" + suffix, [=](State& state) {
     RunCertify(state, CachedCertifier(scenario, observations), CachedTask(scenario, observations));
-  })->Unit(benchmark::kMicrosecond);
+  });
   if (scenario == Scenario::kBicycle && observations <= 400)
-    benchmark::RegisterBenchmark(std::string("certify_unrounded/").append(suffix).c_str(), RunCertifyWithoutRounding,
-                                 observations)
-        ->Unit(benchmark::kMicrosecond);
+    Register("certify_unrounded/" + suffix, [=](State& state) { RunCertifyWithoutRounding(state, observations); });
   if (scenario == Scenario::kBicycle && observations == 400)
-    benchmark::RegisterBenchmark(std::string("certify_centred/").append(suffix).c_str(), [=](State& state) {
+    Register("certify_centred/" + suffix, [=](State& state) {
       const Task& task = CachedTask(scenario, observations);
       Problem problem = *task.problem;
       problem.method = Method::kCentred;
       RunCertify(state, Certifier(std::make_shared<const Problem>(std::move(problem))), task);
-    })->Unit(benchmark::kMicrosecond);
+    });
 
   // A second a call and more, and the same work a thousand times: not run.
   if (observations > (scenario == Scenario::kDense ? 400 : 10'000)) return;
   for (const auto& [name, spelling] : {std::pair("straightforward/", Straightforward::Spelling::kMatrices),
                                        std::pair("straightforward_loops/", Straightforward::Spelling::kLoops)})
-    benchmark::RegisterBenchmark(std::string(name).append(suffix).c_str(), [=, spelling = spelling](State& state) {
+    Register(name + suffix, [=, spelling = spelling](State& state) {
       const Task& task = CachedTask(scenario, observations);
       RunStraightforward(state, Straightforward(task.problem, PlainModelOf(scenario), spelling), task);
-    })->Unit(benchmark::kMicrosecond);
+    });
 }
 
 void RegisterPlainPairwise(int observations) {
   if (observations > 400) return;
-  const std::string name = std::string("straightforward_pairwise/").append(NameOf(Scenario::kBicycle, observations));
-  benchmark::RegisterBenchmark(name.c_str(), [=](State& state) {
+  Register("straightforward_pairwise/" + NameOf(Scenario::kBicycle, observations), [=](State& state) {
     const Straightforward plain(CachedTask(Scenario::kBicycle, observations).problem, PlainModelOf(Scenario::kBicycle));
     for (auto _ : state) benchmark::DoNotOptimize(plain.FindViolation());
-  })->Unit(benchmark::kMicrosecond);
+  });
 }
 
 void RegisterNominalTube() {
   for (const auto& [name, method] : {std::pair("nominal_tube/forereach", Method::kCentred),
                                      std::pair("nominal_tube/forereach_paper", Method::kPaper)})
-    benchmark::RegisterBenchmark(name, [method = method](State& state) {
+    Register(name, [method = method](State& state) {
       const Task task = MakeNominalTube(method);
       RunCertify(state, Certifier(task.problem), task);
-    })->Unit(benchmark::kMicrosecond);
-  benchmark::RegisterBenchmark("nominal_tube/straightforward", [](State& state) {
+    });
+  Register("nominal_tube/straightforward", [](State& state) {
     const Task task = MakeNominalTube();
     RunStraightforward(state, Straightforward(task.problem, PlainModelOf(Scenario::kBicycle)), task);
-  })->Unit(benchmark::kMicrosecond);
+  });
 }
 
 // The paper's bicycle with 400 observations among what a robot meets: the same tube, another test of it.
@@ -167,14 +168,19 @@ std::vector<World> Worlds() {
           {"disc_moving", disc, between, true}};
 }
 
+Task TaskIn(const World& world) {
+  Task task = CachedTask(Scenario::kBicycle, 400);
+  Problem problem = *task.problem;
+  problem.body = world.body;
+  problem.between = world.between;
+  task.problem = std::make_shared<const Problem>(std::move(problem));
+  return task;
+}
+
 void RegisterWorlds() {
   for (const World& world : Worlds())
-    benchmark::RegisterBenchmark((std::string("world/") + world.name).c_str(), [world](State& state) {
-      Task task = CachedTask(Scenario::kBicycle, 400);
-      Problem problem = *task.problem;
-      problem.body = world.body;
-      problem.between = world.between;
-      task.problem = std::make_shared<const Problem>(std::move(problem));
+    Register(std::string("world/") + world.name, [world](State& state) {
+      Task task = TaskIn(world);
       if (world.moves) {
         ObstacleMotion motion;
         motion.velocity = {0.5, 0, 0};
@@ -183,7 +189,7 @@ void RegisterWorlds() {
         task.schedule = {0, 100'000, 5'000};
       }
       RunCertify(state, Certifier(task.problem), task);
-    })->Unit(benchmark::kMicrosecond);
+    });
 }
 
 // The bicycle among the cells of a map and without them. Each cell would leave a certificate if it were 0.3 m larger.
@@ -208,70 +214,58 @@ void RegisterMaps() {
     if (world.moves) continue;
     for (const auto& [name, count, is_indexed] :
          {std::tuple("none", 0, false), {"map_2000", 2000, true}, {"map_2000_without_index", 2000, false}})
-      benchmark::RegisterBenchmark((std::string("map/") + world.name + "/" + name).c_str(), [world, count = count,
-                                                                                             is_indexed = is_indexed](
-                                                                                                State& state) {
-        Task task = CachedTask(Scenario::kBicycle, 400);
-        Problem problem = *task.problem;
-        problem.body = world.body;
-        problem.between = world.between;
-        task.problem = std::make_shared<const Problem>(std::move(problem));
+      Register(std::string("map/") + world.name + "/" + name, [=, count = count, indexed = is_indexed](State& state) {
+        Task task = TaskIn(world);
         const Certifier certifier(task.problem);
         task.obstacles = MapCells(certifier, task, count);
         const ObstacleIndex index(task.obstacles);
-        if (is_indexed)
-          RunCertify(state, certifier, task, {task.obstacles, index});
-        else
-          RunCertify(state, certifier, task);
-      })->Unit(benchmark::kMicrosecond);
+        RunCertify(state, certifier, task, indexed ? ObstacleView(task.obstacles, index) : task.obstacles);
+      });
   }
 }
 
 // The bicycle as text beside the compiled one, its integrators, and a large model.
+using Integrator = ModelText::Integrator;
+struct NamedTask {
+  const char* name;
+  Task (*make)();
+};
+constexpr NamedTask kBicycleMidpoint{"bicycle_midpoint",
+                                     [] { return MakeBicycleTextTask(BicycleText(Integrator::kMidpoint), 400); }},
+    kBicycleMidpointNext{"bicycle_midpoint_next", [] { return MakeBicycleTextTask(BicycleMidpointText(), 400); }},
+    kBicycleRk4{"bicycle_rk4", [] { return MakeBicycleTextTask(BicycleText(Integrator::kRk4), 400); }},
+    kQuadrotor{"quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); }};
+
 void RegisterTextModels() {
-  using Integrator = ModelText::Integrator;
-  const auto add = [](const char* name, auto make) {
-    benchmark::RegisterBenchmark((std::string("model/") + name).c_str(), [make](State& state) {
-      const Task task = make();
+  for (const NamedTask& each :
+       {NamedTask{"bicycle_compiled", [] { return CachedTask(Scenario::kBicycle, 400); }},
+        NamedTask{"bicycle_text", [] { return MakeBicycleTextTask(BicycleText(Integrator::kNone), 400); }},
+        kBicycleMidpoint, kBicycleMidpointNext, kBicycleRk4, kQuadrotor})
+    Register(std::string("model/") + each.name, [each](State& state) {
+      const Task task = each.make();
       RunCertify(state, Certifier(task.problem), task);
-    })->Unit(benchmark::kMicrosecond);
-  };
-  add("bicycle_compiled", [] { return CachedTask(Scenario::kBicycle, 400); });
-  add("bicycle_text", [] { return MakeBicycleTextTask(BicycleText(Integrator::kNone), 400); });
-  add("bicycle_midpoint", [] { return MakeBicycleTextTask(BicycleText(Integrator::kMidpoint), 400); });
-  add("bicycle_midpoint_next", [] { return MakeBicycleTextTask(BicycleMidpointText(), 400); });
-  add("bicycle_rk4", [] { return MakeBicycleTextTask(BicycleText(Integrator::kRk4), 400); });
-  add("quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); });
+    });
 }
 
 // The same calls with steps up to a twentieth off their times, beside those of steps on time (docs/soundness.md, 3.15).
 void RegisterOffsets() {
-  using Integrator = ModelText::Integrator;
-  const auto add = [](const char* name, auto make) {
+  for (const NamedTask& each :
+       {NamedTask{"bicycle", [] { return CachedTask(Scenario::kBicycle, 400); }},
+        NamedTask{"point_mass", [] { return CachedTask(Scenario::kPointMass, 400); }},
+        NamedTask{"bicycle_text", [] { return MakeBicycleTextTask(BicycleText(Integrator::kEuler), 400); }},
+        kBicycleMidpointNext, kBicycleMidpoint, kBicycleRk4, kQuadrotor})
     for (const bool is_off : {false, true})
-      benchmark::RegisterBenchmark((std::string("steps/") + name + (is_off ? "/off_their_times" : "/on_time")).c_str(),
-                                   [make, is_off](State& state) {
-                                     const Task task = make();
-                                     Problem problem = *task.problem;
-                                     if (is_off) problem.timing.error = StepOf(*problem.model) / 20;
-                                     RunCertify(state, Certifier(std::make_shared<Problem>(problem)), task);
-                                   })
-          ->Unit(benchmark::kMicrosecond);
-  };
-  add("bicycle", [] { return CachedTask(Scenario::kBicycle, 400); });
-  add("point_mass", [] { return CachedTask(Scenario::kPointMass, 400); });
-  add("bicycle_text", [] { return MakeBicycleTextTask(BicycleText(Integrator::kEuler), 400); });
-  add("bicycle_midpoint_next", [] { return MakeBicycleTextTask(BicycleMidpointText(), 400); });
-  add("bicycle_midpoint", [] { return MakeBicycleTextTask(BicycleText(Integrator::kMidpoint), 400); });
-  add("bicycle_rk4", [] { return MakeBicycleTextTask(BicycleText(Integrator::kRk4), 400); });
-  add("quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); });
+      Register(std::string("steps/") + each.name + (is_off ? "/off_their_times" : "/on_time"), [=](State& state) {
+        const Task task = each.make();
+        Problem problem = *task.problem;
+        if (is_off) problem.timing.error = StepOf(*problem.model) / 20;
+        RunCertify(state, Certifier(std::make_shared<Problem>(problem)), task);
+      });
 }
 
 void RegisterBatch() {
   const unsigned cores = AllCores();
-  const auto add = [](const std::string& name, const auto& run) {
-    benchmark::RegisterBenchmark(name.c_str(), run)->UseRealTime()->Unit(benchmark::kMicrosecond);
-  };
+  const auto add = [](const std::string& name, const auto& run) { Register(name, run)->UseRealTime(); };
   for (unsigned threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1) {
     const std::string suffix = "/" + std::to_string(threads);
     add("batch/bicycle/400" + suffix, [=](State& state) { RunBatch(state, 400, threads); });

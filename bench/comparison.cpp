@@ -4,9 +4,7 @@
 // Also the inner hull of sampled rollouts, which no enclosure can be narrower than.
 //   comparison [any flag of Google Benchmark]       widths of x, y, theta at the end as counters
 #include <array>
-#include <cmath>
 #include <random>
-#include <vector>
 
 #include <benchmark/benchmark.h>
 #include <boost/numeric/interval.hpp>

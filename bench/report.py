@@ -55,10 +55,6 @@ def table(header, rows):
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def size_name(size):
-    return f"{size:,}"
-
-
 def ratio(a, b):
     return a / b if a is not None and b is not None else None
 
@@ -135,7 +131,7 @@ class Report:
                 ours, plain, loops = (self.cpu(f"{kind}/{scenario}/{size}")
                                       for kind in ("certify", "straightforward", "straightforward_loops"))
                 if ours or plain:
-                    rows.append([f"{scenario}, N = {size_name(size)}", number(ours), number(plain),
+                    rows.append([f"{scenario}, N = {size:,}", number(ours), number(plain),
                                  number(ratio(plain, ours)), number(loops), number(ratio(loops, ours))])
         return table(["", "ForeReach", "straightforward", "ratio", "by loops", "ratio"], rows)
 
@@ -154,7 +150,7 @@ class Report:
                 else:
                     cells = [f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in sizes]
                     rows.append((0, cells))
-        return table(["", *("N = " + size_name(n) for n in sizes)], [cells for _, cells in sorted(rows)])
+        return table(["", *(f"N = {n:,}" for n in sizes)], [cells for _, cells in sorted(rows)])
 
     def plain_pairwise(self):
         times = [f"{number(time)} us at N = {n}" for n in SIZES
@@ -217,66 +213,49 @@ class Report:
         rows = []
         for name, label in labels.items():
             benchmark = self.benchmarks.get(name)
-            time = benchmark and (benchmark.real if "manual" in name else benchmark.cpu)
-            rows.append([label, number(time)])
+            rows.append([label, number(benchmark and (benchmark.real if "manual" in name else benchmark.cpu))])
         return table(["", "us"], rows)
-
-    def candidate_bytes(self):
-        return f"{self.bus_data['candidate_bytes']:,}"
-
-    def decision_bytes(self):
-        return f"{self.bus_data['decision_bytes']:,}"
-
-    def certified_bytes(self):
-        return f"{self.bus_data['certified_bytes']:,}"
 
     def bus(self):
         rows = []
         for name, label in (("certified", "certificate"), ("abstained", "abstention")):
             data = self.bus_data[name]
-            rows.append([f"{label}: echo"] + [number(data["echo"][p]) for p in ("p50", "p99")])
-            rows.append([f"{label}: certifier"] + [number(data["certifier"][p]) for p in ("p50", "p99")])
-            rows.append([f"{label}: the gate's work, as the decisions say"] + [number(data["gate"][p]) for p in ("p50", "p99")])
-            rows.append([f"{label}: added"] + [number(data[f"added_{p}"]) for p in ("p50", "p99")])
-            rows.append([f"{label}: ratio"] + [number(data[f"ratio_{p}"]) for p in ("p50", "p99")])
+            of_both = {what: {p: data[f"{what}_{p}"] for p in ("p50", "p99")} for what in ("added", "ratio")}
+            for what, times in {"echo": data["echo"], "certifier": data["certifier"],
+                                "the gate's work, as the decisions say": data["gate"], **of_both}.items():
+                rows.append([f"{label}: {what}", number(times["p50"]), number(times["p99"])])
         counts = [self.bus_data[name]["certifier"]["count"] for name in ("certified", "abstained")]
         lost = sum(self.bus_data[name]["lost"] for name in ("certified", "abstained"))
         return table(["", "p50", "p99"], rows) + f"\n\n{sum(counts):,} round trips each, {lost} lost."
 
+    def beside(self, group, header, labels):
+        """Those of a group that there are, beside the first."""
+        found = {label: self.benchmarks[f"{group}/{name}"] for name, label in labels.items() if f"{group}/{name}" in self.benchmarks}
+        first = self.benchmarks.get(f"{group}/{next(iter(labels))}")
+        return table(["", "us", header], [[label, number(each.cpu), f"{each.cpu / first.cpu:.2f}"] for label, each in found.items()])
+
     def worlds(self):
-        point = self.benchmarks.get("world/point")
-        rows = []
-        for name, label in (
-            ("point", "point, at the samples"),
-            ("disc_at_frame", "disc around the point, at the samples"),
-            ("disc", "disc ahead of the point, at the samples"),
-            ("rectangle", "rectangle, at the samples"),
-            ("point_swept", "point, at all times"),
-            ("disc_swept", "disc, at all times"),
-            ("rectangle_swept", "rectangle, at all times"),
-            ("disc_moving", "disc, at all times, the circle moves"),
-        ):
-            if benchmark := self.benchmarks.get("world/" + name):
-                rows.append([label, number(benchmark.cpu), f"{benchmark.cpu / point.cpu:.2f}"])
-        return table(["", "us", "beside the point"], rows)
+        return self.beside("world", "beside the point", {
+            "point": "point, at the samples",
+            "disc_at_frame": "disc around the point, at the samples",
+            "disc": "disc ahead of the point, at the samples",
+            "rectangle": "rectangle, at the samples",
+            "point_swept": "point, at all times",
+            "disc_swept": "disc, at all times",
+            "rectangle_swept": "rectangle, at all times",
+            "disc_moving": "disc, at all times, the circle moves"})
 
     def beside_compiled(self, name):
         return ratio(self.cpu("model/" + name), self.cpu("model/bicycle_compiled"))
 
     def models(self):
-        compiled = self.benchmarks.get("model/bicycle_compiled")
-        rows = []
-        for name, label in (
-            ("bicycle_compiled", "bicycle, compiled"),
-            ("bicycle_text", "bicycle, text"),
-            ("bicycle_midpoint", "bicycle, text, midpoint"),
-            ("bicycle_midpoint_next", "bicycle, text, midpoint written out in `next`"),
-            ("bicycle_rk4", "bicycle, text, Runge-Kutta"),
-            ("quadrotor_rk4_20_steps", "quadrotor, text, Runge-Kutta, 20 steps"),
-        ):
-            if benchmark := self.benchmarks.get("model/" + name):
-                rows.append([label, number(benchmark.cpu), f"{benchmark.cpu / compiled.cpu:.2f}"])
-        return table(["", "us", "beside the compiled bicycle"], rows)
+        return self.beside("model", "beside the compiled bicycle", {
+            "bicycle_compiled": "bicycle, compiled",
+            "bicycle_text": "bicycle, text",
+            "bicycle_midpoint": "bicycle, text, midpoint",
+            "bicycle_midpoint_next": "bicycle, text, midpoint written out in `next`",
+            "bicycle_rk4": "bicycle, text, Runge-Kutta",
+            "quadrotor_rk4_20_steps": "quadrotor, text, Runge-Kutta, 20 steps"})
 
     def withdrawals(self):
         rows = []
@@ -350,7 +329,8 @@ def main():
     parser.add_argument("output")
     arguments = parser.parse_args()
     report = Report(arguments)
-    text = re.sub(r"@(\w+)@", lambda match: getattr(report, match[1])(), Path(arguments.template).read_text())
+    sizes = {name: f"{size:,}" for name, size in report.bus_data.items() if name.endswith("_bytes")}
+    text = re.sub(r"@(\w+)@", lambda match: sizes.get(match[1]) or getattr(report, match[1])(), Path(arguments.template).read_text())
     Path(arguments.output).write_text(text)
 
 

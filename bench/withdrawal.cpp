@@ -6,10 +6,6 @@
 // an obstacle appears on its path. `withdrawn` is the time from handing the obstacles to the bus to having the
 // withdrawal, `answered` that to having the robot's answer.
 #include <chrono>
-#include <csignal>
-#include <cstdio>
-#include <functional>
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <random>
@@ -18,17 +14,11 @@
 #include <thread>
 #include <vector>
 
-#include <fcntl.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "bench/candidates.h"
 #include "bench/latencies.h"
-#include "bus/node.h"
+#include "bench/measurement.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
-#include "command_line/command_line.h"
 #include "robot/supervisor.h"
 
 namespace forereach::bench {
@@ -77,34 +67,6 @@ class Treadmill final : public Node, private Supervisor::Robot {
   int step_ = 0;
   std::int64_t next_ = 0;
   Supervisor supervisor_;
-};
-
-// A child process that runs a node until this object goes.
-class Child {
- public:
-  Child(const std::string& url, const std::function<std::unique_ptr<Node>(Bus&)>& make) : process_(fork()) {
-    if (process_ < 0) throw std::runtime_error("fork failed");
-    if (process_ > 0) return;
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
-    dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);  // standard output is the measurement's, and so is
-    dup2(open("/dev/null", O_WRONLY), STDERR_FILENO);  // what is logged: each withdrawal
-    try {
-      const std::unique_ptr<Bus> bus = OpenBus(url);
-      const std::unique_ptr<Node> node = make(*bus);
-      RunNode(*node, *bus);
-    } catch (const std::exception&) {
-    }
-    _exit(0);
-  }
-  ~Child() {
-    kill(process_, SIGTERM);
-    waitpid(process_, nullptr, 0);
-  }
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
-
- private:
-  pid_t process_;
 };
 
 // Planner and perception.
@@ -185,9 +147,9 @@ nlohmann::json Measure(int rounds) {
   config.gate.obstacles_lost_ms = kNeverLost;
   config.gate.step_error_ms = kAnyTime;
   config.gate.learns = false;  // on a treadmill nothing can be learned
-  const std::string url = "udpm://239.255.76.67:" + std::to_string(10'000 + getpid() % 20'000) + "?ttl=0";
-  const Child certifier(url, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
-  const Child robot(url, [&](Bus& bus) { return std::make_unique<Treadmill>(config, bus); });
+  const std::string url = PortUrl(0);
+  const Child certifier(url, true, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
+  const Child robot(url, true, [&](Bus& bus) { return std::make_unique<Treadmill>(config, bus); });
   Driver driver(url, config, clear, blocked);
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   Latencies unused(kWarmUp), withdrawn(static_cast<std::size_t>(rounds)), answered(static_cast<std::size_t>(rounds));
@@ -208,11 +170,5 @@ int main(int argc, char** argv) {
   const Command program{.name = "withdrawal",
                         .purpose = "Time from an obstacle on the bus to the withdrawal of the plan that a robot drives",
                         .options = {{"--rounds", &rounds, "", "plans that are withdrawn", NumberRange{1, 1'000'000}}}};
-  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
-  try {
-    std::cout << Measure(rounds).dump(2) << std::endl;
-  } catch (const std::exception& error) {
-    std::cerr << "withdrawal: " << error.what() << "\n";
-    return 1;
-  }
+  return Print(program, argc, argv, [&] { return Measure(rounds); });
 }

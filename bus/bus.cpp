@@ -6,8 +6,6 @@
 #include <mutex>
 #include <string_view>
 #include <system_error>
-#include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>  // renameat2
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -427,8 +425,7 @@ class KeyDirectory final {
   void Exchange() const {
     if (::renameat2(parent_->get(), other_.c_str(), parent_->get(), name_.c_str(), RENAME_EXCHANGE) != 0)
       FailSystem(path_, "cannot be exchanged for " + other_path() +
-                            ", which needs a file system that exchanges "
-                            "directories in one step");
+                            ", which needs a file system that exchanges directories in one step");
   }
   void Sync() const {
     if (::fsync(parent_->get()) != 0) FailSystem(parent_path_, "cannot be written");

@@ -1,7 +1,6 @@
 #include "bus/node.h"
 
 #include <csignal>
-#include <cstdint>
 
 #include <systemd/sd-daemon.h>
 

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstring>
 #include <fstream>
-#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>

@@ -200,16 +200,15 @@ Command AdviseCommand() {
       .name = kAdvise.name,
       .purpose = kAdvise.purpose,
       .footer =
-          "Each change is the least of its kind, found by a search, and verified by certifying again with it. It is "
-          "not\n"
-          "true because it would help: a smaller slope or a wider domain has to be declared, and to hold.\n\n"
-          "Examples:\n"
-          "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_safety.csv > "
-          "decision.json\n"
-          "  forereach advise decision.json\n"
-          "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
-          "  forereach advise run/log\n"
-          "  forereach advise season --advice-seconds 600",
+          R"(Each change is the least of its kind, found by a search, and verified by certifying again with it. It is not
+true because it would help: a smaller slope or a wider domain has to be declared, and to hold.
+
+Examples:
+  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_safety.csv > decision.json
+  forereach advise decision.json
+  forereach advise run/log/events-20260101-120000-000000.lcmlog
+  forereach advise run/log
+  forereach advise season --advice-seconds 600)",
       .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                             "The abstentions: a decision (the output of certify --json), or logs, databases and "
                             "directories, as in forereach replay"}),

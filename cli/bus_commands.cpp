@@ -17,7 +17,6 @@
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/command_t.hpp"
 #include "lcmtypes/names.h"
-#include "lcmtypes/printable.h"
 #include "records/status_json.h"
 #include "task/config.h"
 #include "task/json_text.h"
@@ -248,11 +247,8 @@ Command KeygenCommand() {
                             "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature"}),
                   Required({"directory", &options->directory, "DIR",
                             "The new directory; with --again, the one that was made"}),
-                  {.name = "--again",
-                   .variable = &options->again,
-                   .type = "ROLE",
-                   .help = "Replace the key of this role in DIR, and no other: its machine is lost",
-                   .one_of = RoleNames()}},
+                  OneOf(RoleNames(), {"--again", &options->again, "ROLE",
+                                      "Replace the key of this role in DIR, and no other: its machine is lost"})},
       .run = [options] {
         const auto again = std::ranges::find(kAllRoles, options->again, RoleName);
         if (again == kAllRoles.end()) {

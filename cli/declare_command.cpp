@@ -1,21 +1,23 @@
 #include <algorithm>
 #include <chrono>
-#include <iomanip>
 #include <iostream>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/offline.h"
+#include "command_line/nearest.h"
 #include "command_line/progress.h"
 #include "forereach/certify/problem.h"
 #include "forereach/declare/region_search.h"
 #include "forereach/declare/slope_bound.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/parallel.h"
+#include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/cover_file.h"
 #include "identify/declare_between.h"
@@ -83,7 +85,7 @@ constexpr int kBoundDigits = 10;  // of a bound
 // The arguments that the slopes of a row depend on and that are not parameters with one value.
 std::vector<std::size_t> FreeArguments(const ResidualSlopes& slopes, const Config& config, int row) {
   const std::vector<Interval> parameters = ParameterRanges(*config.residual);
-  const auto num_variables = static_cast<std::size_t>(config.problem->model->num_variables());
+  const auto num_variables = ToSize(config.problem->model->num_variables());
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < num_variables + parameters.size(); ++i)
     if (slopes.Occurs(row, static_cast<int>(i)) &&
@@ -94,7 +96,7 @@ std::vector<std::size_t> FreeArguments(const ResidualSlopes& slopes, const Confi
 
 template <class Entry>
 std::string NameOf(const Entry& entry, const std::vector<std::string>& names) {
-  return names[static_cast<std::size_t>(entry.row)] + " by " + names[static_cast<std::size_t>(entry.column)];
+  return names[ToSize(entry.row)] + " by " + names[ToSize(entry.column)];
 }
 
 // Rejects a slope without a finite bound. @throws std::invalid_argument that names the slope and a box.
@@ -102,16 +104,16 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
   const std::vector<std::string> names = ArgumentNames(config);
   for (const SlopeBound& bound : bounds) {
     if (!bound.unbounded.empty()) {
-      std::string box;
-      for (const std::size_t i : FreeArguments(slopes, config, bound.row))
-        box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) +
-               ", " + RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
-      throw std::invalid_argument(
-          "no finite bound for the slope of " + NameOf(bound, names) + ": " + config.residual->name +
-          " has none over " + box + ", found after " + std::to_string(bound.boxes) +
-          " boxes; take this box out of `domain` in " + config.path +
-          " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, "
-          "or raise --max-boxes if the box is wide");
+      const std::string box = Joined(FreeArguments(slopes, config, bound.row), [&](std::size_t i) {
+        return names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kBoundDigits) + ", " +
+               RoundedUp(bound.unbounded[i].upper, kBoundDigits) + "]";
+      });
+      throw std::invalid_argument("no finite bound for the slope of " + NameOf(bound, names) + ": " +
+                                  config.residual->name + " has none over " + box + ", found after " +
+                                  std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " +
+                                  config.path +
+                                  " (narrow its bounds, or add an inequality or ball), narrow the residual's "
+                                  "parameters, or raise --max-boxes if the box is wide");
     }
     if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
       throw ConfigError(config.path + ": domain: no point of its box satisfies its inequalities and balls");
@@ -123,9 +125,8 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
   std::string text = "lipschitz: {";
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
-    if (!same_row) text += (i > 0 ? "}, " : "") + names[static_cast<std::size_t>(bounds[i].row)] + ": {";
-    text += (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " +
-            RoundedUp(bounds[i].upper, kBoundDigits);
+    if (!same_row) text += (i > 0 ? "}, " : "") + names[ToSize(bounds[i].row)] + ": {";
+    text += (same_row ? ", " : "") + names[ToSize(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper, kBoundDigits);
   }
   return text + (bounds.empty() ? "}" : "}}");
 }
@@ -147,24 +148,24 @@ std::vector<Region> RegionsFor(const std::vector<SlopeBound>& bounds, const Conf
     one.declaration.regions = {{{{l, {0, 1}}}, Eigen::MatrixXd::Zero(slopes.num_states(), slopes.num_variables())}};
     const bool matters = std::ranges::any_of(
         bounds, [&](const SlopeBound& bound) { return bound.upper > 0 && slopes.Occurs(bound.row, l); });
-    const Interval& range = ranges[static_cast<std::size_t>(l)];
+    const Interval& range = ranges[ToSize(l)];
     if (matters && range.lower < range.upper && FindCoupledRegion(one).empty()) variables.push_back(l);
   }
   RegionSearchOptions search;
-  search.most_cells = static_cast<std::size_t>(options.regions);
+  search.most_cells = ToSize(options.regions);
   return FindRegions(slopes, problem.domain, ParameterRanges(*config.residual), lipschitz, variables, search);
 }
 
 // Two lines a region.
 std::string Yaml(const std::vector<Region>& regions, const std::vector<SlopeBound>& bounds,
                  const std::vector<std::string>& names) {
-  const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
+  const auto name = [&](int i) { return names[ToSize(i)]; };
   std::string text;
   for (const Region& region : regions) {
-    std::string box, rows;
-    for (const auto& [variable, range] : region.box)
-      box +=
-          (box.empty() ? "" : ", ") + name(variable) + ": [" + ToText(range.lower) + ", " + ToText(range.upper) + "]";
+    std::string rows;
+    const std::string box = Joined(region.box, [&](const auto& side) {
+      return name(side.first) + ": [" + ToText(side.second.lower) + ", " + ToText(side.second.upper) + "]";
+    });
     for (std::size_t i = 0; i < bounds.size(); ++i) {
       const int row = bounds[i].row, column = bounds[i].column;
       const double whole = bounds[i].upper;
@@ -194,13 +195,13 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const std::vector<Region>& re
             double seconds) {
   const std::vector<std::string> names = ArgumentNames(config);
   const NominalModel& model = *config.problem->model;
-  const auto columns = static_cast<std::size_t>(model.num_variables());
+  const auto columns = ToSize(model.num_variables());
   Json zero = Json::array();
   for (int k = 0; k < model.num_states(); ++k) zero.push_back(std::vector<double>(columns, 0.0));
   Json lipschitz = zero, lower = zero, entries = Json::array();
   std::size_t boxes = 0;
   for (const SlopeBound& bound : bounds) {
-    const auto row = static_cast<std::size_t>(bound.row), column = static_cast<std::size_t>(bound.column);
+    const auto row = ToSize(bound.row), column = ToSize(bound.column);
     lipschitz[row][column] = bound.upper;
     lower[row][column] = bound.lower;
     Json point = Json::object();
@@ -236,23 +237,22 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const std::vector<Reg
                     double seconds) {
   const TextSlopes slopes(*config.residual);
   const std::vector<std::string> names = ArgumentNames(config);
-  const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
-  std::ostringstream text;
-  text << std::left << "declare: " << config.residual->name << " over the domain, "
-       << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << RoundedUp(LargestGap(bounds), 2) << "\n  "
-       << std::setw(8) << "row" << std::setw(8) << "column" << std::setw(18) << "certified bound" << std::setw(18)
-       << "largest found" << std::setw(10) << "gap" << std::setw(9) << "boxes"
-       << " at\n";
+  const auto line = [](const auto&... cells) {
+    return fmt::format("\n  {:<8}{:<8}{:<18}{:<18}{:<10}{:<9}{}", cells...);
+  };
+  std::string text =
+      fmt::format("declare: {} over the domain, {}{}", config.residual->name,
+                  AllReached(bounds) ? "to a gap of " : "stopped at a gap of ", RoundedUp(LargestGap(bounds), 2)) +
+      line("row", "column", "certified bound", "largest found", "gap", "boxes", " at");
   for (const SlopeBound& bound : bounds) {
-    text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
-         << RoundedUp(bound.upper, kBoundDigits) << std::setw(18) << RoundedDown(bound.lower, kBoundDigits)
-         << std::setw(10) << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
+    std::string at;
     if (!bound.point.empty())
       for (const std::size_t i : FreeArguments(slopes, config, bound.row))
-        text << " " << names[i] << " " << bound.point[i];
-    text << "\n";
+        at += fmt::format(" {} {:.6g}", names[i], bound.point[i]);
+    text += line(names[ToSize(bound.row)], names[ToSize(bound.column)], RoundedUp(bound.upper, kBoundDigits),
+                 RoundedDown(bound.lower, kBoundDigits), RoundedUp(bound.gap(), 2), bound.boxes, at);
   }
-  std::cout << text.str() << "  all other entries are zero\n  took " << seconds << " s\n\ndeclaration:\n  "
+  std::cout << text << "\n  all other entries are zero\n  took " << seconds << " s\n\ndeclaration:\n  "
             << Yaml(bounds, names) << Yaml(regions, bounds, names) << std::endl;
 }
 
@@ -298,7 +298,7 @@ std::vector<CoverFinding> CheckRecord(const CoverFile& file, const Config& confi
     const auto count = std::ranges::count_if(
         file.claims, [&, k = row, l = column](const auto& claim) { return claim.row == k && claim.column == l; });
     if (count != 1)
-      refute(names[static_cast<std::size_t>(row)] + " by " + names[static_cast<std::size_t>(column)],
+      refute(names[ToSize(row)] + " by " + names[ToSize(column)],
              "stands " + std::to_string(count) + " times in the cover, has to stand once");
   }
   return findings;
@@ -310,8 +310,8 @@ std::vector<CoverFinding> CheckClaims(const CoverFile& file, const Config& confi
   std::vector<CoverFinding> findings(file.claims.size());
   std::size_t leaves = 0;
   for (const auto& claim : file.claims)
-    leaves += static_cast<std::size_t>(
-        std::ranges::count_if(claim.cover.nodes, [](const Cover::Node& node) { return node.argument < 0; }));
+    leaves +=
+        ToSize(std::ranges::count_if(claim.cover.nodes, [](const Cover::Node& node) { return node.argument < 0; }));
   Progress progress("boxes checked", leaves);
   ForEachInParallel(file.claims.size(), jobs, [&](std::size_t i, std::size_t) {
     const verifier::SlopeClaim& claim = file.claims[i];
@@ -379,113 +379,79 @@ Command DeclareCommand() {
       .name = kDeclare.name,
       .purpose = kDeclare.purpose,
       .footer =
-          "In the task file, `add` is what the next state has beyond the model's. Each parameter is a number or an "
-          "interval:\n"
-          "  residual: {parameters: {c: [0.1, 0.2]}, add: {v: -c*v*abs(v)}}\n"
-          "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope found.\n"
-          "Copy the last line of the output into the task file.\n\n"
-          "--between needs no residual. It bounds how far the robot's path curves from one sample to the next, for the "
-          "key\n"
-          "task.between.\n\n"
-          "--from-data needs no residual either. It proposes a declaration from the task's transitions, and proves "
-          "nothing; see\n"
-          "docs/data.md. With --hold-out it shows how often fresh transitions contradict what the others propose.\n\n"
-          "Examples:\n"
-          "  forereach declare --config config/bicycle.yaml\n"
-          "  forereach declare --config config/bicycle.yaml --regions 64\n"
-          "  forereach declare --config config/bicycle.yaml --cover cover.json\n"
-          "  forereach declare --config config/bicycle.yaml --check cover.json\n"
-          "  forereach declare --config config/demo.yaml --between\n"
-          "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha\n"
-          "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha --hold-out "
-          "--picture trade_off",
-      .options = {TaskOption(options->config, "Task file (YAML) with a section `residual`"),
-                  {"--gap", &options->search.gap, "",
-                   "Stop when no bound exceeds the largest slope found by more than this fraction",
-                   NumberRange{1e-12, 1e3}},
-                  {"--max-boxes", &options->search.max_boxes, "",
-                   "Stop after this many boxes for each bound; the bound found by then is valid",
-                   NumberRange{1, 100'000'000}},
-                  {"--regions", &options->regions, "",
-                   "Also cut the domain into up to so many cells, where that pays, with proven slopes in each",
-                   NumberRange{1, 1024}},
-                  {.name = "--cover",
-                   .variable = &options->cover,
-                   .type = "FILE.json",
-                   .help = "The file for the proof: the boxes, and a bound for each",
-                   .excludes = "--between"},
-                  {.name = "--check",
-                   .variable = &options->check,
-                   .type = "FILE.json",
-                   .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 confirmed, 1 "
-                           "not confirmed",
-                   .excludes = "--cover"},
-                  {.name = "--between",
-                   .variable = &options->between,
-                   .help = "Bound the motion between two samples instead",
-                   .excludes = "--check"},
-                  {.name = "--from",
-                   .variable = &options->from,
-                   .help = "With --between. equations: proven bounds over the domain, from the model's equations in "
-                           "continuous time; positions: largest second differences of the task's transitions",
-                   .one_of = {"equations", "positions"},
-                   .needs = "--between"},
-                  {.name = "--seconds",
-                   .variable = &options->seconds,
-                   .help = "With --between: the bounds found by then, or by Ctrl-C, are printed; they are valid",
-                   .range = NumberRange{0.1, 1e6},
-                   .needs = "--between"},
-                  {.name = "--from-data",
-                   .variable = &options->from_data,
-                   .help = "Propose a declaration from the task's transitions instead",
-                   .excludes = "--between"},
-                  {.name = "--by",
-                   .variable = &options->data.by,
-                   .type = "[STATE=]NAMES",
-                   .help = "The states and inputs on which the residual may depend, with commas between, of one state "
-                           "or of all; by default on all. May be repeated",
-                   .needs = "--from-data"},
-                  {.name = "--factor",
-                   .variable = &options->data.factor,
-                   .help = "Proposed slopes over the smallest ones that no transitions contradict",
-                   .range = NumberRange{1, 1000},
-                   .needs = "--from-data"},
-                  {.name = "--noise",
-                   .variable = &options->noise,
-                   .help = "The task's noise_bound, or that raised to what the transitions show of their error",
-                   .one_of = {"declared", "estimated"},
-                   .needs = "--from-data"},
-                  {.name = "--disturbance",
-                   .variable = &options->disturbance,
-                   .help = "The task's disturbance, or that raised to the scatter beyond noise_bound of near places",
-                   .one_of = {"declared", "estimated"},
-                   .needs = "--from-data"},
-                  {.name = "--hold-out",
-                   .variable = &options->data.hold_out,
-                   .help = "Learn from every other block of time, and judge by those between",
-                   .needs = "--from-data"},
-                  {.name = "--blocks",
-                   .variable = &options->data.blocks,
-                   .help = "With --hold-out: the number of blocks",
-                   .range = NumberRange{2, 100'000},
-                   .needs = "--hold-out"},
-                  {.name = "--steps",
-                   .variable = &options->data.steps,
-                   .help = "With --hold-out: the length of the stretches of recorded commands that are certified",
-                   .range = NumberRange{1, kMaxSteps},
-                   .needs = "--hold-out"},
-                  {.name = "--confidence",
-                   .variable = &options->data.confidence,
-                   .help = "With --hold-out: of the bound on the rate of blocks with a contradiction",
-                   .range = NumberRange{0.5, 0.999999},
-                   .needs = "--hold-out"},
-                  {.name = "--picture",
-                   .variable = &options->data.picture,
-                   .type = "NAME",
-                   .help = "With --hold-out: the trade-off as NAME.svg and NAME.png, or as one of them",
-                   .needs = "--hold-out"},
-                  JobsOption(options->jobs),
-                  JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
+          R"(In the task file, `add` is what the next state has beyond the model's. Each parameter is a number or an interval:
+  residual: {parameters: {c: [0.1, 0.2]}, add: {v: -c*v*abs(v)}}
+Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope found.
+Copy the last line of the output into the task file.
+
+--between needs no residual. It bounds how far the robot's path curves from one sample to the next, for the key
+task.between.
+
+--from-data needs no residual either. It proposes a declaration from the task's transitions, and proves nothing; see
+docs/data.md. With --hold-out it shows how often fresh transitions contradict what the others propose.
+
+Examples:
+  forereach declare --config config/bicycle.yaml
+  forereach declare --config config/bicycle.yaml --regions 64
+  forereach declare --config config/bicycle.yaml --cover cover.json
+  forereach declare --config config/bicycle.yaml --check cover.json
+  forereach declare --config config/demo.yaml --between
+  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha
+  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha --hold-out --picture trade_off)",
+      .options =
+          {TaskOption(options->config, "Task file (YAML) with a section `residual`"),
+           {"--gap", &options->search.gap, "",
+            "Stop when no bound exceeds the largest slope found by more than this fraction", NumberRange{1e-12, 1e3}},
+           {"--max-boxes", &options->search.max_boxes, "",
+            "Stop after this many boxes for each bound; the bound found by then is valid", NumberRange{1, 100'000'000}},
+           {"--regions", &options->regions, "",
+            "Also cut the domain into up to so many cells, where that pays, with proven slopes in each",
+            NumberRange{1, 1024}},
+           Excluding("--between", {"--cover", &options->cover, "FILE.json",
+                                   "The file for the proof: the boxes, and a bound for each"}),
+           Excluding("--cover", {"--check", &options->check, "FILE.json",
+                                 "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
+                                 "confirmed, 1 not confirmed"}),
+           Excluding("--check", {"--between", &options->between, "", "Bound the motion between two samples instead"}),
+           Needing("--between",
+                   OneOf({"equations", "positions"},
+                         {"--from", &options->from, "",
+                          "With --between. equations: proven bounds over the domain, from the model's equations in "
+                          "continuous time; positions: largest second differences of the task's transitions"})),
+           Needing("--between", {"--seconds", &options->seconds, "",
+                                 "With --between: the bounds found by then, or by Ctrl-C, are printed; they are valid",
+                                 NumberRange{0.1, 1e6}}),
+           Excluding("--between", {"--from-data", &options->from_data, "",
+                                   "Propose a declaration from the task's transitions instead"}),
+           Needing("--from-data", {"--by", &options->data.by, "[STATE=]NAMES",
+                                   "The states and inputs on which the residual may depend, with commas between, of "
+                                   "one state or of all; by default on all. May be repeated"}),
+           Needing("--from-data",
+                   {"--factor", &options->data.factor, "",
+                    "Proposed slopes over the smallest ones that no transitions contradict", NumberRange{1, 1000}}),
+           Needing("--from-data",
+                   OneOf({"declared", "estimated"},
+                         {"--noise", &options->noise, "",
+                          "The task's noise_bound, or that raised to what the transitions show of their error"})),
+           Needing("--from-data",
+                   OneOf({"declared", "estimated"},
+                         {"--disturbance", &options->disturbance, "",
+                          "The task's disturbance, or that raised to the scatter beyond noise_bound of near places"})),
+           Needing("--from-data", {"--hold-out", &options->data.hold_out, "",
+                                   "Learn from every other block of time, and judge by those between"}),
+           Needing("--hold-out", {"--blocks", &options->data.blocks, "", "With --hold-out: the number of blocks",
+                                  NumberRange{2, 100'000}}),
+           Needing("--hold-out",
+                   {"--steps", &options->data.steps, "",
+                    "With --hold-out: the length of the stretches of recorded commands that are certified",
+                    NumberRange{1, kMaxSteps}}),
+           Needing("--hold-out", {"--confidence", &options->data.confidence, "",
+                                  "With --hold-out: of the bound on the rate of blocks with a contradiction",
+                                  NumberRange{0.5, 0.999999}}),
+           Needing("--hold-out", {"--picture", &options->data.picture, "NAME",
+                                  "With --hold-out: the trade-off as NAME.svg and NAME.png, or as one of them"}),
+           JobsOption(options->jobs),
+           JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
       .run = [options] {
         if (options->between)
           return DeclareBetween(

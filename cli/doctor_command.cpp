@@ -12,7 +12,6 @@
 #include <iostream>
 #include <map>
 #include <sstream>
-#include <thread>
 #include <vector>
 
 #include <nlohmann/json.hpp>

@@ -23,10 +23,7 @@ inline void AddKeyOptions(std::vector<Option>& options, LogKey& key) {
   options.push_back({"--key", &key.file, "PATH",
                      "Directory of keys, verify.pub or any key file: messages of a log that its roles did not sign are "
                      "passed over; by default the task file's bus.key"});
-  options.push_back({.name = "--no-key",
-                     .variable = &key.none,
-                     .help = "Believe every message of a log, whoever sent it",
-                     .excludes = "--key"});
+  options.push_back(Excluding("--key", {"--no-key", &key.none, "", "Believe every message of a log, whoever sent it"}));
 }
 
 /** What the work on one run is given. */

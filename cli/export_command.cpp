@@ -160,29 +160,25 @@ int RunExport(ExportArguments options) {
 
 Command ExportCommand() {
   const auto options = std::make_shared<ExportArguments>();
-  Command command{
-      .name = kExport.name,
-      .purpose = kExport.purpose,
-      .footer =
-          "csv     a directory: decisions.csv, controls.csv, executions.csv, withdrawals.csv, gaps.csv\n"
-          "jsonl   the same records, one JSON object a line, in the order of the log\n"
-          "npz     the tubes and controls of certified plans as NumPy arrays\n"
-          "mcap    every message as JSON with its schema, for PlotJuggler and Foxglove\n"
-          "For a directory, a database or logs of several runs, npz and mcap write a directory with a file for each "
-          "run.\n\n"
-          "Examples:\n  forereach export run/log --format csv -o tables\n"
-          "  forereach export run/log/events-20260101-120000-000000.lcmlog --format mcap -o run.mcap",
-      .options = {Required({"inputs", &options->inputs, "LOG|DATABASE|DIRECTORY", kRuns}),
-                  Required({.name = "--format",
-                            .variable = &options->format,
-                            .help = "What is written",
-                            .one_of = kExportFormats}),
-                  Required({"-o,--out", &options->output, "FILE|DIR",
-                            "A new file, or a directory; files that exist are not changed"}),
-                  {"--config", &options->what.config, "FILE",
-                   "The task file of the recording, for its channels and its key; by default the one that the logger "
-                   "kept next to the log, in tasks/, otherwise the usual channels"}},
-      .run = [options] { return RunExport(*options); }};
+  Command command{.name = kExport.name,
+                  .purpose = kExport.purpose,
+                  .footer =
+                      "csv     a directory: decisions.csv, controls.csv, executions.csv, withdrawals.csv, gaps.csv\n"
+                      "jsonl   the same records, one JSON object a line, in the order of the log\n"
+                      "npz     the tubes and controls of certified plans as NumPy arrays\n"
+                      "mcap    every message as JSON with its schema, for PlotJuggler and Foxglove\n"
+                      "For a directory, a database or logs of several runs, npz and mcap write a directory with a file "
+                      "for each run.\n\n"
+                      "Examples:\n  forereach export run/log --format csv -o tables\n"
+                      "  forereach export run/log/events-20260101-120000-000000.lcmlog --format mcap -o run.mcap",
+                  .options = {Required({"inputs", &options->inputs, "LOG|DATABASE|DIRECTORY", kRuns}),
+                              Required(OneOf(kExportFormats, {"--format", &options->format, "", "What is written"})),
+                              Required({"-o,--out", &options->output, "FILE|DIR",
+                                        "A new file, or a directory; files that exist are not changed"}),
+                              {"--config", &options->what.config, "FILE",
+                               "The task file of the recording, for its channels and its key; by default the one that "
+                               "the logger kept next to the log, in tasks/, otherwise the usual channels"}},
+                  .run = [options] { return RunExport(*options); }};
   command.options.push_back(JobsOption(options->jobs));
   AddKeyOptions(command.options, options->what.key);
   return command;

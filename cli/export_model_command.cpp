@@ -1,9 +1,7 @@
-#include <algorithm>
 #include <cctype>
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <stdexcept>
 
 #include "cli/commands.h"
 #include "cli/new_file.h"
@@ -59,16 +57,15 @@ Command ExportModelCommand() {
       .name = kExportModel.name,
       .purpose = kExportModel.purpose,
       .footer =
-          "A program of ten lines, examples/certifier/main.cpp, includes the header and is a certifier with these "
-          "equations\n"
-          "as machine code. Its decisions have the same bits as those of forereach-certifier, which interprets the "
-          "text, so\n"
-          "the task file stays as it is, and all other processes and commands go by it. It refuses a task with other\n"
-          "equations than those that it was built with; parameters and dt may differ.\n"
-          "Exported are equations of the next state (`next`), and rates with `integrator: euler`. A step of midpoint\n"
-          "or rk4 can be written out in `next`; docs/expressions.md, \"At full speed\", has an example and what it "
-          "gains.\n\n"
-          "Example:\n  forereach export-model config/bicycle_text.yaml --out robot_model.h",
+          R"(A program of ten lines, examples/certifier/main.cpp, includes the header and is a certifier with these equations
+as machine code. Its decisions have the same bits as those of forereach-certifier, which interprets the text, so
+the task file stays as it is, and all other processes and commands go by it. It refuses a task with other
+equations than those that it was built with; parameters and dt may differ.
+Exported are equations of the next state (`next`), and rates with `integrator: euler`. A step of midpoint
+or rk4 can be written out in `next`; docs/expressions.md, "At full speed", has an example and what it gains.
+
+Example:
+  forereach export-model config/bicycle_text.yaml --out robot_model.h)",
       .options = {TaskOption(options->config),
                   {"-o,--out", &options->out, "FILE.h", "The header"},
                   {"--name", &options->name, "WORD", "Of the struct; by default the model's name"},

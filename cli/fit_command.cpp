@@ -1,9 +1,8 @@
-#include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <iostream>
-#include <sstream>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -32,9 +31,7 @@ struct FitArguments {
 
 // The parameters to fit: those that are named, or all but dt.
 std::vector<std::string> NamesOf(const std::string& given, const ModelText& text) {
-  std::vector<std::string> names;
-  std::istringstream in(given);
-  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
+  std::vector<std::string> names = SplitAtCommas(given);
   if (given.empty())
     for (const ModelText::Parameter& parameter : text.parameters)
       if (parameter.name != "dt") names.push_back(parameter.name);
@@ -45,12 +42,7 @@ double RootMeanSquare(const Eigen::MatrixXd& errors, Eigen::Index k) {
   return std::sqrt(errors.col(k).squaredNorm() / static_cast<double>(errors.rows()));
 }
 
-std::string Short(double value) {
-  std::ostringstream text;
-  text.precision(kFitDigits);
-  text << value;
-  return text.str();
-}
+std::string Short(double value) { return fmt::format("{:.{}g}", value, kFitDigits); }
 
 std::string DeviationText(const FittedParameter& parameter) {
   if (std::isnan(parameter.deviation)) return "none: no informative number is left over to show the noise";
@@ -61,10 +53,8 @@ std::string DeviationText(const FittedParameter& parameter) {
 }
 
 std::string Yaml(const Fit& fit) {
-  std::string text;
-  for (const FittedParameter& parameter : fit.parameters)
-    text += (text.empty() ? "" : ", ") + parameter.name + ": " + Short(parameter.after);
-  return "parameters: {" + text + "}";
+  return "parameters: {" +
+         Joined(fit.parameters, [](const FittedParameter& each) { return each.name + ": " + Short(each.after); }) + "}";
 }
 
 Json ToJson(const Fit& fit, const NominalModel& model) {
@@ -92,24 +82,20 @@ Json ToJson(const Fit& fit, const NominalModel& model) {
 
 void PrintForPeople(const Fit& fit, const Config& config) {
   const NominalModel& model = *config.problem->model;
-  std::ostringstream out;
-  out << "fit: " << fit.parameters.size() << " parameters to " << fit.after.rows() << " transitions of " << config.path
-      << (fit.converged ? "" : "; stopped before it converged") << "\n"
-      << std::left << "  " << std::setw(18) << "parameter" << std::setw(13) << "before" << std::setw(13) << "after"
-      << "standard error\n";
+  const auto parameters = [](const auto&... cells) { return fmt::format("  {:<18}{:<13}{:<13}{}\n", cells...); };
+  const auto errors = [](const auto&... cells) { return fmt::format("  {:<18}{:<13}{:<13}{:<16}{}\n", cells...); };
+  std::string text = fmt::format("fit: {} parameters to {} transitions of {}{}\n", fit.parameters.size(),
+                                 fit.after.rows(), config.path, fit.converged ? "" : "; stopped before it converged") +
+                     parameters("parameter", "before", "after", "standard error");
   for (const FittedParameter& each : fit.parameters)
-    out << "  " << std::setw(18) << each.name << std::setw(13) << Short(each.before) << std::setw(13)
-        << Short(each.after) << DeviationText(each) << "\n";
-  out << "\n  " << std::setw(18) << "one-step error" << std::setw(13) << "rms before" << std::setw(13) << "rms after"
-      << std::setw(16) << "largest before"
-      << "largest after\n";
+    text += parameters(each.name, Short(each.before), Short(each.after), DeviationText(each));
+  text += "\n" + errors("one-step error", "rms before", "rms after", "largest before", "largest after");
   for (Eigen::Index k = 0; k < fit.after.cols(); ++k)
-    out << "  " << std::setw(18) << model.state_names()[ToSize(k)] << std::setw(13)
-        << RoundedUp(RootMeanSquare(fit.before, k), 4) << std::setw(13) << RoundedUp(RootMeanSquare(fit.after, k), 4)
-        << std::setw(16) << RoundedUp(fit.before.col(k).cwiseAbs().maxCoeff(), 4)
-        << RoundedUp(fit.after.col(k).cwiseAbs().maxCoeff(), 4) << "\n";
+    text += errors(model.state_names()[ToSize(k)], RoundedUp(RootMeanSquare(fit.before, k), 4),
+                   RoundedUp(RootMeanSquare(fit.after, k), 4), RoundedUp(fit.before.col(k).cwiseAbs().maxCoeff(), 4),
+                   RoundedUp(fit.after.col(k).cwiseAbs().maxCoeff(), 4));
   std::cout
-      << out.str()
+      << text
       << "\nThe sum of squared errors of one step, each over its rms before, has a local minimum there. The standard "
          "errors assume\nindependent errors of measurement; what the equations lack is none. A model that fits better "
          "leaves a smaller residual,\nwhich still has to be declared, for the new parameters.\n\n"
@@ -149,22 +135,22 @@ int RunFit(const FitArguments& options) {
 
 Command FitCommand() {
   const auto options = std::make_shared<FitArguments>();
-  return {.name = kFit.name,
-          .purpose = kFit.purpose,
-          .footer =
-              "The model has to be text in the task file or in a model file. Its parameters begin at their values, a "
-              "range at its middle.\n"
-              "Copy the last line into the task file: `model.parameters`. Then declare the residual that is left; see "
-              "docs/data.md.\n\n"
-              "Example:\n  forereach fit --config my_robot.yaml --parameters gain,drag --picture errors",
-          .options = {TaskOption(options->config, "Task file (YAML) with a model as text, and transitions"),
-                      {"--parameters", &options->names, "NAMES",
-                       "Those to fit, with commas between; by default all but dt"},
-                      {"--picture", &options->picture, "NAME",
-                       "The errors before and after against each coordinate, as NAME.svg and NAME.png, or as one of "
-                       "them"},
-                      JsonFlag(options->json)},
-          .run = [options] { return RunFit(*options); }};
+  return {
+      .name = kFit.name,
+      .purpose = kFit.purpose,
+      .footer =
+          "The model has to be text in the task file or in a model file. Its parameters begin at their values, a range "
+          "at its middle.\n"
+          "Copy the last line into the task file: `model.parameters`. Then declare the residual that is left; see "
+          "docs/data.md.\n\n"
+          "Example:\n  forereach fit --config my_robot.yaml --parameters gain,drag --picture errors",
+      .options = {TaskOption(options->config, "Task file (YAML) with a model as text, and transitions"),
+                  {"--parameters", &options->names, "NAMES",
+                   "Those to fit, with commas between; by default all but dt"},
+                  {"--picture", &options->picture, "NAME",
+                   "The errors before and after against each coordinate, as NAME.svg and NAME.png, or as one of them"},
+                  JsonFlag(options->json)},
+      .run = [options] { return RunFit(*options); }};
 }
 
 }  // namespace forereach

@@ -37,24 +37,18 @@ int ReportFleet(const FleetReportArguments& options) {
 
 Command FleetReportCommand() {
   const auto options = std::make_shared<FleetReportArguments>();
-  return {.name = kReport.name,
-          .purpose = "Summarise the rows of all robots in the fleet's store: exit 0, 2 if it cannot be read",
-          .footer =
-              "Example:\n  forereach report --database postgresql://fleet.example/forereach --out fleet.html --runs "
-              "pages",
-          .options = {Required({"--database", &options->database, "URL", kDatabaseAddress}),
-                      {"-o,--out", &options->out, "FILE.html", "Write a page for a browser, a new file"},
-                      {.name = "--runs",
-                       .variable = &options->runs,
-                       .type = "URL",
-                       .help = "Where the pages of runs are: logs lead to URL/ROBOT/LOG.html, as forereach report LOG "
-                               "--out writes them",
-                       .needs = "--out"},
-                      {.name = "--json",
-                       .variable = &options->json,
-                       .help = "One JSON document on standard output",
-                       .excludes = "--out"}},
-          .run = [options] { return ReportFleet(*options); }};
+  return {
+      .name = kReport.name,
+      .purpose = "Summarise the rows of all robots in the fleet's store: exit 0, 2 if it cannot be read",
+      .footer =
+          "Example:\n  forereach report --database postgresql://fleet.example/forereach --out fleet.html --runs pages",
+      .options = {Required({"--database", &options->database, "URL", kDatabaseAddress}),
+                  {"-o,--out", &options->out, "FILE.html", "Write a page for a browser, a new file"},
+                  Needing("--out", {"--runs", &options->runs, "URL",
+                                    "Where the pages of runs are: logs lead to URL/ROBOT/LOG.html, as forereach report "
+                                    "LOG --out writes them"}),
+                  Excluding("--out", {"--json", &options->json, "", "One JSON document on standard output"})},
+      .run = [options] { return ReportFleet(*options); }};
 }
 
 }  // namespace forereach

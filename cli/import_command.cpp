@@ -16,7 +16,6 @@
 #include "cli/offline.h"
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
-#include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/command_delay.h"
 #include "identify/import.h"
@@ -64,14 +63,6 @@ std::map<std::string, std::string> Assignments(const std::string& option, const 
   return values;
 }
 
-// "a,b" as names.
-std::vector<std::string> Names(const std::string& text) {
-  std::vector<std::string> names;
-  std::istringstream in(text);
-  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
-  return names;
-}
-
 // The unit of a state or an input in a model's text; empty if the model is compiled.
 std::string UnitOf(const NominalModel& model, std::size_t variable) {
   if (!model.text()) return "";
@@ -85,7 +76,7 @@ LogFormat FormatOf(const ImportArguments& options) {
   LogFormat format{.delimiter = {},
                    .decimal_comma = options.decimal == "comma",
                    .comment = options.comment,
-                   .header = Names(options.header)};
+                   .header = SplitAtCommas(options.header)};
   if (options.delimiter != "auto")
     format.delimiter = options.delimiter == "comma"       ? ','
                        : options.delimiter == "semicolon" ? ';'
@@ -242,7 +233,7 @@ Json ToJson(const Source& source, const std::vector<std::string>& columns) {
                 {"input_deviation", source.log.input_deviation}};
   for (std::size_t cause = 0; cause < source.log.dropped.size(); ++cause)
     if (source.log.dropped[cause].count > 0)
-      document["dropped"][ToWord(static_cast<Dropped>(cause))] = ToJson(source.log.dropped[cause]);
+      document["dropped"][WordsOf(static_cast<Dropped>(cause)).word] = ToJson(source.log.dropped[cause]);
   if (source.log.At(Dropped::kGap).count > 0) {
     document["dropped"]["gap"]["median_distance_s"] = source.log.median_gap;
     document["dropped"]["gap"]["largest_distance_s"] = source.log.largest_gap;
@@ -286,18 +277,17 @@ void PrintForPeople(const Source& source, const std::vector<std::string>& column
   if (table.headers.count > 0) std::cout << Line(table.headers, "lines that repeat the header");
   for (std::size_t cause = 0; cause < log.dropped.size(); ++cause)
     if (log.dropped[cause].count > 0) {
-      std::cout << Line(log.dropped[cause], Explain(static_cast<Dropped>(cause)));
+      std::cout << Line(log.dropped[cause], WordsOf(static_cast<Dropped>(cause)).line);
       if (static_cast<Dropped>(cause) == Dropped::kGap) PrintGaps(log, options);
     }
 }
 
 // "x 0.0012, y 0.001", of those that are not zero; empty if all are.
 std::string Listed(const std::vector<std::string>& names, const Eigen::VectorXd& values) {
-  std::string text;
-  for (std::size_t k = 0; k < names.size(); ++k)
-    if (const double value = values[static_cast<Eigen::Index>(k)]; value > 0)
-      text += (text.empty() ? "" : ", ") + names[k] + " " + RoundedUp(value, 3);
-  return text;
+  return Joined(names, [&](const std::string& name) {
+    const double value = values[&name - names.data()];
+    return value > 0 ? name + " " + RoundedUp(value, 3) : "";
+  });
 }
 
 // What the transitions cannot know, from the largest of all logs.
@@ -321,29 +311,6 @@ void PrintErrors(const std::vector<Source>& sources, const ImportArguments& opti
                  "include it.\n";
 }
 
-// What a user can do about a cause. Empty where nothing was lost.
-std::string Remedy(Dropped cause) {
-  switch (cause) {
-    case Dropped::kRowLost: return "mend these lines, or say with --delimiter what separates their fields";
-    case Dropped::kNoStamp: return "write the stamps as decimal numbers";
-    case Dropped::kRepeatedStamp: return "leave one row for each stamp";
-    case Dropped::kBackwards: return "sort the rows by their stamps if they are of one run";
-    case Dropped::kEnd: return "record longer runs without a break";
-    case Dropped::kGap: return "raise --tolerance-ms, or let model.dt be a multiple of the log's spacing";
-    case Dropped::kNoState:
-    case Dropped::kNoInput: return "write these fields as decimal numbers";
-    case Dropped::kInputChanges: return "give --input-mean or --input-tolerance";
-    case Dropped::kOutsideDomain: return "widen the task's domain, or give the columns' units with --unit";
-    case Dropped::kNearTheEdge: return "widen the task's domain";
-    case Dropped::kNoNominalValue: return "mend the model's equations there";
-    case Dropped::kAmbiguousAngle: return "record in rad, or with a smaller model.dt";
-    case Dropped::kRepeatedRow:
-    case Dropped::kOutsideWindow:
-    case Dropped::kCount: break;
-  }
-  return "";
-}
-
 // Of the rows of all logs, those that lie in a transition.
 struct Share {
   std::int64_t rows = 0, used = 0;
@@ -361,7 +328,7 @@ Share ShareOf(const std::vector<Source>& sources) {
     share.used += source.log.rows_used;
     share.gap = std::max(share.gap, source.log.median_gap);
     for (std::size_t cause = 0; cause < counts.size(); ++cause)
-      if (!Remedy(static_cast<Dropped>(cause)).empty()) counts[cause] += source.log.dropped[cause].count;
+      if (*WordsOf(static_cast<Dropped>(cause)).remedy != '\0') counts[cause] += source.log.dropped[cause].count;
   }
   share.main_cause = static_cast<Dropped>(std::ranges::max_element(counts) - counts.begin());
   return share;
@@ -374,9 +341,9 @@ void PrintShare(const Share& share, double period) {
   const bool tolerable = share.main_cause == Dropped::kGap && share.gap < period / 2;
   std::cout << fmt::format(
       "import: {} of {} rows ({:.3g} %) are in no transition; the most frequent reason: {} ({})\n", dropped, share.rows,
-      100.0 * static_cast<double>(dropped) / static_cast<double>(share.rows), Explain(share.main_cause),
+      100.0 * static_cast<double>(dropped) / static_cast<double>(share.rows), WordsOf(share.main_cause).line,
       tolerable ? "--tolerance-ms " + RoundedUp(share.gap * 1000, 3) + " takes half of these starts"
-                : Remedy(share.main_cause));
+                : WordsOf(share.main_cause).remedy);
 }
 
 // ---- How late commands act
@@ -415,11 +382,10 @@ void PrintDelay(const CommandDelay& delay, const NominalModel& model) {
   for (std::size_t d = 0; d < delay.error.size(); ++d)
     std::cout << fmt::format("  {:>3} rows late: {}\n", d, Listed(model.state_names(), delay.error[d]));
   if (delay.least > 0)
-    std::cout
-        << "Shift them with --command-delay " << delay.best
-        << ": a certificate then is about inputs as they act, and whoever sends plans has to send each command so "
-           "much earlier.\nOr model it: for a delay of one dt, a state `held` with `held: u` in model.next, and "
-           "`held` for u in the other equations.\n";
+    std::cout << "Shift them with --command-delay " << delay.best
+              << ": a certificate then is about inputs as they act, and whoever sends plans has to send each command "
+                 "so much earlier.\nOr model it: for a delay of one dt, a state `held` with `held: u` in model.next, "
+                 "and `held` for u in the other equations.\n";
 }
 
 Json ToJson(const CommandDelay& delay) {
@@ -521,16 +487,9 @@ int RunImport(ImportArguments options) {
     PrintShare(share, config.period);
   }
   if (all.size() > 0 && !writes)
-    std::cerr
-        << "forereach: less than half of the rows lie in a transition, and which half may be no matter of chance: "
-           "nothing is written. --keep-few writes it.\n";
+    std::cerr << "forereach: less than half of the rows lie in a transition, and which half may be no matter of "
+                 "chance: nothing is written. --keep-few writes it.\n";
   return writes ? 0 : 1;
-}
-
-std::string UnitNames() {
-  std::string text;
-  for (const Unit& unit : KnownUnits()) text += (text.empty() ? "" : ", ") + std::string(unit.name);
-  return text;
 }
 
 }  // namespace
@@ -546,7 +505,7 @@ Command ImportCommand() {
           "A row's input holds until the next row. No state is interpolated, and no transition spans a lost row.\n"
           "docs/data.md says what else counts, and what of it is an error that the declaration has to allow for.\n\n"
           "Units beside those of the model: " +
-          UnitNames() +
+          Joined(KnownUnits(), [](const Unit& unit) { return unit.name; }) +
           ".\n\n"
           "Examples:\n"
           "  forereach import --config my_robot.yaml --time stamp --out transitions.csv log.csv\n"
@@ -557,16 +516,14 @@ Command ImportCommand() {
           {ConfigOption(options->config, "Task file (YAML): its model, dt and domain; its transitions are not read"),
            Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
            {"--time", &options->time, "COLUMN",
-            "The column of the stamps, numbers or dates of ISO 8601, or seconds_of(SECONDS,NANOSECONDS); by "
-            "default `time`, if "
-            "there is such a column and no --rate"},
+            "The column of the stamps, numbers or dates of ISO 8601, or seconds_of(SECONDS,NANOSECONDS); by default "
+            "`time`, if there is such a column and no --rate"},
            {"--time-unit", &options->time_unit, "UNIT", "Unit of the stamps: s, ms, us, ns, min, h"},
            {"--rate", &options->rate, "", "There are no stamps: so many rows are recorded in a second",
             NumberRange{1e-6, 1e9}},
            {"--state", &options->states, "NAME=COLUMN",
-            "The column of a state, or yaw_of(QX,QY,QZ,QW) of a quaternion's four, yaw_of(QZ,QW) of a turn "
-            "about z alone; by "
-            "default the one of its name. May be repeated"},
+            "The column of a state, or yaw_of(QX,QY,QZ,QW) of a quaternion's four, yaw_of(QZ,QW) of a turn about z "
+            "alone; by default the one of its name. May be repeated"},
            {"--input", &options->inputs, "NAME=COLUMN", "The same for an input"},
            {"--inputs-from", &options->inputs_from, "LOG.csv",
             "The inputs are in this log: each holds from its stamp until the next one's"},
@@ -583,10 +540,8 @@ Command ImportCommand() {
             NumberRange{0, 1e6}},
            {"--input-tolerance", &options->input_tolerances, "NAME=VALUE",
             "An input may differ by so much during a step from the one that the step began with"},
-           {.name = "--input-mean",
-            .variable = &options->input_mean,
-            .help = "Take the mean of each input over the step, however it changes",
-            .excludes = "--input-tolerance"},
+           Excluding("--input-tolerance", {"--input-mean", &options->input_mean, "",
+                                           "Take the mean of each input over the step, however it changes"}),
            {"--command-delay", &options->command_delay, "auto|N",
             "Commands act so many rows after theirs; auto: as many as the model's error says"},
            {"--overlapping", &options->overlapping, "",
@@ -596,14 +551,11 @@ Command ImportCommand() {
            {"--from", &options->from, "", "Leave out samples before so many seconds after a log's first stamp",
             NumberRange{0, 1e12}},
            {"--until", &options->until, "", "Leave out samples after so many seconds", NumberRange{0, 1e12}},
-           {.name = "--delimiter",
-            .variable = &options->delimiter,
-            .help = "What stands between two fields; by default the one that the header contains",
-            .one_of = {"auto", "comma", "semicolon", "tab", "blank"}},
-           {.name = "--decimal",
-            .variable = &options->decimal,
-            .help = "What stands before the decimals of a number",
-            .one_of = {"point", "comma"}},
+           OneOf({"auto", "comma", "semicolon", "tab", "blank"},
+                 {"--delimiter", &options->delimiter, "",
+                  "What stands between two fields; by default the one that the header contains"}),
+           OneOf({"point", "comma"},
+                 {"--decimal", &options->decimal, "", "What stands before the decimals of a number"}),
            {"--comment", &options->comment, "TEXT", "A line that begins with this text is a comment"},
            {"--header", &options->header, "NAMES",
             "The names of the columns, with commas between, of a log that does not begin with them"},

@@ -11,7 +11,6 @@
 #include "cli/commands.h"
 #include "cli/new_file.h"
 #include "cli/offline.h"
-#include "forereach/numerics/limits.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
 #include "task/files.h"
@@ -119,8 +118,7 @@ int RunImportWorld(const ImportWorldArguments& options) {
   if (!fits)
     std::cerr << fmt::format(
         "forereach: {} obstacles, and a task takes {}: nothing is written. --task or --region keeps what lies where "
-        "the "
-        "robot drives; {} makes fewer and larger pieces.\n",
+        "the robot drives; {} makes fewer and larger pieces.\n",
         count, kMostObstacles,
         format == "ros"          ? "--coarsen"
         : format == "commonroad" ? "--thickness or --steps-per-window"
@@ -138,50 +136,41 @@ Command ImportWorldCommand() {
       .footer =
           "FILE is the YAML file of a ROS map, a CommonRoad 2020a scenario (.xml), or GeoJSON. OUT has the list "
           "task.obstacles; put it into a task file.\nThe obstacles contain all that the file says is not free. OUT "
-          "begins "
-          "with what was assumed.\n\n"
+          "begins with what was assumed.\n\n"
           "Examples:\n  forereach import-world map.yaml --task my_robot.yaml --whole-task --out my_robot_in_map.yaml\n"
           "  forereach import-world scenario.xml --region 0,-10,60,10 --steps-per-window 5 --out obstacles.yaml\n"
           "  forereach import-world site.geojson --origin 11.58,48.14 --line-width 0.2 --out obstacles.yaml",
-      .options =
-          {Required({"FILE", &options->file, "FILE", "What to read"}),
-           Required({"--out", &options->out, "OUT.yaml", "The obstacles, as a part of a task file"}),
-           {.name = "--format",
-            .variable = &options->format,
-            .help = "What FILE is; by default its name says it",
-            .one_of = {"auto", "ros", "commonroad", "geojson"}},
-           {.name = "--task",
-            .variable = &options->task,
-            .type = "TASK",
-            .help = "Keep what may lie in the positions of this task's domain, with the reach of its body; all "
-                    "outside counts as occupied",
-            .excludes = "--region"},
-           {"--whole-task", &options->whole_task, "",
-            "OUT is that task with its line `obstacles: []` replaced; put it beside the task, whose other files it "
-            "names"},
-           {"--region", &options->region, "XMIN,YMIN,XMAX,YMAX", "The same for a box, in metres"},
-           {.name = "--unknown",
-            .variable = &options->unknown,
-            .help = "ros: what unknown cells are, and all beyond the image",
-            .one_of = {"occupied", "free"}},
-           {"--coarsen", &options->coarsen, "N", "ros: a block of N by N cells is occupied if one of them is",
-            NumberRange{1, 1000}},
-           {"--thickness", &options->thickness, "M",
-            "commonroad: consecutive segments of the boundary are one piece while they lie so near its chord",
-            NumberRange{0, 10}},
-           {"--steps-per-window", &options->steps_per_window, "N",
-            "commonroad: of what moves, one obstacle for so many time steps", NumberRange{1, 1000}},
-           {"--origin", &options->origin, "LON,LAT",
-            "geojson: coordinates are degrees, and x = y = 0 is here; x to the east, y to the north"},
-           {"--metres", &options->metres, "", "geojson: coordinates are metres, even if they look like degrees"},
-           {"--keep-in", &options->keep_in, "",
-            "geojson: stay in the areas, but for those with the property keep_in: false"},
-           {"--line-width", &options->line_width, "M", "geojson: of lines without the property width",
-            NumberRange{0, 1e6}},
-           {"--point-radius", &options->point_radius, "M", "geojson: of points without the property radius",
-            NumberRange{0, 1e6}},
-           {"--force", &options->force, "", "Replace OUT if it exists"},
-           JsonFlag(options->json)},
+      .options = {Required({"FILE", &options->file, "FILE", "What to read"}),
+                  Required({"--out", &options->out, "OUT.yaml", "The obstacles, as a part of a task file"}),
+                  OneOf({"auto", "ros", "commonroad", "geojson"},
+                        {"--format", &options->format, "", "What FILE is; by default its name says it"}),
+                  Excluding("--region", {"--task", &options->task, "TASK",
+                                         "Keep what may lie in the positions of this task's domain, with the reach of "
+                                         "its body; all outside counts as occupied"}),
+                  {"--whole-task", &options->whole_task, "",
+                   "OUT is that task with its line `obstacles: []` replaced; put it beside the task, whose other files "
+                   "it names"},
+                  {"--region", &options->region, "XMIN,YMIN,XMAX,YMAX", "The same for a box, in metres"},
+                  OneOf({"occupied", "free"},
+                        {"--unknown", &options->unknown, "", "ros: what unknown cells are, and all beyond the image"}),
+                  {"--coarsen", &options->coarsen, "N", "ros: a block of N by N cells is occupied if one of them is",
+                   NumberRange{1, 1000}},
+                  {"--thickness", &options->thickness, "M",
+                   "commonroad: consecutive segments of the boundary are one piece while they lie so near its chord",
+                   NumberRange{0, 10}},
+                  {"--steps-per-window", &options->steps_per_window, "N",
+                   "commonroad: of what moves, one obstacle for so many time steps", NumberRange{1, 1000}},
+                  {"--origin", &options->origin, "LON,LAT",
+                   "geojson: coordinates are degrees, and x = y = 0 is here; x to the east, y to the north"},
+                  {"--metres", &options->metres, "", "geojson: coordinates are metres, even if they look like degrees"},
+                  {"--keep-in", &options->keep_in, "",
+                   "geojson: stay in the areas, but for those with the property keep_in: false"},
+                  {"--line-width", &options->line_width, "M", "geojson: of lines without the property width",
+                   NumberRange{0, 1e6}},
+                  {"--point-radius", &options->point_radius, "M", "geojson: of points without the property radius",
+                   NumberRange{0, 1e6}},
+                  {"--force", &options->force, "", "Replace OUT if it exists"},
+                  JsonFlag(options->json)},
       .run = [options] { return RunImportWorld(*options); }};
 }
 

@@ -124,15 +124,10 @@ Command IngestCommand() {
                   Required({"--database", &options->database, "URL", kDatabaseAddress}),
                   {"--robot", &options->ingest.robot, "NAME", "Whose logs they are where the logger had no keys"},
                   {"--config", &options->ingest.config, "FILE", kTaskOfLogs},
-                  {.name = "--shard",
-                   .variable = &options->shard,
-                   .type = "I/N",
-                   .help = "Send the part I of N of each log's rows, I from 1"},
-                  {.name = "--follow",
-                   .variable = &options->follow,
-                   .help = "Send what a logger writes into its directory, until SIGTERM or Ctrl-C; while the server is "
-                           "away, the rows wait there",
-                   .excludes = "--shard"}},
+                  {"--shard", &options->shard, "I/N", "Send the part I of N of each log's rows, I from 1"},
+                  Excluding("--shard", {"--follow", &options->follow, "",
+                                        "Send what a logger writes into its directory, until SIGTERM or Ctrl-C; while "
+                                        "the server is away, the rows wait there"})},
       .run = [options] { return Ingest(*options); }};
   AddKeyOptions(command.options, options->ingest.key);
   return command;

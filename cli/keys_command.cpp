@@ -14,9 +14,7 @@ Command KeysCommand() {
               "An editor that speaks YAML's language server checks a file that begins with\n"
               "  # yaml-language-server: $schema=task.schema.json\n"
               "after  forereach keys --schema > task.schema.json",
-          .options = {{.name = "--schema",
-                       .variable = as_schema.get(),
-                       .help = "Print a JSON Schema instead, for editors"}},
+          .options = {{"--schema", as_schema.get(), "", "Print a JSON Schema instead, for editors"}},
           .run = [as_schema] {
             std::cout << (*as_schema ? SchemaJson() + "\n" : SchemaMarkdown());
             return 0;

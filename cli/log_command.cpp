@@ -143,19 +143,14 @@ Command LogCommand() {
           "  forereach log filter run/log/events-*.lcmlog --outcome abstain_safety -o refused.lcmlog\n"
           "  forereach log cut run/log/events-20260101-120000-000000.lcmlog --from +10 --to +20 -o part.lcmlog\n"
           "  forereach log merge robot.lcmlog camera.lcmlog -o both.lcmlog",
-      .options = {Required({.name = "action",
-                            .variable = &options->action,
-                            .help = "What to do",
-                            .one_of = {"list", "filter", "cut", "merge"}}),
+      .options = {Required(OneOf({"list", "filter", "cut", "merge"}, {"action", &options->action, "", "What to do"})),
                   Required({"logs", &options->logs, "LOG", "LCM event logs"}),
                   {"--from", &options->selection.from, "TIME", "Events from this time on"},
                   {"--to", &options->selection.to, "TIME", "Events before this time"},
                   {"--channel", &options->selection.channels, "NAME", "Events of this channel; may be repeated"},
-                  {.name = "--outcome",
-                   .variable = &options->selection.outcome,
-                   .help = "Candidates, decisions and certified plans of plans with this outcome only; cut and merge "
-                           "keep all other messages",
-                   .one_of = OutcomeNames()},
+                  OneOf(OutcomeNames(), {"--outcome", &options->selection.outcome, "",
+                                         "Candidates, decisions and certified plans of plans with this outcome only; "
+                                         "cut and merge keep all other messages"}),
                   {"-o,--out", &options->output, "FILE", "The new log; list has none"},
                   JsonFlag(options->json, "For list: a JSON object a line")},
       .run = [options] { return RunLog(*options); }};

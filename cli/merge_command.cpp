@@ -165,18 +165,11 @@ int Merge(const MergeArguments& options) {
 }  // namespace
 
 void ShardOptions::AddTo(std::vector<Option>& options) {
-  options.push_back({.name = "--shard",
-                     .variable = &shard,
-                     .type = "I/N",
-                     .help = "Judge the part I of N of each run's cases, I from 1, and write what was found to --out; "
-                             "forereach merge makes one result of all N files",
-                     .needs = "--out",
-                     .excludes = "--json"});
-  options.push_back({.name = "--out",
-                     .variable = &out,
-                     .type = "FILE",
-                     .help = "The file of the shard; an older one is replaced",
-                     .needs = "--shard"});
+  options.push_back(
+      Excluding("--json", Needing("--out", {"--shard", &shard, "I/N",
+                                            "Judge the part I of N of each run's cases, I from 1, and write what was "
+                                            "found to --out; forereach merge makes one result of all N files"})));
+  options.push_back(Needing("--shard", {"--out", &out, "FILE", "The file of the shard; an older one is replaced"}));
 }
 
 Shard ShardOptions::Get() const {
@@ -239,9 +232,8 @@ Command MergeCommand() {
   return {.name = kMerge.name,
           .purpose = kMerge.purpose,
           .footer =
-              "It prints what the command prints without --shard, byte for byte, with its exit code. The files "
-              "have to be all N, of\nthe same command, program, options, task, key and logs under the same "
-              "names.\n\n"
+              "It prints what the command prints without --shard, byte for byte, with its exit code. The files have to "
+              "be all N, of\nthe same command, program, options, task, key and logs under the same names.\n\n"
               "Examples:\n  forereach replay run/log --shard 1/2 --out part1.json\n"
               "  forereach replay run/log --shard 2/2 --out part2.json\n"
               "  forereach merge part1.json part2.json",

@@ -27,10 +27,10 @@ inline constexpr OfflineCommand kPlan{"plan",
 inline constexpr OfflineCommand kImport{"import",
                                         "Make the transitions of a task from logs of states and inputs: exit 0 with a "
                                         "CSV file, 1 if there is none, 2 bad input"};
-inline constexpr OfflineCommand kImportWorld{"import-world",
-                                             "Make a task's obstacles of a ROS map, a CommonRoad scenario or GeoJSON: "
-                                             "exit 0 with a YAML file, 1 if there are more "
-                                             "than a task takes, 2 bad input"};
+inline constexpr OfflineCommand kImportWorld{
+    "import-world",
+    "Make a task's obstacles of a ROS map, a CommonRoad scenario or GeoJSON: exit 0 with a YAML file, 1 if there are "
+    "more than a task takes, 2 bad input"};
 inline constexpr OfflineCommand kFit{"fit",
                                      "Fit the parameters of a model as text to the task's transitions: exit 0 if the "
                                      "search converged, 1 if not, 2 bad input"};
@@ -46,8 +46,7 @@ inline constexpr OfflineCommand kReplay{
     "replay", "Replay a recorded log through the gate: exit 0 if every decision equals the recorded one, otherwise 1"};
 inline constexpr OfflineCommand kMerge{"merge",
                                        "Make one result of the files of replay --shard or verify --shard: exit as the "
-                                       "command without it, 2 if they do not "
-                                       "belong together"};
+                                       "command without it, 2 if they do not belong together"};
 inline constexpr OfflineCommand kAdvise{"advise",
                                         "Find what would have turned abstentions into certificates: exit 0 if each has "
                                         "such a change, 1 if not, 2 bad input"};
@@ -58,8 +57,7 @@ inline constexpr OfflineCommand kCheckLog{
     "check-log",
     "Check a logger's directory for consistency: exit 0 if the event of every row of the database is unchanged in its "
     "log, every row is the one that follows from its event, and no log is damaged or unknown to the database, "
-    "otherwise "
-    "1; logs deleted for the quota are not errors"};
+    "otherwise 1; logs deleted for the quota are not errors"};
 inline constexpr OfflineCommand kRun{
     "run",
     "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock: exit 0 if "

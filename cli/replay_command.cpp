@@ -2,7 +2,6 @@
 #include <iostream>
 #include <map>
 #include <optional>
-#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -276,16 +275,14 @@ Command ReplayCommand() {
           "  forereach replay run/log --shard 2/7 --out part2.json",
       .options = {Required({"logs", &options->logs, "LOG|DATABASE|DIRECTORY", kRuns}),
                   {"--config", &options->config, "FILE", kTaskOfLogs},
-                  {.name = "--other-task",
-                   .variable = &options->other_task,
-                   .help = "Replay it through the gate of another task, given by --config, and show its decisions",
-                   .needs = "--config"},
-                  {.name = "--compare",
-                   .variable = &options->compare,
-                   .help = "Replay it through the gate of another task, given by --config, and count what it would "
-                           "have changed: certificates gained and lost, by cause, obstacle and step",
-                   .needs = "--config",
-                   .excludes = "--other-task"},
+                  Needing("--config",
+                          {"--other-task", &options->other_task, "",
+                           "Replay it through the gate of another task, given by --config, and show its decisions"}),
+                  Excluding("--other-task",
+                            Needing("--config",
+                                    {"--compare", &options->compare, "",
+                                     "Replay it through the gate of another task, given by --config, and count what it "
+                                     "would have changed: certificates gained and lost, by cause, obstacle and step"})),
                   {"--plan-digest", &options->plan_digest, "HEX",
                    "Also print what was recorded and what is decided again on the candidates whose digest begins so"},
                   JsonFlag(options->json)},

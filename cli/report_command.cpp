@@ -14,7 +14,6 @@
 #include "page/gather.h"
 #include "page/write.h"
 #include "records/report.h"
-#include "task/config_error.h"
 
 namespace forereach {
 namespace {
@@ -150,30 +149,19 @@ Command ReportCommand() {
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
                             std::string(kLogs) + "; with --out also databases, directories and logs of several runs"}),
                   {"--config", &report.config, "FILE", kTaskOfLogs},
-                  {.name = "--picture",
-                   .variable = &report.picture,
-                   .type = "FILE",
-                   .help =
-                       "Draw obstacles, tubes and driven path into a .svg or .png file, without an ending into both",
-                   .excludes = "--out"},
+                  Excluding(
+                      "--out",
+                      {"--picture", &report.picture, "FILE",
+                       "Draw obstacles, tubes and driven path into a .svg or .png file, without an ending into both"}),
                   {"-o,--out", &options->out, "FILE.html",
                    "Write a page with figures, every decision and its tube, instead of the text"},
-                  {.name = "--before",
-                   .variable = &options->before,
-                   .type = "LOG|DATABASE|DIRECTORY",
-                   .help = "Show its figures beside those of the others on the page",
-                   .needs = "--out"},
-                  {.name = "--advice-seconds",
-                   .variable = &options->advice_seconds,
-                   .type = "S",
-                   .help = "How long to search what would have turned abstentions, those that missed by least first; "
-                           "the page says which were not searched",
-                   .range = NumberRange{0, 86400},
-                   .needs = "--out"},
-                  {.name = "--force",
-                   .variable = &options->force,
-                   .help = "Overwrite the page if it exists",
-                   .needs = "--out"},
+                  Needing("--out", {"--before", &options->before, "LOG|DATABASE|DIRECTORY",
+                                    "Show its figures beside those of the others on the page"}),
+                  Needing("--out", {"--advice-seconds", &options->advice_seconds, "S",
+                                    "How long to search what would have turned abstentions, those that missed by least "
+                                    "first; the page says which were not searched",
+                                    NumberRange{0, 86400}}),
+                  Needing("--out", {"--force", &options->force, "", "Overwrite the page if it exists"}),
                   JsonFlag(report.json)},
       .run = [options] {
         if (!options->out.empty()) return WritePage(*options);

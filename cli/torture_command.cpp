@@ -36,8 +36,8 @@ Command TortureCommand() {
   Command command{
       .name = "torture",
       .purpose =
-          "Send what a hostile or broken planner and sender would to a running gate and guard, and count what "
-          "gets through: exit 0 if nothing does, 1 if something, 2 bad input. Not to a robot that is in use",
+          "Send what a hostile or broken planner and sender would to a running gate and guard, and count what gets "
+          "through: exit 0 if nothing does, 1 if something, 2 bad input. Not to a robot that is in use",
       .footer =
           "It sends stale, future, doubled, altered, not finite and oversized messages, a flood and a clock that "
           "jumps. With --key, the planner's, it also tries that key, replays and alterations on every other role's "

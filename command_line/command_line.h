@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -22,7 +23,7 @@ struct NumberRange {
   double lower = 0, upper = 0;
 };
 
-/** Most are {name, variable, type, help} or {name, variable, type, help, range}. */
+/** {name, variable, type, help} or {name, variable, type, help, range}, and what the functions below say of it. */
 struct Option {
   std::string name{};   ///< "--config"; without dashes the name of a positional argument.
   Variable variable{};  ///< Must outlive ParseCommandLine.
@@ -34,10 +35,19 @@ struct Option {
   std::string needs{}, excludes{};    ///< The name of another option of this command.
 };
 
-[[nodiscard]] inline Option Required(Option option) {
-  option.required = true;
-  return option;
+/** @name The same option, with more said of it. */
+///@{
+[[nodiscard]] inline Option Required(Option option) { return option.required = true, option; }
+[[nodiscard]] inline Option OneOf(std::vector<std::string> words, Option option) {
+  return option.one_of = std::move(words), option;
 }
+[[nodiscard]] inline Option Needing(std::string other, Option option) {
+  return option.needs = std::move(other), option;
+}
+[[nodiscard]] inline Option Excluding(std::string other, Option option) {
+  return option.excludes = std::move(other), option;
+}
+///@}
 
 /** A program, or one of the commands of a program. */
 struct Command {

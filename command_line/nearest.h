@@ -1,4 +1,4 @@
-/** What a wrong word was probably meant to be. */
+/** Lists of words in options and messages, and what a wrong word was probably meant to be. */
 #pragma once
 
 #include <string>
@@ -12,5 +12,15 @@ namespace forereach {
 
 /** The words, separated by commas. */
 [[nodiscard]] std::string Joined(const std::vector<std::string>& words);
+/** The same of what `text` gives of each element; what is empty is left out. */
+template <class Range, class Text>
+[[nodiscard]] std::string Joined(const Range& range, const Text& text) {
+  std::string all;
+  for (const auto& element : range)
+    if (const std::string word(text(element)); !word.empty()) all += (all.empty() ? "" : ", ") + word;
+  return all;
+}
+/** "a,b" as words. */
+[[nodiscard]] std::vector<std::string> SplitAtCommas(const std::string& text);
 
 }  // namespace forereach

@@ -156,8 +156,8 @@ std::string FleetHtml(const std::vector<FleetTable>& tables, const std::string& 
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>ForeReach: the fleet</title>\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
-      "<style>body{font:15px sans-serif;margin:2em}table{border-collapse:collapse}td,th{padding:.2em .8em;"
-      "text-align:left;border-bottom:1px solid #ccc}</style></head><body>\n<h1>The fleet</h1>\n";
+      "<style>body{font:15px sans-serif;margin:2em}table{border-collapse:collapse}td,th{padding:.2em "
+      ".8em;text-align:left;border-bottom:1px solid #ccc}</style></head><body>\n<h1>The fleet</h1>\n";
   for (const FleetTable& table : tables) {
     const std::size_t robot = Find(table.columns, "robot"), log = Find(table.columns, "log");
     html += fmt::format("<h2>{}</h2>\n<table><tr>", table.title);

@@ -96,8 +96,8 @@ constexpr const char* kAroundTables = R"sql(
 
 // What a session needs, whatever the server's settings are: a transaction is on the disk when it is told to be.
 constexpr const char* kSession =
-    "SET client_encoding = 'UTF8'; SET search_path = public, pg_temp; SET synchronous_commit = on; "
-    "SET extra_float_digits = 1; SET client_min_messages = error";
+    "SET client_encoding = 'UTF8'; SET search_path = public, pg_temp; SET synchronous_commit = on; SET "
+    "extra_float_digits = 1; SET client_min_messages = error";
 
 // Whose rows are copied before they are added.
 constexpr const char* kCopies = R"sql(
@@ -347,8 +347,8 @@ class Store::Connection final {
     const auto version = work.exec1("SELECT max(version) FROM forereach_schema")[0].as<int>();
     if (version < kMigrations[0].version || version > Database::kSchemaVersion)
       throw StoreError(
-          fmt::format("the store: schema version {}, this program knows version {}: use the program that "
-                      "made it, or another database",
+          fmt::format("the store: schema version {}, this program knows version {}: use the program that made it, or "
+                      "another database",
                       version, Database::kSchemaVersion));
     if (version < Database::kSchemaVersion) Migrate(work, version);
     work.commit();
@@ -413,14 +413,13 @@ void Copy(pqxx::work& work, const char* table, const std::string& robot, const s
 // Two logs of one name: the store can hold one of them.
 void RequireSameEvents(pqxx::work& work, const char* table) {
   const pqxx::result other = work.exec(
-      fmt::format("SELECT log_file, event_number FROM pg_temp.new_{0} JOIN public.{0} AS old "
-                  "USING (robot, log_file, event_number, event_utime) WHERE old.event_digest <> new_{0}.event_digest "
-                  "LIMIT 1",
+      fmt::format("SELECT log_file, event_number FROM pg_temp.new_{0} JOIN public.{0} AS old USING (robot, log_file, "
+                  "event_number, event_utime) WHERE old.event_digest <> new_{0}.event_digest LIMIT 1",
                   table));
   if (!other.empty())
     throw StoreError(
-        fmt::format("the store: {}, event {}: it has another event of this number and time: two logs have "
-                    "one name, or one was changed",
+        fmt::format("the store: {}, event {}: it has another event of this number and time: two logs have one name, or "
+                    "one was changed",
                     other[0][0].c_str(), other[0][1].c_str()));
 }
 

@@ -1,7 +1,5 @@
 // Advice as anybody may send it, through what a planner makes of it: what it keeps away from becomes less only where
 // it is eased, is never a NaN, and stays within what the type can name.
-#include <array>
-#include <cmath>
 
 #include "fuzz/fuzz.h"
 #include "planner_bridge/lessons.h"

@@ -138,10 +138,9 @@ MotionProposal FromPositions(const Config& config) {
   const MeasuredMotion measured =
       MeasureMotion(*problem.model, problem.transitions, FrameOf(problem), problem.body, config.period);
   if (measured.triples == 0)
-    throw ConfigError(
-        config.path +
-        ": transitions: none begins with the state in which the one before it ends, so there is no second "
-        "difference; use transitions that were recorded one after another");
+    throw ConfigError(config.path +
+                      ": transitions: none begins with the state in which the one before it ends, so there is no "
+                      "second difference; use transitions that were recorded one after another");
   const auto found = [](double value) { return MotionBound{value, value, 0, true}; };
   std::vector<MotionBound> acceleration;
   for (const double value : measured.acceleration) acceleration.push_back(found(value));

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <sstream>
 
 #include "command_line/nearest.h"
 #include "forereach/numerics/size.h"
@@ -17,11 +16,7 @@ int IndexOf(const std::string& name, const std::vector<std::string>& names) {
   return static_cast<int>(at - names.begin());
 }
 
-std::string List(const Eigen::VectorXd& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "[" : ", ") + ToText(value);
-  return text + "]";
-}
+std::string List(const Eigen::VectorXd& values) { return "[" + Joined(values, ToText) + "]"; }
 
 }  // namespace
 
@@ -36,8 +31,8 @@ std::vector<std::vector<int>> ColumnsBy(const std::vector<std::string>& by, cons
     const std::size_t at = text.find('=');
     const bool for_one = at != std::string::npos;
     std::vector<int> chosen;
-    std::istringstream names(for_one ? text.substr(at + 1) : text);
-    for (std::string name; std::getline(names, name, ',');) chosen.push_back(IndexOf(name, variables));
+    for (const std::string& name : SplitAtCommas(for_one ? text.substr(at + 1) : text))
+      chosen.push_back(IndexOf(name, variables));
     if (for_one) {
       const auto k = ToSize(IndexOf(text.substr(0, at), states));
       if (said[k]) throw ConfigError("--by: " + states[k] + " is given twice");
@@ -54,25 +49,22 @@ std::vector<std::vector<int>> ColumnsBy(const std::vector<std::string>& by, cons
 std::string Explain(const Unexplained& found, const Config& config, const ProposalOptions& options) {
   const NominalModel& model = *config.problem->model;
   const std::vector<std::string> variables = model.variable_names();
-  std::string columns;
-  for (const int l : options.columns[ToSize(found.coordinate)])
-    columns += (columns.empty() ? "" : ", ") + variables[ToSize(l)];
+  const std::string columns =
+      Joined(options.columns[ToSize(found.coordinate)], [&](int l) { return variables[ToSize(l)]; });
   return "no L is consistent: two transitions " +
          (columns.empty() ? std::string("of a residual that may depend on nothing") : "agree in " + columns) +
          ", and their residuals of " + model.state_names()[ToSize(found.coordinate)] + " differ by " +
          RoundedDown(found.pair.difference, 4) +
          " more than noise_bound and disturbance allow. If the robot does not always do the same there, that is a "
          "disturbance (--disturbance estimated); if the residual depends on more, name it (--by); if the sensor errs "
-         "by "
-         "half of that, raise noise_bound (--noise estimated)";
+         "by half of that, raise noise_bound (--noise estimated)";
 }
 
 void RequireSlopes(const Config& config) {
   if (!config.problem->declaration.affine.rows.empty())
-    throw ConfigError(
-        config.path +
-        ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it back "
-        "in place of the proposed rows");
+    throw ConfigError(config.path +
+                      ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it "
+                      "back in place of the proposed rows");
   if (!config.problem->declaration.regions.empty())
     throw ConfigError(config.path +
                       ": declaration.regions: slopes are proposed for the whole domain. Take the regions out first");
@@ -81,14 +73,13 @@ void RequireSlopes(const Config& config) {
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {
   const std::vector<std::string>& states = model.state_names();
   const std::vector<std::string> variables = model.variable_names();
-  std::string rows;
-  for (Eigen::Index k = 0; k < declaration.lipschitz.rows(); ++k) {
-    std::string row;
-    for (Eigen::Index l = 0; l < declaration.lipschitz.cols(); ++l)
-      if (const double slope = declaration.lipschitz(k, l); slope > 0)
-        row += (row.empty() ? "" : ", ") + variables[ToSize(l)] + ": " + ToText(slope);
-    if (!row.empty()) rows += (rows.empty() ? "" : ", ") + states[ToSize(k)] + ": {" + row + "}";
-  }
+  const std::string rows = Joined(states, [&](const std::string& state) {
+    const std::string row = Joined(variables, [&](const std::string& variable) {
+      const double slope = declaration.lipschitz(&state - states.data(), &variable - variables.data());
+      return slope > 0 ? variable + ": " + ToText(slope) : "";
+    });
+    return row.empty() ? "" : state + ": {" + row + "}";
+  });
   std::string text = "  lipschitz: {" + rows + "}\n  noise_bound: " + List(declaration.noise_bound) + "\n";
   if (declaration.growing) {
     text += "  disturbance:\n";

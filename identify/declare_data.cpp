@@ -1,6 +1,5 @@
 #include "identify/declare_data.h"
 
-#include <iomanip>
 #include <iostream>
 #include <sstream>
 
@@ -8,13 +7,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "command_line/nearest.h"
 #include "command_line/progress.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/observations.h"
 #include "identify/declare_by.h"
 #include "identify/lone_slopes.h"
-#include "task/config.h"
 #include "task/json_text.h"
 #include "task/wrapped_angle.h"
 
@@ -28,31 +27,32 @@ constexpr int kTableDigits = 4;  // of a number in the table
 // A line of the transitions' file: its header is line 1.
 int LineOf(const Config& config, int observation) { return config.rows[ToSize(observation)] + 2; }
 
-std::string Listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
+// Of a table: cells of twelve letters, and the last as it is.
+std::string Line(const std::vector<std::string>& cells) {
+  std::string text = "  ";
+  for (const std::string& cell : cells) text += fmt::format("{:<{}}", cell, &cell == &cells.back() ? 0 : 12);
+  return text + "\n";
+}
+
+std::string LinesOf(const Config& config, int first, int second) {
+  return fmt::format("lines {} and {}", LineOf(config, first), LineOf(config, second));
 }
 
 // ---- for people
 
 void PrintSlopes(const Proposal& proposal, const Config& config, std::ostream& out) {
   const std::vector<std::string> names = config.problem->model->variable_names();
-  out << "  " << std::left << std::setw(12) << "row" << std::setw(12) << "column" << std::setw(12) << "smallest"
-      << std::setw(12) << "at least" << std::setw(12) << "proposed"
-      << "because of\n";
+  out << Line({"row", "column", "smallest", "at least", "proposed", "because of"});
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
     for (std::size_t l = 0; l < names.size(); ++l) {
       const auto row = static_cast<Eigen::Index>(k), column = static_cast<Eigen::Index>(l);
       const double proposed = proposal.declaration.lipschitz(row, column);
       if (!(proposed > 0)) continue;
       const ProposedRow& found = proposal.rows[k];
-      out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
-          << RoundedUp(found.smallest.slopes[column], kTableDigits) << std::setw(12)
-          << RoundedDown(found.least[column], kTableDigits) << std::setw(12) << ToText(proposed);
-      if (const auto& reason = found.smallest.reasons[l])
-        out << "lines " << LineOf(config, reason->first) << " and " << LineOf(config, reason->second);
-      out << "\n";
+      const auto& reason = found.smallest.reasons[l];
+      out << Line({names[k], names[l], RoundedUp(found.smallest.slopes[column], kTableDigits),
+                   RoundedDown(found.least[column], kTableDigits), ToText(proposed),
+                   reason ? LinesOf(config, reason->first, reason->second) : ""});
     }
   if (proposal.declaration.lipschitz.maxCoeff() == 0) out << "  no slopes are needed\n";
 }
@@ -63,68 +63,57 @@ using LoneSlopes = std::vector<std::vector<LoneSlope>>;
 void PrintLoneSlopes(const LoneSlopes& rows, const Config& config, std::ostream& out) {
   const std::vector<std::string> names = config.problem->model->variable_names();
   int flat = 0;
-  bool has_slopes = false;
+  std::string table;
   for (std::size_t k = 0; k < rows.size(); ++k)
     for (std::size_t l = 0; l < names.size(); ++l) {
       const LoneSlope& lone = rows[k][l];
-      if (lone.pairs > 0 && !(lone.slope > 0)) ++flat;
-      if (!(lone.slope > 0)) continue;
-      if (!has_slopes)
-        out << "\n  " << std::left << std::setw(12) << "row" << std::setw(12) << "column" << std::setw(12) << "alone"
-            << std::setw(12) << "pairs"
-            << "the largest in\n";
-      has_slopes = true;
-      out << "  " << std::setw(12) << names[k] << std::setw(12) << names[l] << std::setw(12)
-          << RoundedDown(lone.slope, kTableDigits) << std::setw(12) << lone.pairs << "lines "
-          << LineOf(config, lone.first) << " and " << LineOf(config, lone.second) << "\n";
+      flat += lone.pairs > 0 && !(lone.slope > 0);
+      if (lone.slope > 0)
+        table += Line({names[k], names[l], RoundedDown(lone.slope, kTableDigits), std::to_string(lone.pairs),
+                       LinesOf(config, lone.first, lone.second)});
     }
+  if (!table.empty()) out << "\n" << Line({"row", "column", "alone", "pairs", "the largest in"}) << table;
   if (flat > 0)
-    out << (has_slopes ? "  " : "\n  ") << "In " << flat << (has_slopes ? " further" : "")
+    out << (table.empty() ? "\n  " : "  ") << "In " << flat << (table.empty() ? "" : " further")
         << (flat == 1 ? " entry" : " entries") << ", pairs that differ in one column alone show no slope.\n";
 }
 
 void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
-  out << "\n  " << std::left << std::setw(12) << "row" << std::setw(12) << "noise_bound" << std::setw(12)
-      << "  repeated" << std::setw(12) << "  deviation" << std::setw(12) << "  Strongin"
-      << "  Knuth-Chou\n";
+  out << "\n" << Line({"row", "noise_bound", "  repeated", "  deviation", "  Strongin", "  Knuth-Chou"});
   for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
     const ProposedRow& row = proposal.rows[k];
-    const double sigma = proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)];
-    out << "  " << std::setw(12) << model.state_names()[k] << std::setw(12) << ToText(sigma) << "  " << std::setw(10)
-        << RoundedDown(row.noise.repeated, kTableDigits) << "  " << std::setw(10)
-        << RoundedDown(row.noise.deviation, kTableDigits);
+    std::vector<std::string> cells{model.state_names()[k],
+                                   ToText(proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)]),
+                                   "  " + RoundedDown(row.noise.repeated, kTableDigits),
+                                   "  " + RoundedDown(row.noise.deviation, kTableDigits), ""};
     if (row.strongin > 0)
-      out << "  " << std::setw(10) << "x " + RoundedUp(row.strongin, 3) << "  x " << RoundedUp(row.knuth_chou, 3);
-    out << "\n";
+      cells.back() = fmt::format("  {:<10}  x {}", "x " + RoundedUp(row.strongin, 3), RoundedUp(row.knuth_chou, 3));
+    out << Line(cells);
   }
 }
 
 // The smallest slopes of each row with scatter against its disturbance.
 void PrintTrades(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
   const std::vector<std::string> names = model.variable_names();
-  bool any = false;
+  std::string table;
+  const auto line = [](const auto&... cells) { return fmt::format("  {:<12}{:<14}{:<14}{}\n", cells...); };
   for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
     const ProposedRow& row = proposal.rows[k];
     for (std::size_t i = 0; i < row.trades.size(); ++i) {
       const ProposedRow::Trade& trade = row.trades[i];
-      if (!any)
-        out << "\n  " << std::left << std::setw(12) << "row" << std::setw(14) << "noise_bound" << std::setw(14)
-            << "disturbance"
-            << "smallest slopes\n";
-      any = true;
-      std::string slopes;
-      for (std::size_t l = 0; trade.slopes && l < names.size(); ++l)
-        if (const double slope = (*trade.slopes)[static_cast<Eigen::Index>(l)]; slope > 0)
-          slopes += (slopes.empty() ? "" : ", ") + names[l] + " " + RoundedUp(slope, kTableDigits);
+      const std::string slopes = !trade.slopes ? "" : Joined(names, [&](const std::string& name) {
+        const double slope = (*trade.slopes)[&name - names.data()];
+        return slope > 0 ? name + " " + RoundedUp(slope, kTableDigits) : "";
+      });
       const std::string what = !trade.slopes ? "none are consistent" : slopes.empty() ? "none are needed" : slopes;
       const char* note = i + 2 == row.trades.size()   ? "  <- the knee"
                          : i + 1 == row.trades.size() ? "  <- proposed"
                                                       : "";
-      out << "  " << std::setw(12) << names[k] << std::setw(14)
-          << ToText(proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)]) << std::setw(14)
-          << RoundedUp(trade.disturbance, kTableDigits) << what << note << "\n";
+      table += line(names[k], ToText(proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)]),
+                    RoundedUp(trade.disturbance, kTableDigits), what + note);
     }
   }
+  if (!table.empty()) out << "\n" << line("row", "noise_bound", "disturbance", "smallest slopes") << table;
 }
 
 // Rows whose declared error is below what the data show of it.
@@ -151,30 +140,29 @@ void PrintMeaning(const Proposal& proposal, const NominalModel& model, const Dat
          "proposed: "
       << ToText(command.factor)
       << " times the smallest (--factor). No two transitions contradict it.\n"
-         "repeated: half the largest difference of transitions that agree in all columns; the error is at least "
-         "that.\n"
+         "repeated: half the largest difference of transitions that agree in all columns; the error is at least that.\n"
          "deviation: an estimate of the error's standard deviation from near neighbours (Gamma test).\n"
          "Strongin, Knuth-Chou: what these estimators say of a row, as factors of the smallest. They ignore "
          "noise_bound.\n"
-         "\nNothing of this is proven. Transitions can refute a declaration; they cannot show that it holds where "
-         "the robot\nhas not been. A slope of zero says that the residual does not depend on that column at all, and "
-         "it is proposed\nwherever no pair of transitions needs more. "
+         "\nNothing of this is proven. Transitions can refute a declaration; they cannot show that it holds where the "
+         "robot\nhas not been. A slope of zero says that the residual does not depend on that column at all, and it is "
+         "proposed\nwherever no pair of transitions needs more. "
       << (command.estimate_noise ? "noise_bound is raised to what these transitions show.\n"
           : scattered.empty()    ? "noise_bound and disturbance are taken from the task, not learned.\n"
                                  : "noise_bound is taken from the task, not learned.\n");
   if (!scattered.empty())
     out << "Scatter: at nearly the same place (less than a tenth of the columns' standard deviations apart), residuals "
            "differ by more\n  than noise_bound explains: "
-        << Listed(scattered)
+        << Joined(scattered)
         << ". The knee is the least disturbance with which such pairs need no slope. Proposed\n  is "
         << ToText(command.factor)
         << " times that, as a disturbance: the robot may do so again in every step. If it is the sensor that errs by "
            "so\n"
            "  much, declare noise_bound instead; noise that is too large makes tubes too narrow.\n";
   if (!constant.empty())
-    out << "Never varied in these transitions, so that nothing is known of their slopes: " << Listed(constant) << ".\n";
+    out << "Never varied in these transitions, so that nothing is known of their slopes: " << Joined(constant) << ".\n";
   if (const auto names = TooQuiet(proposal, model); !names.empty())
-    out << "The error that near neighbours show is larger than noise_bound and disturbance allow: " << Listed(names)
+    out << "The error that near neighbours show is larger than noise_bound and disturbance allow: " << Joined(names)
         << ".\n  The slopes then explain what is none. Declare a disturbance, or the error that your sensors have.\n";
   out << "How often fresh transitions contradict such a declaration: --hold-out.\n";
 }

@@ -167,31 +167,30 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
                      RoundedUp(trial.half_width, 3));
     table += "\n";
   }
-  std::cout
-      << table
-      << "\nfactor: on the smallest slopes that the learning blocks do not contradict, and on the scatter found "
-         "there.\n"
-         "contradicting: held-out transitions that provably contradict one of the learning blocks.\n"
-         "next block: with "
-      << ToText(100 * command.confidence)
-      << " % confidence, at most so many of all further blocks contain a contradiction (Clopper & Pearson), if\n"
-         "  blocks are independent and alike: the same robot, driven alike, in the same places. Within a block they "
-         "need not be.\n"
-         "  It is no bound for other roads, other days, or a plan that goes where nobody has driven. It is of one row, "
-         "for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor of slopes "
-         "learned from all data.\n"
-         "certified, half-width: if the declaration with this factor is true, the recorded commands of held-out "
-         "stretches\n  as plans, from task.initial_set's half-widths, or the state error where that is larger, about "
-         "the recorded state,\n  among the task's obstacles; the median over the stretches of a position's half-width "
-         "after "
-      << command.steps
-      << " steps (inf: the tube leaves the domain before).\n"
-         "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "
-         "declaration.state_error\n  (not declared: exact). One that has left its slice halts a robot.\n"
-      << (first.windows == 0 ? "There is no stretch of so many transitions that follow one another: use fewer --steps "
-                               "or fewer --blocks.\n"
-                             : "")
-      << std::flush;
+  std::cout << table
+            << "\nfactor: on the smallest slopes that the learning blocks do not contradict, and on the scatter found "
+               "there.\n"
+               "contradicting: held-out transitions that provably contradict one of the learning blocks.\n"
+               "next block: with "
+            << ToText(100 * command.confidence)
+            << " % confidence, at most so many of all further blocks contain a contradiction (Clopper & Pearson), if\n"
+               "  blocks are independent and alike: the same robot, driven alike, in the same places. Within a block "
+               "they need not be.\n"
+               "  It is no bound for other roads, other days, or a plan that goes where nobody has driven. It is of "
+               "one row, for\n  the slopes that half of the data gave: not of the row that looks best afterwards, nor "
+               "of slopes learned from all data.\n"
+               "certified, half-width: if the declaration with this factor is true, the recorded commands of held-out "
+               "stretches\n  as plans, from task.initial_set's half-widths, or the state error where that is larger, "
+               "about the recorded state,\n  among the task's obstacles; the median over the stretches of a position's "
+               "half-width after "
+            << command.steps
+            << " steps (inf: the tube leaves the domain before).\n"
+               "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "
+               "declaration.state_error\n  (not declared: exact). One that has left its slice halts a robot.\n"
+            << (first.windows == 0 ? "There is no stretch of so many transitions that follow one another: use fewer "
+                                     "--steps or fewer --blocks.\n"
+                                   : "")
+            << std::flush;
 }
 
 Json ToJson(const std::vector<Trial>& trials, const DataCommand& command) {

@@ -5,7 +5,6 @@
 #include <initializer_list>
 #include <limits>
 #include <numbers>
-#include <span>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -16,7 +15,6 @@
 #include <unsupported/Eigen/NumericalDiff>
 
 #include "forereach/dynamics/text_model.h"
-#include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach {

@@ -1,9 +1,7 @@
 #include "identify/hold_out.h"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
-#include <string>
 
 #include <fmt/format.h>
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <span>
 
@@ -159,11 +158,11 @@ class Importer {
           "{}: its stamps go back, {} times, first in line {}, and between these lines its rows are typically {:.6g} s "
           "apart, more than a step of the task, {} s: sort the rows by their stamps if they are of one run",
           table_.path, back.count, back.first_line, log_.typical_spacing, ToText(options_.period)));
-    throw ConfigError(fmt::format(
-        "{}: its rows are typically {:.6g} s apart, and a step of the task is {} s; states are not "
-        "interpolated: record faster, or let model.dt be a multiple of the log's spacing; if the stamps are "
-        "not in s, give their unit",
-        table_.path, log_.typical_spacing, ToText(options_.period)));
+    throw ConfigError(
+        fmt::format("{}: its rows are typically {:.6g} s apart, and a step of the task is {} s; states are not "
+                    "interpolated: record faster, or let model.dt be a multiple of the log's spacing; if the stamps "
+                    "are not in s, give their unit",
+                    table_.path, log_.typical_spacing, ToText(options_.period)));
   }
 
   // ---- samples to transitions
@@ -312,48 +311,31 @@ class Importer {
 
 }  // namespace
 
-std::string Explain(Dropped dropped) {
-  switch (dropped) {
-    case Dropped::kRowLost: return "rows with other fields than the header";
-    case Dropped::kNoStamp: return "rows without a stamp";
-    case Dropped::kRepeatedRow: return "rows that repeat the one before";
-    case Dropped::kRepeatedStamp: return "rows with another row's stamp and other values";
-    case Dropped::kBackwards: return "stamps that go backwards: a new piece begins";
-    case Dropped::kOutsideWindow: return "rows before --from or after --until";
-    case Dropped::kEnd: return "starts whose step goes past the end";
-    case Dropped::kGap: return "starts without a stamp near t + dt";
-    case Dropped::kNoState: return "starts with a state that is no number";
-    case Dropped::kNoInput: return "starts with an input that is no number";
-    case Dropped::kInputChanges: return "starts whose input is not constant over the step";
-    case Dropped::kOutsideDomain: return "starts outside the task's domain";
-    case Dropped::kNearTheEdge: return "starts that the declared errors may take out of the task's domain";
-    case Dropped::kNoNominalValue: return "starts where the nominal model has no value";
-    case Dropped::kAmbiguousAngle: return "starts of steps in which the turns of an angle cannot be told";
-    case Dropped::kCount: break;
-  }
-  return "";
-}
-
-std::string ToWord(Dropped dropped) {
-  switch (dropped) {
-    case Dropped::kRowLost: return "row_lost";
-    case Dropped::kNoStamp: return "no_stamp";
-    case Dropped::kRepeatedRow: return "repeated_row";
-    case Dropped::kRepeatedStamp: return "repeated_stamp";
-    case Dropped::kBackwards: return "backwards";
-    case Dropped::kOutsideWindow: return "outside_window";
-    case Dropped::kEnd: return "end";
-    case Dropped::kGap: return "gap";
-    case Dropped::kNoState: return "no_state";
-    case Dropped::kNoInput: return "no_input";
-    case Dropped::kInputChanges: return "input_changes";
-    case Dropped::kOutsideDomain: return "outside_domain";
-    case Dropped::kNearTheEdge: return "near_the_edge";
-    case Dropped::kNoNominalValue: return "no_nominal_value";
-    case Dropped::kAmbiguousAngle: return "ambiguous_angle";
-    case Dropped::kCount: break;
-  }
-  return "";
+const DroppedWords& WordsOf(Dropped dropped) {
+  static constexpr DroppedWords kWords[] = {
+      {"row_lost", "rows with other fields than the header",
+       "mend these lines, or say with --delimiter what separates their fields"},
+      {"no_stamp", "rows without a stamp", "write the stamps as decimal numbers"},
+      {"repeated_row", "rows that repeat the one before", ""},
+      {"repeated_stamp", "rows with another row's stamp and other values", "leave one row for each stamp"},
+      {"backwards", "stamps that go backwards: a new piece begins",
+       "sort the rows by their stamps if they are of one run"},
+      {"outside_window", "rows before --from or after --until", ""},
+      {"end", "starts whose step goes past the end", "record longer runs without a break"},
+      {"gap", "starts without a stamp near t + dt",
+       "raise --tolerance-ms, or let model.dt be a multiple of the log's spacing"},
+      {"no_state", "starts with a state that is no number", "write these fields as decimal numbers"},
+      {"no_input", "starts with an input that is no number", "write these fields as decimal numbers"},
+      {"input_changes", "starts whose input is not constant over the step", "give --input-mean or --input-tolerance"},
+      {"outside_domain", "starts outside the task's domain",
+       "widen the task's domain, or give the columns' units with --unit"},
+      {"near_the_edge", "starts that the declared errors may take out of the task's domain", "widen the task's domain"},
+      {"no_nominal_value", "starts where the nominal model has no value", "mend the model's equations there"},
+      {"ambiguous_angle", "starts of steps in which the turns of an angle cannot be told",
+       "record in rad, or with a smaller model.dt"},
+  };
+  static_assert(std::size(kWords) == static_cast<std::size_t>(Dropped::kCount));
+  return kWords[static_cast<std::size_t>(dropped)];
 }
 
 ImportedLog Import(const LogTable& table, const Problem& problem, const ImportOptions& options) {

@@ -67,10 +67,11 @@ enum class Dropped {
   kCount
 };
 
-/** One line for people. */
-[[nodiscard]] std::string Explain(Dropped dropped);
-/** One word for programs. */
-[[nodiscard]] std::string ToWord(Dropped dropped);
+struct DroppedWords {
+  const char *word, *line;  ///< One for programs, one line for people
+  const char* remedy;       ///< What gets fewer such rows in a log; empty where none are missed
+};
+[[nodiscard]] const DroppedWords& WordsOf(Dropped dropped);
 
 struct ImportedLog {
   Transitions transitions;

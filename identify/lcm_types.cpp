@@ -1,7 +1,6 @@
 #include "identify/lcm_types.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <limits>
 #include <string_view>

@@ -1,6 +1,5 @@
 #include "identify/log_table.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>

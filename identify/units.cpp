@@ -1,6 +1,5 @@
 #include "identify/units.h"
 
-#include <algorithm>
 #include <numbers>
 #include <stdexcept>
 

@@ -19,8 +19,7 @@ std::string_view FaultAdvice(std::int16_t cause) {
     case fault_t::CLOCK_JUMP: return "set the clock right and keep it from jumping again, then `forereach reset`";
     case fault_t::SLICE_LEFT:
       return "find the false assumption (declaration, domain, noise bound, state error or initial set), correct the "
-             "task file, "
-             "`forereach reload`, then `forereach reset`; after a reset alone it happens again";
+             "task file, `forereach reload`, then `forereach reset`; after a reset alone it happens again";
     case fault_t::DECLARATION_FALSIFIED:
       return "a reset alone does not help, every candidate stays F: declare a larger bound, or larger errors of what "
              "is recorded, in the task file, `forereach reload`, then `forereach reset`";

@@ -1,7 +1,6 @@
 #include "robot/guard.h"
 
 #include <algorithm>
-#include <array>
 #include <cinttypes>
 #include <cmath>
 #include <cstdarg>

@@ -197,9 +197,9 @@ void RequireForCertifying(const Config& config) {
   if (config.says_between || config.problem->method == Method::kPaper) return;
   throw ConfigError(
       config.path +
-      ": task.between: missing. Write under `task:` the line `between: {acceleration: [...]}` with bounds "
-      "on the true motion from one sample to the next, which `forereach declare --between` proposes: a "
-      "certificate holds at all times. Or write `between: samples`: it holds at its sample instants only");
+      ": task.between: missing. Write under `task:` the line `between: {acceleration: [...]}` with bounds on the true "
+      "motion from one sample to the next, which `forereach declare --between` proposes: a certificate holds at all "
+      "times. Or write `between: samples`: it holds at its sample instants only");
 }
 
 void RequireForCertifyingOnBus(const Config& config) {
@@ -215,11 +215,10 @@ void RequireForCertifyingOnBus(const Config& config) {
                       "which is an emergency stop, once the obstacles have been unknown for this many milliseconds. "
                       "`never`: the robot executes its plan to the end, through whatever has come there");
   if (config.gate.needs_robot_state && !config.problem->declaration.DeclaresStateError())
-    throw ConfigError(
-        config.path +
-        ": declaration.state_error: missing. Write under `declaration:` how far the true state may be from "
-        "the one that the robot measures, `state_error: {STATE: BOUND, ...}` in the unit of each state; "
-        "one that is not named is exact. Write `state_error: {}` if you mean 0 for all");
+    throw ConfigError(config.path +
+                      ": declaration.state_error: missing. Write under `declaration:` how far the true state may be "
+                      "from the one that the robot measures, `state_error: {STATE: BOUND, ...}` in the unit of each "
+                      "state; one that is not named is exact. Write `state_error: {}` if you mean 0 for all");
   if (config.gate.needs_robot_state && !config.gate.step_error_ms)
     throw ConfigError(
         config.path +

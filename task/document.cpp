@@ -1,13 +1,11 @@
 #include "task/document.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <map>
 #include <sstream>
 #include <stdexcept>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -453,8 +451,8 @@ YAML::Node ParseYaml(const std::string& path, const std::string& text) {
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw ConfigError(At(path, LineOf(error.mark)) +
-                      "not valid YAML; look at indentation, brackets, quotes, colons "
-                      "and words with * or &, here and in the line before" +
+                      "not valid YAML; look at indentation, brackets, quotes, colons and words with * or &, here and "
+                      "in the line before" +
                       TabAdvice(text, error.mark.line));
   }
 }

@@ -1,7 +1,6 @@
 #include "task/laws.h"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "forereach/dynamics/expression.h"

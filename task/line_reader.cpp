@@ -1,7 +1,6 @@
 #include "task/line_reader.h"
 
 #include <algorithm>
-#include <string_view>
 
 #include <fmt/format.h>
 

@@ -314,11 +314,10 @@ std::vector<Key> ModelKeys() {
       keys.push_back(OnlyFor(std::string(model.name),
                              Required(Number("model." + std::string(parameter.name), std::string(parameter.unit),
                                              UpTo(parameter.most), std::string(parameter.meaning)))));
-  keys.push_back(
-      Optional(Names("model.set_at_steps", Between(0, kMaxStates), Key::Size::kStates,
-                     "The states that the robot's software sets at the boundaries of steps, whatever a step lasts: "
-                     "what robot.step_error_ms adds leaves them out."),
-               "none"));
+  keys.push_back(Optional(Names("model.set_at_steps", Between(0, kMaxStates), Key::Size::kStates,
+                                "The states that the robot's software sets at the boundaries of steps, whatever a step "
+                                "lasts: what robot.step_error_ms adds leaves them out."),
+                          "none"));
   keys.push_back(Map("model.rate_bound",
                      "Where equations in `next` do not use dt, how fast the true state moves: robot.step_error_ms "
                      "needs it of each such state."));

@@ -17,10 +17,9 @@ const Config& WithLaws(const Config& config) {
         config.path + ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +
         config.problem->model->input_names()[0] + ": ...}; `forereach init` writes it for the models of the library");
   if (!config.laws.at_rest)
-    throw ConfigError(
-        config.path +
-        ": planner.at_rest: missing: it says where a braking tail ends; by default where task.rest does, which is "
-        "missing, too");
+    throw ConfigError(config.path +
+                      ": planner.at_rest: missing: it says where a braking tail ends; by default where task.rest does, "
+                      "which is missing, too");
   return config;
 }
 

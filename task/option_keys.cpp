@@ -71,21 +71,21 @@ std::vector<Key> GateKeys() {
       gate.Number("max_clock_jump_ms", "ms", UpTo(kHourMs), &GateOptions::max_clock_jump_ms,
                   "If the wall clock moves by more against the monotonic clock, a fault is latched."),
       Optional(gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
-                           "How far the clocks of the robot and of the obstacles' sender may differ. Moving "
-                           "obstacles need this key. A robot's state or obstacles that arrive further from their "
-                           "stamp, less `bus.delay_ms`, keep the certifier from certifying until one arrives inside."),
+                           "How far the clocks of the robot and of the obstacles' sender may differ. Moving obstacles "
+                           "need this key. A robot's state or obstacles that arrive further from their stamp, less "
+                           "`bus.delay_ms`, keep the certifier from certifying until one arrives inside."),
                "no obstacle may move"),
       gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
-                        "bus: task.obstacles and those of the last OBSTACLES message; nothing is certified "
-                        "before the first one or while they are unknown. task: task.obstacles alone; "
-                        "OBSTACLES is refused. forereach-certifier and `forereach run` require this key."),
+                        "bus: task.obstacles and those of the last OBSTACLES message; nothing is certified before the "
+                        "first one or while they are unknown. task: task.obstacles alone; OBSTACLES is refused. "
+                        "forereach-certifier and `forereach run` require this key."),
       gate.Number("obstacles_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_timeout_ms,
                   "With `obstacles: bus`: they become unknown this long after the stamp of the last message. Send the "
                   "whole set at least three times in this period."),
       gate.Number("obstacles_lost_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_lost_ms,
-                  "Required with `obstacles: bus`, at least 1.5 times obstacles_timeout_ms. When the "
-                  "obstacles have been unknown for so long, plans under way are withdrawn: an emergency stop, "
-                  "which no certificate covers. For so long a robot may drive among obstacles that nobody sees."),
+                  "Required with `obstacles: bus`, at least 1.5 times obstacles_timeout_ms. When the obstacles have "
+                  "been unknown for so long, plans under way are withdrawn: an emergency stop, which no certificate "
+                  "covers. For so long a robot may drive among obstacles that nobody sees."),
       Word("gate.obstacles_lost_ms", {"never"},
            "The robot executes its plan to the end, through whatever has come there.",
            [](const Field&, TaskDraft& draft) { draft.config.gate.obstacles_lost_ms = kNeverLost; }),
@@ -159,8 +159,8 @@ std::vector<Key> BusKeys() {
           "In LCM's form: multicast group and port, options `ttl` and `recv_buf_size`. `--lcm-url` takes precedence."),
       bus.Number("delay_ms", "ms", Between(0, kHourMs), &BusOptions::delay_ms,
                  "The longest time from a message's stamp to its arrival at the certifier if all clocks agree. With "
-                 "gate.max_clock_error_ms, what arrives later by more than that is taken for that of a clock that "
-                 "is behind. One that is behind by less may stay unnoticed, so declare no more than is needed."),
+                 "gate.max_clock_error_ms, what arrives later by more than that is taken for that of a clock that is "
+                 "behind. One that is behind by less may stay unnoticed, so declare no more than is needed."),
       Optional(bus.Text("name", &BusOptions::name,
                         "Part of every signature: a message for one bus is refused on another. All processes of a "
                         "robot need the same name."),
@@ -219,10 +219,9 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("policy_samples", Between(1, 10000), &PlannerOptions::policy_samples,
                       "Of `source: policy`: so many candidates are sampled at once and sent in batches; `candidates` "
                       "is then the most batches."),
-      planner.Word<bool>(
-          "repair", {{"false", false}, {"true", true}}, &PlannerOptions::repairs,
-          "true: candidates ask the certifier for the nearest plan that it would certify, and a start for "
-          "which no candidate was certified gets the nearest of these."),
+      planner.Word<bool>("repair", {{"false", false}, {"true", true}}, &PlannerOptions::repairs,
+                         "true: candidates ask the certifier for the nearest plan that it would certify, and a start "
+                         "for which no candidate was certified gets the nearest of these."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking,
                      "Acceleration and deceleration that the search expects of the robot."),
@@ -230,10 +229,10 @@ std::vector<Key> PlannerKeys() {
                      "Of one query, counted in steps of the model, 400 a millisecond; slow models take longer."),
       planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed, "Of the planner's random numbers."),
       Optional(
-          planner.Vector(
-              "initial_half_width", "of the state", kNotNegative, Size::kStates, &PlannerOptions::initial_half_width,
-              "Half the width of each candidate's X0 without the state error, by which the planner widens it: how far "
-              "the state that is measured at the start may be from the predicted one."),
+          planner.Vector("initial_half_width", "of the state", kNotNegative, Size::kStates,
+                         &PlannerOptions::initial_half_width,
+                         "Half the width of each candidate's X0 without the state error, by which the planner widens "
+                         "it: how far the state that is measured at the start may be from the predicted one."),
           "as task.initial_set"),
   };
   std::ranges::move(LawKeys(), std::back_inserter(keys));
@@ -253,11 +252,10 @@ Key WithinDeclared(const OptionRows<RobotOptions>& robot, const char* name, std:
 }
 
 Key RobotJitter(const OptionRows<RobotOptions>& robot) {
-  Key key =
-      robot.OneOf("step_jitter", {"none", "random", "adversarial"}, &RobotOptions::step_jitter,
-                  "How far its steps are off their times, within robot.step_error_ms: a boundary is up to half of "
-                  "that early or late, and so are two of them by all of it. random: uniformly. adversarial: by "
-                  "all of the half, early or late.");
+  Key key = robot.OneOf(
+      "step_jitter", {"none", "random", "adversarial"}, &RobotOptions::step_jitter,
+      "How far its steps are off their times, within robot.step_error_ms: a boundary is up to half of that early or "
+      "late, and so are two of them by all of it. random: uniformly. adversarial: by all of the half, early or late.");
   key.read = [read = key.read](const Field& at, TaskDraft& draft) {
     read(at, draft);
     if (draft.config.robot.step_jitter != "none" && StepErrorUs(draft.config.gate).value_or(0) == 0)
@@ -321,28 +319,28 @@ std::vector<Key> RobotKeys() {
              "Its absolute value falls at least so fast. One of robot.hold."),
       Optional(Number("robot.step_error_ms", "ms", Between(0, kHourMs),
                       "Required where the robot's state arms the certifier. How far the boundary of a step may be from "
-                      "its time on the robot's clock, counted from the "
-                      "plan's start and from its first step; below half of model.dt. The robot's guard stops a plan at "
-                      "a step that is further off or lasts longer by more, and certificates hold for all steps within. "
-                      "0: steps are on time.",
+                      "its time on the robot's clock, counted from the plan's start and from its first step; below "
+                      "half of model.dt. The robot's guard stops a plan at a step that is further off or lasts longer "
+                      "by more, and certificates hold for all steps within. 0: steps are on time.",
                       [](const Field& at, TaskDraft& draft) { draft.config.gate.step_error_ms = at.Number(); }),
                "certificates say that steps are on time"),
       Word("robot.step_error_ms", {"any"},
            "Steps are taken at any time, and nobody looks at a clock: certificates hold for steps on time. Not with "
            "gate.max_clock_error_ms.",
            [](const Field&, TaskDraft& draft) { draft.config.gate.step_error_ms = kAnyTime; }),
-      Optional(robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
-                            "Wall-clock time of a step. The certifier takes steps to last no longer than this or "
-                            "model.dt. With bounds in task.between, or a clock (robot.step_error_ms, "
-                            "gate.max_clock_error_ms), it is model.dt."),
-               "model.dt"),
+      Optional(
+          robot.Number(
+              "step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
+              "Wall-clock time of a step. The certifier takes steps to last no longer than this or model.dt. With "
+              "bounds in task.between, or a clock (robot.step_error_ms, gate.max_clock_error_ms), it is model.dt."),
+          "model.dt"),
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after it, even without the goal."),
       WithinDeclared(
           robot, "disturbance", &RobotOptions::disturbance,
           [](const Declaration& declaration) { return declaration.IsDisturbed(); }, "disturbance",
-          "In each step, within declaration.disturbance. random: of each state a uniform value. adversarial: "
-          "of each state its bound, with signs that stay for 1 to 32 steps."),
+          "In each step, within declaration.disturbance. random: of each state a uniform value. adversarial: of each "
+          "state its bound, with signs that stay for 1 to 32 steps."),
       WithinDeclared(
           robot, "sensor_error", &RobotOptions::sensor_error,
           [](const Declaration& declaration) { return !declaration.state_error.isZero(0); }, "state_error",

@@ -224,19 +224,17 @@ std::vector<Key> DeclarationKeys() {
   Key range = Vector("declaration.regions[].in.<variable>", "of the variable", kReal, Size::kAny,
                      "[least, largest]; both may lie outside the domain.");
   range.count = Between(2, 2);
-  Key regions =
-      List("declaration.regions", Between(0, Region::kMaxRegions),
-           "Boxes in which the residual changes less than declaration.lipschitz says. Where boxes overlap, the "
-           "least of their slopes holds, entry by entry.");
+  Key regions = List("declaration.regions", Between(0, Region::kMaxRegions),
+                     "Boxes in which the residual changes less than declaration.lipschitz says. Where boxes overlap, "
+                     "the least of their slopes holds, entry by entry.");
   regions.read = CheckRegions;
   const auto state_error = ErrorKeys(
       "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,
       "e by names: each state that is recorded differs from the true one by at most this, before a step and after it. "
       "What it makes of f0 and the residual is derived; noise_bound is for other errors of the successor.");
-  const auto input_error = ErrorKeys(
-      "input", Size::kInputs, &Declaration::input_error, &SchemaScope::inputs,
-      "The same of each input: how far the one that is recorded, or that the plan gives, may be off the one that "
-      "acted.");
+  const auto input_error = ErrorKeys("input", Size::kInputs, &Declaration::input_error, &SchemaScope::inputs,
+                                     "The same of each input: how far the one that is recorded, or that the plan "
+                                     "gives, may be off the one that acted.");
   return {
       Required(Map("declaration", "The bounds on the residual.")),
       Required(Map("declaration.lipschitz",
@@ -248,23 +246,20 @@ std::vector<Key> DeclarationKeys() {
       Required(Vectors("declaration.lipschitz", "of the state per that of the coordinate", kNotNegative,
                        Between(1, kMaxStates), Size::kVariables, "L as a matrix: one row a state.",
                        ReadLipschitzMatrix)),
-      Optional(
-          Map("declaration.affine",
-              "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the whole "
-              "domain. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at most that; errors of "
-              "the "
-              "column (`state_error`, `input_error`) count by it, and need it.",
-              ReadAffine),
-          "none"),
+      Optional(Map("declaration.affine",
+                   "Rows of the residual that are affine: r_k(z) = sum over the columns l of M_kl z_l + b_k on the "
+                   "whole domain. Data bound M and b. An entry of `lipschitz` there says that |M_kl| is at most that; "
+                   "errors of the column (`state_error`, `input_error`) count by it, and need it.",
+                   ReadAffine),
+               "none"),
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
       Required(Names("declaration.affine.columns", Between(1, AffineRows::kMaxColumns), Size::kVariables,
                      "The states and inputs that they depend on.")),
       Optional(std::move(regions), "[]"),
       Map("declaration.regions[]", "One box.", ReadRegion),
-      Required(
-          Map("declaration.regions[].in",
-              "The box: ranges of states and inputs, of at most three in all regions. No inequality and no ball of "
-              "the domain names one of these.")),
+      Required(Map("declaration.regions[].in",
+                   "The box: ranges of states and inputs, of at most three in all regions. No inequality and no ball "
+                   "of the domain names one of these.")),
       std::move(range),
       Required(Map("declaration.regions[].lipschitz",
                    "L in the box, by names, at most declaration.lipschitz. A state that is not named has that; in the "
@@ -292,11 +287,11 @@ std::vector<Key> DeclarationKeys() {
       input_error[0],
       input_error[1],
       input_error[2],
-      Required(Text("transitions",
-                    "CSV of observed steps, relative to this file: a column for each state, each input and each "
-                    "`<state>_next`, all inside the domain, at least one row. Those whose declared errors may take "
-                    "them out are left out.",
-                    [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
+      Required(Text(
+          "transitions",
+          "CSV of observed steps, relative to this file: a column for each state, each input and each `<state>_next`, "
+          "all inside the domain, at least one row. Those whose declared errors may take them out are left out.",
+          [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
       Optional(Word("declaration.transitions_are", {"measured", "exact"},
                     "measured: state_error and input_error are those of the file's transitions, too. exact: the file's "
                     "are exact, as a simulation makes them, and the errors are those of the robot on the bus alone.",
@@ -558,8 +553,8 @@ std::vector<Key> BodyKeys() {
 std::vector<Key> BetweenKeys() {
   return {
       Optional(Word("task.between", {"samples"},
-                    "Certificates hold at the sample instants only, as in the paper. forereach-certifier and "
-                    "the commands that certify require this key, in one of its forms, unless the method is `paper`.",
+                    "Certificates hold at the sample instants only, as in the paper. forereach-certifier and the "
+                    "commands that certify require this key, in one of its forms, unless the method is `paper`.",
                     [](const Field&, TaskDraft& draft) { draft.config.says_between = true; }),
                "samples with `certifier.method: paper`"),
       Map("task.between",
@@ -599,11 +594,10 @@ std::vector<Key> ObstacleKeys() {
       Required(List("task.obstacles", Between(0, kMostObstacles),
                     "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
       Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves; a name.", ReadObstacle),
-      Text(
-          "task.obstacles[].name",
-          fmt::format("For messages, instead of its number: a letter, then letters, digits and any of `_-.:/`, at most "
-                      "{} in all. Pieces of one thing may share it.",
-                      kMaxObstacleName)),
+      Text("task.obstacles[].name",
+           fmt::format("For messages, instead of its number: a letter, then letters, digits and any of `_-.:/`, at "
+                       "most {} in all. Pieces of one thing may share it.",
+                       kMaxObstacleName)),
       ObstacleKind("circle", "A disc; for two safety coordinates.", ReadCircle),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
       Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),

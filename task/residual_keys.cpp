@@ -1,5 +1,4 @@
 // The rows of residuals: `residual`, which `forereach declare` bounds, and `robot.residual`.
-#include <iterator>
 #include <numbers>
 
 #include "forereach/dynamics/angles.h"
@@ -132,14 +131,13 @@ std::vector<Key> Rows(const std::string& path, std::vector<std::string_view> nam
       Map(path + ".parameters", meaning_of("parameters", "Of a residual as text, in the units of its expressions.")));
   add(Number(path + ".parameters.<name>", "", kReal, "The value."));
   keys.push_back(Map(path + ".let", meaning_of("let", "Definitions, which later expressions may use.")));
-  keys.push_back(Expression(
-      path + ".let.<name>",
-      meaning_of("let.<name>",
-                 "It may use states, inputs, parameters and definitions of the model, these parameters, and the "
-                 "definitions before it ([docs/expressions.md](../docs/expressions.md)).")));
-  keys.push_back(Map(path + ".add", meaning_of("add",
-                                               "A residual as text: what the states have beyond the model's "
-                                               "after a step.")));
+  keys.push_back(
+      Expression(path + ".let.<name>",
+                 meaning_of("let.<name>",
+                            "It may use states, inputs, parameters and definitions of the model, these parameters, and "
+                            "the definitions before it ([docs/expressions.md](../docs/expressions.md)).")));
+  keys.push_back(Map(path + ".add",
+                     meaning_of("add", "A residual as text: what the states have beyond the model's after a step.")));
   keys.push_back(
       Expression(path + ".add.<state>", meaning_of("add.<state>", "What is added to it; zero if it is left out.")));
   return keys;

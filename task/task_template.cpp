@@ -218,8 +218,7 @@ std::string EmergencyStop(const TaskTemplate& task, const std::vector<std::strin
     if (std::ranges::find(held, name) != held.end()) rates.emplace_back(name, 1);
   if (rates.empty()) return "";
   return "  # How fast its brakes take each of them to zero whatever happens, in its unit per second. PLACEHOLDER: "
-         "what "
-         "your robot\n"
+         "what your robot\n"
          "  # surely does. Stops begin the earlier the less it is.\n"
          "  emergency_stop: " +
          Bounds(rates) + "\n";
@@ -245,8 +244,7 @@ std::string PlannerKey(const TaskTemplate& task, const std::vector<std::string>&
   const std::vector<std::pair<std::string, double>> rest = Rest(task);
   if (!task.laws)
     return "# The planner: how the robot stops, an expression of the state for each input, clipped to domain.input, "
-           "and "
-           "where it is\n"
+           "and where it is\n"
            "# at rest. docs/planner.md explains them. The planner starts when these lines are there.\n"
            "# planner:\n"
            "#   " +

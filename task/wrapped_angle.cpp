@@ -43,11 +43,12 @@ std::optional<WrappedAngle> FindWrappedAngle(const NominalModel& model, const Tr
     const auto turn = std::ranges::find_if(differences, IsOneTurn);
     if (turn == differences.end() || 2 * near <= std::ssize(differences)) continue;
     const std::string& name = model.state_names()[ToSize(k)];
-    return WrappedAngle{static_cast<int>(turn - differences.begin()),
-                        fmt::format("{} differs from the model's next value by {:.4g} rad, about one turn, and "
-                                    "model.angles does not name it",
-                                    name, std::abs(*turn)),
-                        fmt::format("write `angles: [{}]` under model; or unwrap the data, if it is no angle", name)};
+    return WrappedAngle{
+        static_cast<int>(turn - differences.begin()),
+        fmt::format(
+            "{} differs from the model's next value by {:.4g} rad, about one turn, and model.angles does not name it",
+            name, std::abs(*turn)),
+        fmt::format("write `angles: [{}]` under model; or unwrap the data, if it is no angle", name)};
   }
   return std::nullopt;
 }

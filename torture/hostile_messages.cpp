@@ -1,7 +1,6 @@
 #include "torture/hostile_messages.h"
 
 #include <initializer_list>
-#include <iterator>
 #include <limits>
 
 #include "forereach/advice_t.hpp"

@@ -1,7 +1,6 @@
 #include "torture/torture.h"
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -17,7 +16,6 @@
 #include "certifier/gate/stamp.h"
 #include "certifier/gate/upheld.h"
 #include "forereach/certifier_status_t.hpp"
-#include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -365,10 +363,9 @@ class Torturer final {
 void RequireLoopback(const BusOptions& bus, const std::string& beyond_loopback) {
   const bool stays = !bus.url.starts_with("udpm://") || ParseMulticastUrl(bus.url).ttl == 0;
   if (stays || beyond_loopback == bus.bus_name()) return;
-  throw ConfigError(bus.url +
-                    ": leaves this machine (ttl is not 0). To torture other machines on purpose, add "
-                    "--beyond-loopback " +
-                    bus.bus_name());
+  throw ConfigError(
+      bus.url + ": leaves this machine (ttl is not 0). To torture other machines on purpose, add --beyond-loopback " +
+      bus.bus_name());
 }
 
 }  // namespace

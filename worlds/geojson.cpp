@@ -84,15 +84,14 @@ class Drawing {
   World Read(const Json& document) {
     TakeObject(JsonField(path_, document), nullptr, 0);
     if (!options_.origin && !options_.are_metres && any_ && LooksLikeDegrees())
-      throw ConfigError(
-          path_ +
-          ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if they are "
-          "metres");
+      throw ConfigError(path_ +
+                        ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if "
+                        "they are metres");
     AddStayIn();
     if (plane_)
       world_.notes.push_back(
-          fmt::format("x east and y north in the tangent plane of WGS 84; each piece grown by up to {} "
-                      "m, for sides that are straight in degrees.",
+          fmt::format("x east and y north in the tangent plane of WGS 84; each piece grown by up to {} m, for sides "
+                      "that are straight in degrees.",
                       RoundedUp(largest_bend_, 3)));
     return std::move(world_);
   }

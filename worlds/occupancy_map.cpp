@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <utility>
 
 #include <fmt/format.h>
 

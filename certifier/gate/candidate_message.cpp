@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "certifier/gate/stamp.h"
-#include "forereach/numerics/text.h"
 #include "task/step_time.h"
 
 namespace forereach {

@@ -1,7 +1,6 @@
 #include "certifier/gate/repair.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>

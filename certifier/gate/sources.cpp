@@ -1,6 +1,5 @@
 #include "certifier/gate/sources.h"
 
-#include <algorithm>
 #include <cstdlib>
 
 namespace forereach {

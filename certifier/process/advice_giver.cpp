@@ -1,7 +1,5 @@
 #include "certifier/process/advice_giver.h"
 
-#include <utility>
-
 #include "certifier/gate/advice_message.h"
 #include "certifier/gate/repair.h"
 #include "certifier/gate/stamp.h"

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <iostream>
 #include <random>
-#include <utility>
 
 #include <fmt/core.h>
 #include <sys/resource.h>

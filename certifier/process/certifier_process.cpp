@@ -16,9 +16,9 @@ int CertifierProcess(int argc, char** argv) {
   return RunProcess(
       argc, argv,
       {"forereach-certifier",
-       "Certifies candidate plans on the bus, or abstains with a reason. Each candidate gets exactly one "
-       "decision, and only certified plans are passed on. Of several certifiers on one bus one is in "
-       "charge, and the others stand by. SIGHUP reads the task file again.",
+       "Certifies candidate plans on the bus, or abstains with a reason. Each candidate gets exactly one decision, and "
+       "only certified plans are passed on. Of several certifiers on one bus one is in charge, and the others stand "
+       "by. SIGHUP reads the task file again.",
        "forereach-certifier --config config/demo.yaml", Role::kCertifier},
       [&state](const Config& config, Bus& bus) {
         auto latch = std::make_unique<LatchFile>(state.empty() ? config.gate.state : state);

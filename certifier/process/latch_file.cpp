@@ -1,8 +1,6 @@
 #include "certifier/process/latch_file.h"
 
-#include <array>
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -143,8 +141,8 @@ bool LatchFile::OpenDirectory() {
     ::close(directory);
     if (cause == EWOULDBLOCK)
       throw BadInput("gate.state: " + directory_ +
-                     ": another certifier keeps its state there; each robot and each "
-                     "standby certifier needs its own directory (--state)");
+                     ": another certifier keeps its state there; each robot and each standby certifier needs its own "
+                     "directory (--state)");
     return Fail(directory_ + ": cannot be locked: " + std::generic_category().message(cause));
   }
   if (lock_ >= 0) ::close(lock_);
