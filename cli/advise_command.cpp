@@ -10,7 +10,6 @@
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/offline.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/decision_record.h"
@@ -197,8 +196,7 @@ int RunAdvise(const AdviseArguments& options) {
 Command AdviseCommand() {
   const auto options = std::make_shared<AdviseArguments>();
   Command command{
-      .name = kAdvise.name,
-      .purpose = kAdvise.purpose,
+      .name = "advise",
       .footer =
           R"(Each change is the least of its kind, found by a search, and verified by certifying again with it. It is not
 true because it would help: a smaller slope or a wider domain has to be declared, and to hold.

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "forereach/certify/explain.h"
 #include "forereach/numerics/text.h"
 #include "forereach/safety/obstacle_index.h"
@@ -126,8 +125,7 @@ int Certify(const CertifyArguments& options) {
 Command CertifyCommand() {
   const auto options = std::make_shared<CertifyArguments>();
   return {
-      .name = kCertify.name,
-      .purpose = kCertify.purpose,
+      .name = "certify",
       .footer = "Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv",
       .options = {ConfigOption(options->config),
                   Required(

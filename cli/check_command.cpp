@@ -10,7 +10,6 @@
 #include "advise/hypotheses.h"
 #include "advise/task_check.h"
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/text.h"
 #include "identify/declare_data.h"
@@ -151,8 +150,7 @@ int Check(const CheckArguments& options) {
 
 Command CheckCommand() {
   const auto options = std::make_shared<CheckArguments>();
-  return {.name = kCheck.name,
-          .purpose = kCheck.purpose,
+  return {.name = "check",
           .footer =
               "It compares the domain and the declaration with the data, looks at the start, the goal, the obstacles "
               "and the\n"

@@ -5,7 +5,6 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/offline.h"
 #include "records/check.h"
 #include "task/json_text.h"
 
@@ -28,8 +27,7 @@ int RunCheckLog(const CheckLogArguments& options) {
 
 Command CheckLogCommand() {
   const auto options = std::make_shared<CheckLogArguments>();
-  Command command{.name = kCheckLog.name,
-                  .purpose = kCheckLog.purpose,
+  Command command{.name = "check-log",
                   .footer = "Example:\n  forereach check-log run/log",
                   .options = {Required({"directory", &options->directory, "DIRECTORY", "The logger's directory"}),
                               {"--config", &options->config, "FILE", kTaskOfRecords},

@@ -1,14 +1,20 @@
 #include "cli/commands.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "bus/process.h"
+#include "cli/offline.h"
 
 namespace forereach {
 
 int RunCommands(std::vector<Command> commands, int argc, char** argv) {
+  for (Command& command : commands)
+    if (const auto known = std::ranges::find(kOfflineCommands, command.name, &OfflineCommand::name);
+        command.purpose.empty() && known != std::end(kOfflineCommands))
+      command.purpose = known->purpose;
   std::string chosen;
   const Command program{
       .name = "forereach",

@@ -67,7 +67,8 @@ inline constexpr const char* kDatabaseAddress =
 [[nodiscard]] Command TailCommand();
 [[nodiscard]] Command TortureCommand();
 
-/** Runs the one of the commands that the command line chooses. @return the program's exit code. */
+/** Runs the one of the commands that the command line chooses. Those of cli/offline.h have their purpose there. @return
+ * the program's exit code. */
 [[nodiscard]] int RunCommands(std::vector<Command> commands, int argc, char** argv);
 
 }  // namespace forereach

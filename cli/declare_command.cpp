@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
 #include "forereach/certify/problem.h"
@@ -376,8 +375,7 @@ int CheckCover(const DeclareArguments& options) {
 Command DeclareCommand() {
   const auto options = std::make_shared<DeclareArguments>();
   return {
-      .name = kDeclare.name,
-      .purpose = kDeclare.purpose,
+      .name = "declare",
       .footer =
           R"(In the task file, `add` is what the next state has beyond the model's. Each parameter is a number or an interval:
   residual: {parameters: {c: [0.1, 0.2]}, add: {v: -c*v*abs(v)}}

@@ -10,7 +10,6 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
 #include "records/output_file.h"
@@ -160,8 +159,7 @@ int RunExport(ExportArguments options) {
 
 Command ExportCommand() {
   const auto options = std::make_shared<ExportArguments>();
-  Command command{.name = kExport.name,
-                  .purpose = kExport.purpose,
+  Command command{.name = "export",
                   .footer =
                       "csv     a directory: decisions.csv, controls.csv, executions.csv, withdrawals.csv, gaps.csv\n"
                       "jsonl   the same records, one JSON object a line, in the order of the log\n"

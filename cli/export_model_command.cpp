@@ -5,7 +5,6 @@
 
 #include "cli/commands.h"
 #include "cli/new_file.h"
-#include "cli/offline.h"
 #include "forereach/dynamics/equations_header.h"
 #include "task/config.h"
 
@@ -54,8 +53,7 @@ int ExportModel(const ExportModelArguments& options) {
 Command ExportModelCommand() {
   const auto options = std::make_shared<ExportModelArguments>();
   return {
-      .name = kExportModel.name,
-      .purpose = kExportModel.purpose,
+      .name = "export-model",
       .footer =
           R"(A program of ten lines, examples/certifier/main.cpp, includes the header and is a certifier with these equations
 as machine code. Its decisions have the same bits as those of forereach-certifier, which interprets the text, so

@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "command_line/nearest.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -136,8 +135,7 @@ int RunFit(const FitArguments& options) {
 Command FitCommand() {
   const auto options = std::make_shared<FitArguments>();
   return {
-      .name = kFit.name,
-      .purpose = kFit.purpose,
+      .name = "fit",
       .footer =
           "The model has to be text in the task file or in a model file. Its parameters begin at their values, a range "
           "at its middle.\n"

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "fleet/report.h"
 #include "records/output_file.h"
 #include "task/json_text.h"
@@ -38,7 +37,7 @@ int ReportFleet(const FleetReportArguments& options) {
 Command FleetReportCommand() {
   const auto options = std::make_shared<FleetReportArguments>();
   return {
-      .name = kReport.name,
+      .name = "report",
       .purpose = "Summarise the rows of all robots in the fleet's store: exit 0, 2 if it cannot be read",
       .footer =
           "Example:\n  forereach report --database postgresql://fleet.example/forereach --out fleet.html --runs pages",

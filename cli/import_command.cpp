@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
 #include "forereach/numerics/text.h"
@@ -497,8 +496,7 @@ int RunImport(ImportArguments options) {
 Command ImportCommand() {
   const auto options = std::make_shared<ImportArguments>();
   return {
-      .name = kImport.name,
-      .purpose = kImport.purpose,
+      .name = "import",
       .footer =
           "A transition is (state at t, input held from t to t + dt, state at t + dt), with dt and the names of the "
           "task's model.\n"

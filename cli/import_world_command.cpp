@@ -10,7 +10,6 @@
 
 #include "cli/commands.h"
 #include "cli/new_file.h"
-#include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
 #include "task/files.h"
@@ -131,8 +130,7 @@ int RunImportWorld(const ImportWorldArguments& options) {
 Command ImportWorldCommand() {
   const auto options = std::make_shared<ImportWorldArguments>();
   return {
-      .name = kImportWorld.name,
-      .purpose = kImportWorld.purpose,
+      .name = "import-world",
       .footer =
           "FILE is the YAML file of a ROS map, a CommonRoad 2020a scenario (.xml), or GeoJSON. OUT has the list "
           "task.obstacles; put it into a task file.\nThe obstacles contain all that the file says is not free. OUT "

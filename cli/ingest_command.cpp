@@ -8,7 +8,6 @@
 #include "bus/log.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/offline.h"
 #include "fleet/ingest.h"
 #include "lcmtypes/printable.h"
 #include "records/log_directory.h"
@@ -112,8 +111,7 @@ int Ingest(IngestArguments options) {
 Command IngestCommand() {
   const auto options = std::make_shared<IngestArguments>();
   Command command{
-      .name = kIngest.name,
-      .purpose = kIngest.purpose,
+      .name = "ingest",
       .footer =
           "A row that is there is not written again, so the same logs may be sent any number of times, and by several "
           "programs. See docs/fleet.md.\n\n"

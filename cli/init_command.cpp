@@ -11,7 +11,6 @@
 
 #include "cli/commands.h"
 #include "cli/new_file.h"
-#include "cli/offline.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
@@ -285,8 +284,7 @@ int Init(const InitArguments& options) {
 Command InitCommand() {
   const auto options = std::make_shared<InitArguments>();
   return {
-      .name = kInit.name,
-      .purpose = kInit.purpose,
+      .name = "init",
       .footer =
           "With --model, states, inputs, parameters and units are those of a file in config/models, and the ranges "
           "are\n"

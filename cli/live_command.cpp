@@ -9,7 +9,6 @@
 #include "bus/node.h"
 #include "bus/process.h"
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "live/web_server.h"
 #include "task/config.h"
 
@@ -83,8 +82,7 @@ int RunLive(const LiveArguments& options) {
 
 Command LiveCommand() {
   const auto options = std::make_shared<LiveArguments>();
-  return {.name = kLive.name,
-          .purpose = kLive.purpose,
+  return {.name = "live",
           .footer =
               "It listens to the bus and sends nothing. The page is for browsers of this machine alone; from another "
               "one, forward its port: ssh -L 8080:127.0.0.1:8080 ROBOT. It prints its address, and ends with Ctrl-C. "

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/log_edit.h"
@@ -128,8 +127,7 @@ std::vector<std::string> OutcomeNames() {
 Command LogCommand() {
   const auto options = std::make_shared<LogArguments>();
   return {
-      .name = kLogEdit.name,
-      .purpose = kLogEdit.purpose,
+      .name = "log",
       .footer =
           "list    a line for each event: time (UTC), number, channel, type, plan, and its outcome, kind or cause\n"
           "filter  the chosen events, in the order of the logs named, into a new log\n"

@@ -15,6 +15,8 @@
 namespace forereach {
 namespace {
 
+constexpr const char* kPrograms[] = {FOREREACH_OFFLINE, FOREREACH_LIVE, FOREREACH_FLEET, FOREREACH_DEMO};
+
 // Becomes another program, by its path from this one's directory; returns only if it cannot be started.
 int Become(const char* path, char** argv) {
   std::error_code error;
@@ -47,14 +49,10 @@ int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands;
   for (const OfflineCommand& each : kOfflineCommands) {
-    const std::string_view name = each.name;
-    const bool is_of_fleet = name == kIngest.name || (name == kReport.name && NamesStore(argc, argv));
-    const char* const program = name == kLive.name   ? FOREREACH_LIVE
-                                : name == kDemo.name ? FOREREACH_DEMO
-                                : is_of_fleet        ? FOREREACH_FLEET
-                                                     : FOREREACH_OFFLINE;
-    if (argc > 1 && name == argv[1]) return Become(program, argv);
-    commands.push_back({.name = each.name, .purpose = each.purpose, .run = [=] { return Become(program, argv); }});
+    const bool is_of_fleet = each.name == std::string_view("report") && NamesStore(argc, argv);
+    const char* const program = kPrograms[static_cast<int>(is_of_fleet ? Program::kFleet : each.program)];
+    if (argc > 1 && each.name == std::string_view(argv[1])) return Become(program, argv);
+    commands.push_back({.name = each.name, .run = [=] { return Become(program, argv); }});
   }
   for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),
                                    TortureCommand(), ResetCommand(), ReloadCommand(), KeygenCommand()})

@@ -13,7 +13,6 @@
 #include "bus/bus_options.h"
 #include "bus/keys.h"
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "cli/shards.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/grounds.h"
@@ -229,8 +228,7 @@ void Shards::RefuseRun(const std::string& file, std::size_t run) const {
 
 Command MergeCommand() {
   const auto options = std::make_shared<MergeArguments>();
-  return {.name = kMerge.name,
-          .purpose = kMerge.purpose,
+  return {.name = "merge",
           .footer =
               "It prints what the command prints without --shard, byte for byte, with its exit code. The files have to "
               "be all N, of\nthe same command, program, options, task, key and logs under the same names.\n\n"

@@ -5,7 +5,6 @@
 
 #include "advise/task_check.h"
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "forereach/certify/explain.h"
 #include "lcmtypes/printable.h"
 #include "planner_bridge/certified_plan.h"
@@ -84,8 +83,7 @@ int MakePlan(const PlanArguments& options) {
 
 Command PlanCommand() {
   const auto options = std::make_shared<PlanArguments>();
-  return {.name = kPlan.name,
-          .purpose = kPlan.purpose,
+  return {.name = "plan",
           .footer =
               "The task's planner proposes, and the task's certifier decides on each candidate. The written plan is "
               "certified\n"

@@ -7,7 +7,6 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/offline.h"
 #include "cli/shards.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
@@ -265,8 +264,7 @@ int PrintMergedComparison(const Shards& shards, bool json) {
 Command ReplayCommand() {
   const auto options = std::make_shared<ReplayArguments>();
   Command command{
-      .name = kReplay.name,
-      .purpose = kReplay.purpose,
+      .name = "replay",
       .footer =
           "With --compare: exit 0 if no certificate would have been lost, otherwise 1.\n\n"
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"

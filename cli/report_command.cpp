@@ -9,7 +9,6 @@
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/new_file.h"
-#include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "page/gather.h"
 #include "page/write.h"
@@ -137,8 +136,7 @@ Command ReportCommand() {
   const auto options = std::make_shared<ReportArguments>();
   ReportOptions& report = options->report;
   Command command{
-      .name = kReport.name,
-      .purpose = kReport.purpose,
+      .name = "report",
       .footer =
           "With --out it writes a page for a browser: one HTML file that needs no network. See docs/analysis.md.\n\n"
           "Examples:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo\n"

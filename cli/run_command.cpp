@@ -4,7 +4,6 @@
 
 #include "bus/process.h"
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "logger/logger_node.h"
 #include "simulator/drive_counts.h"
 #include "simulator/lockstep.h"
@@ -55,8 +54,7 @@ int Run(const RunArguments& options) {
 
 Command RunCommand() {
   const auto options = std::make_shared<RunArguments>();
-  return {.name = kRun.name,
-          .purpose = kRun.purpose,
+  return {.name = "run",
           .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
           .options = {TaskOption(options->config),
                       {"--directory", &options->directory, "DIR", "The logger's directory"},

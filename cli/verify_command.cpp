@@ -10,7 +10,6 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/offline.h"
 #include "cli/shards.h"
 #include "forereach/certify/certifier.h"
 #include "forereach/numerics/parallel.h"
@@ -290,8 +289,7 @@ int PrintMergedVerification(const Shards& shards, bool json) {
 Command VerifyCommand() {
   const auto options = std::make_shared<VerifyArguments>();
   Command command{
-      .name = kVerify.name,
-      .purpose = kVerify.purpose,
+      .name = "verify",
       .footer =
           "Each certificate is compared with the digests of its inputs, then with a tube rederived from them: every\n"
           "recorded set has to contain the derived one, and the derived tube has to stay clear of every obstacle.\n"
