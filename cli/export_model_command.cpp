@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "cli/commands.h"
-#include "cli/new_file.h"
 #include "forereach/dynamics/equations_header.h"
+#include "records/output_file.h"
 #include "task/config.h"
 
 namespace forereach {

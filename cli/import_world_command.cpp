@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/new_file.h"
 #include "lcmtypes/printable.h"
+#include "records/output_file.h"
 #include "task/config.h"
 #include "task/files.h"
 #include "task/json_text.h"

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "cli/commands.h"
-#include "cli/new_file.h"
 #include "forereach/dynamics/expression.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/declare_data.h"
+#include "records/output_file.h"
 #include "task/config.h"
 #include "task/csv.h"
 #include "task/files.h"

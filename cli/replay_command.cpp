@@ -10,7 +10,6 @@
 #include "cli/shards.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
-#include "records/compare.h"
 #include "records/log_tasks.h"
 #include "records/replay.h"
 #include "records/result_json.h"

@@ -8,10 +8,10 @@
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
-#include "cli/new_file.h"
 #include "lcmtypes/printable.h"
 #include "page/gather.h"
 #include "page/write.h"
+#include "records/output_file.h"
 #include "records/report.h"
 
 namespace forereach {

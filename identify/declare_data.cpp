@@ -13,7 +13,7 @@
 #include "forereach/numerics/text.h"
 #include "forereach/residual/observations.h"
 #include "identify/declare_by.h"
-#include "identify/lone_slopes.h"
+#include "identify/smallest_row.h"
 #include "task/json_text.h"
 #include "task/wrapped_angle.h"
 

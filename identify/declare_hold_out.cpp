@@ -12,7 +12,6 @@
 #include "forereach/certify/batch.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
-#include "identify/binomial.h"
 #include "identify/declare_by.h"
 #include "identify/declare_data.h"
 #include "identify/hold_out.h"

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "forereach/numerics/text.h"
-#include "identify/wanted_column.h"
+#include "identify/log_table.h"
 #include "records/event_log.h"
 #include "task/config_error.h"
 

@@ -79,4 +79,23 @@ all, has a second header that differs, or ends inside a quoted field; the delimi
  */
 [[nodiscard]] std::vector<std::string> LogColumns(const std::string& path, const LogFormat& format);
 
+/** A column that somebody wants of a log: one of the log's, or what is made of several. */
+class WantedColumn final {
+ public:
+  /** A name, yaw_of(qx,qy,qz,qw), yaw_of(qz,qw) or seconds_of(s,ns). @throws ConfigError for another
+  number of arguments. */
+  explicit WantedColumn(const std::string& text);
+
+  /** The log's columns that it is made of. */
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+  /** Its value. NaN where one of theirs is, or they are no unit quaternion. @pre values.size() == names().size(). */
+  [[nodiscard]] double Of(const std::vector<double>& values) const;
+
+ private:
+  enum class Kind { kPlain, kYaw, kHalfYaw, kSeconds };
+
+  Kind kind_ = Kind::kPlain;
+  std::vector<std::string> names_;
+};
+
 }  // namespace forereach

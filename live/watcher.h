@@ -1,7 +1,7 @@
 /** What the live page shows, from the messages of the bus. It uses no bus, socket or clock: a test hands it messages.
 
 **Trust.** With keys, messages that their role did not sign are counted and have no other effect
-(records/log_authenticator.h). Without keys every message counts, and the page says so.
+(records/log_trust.h). Without keys every message counts, and the page says so.
 
 **Bounds.** Of each kind of record the last ones are kept, so no sender can make it grow. A few tubes are drawn in each
 tick, those of certificates first; the other decisions are shown without theirs.
@@ -33,7 +33,7 @@ certificate. */
 #include "forereach/robot_state_t.hpp"
 #include "page/page_data.h"
 #include "records/interpreter.h"
-#include "records/log_authenticator.h"
+#include "records/log_trust.h"
 #include "records/undecided.h"
 #include "task/config.h"
 

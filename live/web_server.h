@@ -7,6 +7,9 @@ readers hold up neither the bus nor each other, and there are at most kMostReade
 
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "lcmtypes/bad_input.h"
 #include "live/watcher.h"
@@ -38,5 +41,20 @@ class WebServer final {
   class Content;
   std::unique_ptr<Content> content_;
 };
+
+struct HttpRequest {
+  std::string_view method;
+  std::string_view target;  ///< Without a query. civetweb has decoded it, and cut it off at "%00".
+  std::string_view query{};
+  std::vector<std::pair<std::string_view, std::string_view>> headers{};
+};
+
+enum class Answer { kPage, kEvents, kBadRequest = 400, kForbidden = 403, kNotFound = 404, kNotAllowed = 405 };
+
+/** Only GET of "/" and "/events", without query or body, is answered, and only
+- under the names 127.0.0.1 and localhost, with any port, as of a forwarded one: a name that an attacker resolves to
+  this machine is none of these;
+- not for a page of another origin, as far as the browser names it (Origin, Sec-Fetch-Site). */
+[[nodiscard]] Answer Judge(const HttpRequest& request);
 
 }  // namespace forereach

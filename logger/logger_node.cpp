@@ -7,7 +7,7 @@
 #include <fmt/core.h>
 
 #include "forereach/logger_status_t.hpp"
-#include "records/log_authenticator.h"
+#include "records/log_trust.h"
 
 namespace forereach {
 namespace {

@@ -1,7 +1,7 @@
 # cmake -DOUT=assets.cpp -DDIRECTORY=page -DASSETS=NAME=FILE;... -P embed.cmake: files of the pages as C++. Where one has
 # <!-- FILE.html -->, the content of that file takes its place.
 cmake_minimum_required(VERSION 3.25)
-set(text "// Made by page/embed.cmake.\n#include \"page/assets.h\"\n\n")
+set(text "// Made by page/embed.cmake.\n#include \"page/document.h\"\n\n")
 string(APPEND text "#pragma GCC diagnostic ignored \"-Woverlength-strings\"\n\nnamespace forereach {\n")
 foreach(asset ${ASSETS})
   string(REGEX MATCH "^([^=]+)=(.+)$" ignored "${asset}")

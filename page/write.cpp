@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "lcmtypes/printable.h"
-#include "page/columns.h"
 #include "page/detail.h"
 #include "page/document.h"
 #include "task/json_text.h"

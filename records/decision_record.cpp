@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <iterator>
 #include <set>
+#include <sstream>
 
 #include <nlohmann/json.hpp>
 
@@ -29,25 +31,10 @@ class Reading {
  public:
   Reading(const std::string& path, const JsonField& document, const Config& config)
       : document_(document), config_(config), record_{path, {}, {}, {}} {
-    std::set<std::string> keys{"outcome",
-                               "holds",
-                               "cause",
-                               "step",
-                               "coordinate",
-                               "exit",
-                               "first_observation",
-                               "second_observation",
-                               "obstacle",
-                               "part",
-                               "closest_step",
-                               "margin",
-                               "threshold",
-                               "message",
-                               "capped",
-                               "inputs",
-                               "tube",
-                               "digests",
-                               "elapsed_us"};
+    std::istringstream words(
+        "outcome holds cause step coordinate exit first_observation second_observation obstacle part closest_step "
+        "margin threshold message capped inputs tube digests elapsed_us");
+    std::set<std::string> keys(std::istream_iterator<std::string>(words), {});
     if (config_.problem->declaration.IsDisturbed()) keys.insert("disturbance");
     document_.RequireFields(keys);
     if (!(document_["elapsed_us"].Number() >= 0)) document_["elapsed_us"].Fail("is negative");

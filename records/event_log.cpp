@@ -15,7 +15,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "records/event_record.h"
 #include "task/files.h"
 
 namespace forereach {

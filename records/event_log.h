@@ -206,4 +206,8 @@ class EventLogWriter final {
   std::string problem_;
 };
 
+/** Adds a record to `out`. @pre the limits of the format, as EventLogReader keeps them. */
+void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t utime, const std::string& channel,
+               Bytes data);
+
 }  // namespace forereach

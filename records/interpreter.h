@@ -4,7 +4,7 @@ the same rows, live and when a log is read again.
 **Sequence numbers** (StreamOrder). A message ahead of its stream's count makes a gap "bus". A late or repeated one
 makes none. A sender that restarted makes a gap "restart". A late message that a gap has counted as lost stays counted.
 
-With a key, messages that are not authentic (log_authenticator.h) make no rows and do not count. */
+With a key, messages that are not authentic (LogAuthenticator) make no rows and do not count. */
 #pragma once
 
 #include <compare>
@@ -18,7 +18,7 @@ With a key, messages that are not authentic (log_authenticator.h) make no rows a
 #include "lcmtypes/codec.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
-#include "records/log_authenticator.h"
+#include "records/log_trust.h"
 #include "records/rows.h"
 #include "records/undecided.h"
 #include "task/config.h"

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "lcmtypes/printable.h"
-#include "records/event_record.h"
+#include "records/event_log.h"
 #include "records/log_survey.h"
 #include "records/output_file.h"
 #include "task/date.h"

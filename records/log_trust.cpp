@@ -4,8 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "records/log_authenticator.h"
-
 namespace forereach {
 
 void LogKey::Override(BusOptions& options) const {
@@ -37,6 +35,14 @@ nlohmann::json ToJson(const Refusals& refused) {
 
 nlohmann::json ToJson(const PassedOver& passed_over) {
   return {{"not_authentic", ToJson(passed_over.not_authentic)}, {"undecodable", passed_over.undecodable}};
+}
+
+bool LogAuthenticator::IsAuthentic(const LogEvent& event) {
+  if (!keys_ || !speakers_.contains(event.channel)) return true;
+  if (!authenticator_)
+    authenticator_.emplace(*keys_, channels_.name.empty() ? std::nullopt : std::optional(channels_.name), speakers_,
+                           std::nullopt);
+  return authenticator_->Check(event.channel, event.data, event.utime).first == Authenticity::kAuthentic;
 }
 
 }  // namespace forereach

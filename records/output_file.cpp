@@ -129,4 +129,16 @@ void GiveName(const std::string& file, const std::string& path) {
   copy.Close();
 }
 
+void RequireNewFile(const std::string& path, bool force) {
+  if (!force && Exists(path))
+    throw OutputError(path + ": the file exists, and is not changed; choose another name, or write --force");
+}
+
+void WriteNewFile(const std::string& path, const std::string& text, bool force) {
+  RequireNewFile(path, force);
+  OutputFile file(path, force ? OutputFile::Existing::kReplaced : OutputFile::Existing::kKept);
+  file.Write(text);
+  file.Close();
+}
+
 }  // namespace forereach

@@ -60,4 +60,11 @@ class OutputFile final {
 /** Gives a finished file another name, by a link or a copy. @throws OutputError if that file exists. */
 void GiveName(const std::string& file, const std::string& path);
 
+/** For a command whose work takes long: fails as WriteNewFile would now, if the file exists. @throws OutputError. */
+void RequireNewFile(const std::string& path, bool force);
+
+/** Writes a file that does not exist yet; with `force`, in the place of one that does. Whole, or not at all.
+@throws OutputError. */
+void WriteNewFile(const std::string& path, const std::string& text, bool force);
+
 }  // namespace forereach

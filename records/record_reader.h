@@ -15,10 +15,8 @@ candidates without a decision, whatever the length of the logs. */
 #include "forereach/withdrawal_t.hpp"
 #include "records/event_log.h"
 #include "records/interpreter.h"
-#include "records/log_authenticator.h"
 #include "records/log_survey.h"
 #include "records/log_trust.h"
-#include "records/repeated_withdrawals.h"
 #include "records/rows.h"
 #include "records/undecided.h"
 

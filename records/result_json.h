@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/authentic.h"
-#include "records/compare.h"
 #include "records/event_log.h"
 #include "records/log_trust.h"
 #include "records/replay.h"

@@ -6,9 +6,16 @@
 #include "lcmtypes/names.h"
 
 namespace forereach {
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+OrderedJson If(bool is_known, const OrderedJson& value) { return is_known ? value : OrderedJson(nullptr); }
+
+}  // namespace
 
 nlohmann::ordered_json ToJson(const certifier_status_t& status, bool is_signed) {
-  nlohmann::ordered_json by_outcome, by_cause;
+  OrderedJson by_outcome, by_cause;
   for (std::int16_t i = 0; i < 16; ++i)
     if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];
   for (std::int16_t i = 1; i < 64; ++i)
@@ -16,11 +23,10 @@ nlohmann::ordered_json ToJson(const certifier_status_t& status, bool is_signed) 
   return {
       {"level", LevelName(status.level)},
       {"state", StateName(status.state)},
-      {"fault", status.fault == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(FaultName(status.fault))},
+      {"fault", If(status.fault != 0, FaultName(status.fault))},
       {"latch", LatchName(status.latch)},
       {"message", GetText(status.message)},
-      {"advice",
-       status.fault == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(FaultAdvice(status.fault))},
+      {"advice", If(status.fault != 0, FaultAdvice(status.fault))},
       {"signed", is_signed},
       {"shadow", status.shadow != 0},
       {"version", status.version},
@@ -30,16 +36,13 @@ nlohmann::ordered_json ToJson(const certifier_status_t& status, bool is_signed) 
       {"by_cause", by_cause},
       {"instance", status.instance},
       {"started_utime", status.started_utime},
-      {"other_instance",
-       status.other_instance == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(status.other_instance)},
+      {"other_instance", If(status.other_instance != 0, status.other_instance)},
       {"obstacles",
        {{"source", ObstaclesSourceName(status.obstacles_source)},
         {"known", status.obstacles_known != 0},
         {"in_force", status.obstacles_in_force},
-        {"utime", status.obstacles_utime == 0 ? nlohmann::ordered_json(nullptr)
-                                              : nlohmann::ordered_json(status.obstacles_utime)},
-        {"age_us", status.obstacles_age_us < 0 ? nlohmann::ordered_json(nullptr)
-                                               : nlohmann::ordered_json(status.obstacles_age_us)},
+        {"utime", If(status.obstacles_utime != 0, status.obstacles_utime)},
+        {"age_us", If(status.obstacles_age_us >= 0, status.obstacles_age_us)},
         {"lost", status.obstacles_lost}}},
       {"unsigned", status.is_unsigned != 0},
       {"candidates_lost", status.candidates_lost},

@@ -4,7 +4,7 @@ through this class.
 The timeline follows the certifier through event logs: starts of its process, reloads, and the obstacles and learned
 transitions of each decision. It pairs each candidate with its decision and its certified plan.
 
-**Authentic messages.** With a key, messages that are not authentic (log_authenticator.h) are passed over and counted.
+**Authentic messages.** With a key, messages that are not authentic (LogAuthenticator) are passed over and counted.
 
 **Starts and reloads.** Heartbeats, decisions and certified plans each have a count of their own (StreamOrder). A
 process has started when one of these counts begins again before another count has shown this start, and with a first
@@ -37,10 +37,8 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
-#include "records/log_authenticator.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
-#include "records/repeated_withdrawals.h"
 #include "records/undecided.h"
 #include "task/config.h"
 

@@ -1,14 +1,19 @@
-/** Messages with candidates of a log without a decision so far. */
+/** Messages of a log that belong together: candidates without a decision so far, and repetitions of a withdrawal. */
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/candidate_batch.h"
+#include "lcmtypes/codec.h"
 
 namespace forereach {
 
@@ -79,6 +84,25 @@ class Undecided final {
   std::int64_t next_ = 0;
   std::multimap<Digest, std::int64_t> of_key_;
   Entries entries_;
+};
+
+/** The certifier repeats a withdrawal until the robot answers (docs/bus.md); a log has each repetition. */
+class RepeatedWithdrawals final {
+ public:
+  /** Whether it is not among the last kMost, of which repetitions differ in utime and sequence alone. */
+  [[nodiscard]] bool IsFirst(withdrawal_t withdrawal) {
+    withdrawal.utime = withdrawal.sequence = 0;
+    const Digest digest = DigestOf(Encode(withdrawal));
+    if (std::ranges::find(last_, digest) != last_.end()) return false;
+    if (last_.size() == kMost) last_.pop_front();
+    last_.push_back(digest);
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 4096;  // which may be repeated at one time
+
+  std::deque<Digest> last_;
 };
 
 }  // namespace forereach

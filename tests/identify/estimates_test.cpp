@@ -3,9 +3,7 @@
 #include "tests/test.h"
 
 #include "forereach/residual/consistency.h"
-#include "identify/binomial.h"
 #include "identify/hold_out.h"
-#include "identify/lone_slopes.h"
 #include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
 #include "tests/identify/seed.h"

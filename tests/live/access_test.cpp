@@ -1,4 +1,4 @@
-#include "live/access.h"
+#include "live/web_server.h"
 
 #include "tests/test.h"
 

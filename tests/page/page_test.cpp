@@ -1,7 +1,7 @@
 
 #include "forereach/numerics/parallel.h"
-#include "page/columns.h"
 #include "page/detail.h"
+#include "page/document.h"
 #include "page/gather.h"
 #include "page/write.h"
 #include "records/database.h"

@@ -1,5 +1,5 @@
 // `forereach replay --compare`: what another task would have changed.
-#include "records/compare.h"
+#include "records/replay.h"
 
 #include "records/database.h"
 #include "records/timeline.h"

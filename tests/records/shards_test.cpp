@@ -1,7 +1,7 @@
 // `--shard I/N` of replay and verify, and `forereach merge`: of all shards it makes what one command prints.
 
 #include "lcmtypes/seal.h"
-#include "records/compare.h"
+#include "records/replay.h"
 #include "records/result_json.h"
 #include "records/shard.h"
 #include "tests/cli/program.h"
