@@ -19,6 +19,7 @@
 #include "bus/authentic.h"
 #include "bus/bus.h"
 #include "bus/bus_options.h"
+#include "bus/descriptor.h"
 #include "bus/process.h"
 #include "bus/udp_receiver.h"
 #include "cli/commands.h"
@@ -46,23 +47,11 @@ struct Check {
   bool warning = false;  // it is not good, and the bus works all the same
 };
 
-class Socket {
- public:
-  Socket() : handle_(socket(AF_INET, SOCK_DGRAM, 0)) {}
-  ~Socket() { close(handle_); }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  [[nodiscard]] int handle() const { return handle_; }
-
- private:
-  int handle_;
-};
-
 Check CheckLoopback() {
-  const Socket socket;
+  const Descriptor socket(::socket(AF_INET, SOCK_DGRAM, 0));
   ifreq request{};
   std::copy_n("lo", 3, request.ifr_name);
-  const bool up = ioctl(socket.handle(), SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP);
+  const bool up = ioctl(socket.get(), SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP);
   return {"loopback interface", up, up ? "up" : "down", std::string(kReadyCommand) + ", or: ip link set lo up"};
 }
 

@@ -1,5 +1,9 @@
 #include <ctime>
 #include <iostream>
+#include <optional>
+#include <string_view>
+
+#include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
@@ -65,33 +69,23 @@ int List(const LogArguments& options) {
   if (!options.json)
     std::cout << "time                        event  channel           type                  plan  what\n";
   user.on_event = [&](const LogEvent& event, const std::optional<MessageSummary>& summary, const std::string& log) {
-    const std::string type(summary ? summary->type : std::string_view("unknown"));
+    const std::string_view type = summary ? summary->type : "unknown", what = summary ? summary->what : "";
+    const std::optional<std::int64_t> plan = summary ? summary->plan_id : std::nullopt;
     if (options.json) {
-      nlohmann::ordered_json line;
-      line["log"] = Printable(log);
-      line["event_number"] = event.number;
-      line["utime"] = event.utime;
-      line["channel"] = Printable(event.channel);
-      line["type"] = nullptr;
-      line["plan_id"] = nullptr;
-      line["what"] = nullptr;
-      line["bytes"] = event.data.size();
-      if (summary) line["type"] = summary->type;
-      if (summary && summary->plan_id) line["plan_id"] = *summary->plan_id;
-      if (summary && !summary->what.empty()) line["what"] = summary->what;
+      using Json = nlohmann::ordered_json;
+      const Json line{{"log", Printable(log)},
+                      {"event_number", event.number},
+                      {"utime", event.utime},
+                      {"channel", Printable(event.channel)},
+                      {"type", summary ? Json(type) : Json(nullptr)},
+                      {"plan_id", plan ? Json(*plan) : Json(nullptr)},
+                      {"what", what.empty() ? Json(nullptr) : Json(what)},
+                      {"bytes", event.data.size()}};
       std::cout << JsonText(line) << '\n';
       return;
     }
-    const auto padded = [](std::string text, std::size_t width) {
-      if (text.size() < width) text.resize(width, ' ');
-      return text;
-    };
-    const std::string number = std::to_string(event.number);
-    const std::string plan = summary && summary->plan_id ? std::to_string(*summary->plan_id) : "-";
-    std::cout << Date(event.utime) << std::string(number.size() < 7 ? 7 - number.size() : 1, ' ') << number << "  "
-              << padded(Printable(event.channel), 17) << ' ' << padded(type, 21)
-              << std::string(plan.size() < 4 ? 4 - plan.size() : 0, ' ') << plan << "  "
-              << (summary ? summary->what : "") << '\n';
+    std::cout << fmt::format("{} {:>6}  {:<17} {:<21}{:>4}  {}\n", Date(event.utime), event.number,
+                             Printable(event.channel), type, plan ? std::to_string(*plan) : "-", what);
   };
   const LogEditResult result = ReadLogs(options.logs, options.selection, LogSequence::kAsNamed, user);
   return Finish(result, "log: ", options.json ? std::cerr : std::cout);

@@ -49,11 +49,8 @@ void PrintMissing(const NamedRuns& named) {
 }
 
 void PrintJson(const ReplayResult& result, const NamedRuns& named) {
-  nlohmann::json document{{"candidates", result.candidates},           {"agreed", result.agreed},
-                          {"withdrawals", result.withdrawals},         {"proposals", result.proposals},
-                          {"circumstances", result.circumstances},     {"corruptions", result.corruptions},
-                          {"passed_over", ToJson(result.passed_over)}, {"shown", result.shown},
-                          {"differences", result.differences}};
+  nlohmann::json document = result;
+  document["passed_over"] = ToJson(result.passed_over);
   if (named.is_many) {
     document["runs"] = named.runs.size();
     document["missing"] = named.missing;

@@ -1,12 +1,13 @@
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+
+#include <fmt/format.h>
 
 #include <unistd.h>
 
@@ -49,11 +50,8 @@ const char* ColorOf(std::int16_t outcome) {
 // In UTC, with milliseconds.
 std::string TimeOfDay(std::int64_t utime) {
   const std::int64_t ms = utime / 1000, of_day = (ms % 86'400'000 + 86'400'000) % 86'400'000;
-  char text[16];
-  std::snprintf(text, sizeof text, "%02d:%02d:%02d.%03d", static_cast<int>(of_day / 3'600'000),
-                static_cast<int>(of_day / 60'000 % 60), static_cast<int>(of_day / 1000 % 60),
-                static_cast<int>(of_day % 1000));
-  return text;
+  return fmt::format("{:02}:{:02}:{:02}.{:03}", of_day / 3'600'000, of_day / 60'000 % 60, of_day / 1000 % 60,
+                     of_day % 1000);
 }
 
 // Prints decisions as they come. It sends nothing.

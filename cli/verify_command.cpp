@@ -194,13 +194,9 @@ class Verifying final : public CertificateUser {
 };
 
 void PrintJson(const Verified& sum, const NamedRuns& named) {
-  nlohmann::json document{{"certificates", sum.certificates},
-                          {"confirmed", sum.confirmed},
-                          {"refuted", sum.refuted},
-                          {"cannot_verify", sum.cannot_verify},
-                          {"not_certificates", sum.not_certificates},
-                          {"passed_over", ToJson(sum.passed_over)},
-                          {"failures", sum.failures}};
+  nlohmann::json document = sum;
+  for (const char* other : {"of_decision", "remainders", "first_failure"}) document.erase(other);
+  document["passed_over"] = ToJson(sum.passed_over);
   if (named.is_many) {
     document["runs"] = named.runs.size();
     document["missing"] = named.missing;
