@@ -342,16 +342,21 @@ void Certifier::Require(const Zonotope& initial_set, const ObstacleView& obstacl
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles, Tube& tube,
                             int known) const noexcept {
   tube.length_ = std::clamp(known, 0, tube.length_);
-  tube.slices_[0].Assign(initial_set);
-  Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
-  // A contradiction precedes every other cause: no residual is admissible, so a tube would say nothing.
-  if (violation()) return Falsified(*violation());
-  Decision decision = Propagate(plan, tube);
+  Decision decision = Begin(initial_set, tube);
+  if (decision.outcome != Outcome::kNone) return decision;
+  decision = Propagate(plan, tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeBetween(tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeSafety(plan, obstacles, tube);
   for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
   return decision;
+}
+
+// A contradiction precedes every other cause: no residual is admissible, so a tube would say nothing.
+Decision Certifier::Begin(const Zonotope& initial_set, Tube& tube) const noexcept {
+  tube.slices_[0].Assign(initial_set);
+  Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
+  return violation() ? Falsified(*violation()) : Decision{};
 }
 
 Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
@@ -368,16 +373,21 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
 }
 
 Decision Certifier::JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube, int first) const noexcept {
-  const Decision limits = limits_.Judge(plan, tube, first);
-  const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
+  return JudgeSafety(plan, obstacles, tube, first, first, {});
+}
+
+Decision Certifier::JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube, int first_sample,
+                                int first_unit, const Decision& before) const noexcept {
+  const Decision limits = limits_.Judge(plan, tube, first_sample);
+  const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first_unit, before);
   // The earlier failure is reported; of two at one step, the limit.
   const bool is_touched_before = among_obstacles.outcome == Outcome::kSafety && among_obstacles.step < limits.step;
   return limits.outcome == Outcome::kNone || is_touched_before ? among_obstacles : limits;
 }
 
-Decision Certifier::JudgeBetween(const Tube& tube) const noexcept {
+Decision Certifier::JudgeBetween(const Tube& tube, int first) const noexcept {
   Decision decision;
-  for (int t = 0; t < tube.length(); ++t)
+  for (int t = first; t < tube.length(); ++t)
     for (const RateBounds::Bound& bound : rates_.bounds()) {
       const int k = bound.state;
       const double least = LeastChange(tube.hull(t, k), tube.hull(t + 1, k), bound.is_angle);

@@ -127,13 +127,19 @@ class Certifier final {
                                  Tube& tube, int known = 0) const noexcept;
 
  private:
+  friend class Extender;
+  // X_0 of a tube; F if the observations contradict the declaration, else outcome kNone.
+  [[nodiscard]] Decision Begin(const Zonotope& initial_set, Tube& tube) const noexcept;
   // From step tube.length() on.
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
-  /** Outcome kNone unless a step changes a state by more than its declared rate allows, whatever the states in its two
-  slices. */
-  [[nodiscard]] Decision JudgeBetween(const Tube& tube) const noexcept;
+  /** Outcome kNone unless a step from `first` on changes a state by more than its declared rate allows, whatever the
+  states in its two slices. */
+  [[nodiscard]] Decision JudgeBetween(const Tube& tube, int first = 0) const noexcept;
   /** Outcome kNone if the last slice is provably at rest. */
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
+  // As the public one: limits from one sample on, obstacles from one unit on. @param before as SafetyTest's.
+  [[nodiscard]] Decision JudgeSafety(const Plan& plan, const ObstacleView& obstacles, Tube& tube, int first_sample,
+                                     int first_unit, const Decision& before) const noexcept;
 
   void TestRates();
   void ForgetDropped();

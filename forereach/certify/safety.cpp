@@ -409,8 +409,8 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
 // does not depend on the order in which pairs are seen, so an index changes nothing.
 class SafetyTest::Judgement {
  public:
-  Judgement(const SafetyTest& test, const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
-            int first) noexcept
+  Judgement(const SafetyTest& test, const ObstacleView& obstacles, const Schedule& schedule, Tube& tube, int first,
+            const Decision& before) noexcept
       : test_(test),
         obstacles_(obstacles),
         first_(first),
@@ -418,7 +418,10 @@ class SafetyTest::Judgement {
         tube_(tube),
         schedule_(schedule),
         touched_(units_),
-        unit_(test, schedule, tube, tube.places_) {}
+        unit_(test, schedule, tube, tube.places_) {
+    if (before.obstacle >= 0)
+      closest_.Consider({{before.margin, before.threshold}, before.part}, before.closest_step, before.obstacle);
+  }
 
   [[nodiscard]] Decision Run() noexcept {
     if (first_ < units_) {
@@ -933,9 +936,9 @@ class SafetyTest::Judgement {
   HullTree tree_;
 };
 
-Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
-                           int first) const noexcept {
-  return Judgement(*this, obstacles, schedule, tube, first).Run();
+Decision SafetyTest::Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube, int first,
+                           const Decision& before) const noexcept {
+  return Judgement(*this, obstacles, schedule, tube, first, before).Run();
 }
 
 }  // namespace forereach

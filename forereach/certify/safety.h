@@ -41,11 +41,12 @@ class SafetyTest final {
   /** Judges the units from `first` on. The outcome is kCertified only with a proof that the body is disjoint from every
   obstacle in each of them; otherwise it is kSafety with the first unit that is not proven as `step`, and the first
   obstacle there. A certificate names the closest approach, of several as close the first; with no unit left none.
+  @param before names the closest approach in earlier units, which stays if nothing is closer; or nothing.
   @param tube its slices are read; its scratch memory is used. @pre the obstacles and the schedule are as
   Certifier::Require wants them. It allocates nothing. Cost for each unit and obstacle: O(p) if the hulls are far from
   each other, otherwise as Separate for the points of the body; nothing for those that an index leaves out. */
-  [[nodiscard]] Decision Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube,
-                               int first = 0) const noexcept;
+  [[nodiscard]] Decision Judge(const ObstacleView& obstacles, const Schedule& schedule, Tube& tube, int first = 0,
+                               const Decision& before = {}) const noexcept;
 
   /** The proven distance between the body and an obstacle in unit t: the largest of the bounds by interval hulls and by
   the best direction. Infinite if the obstacle is nowhere in that unit. @pre 0 <= t < NumUnits(tube). */

@@ -36,6 +36,7 @@ class Tube final {
 
  private:
   friend class Certifier;
+  friend class Extender;
   friend class Pieces;
   friend class SafetyTest;
   std::vector<Zonotope> slices_;

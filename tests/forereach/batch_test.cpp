@@ -7,15 +7,9 @@
 
 #include "tests/test.h"
 
-#include "tests/oracle/affine_problems.h"
-#include "tests/oracle/any_surroundings.h"
+#include "tests/oracle/any_task.h"
 
 namespace forereach::batch_test {
-
-auto Fields(const Decision& d) {
-  return std::tuple(d.outcome, d.cause, d.step, d.exit.kind, d.exit.index, d.coordinate, d.first_observation,
-                    d.second_observation, d.obstacle, d.closest_step, d.margin, d.threshold, d.capped);
-}
 
 // The hulls of a tube, as far as it was computed.
 std::vector<double> Hulls(const Tube& tube) {
@@ -123,19 +117,6 @@ std::string BitsOf(const Tube& tube) {
     add(std::span(envelope.upper).first(ToSize(slice.dim())));
   }
   return bits;
-}
-
-// Everything that decides a step: body, bounds between the samples, disturbances, affine rows, offsets, limits.
-std::shared_ptr<Problem> AnyTask(Random& random, bool bicycle) {
-  auto problem = AnyWorld(random, bicycle);
-  if (random.Coin(0.4)) Disturb(random, *problem);
-  if (random.Coin(0.3)) static_cast<void>(MakeAffine(random, *problem));
-  if (random.Coin(0.4)) Shift(random, *problem);
-  const auto& names = problem->model->state_names();
-  if (random.Coin(0.5))
-    problem->limits = {{.name = "a limit", .that = {names[0] + "*" + names.back()}, .at_most = random.Uniform(0, 30)}};
-  if (random.Coin(0.2)) problem->rest = {{problem->model->num_states() - 1, 0.5}};
-  return problem;
 }
 
 // Each plan is a beginning of an earlier one and steps of its own; -0 and 0 are not the same control.
