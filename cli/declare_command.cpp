@@ -163,7 +163,7 @@ std::string Yaml(const std::vector<Region>& regions, const std::vector<SlopeBoun
   for (const Region& region : regions) {
     std::string rows;
     const std::string box = Joined(region.box, [&](const auto& side) {
-      return name(side.first) + ": [" + ToText(side.second.lower) + ", " + ToText(side.second.upper) + "]";
+      return name(side.variable) + ": [" + ToText(side.range.lower) + ", " + ToText(side.range.upper) + "]";
     });
     for (std::size_t i = 0; i < bounds.size(); ++i) {
       const int row = bounds[i].row, column = bounds[i].column;

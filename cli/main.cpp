@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
   std::vector<Command> commands;
   for (const OfflineCommand& each : kOfflineCommands) {
     const bool is_of_fleet = each.name == std::string_view("report") && NamesStore(argc, argv);
-    const char* const program = kPrograms[static_cast<int>(is_of_fleet ? Program::kFleet : each.program)];
+    const char* const program = kPrograms[static_cast<int>(is_of_fleet ? OfflineProgram::kFleet : each.program)];
     if (argc > 1 && each.name == std::string_view(argv[1])) return Become(program, argv);
     commands.push_back({.name = each.name, .run = [=] { return Become(program, argv); }});
   }

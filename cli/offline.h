@@ -6,11 +6,11 @@ forereach-fleet, which loads PostgreSQL's client and is a package of its own. `d
 
 namespace forereach {
 
-enum class Program { kOffline, kLive, kFleet, kDemo };
+enum class OfflineProgram { kOffline, kLive, kFleet, kDemo };
 
 struct OfflineCommand {
   const char *name, *purpose;
-  Program program = Program::kOffline;
+  OfflineProgram program = OfflineProgram::kOffline;
 };
 
 inline constexpr OfflineCommand kOfflineCommands[] = {
@@ -62,12 +62,12 @@ inline constexpr OfflineCommand kOfflineCommands[] = {
     {"ingest",
      "Send the rows of recorded runs to the fleet's store, a PostgreSQL: exit 0 if it has all of them, 1 if some could "
      "not be read or sent",
-     Program::kFleet},
+     OfflineProgram::kFleet},
     {"live",
      "Show the running robot on a page for this machine's browsers, until Ctrl-C: it listens to the bus and sends "
      "nothing",
-     Program::kLive},
-    {"demo", "Drive a car through circles and traffic, with a report and a picture in ./run", Program::kDemo},
+     OfflineProgram::kLive},
+    {"demo", "Drive a car through circles and traffic, with a report and a picture in ./run", OfflineProgram::kDemo},
 };
 
 }  // namespace forereach

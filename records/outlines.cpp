@@ -24,13 +24,17 @@ constexpr int kCornersOfDisc = 16;
 
 // The corners of the convex hull, by Andrew's monotone chain.
 Svg::Points HullOf(const std::vector<Vector2d>& points, double radius) {
-  Svg::Points all;
-  for (const Vector2d& point : points) {
-    if (radius == 0) all.push_back(point);
-    for (int i = 0; radius > 0 && i < kCornersOfDisc; ++i) {
-      const double angle = 2 * M_PI * i / kCornersOfDisc;
-      all.push_back(point + radius * Vector2d(std::cos(angle), std::sin(angle)));
-    }
+  static const auto kDisc = [] {
+    std::array<Vector2d, kCornersOfDisc> disc;
+    for (int i = 0; i < kCornersOfDisc; ++i)
+      disc[ToSize(i)] = Eigen::Rotation2Dd(2 * M_PI * i / kCornersOfDisc) * Vector2d::UnitX();
+    return disc;
+  }();
+  Svg::Points all = points;
+  if (radius > 0) {  // a corner of the result is one of a disc around a corner of the hull of the points
+    all.clear();
+    for (const Vector2d& point : HullOf(points))
+      for (const Vector2d& corner : kDisc) all.push_back(point + radius * corner);
   }
   if (all.size() < 2) return all;
   std::ranges::sort(all, {}, [](const Vector2d& a) { return std::pair(a.x(), a.y()); });

@@ -27,6 +27,29 @@ TEST(Outlines, HullsAreCounterClockwiseAndConvex) {
   for (const Vector2d& corner : disc) EXPECT_NEAR((corner - Vector2d(1, 2)).norm(), 0.5, 1e-12);
 }
 
+// The hull of all discs reaches as far in each direction as the farthest of them, and no farther; doubled points,
+// points in one line and inner ones change nothing.
+TEST(Outlines, AHullOfDiscsReachesAsFarAsTheFarthestDisc) {
+  FreshRandom random;
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<Vector2d> points;
+    for (int i = 0; i < 1 + trial % 40; ++i) points.emplace_back(uniform(random), trial % 3 == 0 ? 0 : uniform(random));
+    if (trial % 5 == 0) points.push_back(points.front());
+    const double radius = 0.1 + std::abs(uniform(random));
+    const Svg::Points disc = HullOf({Vector2d::Zero()}, radius), hull = HullOf(points, radius);
+    const auto reach = [](const std::vector<Vector2d>& of, const Vector2d& direction) {
+      double most = -kInfinity;
+      for (const Vector2d& point : of) most = std::max(most, point.dot(direction));
+      return most;
+    };
+    for (double angle = 0; angle < 2 * M_PI; angle += 0.01) {
+      const Vector2d direction(std::cos(angle), std::sin(angle));
+      EXPECT_NEAR(reach(hull, direction), reach(points, direction) + reach(disc, direction), 1e-12);
+    }
+  }
+}
+
 Problem Car() {
   Problem problem = WorldOf(MakeKinematicBicycle(0.1, 2.5), Within({100, 100, 3, 20, 3, 0.5}), Within({1, 1}));
   problem.body = {.heading = 2, .parts = {{{{-1, -1, 0}, {3, -1, 0}, {3, 1, 0}, {-1, 1, 0}}, 0}, {{{4, 0, 0}}, 0.5}}};
