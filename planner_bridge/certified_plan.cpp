@@ -18,7 +18,7 @@ class PlanSearch final {
       : proposer_(proposer),
         certifier_(certifier),
         config_(config),
-        initial_set_(Zonotope::Enclose(config.initial_set)),
+        initial_set_(std::make_shared<const Zonotope>(Zonotope::Enclose(config.initial_set))),
         half_width_((config.initial_set.upper() - config.initial_set.lower()) / 2),
         schedule_(schedule),
         seed_(seed * kSeedSpread),
@@ -41,6 +41,8 @@ class PlanSearch final {
       request.limit_margin = lessons_.limit_margin();
       request.may_follow_hints = attempt == 0;
       request.schedule = schedule_;
+      request.initial_set = initial_set_;
+      request.before = found_.controls.leftCols(found_.progress_steps);
       request.schedule.start_us += found_.progress_steps * schedule_.step_us;
       const std::optional<Proposal> part = proposer_.Propose(request);
       if (!part) continue;
@@ -65,8 +67,8 @@ class PlanSearch final {
   Decision Certify(const Eigen::MatrixXd& controls) {
     const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
                     static_cast<int>(controls.rows()), schedule_};
-    certifier_.Require(plan, initial_set_, config_.obstacles);
-    return certifier_.Certify(plan, initial_set_, config_.obstacles, candidate_tube_);
+    certifier_.Require(plan, *initial_set_, config_.obstacles);
+    return certifier_.Certify(plan, *initial_set_, config_.obstacles, candidate_tube_);
   }
 
   void Keep(Eigen::MatrixXd controls, int progress_steps, const Decision& decision) {
@@ -90,7 +92,7 @@ class PlanSearch final {
   Proposer& proposer_;
   const Certifier& certifier_;
   const Config& config_;
-  const Zonotope initial_set_;
+  const std::shared_ptr<const Zonotope> initial_set_;
   const Eigen::VectorXd half_width_;
   const Schedule schedule_;
   std::uint32_t seed_;

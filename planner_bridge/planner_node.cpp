@@ -385,15 +385,20 @@ std::optional<Proposal> PlannerNode::StopFrom(std::span<const double> state) con
 }
 
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
-  return {round.start.center,
-          round.lessons.clearance(),
-          round.lessons.DomainMargin(round.start.half_width, config_.problem->projection),
-          static_cast<std::uint32_t>(config_.planner.seed) * kSeedSpread + static_cast<std::uint32_t>(searches_),
-          round.searches - 1,
-          {round.start.utime, period_us_, ScheduleErrorUs(config_.gate)},
-          round.lessons.limit_margin(),
-          round.lessons.obstacle_clearance(),
-          round.searches == 1 && !(refused_center_ && *refused_center_ == round.start.center)};
+  PlanRequest request{
+      round.start.center,
+      round.lessons.clearance(),
+      round.lessons.DomainMargin(round.start.half_width, config_.problem->projection),
+      static_cast<std::uint32_t>(config_.planner.seed) * kSeedSpread + static_cast<std::uint32_t>(searches_),
+      round.searches - 1,
+      {round.start.utime, period_us_, ScheduleErrorUs(config_.gate)},
+      round.lessons.limit_margin(),
+      round.lessons.obstacle_clearance(),
+      round.searches == 1 && !(refused_center_ && *refused_center_ == round.start.center)};
+  if (config_.planner.certifies)
+    request.initial_set =
+        std::make_shared<const Zonotope>(Zonotope::FromBox(round.start.center, round.start.half_width));
+  return request;
 }
 
 void PlannerNode::OnDecision(const decision_t& decision, std::int64_t now_us) {

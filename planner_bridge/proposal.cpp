@@ -24,6 +24,7 @@
 #include <ompl/util/RandomNumbers.h>
 #include <Eigen/QR>
 
+#include "forereach/certify/extender.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/clearance.h"
 #include "forereach/safety/limit_values.h"
@@ -70,6 +71,40 @@ double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::St
 using RealVectorControl = oc::RealVectorControlSpace::ControlType;
 const double* Values(const oc::Control* control) { return control->as<RealVectorControl>()->values; }
 double* Values(oc::Control* control) { return control->as<RealVectorControl>()->values; }
+
+using Node = std::shared_ptr<const TubeNode>;
+
+// Where the tree is certified, a state has the node of the tube that leads there; both are copied together.
+class SearchSpace final : public ob::RealVectorStateSpace {
+ public:
+  struct NodeState final : StateType {
+    Node node;
+  };
+  using RealVectorStateSpace::RealVectorStateSpace;
+
+  ob::State* allocState() const override {
+    auto* const state = new NodeState;
+    state->values = new double[dimension_];
+    return state;
+  }
+  void freeState(ob::State* state) const override {
+    delete[] Values(state);
+    delete static_cast<NodeState*>(state);
+  }
+  void copyState(ob::State* to, const ob::State* from) const override {
+    RealVectorStateSpace::copyState(to, from);
+    NodeOf(to) = NodeOf(from);
+  }
+  static Node& NodeOf(ob::State* state) { return static_cast<NodeState*>(state)->node; }
+  static const Node& NodeOf(const ob::State* state) { return static_cast<const NodeState*>(state)->node; }
+};
+
+// For a tree whose nodes are certified.
+struct Certifying {
+  explicit Certifying(const std::shared_ptr<const Problem>& problem) : certifier(problem) {}
+  Certifier certifier;
+  Tube tube;
+};
 
 Box ProjectedRegion(const Problem& problem) {
   const Box& box = problem.domain.state;
@@ -215,7 +250,8 @@ class Planner final : public Proposer {
         limits_(*problem_->model, problem_->limits),
         region_(ProjectedRegion(*problem_)),
         goal_(Eigen::Map<const Eigen::VectorXd>(options_.goal.data(), std::ssize(options_.goal))),
-        obstacles_(config.obstacles) {
+        obstacles_(config.obstacles),
+        certifying_(options_.certifies ? std::make_unique<Certifying>(problem_) : nullptr) {
     ompl::msg::noOutputHandler();
   }
 
@@ -270,6 +306,7 @@ class Planner final : public Proposer {
   Eigen::VectorXd goal_;
   double half_breadth_ = HalfBreadth(problem_->body);
   std::vector<Obstacle> obstacles_;
+  std::unique_ptr<Certifying> certifying_;  // or null
   std::map<std::pair<double, std::ptrdiff_t>, std::optional<NavigationField>>
       fields_;  // by clearance and how many are gone
 };
@@ -315,7 +352,7 @@ class Planner::Search {
     top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_.Speed(x));
     least_speed_ = std::min(-kReverse, planner.motion_.Speed(x));
     at_rest_ = planner.motion_.IsAtRest(x);
-    start_valid_ = Allowed(x, 0);
+    start_valid_ = Allowed(x, 0) && BeginTree(request);
   }
 
   /** False if the start itself is not allowed. */
@@ -337,7 +374,8 @@ class Planner::Search {
     Eigen::MatrixXd progress(static_cast<Eigen::Index>(m_), static_cast<Eigen::Index>(path.getControlCount()));
     for (Eigen::Index t = 0; t < progress.cols(); ++t)
       std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, progress.col(t).data());
-    return Assemble(progress, StateOf(Values(path.getStates().back())), ambition);
+    const ob::State* const end = path.getStates().back();
+    return Assemble(progress, StateOf(Values(end)), SearchSpace::NodeOf(end), ambition);
   }
 
   /** What the hints themselves do, without a search. @pre the robot has hints. */
@@ -345,13 +383,15 @@ class Planner::Search {
     Eigen::MatrixXd progress(static_cast<Eigen::Index>(m_), planner_.options_.progress_steps);
     std::vector<double> s(start_.begin(), start_.end());
     s.insert(s.end(), {0, start_distance_});
+    Node node = root_;
     for (int t = 0; t < progress.cols(); ++t) {
       double* u = progress.col(t).data();
       planner_.motion_.Pursue(StateOf(s.data()), DesiredIn(s.data(), 0, 0), {u, m_});
-      if (!Propagate(s.data(), u, s.data()) || !Allowed(StateOf(s.data()), t + 1)) return std::nullopt;
+      if (!Propagate(s.data(), node, u, s.data(), node) || !Allowed(StateOf(s.data()), t + 1)) return std::nullopt;
     }
     for (const Ambition& ambition : kAmbitions)
-      if (!ambition.at_rest && Meets(s.data(), ambition)) return Assemble(progress, StateOf(s.data()), ambition);
+      if (!ambition.at_rest && Meets(s.data(), node, ambition))
+        return Assemble(progress, StateOf(s.data()), node, ambition);
     return std::nullopt;
   }
 
@@ -367,7 +407,7 @@ class Planner::Search {
       const double* s = Values(state);
       const double missing = std::max(search_.Shortfall(s, ambition_), 0.0);
       const double steps = search_.planner_.options_.progress_steps - search_.StepsOf(s);
-      const bool satisfied = steps == 0 && search_.Meets(s, ambition_);
+      const bool satisfied = steps == 0 && search_.Meets(s, SearchSpace::NodeOf(state), ambition_);
       // Metres and steps alike: only their order matters. OMPL takes a state at distance zero for a solution.
       if (distance != nullptr) *distance = satisfied ? 0 : missing + steps + 1;
       return satisfied;
@@ -435,9 +475,36 @@ class Planner::Search {
     return deviation_.empty() || Clear(Sweep(BodyAt(x), BodyAt(next), deviation_, t));
   }
 
-  // False outside the certification domain, past the progress part or if the way is not clear; then `to` is not a state
-  // of the search.
-  [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const {
+  // The root of a tree that is certified. False if no plan from the request's X_0 is.
+  [[nodiscard]] bool BeginTree(const PlanRequest& request) {
+    if (!planner_.certifying_) return true;
+    if (!request.initial_set) return false;
+    Schedule schedule = request.schedule;
+    schedule.start_us -= request.before.cols() * schedule.step_us;
+    auto& [certifier, tube] = *planner_.certifying_;
+    extender_.emplace(certifier, planner_.obstacles_, schedule, tube, false);
+    auto root = std::make_shared<TubeNode>();
+    bool proven = extender_->Begin(*request.initial_set, *root).outcome == Outcome::kNone;
+    for (Eigen::Index t = 0; t < request.before.cols() && proven; ++t)
+      proven = extender_->Extend(*root, {request.before.col(t).data(), m_}, *root).outcome == Outcome::kNone;
+    root_ = std::move(root);
+    return proven;
+  }
+
+  // The node after one more control, which may be that before. False if no plan that begins so is certified.
+  [[nodiscard]] bool Extend(const Node& from, const double* u, Node& next) const {
+    if (!extender_) return true;
+    auto node = std::make_shared<TubeNode>();
+    if (!from || from->depth() == kMaxSteps || extender_->Extend(*from, {u, m_}, *node).outcome != Outcome::kNone)
+      return false;
+    next = std::move(node);
+    return true;
+  }
+
+  // False outside the certification domain, past the progress part, if the way is not clear or no tube leads there;
+  // then `to` is not a state of the search.
+  [[nodiscard]] bool Propagate(const double* from, const Node& from_node, const double* u, double* to,
+                               Node& to_node) const {
     std::array<double, kMaxVariables> z;
     std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
     const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
@@ -445,7 +512,8 @@ class Planner::Search {
     bool inside = steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains(all) &&
                   KeepsLimitsOfInputs(all);
     Step({z.data(), n_}, z.data() + n_, {to, n_});
-    inside = inside && WayIsClear({z.data(), n_}, {to, n_}, static_cast<int>(steps) - 1);
+    inside =
+        inside && WayIsClear({z.data(), n_}, {to, n_}, static_cast<int>(steps) - 1) && Extend(from_node, u, to_node);
     to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
     to[n_ + 1] = std::min(best, field_.DistanceToGo(Position({to, n_})));
     return inside;
@@ -499,11 +567,11 @@ class Planner::Search {
   }
 
   // Whether a state at the end of the progress part is what the ambition asks for.
-  [[nodiscard]] bool Meets(const double* s, const Ambition& ambition) const {
+  [[nodiscard]] bool Meets(const double* s, const Node& node, const Ambition& ambition) const {
     const bool arrives = BestOf(s) <= kShareOfRadius * planner_.options_.goal_radius;
     Eigen::MatrixXd tail;
     return Shortfall(s, ambition) <= 0 && (arrives || HeadsWell(StateOf(s), ambition.heading)) &&
-           FindTail(StateOf(s), ambition, tail);
+           FindTail(StateOf(s), node, ambition, tail);
   }
 
   // Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
@@ -515,14 +583,16 @@ class Planner::Search {
     return drift.dot(field_.Descent(Position({ahead.data(), n_}))) >= cosine * drift.norm();
   }
 
-  [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
+  [[nodiscard]] bool FindTail(std::span<const double> x, const Node& node, const Ambition& ambition,
+                              Eigen::MatrixXd& tail) const {
     const RobotMotion& motion = planner_.motion_;
     for (int shape = 0; shape < motion.num_tails(); ++shape)
-      if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
+      if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, node, ambition, tail))
+        return true;
     return false;
   }
 
-  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Ambition& ambition,
+  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, Node node, const Ambition& ambition,
                                    const Eigen::MatrixXd& tail) const {
     std::array<double, kMaxVariables> z;
     std::copy(x.begin(), x.end(), z.begin());
@@ -534,7 +604,8 @@ class Planner::Search {
       std::array<double, kMaxStates> next;
       Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
       const int sample = planner_.options_.progress_steps + t;
-      if (!Allowed({next.data(), n_}, sample + 1) || !WayIsClear({z.data(), n_}, {next.data(), n_}, sample))
+      if (!Allowed({next.data(), n_}, sample + 1) || !WayIsClear({z.data(), n_}, {next.data(), n_}, sample) ||
+          !Extend(node, tail.col(t).data(), node))
         return false;
       std::copy_n(next.begin(), n_, z.begin());
       const Eigen::VectorXd moved = Position({z.data(), n_}) - position;
@@ -589,7 +660,7 @@ class Planner::Search {
   }
 
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {
-    auto states = std::make_shared<ob::RealVectorStateSpace>(static_cast<unsigned>(n_ + 2));
+    auto states = std::make_shared<SearchSpace>(static_cast<unsigned>(n_ + 2));
     ob::RealVectorBounds bounds(static_cast<unsigned>(n_ + 2));
     std::copy(lower_.begin(), lower_.end(), bounds.low.begin());  // steps and distance begin at 0
     std::copy(upper_.begin(), upper_.end(), bounds.high.begin());
@@ -623,7 +694,9 @@ class Planner::Search {
     space->setPropagationStepSize(planner_.motion_.dt());
     space->setMinMaxControlDuration(1, kLongestHold);
     setup->setStatePropagator([this](const ob::State* from, const oc::Control* u, double, ob::State* to) {
-      static_cast<void>(Propagate(Values(from), Values(u), Values(to)));
+      Node node;
+      static_cast<void>(Propagate(Values(from), SearchSpace::NodeOf(from), Values(u), Values(to), node));
+      SearchSpace::NodeOf(to) = std::move(node);
     });
     setup->setStateValidityChecker([this](const ob::State* state) {
       const double* s = Values(state);
@@ -633,6 +706,7 @@ class Planner::Search {
     std::copy_n(start_.data(), n_, start->values);
     start->values[n_] = 0;
     start->values[n_ + 1] = start_distance_;
+    SearchSpace::NodeOf(start.get()) = root_;
     setup->setStartState(start);
     setup->setGoal(std::make_shared<ProgressGoal>(space, *this, ambition));
     setup->setPlanner(planner_.make_algorithm_(space));
@@ -641,9 +715,9 @@ class Planner::Search {
 
   // @pre the progress part ends in `end`.
   [[nodiscard]] std::optional<Proposal> Assemble(const Eigen::MatrixXd& progress, std::span<const double> end,
-                                                 const Ambition& ambition) const {
+                                                 const Node& node, const Ambition& ambition) const {
     Eigen::MatrixXd tail;
-    if (!FindTail(end, ambition, tail)) return std::nullopt;
+    if (!FindTail(end, node, ambition, tail)) return std::nullopt;
     Proposal proposal{
         Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), static_cast<int>(progress.cols()), {}};
     proposal.controls << progress, tail;
@@ -665,7 +739,9 @@ class Planner::Search {
   std::vector<double> deviation_;  // of each part between two samples; empty: only the samples count
   double start_distance_, gain_, top_speed_, least_speed_;
   bool at_rest_, start_valid_;
-  mutable std::int64_t work_ = 0;  // model steps
+  Node root_;                                 // null, as all nodes, unless the tree is certified
+  mutable std::optional<Extender> extender_;  // likewise
+  mutable std::int64_t work_ = 0;             // model steps
 };
 
 std::optional<Proposal> Planner::Propose(const PlanRequest& request) {

@@ -9,7 +9,10 @@ discretisation, against obstacles grown by a clearance, against the domain and a
 its parts at expressions, from sample to sample if the problem has bounds between them, and each moving obstacle at the
 time of the step. The travel distance takes moving obstacles into account only if their velocity is zero. It is that of
 P x; if all parts of the body stand at expressions, P x is no place among obstacles, but the joints of an arm perhaps,
-and the room there is that of the body in the state with this P x and zeros. */
+and the room there is that of the body in the state with this P x and zeros.
+
+With planner.certifies the search extends tubes from the request's X_0 (forereach/certify/extender.h): its tree holds
+only what is proven so far, and a candidate is certified by the same observations but for what is asked of its end. */
 #pragma once
 
 #include <memory>

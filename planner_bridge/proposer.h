@@ -40,6 +40,10 @@ struct PlanRequest {
   /** Whether the candidate may be what the task's hints do, whatever the seed is: once for each start, since the same
   request would give it again. */
   bool may_follow_hints = false;
+  /** For planner.certifies: X_0 of the plan, and the controls that lead from it to `state`, m-by-t; the request's
+  schedule begins after them. Without X_0 such a search finds nothing. */
+  std::shared_ptr<const Zonotope> initial_set = {};
+  Eigen::MatrixXd before = {};
 };
 
 struct Proposal {

@@ -219,6 +219,9 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("policy_samples", Between(1, 10000), &PlannerOptions::policy_samples,
                       "Of `source: policy`: so many candidates are sampled at once and sent in batches; `candidates` "
                       "is then the most batches."),
+      planner.Word<bool>("certifies", {{"false", false}, {"true", true}}, &PlannerOptions::certifies,
+                         "true: the search certifies each step that it takes, so its plans keep at least as clear "
+                         "as their tubes need. Not of `source: policy`."),
       planner.Word<bool>("repair", {{"false", false}, {"true", true}}, &PlannerOptions::repairs,
                          "true: candidates ask the certifier for the nearest plan that it would certify, and a start "
                          "for which no candidate was certified gets the nearest of these."),

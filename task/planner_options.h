@@ -19,6 +19,7 @@ struct PlannerOptions {
   int lead_steps = 2;           ///< A candidate starts this many steps after the state from which it was planned.
   int candidates = 12;          ///< The largest number of candidates for one start.
   int policy_samples = 1;       ///< Candidates of a learned policy at once.
+  bool certifies = false;       ///< The search keeps to what is certified.
   bool repairs = false;         ///< Candidates ask for a repair, and one that comes is sent.
   double cruise_speed = 8;      ///< m/s
   double braking = 2.5;         ///< m/s^2

@@ -3,6 +3,7 @@
 #include "tests/test.h"
 
 #include "planner_bridge/lessons.h"
+#include "planner_bridge/proposal.h"
 #include "tests/planner_bridge/tasks.h"
 
 namespace forereach::certified_plan_test {
@@ -16,10 +17,11 @@ Config WithInitialSet(Config config) {
 TEST(CertifiedPlan, TakesThePointMassToTheGoalInOnePlanThatEndsInAStop) {
   Config config = WithInitialSet(PointMass());
   config.planner.tail_steps = 20;
-  const auto proposer = MakeProposer(config);
   const Certifier certifier(config.problem);
-  for (std::uint32_t seed = 1; seed <= 8; ++seed) {
+  for (std::uint32_t seed = 1; seed <= 16; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
+    config.planner.certifies = seed > 8;  // then each part continues the tube of those before it
+    const auto proposer = MakeProposer(config);
     const CertifiedPlan plan = FindCertifiedPlan(*proposer, certifier, config, seed);
     ASSERT_GT(plan.controls.cols(), 0);
     EXPECT_TRUE(plan.reaches_goal);
@@ -58,6 +60,56 @@ TEST(CertifiedPlan, LearnsTheMarginFromALimit) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     EXPECT_TRUE(FindCertifiedPlan(*proposer, Certifier(problem), config, seed).reaches_goal);
   }
+}
+
+struct SearchThatCertifies : testing::Test {
+  SearchThatCertifies() {
+    config_.planner.certifies = true;
+    config_.planner.clearance = 0;
+    initial_set_ = std::make_shared<const Zonotope>(Zonotope::FromBox(
+        Eigen::VectorXd::Zero(6), Eigen::Map<const Eigen::VectorXd>(config_.planner.initial_half_width.data(), 6)));
+  }
+  std::optional<Proposal> Propose(std::uint32_t seed) const {
+    PlanRequest request{.state = Eigen::VectorXd::Zero(6), .clearance = 0, .seed = seed};
+    request.initial_set = initial_set_;
+    return MakeOmplProposer(config_)->Propose(request);
+  }
+  Decision Decide(const Proposal& proposal) const {
+    const Eigen::MatrixXd& controls = proposal.controls;
+    Tube tube;
+    return Certifier(config_.problem)
+        .Certify({controls.data(), 2, static_cast<int>(controls.cols()), 2}, *initial_set_, config_.obstacles, tube);
+  }
+
+  Config config_ = Between(Bicycle());
+  std::shared_ptr<const Zonotope> initial_set_;
+
+ private:
+  // Circles to both sides, so near that a plan without clearance may touch them.
+  static Config Between(Config config) {
+    config.obstacles = {Obstacle::Circle(Vec({9, 2}), 1.2), Obstacle::Circle(Vec({9, -2}), 1.2)};
+    return config;
+  }
+};
+
+TEST_F(SearchThatCertifies, ProposesNothingThatIsNotCertified) {
+  for (const std::string algorithm : {"kpiece", "est", "pdst", "rrt", "sst"}) {
+    config_.planner.algorithm = algorithm;
+    int found = 0;
+    for (std::uint32_t seed = 1; seed <= 10; ++seed) {
+      SCOPED_TRACE(algorithm + ", seed " + std::to_string(seed));
+      const std::optional<Proposal> proposal = Propose(seed);
+      if (!proposal) continue;
+      ++found;
+      EXPECT_EQ(Decide(*proposal).outcome, Outcome::kCertified);
+    }
+    EXPECT_GT(found, 3) << algorithm;
+  }
+}
+
+TEST_F(SearchThatCertifies, FindsNothingWithoutAnInitialSet) {
+  initial_set_ = nullptr;
+  EXPECT_FALSE(Propose(1));
 }
 
 TEST(Lessons, AnExceededLimitAddsTheExcessOfTheTubeToItsMargin) {

@@ -29,7 +29,7 @@ struct Options {
   std::vector<std::string> tasks;
   std::string obstacles;
   int seeds = 20, first_seed = 1;
-  bool advice = false, repair = false;
+  bool advice = false, repair = false, certifies = false;
   double scatter = 0;
   double errors = 0;
 };
@@ -144,6 +144,11 @@ int Run(const Options& options) {
       all_good = DriveAll(name + ", advised", config, options) && all_good;
       config.gate.advises = false;
     }
+    if (options.certifies) {
+      config.planner.certifies = true;
+      all_good = DriveAll(name + ", certifies", config, options) && all_good;
+      config.planner.certifies = false;
+    }
     if (options.repair) {
       config.planner.repairs = true;
       all_good = DriveAll(name + ", repaired", config, options) && all_good;
@@ -180,6 +185,7 @@ int main(int argc, char** argv) {
            .help = "Moves each obstacle of the task by up to so many metres in each coordinate, by the seed",
            .range = NumberRange{0, 1000}},
           {"--advice", &options.advice, "Drives each task once more with gate.advice: send"},
+          {"--certifies", &options.certifies, "Drives each task once more with planner.certifies: true"},
           {"--repair", &options.repair, "Drives each task once more with planner.repair: true"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   logging::Silence();
