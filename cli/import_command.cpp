@@ -16,10 +16,12 @@
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
 #include "forereach/numerics/text.h"
+#include "identify/channel_table.h"
 #include "identify/command_delay.h"
 #include "identify/import.h"
 #include "identify/joined_logs.h"
 #include "identify/lcm_table.h"
+#include "identify/mcap_table.h"
 #include "identify/units.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
@@ -116,31 +118,37 @@ Columns ColumnsOf(const ImportArguments& options, const NominalModel& model) {
   return columns;
 }
 
-bool IsLcm(const ImportArguments& options) {
-  return !options.lcm_types.empty() || options.logs.front().ends_with(".lcmlog");
+bool IsMcap(const ImportArguments& options) { return options.logs.front().ends_with(".mcap"); }
+
+// Of messages on channels.
+bool IsRecording(const ImportArguments& options) {
+  return IsMcap(options) || !options.lcm_types.empty() || options.logs.front().ends_with(".lcmlog");
 }
 
 // States and inputs of one channel, or of two that are joined by their stamps.
-LogTable LcmTableOf(const std::string& path, const Columns& columns, const ImportArguments& options) {
+LogTable TableOfChannels(const std::string& path, const Columns& columns, const ImportArguments& options) {
   LcmTypes types;
   for (const std::string& file : options.lcm_types) types.Add(file);
+  const auto read = [&](const std::string& from, const std::vector<std::string>& wanted) {
+    return IsMcap(options) ? ReadMcapLog(from, wanted) : ReadLcmLog(from, wanted, types);
+  };
   const std::vector<std::string> inputs(columns.inputs.begin() + 1, columns.inputs.end());
   const std::vector<std::string> states(columns.states.begin() + 1, columns.states.end());
-  if (inputs.empty() || ChannelOf(inputs) == ChannelOf(states)) return ReadLcmLog(path, columns.All(true), types);
+  if (inputs.empty() || ChannelOf(inputs) == ChannelOf(states)) return read(path, columns.All(true));
   const std::string& from = options.inputs_from.empty() ? path : options.inputs_from;
-  return Joined(ReadLcmLog(path, columns.states, types), ReadLcmLog(from, columns.inputs, types));
+  return Joined(read(path, columns.states), read(from, columns.inputs));
 }
 
 LogTable TableOf(const std::string& path, const Columns& columns, const ImportArguments& options) {
   const LogFormat format = FormatOf(options);
-  if (IsLcm(options)) return LcmTableOf(path, columns, options);
+  if (IsRecording(options)) return TableOfChannels(path, columns, options);
   if (options.inputs_from.empty()) return ReadLog(path, columns.All(!options.rate), format);
   return Joined(ReadLog(path, columns.states, format), ReadLog(options.inputs_from, columns.inputs, format));
 }
 
 // Rows of two logs are joined by their stamps, and a delay in rows of both is none.
 void CheckJoin(const ImportArguments& options) {
-  if (IsLcm(options) || (options.inputs_from.empty() && options.inputs_time.empty())) return;
+  if (IsRecording(options) || (options.inputs_from.empty() && options.inputs_time.empty())) return;
   if (options.inputs_from.empty()) Refuse("inputs-time", "needs --inputs-from");
   if (options.rate) Refuse("inputs-from", "needs stamps, and --rate says that there are none");
   if (options.logs.size() != 1) Refuse("inputs-from", "belongs to one log of states");
@@ -413,8 +421,9 @@ int ShiftBy(const ImportArguments& options, const std::optional<CommandDelay>& d
 // Without --time and --rate, a column of this name has the stamps.
 void FindTime(ImportArguments& options) {
   constexpr const char* kUsual = "time";
-  if (IsLcm(options)) {
-    if (options.rate) Refuse("rate", "messages of LCM have stamps");
+  if (IsMcap(options) && !options.lcm_types.empty()) Refuse("lcm-types", "is for LCM logs, not for MCAP files");
+  if (IsRecording(options)) {
+    if (options.rate) Refuse("rate", "recorded messages have stamps");
     if (options.time.empty()) options.time = "recorded";
     return;
   }
@@ -509,7 +518,9 @@ Command ImportCommand() {
           "  forereach import --config my_robot.yaml --time stamp --out transitions.csv log.csv\n"
           "  forereach import --config my_robot.yaml --time 'mocap time' --time-unit ms --tolerance-ms 2 \\\n"
           "    --state x='mocap x' --state theta='mocap yaw' --unit theta=deg --unwrap theta \\\n"
-          "    --input a=cmd.accel --input-mean --out transitions.csv monday.csv tuesday.csv",
+          "    --input a=cmd.accel --input-mean --out transitions.csv monday.csv tuesday.csv\n"
+          "  forereach import --config my_robot.yaml --state x=/odom.pose.pose.position.x \\\n"
+          "    --state v=/odom.twist.twist.linear.x --input u=/cmd_vel.linear.x --out transitions.csv run.mcap",
       .options =
           {ConfigOption(options->config, "Task file (YAML): its model, dt and domain; its transitions are not read"),
            Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
@@ -527,8 +538,9 @@ Command ImportCommand() {
             "The inputs are in this log: each holds from its stamp until the next one's"},
            {"--inputs-time", &options->inputs_time, "COLUMN", "Its column of stamps; by default that of --time"},
            {"--lcm-types", &options->lcm_types, "FILE.lcm",
-            "LOG is an LCM event log with messages of these types. Columns are CHANNEL.field; `recorded`, the default "
-            "of --time, is when a message was received. Inputs may be of another channel. May be repeated"},
+            "LOG is an LCM event log with messages of these types. Of it, and of an MCAP file (.mcap), columns are "
+            "CHANNEL.field; `recorded`, the default of --time, is when a message was recorded. Inputs may be of another "
+            "channel. May be repeated"},
            {"--unit", &options->units, "NAME=UNIT",
             "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
            {"--unwrap", &options->unwrapped, "STATE",

@@ -20,7 +20,7 @@ template <class Range, class Text>
     if (const std::string word(text(element)); !word.empty()) all += (all.empty() ? "" : ", ") + word;
   return all;
 }
-/** "a,b" as words. */
+/** The words between commas; none of an empty text. */
 [[nodiscard]] std::vector<std::string> SplitAtCommas(const std::string& text);
 
 }  // namespace forereach

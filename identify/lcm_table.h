@@ -6,16 +6,11 @@
 
 namespace forereach {
 
-/** Fields of the messages of one channel.
-@param wanted `CHANNEL.place`, all of one channel, with what log_table.h makes of several; `recorded` is when the
-recorder received the message, in seconds since 1970. Rows are counted as lines are: row i is the channel's message i,
-from 1. A message of another type or length than its channel's first one is lost, as is what damage takes of the log.
+/** Fields of the messages of one channel. @param wanted as of a ChannelTable. A message of another type or length than
+its channel's first one is lost, as is what damage takes of the log.
 @throws ConfigError if columns are of two channels or the log has no message of it, if no type has its fingerprint or
 the type no such number; LogError if the log cannot be read. */
 [[nodiscard]] LogTable ReadLcmLog(const std::string& path, const std::vector<std::string>& wanted,
                                   const LcmTypes& types);
-
-/** The channel of such columns; empty if none names one. @throws ConfigError if they name two. */
-[[nodiscard]] std::string ChannelOf(const std::vector<std::string>& wanted);
 
 }  // namespace forereach

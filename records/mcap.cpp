@@ -5,29 +5,15 @@
 #include <limits>
 #include <utility>
 
-#include <zlib.h>
+#include "records/mcap_format.h"
 
 namespace forereach {
 namespace {
 
-constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
+using mcap::Crc, mcap::kMagic, mcap::Opcode;
+
 constexpr std::size_t kChunkBytes = 1 << 20;
 
-enum class Opcode : std::uint8_t {
-  kHeader = 0x01,
-  kFooter = 0x02,
-  kSchema = 0x03,
-  kChannel = 0x04,
-  kMessage = 0x05,
-  kChunk = 0x06,
-  kMessageIndex = 0x07,
-  kChunkIndex = 0x08,
-  kStatistics = 0x0B,
-  kSummaryOffset = 0x0E,
-  kDataEnd = 0x0F,
-};
-
-// All numbers are little-endian, and texts have their length before them.
 void Put(std::string& out, std::unsigned_integral auto value) {
   for (std::size_t i = 0; i < sizeof value; ++i) out.push_back(static_cast<char>(value >> (8 * i) & 0xff));
 }
@@ -53,11 +39,6 @@ std::string BytesOf(const Field&... fields) {
 
 std::string Record(Opcode op, std::string_view content) {
   return static_cast<char>(op) + BytesOf(std::uint64_t{content.size()}).append(content);
-}
-
-std::uint32_t Crc(std::uint32_t before, std::string_view bytes) {
-  return static_cast<std::uint32_t>(
-      crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 std::uint64_t Nanoseconds(std::int64_t us) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "records/mcap.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 
@@ -39,6 +40,25 @@ TEST_F(ImportCommandTest, AColumnOfTimeNeedsNoOption) {
   EXPECT_THAT(Import("--rate 5 " + log_).text, HasSubstr("a step of the task is")) << "--rate takes no stamps";
   scratch_.Write("log.csv", "0,0,1,0,0,0,0\n0.15,0,1,0,0,0,0.15\n");
   EXPECT_EQ(Import("--header px,py,vx,vy,ax,ay,time " + log_).code, 0);
+}
+
+TEST_F(ImportCommandTest, OfAnMcapFileChannelsAreJoinedByTheirStamps) {
+  const std::string path = scratch_ / "run.mcap";
+  McapWriter writer{OutputFile(path)};
+  const auto schema = writer.AddSchema("any", "{}");
+  const auto state = writer.AddChannel(schema, "STATE"), command = writer.AddChannel(schema, "CMD");
+  for (int i = 0; i < 4; ++i) {
+    writer.Write(command, 0, 150'000 * i, 0, R"({"a": [0.5, 0]})");
+    writer.Write(state, 0, 150'000 * i + 10, 0, fmt::format(R"({{"x": {}, "v": [1, 0]}})", 100 + 15 * i));
+  }
+  writer.Finish();
+  const std::string columns =
+      "--state px=STATE.x --unit px=cm --state py=STATE.v[1] --state 'vx=STATE.v[0]' --state 'vy=STATE.v[1]' "
+      "--input 'ax=CMD.a[0]' --input 'ay=CMD.a[1]' ";
+  EXPECT_THAT(Import(columns + path), Exits(0, "import: 2 transitions of 0.15 s"));
+  EXPECT_FIELDS(LoadConfig(scratch_ / "task.yaml").problem->transitions, (size(), 2), (z(1, 0), 1.15), (z(0, 4), 0.5));
+  EXPECT_THAT(Import(columns + "--rate 5 " + path), Exits(2, "recorded messages have stamps"));
+  EXPECT_THAT(Import(columns + "--lcm-types a.lcm " + path), Exits(2, "is for LCM logs"));
 }
 
 TEST_F(ImportCommandTest, SaysHowFarTheNearestStampsAre) {
