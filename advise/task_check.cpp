@@ -92,9 +92,12 @@ class Examination final {
   void Remark(const std::string& key, std::string what, std::string advice) {
     Add(key, std::move(what), std::move(advice), true);
   }
+  [[nodiscard]] std::string ObstacleKey(std::size_t i) const {
+    return i < config_.num_listed ? fmt::format("task.obstacles[{}]", i) : "task.keep_in";
+  }
   [[nodiscard]] std::string ObstacleText(std::size_t i) const {
     const std::string& name = config_.obstacles[i].name();
-    return fmt::format("task.obstacles[{}]", i) + (name.empty() ? "" : " (" + name + ")");
+    return ObstacleKey(i) + (name.empty() ? "" : " (" + name + ")");
   }
 
   [[nodiscard]] const Box& BoxOf(std::size_t l) const {
@@ -581,10 +584,9 @@ class Examination final {
     for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
       const Obstacle& obstacle = config_.obstacles[i];
       const Decision decision = certifier.Certify(PlanOf(1), initial_set, {&obstacle, 1}, tube);
-      const std::string key = fmt::format("task.obstacles[{}]", i);
       if (decision.outcome == Outcome::kSafety && decision.step == 0)
-        Add(key,
-            "the robot may touch " + (obstacle.name().empty() ? "it" : obstacle.name()) +
+        Add(ObstacleKey(i),
+            "the robot " + (obstacle.name().empty() ? "may touch it" : MayTouch({&obstacle, 1}, 0)) +
                 " at the start: the proven distance is " + Down(decision.margin) + " m, and " + Up(decision.threshold) +
                 " m are needed",
             "move task.initial_set or the obstacle, or make them smaller");
@@ -783,7 +785,7 @@ class Examination final {
     const double step = LongestStep(), body = BodyThickness();
     for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
       const Obstacle& obstacle = config_.obstacles[i];
-      if (obstacle.kind() == Obstacle::Kind::kHalfSpace) continue;
+      if (obstacle.kind() == Obstacle::Kind::kHalfSpace || IsOutside(obstacle)) continue;  // more is behind a piece
       const double thickness = LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
       if (step <= thickness + body) continue;
       Add("task.between",

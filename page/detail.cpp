@@ -147,14 +147,17 @@ bool DrawTube(const Units& units, const Units& bodies, const std::vector<Obstacl
 
 void DrawObstacles(const std::vector<Obstacle>& obstacles, const std::vector<double>& times_us,
                    const Eigen::AlignedBox2d& frame, int deciding, bool has_names, Svg& svg) {
+  const auto is_outside = [&](std::size_t k) { return k < obstacles.size() && IsOutside(obstacles[k]); };
   for (std::size_t k = 0; k < obstacles.size(); ++k) {
+    if (is_outside(k) && !is_outside(k - 1)) svg.Open("class=\"outside\"");  // as one, without what is between pieces
     svg.Open(static_cast<int>(k) == deciding ? "class=\"obstacle binding\"" : "class=\"obstacle\"");
     DrawObstacle(obstacles[k], times_us, frame,
-                 !has_names                    ? ""
+                 !has_names || is_outside(k)   ? ""
                  : obstacles[k].name().empty() ? std::to_string(k)
                                                : obstacles[k].name(),
                  svg);
     svg.Close();
+    if (is_outside(k) && !is_outside(k + 1)) svg.Close();
   }
 }
 

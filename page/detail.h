@@ -24,8 +24,8 @@ place in the plane; nothing is drawn then.
                             const std::vector<std::vector<Svg::Points>>& bodies, const std::vector<Obstacle>& obstacles,
                             int deciding, PageDetail& detail);
 
-/** A group for each obstacle (DrawObstacle in records/outlines.h). @param has_names with its name, or else its number.
- */
+/** A group for each obstacle (DrawObstacle in records/outlines.h), in one more for those outside of an area to stay in.
+@param has_names with its name, or else its number. */
 void DrawObstacles(const std::vector<Obstacle>& obstacles, const std::vector<double>& times_us,
                    const Eigen::AlignedBox2d& frame, int deciding, bool has_names, Svg& svg);
 

@@ -168,7 +168,7 @@ const showNow = () => {
   svg.innerHTML = state.obstacles + tubes.map(({detail}) => `<g class="glance">${detail.svg}</g>`).join('') +
     `<polyline class="driven" points="${state.places.map(([x, y]) => `${Number(x)},${-y}`).join(' ')}"/>` + (robot?.svg ?? '');
   [...svg.querySelectorAll('.glance')].forEach((group, k) => group.style.setProperty('--tube', colorOf(tubes[k])));
-  svg.querySelectorAll(':scope > .scene > .obstacle')[refused?.obstacle ?? -1]?.classList.add('binding');
+  svg.querySelectorAll(':scope > .scene .obstacle')[refused?.obstacle ?? -1]?.classList.add('binding');
   byId('shows').textContent = last ? `The newest decision: ${last.message}` : '';
   showView();
   fillLegend([['#6b7280', 'obstacles now, and where they will be'], [INK, 'the robot and its path'], ...tubes.reverse().map((tube) =>

@@ -124,7 +124,7 @@ const select = (run, filters, {withTime = true} = {}) => {
   for (const name of CHOICES) {
     if (filters[name] === null) continue;
     const values = d[name].values;
-    const wanted = d[name].names ? d[name].names.indexOf(filters[name]) : Number(filters[name]);
+    const wanted = d[name].names.indexOf(filters[name]);
     for (let i = 0; i < run.count; ++i) if (values[i] !== wanted) shown[i] = 0;
   }
   run.size = 0;
@@ -367,7 +367,7 @@ const groupsOf = (run, name) => {
     if (nameAt(d.outcome, i) === 'certified') ++group.certified;
     groups.set(value, group);
   }
-  return new Map([...groups].map(([value, group]) => [d[name].names ? d[name].names[value] : String(value), group]));
+  return new Map([...groups].map(([value, group]) => [d[name].names[value], group]));
 };
 const showGroups = (run, before, id, caption, name, label) => {
   const old = before ? groupsOf(before, name) : null, groups = groupsOf(run, name);
@@ -418,7 +418,7 @@ const COLUMNS = [
   {id: 'outcome', title: 'Outcome', text: (run, i) => outcomeLabel(nameAt(run.decisions.outcome, i)), names: 'outcome', chip: true},
   {id: 'cause', title: 'Cause', text: (run, i) => { const cause = nameAt(run.decisions.cause, i); return cause === 'none' ? '' : cause.replaceAll('_', ' '); }, names: 'cause'},
   {id: 'step', title: 'Step', number: true, key: (run) => run.decisions.step.values, text: (run, i) => indexText(run.decisions.step.values[i])},
-  {id: 'obstacle', title: 'Obstacle', rare: true, number: true, key: (run) => run.decisions.obstacle.values, text: (run, i) => indexText(run.decisions.obstacle.values[i])},
+  {id: 'obstacle', title: 'Obstacle', rare: true, text: (run, i) => nameAt(run.decisions.obstacle, i), names: 'obstacle'},
   {id: 'clearance', title: 'Margin', rare: true, number: true, text: (run, i) => number(clearanceAt(run.decisions, i), 4),
     key: (run) => Float64Array.from({length: run.count}, (_, i) => clearanceAt(run.decisions, i))},
   {id: 'latency', title: 'Latency', rare: true, number: true, key: (run) => run.decisions.latency.values, text: (run, i) => duration(run.decisions.latency.values[i])},
@@ -431,13 +431,14 @@ const indexText = (index) => (index < 0 ? '' : String(index));
 const rowHeight = () => (narrow.matches ? 40 : 30);
 const MOST_PIXELS = 12e6;  // browsers lay out no more than about 16 million
 
+const byName = (a, b) => a.localeCompare(b, 'en', {numeric: true}) || (a < b ? -1 : 1);
 const sortKey = (run, column) => {
   run.keys ??= {};
   if (run.keys[column.id]) return run.keys[column.id];
   if (!column.names) return run.keys[column.id] = column.key(run);
   const {values, names} = run.decisions[column.names];
   const ranks = new Uint32Array(names.length);
-  names.map((_, k) => k).sort((a, b) => (names[a] < names[b] ? -1 : 1)).forEach((k, rank) => { ranks[k] = rank; });
+  names.map((_, k) => k).sort((a, b) => byName(names[a], names[b])).forEach((k, rank) => { ranks[k] = rank; });
   return run.keys[column.id] = values.map((value) => ranks[value]);
 };
 // Rows without a value come last, whatever the direction; equal ones in the order of the log.
@@ -613,7 +614,6 @@ const showDetail = (run, i) => drawPart('the chosen decision', ['detail'], () =>
   const config = nameAt(d.config, i), task = run.raw.tasks.find((each) => each.digest === config);
   const outcome = nameAt(d.outcome, i), cause = nameAt(d.cause, i), digest = hexAt(d.digest.values, i);
   const hasDrawing = Boolean(detail?.frame && !detail.missing);
-  const index = (column) => (column.values[i] >= 0 ? String(column.values[i]) : '');
   const margin = d.margin.values[i], threshold = d.threshold.values[i];
   byId('sentence').textContent = textAt(d.message, i) || '(no sentence)';
   fillList('facts', [
@@ -624,7 +624,7 @@ const showDetail = (run, i) => drawPart('the chosen decision', ['detail'], () =>
     ['Sequence', String(d.sequence.values[i])],
     ['Took', `${duration(d.elapsed.values[i])} in the gate, latency ${duration(d.latency.values[i])}`],
     ['Binding step', d.step.values[i] >= 0 ? `${d.step.values[i]}, the first that fails` : detail?.binding >= 0 ? `${detail.binding}, the closest` : ''],
-    ['Obstacle', index(d.obstacle)],
+    ['Obstacle', nameAt(d.obstacle, i)],
     ['Part of the body', detail?.part >= 0 && run.raw.tasks[detail.task]?.parts > 1 ? String(detail.part) : ''],
     ['Coordinate', coordinateText(d, i, task)],
     ['Observations', d.first.values[i] >= 0 ? `${d.first.values[i]} and ${d.second.values[i]} contradict each other` : ''],
@@ -659,14 +659,14 @@ const readFilters = () => {
 };
 const fillChoices = (run) => {
   const labels = {outcome: outcomeLabel, cause: (name) => name.replaceAll('_', ' '), robot: (name) => name || '(no name)', source: (name) => name || '(no name)',
-    config: (digest) => taskLabel(run, digest), obstacle: (index) => (index < 0 ? 'none' : String(index))};
+    config: (digest) => taskLabel(run, digest), obstacle: (name) => name || 'none'};
   const fill = (name, values) => byId(`f-${name}`).replaceChildren(make('option', 'all'), ...values.map((value) => {
     const option = make('option', labels[name](value));
     option.value = String(value);
     return option;
   }));
   for (const name of CHOICES)
-    fill(name, run.decisions[name].names ? [...run.decisions[name].names].sort() : [...new Set(run.decisions[name].values)].sort((a, b) => a - b));
+    fill(name, [...run.decisions[name].names].sort(byName));
 };
 const taskLabel = (run, digest) => {
   const task = run.raw.tasks.find((each) => each.digest === digest);
@@ -700,7 +700,7 @@ const start = async () => {
   fillChoices(run);
   const groups = [['robot', 'By robot', (name) => name || '(no name)'], ['source', 'By source', (name) => name || '(no name)'],
     ['config', 'By task, with its config digest', (digest) => taskLabel(run, digest)],
-    ['obstacle', 'By the obstacle that decided', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`)]];
+    ['obstacle', 'By the obstacle that decided', (name) => name.replace(/^(?=\d)/, 'obstacle ') || 'none']];
   const choosePassing = () => {
     const filters = readFilters();
     select(run, filters);

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/explain.h"
 #include "lcmtypes/printable.h"
 #include "page/detail.h"
 #include "page/document.h"
@@ -78,6 +79,11 @@ Json RobotColumn(const PageRun& run) {
   return column;
 }
 
+std::string ObstacleText(const PageDecision& row) {
+  std::string name = row.obstacle < 0 ? "" : ObstacleNamedIn(row.message);
+  return row.obstacle < 0 || !name.empty() ? name : std::to_string(row.obstacle);
+}
+
 Json DecisionsJson(const PageRun& run) {
   const auto& rows = run.decisions;
   using Row = PageDecision;
@@ -92,7 +98,7 @@ Json DecisionsJson(const PageRun& run) {
           {"cause", NamesColumn(rows, &Row::cause)},
           {"step", ColumnOf<std::int32_t>(rows, &Row::step)},
           {"coordinate", ColumnOf<std::int32_t>(rows, &Row::coordinate)},
-          {"obstacle", ColumnOf<std::int32_t>(rows, &Row::obstacle)},
+          {"obstacle", NamesColumn(rows, ObstacleText)},
           {"first", ColumnOf<std::int32_t>(rows, &Row::first_observation)},
           {"second", ColumnOf<std::int32_t>(rows, &Row::second_observation)},
           {"margin", ColumnOf<double>(rows, &Row::margin)},

@@ -62,6 +62,7 @@ verifier::Certificate CertificateOf(const candidate_plan_t& plan, const Basis& b
   for (int t = 0; t < plan.num_steps; ++t)
     certificate.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.control[t], plan.num_inputs);
   certificate.obstacles = *basis.obstacles;
+  certificate.stay_in = StayInOf(*basis.task);
   certificate.schedule = ScheduleOf(plan, basis.task->gate);
   certificate.known = KnownRowsOf(basis);
   return certificate;

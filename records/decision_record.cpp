@@ -68,6 +68,7 @@ class Reading {
       record_.mismatches.push_back(
           {kOtherInput + std::string("inputs.initial_set"), "that of " + config_.path, "another"});
     record_.certificate.obstacles = config_.obstacles;
+    record_.certificate.stay_in = StayInOf(config_);
     const Schedule& schedule = record_.certificate.schedule =
         ScheduleFromZero(config_, static_cast<int>(record_.certificate.controls.cols()));
     Compare(
@@ -189,6 +190,18 @@ class Reading {
 };
 
 }  // namespace
+
+std::vector<verifier::StayIn> StayInOf(const Config& config) {
+  std::vector<verifier::StayIn> areas;
+  for (const auto& [name, area] : config.keep_in) {
+    verifier::StayIn& stay_in = areas.emplace_back(verifier::StayIn{name, {}});
+    std::vector<Ring> rings{area.outer};
+    rings.insert(rings.end(), area.holes.begin(), area.holes.end());
+    for (const Ring& ring : rings)
+      for (auto& corners = stay_in.rings.emplace_back(); const auto& [x, y] : ring) corners.emplace_back(x, y);
+  }
+  return areas;
+}
 
 std::vector<double> ThresholdsOf(const Problem& problem, const Obstacle& obstacle, const Schedule& schedule, int t) {
   const Placement placement = PlacementOf(problem);

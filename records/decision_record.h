@@ -32,6 +32,9 @@ struct RecordedCertificate {
   }
 };
 
+/** The areas to stay in of a task, for the verifier. */
+[[nodiscard]] std::vector<verifier::StayIn> StayInOf(const Config& config);
+
 /** The distances to be kept that a certifier may name for an obstacle in unit t of a plan (certify/safety.h), metres:
 that of each part of the body, then that of the whole body. @pre the certifier accepts the problem. */
 [[nodiscard]] std::vector<double> ThresholdsOf(const Problem& problem, const Obstacle& obstacle,

@@ -14,6 +14,7 @@ meaning, unit, range and default; config/README.md is generated from it. */
 #include "task/canonical.h"
 #include "task/config_error.h"
 #include "task/gate_options.h"
+#include "task/keep_in.h"
 #include "task/laws.h"
 #include "task/logger_options.h"
 #include "task/planner_options.h"
@@ -32,7 +33,10 @@ struct Config {
   may lie outside the domain. The grounds name all. */
   int left_out = 0;
   double period = 0;  ///< model.dt: from one sample to the next, s.
+  /** Those of task.obstacles, and behind them what is outside of each area of keep_in. */
   std::vector<Obstacle> obstacles;
+  std::size_t num_listed = 0;  ///< So many of them are of task.obstacles.
+  std::vector<KeepIn> keep_in;
   Box initial_set;  ///< X0, rounded outward.
   /** False: the file has no task.between, and its certificates hold at the samples only. */
   bool says_between = false;

@@ -16,6 +16,7 @@
 #include "forereach/residual/growing_disturbance.h"
 #include "forereach/residual/region_grid.h"
 #include "forereach/safety/clearance.h"
+#include "task/keep_in.h"
 #include "task/key_rows.h"
 #include "task/most_obstacles.h"
 #include "task/number.h"
@@ -462,6 +463,7 @@ void ReadMotion(const Field& at, TaskDraft& draft) {
 }
 
 void ReadObstacle(const Field& at, TaskDraft& draft) {
+  ++draft.config.num_listed;
   const bool moves = at.Has("motion"), is_named = at.Has("name");
   if (const std::size_t kinds = at.Keys().size() - (moves ? 1 : 0) - (is_named ? 1 : 0); kinds != 1)
     at.Fail(fmt::format("has {} keys of a shape, has to have one of circle, box, polygon, half_plane", kinds));
@@ -471,6 +473,37 @@ void ReadObstacle(const Field& at, TaskDraft& draft) {
   if (const std::string why = WhyNoName(name); !why.empty()) at.Fail("name", why);
   Obstacle& obstacle = draft.config.obstacles.back();
   obstacle = obstacle.Named(name);
+}
+
+Ring RingOf(const Field& at) {
+  Ring ring;
+  for (const Eigen::VectorXd& corner : at.Vectors()) ring.push_back({corner[0], corner[1]});
+  return ring;
+}
+
+// After the obstacles of the list.
+void ReadKeepIn(const Field& at, TaskDraft& draft) {
+  Config& config = draft.config;
+  if (draft.scope.safety_dim != 2)
+    at.Fail(fmt::format("is for two safety coordinates, the task has {}", draft.scope.safety_dim));
+  KeepIn keep_in{at.Has("name") ? at["name"].Text() : "keep_in", {RingOf(at["vertices"]), {}}};
+  const std::string name = std::string(kOutside) + keep_in.name;
+  if (const std::string why = WhyNoName(keep_in.name); !why.empty()) at.Fail("name", why);
+  if (name.size() > kMaxObstacleName)
+    at.Fail("name", fmt::format("has {} characters, must have 1 to {}", keep_in.name.size(),
+                                kMaxObstacleName - kOutside.size()));
+  for (const Field& hole : at.Entries("holes")) keep_in.area.holes.push_back(RingOf(hole));
+  try {
+    for (const Obstacle& piece : OutsideOf({keep_in.area})) config.obstacles.push_back(piece.Named(name));
+  } catch (const NoPolygon& error) {
+    at.Fail(error.what());
+  }
+  if (config.obstacles.size() > kMostObstacles)
+    at.Fail(
+        fmt::format("what is outside of it has so many convex pieces that the task has {} obstacles, which is "
+                    "outside {}",
+                    config.obstacles.size(), Between(0, kMostObstacles).text()));
+  config.keep_in.push_back(std::move(keep_in));
 }
 
 // A limit has at least one of both bounds.
@@ -629,6 +662,28 @@ std::vector<Key> ObstacleKeys() {
   };
 }
 
+std::vector<Key> KeepInKeys() {
+  const Range count = Between(3, kMaxKeepInCorners);
+  const Range place = Between(-1e9, 1e9);
+  return {
+      Optional(List("task.keep_in", Between(0, 16),
+                    "Areas that the robot has to stay in, in each of them; for two safety coordinates. They need not "
+                    "be convex. All outside and the boundary are obstacles, in convex pieces, which count as such."),
+               "[]"),
+      Map("task.keep_in[]", "One area.", ReadKeepIn),
+      Optional(Text("task.keep_in[].name",
+                    fmt::format("For messages: \"may leave lawn\". As of an obstacle, at most {} characters.",
+                                kMaxObstacleName - kOutside.size())),
+               "keep_in"),
+      Required(Vectors("task.keep_in[].vertices", "m", place, count, Size::kSafety,
+                       "The corners of its boundary, one after the other, in either direction. Sides may not meet.")),
+      Optional(List("task.keep_in[].holes", Between(0, kMaxKeepInCorners / 3), "Parts of it that are no part of it."),
+               "[]"),
+      Vectors("task.keep_in[].holes[]", "m", place, count, Size::kSafety,
+              "The corners of a hole inside of the boundary, apart from it and from other holes."),
+  };
+}
+
 void CheckOrder(const Field& at, TaskDraft& draft) {
   const int order = draft.problem.zonotope_order, states = draft.problem.model->num_states(),
             largest = (kMaxGenerators - 1) / states - 2;
@@ -660,7 +715,7 @@ std::vector<Key> CertifierKeys() {
 std::vector<Key> ProblemKeys() {
   std::vector<Key> keys;
   for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, BodyKeys, BetweenKeys, LimitKeys,
-                          ObstacleKeys, CertifierKeys})
+                          ObstacleKeys, KeepInKeys, CertifierKeys})
     std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }

@@ -248,6 +248,8 @@ class SliceCheck {
       sweeps.push_back(
           SweepsOf(problem_, problem_.body.parts[p], *frame_, next ? &*next : nullptr, &functions_.places[p]));
     frame_ = std::move(next);
+    for (const StayIn& area : certificate_.stay_in)
+      for (std::size_t p = 0; p < sweeps.size() && !failure_; ++p) CheckStaysIn(area, sweeps[p], p);
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const std::string name = NameOf(certificate_.obstacles, static_cast<int>(o));
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
@@ -268,6 +270,20 @@ class SliceCheck {
             });
       }
     }
+  }
+
+  void CheckStaysIn(const StayIn& area, const std::vector<Sweep>& sweeps, std::size_t part) {
+    Answer answer = sweeps.empty() ? Answer::kUnknown : Answer::kNo;
+    Real best(-std::numeric_limits<double>::infinity());
+    for (const Sweep& sweep : sweeps) {
+      Real margin;
+      const Answer of_this = IsWithin(sweep, area.rings, margin);
+      best = max(best, margin);
+      if (of_this == Answer::kYes) return;
+      if (of_this == Answer::kUnknown) answer = of_this;
+    }
+    claims_.Judge(answer, best, 0.0, abs(best), "above",
+                  [&] { return "part " + std::to_string(part) + " of the body stays in " + area.name; });
   }
 
   // The part lies in every one of the sweeps: one that is clear is enough.

@@ -326,6 +326,26 @@ class SeparationSearch {
   bool undecided_ = false;
 };
 
+using Rings = std::vector<std::vector<Eigen::Vector2d>>;
+
+// Whether rings go an odd number of times around a point: so many sides are met by the ray to its right.
+Answer IsAround(const Rings& rings, const RealVector& p) {
+  bool is_odd = false;
+  for (const auto& ring : rings)
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const Eigen::Vector2d &a = ring[i], &b = ring[(i + 1) % ring.size()];
+      const Answer below_a = IsBelow(p[1], a.y()), below_b = IsBelow(p[1], b.y());
+      if (below_a == Answer::kUnknown || below_b == Answer::kUnknown) return Answer::kUnknown;
+      if (below_a == below_b) continue;
+      const Real turn = (Real(b.x()) - a.x()) * (p[1] - a.y()) - (Real(b.y()) - a.y()) * (p[0] - a.x());
+      const Answer is_left = IsBelow(0.0, turn);
+      if (is_left == Answer::kUnknown || (is_left == Answer::kNo && IsBelow(turn, 0.0) != Answer::kYes))
+        return Answer::kUnknown;
+      if (is_left == below_b) is_odd = !is_odd;
+    }
+  return is_odd ? Answer::kYes : Answer::kNo;
+}
+
 }  // namespace
 
 Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best, const Passage& passage) {
@@ -336,6 +356,22 @@ Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, R
   best = search.best() ? *search.best() : Real(-std::numeric_limits<double>::infinity());
   if (proven) return Answer::kYes;
   return search.undecided() ? Answer::kUnknown : Answer::kNo;
+}
+
+Answer IsWithin(const Sweep& sweep, const Rings& rings, Real& margin) {
+  const Real infinity(std::numeric_limits<double>::infinity());
+  margin = -infinity;
+  if (const Answer inside = IsAround(rings, sweep.places().front().center); inside != Answer::kYes) return inside;
+  margin = infinity;
+  for (const auto& ring : rings)
+    for (std::size_t i = 0; i < ring.size(); ++i) {
+      const Eigen::Vector2d &a = ring[i], &b = ring[(i + 1) % ring.size()];
+      Real best;
+      const Answer clear = IsClear(sweep, Obstacle::Polygon({a, b, b}), 0, best);
+      margin = min(margin, best);
+      if (clear != Answer::kYes) return clear;
+    }
+  return Answer::kYes;
 }
 
 }  // namespace forereach::verifier

@@ -20,4 +20,9 @@ means that the best direction gives no proof. @param best is set to the largest 
 [[nodiscard]] Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best,
                              const Passage& passage = {});
 
+/** Whether a sweep in the plane lies inside of rings: it is connected, meets none of their sides, and the rings go an
+odd number of times around one of its points. @param margin is set to the largest lower bound found on its distance from
+the sides, or to minus infinity if the point is outside. */
+[[nodiscard]] Answer IsWithin(const Sweep& sweep, const std::vector<std::vector<Eigen::Vector2d>>& rings, Real& margin);
+
 }  // namespace forereach::verifier

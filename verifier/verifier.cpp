@@ -110,6 +110,8 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
     return misfit("the initial set is finite and fits the model");
   for (const Obstacle& obstacle : certificate.obstacles)
     if (obstacle.dim() != problem.projection.rows()) return misfit("the obstacles fit the projection");
+  if (!certificate.stay_in.empty() && problem.projection.rows() != 2)
+    return misfit("areas to stay in have two safety coordinates");
   if (const char* what = FindMisfit(problem.body, problem.projection.rows(), n)) return misfit(what);
   if (problem.between)
     if (const char* what = FindMisfit(*problem.between, problem.projection.rows(), *problem.model)) return misfit(what);

@@ -39,11 +39,18 @@ struct RecordedSlice {
   Eigen::VectorXd envelope_lower, envelope_upper, remainder;
 };
 
+/** An area that the robot has to stay in: the points around which the rings go an odd number of times. */
+struct StayIn {
+  std::string name;
+  std::vector<std::vector<Eigen::Vector2d>> rings;  ///< Closed chains of sides.
+};
+
 /** A recorded certificate. */
 struct Certificate {
   InitialSet initial_set;
   Eigen::MatrixXd controls;  ///< inputs-by-T
   std::vector<Obstacle> obstacles;
+  std::vector<StayIn> stay_in;        ///< Judged by their sides, not by the obstacles that were made of them.
   Schedule schedule;                  ///< Needed where obstacles move.
   KnownRows known;                    ///< The problem's transitions that the certifier knew.
   std::vector<RecordedSlice> slices;  ///< T + 1 slices, or none. Without them only safety is checked.

@@ -16,6 +16,8 @@
 #include "task/files.h"
 #include "task/json_field.h"
 #include "task/json_text.h"
+#include "task/keep_in.h"
+#include "task/number.h"
 
 namespace forereach {
 namespace {
@@ -124,11 +126,14 @@ class Drawing {
       if (depth > 8) at.Fail("is nested too deeply");
       for (std::size_t i = 0; i < geometries.Count(); ++i) TakeObject(geometries[i], properties, depth + 1);
     } else {
-      TakeGeometry(type, at, StyleOf(properties));
+      TakeGeometry(type, at, StyleOf(properties, type));
     }
   }
 
   void TakeGeometry(const std::string& type, const JsonField& at, Style style) {
+    constexpr std::string_view kTypes[] = {"Polygon",         "MultiPolygon", "LineString",
+                                           "MultiLineString", "Point",        "MultiPoint"};
+    if (std::ranges::find(kTypes, type) == std::end(kTypes)) at.Fail("type " + type + " is none of GeoJSON's");
     if (style.name.empty()) style.name = !feature_.empty() ? feature_ : at.name().empty() ? type : at.name();
     const JsonField coordinates = at["coordinates"];
     const auto each = [&](const auto& take) {
@@ -139,23 +144,26 @@ class Drawing {
     if (type == "LineString") return TakeLine(coordinates, style);
     if (type == "MultiLineString") return each([this](const auto& c, const auto& s) { TakeLine(c, s); });
     if (type == "Point") return TakePoint(coordinates, style);
-    if (type == "MultiPoint") return each([this](const auto& c, const auto& s) { TakePoint(c, s); });
-    at.Fail("type " + type + " is none of GeoJSON's");
+    each([this](const auto& c, const auto& s) { TakePoint(c, s); });
   }
 
-  [[nodiscard]] Style StyleOf(const JsonField* properties) const {
+  [[nodiscard]] Style StyleOf(const JsonField* properties, const std::string& type) const {
     Style style{"", options_.keep_in, options_.line_width, options_.point_radius};
     if (!properties) return style;
     const Json& json = properties->json();
     if (json.contains("name") && json["name"].is_string()) style.name = json["name"].get<std::string>();
     if (json.contains("keep_in")) style.keep_in = (*properties)["keep_in"].Bool();
-    if (json.contains("width")) style.width = Size((*properties)["width"]);
-    if (json.contains("radius")) style.radius = Size((*properties)["radius"]);
+    // An area may have them, too, and there they may be anything.
+    if (json.contains("width") && type.ends_with("LineString")) style.width = Size((*properties)["width"]);
+    if (json.contains("radius") && type.ends_with("Point")) style.radius = Size((*properties)["radius"]);
     return style;
   }
 
   static double Size(const JsonField& at) {
-    const double size = at.Number();
+    // Maps of others have texts in all properties.
+    const Parsed<double> text = at.json().is_string() ? ParseNumber(at.json().get<std::string>()) : Parsed<double>{};
+    if (!text.problem.empty()) at.Fail("'" + at.json().get<std::string>().substr(0, 40) + "' " + text.problem);
+    const double size = at.json().is_string() ? text.value : at.Number();
     if (!(size >= 0 && size <= kFarthest)) at.Fail(fmt::format("{} is outside [0, {}]", ToText(size), kFarthest));
     return size;
   }
@@ -219,25 +227,26 @@ class Drawing {
       if (i > 0) area.holes.push_back(std::move(ring));
     }
     if (at.Count() == 0) at.Fail("has no ring");
-    if (!style.keep_in) return AddPieces(area, bend, style.name, at.name());
-    // What has to be left is what lies outside of it, and in its holes.
-    for (const Ring& hole : area.holes) AddPieces({hole, {}}, bend, "hole in " + style.name, at.name());
-    static_cast<void>(Pieces({area.outer, area.holes}, at.name()));  // it has to be an area
-    stay_in_.push_back(std::move(area.outer));
+    if (!style.keep_in) {
+      const int most = bend > 0 ? kMaxObstaclePoints - 4 : kMaxObstaclePoints;  // a grown piece may have four more
+      for (const Ring& piece : Cut(at.name(), [&] { return ConvexPieces(area, most); }))
+        world_.Add(style.name, Grown(piece, bend));
+      return;
+    }
+    static_cast<void>(Cut(at.name(), [&] { return ConvexPieces(area, 3); }));  // an error of its own has its place
+    stay_in_name_ = stay_in_.empty() ? style.name : "all areas";
+    stay_in_.push_back(std::move(area));
     stay_in_bend_ = std::max(stay_in_bend_, bend);
   }
 
-  [[nodiscard]] std::vector<Ring> Pieces(const Area& area, const std::string& place) const {
-    // A grown piece may have four corners more.
+  // What `pieces` gives of areas.
+  template <class Pieces>
+  [[nodiscard]] auto Cut(const std::string& place, const Pieces& pieces) const -> decltype(pieces()) {
     try {
-      return ConvexPieces(area, plane_ ? kMaxObstaclePoints - 4 : kMaxObstaclePoints);
+      return pieces();
     } catch (const NoPolygon& error) {
       throw ConfigError(path_ + ": " + place + ": " + error.what());
     }
-  }
-
-  void AddPieces(const Area& area, double margin, const std::string& name, const std::string& place) {
-    for (const Ring& piece : Pieces(area, place)) world_.Add(name, Grown(piece, margin));
   }
 
   void TakeLine(const JsonField& at, const Style& style) {
@@ -257,24 +266,10 @@ class Drawing {
     world_.Add(style.name, Obstacle::Circle(Eigen::Vector2d(point.x, point.y), radius));
   }
 
-  // All that is not in an area to stay in: a frame around them, with each of them as a hole, and what is beyond it.
   void AddStayIn() {
     if (stay_in_.empty()) return;
-    PlanePoint lower = stay_in_[0][0], upper = lower;
-    for (const Ring& ring : stay_in_)
-      for (const auto& [x, y] : ring) {
-        lower = {std::min(lower.x, x), std::min(lower.y, y)};
-        upper = {std::max(upper.x, x), std::max(upper.y, y)};
-      }
-    const double thick = std::max({upper.x - lower.x, upper.y - lower.y, 1.0});
-    lower = {lower.x - thick, lower.y - thick};
-    upper = {upper.x + thick, upper.y + thick};
-    const Ring frame{lower, {upper.x, lower.y}, upper, {lower.x, upper.y}};
-    AddPieces({frame, std::move(stay_in_)}, stay_in_bend_, "outside", "the areas to stay in");
-    for (const auto& [axis, low, high] : {std::tuple{0, lower.x, upper.x}, {1, lower.y, upper.y}}) {
-      world_.AddBeyond(axis, -1, low, "far outside");
-      world_.AddBeyond(axis, 1, high, "far outside");
-    }
+    for (const Obstacle& obstacle : Cut("the areas to stay in", [this] { return OutsideOf(stay_in_, stay_in_bend_); }))
+      world_.Add(std::string(kOutside) + stay_in_name_, obstacle);
   }
 
   const std::string& path_;
@@ -282,7 +277,8 @@ class Drawing {
   std::optional<TangentPlane> plane_;
   std::string feature_;  // by its id, if it has one
   World world_;
-  std::vector<Ring> stay_in_;
+  std::vector<Area> stay_in_;
+  std::string stay_in_name_;
   double stay_in_bend_ = 0, largest_bend_ = 0;
   PlanePoint lower_{kInfinity, kInfinity}, upper_{-kInfinity, -kInfinity};
   bool any_ = false;

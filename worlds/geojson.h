@@ -23,8 +23,8 @@ struct GeoJsonOptions {
 of these the union counts, and their boundaries are outside of it. A line is all points within half its width, a point a
 disc. Areas to keep out of are exact, but with an origin: then each piece is grown by a bound on what the plane and
 straight sides make of the ground, which a note states. The bound holds within 10 km of the origin and up to 80 degrees
-of latitude; what lies beyond is refused. Heights are ignored. The complement of the areas to stay in is exact up to a
-frame around them, which is as thick as they are, beyond which half-planes begin.
+of latitude; what lies beyond is refused. Heights are ignored. Outside of the areas to stay in is what OutsideOf
+(task/keep_in.h) makes of them.
 @throws ConfigError with file and place: no GeoJSON, a side that meets another one, a number out of range. */
 [[nodiscard]] World ReadGeoJson(const std::string& path, const GeoJsonOptions& options);
 

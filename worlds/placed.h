@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "worlds/plane.h"
+#include "task/plane.h"
 
 namespace forereach {
 

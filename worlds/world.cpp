@@ -10,30 +10,10 @@
 #include "forereach/numerics/text.h"
 #include "lcmtypes/printable.h"
 #include "task/config_error.h"
+#include "task/keep_in.h"
 
 namespace forereach {
 namespace {
-
-Eigen::Vector2d ToVector(const PlanePoint& p) { return {p.x, p.y}; }
-
-// A convex polygon; an axis-aligned box if it is one. A point or a segment is a polygon that repeats its last corner.
-Obstacle ToObstacle(const Ring& hull) {
-  PlanePoint lower = hull.front(), upper = hull.front();
-  for (const auto& [x, y] : hull) {
-    lower = {std::min(lower.x, x), std::min(lower.y, y)};
-    upper = {std::max(upper.x, x), std::max(upper.y, y)};
-  }
-  const bool is_box = std::ranges::all_of(hull, [&](const PlanePoint& p) {
-    return (p.x == lower.x || p.x == upper.x) && (p.y == lower.y || p.y == upper.y);
-  });
-  // A diagonal has its corners at those of a box, too.
-  if (is_box && (hull.size() == 4 || lower.x == upper.x || lower.y == upper.y))
-    return Obstacle::AxisBox(ToVector(lower), ToVector(upper));
-  std::vector<Eigen::VectorXd> vertices;
-  for (const PlanePoint& p : hull) vertices.emplace_back(ToVector(p));
-  while (vertices.size() < 3) vertices.push_back(vertices.back());
-  return Obstacle::Polygon(vertices);
-}
 
 std::string Numbers(const Eigen::VectorXd& y) { return fmt::format("[{}, {}]", ToText(y[0]), ToText(y[1])); }
 

@@ -9,7 +9,7 @@
 
 #include "forereach/safety/obstacle.h"
 #include "forereach/sets/box.h"
-#include "worlds/plane.h"
+#include "task/plane.h"
 
 namespace forereach {
 

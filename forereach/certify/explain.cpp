@@ -84,8 +84,8 @@ std::string ExplainSafety(const Decision& decision, const Problem& problem, std:
   if (decision.outcome == Outcome::kCertified)
     return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance}, obstacles);
   const std::string who = NamesPart(problem, decision.part) ? "part " + std::to_string(decision.part) : "the robot";
-  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " may touch " +
-         NameOf(obstacles, decision.obstacle) + " (by " + RoundedUp(-clearance) + " m)";
+  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " " + MayTouch(obstacles, decision.obstacle) +
+         " (by " + RoundedUp(-clearance) + " m)";
 }
 
 std::string Sentence(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles) {
@@ -151,6 +151,17 @@ std::string ExplainCertificate(const Problem& problem, const ClosestApproach& cl
 
 std::string CertifiedInPieces(int pieces) { return "; X0 in " + std::to_string(pieces) + " pieces"; }
 std::string AlsoInPieces(int trials) { return "; so after " + std::to_string(trials) + " trials with X0 in pieces"; }
+
+std::string ObstacleNamedIn(std::string_view sentence) {
+  for (const std::string_view before : {" may touch ", " may leave ", " m from "})
+    if (const std::size_t at = sentence.find(before); at != std::string_view::npos) {
+      std::string_view name = sentence.substr(at + before.size());
+      name = name.substr(0, name.find_first_of(" ,;"));
+      if (!WhyNoName(name).empty() || name == "obstacle") return {};
+      return std::string(before == " may leave " ? kOutside : "").append(name);
+    }
+  return {};
+}
 
 const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }
 

@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "forereach/certify/decision.h"
 #include "forereach/certify/problem.h"
@@ -36,6 +37,10 @@ Problem::between, otherwise at the sample instants only; that it allows for a di
 the limits hold at the sample instants, if there are any. */
 [[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest,
                                              std::span<const Obstacle> obstacles);
+
+/** The name of the obstacle in such a sentence; empty if it has none, or the sentence is another. For records, which
+keep sentences and numbers. */
+[[nodiscard]] std::string ObstacleNamedIn(std::string_view sentence);
 
 /** "all_times" or "samples": when a decision of the problem holds. */
 [[nodiscard]] const char* HoldsName(const Problem& problem);

@@ -151,6 +151,11 @@ std::string NameOf(std::span<const Obstacle> obstacles, int index) {
   return is_named ? obstacles[ToSize(index)].name() : "obstacle " + std::to_string(index);
 }
 
+std::string MayTouch(std::span<const Obstacle> obstacles, int index) {
+  const std::string name = NameOf(obstacles, index);
+  return name.starts_with(kOutside) ? "may leave " + name.substr(kOutside.size()) : "may touch " + name;
+}
+
 double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
   switch (obstacle.kind()) {
     case Obstacle::Kind::kCircle: return (y - obstacle.points()[0]).norm() - obstacle.radius();

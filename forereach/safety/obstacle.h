@@ -83,6 +83,14 @@ class Obstacle final {
 /** How a sentence calls an obstacle: by its name, or "obstacle 6" by its index. @param index may be that of none. */
 [[nodiscard]] std::string NameOf(std::span<const Obstacle> obstacles, int index);
 
+/** What names of pieces begin with that together are all outside of an area to stay in: "outside:lawn". Sentences and
+drawings look at it, no decision does. */
+inline constexpr std::string_view kOutside = "outside:";
+[[nodiscard]] inline bool IsOutside(const Obstacle& obstacle) { return obstacle.name().starts_with(kOutside); }
+
+/** "may touch oak_2"; of a piece outside of an area to stay in, "may leave lawn". */
+[[nodiscard]] std::string MayTouch(std::span<const Obstacle> obstacles, int index);
+
 /** The distance in metres from a point y (p entries) to the obstacle, negative inside, in plain arithmetic. A motion is
 ignored. Use it for planning, simulation and display, not for bounds. */
 [[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y);

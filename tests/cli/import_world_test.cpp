@@ -54,6 +54,59 @@ TEST_F(ImportWorldTest, APlanIsCertifiedAmongTheObstaclesOfAMap) {
   EXPECT_THAT(Certify("out.yaml"), Exits(1, "may touch obstacle 0"));
 }
 
+// The robot drives a metre along x. Messages, the check and the verifier know the area.
+TEST_F(ImportWorldTest, APlanIsCertifiedInAnAreaToStayIn) {
+  const auto task = [&](const std::string& area) {
+    return std::string(kTask).replace(std::string(kTask).find("[]  # of the map"), 16, "[]\n  keep_in: " + area);
+  };
+  // Between two arms.
+  const std::string lawn =
+      "[{name: lawn, vertices: [[-2, -2], [2, -2], [2, -1], [1.5, -1], [1.5, 0.5], [2, 0.5], [2, 1], [-2, 1]]";
+  scratch_.Write("lawn.yaml", task(lawn + "}]"));
+  const Config config = LoadConfig(scratch_ / "lawn.yaml");
+  EXPECT_EQ(config.keep_in.front().name, "lawn");
+  EXPECT_EQ(config.num_listed, 0u);
+  EXPECT_TRUE(std::ranges::all_of(config.obstacles, IsOutside));
+  EXPECT_THAT(Certify("lawn.yaml"), Exits(0, "certified: the robot stays clear at all times"));
+  const std::string certificate = scratch_ / "certificate.json";
+  const auto certify = [&](const char* config_file) {
+    return Forereach("certify --json --config " + scratch_ / config_file + " --plan " + scratch_ / "plan.csv" + " > " +
+                     certificate);
+  };
+  ASSERT_EQ(certify("lawn.yaml").code, 0);
+  EXPECT_THAT(Forereach("verify " + certificate), Exits(0));
+  EXPECT_THAT(Forereach("check " + scratch_ / "lawn.yaml" + " --plan " + scratch_ / "plan.csv" + " 2>&1"), Exits(0));
+  scratch_.Write("hole.yaml", task(lawn + ", holes: [[[0.5, -0.1], [0.6, 0], [0.5, 0.1]]]}]"));
+  EXPECT_THAT(Certify("hole.yaml"), Exits(1, "the robot may leave lawn (by "));
+  scratch_.Write("far.yaml", task("[{vertices: [[1, 1], [2, 1], [2, 2]]}]"));
+  EXPECT_THAT(Certify("far.yaml"), Exits(1, "the robot may leave keep_in (by "));
+  EXPECT_THAT(Forereach("check " + scratch_ / "far.yaml" + " 2>&1"),
+              Exits(1, "task.keep_in: the robot may leave keep_in at the start"));
+}
+
+TEST_F(ImportWorldTest, AnAreaToStayInThatIsNoneIsAnError) {
+  const auto why = [&](const std::string& area) {
+    scratch_.Write("area.yaml", std::string(kTask).replace(std::string(kTask).find("[]  # of the map"), 16,
+                                                           "[]\n  keep_in: " + area));
+    return Thrown<ConfigError>([&] { static_cast<void>(LoadConfig(scratch_ / "area.yaml")); });
+  };
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 4], [4, 0], [0, 4]]}]"),
+              AllOf(HasSubstr("area.yaml:11: task.keep_in[0]: the side from (0, 0) to (4, 4) meets")));
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [2, 0]]}]"), HasSubstr("meets the side"));
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0]]}]"), HasSubstr("2"));
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [.nan, 0]]}]"), HasSubstr("task.keep_in[0].vertices[2][0]"));
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [1e300, 5]]}]"), HasSubstr("is outside [-1e+09, 1e+09]"));
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [4, 4, 1]]}]"), HasSubstr("task.keep_in[0].vertices[2]"));
+  EXPECT_THAT(why("[{name: 9lives, vertices: [[0, 0], [4, 0], [4, 4]]}]"), HasSubstr("must begin with a letter"));
+  EXPECT_THAT(why("[{name: a234567890123456789012345, vertices: [[0, 0], [4, 0], [4, 4]]}]"),
+              HasSubstr("has 25 characters, must have 1 to 23"));
+  std::string many;
+  for (int i = 0; i < 100'000; ++i) many += fmt::format("{}[{}, {}]", i > 0 ? ", " : "", i, i % 2);
+  EXPECT_THAT(why("[{vertices: [" + many + "]}]"), HasSubstr("task.keep_in[0].vertices: has 100000 entries"));
+  EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [4, 4]], holes: [[[5, 5], [6, 5], [6, 6]]]}]"),
+              HasSubstr("the hole at (6, 6) is not inside"));
+}
+
 TEST_F(ImportWorldTest, WritesAPartOfATaskFile) {
   ASSERT_EQ(ImportWorld(scratch_ / "map.yaml" + " --unknown free").code, 0);
   const std::string text = Read(scratch_ / "out.yaml");

@@ -86,11 +86,15 @@ TEST(Certificate, CallsAnObstacleByItsName) {
   Judge judge(PointMassInHalves());
   for (const bool is_hit : {false, true}) {
     const Obstacle oak = Obstacle::Circle(Vec({2, is_hit ? 1.0 : 3.0}), 1);
-    const std::vector<Obstacle> plain{oak}, named{oak.Named("oak_2")};
+    const std::vector<Obstacle> plain{oak}, named{oak.Named("oak_2")}, outside{oak.Named("outside:lawn")};
     const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(4), named);
     const Problem& problem = judge.certifier().problem();
     EXPECT_THAT(Explain(d, problem, named), HasSubstr(is_hit ? "may touch oak_2 (by" : " m from oak_2"));
     EXPECT_THAT(Explain(d, problem, plain), HasSubstr(is_hit ? "may touch obstacle 0 (by" : " m from obstacle 0"));
+    EXPECT_THAT(Explain(d, problem, outside), HasSubstr(is_hit ? "may leave lawn (by" : " m from outside:lawn"));
+    EXPECT_EQ(ObstacleNamedIn(Explain(d, problem, named)), "oak_2");
+    EXPECT_EQ(ObstacleNamedIn(Explain(d, problem, plain)), "");
+    EXPECT_EQ(ObstacleNamedIn(Explain(d, problem, outside)), "outside:lawn");
     EXPECT_EQ(Explain(d, problem), Explain(d, problem, plain)) << "without obstacles there are only numbers";
   }
 }

@@ -129,6 +129,17 @@ TEST(DrawTest, ObstaclesMoveByTheDrawingsClock) {
           HasSubstr(">2</text>")));
 }
 
+// Its pieces are one shape without names, and each is found by its number.
+TEST(DrawTest, OutsideOfAnAreaIsOneGroup) {
+  PageDetail detail;
+  const Obstacle box = Obstacle::AxisBox(Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 2)),
+                 outside = box.Named("outside:lawn");
+  ASSERT_TRUE(DrawTube({{{{0, 0}, {9, 0}, {9, 9}}}}, {}, {box, outside, outside, box}, 2, detail));
+  EXPECT_THAT(detail.svg, HasSubstr("<g class=\"outside\"><g class=\"obstacle\">"));
+  EXPECT_THAT(detail.svg, testing::ContainsRegex("<g class=\"obstacle binding\"><path [^>]*/></g></g><g class=\"obst"));
+  EXPECT_THAT(detail.svg, AllOf(Not(HasSubstr("lawn")), HasSubstr(">3</text>")));
+}
+
 TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
   const PageRun run = GatherPage({kCourseLog}, kCourseTask, {}, {});
   ASSERT_GT(run.decisions.size(), 20u);
@@ -387,6 +398,21 @@ TEST(GatherTest, APageOfAShadowSaysSoAndWhatHappened) {
   const Output printed = Forereach("report '" + log + "' --config '" + kTask + "'");
   EXPECT_THAT(printed.text, testing::StartsWith("SHADOW"));
   EXPECT_THAT(printed.text, testing::ContainsRegex("driven [1-9][0-9]*: 0 left a slice \\(0 of [1-9][0-9]* states\\)"));
+}
+
+TEST(WriteTest, ObstaclesHaveTheirNames) {
+  PageRun run;
+  DecisionRow row;
+  for (const auto& [obstacle, message] : {std::pair(3, "at step 2 the robot may touch oak_2 (by 1 m)"),
+                                          {-1, "closest at step 2, 1 m from oak_3"},
+                                          {7, "closest at step 2, 1 m from obstacle 7; steps on time"},
+                                          {1, "the robot may leave lawn (by 1 m)"}}) {
+    row.obstacle = obstacle;
+    row.message = message;
+    run.decisions.emplace_back(row);
+  }
+  run.parts = {{"", {}, run.decisions.size()}};
+  EXPECT_THAT(PageHtml(run), HasSubstr(R"("names":["oak_2","","7","outside:lawn"])"));
 }
 
 TEST(WriteTest, ALogNamedLikeAKeyIsWritten) {

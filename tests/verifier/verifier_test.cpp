@@ -27,6 +27,28 @@ Certificate OneStep() {
 
 TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), OneStep())); }
 
+// The slices are [-1, 1]^2, then [-1.375, 1.625] by [-1.5, 1.5]. No obstacle says anything.
+TEST(StayIn, IsJudgedByTheSidesAlone) {
+  constexpr double kHair = 1e-9;
+  const auto judge = [](std::vector<std::vector<Eigen::Vector2d>> rings) {
+    Certificate certificate = OneStep();
+    certificate.stay_in = {{"yard", std::move(rings)}};
+    return Judge(Halves(), certificate);
+  };
+  const auto notched = [](double x) {  // a yard with a notch, whose tip is at x
+    return std::vector<Eigen::Vector2d>{{-2, -2}, {4, -2}, {4, 0}, {x, 0}, {4, 1}, {4, 2}, {-2, 2}};
+  };
+  ExpectConfirmed(judge({notched(1.625 + kHair)}));
+  ExpectRefuted(judge({notched(1.625 - kHair)}), 1, "the body stays in yard");
+  ExpectRefuted(judge({notched(-1)}), 0, "the body stays in yard");
+  ExpectRefuted(judge({{{5, 0}, {6, 0}, {6, 1}}}), 0, "the body stays in yard");
+  ExpectRefuted(judge({{{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}}}), 0, "the body stays in yard");
+  const auto with_hole = [&](double x) { return judge({notched(3), {{x, 0}, {x + 0.5, 0}, {x + 0.25, 0.5}}}); };
+  ExpectConfirmed(with_hole(1.625 + kHair));
+  ExpectRefuted(with_hole(1.625 - kHair), 1, "the body stays in yard");
+  ExpectRefuted(judge({notched(3), {{-3, -3}, {5, -3}, {5, 3}, {-3, 3}}}), 0, "stays in yard");
+}
+
 // f0(z) - f0(c) - J (z - c) lies inside the split remainder, wherever in the slice z is.
 TEST(SplitRemainder, HoldsAllOverTheSlice) {
   const auto problem = std::make_shared<Problem>(

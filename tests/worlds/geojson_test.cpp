@@ -56,6 +56,14 @@ TEST_F(GeoJsonTest, OfTwoAreasToStayInTheUnionCounts) {
   EXPECT_TRUE(Contains(world, At(3.5, 1)));
 }
 
+TEST_F(GeoJsonTest, TextsOfOtherMapsAreReadAsNumbersWhereTheyCount) {
+  constexpr const char* kLine = R"({"type": "LineString", "coordinates": [[0,0],[4,0]]})";
+  EXPECT_TRUE(Contains(Drawing(Feature(kLine, R"({"width": "3"})")), At(2, 1.5)));
+  EXPECT_THAT(WhyNot(Feature(kLine, R"({"width": "3 m"})")), HasSubstr("properties.width: '3 m'"));
+  EXPECT_FALSE(Drawing(Feature(kArea, R"({"width": "wide", "radius": "?"})")).pieces.empty());
+  EXPECT_THAT(WhyNot(R"({"type": "Topology", "objects": {}})"), HasSubstr("type Topology is none of GeoJSON's"));
+}
+
 TEST_F(GeoJsonTest, LinesAndPointsHaveASize) {
   const World world = Drawing(
       R"({"type": "GeometryCollection", "geometries": [{"type": "LineString", "coordinates": [[0,0,9],[3,4]]},

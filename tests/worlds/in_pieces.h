@@ -25,6 +25,17 @@ using ExactPoint = std::pair<Rational, Rational>;
   return true;
 }
 
+/** Whether a point lies inside a ring, by the parity of the sides right of it; none may go through the point. */
+[[nodiscard]] inline bool IsEnclosed(const Ring& ring, const ExactPoint& p) {
+  bool inside = false;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const ExactPoint a = ToExact(ring[i]), b = ToExact(ring[(i + 1) % ring.size()]);
+    if ((a.second > p.second) != (b.second > p.second) && (Cross(a, b, p) > 0) == (b.second > a.second))
+      inside = !inside;
+  }
+  return inside;
+}
+
 /** The corners of a box or polygon. */
 [[nodiscard]] inline Ring CornersOf(const Obstacle& obstacle) {
   std::vector<PlanePoint> points;

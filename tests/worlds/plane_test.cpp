@@ -1,5 +1,5 @@
 // Polygons cut into convex pieces, judged by exact rationals.
-#include "worlds/plane.h"
+#include "task/plane.h"
 
 #include "tests/test.h"
 #include "tests/worlds/in_pieces.h"
@@ -13,17 +13,6 @@ Rational TwiceArea(const Ring& ring) {
     area += a.first * b.second - a.second * b.first;
   }
   return area;
-}
-
-// Whether a point lies inside a ring, by the parity of the sides right of it; none may go through the point.
-bool IsEnclosed(const Ring& ring, const ExactPoint& p) {
-  bool inside = false;
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    const ExactPoint a = ToExact(ring[i]), b = ToExact(ring[(i + 1) % ring.size()]);
-    if ((a.second > p.second) != (b.second > p.second) && (Cross(a, b, p) > 0) == (b.second > a.second))
-      inside = !inside;
-  }
-  return inside;
 }
 
 // The pieces are convex and small, and points are in one of them exactly if they are in the area.

@@ -1,4 +1,4 @@
-#include "worlds/plane.h"
+#include "task/plane.h"
 
 #include <gmpxx.h>
 
@@ -136,7 +136,7 @@ std::optional<std::size_t> Seen(const Ring& ring, const PlanePoint& from, const 
 }
 
 // The hole that reaches furthest to the right sees the outer ring from there, so holes are joined from the right.
-Ring Joined(std::vector<Ring> rings) {
+Ring Bridged(std::vector<Ring> rings) {
   std::vector<Side> sides = SidesOf(rings);
   const auto rightmost = [](const Ring& ring) {
     return std::ranges::max_element(ring, [](const auto& a, const auto& b) { return a < b; });
@@ -292,7 +292,7 @@ std::vector<Ring> ConvexPieces(const Area& area, int most_corners) {
   RequireApart(rings);
   for (std::size_t r = 0; r < rings.size(); ++r)
     if (IsCounterClockwise(rings[r]) != (r == 0)) std::ranges::reverse(rings[r]);
-  return Joiner(Triangles(Joined(std::move(rings))), most_corners).Join();
+  return Joiner(Triangles(Bridged(std::move(rings))), most_corners).Join();
 }
 
 bool Meet(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c, const PlanePoint& d) {
