@@ -132,7 +132,8 @@ Command ImportWorldCommand() {
   return {
       .name = "import-world",
       .footer =
-          "FILE is the YAML file of a ROS map, a CommonRoad 2020a scenario (.xml), or GeoJSON. OUT has the list "
+          "FILE is the YAML file of a ROS map, a CommonRoad 2020a or 2018b scenario (.xml), or GeoJSON. OUT has the "
+          "list "
           "task.obstacles; put it into a task file.\nThe obstacles contain all that the file says is not free. OUT "
           "begins with what was assumed.\n\n"
           "Examples:\n  forereach import-world map.yaml --task my_robot.yaml --whole-task --out my_robot_in_map.yaml\n"

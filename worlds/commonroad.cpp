@@ -50,6 +50,11 @@ class ScenarioReader {
     Fail(at, "has no " + std::string(child));
   }
 
+  // An element's name. In 2018b an obstacle's is that of its role.
+  [[nodiscard]] std::string KindOf(const XmlElement& at) const {
+    return at.name == "obstacle" ? std::string(Trimmed(Require(at, "role").text)) + "Obstacle" : at.name;
+  }
+
   [[nodiscard]] double Number(const XmlElement& at, double lower, double upper) const {
     return Checked(at, std::string(Trimmed(at.text)), lower, upper);
   }
@@ -432,9 +437,9 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
   if (root->name != "commonRoad") in.Fail(*root, "is no scenario of CommonRoad");
   const std::string* version = root->Attribute("commonRoadVersion");
   const std::string* step_text = root->Attribute("timeStepSize");
-  if (!version || *version != "2020a")
+  if (!version || (*version != "2020a" && *version != "2018b"))
     in.Fail(*root, "commonRoadVersion is " + (version ? *version : "missing") +
-                       ", has to be 2020a; commonroad-io reads older ones and writes it");
+                       ", has to be 2020a or 2018b; commonroad-io reads others and writes 2020a");
   if (!step_text) in.Fail(*root, "has no timeStepSize");
   const double step = in.Checked(*root, *step_text, 1e-6, 1e3);
   World world;
@@ -443,15 +448,16 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
   ObstacleReader obstacles(in, step, options.steps_per_window, world);
   std::map<std::string, int> counts;
   for (const auto& child : root->children) {
-    if (!child->name.ends_with("Obstacle")) continue;
-    ++counts[child->name];
+    const std::string kind = in.KindOf(*child);
+    if (!kind.ends_with("Obstacle")) continue;
+    ++counts[kind];
     const std::string* id = child->Attribute("id");
-    const std::string name = child->name + " " + (id ? *id : "?");
-    if (child->name == "staticObstacle")
+    const std::string name = kind + " " + (id ? *id : "?");
+    if (kind == "staticObstacle")
       obstacles.ReadStanding(*child, name);
-    else if (child->name == "environmentObstacle")
+    else if (kind == "environmentObstacle")
       obstacles.ReadEnvironment(*child, name);
-    else if (child->name == "dynamicObstacle" || child->name == "phantomObstacle")
+    else if (kind == "dynamicObstacle" || kind == "phantomObstacle")
       obstacles.ReadMoving(*child, name);
     else
       in.Fail(*child, "is no kind of obstacle that is known");

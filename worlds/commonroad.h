@@ -1,4 +1,4 @@
-/** Scenarios of CommonRoad, version 2020a: the road's boundary, what stands on it, and what moves on it. */
+/** Scenarios of CommonRoad, version 2020a or 2018b: the road's boundary, what stands on it, and what moves on it. */
 #pragma once
 
 #include <string>

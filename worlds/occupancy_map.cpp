@@ -1,9 +1,14 @@
 #include "worlds/occupancy_map.h"
 
+#include <cairo.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -29,7 +34,9 @@ class PgmReader {
   GrayImage Read() {
     const std::string_view kind = rest_.substr(0, 2);
     if (kind != "P2" && kind != "P5")
-      Fail("is no PGM image, which begins with P2 or P5; `convert IMAGE map.pgm` of ImageMagick makes one");
+      Fail(
+          "is neither a PGM image, which begins with P2 or P5, nor a PNG; `convert IMAGE map.pgm` of ImageMagick makes "
+          "one");
     rest_.remove_prefix(2);
     GrayImage image;
     image.width = Number("width", kMaxPixels);
@@ -130,11 +137,7 @@ std::vector<Key> MapKeys(MapFile& map) {
       Required(Number("free_thresh", "", share, "A cell that is lighter is free.",
                       [&map](const Field& at, TaskDraft&) { map.free = at.Number(); })),
       Optional(Word("mode", {"trinary", "scale", "raw"}, "What values between the two thresholds are.",
-                    [&map](const Field& at, TaskDraft&) {
-                      map.mode = at.Text();
-                      if (map.mode == "raw")
-                        at.Fail("raw: values are costs, and nothing says which of them is free; use trinary or scale");
-                    }),
+                    [&map](const Field& at, TaskDraft&) { map.mode = at.Text(); }),
                "trinary"),
       Text("<name>", "Ignored.", [&map](const Field& at, TaskDraft&) { map.unknown_keys.push_back(at.name()); }),
   };
@@ -152,13 +155,21 @@ MapFile ReadMapFile(const std::string& path) {
 
 // ---- Cells
 
+// What map_saver writes for unknown cells. Its free_thresh of 0.25 would take it for free.
+bool IsSaversUnknown(const GrayImage& image, const MapFile& map, int value) {
+  return map.mode == "trinary" && !map.is_negated && 255 * value == 205 * image.largest;
+}
+
 std::vector<bool> OccupiedCells(const GrayImage& image, const MapFile& map, bool unknown_is_free) {
   // By gray value, since there are few of them.
   std::vector<bool> is_occupied(ToSize(image.largest) + 1);
   for (int value = 0; value <= image.largest; ++value) {
     const double dark = static_cast<double>(map.is_negated ? value : image.largest - value) / image.largest;
     const bool takes_unknown = unknown_is_free && map.mode == "trinary";
-    is_occupied[ToSize(value)] = takes_unknown ? dark > map.occupied : !(dark < map.free);
+    is_occupied[ToSize(value)] = map.mode == "raw"                    ? value != (map.is_negated ? image.largest : 0)
+                                 : takes_unknown                      ? dark > map.occupied
+                                 : IsSaversUnknown(image, map, value) ? true
+                                                                      : !(dark < map.free);
   }
   std::vector<bool> cells(image.values.size());
   const auto width = ToSize(image.width), height = ToSize(image.height);
@@ -310,6 +321,47 @@ void AddOutside(World& world, const Placing& placing, const GrayImage& grid) {
 
 }  // namespace
 
+GrayImage ReadPng(const std::string& file, std::string_view bytes) {
+  const auto number = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    for (std::size_t i = at; i < at + 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[i]);
+    return value;
+  };
+  constexpr std::size_t kHead = 24;  // up to width and height
+  if (bytes.size() < kHead || std::uint64_t{number(16)} * number(20) > kMaxPixels)
+    throw ConfigError(fmt::format("{}: has no size, or more than {} pixels", file, kMaxPixels));
+  const auto read = [](void* rest, unsigned char* to, unsigned count) noexcept {
+    auto& from = *static_cast<std::string_view*>(rest);
+    if (count > from.size()) return CAIRO_STATUS_READ_ERROR;
+    std::copy_n(from.begin(), count, to);
+    from.remove_prefix(count);
+    return CAIRO_STATUS_SUCCESS;
+  };
+  const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
+      cairo_image_surface_create_from_png_stream(read, &bytes), &cairo_surface_destroy);
+  cairo_surface_t* const image = surface.get();
+  const cairo_format_t format = cairo_image_surface_get_format(image);
+  if (cairo_surface_status(image) != CAIRO_STATUS_SUCCESS ||
+      (format != CAIRO_FORMAT_RGB24 && format != CAIRO_FORMAT_ARGB32))
+    throw ConfigError(file + ": is no PNG image that can be read");
+  GrayImage gray{cairo_image_surface_get_width(image), cairo_image_surface_get_height(image), 3 * 255, {}};
+  for (int row = 0; row < gray.height; ++row) {
+    const unsigned char* at =
+        cairo_image_surface_get_data(image) + std::ptrdiff_t{row} * cairo_image_surface_get_stride(image);
+    for (int column = 0; column < gray.width; ++column, at += 4) {
+      std::uint32_t pixel = 0;
+      std::memcpy(&pixel, at, sizeof pixel);
+      if (format == CAIRO_FORMAT_ARGB32 && pixel >> 24 != 255)
+        throw ConfigError(fmt::format(
+            "{}: the pixel at column {}, row {} is not opaque; `convert IMAGE -background black -alpha remove map.png` "
+            "of ImageMagick makes such cells occupied",
+            file, column, row));
+      gray.values.push_back(static_cast<std::uint16_t>((pixel >> 16 & 255) + (pixel >> 8 & 255) + (pixel & 255)));
+    }
+  }
+  return gray;
+}
+
 GrayImage ReadPgm(const std::string& file, std::string_view bytes) { return PgmReader(file, bytes).Read(); }
 
 std::vector<CellBlock> Blocks(const std::vector<bool>& occupied, int width, int height) {
@@ -319,7 +371,9 @@ std::vector<CellBlock> Blocks(const std::vector<bool>& occupied, int width, int 
 World ReadOccupancyMap(const std::string& path, const MapOptions& options) {
   const MapFile map = ReadMapFile(path);
   const std::string image_path = (std::filesystem::path(path).parent_path() / map.image).string();
-  const GrayImage image = ReadPgm(image_path, ReadWhole(image_path, 12 * kMaxPixels, path + ": image: "));
+  const std::string bytes = ReadWhole(image_path, 12 * kMaxPixels, path + ": image: ");
+  const bool is_png = bytes.starts_with("\x89PNG\r\n\x1a\n");
+  const GrayImage image = is_png ? ReadPng(image_path, bytes) : ReadPgm(image_path, bytes);
   const Grid grid =
       Coarsened({image.width, image.height, OccupiedCells(image, map, options.unknown_is_free)}, options.coarsen);
   const Placing placing(map, options.coarsen);
@@ -335,6 +389,10 @@ World ReadOccupancyMap(const std::string& path, const MapOptions& options) {
         fmt::format("A cell is {0} by {0} of the map's, occupied if one of them is.", options.coarsen));
   world.notes.push_back(options.unknown_is_free ? "Unknown cells are free, and so is all beyond the image."
                                                 : "Unknown cells are occupied, and so is all beyond the image.");
+  if (!options.unknown_is_free && (255 - 205) / 255.0 < map.free && map.mode == "trinary" && !map.is_negated)
+    world.notes.push_back(
+        "Gray 205, which map_saver writes for unknown cells, is unknown here; by the file's free_thresh it were free.");
+  if (map.mode == "raw") world.notes.push_back("Mode raw: what has a cost above 0 is occupied.");
   if (map.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
   for (const std::string& key : map.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
   if (!options.unknown_is_free) AddOutside(world, Placing(map, 1), image);

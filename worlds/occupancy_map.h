@@ -1,4 +1,5 @@
-/** Maps of ROS: a YAML file that names a PGM image of cells, as map_saver writes them and map_server reads them. */
+/** Maps of ROS: a YAML file that names a PGM or PNG image of cells, as map_saver writes them and map_server reads them.
+ */
 #pragma once
 
 #include <cstddef>
@@ -31,6 +32,10 @@ inline constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
 has a value above the largest. */
 [[nodiscard]] GrayImage ReadPgm(const std::string& file, std::string_view bytes);
 
+/** The same of a PNG image: of each pixel the sum of red, green and blue. @param file its name in messages.
+@throws ConfigError if it is none that can be read, has more than kMaxPixels, or a pixel is not opaque. */
+[[nodiscard]] GrayImage ReadPng(const std::string& file, std::string_view bytes);
+
 /** Cells column..column + width - 1 of the rows row..row + height - 1, and which cells are occupied, row by row. */
 struct CellBlock {
   int column = 0, row = 0, width = 0, height = 0;
@@ -44,8 +49,9 @@ its row or along its column, whichever covers more that was not covered. Cost: o
 /** The occupied cells of a map as boxes, or as polygons if its origin is turned. Each covers its cells and at most the
 rounding of its corners more. With unknown cells occupied, so is all beyond the image: half-planes, or bars as thick as
 the map if it is turned.
-A cell is occupied, free or unknown as for map_server in mode trinary. In mode scale, what is neither free nor occupied
-is occupied. @throws ConfigError with file, line, key and value. */
+A cell is occupied, free or unknown as for map_server in mode trinary, but gray 205 of 255, which map_saver writes for
+unknown, is unknown whatever the thresholds say. In mode scale, what is neither free nor occupied is occupied; in mode
+raw, what has a cost. @throws ConfigError with file, line, key and value. */
 [[nodiscard]] World ReadOccupancyMap(const std::string& path, const MapOptions& options);
 
 }  // namespace forereach

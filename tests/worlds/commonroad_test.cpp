@@ -58,6 +58,19 @@ TEST_F(CommonRoadTest, TheBoundaryIsWhereNoNeighbourIs) {
   EXPECT_EQ(world.pieces.size(), 3u);
 }
 
+TEST_F(CommonRoadTest, In2018bTheRoleOfAnObstacleIsAnElement) {
+  kHead = "<commonRoad timeStepSize=\"0.1\" commonRoadVersion=\"2018b\">\n";
+  const World world = Scenario(
+      std::string("<obstacle id=\"1\"><role>static</role><type>car</type>") + kCar + State("initialState", 0, 0, 0, 0) +
+      "</obstacle><obstacle id=\"2\"><role> dynamic </role>" + kCar + State("initialState", 20, 0, 0, 0) +
+      "<trajectory>" + State("state", 30, 0, 0, 1) + "</trajectory></obstacle>");
+  ASSERT_EQ(world.pieces.size(), 2u);
+  EXPECT_EQ(world.pieces[0].name, "staticObstacle 1");
+  EXPECT_TRUE(world.pieces[1].window && Contains(world, At(25, 0), 0.05));
+  EXPECT_THAT(WhyNot("<obstacle id=\"1\"/>"), HasSubstr("obstacle: has no role"));
+  EXPECT_THAT(WhyNot("<obstacle id=\"1\"><role>dark</role></obstacle>"), HasSubstr("no kind of obstacle"));
+}
+
 TEST_F(CommonRoadTest, SegmentsNearTheirChordAreOnePiece) {
   std::vector<PlanePoint> left, right;
   for (int i = 0; i <= 40; ++i) {
@@ -192,8 +205,8 @@ TEST_F(CommonRoadTest, RefusesWithTheLine) {
   EXPECT_THAT(WhyNot(deep), HasSubstr("nest deeper"));
   kHead = "<!DOCTYPE a [<!ENTITY b \"b\">]>\n<commonRoad>";
   EXPECT_THAT(WhyNot(""), HasSubstr("document type declaration"));
-  kHead = "<commonRoad timeStepSize=\"0.1\" commonRoadVersion=\"2018b\">";
-  EXPECT_THAT(WhyNot(""), HasSubstr("commonRoadVersion is 2018b, has to be 2020a"));
+  kHead = "<commonRoad timeStepSize=\"0.1\" commonRoadVersion=\"2017a\">";
+  EXPECT_THAT(WhyNot(""), HasSubstr("commonRoadVersion is 2017a, has to be 2020a or 2018b"));
 }
 
 }  // namespace forereach::commonroad_test

@@ -23,8 +23,8 @@ TEST(Pgm, IsReadInBothFormatsWithComments) {
 }
 
 TEST(Pgm, RefusesWhatIsNoneAndAllocatesNothingForIt) {
-  EXPECT_THAT(Refusal(""), HasSubstr("no PGM image"));
-  EXPECT_THAT(Refusal("\x89PNG"), HasSubstr("no PGM image"));
+  EXPECT_THAT(Refusal(""), HasSubstr("neither a PGM image"));
+  EXPECT_THAT(Refusal("GIF89a"), HasSubstr("neither a PGM image"));
   EXPECT_THAT(Refusal("P5"), HasSubstr("no number where the width has to be"));
   EXPECT_THAT(Refusal("P5 # no end"), HasSubstr("no number"));
   EXPECT_THAT(Refusal("P5 99999999999999999999 1 255 "), HasSubstr("width is above"));
@@ -59,6 +59,27 @@ TEST(Blocks, AreFew) {
   EXPECT_EQ(Blocks(std::vector<bool>(600, true), 30, 20).size(), 1u);
   // A cross: one along, one across, over each other.
   EXPECT_EQ(Blocks({false, true, false, true, true, true, false, true, false}, 3, 3).size(), 2u);
+}
+
+constexpr const char* kGrayPng =
+    "iVBORw0KGgoAAAANSUhEUgAAAAMAAAACCAAAAAC4HznGAAAAEElEQVR4nGNgOPuP4d8/BgAOwgPIDrapNAAAAABJRU5E"
+    "rkJggg==";
+constexpr const char* kOpaquePng =
+    "iVBORw0KGgoAAAANSUhEUgAAAAMAAAACCAYAAACddGYaAAAAHklEQVR4nGNgYGD4f/bs2f///v37zwAi/v4HMoCCANoU"
+    "EVDWsJUMAAAAAElFTkSuQmCC";
+constexpr const char* kTransparentPng =
+    "iVBORw0KGgoAAAANSUhEUgAAAAMAAAACCAYAAACddGYaAAAAG0lEQVR4nGNgYGD4f/bsWYZ///79BxNgBlAQAMgnEFFn"
+    "/lC/AAAAAElFTkSuQmCC";
+
+std::string FromBase64(std::string_view text) {
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  unsigned bits = 0, count = 0;
+  for (const char c : text.substr(0, text.find('='))) {
+    bits = bits << 6 | static_cast<unsigned>(kDigits.find(c));
+    if ((count += 6) >= 8) bytes += static_cast<char>(bits >> (count -= 8) & 255);
+  }
+  return bytes;
 }
 
 struct MapTest : testing::Test {
@@ -154,8 +175,48 @@ TEST_F(MapTest, NegatedAndScaledMaps) {
   EXPECT_TRUE(Contains(scaled, Middle(1, 1))) << "205 is between the thresholds";
 }
 
+TEST_F(MapTest, OfARawMapWhatHasACostIsOccupied) {
+  scratch_.Write("map.pgm", "P2 3 2 255 0 1 100 0 255 0");
+  const World world = Map(With("mode: raw"), {.unknown_is_free = true});
+  for (int column = 0; column < 3; ++column)
+    for (int row = 0; row < 2; ++row)
+      EXPECT_EQ(Contains(world, Middle(column, row)), row == 1 ? column > 0 : column == 1) << column << ", " << row;
+}
+
+// Its own free_thresh, 0.25, would take 205 for free.
+TEST_F(MapTest, WhatMapSaverWritesForUnknownIsUnknown) {
+  const std::string yaml = Instead("free_thresh", "free_thresh: 0.25");
+  const World world = Map(yaml);
+  EXPECT_TRUE(Contains(world, Middle(1, 1)));
+  EXPECT_THAT(world.notes, Contains(StartsWith("Gray 205")));
+  EXPECT_FALSE(Contains(Map(yaml, {.unknown_is_free = true}), Middle(1, 1)));
+  EXPECT_THAT(Map(kYaml).notes, Not(Contains(StartsWith("Gray 205"))));
+}
+
+// The same cells as map.pgm, in gray and in colours.
+TEST_F(MapTest, APngImageIsRead) {
+  const std::string yaml = Instead("image", "image: map.png");
+  const auto write = [&](const char* base64) { scratch_.Write("map.png", FromBase64(base64)); };
+  write(kGrayPng);
+  const World world = Map(yaml), same = Map(kYaml);
+  EXPECT_EQ(world.pieces.size(), same.pieces.size());
+  for (int column = -2; column < 5; ++column)
+    for (int row = -2; row < 4; ++row)
+      EXPECT_EQ(Contains(world, Middle(column, row)), Contains(same, Middle(column, row))) << column << ", " << row;
+  write(kOpaquePng);
+  EXPECT_EQ(Map(yaml).pieces.size(), same.pieces.size());
+  write(kTransparentPng);
+  EXPECT_THAT(WhyNot(yaml), HasSubstr("map.png: the pixel at column 1, row 0 is not opaque"));
+  const std::string whole = FromBase64(kGrayPng);
+  scratch_.Write("map.png", whole.substr(0, whole.size() - 30));
+  EXPECT_THAT(WhyNot(yaml), HasSubstr("map.png: is no PNG image that can be read"));
+  scratch_.Write("map.png", whole.substr(0, 16) + std::string(8, '\x7f') + whole.substr(24));
+  EXPECT_THAT(WhyNot(yaml), HasSubstr("more than 67108864 pixels"));
+  scratch_.Write("map.png", whole.substr(0, 20));
+  EXPECT_THAT(WhyNot(yaml), HasSubstr("has no size"));
+}
+
 TEST_F(MapTest, WhatTheFileLacksIsSaid) {
-  EXPECT_THAT(WhyNot(With("mode: raw")), HasSubstr("map.yaml:7: mode: raw: values are costs"));
   EXPECT_THAT(WhyNot(Instead("resolution", "resolution: 0")), HasSubstr("map.yaml:2: resolution: 0 is outside"));
   EXPECT_THAT(WhyNot(Instead("resolution", "")), HasSubstr("resolution: missing"));
   EXPECT_THAT(WhyNot(Instead("origin", "origin: [0]")), HasSubstr("has to have x, y and yaw"));
