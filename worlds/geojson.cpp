@@ -162,7 +162,8 @@ class Drawing {
   static double Size(const JsonField& at) {
     // Maps of others have texts in all properties.
     const Parsed<double> text = at.json().is_string() ? ParseNumber(at.json().get<std::string>()) : Parsed<double>{};
-    if (!text.problem.empty()) at.Fail("'" + at.json().get<std::string>().substr(0, 40) + "' " + text.problem);
+    if (!text.problem.empty())
+      at.Fail("'" + at.json().get<std::string>().substr(0, 40) + "' " + std::string(text.problem));
     const double size = at.json().is_string() ? text.value : at.Number();
     if (!(size >= 0 && size <= kFarthest)) at.Fail(fmt::format("{} is outside [0, {}]", ToText(size), kFarthest));
     return size;
