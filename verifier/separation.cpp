@@ -338,9 +338,9 @@ Answer IsAround(const Rings& rings, const RealVector& p) {
       if (below_a == Answer::kUnknown || below_b == Answer::kUnknown) return Answer::kUnknown;
       if (below_a == below_b) continue;
       const Real turn = (Real(b.x()) - a.x()) * (p[1] - a.y()) - (Real(b.y()) - a.y()) * (p[0] - a.x());
-      const Answer is_left = IsBelow(0.0, turn);
-      if (is_left == Answer::kUnknown || (is_left == Answer::kNo && IsBelow(turn, 0.0) != Answer::kYes))
-        return Answer::kUnknown;
+      const Answer is_left = IsBelow(0.0, turn), is_right = IsBelow(turn, 0.0);
+      if (is_left == Answer::kUnknown || is_right == Answer::kUnknown) return Answer::kUnknown;
+      if (is_left == is_right) return Answer::kNo;  // on the side
       if (is_left == below_b) is_odd = !is_odd;
     }
   return is_odd ? Answer::kYes : Answer::kNo;
@@ -359,10 +359,9 @@ Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, R
 }
 
 Answer IsWithin(const Sweep& sweep, const Rings& rings, Real& margin) {
-  const Real infinity(std::numeric_limits<double>::infinity());
-  margin = -infinity;
+  margin = 0.0;
   if (const Answer inside = IsAround(rings, sweep.places().front().center); inside != Answer::kYes) return inside;
-  margin = infinity;
+  margin = std::numeric_limits<double>::infinity();
   for (const auto& ring : rings)
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const Eigen::Vector2d &a = ring[i], &b = ring[(i + 1) % ring.size()];

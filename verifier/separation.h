@@ -22,7 +22,7 @@ means that the best direction gives no proof. @param best is set to the largest 
 
 /** Whether a sweep in the plane lies inside of rings: it is connected, meets none of their sides, and the rings go an
 odd number of times around one of its points. @param margin is set to the largest lower bound found on its distance from
-the sides, or to minus infinity if the point is outside. */
+the sides, or to 0 if the point is outside. */
 [[nodiscard]] Answer IsWithin(const Sweep& sweep, const std::vector<std::vector<Eigen::Vector2d>>& rings, Real& margin);
 
 }  // namespace forereach::verifier
