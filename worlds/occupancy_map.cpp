@@ -391,7 +391,8 @@ World ReadOccupancyMap(const std::string& path, const MapOptions& options) {
                                                 : "Unknown cells are occupied, and so is all beyond the image.");
   if (!options.unknown_is_free && (255 - 205) / 255.0 < map.free && map.mode == "trinary" && !map.is_negated)
     world.notes.push_back(
-        "Gray 205, which map_saver writes for unknown cells, is unknown here; by the file's free_thresh it would be free.");
+        "Gray 205, which map_saver writes for unknown cells, is unknown here; by the file's free_thresh it would be "
+        "free.");
   if (map.mode == "raw") world.notes.push_back("Mode raw: what has a cost above 0 is occupied.");
   if (map.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
   for (const std::string& key : map.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
