@@ -91,7 +91,7 @@ TEST_F(ImportWorldTest, AnAreaToStayInThatIsNoneIsAnError) {
     return Thrown<ConfigError>([&] { static_cast<void>(LoadConfig(scratch_ / "area.yaml")); });
   };
   EXPECT_THAT(why("[{vertices: [[0, 0], [4, 4], [4, 0], [0, 4]]}]"),
-              AllOf(HasSubstr("area.yaml:11: task.keep_in[0]: the side from (0, 0) to (4, 4) meets")));
+              AllOf(HasSubstr("area.yaml:12: task.keep_in[0]: the side from (0, 0) to (4, 4) meets")));
   EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [2, 0]]}]"), HasSubstr("meets the side"));
   EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0]]}]"), HasSubstr("2"));
   EXPECT_THAT(why("[{vertices: [[0, 0], [4, 0], [.nan, 0]]}]"), HasSubstr("task.keep_in[0].vertices[2][0]"));
