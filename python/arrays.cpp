@@ -47,10 +47,10 @@ Eigen::VectorXd VectorOf(const py::handle& given, const std::string& name) {
   return Eigen::Map<const Eigen::VectorXd>(numbers.data(), numbers.size());
 }
 
-std::pair<py::object, py::object> PairOf(const py::handle& x0) {
-  if (!py::isinstance<py::sequence>(x0) || py::len(x0) != 2)
-    throw std::invalid_argument("x0: must be a pair (center, half_width)");
-  const auto pair = py::reinterpret_borrow<py::sequence>(x0);
+std::pair<py::object, py::object> PairOf(const py::handle& given, const std::string& name) {
+  if (!py::isinstance<py::sequence>(given) || py::len(given) != 2)
+    throw std::invalid_argument(name + ": must be a pair " + (name == "x0" ? "(center, half_width)" : "(z, x_next)"));
+  const auto pair = py::reinterpret_borrow<py::sequence>(given);
   return {pair[0], pair[1]};
 }
 

@@ -26,8 +26,8 @@ no real numbers of at most 64 bits. Numbers that are not finite pass: they are j
 
 [[nodiscard]] Eigen::VectorXd VectorOf(const py::handle& given, const std::string& name);
 
-/** The two arrays of an x0. @throws std::invalid_argument if it is no pair. */
-[[nodiscard]] std::pair<py::object, py::object> PairOf(const py::handle& x0);
+/** The two arrays of `x0` or `data`. @throws std::invalid_argument if it is no pair. */
+[[nodiscard]] std::pair<py::object, py::object> PairOf(const py::handle& given, const std::string& name = "x0");
 
 /** (T, m) as m-by-T, a column a step: the layout of a Plan. */
 [[nodiscard]] Eigen::MatrixXd ControlsOf(const py::handle& given);

@@ -39,10 +39,28 @@ std::string TextOf(const py::object& task) {
       .cast<std::string>();
 }
 
-TaskPointer MakeTask(const py::object& task, const std::string& path) {
-  const std::string text = TextOf(task);
+Eigen::MatrixXd RowsOf(const py::handle& given, const std::string& name) {
+  const py::array_t<double> numbers = NumbersOf(given, name, 2);
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      numbers.data(), numbers.shape(0), numbers.shape(1));
+}
+
+TaskPointer MakeTask(const py::object& task, const std::string& path, const py::object& data, const py::kwargs& keys) {
+  if (task.is_none() == keys.empty())
+    throw std::invalid_argument("task: must be a dict or a text, or its keys by name");
+  py::object whole = task.is_none() ? keys : task;
+  std::optional<Transitions> transitions;
+  if (!data.is_none()) {
+    const auto [z, next] = PairOf(data, "data");
+    transitions = Transitions{RowsOf(z, "data: z"), RowsOf(next, "data: x_next")};
+    if (py::isinstance<py::dict>(whole)) {
+      whole = whole.attr("copy")();
+      whole.attr("setdefault")("transitions", "data");
+    }
+  }
+  const std::string text = TextOf(whole);
   const py::gil_scoped_release release;
-  return std::make_shared<JudgingTask>(ConfigOfText(path, text));
+  return std::make_shared<JudgingTask>(ConfigOfText(path, text, transitions ? &*transitions : nullptr));
 }
 
 TaskPointer LoadTaskFile(const std::string& path) { return std::make_shared<JudgingTask>(LoadConfig(path)); }
@@ -205,9 +223,13 @@ py::dict FitOf(const JudgingTask& task, const std::vector<std::string>& names) {
   if (!text)
     throw ConfigError(task.config().path + ": model: " + task.model().name() +
                       " is compiled; only the parameters of a model as text can be fitted");
+  std::vector<std::string> those = names;
+  if (names.empty())
+    for (const ModelText::Parameter& parameter : text->parameters)
+      if (parameter.name != "dt") those.push_back(parameter.name);
   const Fit fit = [&] {
     const py::gil_scoped_release release;
-    return FitParameters(*text, WithoutWrappedAngle(task)->transitions, names);
+    return FitParameters(*text, WithoutWrappedAngle(task)->transitions, those);
   }();
   using namespace py::literals;
   py::dict parameters, deviations;
@@ -283,10 +305,13 @@ void BindTask(py::module_& module) {
   py::class_<JudgingTask, TaskPointer>(module, "Task", R"(A task: model, domain, declaration, observed steps, obstacles.
 
 Any number of threads may use one. n states, m inputs, T steps; the units are the model's.)")
-      .def(py::init(&MakeTask), py::arg("task"), py::arg("path") = "task",
-           R"(Of a dict with the keys of a task file, or the text of one.
+      .def(
+          py::init(&MakeTask), py::arg("task") = py::none(), py::pos_only(), py::arg("path") = "task",
+          py::arg("data") = py::none(),
+          R"(Of a dict with the keys of a task file, the text of one, or the keys by name: Task(model={...}, domain={...}, ...).
 
-`path` names it in messages, and the files that it names are relative to the directory of `path`.)")
+`path` names it in messages, and the files that it names are relative to the directory of `path`.
+data: (z, x_next) of observed steps, (N, n + m) and (N, n), instead of the file `transitions`.)")
       .def_static("load", &LoadTaskFile, py::arg("path"), WithoutGil(), "Reads a task file.")
       .def_property_readonly("path", [](const JudgingTask& task) { return task.config().path; })
       .def_property_readonly(
@@ -321,8 +346,9 @@ It is judged with what the task knew when it decided.)")
 
 by: "v,omega" for every state, or "theta=v,omega" for one. The result has `lipschitz` (n, n + m),
 `noise_bound` and `disturbance` (n,), `yaml`, and of the task's own steps how many slices were held against steps left out, how many miss them, and a warning.)")
-      .def("fit", &FitOf, py::arg("parameters"),
-           R"(Fits the named parameters of a model as text to the observations, as `forereach fit`.
+      .def(
+          "fit", &FitOf, py::arg("parameters") = std::vector<std::string>(),
+          R"(Fits the named parameters of a model as text, by default all but dt, to the observations, as `forereach fit`.
 
 The result has `parameters`, their standard errors `deviations`, and one-step errors `before` and `after`, (N, n).)");
 }

@@ -126,7 +126,20 @@ void RequireSteps(const Document& file, const Problem& problem) try {
   file.Fail("robot.step_error_ms", error.what());
 }
 
-Config Load(Document file, TransitionsFile transitions, const NamedFiles& instead) {
+Transitions TransitionsOf(const Transitions& data, const NominalModel& model) {
+  const auto require = [&](const char* what, const Eigen::MatrixXd& given, int columns) {
+    if (given.rows() == 0 || given.rows() != data.z.rows() || given.cols() != columns)
+      throw ConfigError(
+          fmt::format("data: {} has {} rows and {} columns, has to have {} rows, at least 1, and {} columns", what,
+                      given.rows(), given.cols(), data.z.rows(), columns));
+    if (!given.allFinite()) throw ConfigError(fmt::format("data: {} has a number that is not finite", what));
+  };
+  require("z", data.z, model.num_variables());
+  require("x_next", data.x_next, model.num_states());
+  return data;
+}
+
+Config Load(Document file, TransitionsFile transitions, const NamedFiles& instead, const Transitions* data = nullptr) {
   TaskDraft draft;
   draft.model_file.path = instead.model;
   file.Read(draft);
@@ -142,9 +155,11 @@ Config Load(Document file, TransitionsFile transitions, const NamedFiles& instea
                               model.variable_names()[ToSize(l)], model.state_names()[ToSize(k)],
                               model.state_names()[ToSize(k)], model.variable_names()[ToSize(l)]));
   if (!instead.transitions.empty()) transitions_path = instead.transitions;
+  if (data) transitions_path = "data";
   if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;
   if (transitions == TransitionsFile::kRead) {
-    problem.transitions = ReadTransitions(transitions_path, model, file.Place("transitions"));
+    problem.transitions =
+        data ? TransitionsOf(*data, model) : ReadTransitions(transitions_path, model, file.Place("transitions"));
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
   }
   config.path = file.path();
@@ -182,8 +197,8 @@ Config LoadConfig(const std::string& path, const NamedFiles& instead) {
   return Load(Document(path), TransitionsFile::kRead, instead);
 }
 
-Config ConfigOfText(const std::string& path, const std::string& text) {
-  return Load(Document::OfText(path, text), TransitionsFile::kRead, {});
+Config ConfigOfText(const std::string& path, const std::string& text, const Transitions* data) {
+  return Load(Document::OfText(path, text), TransitionsFile::kRead, {}, data);
 }
 
 NamedFiles FilesNamedBy(const std::string& path) {

@@ -232,6 +232,32 @@ class Tasks(unittest.TestCase):
         np.testing.assert_array_equal(fr.Task(text, path=BICYCLE).certify(plan("bicycle_safety")[0]).tube.hull,
                                       fr.Task.load(BICYCLE).certify(plan("bicycle_safety")[0]).tube.hull)
 
+    def test_are_keys_by_name_and_arrays_of_observed_steps(self):
+        keys = {key: value for key, value in self.SMALL.items() if key != "transitions"}
+        z, x_next = np.array([[0, 1, 0], [0, -1, 0.5]]), np.array([[0.1, 0.99], [-0.1, -0.94]])
+        task = fr.Task(**keys, data=(z, x_next))
+        self.assertEqual(task.num_observations, 2)
+        with tempfile.TemporaryDirectory() as directory:
+            rows = np.hstack([z, x_next])
+            np.savetxt(f"{directory}/small.csv", rows, "%.17g", ",", header="x,v,a,x_next,v_next", comments="")
+            file = fr.Task(self.SMALL, path=f"{directory}/task")
+        for same in [fr.Task(keys, data=(z, x_next)), fr.Task(self.SMALL, data=(np.asfortranarray(z), x_next.tolist())), file]:
+            np.testing.assert_array_equal(same.certify([[0.5]] * 9).tube.hull, task.certify([[0.5]] * 9).tube.hull)
+        self.assertNotIn("transitions", keys)
+        for words, data in [
+            ("must be a pair .z, x_next.", z[:1]),
+            ("data: z: has 1 dimensions", (z[0], x_next)),
+            ("data: z has 2 rows and 2 columns, has to have 2 rows, at least 1, and 3 columns", (z[:, :2], x_next)),
+            ("data: x_next has 1 rows and 2 columns, has to have 2 rows", (z, x_next[:1])),
+            ("data: z has 0 rows", (z[:0], x_next[:0])),
+            ("data: x_next has a number that is not finite", (z, x_next * np.nan)),
+            (r"data:3: v: -5 is outside \[-3, 3\] of domain.state", (z * [1, 5, 1] * [[0.2], [1]], x_next)),
+        ]:
+            self.assertRaisesRegex(fr.Error, words, fr.Task, keys, data=data)
+        self.assertRaisesRegex(fr.Error, "must be a dict or a text, or its keys by name", fr.Task)
+        self.assertRaisesRegex(fr.Error, "must be a dict or a text, or its keys by name", fr.Task, keys, model={})
+        self.assertRaisesRegex(fr.Error, "no_such", fr.Task, **keys, no_such=1)
+
     def test_learn_what_they_observe(self):
         task = self.small()
         before = task.certify([[0.5]] * 10)
@@ -255,6 +281,7 @@ class Tasks(unittest.TestCase):
         for v in rng.uniform(-1, 1, 30):
             self.assertEqual(task.observe([0, v, 0], [0.1 * v, 0.99 * v + rng.normal(0, 1e-10)]), "")
         self.assertAlmostEqual(task.fit(["drag"])["parameters"]["drag"], 0.01, 6)
+        self.assertEqual(task.fit()["parameters"], task.fit(["drag"])["parameters"])
         found = task.declare(by=["v"], factor=1.0, estimate_disturbance=False)
         self.assertEqual((found["lipschitz"].shape, found["disturbance"].tolist()), ((2, 3), [0, 0]))
         self.assertTrue(0.0099 < found["lipschitz"][1, 1] < 0.0101, found)
