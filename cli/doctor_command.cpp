@@ -37,7 +37,13 @@ namespace {
 
 constexpr int kRoundTrips = 500;
 constexpr std::size_t kRoundTripBytes = 2048;
-constexpr const char* kReadyCommand = "scripts/ready-bus";
+// Installed beside bin/, or in the tree that this was built in.
+std::string ReadyCommand() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path installed = self.parent_path().parent_path() / "libexec/forereach/ready-bus";
+  return std::filesystem::exists(installed, error) ? installed.string() : "scripts/ready-bus";
+}
 
 struct Check {
   std::string name;
@@ -52,7 +58,7 @@ Check CheckLoopback() {
   ifreq request{};
   std::copy_n("lo", 3, request.ifr_name);
   const bool up = ioctl(socket.get(), SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP);
-  return {"loopback interface", up, up ? "up" : "down", std::string(kReadyCommand) + ", or: ip link set lo up"};
+  return {"loopback interface", up, up ? "up" : "down", ReadyCommand() + ", or: ip link set lo up"};
 }
 
 // The interface of the most specific route to `group`, empty if there is none. The kernel's table has addresses and
@@ -81,7 +87,7 @@ std::string InterfaceOfRoute(const std::string& group) {
 Check CheckRoute(const std::string& group) {
   const std::string interface = InterfaceOfRoute(group);
   return {"multicast route to " + group, interface == "lo", interface.empty() ? "none" : "by " + interface,
-          std::string(kReadyCommand) + ", or: ip route add 224.0.0.0/4 dev lo"};
+          ReadyCommand() + ", or: ip route add 224.0.0.0/4 dev lo"};
 }
 
 Check CheckBuffer() {
