@@ -7,13 +7,13 @@ import re
 from html import escape
 
 GREEK = dict(zip("alpha beta gamma delta eps eta theta lambda mu pi rho sigma tau phi".split(), "αβγδεηθλμπρστφ"))
-FUNCTIONS = set("abs atan2 ball ceiling conv cos diag dist dt exp fl floor growth hypot log log1p lower max mid min pow sin sqrt sup tan tanh "
-                "ulp union unit upper".split())
+FUNCTIONS = set("abs atan2 ball ceiling conv cos diag dist dt exp fl floor growth hypot log log1p lower max mid min pow sin sqrt "
+                "sup tan tanh ulp union unit upper".split())
 SIGNS = {"<=": "≤", ">=": "≥", "+-": "±", "-+": "∓", "->": "→", "<-": "←", "..": "…", ".": "·", "*": "·", "-": "−"}
 WRITTEN = {"inf": "∞", "int": "∫", "sum": "∑", "union": "∪"}
 BREAKS = {"=", "<", ">", "<=", ">=", "+", "-", "+-", "-+", "->", "<-"}  # where a formula may wrap
 LONGEST = 24  # characters of what may not wrap
-CLOSING = {"(": ")", "[": "]", "{": "}", "⟨": "⟩"}
+CLOSING = {"(": ")]", "[": "])", "{": "}", "<": ">"}  # of intervals one end may be open
 
 # A hat is a ^ with nothing to raise; a sign directly behind a name, and before none, is raised.
 NAME = r"(?P<name>[A-Za-z]+\d?(?![A-Za-z0-9]))"
@@ -38,9 +38,10 @@ class Token:
             self.kind = "sign"
         self.strong = self.weak = False
         if self.kind == "name":
-            name, marked = self.parts["name"], any(self.parts[part] for part in ("accent", "prime", "sup", "sub", "sup2", "raised"))
-            letter = len(name.rstrip("0123456789")) == 1
-            self.strong = name in GREEK or name == "inf" or (letter and (name not in "aAI" or marked)) or bool(self.parts["sub"] or self.parts["accent"])
+            name, letter = self.parts["name"], len(self.parts["name"].rstrip("0123456789")) == 1
+            marked = any(self.parts[part] for part in ("accent", "prime", "sup", "sub", "sup2", "raised"))
+            self.strong = (name in GREEK or name == "inf" or (letter and (name not in "aAI" or marked))
+                           or bool(self.parts["sub"] or self.parts["accent"]))
             self.weak = not self.strong and (name in FUNCTIONS or name == "Box" or letter)
             is_identifier = len(name) > 2 and len(self.parts["sub"] or "") > 4  # signed_square
             if is_identifier or not (self.strong or self.weak):
@@ -67,7 +68,8 @@ def below(text):
         return f"<mi>{GREEK[text]}</mi>"
     if len(text) > 3 and text.isalpha():
         return f"<mi>{text}</mi>"
-    return "<mrow>" + "".join(f"<m{'n' if c.isdigit() else 'i' if c.isalpha() else 'o'}>{c}</m{'n' if c.isdigit() else 'i' if c.isalpha() else 'o'}>" for c in text) + "</mrow>"
+    tags = ["mn" if letter.isdigit() else "mi" if letter.isalpha() else "mo" for letter in text]
+    return "<mrow>" + "".join(f"<{tag}>{letter}</{tag}>" for tag, letter in zip(tags, text)) + "</mrow>"
 
 
 def scripts(base, sub, sup):
@@ -97,7 +99,8 @@ def named(parts):
 
 
 def fence(sign, sub, sup):
-    return scripts(f'<mo stretchy="false" lspace="0" rspace="0">{escape(sign)}</mo>', sub and below(sub[1:]), sup and raised(sup[1:]))
+    base = f'<mo stretchy="false" lspace="0" rspace="0">{escape(sign)}</mo>'
+    return scripts(base, sub and below(sub[1:]), sup and raised(sup[1:]))
 
 
 def element(token, tokens, i):
@@ -119,12 +122,14 @@ def element(token, tokens, i):
         return '<mspace width="0.2em"></mspace>' if wide else ""
     if token.kind == "sign":
         before = next((each for each in reversed(tokens[:i]) if each.kind != "space"), None)
-        is_prefix = (before is None or before.kind in ("open", "comma", "sign", "bar")) and i + 1 < len(tokens) and tokens[i + 1].kind != "space"
+        is_first = before is None or before.kind in ("open", "comma", "sign", "bar")
+        is_prefix = is_first and i + 1 < len(tokens) and tokens[i + 1].kind != "space"
         apart = ' form="prefix" lspace="0" rspace="0"' if is_prefix else ""
         return f"<mo{apart}>{escape(SIGNS.get(token.text, token.text))}</mo>"
-    if token.text == "x":
+    if token.kind == "times":
         return "<mo>×</mo>"
-    return f"<mo>{escape(token.text)}</mo>" if token.kind in ("comma",) else f"<mtext>{escape(token.text)}</mtext>"
+    tag = "mo" if token.kind == "comma" else "mtext"
+    return f"<{tag}>{escape(token.text)}</{tag}>"
 
 
 def tokens_of(text):
@@ -151,13 +156,10 @@ def balanced(tokens):
         if token.kind == "open":
             stack.append(i)
         elif token.kind == "close":
-            match = stack and CLOSING[tokens[stack[-1]].parts["open"].replace("<", "⟨")] == token.parts["close"].replace(">", "⟩")
-            if match:
+            if stack and token.parts["close"] in CLOSING[tokens[stack[-1]].parts["open"]]:
                 stack.pop()
-            elif not stack or "[" not in (tokens[stack[-1]].text + token.text) and "(" not in (tokens[stack[-1]].text + token.text):
-                cut.add(i)
             else:
-                stack.pop()  # half-open intervals
+                cut.add(i)
         elif token.kind == "bar":
             bars.append(i)
     cut.update(stack)
@@ -179,11 +181,12 @@ def trimmed(piece):
     """(what stands before, the formula, what stands after)."""
     begin, end = 0, len(piece)
     first = 1 if piece and piece[0].kind == "space" else 0
-    if [token.kind for token in piece[first:first + 4]] == ["open", "name", "close", "space"] and len(piece[first + 1].text) == 1:
+    kinds = [token.kind for token in piece[first:first + 4]]
+    if kinds == ["open", "name", "close", "space"] and len(piece[first + 1].text) == 1:
         begin = first + 3  # (b), of a list
     while begin < end:
         token = piece[begin]
-        glued = token.kind == "sign" and token.text in ("-", "+-", "-+") and begin + 1 < end and piece[begin + 1].kind != "space"
+        glued = token.text in ("-", "+-", "-+") and begin + 1 < end and piece[begin + 1].kind != "space"
         article = token.text in ("a", "A", "I") and begin + 1 < end and piece[begin + 1].kind == "space" and not (
             begin + 2 < end and piece[begin + 2].kind == "sign")
         if token.kind in ("space", "comma") or (token.kind == "sign" and not glued) or article:
@@ -211,8 +214,8 @@ def is_formula(piece):
 
 
 def plain(tokens):
-    return escape("".join(SIGNS.get(token.text, token.text) if token.kind == "sign" and token.text in ("<=", ">=", "+-", "..") else token.text
-                          for token in tokens), quote=False)
+    written = [SIGNS[token.text] if token.text in ("<=", ">=", "+-", "..") else token.text for token in tokens]
+    return escape("".join(written), quote=False)
 
 
 def split(piece, limit):
@@ -274,5 +277,6 @@ def display(block):
     """HTML of an indented block: each line is formulas, several blanks apart."""
     lines = []
     for line in block.strip("\n").splitlines():
-        lines.append("<p class=formula>" + " &emsp; ".join(typeset(part) for part in re.split(r"\s{2,}", line.strip())) + "</p>")
+        parts = [typeset(part) for part in re.split(r"\s{2,}", line.strip())]
+        lines.append(f"<p class=formula>{' &emsp; '.join(parts)}</p>")
     return "\n".join(lines) + "\n"

@@ -6,7 +6,8 @@ from textwrap import dedent
 from formulas import typeset
 
 COMMENT = re.compile(r"^[ ]*/\*\*(.*?)\*/[ ]*\n", re.M | re.S)
-NOT_SHOWN = re.compile(r"^(?:#pragma once|#include .*|FOREREACH_ARITHMETIC_\w+|namespace [\w:]* ?\{|\} *// *namespace.*|public:)\n", re.M)
+NOT_SHOWN = re.compile(
+    r"^(?:#pragma once|#include .*|FOREREACH_ARITHMETIC_\w+|namespace [\w:]* ?\{|\} *// *namespace.*)\n", re.M)
 PRIVATE = re.compile(r"^( *) private:\n.*?(?=^\1\};)", re.M | re.S)
 MARK = {"param": "", "tparam": "", "throws": "throws ", "pre": "before: ", "post": "after: ", "return": "returns "}
 
@@ -39,14 +40,17 @@ def prose(comment, link):
         made += f"<p>{words(first, link)}</p>\n" if first.strip() else ""
         items = ""
         for mark, text in zip(marked[::2], marked[1::2]):
-            name, rest = (re.match(r"(\S+)(.*)", text, re.S).groups() if mark in ("param", "tparam", "throws") else ("", text))
-            items += f"<li>{MARK[mark]}" + (f"<code>{escape(name, quote=False)}</code>" if name else "") + f"{words(rest, link)}</li>\n"
+            is_named = mark in ("param", "tparam", "throws")
+            name, rest = re.match(r"(\S+)(.*)", text, re.S).groups() if is_named else ("", text)
+            named = f"<code>{escape(name, quote=False)}</code>" if name else ""
+            items += f"<li>{MARK[mark]}{named}{words(rest, link)}</li>\n"
         made += f"<ul>\n{items}</ul>\n" if items else ""
     return made
 
 
 def html(content, link):
-    return "".join(prose(comment, link) + (f"<pre>{escape(code, quote=False)}</pre>\n" if code else "") for comment, code in content)
+    below = [f"<pre>{escape(code, quote=False)}</pre>\n" if code else "" for _, code in content]
+    return "".join(prose(comment, link) + code for (comment, _), code in zip(content, below))
 
 
 def first_sentence(content):
