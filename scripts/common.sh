@@ -96,4 +96,7 @@ build() {
 # For a build of the programs alone.
 programs_only=(-DFOREREACH_TESTS=OFF -DFOREREACH_PYTHON=OFF -DFOREREACH_FLEET=OFF)
 
+# source_into DIRECTORY: the last commit; without git, the tree.
+source_into() { mkdir -p "$1" && { git archive HEAD 2>/dev/null || tar -c --exclude=./build --exclude=./run .; } | tar -x -C "$1"; }
+
 bus_is_ready() { "$root/scripts/ready-bus" --check; }
