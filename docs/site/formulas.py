@@ -118,7 +118,8 @@ def element(token, tokens, i):
         return fence("|", parts["bar_sub"], parts["bar_sup"])
     if token.kind == "space":  # a word of a formula keeps its distance
         near = [tokens[k].parts.get("name") or "" for k in (i - 1, i + 1) if 0 <= k < len(tokens)]
-        wide = any(len(name.rstrip("0123456789")) > 1 and name not in GREEK for name in near)
+        wide = any(len(name.rstrip("0123456789")) > 1 and name not in GREEK for name in near) or (
+            i + 1 < len(tokens) and tokens[i + 1].kind == "open")
         return '<mspace width="0.2em"></mspace>' if wide else ""
     if token.kind == "sign":
         before = next((each for each in reversed(tokens[:i]) if each.kind != "space"), None)
