@@ -1,10 +1,11 @@
-/** Vectors of doubles: Lanes has four, Pack has eight. Results have the same bits on every machine, because only +, -,
-*, /, max, min, |.| and comparisons are used, lane by lane, and sums always have the same order. The instruction set
-(instruction_set.h) changes the time only.
+/** Vectors of doubles: Lanes has four, Pack has eight, and WidePack has eight in one register. Results have the same
+bits on every machine, because only +, -, *, /, max, min, |.| and comparisons are used, lane by lane, and sums always
+have the same order. The instruction set (instruction_set.h) changes the time only.
 
 The convention for passing a vector by value depends on the instruction set for which a function is compiled. So every
 function or lambda that takes or returns Lanes is marked FOREREACH_INLINE, which inlines without optimisation too. Bits
-and FromBits reinterpret a vector; std::bit_cast would be a call. Pack is a class and is passed in memory. */
+and FromBits reinterpret a vector; std::bit_cast would be a call. Pack is a class and is passed in memory; functions
+that take or return a WidePack are marked as well. */
 #pragma once
 
 #include <array>
@@ -153,6 +154,8 @@ FOREREACH_INLINE Same Fill(double x) { return {AllLanes(x)}; }
 FOREREACH_INLINE Pack LoadPack(const Pack& p) { return {p.low, p.high}; }
 /** From any address of eight doubles. */
 FOREREACH_INLINE Pack LoadPack(const double* p) { return {LoadLanes(p), LoadLanes(p + kLaneCount)}; }
+FOREREACH_INLINE Lanes Low(const Pack& a) { return a.low; }
+FOREREACH_INLINE Lanes High(const Pack& a) { return a.high; }
 
 FOREREACH_INLINE Pack operator+(const Pack& a, const Pack& b) { return {a.low + b.low, a.high + b.high}; }
 FOREREACH_INLINE Pack operator-(const Pack& a, const Pack& b) { return {a.low - b.low, a.high - b.high}; }
@@ -162,28 +165,83 @@ FOREREACH_INLINE Pack Min(const Pack& a, const Pack& b) { return {Min(a.low, b.l
 FOREREACH_INLINE Pack Max(const Pack& a, const Pack& b) { return {Max(a.low, b.low), Max(a.high, b.high)}; }
 FOREREACH_INLINE double Max(double a, double b) { return a > b ? a : b; }
 
+/** Eight doubles in one register, for code that runs with AVX-512 alone. Comparisons go by its halves: g++ fixes the
+type of their masks before it knows the instruction set. */
+struct WidePack {
+  using Eight [[gnu::vector_size(64)]] = double;
+  using Bits [[gnu::vector_size(64)]] = std::int64_t;
+  Eight all;
+};
+
+FOREREACH_INLINE Lanes Low(const WidePack& a) { return __builtin_shufflevector(a.all, a.all, 0, 1, 2, 3); }
+FOREREACH_INLINE Lanes High(const WidePack& a) { return __builtin_shufflevector(a.all, a.all, 4, 5, 6, 7); }
+FOREREACH_INLINE WidePack operator+(const WidePack& a, const WidePack& b) { return {a.all + b.all}; }
+FOREREACH_INLINE WidePack operator-(const WidePack& a, const WidePack& b) { return {a.all - b.all}; }
+FOREREACH_INLINE WidePack operator*(const WidePack& a, const WidePack& b) { return {a.all * b.all}; }
+FOREREACH_INLINE WidePack Abs(const WidePack& a) {
+  return {reinterpret_cast<WidePack::Eight>(reinterpret_cast<WidePack::Bits>(a.all) & INT64_MAX)};
+}
+FOREREACH_INLINE WidePack Min(const WidePack& a, const WidePack& b) { return {a.all < b.all ? a.all : b.all}; }
+FOREREACH_INLINE WidePack Max(const WidePack& a, const WidePack& b) { return {a.all > b.all ? a.all : b.all}; }
+
+/** How P, Pack or WidePack, is made. */
+template <class P>
+struct Packs {
+  using Equal = Same;
+  FOREREACH_INLINE static Pack Join(const Lanes& low, const Lanes& high) { return {low, high}; }
+  FOREREACH_INLINE static Pack Load(const Pack& p) { return LoadPack(p); }
+  FOREREACH_INLINE static Pack Load(const double* p) { return LoadPack(p); }
+  FOREREACH_INLINE static Same Repeat(const Lanes& x) { return {x}; }
+  FOREREACH_INLINE static Same Fill(double x) { return forereach::Fill(x); }
+};
+template <>
+struct Packs<WidePack> {
+  using Equal = WidePack;
+  FOREREACH_INLINE static WidePack Join(const Lanes& low, const Lanes& high) {
+    return {__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7)};
+  }
+  FOREREACH_INLINE static WidePack Load(const Pack& p) { return Load(&p.low); }
+  FOREREACH_INLINE static WidePack Load(const void* p) {
+    WidePack x;
+    __builtin_memcpy(&x, p, sizeof x);
+    return x;
+  }
+  FOREREACH_INLINE static WidePack Repeat(const Lanes& x) { return Join(x, x); }
+  // A list of eight is assembled number by number.
+  FOREREACH_INLINE static WidePack Fill(double x) {
+    const Lanes four = AllLanes(x);
+    return {__builtin_shufflevector(four, four, 0, 0, 0, 0, 0, 0, 0, 0)};
+  }
+};
+
 /** The largest of eight. */
-FOREREACH_INLINE double MaxLane(const Pack& a) {
-  const Lanes m = Max(a.low, a.high);
+template <class P>
+FOREREACH_INLINE double MaxLane(const P& a) {
+  const Lanes m = Max(Low(a), High(a));
   return Max(Max(m[0], m[2]), Max(m[1], m[3]));
 }
 
 /** The sum of eight. Each number passes three roundings. */
-FOREREACH_INLINE double SumLanes(const Pack& a) { return Sum(a.low + a.high); }
+template <class P>
+FOREREACH_INLINE double SumLanes(const P& a) {
+  return Sum(Low(a) + High(a));
+}
 
 /** Replaces the last three bits of each double by the number of its lane, so that TaggedLane of the largest gives its
 lane. Changes a number by at most seven units in the last place. @pre all are finite. */
-FOREREACH_INLINE Pack TagLanes(const Pack& a) {
+template <class P>
+FOREREACH_INLINE P TagLanes(const P& a) {
   const LaneMask rest = ~LaneMask{7, 7, 7, 7};
-  return {FromBits((Bits(a.low) & rest) | LaneMask{0, 1, 2, 3}),
-          FromBits((Bits(a.high) & rest) | LaneMask{4, 5, 6, 7})};
+  return Packs<P>::Join(FromBits((Bits(Low(a)) & rest) | LaneMask{0, 1, 2, 3}),
+                        FromBits((Bits(High(a)) & rest) | LaneMask{4, 5, 6, 7}));
 }
 FOREREACH_INLINE std::size_t TaggedLane(double value) { return std::bit_cast<std::uint64_t>(value) & 7; }
 
 /** a with the lanes that hold `value` set to `other`. */
-FOREREACH_INLINE Pack Replace(const Pack& a, double value, double other) {
+template <class P>
+FOREREACH_INLINE P Replace(const P& a, double value, double other) {
   const Lanes v = AllLanes(value), o = AllLanes(other);
-  return {a.low == v ? o : a.low, a.high == v ? o : a.high};
+  return Packs<P>::Join(Low(a) == v ? o : Low(a), High(a) == v ? o : High(a));
 }
 
 }  // namespace forereach

@@ -108,17 +108,24 @@ struct LipschitzEnvelope::Search {
   [[nodiscard]] Sides RunWith(const QuerySet& set, const More&... more) const {
     return Run(Metric(row.distance, set, more...));
   }
-  template <class Metric, class... More>
+  template <template <class> class Metric, class... More>
   [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
-    return Dispatch<&Search::RunWith<Metric, More...>>(options.instructions, *this, set, more...);
+    return Dispatch<&Search::RunWith<Metric<Pack>, More...>, &Search::RunWith<Metric<WidePack>, More...>>(
+        options.instructions, *this, set, more...);
   }
+  template <class P>
+  using OneColumn = internal::PatternMetric<1, P>;
+  template <class P>
+  using TwoColumns = internal::PatternMetric<2, P>;
+  template <class P>
+  using ThreeColumns = internal::PatternMetric<3, P>;
 
   [[nodiscard]] Sides Best(const QuerySet& set) const {
     const std::size_t columns = row.distance.columns().size();
     const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
-    if (columns == 1) return With<internal::PatternMetric<1>>(set, margin);
-    if (columns == 2) return With<internal::PatternMetric<2>>(set, margin);
-    if (columns == 3) return With<internal::PatternMetric<3>>(set, margin);
+    if (columns == 1) return With<OneColumn>(set, margin);
+    if (columns == 2) return With<TwoColumns>(set, margin);
+    if (columns == 3) return With<ThreeColumns>(set, margin);
     if (columns > ToSize(kMaxExactColumns)) return With<internal::HullMetric>(set, margin);
     return With<internal::SignMetric>(set, margin, std::span<const double>(row.component_errors));
   }

@@ -1,5 +1,5 @@
 /** The distances D_i of a query set to the observations, Eq. (zonotope-set-distance), eight at a time, for the search
-over an ObservationIndex (search.h).
+over an ObservationIndex (search.h). Each is a template over the type of eight in registers, P: Pack or WidePack.
 
 A metric has
 - coordinates(): those of an observation in this row;
@@ -48,13 +48,15 @@ struct Variable {
 };
 
 /** Reads a row of generators, eight at a time. Entries behind the last generator are zero. */
+template <class P>
 class Chunks {
  public:
   explicit Chunks(const Zonotope& slice) : padded_(slice.padded_size()) {}
   [[nodiscard]] std::size_t size() const { return (padded_ + kLaneCount) / kPackSize; }
-  [[nodiscard]] Pack Get(const double* row, std::size_t chunk) const {
+  [[nodiscard]] FOREREACH_INLINE P Get(const double* row, std::size_t chunk) const {
     const std::size_t first = chunk * kPackSize;
-    return first + kPackSize <= padded_ ? LoadPack(row + first) : Pack{LoadLanes(row + first), AllLanes(0)};
+    if (first + kPackSize <= padded_) return Packs<P>::Load(row + first);
+    return Packs<P>::Join(LoadLanes(row + first), AllLanes(0));
   }
 
  private:
@@ -62,21 +64,25 @@ class Chunks {
 };
 
 /** The distance of x to each of eight intervals; zero inside. */
-inline Pack Gap(const Pack& lowest, const Pack& highest, const Pack& x) {
-  return Max(Max(lowest - x, x - highest), Fill(0));
+template <class P>
+FOREREACH_INLINE P Gap(const P& lowest, const P& highest, const P& x) {
+  return Max(Max(lowest - x, x - highest), P(Packs<P>::Fill(0)));
 }
 
 /** Rows with one to three columns: D_i = max_s (|A_s - alpha_is| + w_s), A_s = sum_l s_l L_kl c_l and
 w_s = sum_j |sum_l s_l L_kl G_lj| + sum_l L_kl s_l, common = w_0. */
-template <std::size_t kColumns>
+template <std::size_t kColumns, class P>
 class PatternMetric {
+  using Eights = Packs<P>;
+
  public:
   static constexpr bool kRefines = false;
+  using InRegisters = P;
 
   /** @param margin at least twice the error bound of plain arithmetic in this row. */
   PatternMetric(const LipschitzRow& row, const QuerySet& set, double margin) {
     std::array<double, kColumns> weighted;
-    std::array<Same, kColumns> slope;
+    std::array<typename Eights::Equal, kColumns> slope;
     std::array<const double*, kColumns> generators;
     double slack = 0;
     for (std::size_t l = 0; l < kColumns; ++l) {
@@ -84,14 +90,14 @@ class PatternMetric {
       const Variable variable(set, column.variable);
       weighted[l] = column.slope * variable.center;
       slack += column.slope * variable.slack;
-      slope[l] = Fill(column.slope);
+      slope[l] = Eights::Fill(column.slope);
       generators[l] = variable.generators;
     }
-    std::array<Pack, kPatterns> spread;
-    spread.fill(Fill(0));
-    const Chunks chunks(set.slice);
+    std::array<P, kPatterns> spread;
+    spread.fill(Eights::Fill(0));
+    const Chunks<P> chunks(set.slice);
     for (std::size_t j = 0; j < chunks.size(); ++j) {
-      std::array<Pack, kColumns> term;
+      std::array<P, kColumns> term;
       for (std::size_t l = 0; l < kColumns; ++l) term[l] = slope[l] * chunks.Get(generators[l], j);
       for (std::size_t s = 0; s < kPatterns; ++s) spread[s] = spread[s] + Abs(Signed(s, term));
     }
@@ -100,7 +106,7 @@ class PatternMetric {
       return std::array{at(0), at(1), at(2), at(3)};
     };
     const auto sums =
-        lanes([&](std::size_t s) __attribute__((always_inline)) { return spread[s].low + spread[s].high; });
+        lanes([&](std::size_t s) __attribute__((always_inline)) { return Low(spread[s]) + High(spread[s]); });
     const auto centers = lanes([&](std::size_t s) { return Signed(s, weighted); });
     const Lanes spreads = SumEach(sums[0], sums[1], sums[2], sums[3]) + AllLanes(slack);
     common_ = spreads[0];
@@ -108,30 +114,31 @@ class PatternMetric {
     const Lanes below = center - extra + AllLanes(margin), above = -center - extra + AllLanes(margin);
     Lanes farthest = AllLanes(0);
     for (std::size_t s = 0; s < kPatterns; ++s) {
-      center_[s] = {AllLanes(center[s])};
-      extra_[s] = {AllLanes(extra[s])};
-      from_below_[s] = {AllLanes(below[s])};
-      from_above_[s] = {AllLanes(above[s])};
-      farthest = Max(farthest, extra_[s].all);
+      center_[s] = Eights::Fill(center[s]);
+      extra_[s] = Eights::Fill(extra[s]);
+      from_below_[s] = Eights::Fill(below[s]);
+      from_above_[s] = Eights::Fill(above[s]);
+      farthest = Max(farthest, AllLanes(extra[s]));
     }
-    anywhere_ = {AllLanes(margin) - farthest};
+    anywhere_ = Eights::Repeat(AllLanes(margin) - farthest);
   }
 
   [[nodiscard]] static constexpr std::size_t coordinates() { return kPatterns; }
   [[nodiscard]] double common() const { return common_; }
 
-  [[nodiscard]] Pack Block(const Pack* block) const {
-    Pack distance = Abs(center_[0] - LoadPack(block[0]));
+  [[nodiscard]] FOREREACH_INLINE P Block(const Pack* block) const {
+    P distance = Abs(center_[0] - Eights::Load(block[0]));
     for (std::size_t s = 1; s < kPatterns; ++s)
-      distance = Max(distance, Abs(center_[s] - LoadPack(block[s])) + extra_[s]);
+      distance = Max(distance, Abs(center_[s] - Eights::Load(block[s])) + extra_[s]);
     return distance;
   }
 
-  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+  [[nodiscard]] FOREREACH_INLINE P Node(const Pack* node, std::size_t side) const {
     node += side * (2 * kPatterns + 1);
-    Pack bound = LoadPack(node[2 * kPatterns]) + anywhere_;
+    P bound = Eights::Load(node[2 * kPatterns]) + anywhere_;
     for (std::size_t s = 0; s < kPatterns; ++s)
-      bound = Min(bound, Min(LoadPack(node[2 * s]) + from_below_[s], LoadPack(node[2 * s + 1]) + from_above_[s]));
+      bound =
+          Min(bound, Min(Eights::Load(node[2 * s]) + from_below_[s], Eights::Load(node[2 * s + 1]) + from_above_[s]));
     return bound;
   }
 
@@ -139,7 +146,7 @@ class PatternMetric {
   static constexpr std::size_t kPatterns = std::size_t{1} << (kColumns - 1);
 
   template <class T>
-  static T Signed(std::size_t s, const std::array<T, kColumns>& terms) {
+  FOREREACH_INLINE static T Signed(std::size_t s, const std::array<T, kColumns>& terms) {
     T sum = terms[kColumns - 1];
     for (std::size_t l = 0; l + 1 < kColumns; ++l)
       sum = LipschitzRow::IsNegative(s, l) ? sum - terms[l] : sum + terms[l];
@@ -147,18 +154,23 @@ class PatternMetric {
   }
 
   double common_;
-  std::array<Same, kPatterns> center_, extra_;           // A_s, w_s - w_0
-  std::array<Same, kPatterns> from_below_, from_above_;  // A_s - extra_s and -A_s - extra_s, plus the margin
-  Same anywhere_;                                        // the margin - max_s extra_s
+  using Equal = typename Eights::Equal;
+  std::array<Equal, kPatterns> center_, extra_;           // A_s, w_s - w_0
+  std::array<Equal, kPatterns> from_below_, from_above_;  // A_s - extra_s and -A_s - extra_s, plus the margin
+  Equal anywhere_;                                        // the margin - max_s extra_s
 };
 
 /** d_i = sum_l L_kl |c_l - z_il| in any number of columns. */
+template <class P>
 class CenterDistance {
  public:
+  using InRegisters = P;
+  using Eights = Packs<P>;
+
   CenterDistance(const LipschitzRow& row, const QuerySet& set) : columns_(row.columns().size()) {
     for (std::size_t l = 0; l < columns_; ++l) {
       const LipschitzRow::Column& column = row.columns()[l];
-      center_[l] = Fill(column.slope * Variable(set, column.variable).center);
+      center_[l] = Eights::Fill(column.slope * Variable(set, column.variable).center);
     }
   }
 
@@ -169,58 +181,65 @@ class CenterDistance {
     return center_[l].all[0] - block[l].at(lane);
   }
 
-  [[nodiscard]] Pack Block(const Pack* block) const {
-    Pack distance = Abs(center_[0] - LoadPack(block[0]));
-    for (std::size_t l = 1; l < columns_; ++l) distance = distance + Abs(center_[l] - LoadPack(block[l]));
+  [[nodiscard]] FOREREACH_INLINE P Block(const Pack* block) const {
+    P distance = Abs(center_[0] - Eights::Load(block[0]));
+    for (std::size_t l = 1; l < columns_; ++l) distance = distance + Abs(center_[l] - Eights::Load(block[l]));
     return distance;
   }
 
   /** An upper bound on v_i - d_i, without a margin for rounding. */
-  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
-    Pack bound = LoadPack(node[side]);
+  [[nodiscard]] FOREREACH_INLINE P Node(const Pack* node, std::size_t side) const {
+    P bound = Eights::Load(node[side]);
     for (std::size_t l = 0; l < columns_; ++l)
-      bound = bound - Gap(LoadPack(node[2 + 2 * l]), LoadPack(node[3 + 2 * l]), center_[l]);
+      bound = bound - Gap<P>(Eights::Load(node[2 + 2 * l]), Eights::Load(node[3 + 2 * l]), center_[l]);
     return bound;
   }
 
  private:
   std::size_t columns_;
-  std::array<Same, kMaxVariables> center_;
+  std::array<typename Eights::Equal, kMaxVariables> center_;
 };
 
 /** Rows with too many columns for signs, over the interval hull: D_i = d_i + sum_l L_kl r_l, common = the sum. */
-class HullMetric : public CenterDistance {
+template <class P>
+class HullMetric : public CenterDistance<P> {
+  using Eights = Packs<P>;
+
  public:
   static constexpr bool kRefines = false;
 
   HullMetric(const LipschitzRow& row, const QuerySet& set, double margin)
-      : CenterDistance(row, set), margin_(Fill(margin)) {
+      : CenterDistance<P>(row, set), margin_(Eights::Fill(margin)) {
     for (const LipschitzRow::Column& column : row.columns())
       common_ += column.slope * Variable(set, column.variable).half_width;
   }
   [[nodiscard]] double common() const { return common_; }
-  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
-    return CenterDistance::Node(node, side) + margin_;
+  [[nodiscard]] FOREREACH_INLINE P Node(const Pack* node, std::size_t side) const {
+    return CenterDistance<P>::Node(node, side) + margin_;
   }
 
  private:
   double common_ = 0;
-  Same margin_;
+  typename Eights::Equal margin_;
 };
 
 /** Rows in between: Block and Node give d_i + a lower bound of the spreads w_s, which is not above D_i, and Refine
 gives D_i = max_s |sum_l s_l v_il| + w_s, v_il = L_kl (c_l - z_il). Over all z in the hull, z_l - z_il has one sign
 where |c_l - z_il| >= r_l: there the maximum has that sign, and only the signs of the other columns are tried. */
-class SignMetric : public CenterDistance {
+template <class P>
+class SignMetric : public CenterDistance<P> {
+  using Eights = Packs<P>;
+
  public:
+  using CenterDistance<P>::columns, CenterDistance<P>::Component;
   static constexpr bool kRefines = true;
   static constexpr std::size_t kMaxColumns = 12;
 
   /** @param margin as PatternMetric's. @param errors for each column, at least the error of L_kl r_l plus that of
   v_il. */
   SignMetric(const LipschitzRow& row, const QuerySet& set, double margin, std::span<const double> errors)
-      : CenterDistance(row, set), chunks_(Chunks(set.slice).size()) {
-    const Chunks chunks(set.slice);
+      : CenterDistance<P>(row, set), chunks_(Chunks<P>(set.slice).size()) {
+    const Chunks<P> chunks(set.slice);
     for (std::size_t l = 0; l < columns(); ++l) {
       const LipschitzRow::Column& column = row.columns()[l];
       const Variable variable(set, column.variable);
@@ -228,15 +247,15 @@ class SignMetric : public CenterDistance {
       hull_ += reach_[l];
       slack_ += column.slope * variable.slack;
       for (std::size_t j = 0; j < chunks_; ++j)
-        weighted_[l][j] = Fill(column.slope) * chunks.Get(variable.generators, j);
+        weighted_[l][j] = Eights::Fill(column.slope) * chunks.Get(variable.generators, j);
     }
-    least_ = Fill(LeastSpread() + slack_ - margin);
+    least_ = Eights::Fill(LeastSpread() + slack_ - margin);
   }
 
   [[nodiscard]] double common() const { return 0; }
-  [[nodiscard]] Pack Block(const Pack* block) const { return CenterDistance::Block(block) + least_; }
-  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
-    return CenterDistance::Node(node, side) - least_;
+  [[nodiscard]] FOREREACH_INLINE P Block(const Pack* block) const { return CenterDistance<P>::Block(block) + least_; }
+  [[nodiscard]] FOREREACH_INLINE P Node(const Pack* node, std::size_t side) const {
+    return CenterDistance<P>::Node(node, side) - least_;
   }
 
   /** D_i of one observation, by 2^f patterns for f columns with a free sign. If `patterns` does not allow that many, it
@@ -244,7 +263,7 @@ class SignMetric : public CenterDistance {
   [[nodiscard]] double Refine(const Pack* block, std::size_t lane, int& patterns, bool& capped) const {
     Signs signs;
     signs.sums[0] = 0;
-    for (std::size_t j = 0; j < chunks_; ++j) signs.along[0][j] = Fill(0);
+    for (std::size_t j = 0; j < chunks_; ++j) signs.along[0][j] = Eights::Fill(0);
     std::size_t free = 0, fixed = 0;
     for (std::size_t l = 0; l < columns(); ++l) {
       const double component = Component(block, lane, l);
@@ -271,13 +290,13 @@ class SignMetric : public CenterDistance {
     std::array<std::size_t, kMaxColumns> free;
     std::array<double, kMaxColumns> components;
     std::array<double, kMaxColumns + 1> sums;
-    std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
+    std::array<std::array<P, kMaxChunks>, kMaxColumns + 1> along;
   };
 
   // Multiplies by the sign: a branch would be mispredicted half the time, and the product is exact.
   void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, double sign) const {
     signs.sums[to] = signs.sums[from] + sign * component;
-    const Same same = Fill(sign);
+    const auto same = Eights::Fill(sign);
     for (std::size_t j = 0; j < chunks_; ++j) signs.along[to][j] = signs.along[from][j] + same * weighted_[l][j];
   }
 
@@ -288,7 +307,7 @@ class SignMetric : public CenterDistance {
       const auto same = pattern == 0 ? 0 : free - 1 - ToSize(std::countr_zero(pattern));
       for (std::size_t t = same; t < free; ++t)
         Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1 ? -1 : 1);
-      Pack spread = Fill(0);
+      P spread = Eights::Fill(0);
       for (std::size_t j = 0; j < chunks_; ++j) spread = spread + Abs(signs.along[free][j]);
       farthest = Max(farthest, std::abs(signs.sums[free]) + (SumLanes(spread) + slack_));
     }
@@ -297,24 +316,24 @@ class SignMetric : public CenterDistance {
 
   // |sum_l s_l g_l| >= 2 max_l |g_l| - sum_l |g_l|, for each generator.
   double LeastSpread() const {
-    Pack least = Fill(0);
+    P least = Eights::Fill(0);
     for (std::size_t j = 0; j < chunks_; ++j) {
-      Pack sum = Fill(0), largest = Fill(0);
+      P sum = Eights::Fill(0), largest = Eights::Fill(0);
       for (std::size_t l = 0; l < columns(); ++l) {
-        const Pack term = Abs(weighted_[l][j]);
+        const P term = Abs(weighted_[l][j]);
         sum = sum + term;
         largest = Max(largest, term);
       }
-      least = least + Max(largest + largest - sum, Fill(0));
+      least = least + Max(largest + largest - sum, P(Eights::Fill(0)));
     }
     return SumLanes(least);
   }
 
   std::size_t chunks_;
   double hull_ = 0, slack_ = 0;
-  Same least_;
+  typename Eights::Equal least_;
   std::array<double, kMaxColumns> reach_;
-  std::array<std::array<Pack, kMaxChunks>, kMaxColumns> weighted_;
+  std::array<std::array<P, kMaxChunks>, kMaxColumns> weighted_;
 };
 
 }  // namespace forereach::internal

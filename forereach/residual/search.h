@@ -36,12 +36,13 @@ struct Sides {
 their bounds, until no bound exceeds the best. @param optimistic upper bounds on v_i - D_i; the values themselves if the
 metric does not refine. */
 template <class Metric>
-double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best,
-                   Budget& budget) {
+double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values,
+                   const typename Metric::InRegisters& optimistic, double best, Budget& budget) {
+  using P = typename Metric::InRegisters;
   if constexpr (!Metric::kRefines) {
     return Max(best, MaxLane(optimistic));
   } else {
-    for (Pack left = TagLanes(Max(optimistic, Fill(-kMaxDouble)));;) {
+    for (P left = TagLanes(Max(optimistic, P(Packs<P>::Fill(-kMaxDouble))));;) {
       const double next = MaxLane(left);
       if (!(next > Max(best, ObservationIndex::kMissing))) return best;
       const std::size_t lane = TaggedLane(next);
@@ -54,12 +55,13 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
 /** `best`, raised to both maxima over `count` adjacent blocks. */
 template <class Metric>
 Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, const Sides& best, Budget&) {
+  using P = typename Metric::InRegisters;
   const std::size_t coordinates = metric.coordinates();
-  Pack floors = Fill(best.floor), ceilings = Fill(best.negated_ceiling);
+  P floors = Packs<P>::Fill(best.floor), ceilings = Packs<P>::Fill(best.negated_ceiling);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
-    const Pack distance = metric.Block(block);
-    floors = Max(LoadPack(block[coordinates]) - distance, floors);
-    ceilings = Max(LoadPack(block[coordinates + 1]) - distance, ceilings);
+    const P distance = metric.Block(block);
+    floors = Max(Packs<P>::Load(block[coordinates]) - distance, floors);
+    ceilings = Max(Packs<P>::Load(block[coordinates + 1]) - distance, ceilings);
   }
   return {MaxLane(floors), MaxLane(ceilings)};
 }
@@ -69,16 +71,17 @@ best. */
 template <class Metric>
 requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
                                            const Sides& before, Budget& budget) {
+  using P = typename Metric::InRegisters;
   const std::size_t coordinates = metric.coordinates();
-  std::array<std::array<Pack, kMaxRefinedBlocks>, 2> optimistic;
+  std::array<std::array<P, kMaxRefinedBlocks>, 2> optimistic;
   std::array<std::array<double, kMaxRefinedBlocks>, 2> highest;
   std::array<std::size_t, 2> first{0, 0};
   std::array<double, 2> top{-kInfinity, -kInfinity};
   for (std::size_t b = 0; b < count; ++b) {
     const Pack* block = blocks + b * (coordinates + 2);
-    const Pack distance = metric.Block(block);
+    const P distance = metric.Block(block);
     for (std::size_t side = 0; side < 2; ++side) {
-      optimistic[side][b] = LoadPack(block[coordinates + side]) - distance;
+      optimistic[side][b] = Packs<P>::Load(block[coordinates + side]) - distance;
       highest[side][b] = MaxLane(optimistic[side][b]);
       first[side] = highest[side][b] > top[side] ? b : first[side];
       top[side] = Max(highest[side][b], top[side]);
@@ -100,10 +103,12 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
 /** The larger of `best` and the maximum over one leaf, for one side. */
 template <class Metric>
 double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t side, double best, Budget& budget) {
+  using P = typename Metric::InRegisters;
   const std::size_t coordinates = metric.coordinates();
-  Pack highest = Fill(-kInfinity);
+  P highest = Packs<P>::Fill(-kInfinity);
   for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
-    const Pack values = LoadPack(block[coordinates + side]), optimistic = values - metric.Block(block);
+    const Pack& values = block[coordinates + side];
+    const P optimistic = Packs<P>::Load(values) - metric.Block(block);
     if constexpr (Metric::kRefines)
       best = BestOfBlock(metric, block, values, optimistic, best, budget);
     else
@@ -116,6 +121,8 @@ double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t side, dou
 bound first. It proceeds in steps, so that two searches can alternate and hide the latency of comparisons and memory. */
 template <class Metric, std::size_t kSide>
 class Descent {
+  using P = typename Metric::InRegisters;
+
  public:
   /** @param best what was found in the leaf `found`, which is passed. */
   Descent(const Metric& metric, const ObservationIndex& index, double best, std::uint32_t found)
@@ -153,13 +160,13 @@ class Descent {
 
  private:
   struct Level {
-    Pack bounds;  // of the children not yet visited
+    P bounds;  // of the children not yet visited
     std::size_t first_child;
   };
 
-  static Pack Without(const Pack& bounds, std::size_t lane) {
+  FOREREACH_INLINE static P Without(const P& bounds, std::size_t lane) {
     const Lanes missing = AllLanes(-kMaxDouble);
-    return {AtLane(lane) ? missing : bounds.low, AtLane(lane - kLaneCount) ? missing : bounds.high};
+    return Packs<P>::Join(AtLane(lane) ? missing : Low(bounds), AtLane(lane - kLaneCount) ? missing : High(bounds));
   }
 
   void Prefetch() const {
@@ -183,6 +190,8 @@ class Descent {
 leaf that both descents visit counts twice. */
 template <class Metric>
 class TreeSearch {
+  using P = typename Metric::InRegisters;
+
  public:
   /** @param found where to begin; set to where the bounds are. */
   TreeSearch(const Metric& metric, const ObservationIndex& index, FoundIn& found, Budget& budget)
@@ -221,7 +230,7 @@ class TreeSearch {
   // Every leaf that may hold a better bound, of either side. Among few leaves, few do after the first.
   void VisitLeaves(std::size_t first, std::size_t second) {
     for (std::size_t node = 0; node < index_.num_nodes(1); ++node) {
-      const Pack floors = metric_.Node(index_.node(1, node), 0), ceilings = metric_.Node(index_.node(1, node), 1);
+      const P floors = metric_.Node(index_.node(1, node), 0), ceilings = metric_.Node(index_.node(1, node), 1);
       for (unsigned left = ~(BitIn(node, first) | BitIn(node, second)); (left &= Better(floors, ceilings)) != 0;
            left &= left - 1) {
         budget_.capped |= budget_.leaves <= 0;
@@ -248,10 +257,10 @@ class TreeSearch {
   }
 
   // A bit for each child whose bound exceeds the best of its side. That of a missing child does not.
-  [[nodiscard]] unsigned Better(const Pack& floors, const Pack& ceilings) const {
+  [[nodiscard]] FOREREACH_INLINE unsigned Better(const P& floors, const P& ceilings) const {
     const Lanes floor = AllLanes(best_.floor), ceiling = AllLanes(best_.negated_ceiling);
-    return BitsOf((floors.low > floor) | (ceilings.low > ceiling)) |
-           BitsOf((floors.high > floor) | (ceilings.high > ceiling)) << kLaneCount;
+    return BitsOf((Low(floors) > floor) | (Low(ceilings) > ceiling)) |
+           BitsOf((High(floors) > floor) | (High(ceilings) > ceiling)) << kLaneCount;
   }
 
   const Metric& metric_;

@@ -575,13 +575,18 @@ TEST_P(Reproducible, BitForBitOnEveryThread) {
 }
 
 TEST_P(Reproducible, BitForBitOnEveryInstructionSet) {
-  Problem problem = certifier_->problem();
-  problem.instructions = InstructionSet::kBaseline;
-  Tube tube, baseline;
+  Tube tube;
   const Decision decision = Certify(tube);
-  certifier_.emplace(std::make_shared<Problem>(problem));
-  const Decision again = Certify(baseline);
-  ExpectSame(decision, tube, again, baseline);
+  for (const InstructionSet instructions :
+       {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+    if (!IsSupported(instructions)) continue;
+    Problem problem = certifier_->problem();
+    problem.instructions = instructions;
+    certifier_.emplace(std::make_shared<Problem>(problem));
+    Tube other;
+    const Decision again = Certify(other);
+    ExpectSame(decision, tube, again, other);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, Reproducible, testing::Values(Method::kPaper, Method::kCentred),

@@ -72,7 +72,9 @@ TEST(StandingCores, BoundWhatSeparateHullsBoundsOneByOne) {
         hull.center[k] = random.Uniform(-4, 4), hull.half_width[k] = random.Uniform(0, 0.5);
     if (random.Coin(0.1)) hulls[1].half_width[0] = kNan;
     std::vector<double> bounds(hulls.size() * cores.stride(), 0);
-    for (const InstructionSet instructions : {InstructionSet::kBaseline, BestInstructionSet()}) {
+    for (const InstructionSet instructions :
+         {InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512}) {
+      if (!IsSupported(instructions)) continue;
       cores.Bound(hulls, bounds.data(), instructions);
       for (std::size_t h = 0; h < hulls.size(); ++h)
         for (std::size_t o = 0; o < cores.stride(); ++o) {

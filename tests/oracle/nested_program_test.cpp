@@ -108,7 +108,7 @@ class NestedProgramTest : public testing::TestWithParam<InstructionSet> {};
 
 // Soundness without slack, up to what 256 bits round; and as tight as the arithmetic of interval.h, node by node.
 TEST_P(NestedProgramTest, BoundsWhatIsNeededOverBothBoxes) {
-  if (GetParam() == InstructionSet::kAvx2 && BestInstructionSet() != InstructionSet::kAvx2) GTEST_SKIP();
+  if (!IsSupported(GetParam())) GTEST_SKIP();
   TracedRandom random(7202);
   int compared = 0, unbounded = 0;
   for (int trial = 0; trial < 1500; ++trial) {
@@ -178,7 +178,8 @@ TEST_P(NestedProgramTest, BoundsWhatIsNeededOverBothBoxes) {
   EXPECT_GT(unbounded, 100);
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, NestedProgramTest, testing::Values(InstructionSet::kBaseline, InstructionSet::kAvx2));
+INSTANTIATE_TEST_SUITE_P(Each, NestedProgramTest,
+                         testing::Values(InstructionSet::kBaseline, InstructionSet::kAvx2, InstructionSet::kAvx512));
 
 // What only second derivatives need does not spoil the first ones, nor the outer box what is known over the inner one.
 TEST(NestedProgram, SaysOverWhichBoxItHasNoBound) {
