@@ -15,8 +15,9 @@
 namespace forereach {
 
 /** The computed part of the reachable tube: slices X_0 .. X_length and a record of each completed step. Construct it
-once and reuse it for every plan: it has room for the longest horizon, about 2.5 MB. */
-class Tube final {
+once and reuse it for every plan: it has room for the longest horizon, about 2.5 MB. Each has a cache line to itself:
+threads write to neighbouring ones. */
+class alignas(64) Tube final {
  public:
   Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1), places_(kMaxPieces) {}
 
