@@ -106,13 +106,18 @@ void RegisterCertify(Scenario scenario, int observations) {
   });
   if (scenario == Scenario::kBicycle && observations <= 400)
     Register("certify_unrounded/" + suffix, [=](State& state) { RunCertifyWithoutRounding(state, observations); });
-  if (scenario == Scenario::kBicycle && observations == 400)
-    Register("certify_centred/" + suffix, [=](State& state) {
+  const auto register_other = [&](const std::string& name, auto change) {
+    Register(name + suffix, [=](State& state) {
       const Task& task = CachedTask(scenario, observations);
       Problem problem = *task.problem;
-      problem.method = Method::kCentred;
+      change(problem);
       RunCertify(state, Certifier(std::make_shared<const Problem>(std::move(problem))), task);
     });
+  };
+  if (scenario == Scenario::kBicycle && observations == 400)
+    register_other("certify_centred/", [](Problem& problem) { problem.method = Method::kCentred; });
+  if (observations == 400 && BestInstructionSet() == InstructionSet::kAvx512)
+    register_other("certify_avx2/", [](Problem& problem) { problem.instructions = InstructionSet::kAvx2; });
 
   // A second a call and more, and the same work a thousand times: not run.
   if (observations > (scenario == Scenario::kDense ? 400 : 10'000)) return;
