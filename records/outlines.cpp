@@ -20,6 +20,12 @@ using Eigen::Vector2d;
 
 constexpr int kCornersOfDisc = 16;
 
+// Of the corners of a disc, the last before the outward normal of an edge of a counter-clockwise polygon: 0 to 15.
+int SectorOf(const Vector2d& edge) {
+  const double turns = std::atan2(-edge.x(), edge.y()) / (2 * M_PI);
+  return std::min(static_cast<int>((turns < 0 ? turns + 1 : turns) * kCornersOfDisc), kCornersOfDisc - 1);
+}
+
 }  // namespace
 
 // The corners of the convex hull, by Andrew's monotone chain.
@@ -31,10 +37,22 @@ Svg::Points HullOf(const std::vector<Vector2d>& points, double radius) {
     return disc;
   }();
   Svg::Points all = points;
-  if (radius > 0) {  // a corner of the result is one of a disc around a corner of the hull of the points
+  if (radius > 0) {
+    const Svg::Points inner = HullOf(points);
+    const auto at = [&](std::size_t i) -> const Vector2d& { return inner[i % inner.size()]; };
     all.clear();
-    for (const Vector2d& point : HullOf(points))
-      for (const Vector2d& corner : kDisc) all.push_back(point + radius * corner);
+    // A corner of the result is one of a disc around a corner of `inner`, between the normals of the edges there. One
+    // more on either side costs little; edges that are not finite have no normal.
+    for (std::size_t i = 0; i < inner.size(); ++i) {
+      const Vector2d before = at(i) - at(i + inner.size() - 1), after = at(i + 1) - at(i);
+      int first = 0, last = kCornersOfDisc - 1;
+      if (inner.size() > 2 && before.allFinite() && after.allFinite()) {
+        first = SectorOf(before) - 1;
+        last = first + std::min((SectorOf(after) - first + kCornersOfDisc) % kCornersOfDisc + 2, last);
+      }
+      for (int k = first; k <= last; ++k)
+        all.push_back(at(i) + radius * kDisc[ToSize((k + kCornersOfDisc) % kCornersOfDisc)]);
+    }
   }
   if (all.size() < 2) return all;
   std::ranges::sort(all, {}, [](const Vector2d& a) { return std::pair(a.x(), a.y()); });
