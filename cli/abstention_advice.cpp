@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -21,6 +22,7 @@
 #include "forereach/safety/clearance.h"
 #include "forereach/sets/zonogon.h"
 #include "verifier/verifier.h"
+#include "task/json_text.h"
 
 namespace forereach {
 
@@ -146,14 +148,15 @@ std::vector<AdviceGroup> GroupsOf(const AbstentionAdvice& advice) {
 }
 
 std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
-                                                     double seconds, bool with_inner) {
+                                                     double seconds, bool with_inner, const Shard& shard) {
   std::vector<std::vector<AbstentionAdvice>> advised(runs.size());
   std::vector<std::pair<std::size_t, std::size_t>> work;  // run, abstention
   std::map<const Config*, BrakingTails> tails;
   for (std::size_t run = 0; run < runs.size(); ++run) {
     const std::size_t count = runs[run].all.size();
     advised[run].assign(count, {});
-    for (std::size_t i = 0; i < count; ++i) work.emplace_back(run, i);
+    for (auto i = static_cast<std::size_t>(shard.index); i < count; i += static_cast<std::size_t>(shard.count))
+      work.emplace_back(run, i);
     for (const auto& task : runs[run].tasks) tails[task.get()] = TailsOf(*task);
   }
   std::ranges::stable_sort(work, {}, [&](const auto& each) { return Shortfall(runs[each.first].all[each.second]); });
@@ -221,6 +224,59 @@ std::string Describe(const InnerBound& bound) {
     text += "; no sound method could certify this with these data: of a system that agrees with all of them, " +
             bound.contact;
   return text;
+}
+
+AdviceOfRun& AdviceOfRun::operator+=(AdviceOfRun&& more) {
+  std::ranges::move(more.advice, std::back_inserter(advice));
+  return *this;
+}
+
+// What --json prints, and what people alone are shown. An infinite number is null.
+void to_json(nlohmann::json& json, const AdviceOfRun& of_run) {
+  json = nlohmann::json::array();
+  for (const AbstentionAdvice& each : of_run.advice) {
+    nlohmann::json& kept = json.emplace_back(each);
+    for (std::size_t i = 0; i < each.advices.size(); ++i) kept["advice"][i]["smaller"] = each.advices[i].smaller;
+  }
+  json = ParseJson(JsonText(json));
+}
+
+namespace {
+
+double NumberIn(const nlohmann::json& json) { return json.is_null() ? kInfinity : json.get<double>(); }
+
+Advice AdviceOf(const nlohmann::json& json) {
+  int change = 0;
+  while (change < static_cast<int>(Change::kOutlier) && json.at("change") != Name(static_cast<Change>(change)))
+    ++change;
+  Advice advice;
+  advice.change = static_cast<Change>(change);
+  advice.what = json.at("what");
+  advice.smaller = json.at("smaller");
+  advice.amount = NumberIn(json.at("amount"));
+  advice.turns = json.at("turns");
+  advice.row = json.value("row", -1);
+  advice.column = json.value("column", -1);
+  advice.then = json.value("then", "");
+  const auto place = json.value("place", std::vector<double>());
+  advice.place = Eigen::Map<const Eigen::VectorXd>(place.data(), std::ssize(place));
+  return advice;
+}
+
+}  // namespace
+
+void from_json(const nlohmann::json& json, AdviceOfRun& of_run) {
+  for (const nlohmann::json& kept : json) {
+    AbstentionAdvice& advice = of_run.advice.emplace_back();
+    for (const nlohmann::json& each : kept.at("advice")) advice.advices.push_back(AdviceOf(each));
+    advice.missing = kept.value("missing", "");
+    if (const auto remedy = kept.find("remedy"); remedy != kept.end())
+      advice.remedy = Remedy{remedy->at("what"), remedy->at("turns"), remedy->value("key", ""),
+                             remedy->contains("value") ? NumberIn(remedy->at("value")) : 0};
+    if (const auto inner = kept.find("inner"); inner != kept.end())
+      advice.inner = InnerBound{inner->at("step"), NumberIn(inner->at("half_width")), NumberIn(inner->at("least")),
+                                inner->at("contact")};
+  }
 }
 
 }  // namespace forereach

@@ -12,6 +12,7 @@
 #include "advise/case.h"
 #include "advise/gate_advice.h"
 #include "forereach/certify/certifier.h"
+#include "records/shard.h"
 
 namespace forereach {
 
@@ -60,8 +61,19 @@ void to_json(nlohmann::json& json, const AbstentionAdvice& advice);
 
 /** What would have turned the abstentions of several runs, on `jobs` threads in all and with a progress bar.
 @param seconds after this time no further one is begun, but for the first; the others have `missing`. Those that missed
-by least come first. @param with_inner asks for the inner bound of what was judged. */
+by least come first. @param with_inner asks for the inner bound of what was judged. @param shard of each run's
+abstentions; the others have no advice. */
 [[nodiscard]] std::vector<std::vector<AbstentionAdvice>> AdviseAll(const std::vector<Abstentions>& runs, unsigned jobs,
-                                                                   double seconds, bool with_inner = false);
+                                                                   double seconds, bool with_inner = false,
+                                                                   const Shard& shard = {});
+
+/** What is searched for in a run, in the order of its abstentions: as the files of shards keep it. */
+struct AdviceOfRun {
+  std::vector<AbstentionAdvice> advice;
+
+  AdviceOfRun& operator+=(AdviceOfRun&& more);
+};
+void to_json(nlohmann::json& json, const AdviceOfRun& of_run);
+void from_json(const nlohmann::json& json, AdviceOfRun& of_run);
 
 }  // namespace forereach

@@ -10,6 +10,7 @@
 #include "cli/abstention_advice.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
+#include "cli/shards.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/decision_record.h"
@@ -26,6 +27,7 @@ struct AdviseArguments {
   bool json = false, all = false, inner = false;
   unsigned jobs = AllCores();
   std::optional<double> seconds;
+  ShardOptions shard;
 };
 
 constexpr std::size_t kMostExamined = 3000;  // of a run
@@ -153,7 +155,8 @@ void PrintJson(const Advised& all, const Totals& totals) {
             << std::endl;
 }
 
-Advised AdviseRuns(const AdviseArguments& options) {
+// Without advice.
+Advised ReadRuns(const AdviseArguments& options) {
   Advised all{RunsNamedBy(options.files, options.jobs), {}, {}};
   NamedRuns& named = all.named;
   const RunTasks tasks(options.config, options.key, named.is_many);
@@ -172,26 +175,65 @@ Advised AdviseRuns(const AdviseArguments& options) {
                                         count + left_out, kMostExamined));
   if (std::ranges::all_of(all.runs, [](const Abstentions& run) { return run.tasks.empty(); }))
     throw ConfigError(options.files[0] + ": " + (named.missing.empty() ? "no decisions" : named.missing[0]));
-  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity), options.inner);
   return all;
 }
 
-Advised AdviseDecision(const AdviseArguments& options) {
+Advised ReadDecision(const AdviseArguments& options) {
+  if (options.shard.is_given())
+    throw ConfigError(options.files[0] + ": --shard divides logs, and this is a single decision");
   Advised all;
   all.runs.push_back(AbstentionOf(options.files[0], options.config));
-  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity), options.inner);
   return all;
 }
 
-int RunAdvise(const AdviseArguments& options) {
-  const bool is_document = options.files.size() == 1 && KindOf(options.files[0]) == FileKind::kJson;
-  const Advised all = is_document ? AdviseDecision(options) : AdviseRuns(options);
+int PrintAdvised(const Advised& all, bool json, bool unfolds) {
   const Totals totals = TotalsOf(all);
-  options.json ? PrintJson(all, totals) : PrintForPeople(all, totals, options.all);
+  json ? PrintJson(all, totals) : PrintForPeople(all, totals, unfolds);
   return all.named.missing.empty() && totals.turned == totals.abstentions ? 0 : 1;
 }
 
+// The advice that is a shard's. Merge reads the logs again for the rest: that takes no search.
+int WriteAdvised(const AdviseArguments& options, Advised all) {
+  ResultsOfRuns<AdviceOfRun> results;
+  for (std::vector<AbstentionAdvice>& advice : all.advice) {
+    auto& of_run = results.emplace_back().emplace();
+    for (AbstentionAdvice& each : advice)
+      if (of_run.Next(options.shard.Get())) of_run.Tell().advice.push_back(std::move(each));
+  }
+  return WriteShard(options.shard,
+                    {.name = "advise",
+                     .options = options.inner ? "inner" : "",
+                     .config = options.config,
+                     .key = options.key,
+                     .arguments = {{"files", options.files},
+                                   {"all", options.all},
+                                   {"key", options.key.file},
+                                   {"no_key", options.key.none}}},
+                    all.named, results);
+}
+
+int RunAdvise(const AdviseArguments& options) {
+  const Shard shard = options.shard.Get();
+  const bool is_document = options.files.size() == 1 && KindOf(options.files[0]) == FileKind::kJson;
+  Advised all = is_document ? ReadDecision(options) : ReadRuns(options);
+  all.advice = AdviseAll(all.runs, options.jobs, options.seconds.value_or(kInfinity), options.inner, shard);
+  if (options.shard.is_given()) return WriteAdvised(options, std::move(all));
+  return PrintAdvised(all, options.json, options.all);
+}
+
 }  // namespace
+
+int PrintMergedAdvice(const Shards& shards, bool json) {
+  const nlohmann::json& arguments = shards.arguments();
+  AdviseArguments options;
+  arguments.at("files").get_to(options.files);
+  options.config = shards.config();
+  options.key = {.file = arguments.at("key"), .none = arguments.at("no_key")};
+  Advised all = ReadRuns(options);
+  shards.RequireSameRuns(all.named);
+  for (auto& of_run : shards.Results<AdviceOfRun>()) all.advice.push_back(std::move(of_run.value()).Sum().advice);
+  return PrintAdvised(all, json, arguments.at("all"));
+}
 
 Command AdviseCommand() {
   const auto options = std::make_shared<AdviseArguments>();
@@ -206,21 +248,26 @@ Examples:
   forereach advise decision.json
   forereach advise run/log/events-20260101-120000-000000.lcmlog
   forereach advise run/log
+  forereach advise run/log --shard 2/7 --out part2.json
   forereach advise season --advice-seconds 600)",
       .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                             "The abstentions: a decision (the output of certify --json), or logs, databases and "
                             "directories, as in forereach replay"}),
                   {"--config", &options->config, "FILE", kTaskOfRecords},
-                  {"--advice-seconds", &options->seconds, "S",
-                   "How long to search, the abstentions that missed by least first; the others are said not to be "
-                   "searched. By default all are",
-                   NumberRange{0, 86400}},
+                  {.name = "--advice-seconds",
+                   .variable = &options->seconds,
+                   .type = "S",
+                   .help = "How long to search, the abstentions that missed by least first; the others are said not to "
+                           "be searched. By default all are",
+                   .range = NumberRange{0, 86400},
+                   .excludes = "--shard"},
                   {"--inner", &options->inner, "",
                    "Also how wide every sound tube is, and whether a system that agrees with all data touches"},
                   {"--all", &options->all, "", "Show every change, not the first of each kind alone"},
                   JobsOption(options->jobs),
                   JsonFlag(options->json)},
       .run = [options] { return RunAdvise(*options); }};
+  options->shard.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

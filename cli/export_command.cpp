@@ -10,6 +10,7 @@
 
 #include "cli/commands.h"
 #include "cli/each_run.h"
+#include "cli/shards.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
 #include "records/output_file.h"
@@ -24,6 +25,7 @@ struct ExportArguments {
   std::string format, output;
   ExportOptions what;
   unsigned jobs = AllCores();
+  ShardOptions shard;
 
   [[nodiscard]] bool is_table() const {
     return what.format == ExportFormat::kCsv || what.format == ExportFormat::kJsonLines;
@@ -131,21 +133,23 @@ void Describe(const ExportArguments& options, const ExportResult& result, const 
   std::cout << DescribePassedOver(result.passed_over) << "; written to " << options.output << std::endl;
 }
 
-int RunExport(ExportArguments options) {
+void SetFormat(ExportArguments& options, bool is_many) {
   options.what.format =
       static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) - kExportFormats.begin());
+  options.what.names_robot = is_many;
   if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
-  NamedRuns named = RunsNamedBy(options.inputs, options.jobs);
-  options.what.names_robot = named.is_many;
-  RequireNoOutput(options, named);  // before the logs are read
-  const PartsDirectory parts(options.output);
-  const auto results =
-      ForEachRun<ExportResult>(named, options.jobs, "exported", [&](const RunLogs& run, RunWork& work) {
-        std::vector<std::string> files;
-        for (const std::string& name : ExportFiles(options.what.format))
-          files.push_back(parts.path / fmt::format("{}.{}", &run - named.runs.data(), name));
-        return ExportRun(run, options.what, files, [&](std::int64_t bytes) { work.Read(bytes); });
-      });
+}
+
+// The files of a run before they are joined.
+std::vector<std::string> FilesOf(const ExportArguments& options, const PartsDirectory& parts, std::ptrdiff_t run) {
+  std::vector<std::string> files;
+  for (const std::string& name : ExportFiles(options.what.format))
+    files.push_back(parts.path / fmt::format("{}.{}", run, name));
+  return files;
+}
+
+int Finish(const ExportArguments& options, const NamedRuns& named,
+           const std::vector<std::optional<ExportResult>>& results, const PartsDirectory& parts) {
   Write(options, named, results, parts.path);
   ExportResult sum;
   for (const auto& result : results)
@@ -155,7 +159,70 @@ int RunExport(ExportArguments options) {
   return sum.has_messages && sum.damage.places == 0 && named.missing.empty() ? 0 : 1;
 }
 
+int WriteShardOfExport(const ExportArguments& options, NamedRuns& named) {
+  const Shard shard = options.shard.Get();
+  const PartsDirectory parts(options.output);
+  const auto of_run = [&](std::ptrdiff_t run) { return (parts.path / std::to_string(run)).string(); };
+  const auto results =
+      ForEachRun<CaseResults<ExportResult>>(named, options.jobs, "exported", [&](const RunLogs& run, RunWork& work) {
+        const std::ptrdiff_t number = &run - named.runs.data();
+        return ExportShard(run, number, options.what, shard, of_run(number),
+                           [&](std::int64_t bytes) { work.Read(bytes); });
+      });
+  OutputFile pieces(parts.path / "pieces");
+  pieces.Write("\n");  // where the results stand in the shard's file
+  for (std::ptrdiff_t run = 0; run < std::ssize(results); ++run)
+    if (results[static_cast<std::size_t>(run)]) pieces.WriteContentOf(of_run(run));
+  pieces.Write("}\n");
+  pieces.Close();
+  return WriteShard(options.shard,
+                    {.name = "export",
+                     .options = options.format,
+                     .config = options.what.config,
+                     .key = options.what.key,
+                     .arguments = {{"format", options.format}},
+                     .pieces = pieces.path()},
+                    named, results);
+}
+
+int RunExport(ExportArguments options) {
+  NamedRuns named = RunsNamedBy(options.inputs, options.jobs);
+  SetFormat(options, named.is_many);
+  options.shard.out = options.output;
+  if (options.shard.is_given()) return WriteShardOfExport(options, named);
+  RequireNoOutput(options, named);  // before the logs are read
+  const PartsDirectory parts(options.output);
+  const auto results =
+      ForEachRun<ExportResult>(named, options.jobs, "exported", [&](const RunLogs& run, RunWork& work) {
+        return ExportRun(run, options.what, FilesOf(options, parts, &run - named.runs.data()),
+                         [&](std::int64_t bytes) { work.Read(bytes); });
+      });
+  return Finish(options, named, results, parts);
+}
+
 }  // namespace
+
+int WriteMergedExport(const Shards& shards, const std::string& out) {
+  ExportArguments options;
+  shards.arguments().at("format").get_to(options.format);
+  options.output = out;
+  const NamedRuns& named = shards.named();
+  SetFormat(options, named.is_many);
+  RequireNoOutput(options, named);
+  const PartsDirectory parts(options.output);
+  std::vector<ShardPieces> pieces;
+  for (const std::string& file : shards.files()) pieces.emplace_back(file);
+  std::vector<std::optional<ExportResult>> results;
+  for (auto& of_run : shards.Results<ExportResult>()) {
+    const std::ptrdiff_t run = std::ssize(results);
+    auto& result = results.emplace_back();
+    if (!of_run) continue;
+    result = ExportPieces(named.runs[static_cast<std::size_t>(run)].robot, run, of_run->cases, options.what, pieces,
+                          FilesOf(options, parts, run));
+    *result += std::move(*of_run).Sum();
+  }
+  return Finish(options, named, results, parts);
+}
 
 Command ExportCommand() {
   const auto options = std::make_shared<ExportArguments>();
@@ -168,14 +235,20 @@ Command ExportCommand() {
                       "For a directory, a database or logs of several runs, npz and mcap write a directory with a file "
                       "for each run.\n\n"
                       "Examples:\n  forereach export run/log --format csv -o tables\n"
-                      "  forereach export run/log/events-20260101-120000-000000.lcmlog --format mcap -o run.mcap",
+                      "  forereach export run/log/events-20260101-120000-000000.lcmlog --format mcap -o run.mcap\n"
+                      "  forereach export run/log --format jsonl --shard 2/7 -o part2",
                   .options = {Required({"inputs", &options->inputs, "LOG|DATABASE|DIRECTORY", kRuns}),
                               Required(OneOf(kExportFormats, {"--format", &options->format, "", "What is written"})),
                               Required({"-o,--out", &options->output, "FILE|DIR",
                                         "A new file, or a directory; files that exist are not changed"}),
                               {"--config", &options->what.config, "FILE",
                                "The task file of the recording, for its channels and its key; by default the one that "
-                               "the logger kept next to the log, in tasks/, otherwise the usual channels"}},
+                               "the logger kept next to the log, in tasks/, otherwise the usual channels"},
+                              {.name = "--shard",
+                               .variable = &options->shard.shard,
+                               .type = "I/N",
+                               .help = "Write the part I of N of each run's records, I from 1, to the file --out; "
+                                       "forereach merge makes of all N files what would have been written"}},
                   .run = [options] { return RunExport(*options); }};
   command.options.push_back(JobsOption(options->jobs));
   AddKeyOptions(command.options, options->what.key);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <limits>
 #include <map>
@@ -28,8 +29,10 @@ namespace {
 namespace fs = std::filesystem;
 
 using PrintMerged = int (*)(const Shards&, bool json);
-const std::map<std::string, PrintMerged> kMerged = {
-    {"compare", PrintMergedComparison}, {"replay", PrintMergedReplay}, {"verify", PrintMergedVerification}};
+const std::map<std::string, PrintMerged> kMerged = {{"advise", PrintMergedAdvice},
+                                                    {"compare", PrintMergedComparison},
+                                                    {"replay", PrintMergedReplay},
+                                                    {"verify", PrintMergedVerification}};
 
 constexpr std::string_view kBeginning = "{\"command\":\"";  // of a shard's file
 
@@ -42,6 +45,19 @@ std::string DigestOfFile(const std::string& path) {
   Digest digest{};
   while (const std::size_t bytes = file.Read(block.data(), block.size()))
     digest = ChainedDigest(digest, Bytes(reinterpret_cast<const std::uint8_t*>(block.data()), bytes));
+  return ToHex(digest);
+}
+
+// Of what is behind the first line.
+std::string DigestOfRest(const std::string& path) {
+  std::ifstream file(path);
+  std::string first;
+  std::getline(file, first);
+  std::vector<char> block(1 << 20);
+  Digest digest{};
+  while (file.read(block.data(), std::ssize(block)), file.gcount() > 0)
+    digest = ChainedDigest(
+        digest, Bytes(reinterpret_cast<const std::uint8_t*>(block.data()), static_cast<std::size_t>(file.gcount())));
   return ToHex(digest);
 }
 
@@ -69,6 +85,13 @@ std::string DigestOfRun(const RunLogs& run) {
   std::string inputs = run.robot + "\n" + run.database + "\n";
   for (const std::string& log : run.logs) inputs += log + "\n" + DigestOfFile(log) + "\n";
   return ToHex(DigestOf(inputs + DescribeTasks(fs::path(NameOf(run)).parent_path())));
+}
+
+nlohmann::json DescribeRuns(const NamedRuns& named) {
+  nlohmann::json runs = nlohmann::json::array();
+  for (const RunLogs& run : named.runs)
+    runs.push_back({{"robot", run.robot}, {"name", NameOf(run)}, {"digest", DigestOfRun(run)}});
+  return runs;
 }
 
 // Everything besides the runs.
@@ -106,15 +129,31 @@ struct ShardFile {
 
 std::string DigestOfDocument(const nlohmann::json& document) { return ToHex(DigestOf(JsonText(document))); }
 
+std::string FirstLine(const std::string& path) {
+  InputFile file(path, std::numeric_limits<std::int64_t>::max());
+  std::string line;
+  std::vector<char> block(1 << 16);
+  while (const std::size_t bytes = file.Read(block.data(), block.size())) {
+    const std::string_view read(block.data(), bytes);
+    const std::size_t end = read.find('\n');
+    line += read.substr(0, end);
+    if (end != std::string_view::npos) break;
+    if (std::ssize(line) > kLargestJsonFile) RefuseShard(path, "not the file of a shard: its first line is too long");
+  }
+  return line;
+}
+
 ShardFile ReadShard(const std::string& path) {
   try {
-    ShardFile file{path, ParseJson(ReadWhole(path, kLargestJsonFile))};
+    ShardFile file{path, ParseJson(FirstLine(path))};
     const auto digest = file["digest"].get<std::string>();
     file.document.erase("digest");
-    if (DigestOfDocument(file.document) != digest) RefuseShard(path, "is damaged: its digest is that of other content");
+    if (DigestOfDocument(file.document) != digest || DigestOfRest(path) != file["pieces"])
+      RefuseShard(path, "is damaged: its digest is that of other content");
     if (file["program"] != DigestOfProgram()) RefuseShard(path, "another version of this program wrote it");
     if (file.number() < 1 || file.number() > file.count() || file.count() > kMostShards ||
-        file["results"].size() != file["runs"].size() || !kMerged.contains(file["command"].get<std::string>()))
+        file["results"].size() != file["runs"].size() ||
+        !(file["command"] == kExport.name || kMerged.contains(file["command"].get<std::string>())))
       RefuseShard(path, "no shard is such");
     return file;
   } catch (const nlohmann::json::exception& error) {
@@ -126,7 +165,7 @@ ShardFile ReadShard(const std::string& path) {
 void RequireTogether(const ShardFile& first, const ShardFile& file) {
   const auto refuse = [&](const std::string& how) { RefuseShard(file.path, how + " than " + first.path); };
   if (file["command"] != first["command"]) refuse("is of another command");
-  if (file["job"] != first["job"] || file["config"] != first["config"])
+  if (file["job"] != first["job"] || file["config"] != first["config"] || file["options"] != first["options"])
     refuse("was made with another task, key or option");
   for (const char* key : {"runs", "is_many", "missing"})
     if (file[key] != first[key]) refuse("is of other runs");
@@ -153,12 +192,20 @@ std::map<int, ShardFile> ReadAllShards(const std::vector<std::string>& paths) {
 
 struct MergeArguments {
   std::vector<std::string> files;
+  std::string out;
   bool json = false;
 };
 
-int Merge(const MergeArguments& options) {
+int Merge(const MergeArguments& options) try {
   const Shards shards(options.files);
+  const bool is_export = shards.name() == kExport.name;
+  if (is_export == options.out.empty())
+    throw ConfigError(is_export ? "--out: is needed, since these are the shards of an export"
+                                : "--out: is for the shards of an export, and these are of " + shards.name());
+  if (is_export) return WriteMergedExport(shards, options.out);
   return kMerged.at(shards.name())(shards, options.json);
+} catch (const nlohmann::json::exception&) {
+  RefuseShard(options.files.front(), "has no results of this command");
 }
 
 }  // namespace
@@ -181,18 +228,17 @@ Shard ShardOptions::Get() const {
 int WriteShard(const ShardOptions& options, const ShardedCommand& command, const NamedRuns& named,
                const nlohmann::json& results) {
   const Shard shard = options.Get();
-  nlohmann::json runs = nlohmann::json::array();
-  for (const RunLogs& run : named.runs)
-    runs.push_back({{"robot", run.robot}, {"name", NameOf(run)}, {"digest", DigestOfRun(run)}});
-  nlohmann::json document{{"shard", shard.index + 1}, {"of", shard.count},        {"program", DigestOfProgram()},
-                          {"command", command.name},  {"job", JobOf(command)},    {"config", command.config},
-                          {"is_many", named.is_many}, {"missing", named.missing}, {"runs", std::move(runs)},
-                          {"results", results}};
+  nlohmann::json document{
+      {"shard", shard.index + 1},     {"of", shard.count},        {"program", DigestOfProgram()},
+      {"command", command.name},      {"job", JobOf(command)},    {"config", command.config},
+      {"options", command.arguments}, {"is_many", named.is_many}, {"missing", named.missing},
+      {"runs", DescribeRuns(named)},  {"results", results},       {"pieces", DigestOfRest(command.pieces)}};
   if (ParseJson(JsonText(document)) != document)
     throw OutputError(options.out + ": a name or text of the result is not UTF-8, which this file cannot hold");
   document["digest"] = DigestOfDocument(document);
   OutputFile file(options.out, OutputFile::Existing::kReplaced);
   file.Write(JsonText(document) + "\n");
+  if (!command.pieces.empty()) file.WriteContentOf(command.pieces, true);
   file.Close();
   std::cout << "shard " << options.shard << " of " << command.name << " is written to " << Printable(options.out)
             << std::endl;
@@ -207,6 +253,8 @@ Shards::Shards(const std::vector<std::string>& files) {
         config_ = file["config"].get<std::string>();
         named_.is_many = file["is_many"].get<bool>();
         file["missing"].get_to(named_.missing);
+        arguments_ = file["options"];
+        runs_ = file["runs"];
         for (const nlohmann::json& run : file["runs"])
           named_.runs.push_back({.robot = run.at("robot").get<std::string>(),
                                  .logs = {run.at("name").get<std::string>()},
@@ -220,7 +268,18 @@ Shards::Shards(const std::vector<std::string>& files) {
   }
 }
 
+std::vector<std::string> Shards::files() const {
+  std::vector<std::string> files;
+  for (const OfShard& each : results_) files.push_back(each.file);
+  return files;
+}
+
 void Shards::RefuseResults(const std::string& file) { RefuseShard(file, "has no results of this command"); }
+
+void Shards::RequireSameRuns(const NamedRuns& found) const {
+  if (DescribeRuns(found) != runs_)
+    RefuseShard(results_.front().file, "is of other logs than those that are there now");
+}
 
 void Shards::RefuseRun(const std::string& file, std::size_t run) const {
   RefuseShard(file, "found other cases or messages in " + NameOf(named_.runs[run]) + " than " + results_.front().file);
@@ -234,9 +293,15 @@ Command MergeCommand() {
               "be all N, of\nthe same command, program, options, task, key and logs under the same names.\n\n"
               "Examples:\n  forereach replay run/log --shard 1/2 --out part1.json\n"
               "  forereach replay run/log --shard 2/2 --out part2.json\n"
-              "  forereach merge part1.json part2.json",
+              "  forereach merge part1.json part2.json\n"
+              "  forereach export run/log --format csv --shard 1/2 --out part1\n"
+              "  forereach merge part1 part2 --out tables",
           .options = {Required({"files", &options->files, "FILE", "The files of all shards, in any order"}),
-                      JsonFlag(options->json)},
+                      {"-o,--out", &options->out, "FILE|DIR", "Of an export: what is written, as by its own --out"},
+                      {.name = "--json",
+                       .variable = &options->json,
+                       .help = "One JSON document on standard output",
+                       .excludes = "--out"}},
           .run = [options] { return Merge(*options); }};
 }
 

@@ -41,8 +41,8 @@ inline constexpr OfflineCommand kOfflineCommands[] = {
      "certificates and all are confirmed, 1 with the first that is not and its first failing step, 2 bad input"},
     {"replay", "Replay a recorded log through the gate: exit 0 if every decision equals the recorded one, otherwise 1"},
     {"merge",
-     "Make one result of the files of replay --shard or verify --shard: exit as the command without it, 2 if they do "
-     "not belong together"},
+     "Make one result of the files of a command with --shard: exit as the command without it, 2 if they do not belong "
+     "together"},
     {"advise",
      "Find what would have turned abstentions into certificates: exit 0 if each has such a change, 1 if not, 2 bad "
      "input"},

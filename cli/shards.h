@@ -29,10 +29,12 @@ struct ShardOptions {
 
 /** A command whose results can be merged. */
 struct ShardedCommand {
-  std::string name;     ///< replay, compare or verify
+  std::string name;     ///< replay, compare, verify, advise or export
   std::string options;  ///< Of those, the ones that change its result.
   std::string config;   ///< The task file as it was named; empty for none.
   LogKey key;
+  nlohmann::json arguments = {};  ///< What merge needs of the command line.
+  std::string pieces = {};        ///< A file whose content follows the results (records/export.h).
 };
 
 /** The results of one run are null if it could not be read. */
@@ -59,8 +61,13 @@ class Shards final {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::string& config() const { return config_; }
-  /** Of the runs, only their robots. */
+  /** Of the runs, only their robots and names. */
   [[nodiscard]] const NamedRuns& named() const { return named_; }
+  [[nodiscard]] const nlohmann::json& arguments() const { return arguments_; }
+  /** In the order of their numbers. */
+  [[nodiscard]] std::vector<std::string> files() const;
+  /** For a command that reads the logs again. @throws BadInput if these are others than the shards'. */
+  void RequireSameRuns(const NamedRuns& found) const;
   /** Of all cases. @throws BadInput if a shard does not say the same of a run as another, or has no such results. */
   template <class Result>
   [[nodiscard]] ResultsOfRuns<Result> Results() const {
@@ -99,6 +106,7 @@ class Shards final {
 
   std::string name_, config_;
   NamedRuns named_;
+  nlohmann::json arguments_, runs_;
   std::vector<OfShard> results_;  // in the order of their numbers
 };
 
@@ -106,5 +114,7 @@ class Shards final {
 int PrintMergedReplay(const Shards& shards, bool json);
 int PrintMergedComparison(const Shards& shards, bool json);
 int PrintMergedVerification(const Shards& shards, bool json);
+int PrintMergedAdvice(const Shards& shards, bool json);
+int WriteMergedExport(const Shards& shards, const std::string& out);
 
 }  // namespace forereach

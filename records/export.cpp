@@ -23,14 +23,39 @@
 namespace forereach {
 namespace {
 
-// A format. It counts what it writes.
+// Where a shard's pieces go.
+struct ShardFile {
+  std::int64_t run;
+  Shard shard;
+  OutputFile file;
+};
+
+// A format. It counts what it writes. It makes a piece of each case, and puts it into its files, or a shard's.
 class Sink : public RecordUser {
  public:
-  explicit Sink(std::string name) : robot(std::move(name)) {}
+  explicit Sink(std::string name, ShardFile* shard) : robot(std::move(name)), shard_(shard) {}
+  /** Writes a piece of ExportShard. @throws nlohmann::json::exception if it is none. */
+  virtual void Put(const nlohmann::json& piece) = 0;
   virtual void Finish() = 0;
 
   const std::string robot;
   ExportResult result;
+  std::int64_t cases = 0;
+
+ protected:
+  // The next case has come. Whether it is ours.
+  [[nodiscard]] bool Next() { return shard_ ? cases++ % shard_->shard.count == shard_->shard.index : true; }
+  [[nodiscard]] bool IsShard() const { return shard_ != nullptr; }
+  void Keep(nlohmann::json what) {
+    nlohmann::json piece{shard_->run, cases - 1};
+    for (auto& each : what) piece.push_back(std::move(each));
+    std::string bytes;
+    nlohmann::json::to_cbor(piece, bytes);
+    shard_->file.Write(bytes);
+  }
+
+ private:
+  ShardFile* const shard_;  // null: all cases, in the format's files
 };
 
 OutputFile FileOf(const std::string& path) { return OutputFile(path, OutputFile::Existing::kReplaced); }
@@ -42,51 +67,70 @@ class TableSink : public Sink {
   using Sink::Sink;
 
   void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) final {
+    if (!Next()) return;
     ++result.decisions;
     result.without_candidate += candidate == nullptr;
     Write("decision", CellsOf(robot, row, candidate), candidate);
     if (candidate && HasCounts(*candidate)) OnControls(row, *candidate);
   }
   void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) final {
+    if (!Next()) return;
     ++result.withdrawals;
     Write("withdrawal", CellsOf(robot, withdrawal, event), nullptr);
   }
   void OnExecution(const EventRow& row) final {
+    if (!Next()) return;
     ++result.executions;
     Write("execution_event", CellsOf(robot, row), nullptr);
   }
   void OnGap(const GapRow& row) final {
+    if (!Next()) return;
     ++result.gaps;
     Write("gap", CellsOf(robot, row), nullptr);
+  }
+  void Put(const nlohmann::json& piece) final {
+    Append(piece.at(2).get_ref<const std::string&>(), piece.at(3).get_ref<const std::string&>());
+  }
+
+ protected:
+  void Write(const std::string& record, const Cells& cells, const candidate_plan_t* candidate) {
+    const std::string line = LineOf(record, cells, candidate);
+    IsShard() ? Keep({record, line}) : Append(record, line);
   }
 
  private:
   virtual void OnControls(const DecisionRow&, const candidate_plan_t&) {}
-  virtual void Write(const char* record, const Cells& cells, const candidate_plan_t* candidate) = 0;
+  virtual std::string LineOf(const std::string& record, const Cells& cells, const candidate_plan_t* candidate) = 0;
+  virtual void Append(const std::string& record, const std::string& line) = 0;
 };
 
 class JsonLinesSink final : public TableSink {
  public:
-  JsonLinesSink(const std::string& name, const std::string& path) : TableSink(name), file_(FileOf(path)) {}
-  void Finish() override { file_.Close(); }
+  JsonLinesSink(const std::string& name, ShardFile* shard, const std::vector<std::string>& files)
+      : TableSink(name, shard) {
+    if (!shard) file_.emplace(FileOf(files.at(0)));
+  }
+  void Finish() override { file_->Close(); }
 
  private:
-  void Write(const char* record, const Cells& cells, const candidate_plan_t* candidate) override {
-    file_.Write(JsonLine(record, cells, candidate));
+  std::string LineOf(const std::string& record, const Cells& cells, const candidate_plan_t* candidate) override {
+    return JsonLine(record, cells, candidate);
   }
+  void Append(const std::string&, const std::string& line) override { file_->Write(line); }
 
-  OutputFile file_;
+  std::optional<OutputFile> file_;
 };
 
 class CsvSink final : public TableSink {
  public:
-  CsvSink(const std::string& name, const std::vector<std::string>& files) : TableSink(name) {
+  CsvSink(const std::string& name, ShardFile* shard, const std::vector<std::string>& files) : TableSink(name, shard) {
+    if (shard) return;
     static const candidate_plan_t none{};
     const Cells first[] = {CellsOf("", DecisionRow{}, nullptr), CellsOfControl("", DecisionRow{}, none, 0),
                            CellsOf("", EventRow{}), CellsOf("", withdrawal_t{}, LogReference{}), CellsOf("", GapRow{})};
     const char* const records[] = {"decision", "control", "execution_event", "withdrawal", "gap"};
     for (std::size_t i = 0; i < std::size(records); ++i)
-      files_.emplace(records[i], FileOf(files[i])).first->second.Write(CsvHeader(first[i]));
+      files_.emplace(records[i], FileOf(files.at(i))).first->second.Write(CsvHeader(first[i]));
   }
   void Finish() override {
     for (auto& [record, file] : files_) file.Close();
@@ -96,70 +140,85 @@ class CsvSink final : public TableSink {
   void OnControls(const DecisionRow& row, const candidate_plan_t& candidate) override {
     for (int t = 0; t < candidate.num_steps; ++t) Write("control", CellsOfControl(robot, row, candidate, t), nullptr);
   }
-  void Write(const char* record, const Cells& cells, const candidate_plan_t*) override {
-    files_.find(record)->second.Write(CsvLine(cells));
+  std::string LineOf(const std::string&, const Cells& cells, const candidate_plan_t*) override {
+    return CsvLine(cells);
+  }
+  void Append(const std::string& record, const std::string& line) override {
+    if (const auto file = files_.find(record); file != files_.end()) file->second.Write(line);
   }
 
-  std::map<std::string_view, OutputFile> files_;
+  std::map<std::string, OutputFile> files_;
 };
 
 // ---- Tubes.
 
 class NpzSink final : public Sink {
  public:
-  NpzSink(const std::string& of, const std::string& path) : Sink(of), arrays_(FileOf(path)) {
+  NpzSink(const std::string& of, ShardFile* shard, const std::vector<std::string>& files) : Sink(of, shard) {
+    if (shard) return;
+    arrays_.emplace(FileOf(files.at(0)));
     for (const char* name : {"plan_id", "utime", "start_utime", "step_us", "expires_utime", "event_number",
                              "num_states", "num_inputs", "num_steps"})
-      arrays_.Declare(name, 'i');
-    for (const char* name : {"robot", "source", "log_file", "plan_digest"}) arrays_.Declare(name, 'S');
+      arrays_->Declare(name, 'i');
+    for (const char* name : {"robot", "source", "log_file", "plan_digest"}) arrays_->Declare(name, 'S');
     for (const char* name : {"slice_lower", "slice_upper", "controls", "initial_center", "initial_half_width"})
-      arrays_.Declare(name, 'f');
+      arrays_->Declare(name, 'f');
     AddBegins();
   }
 
+  // A piece is the message: its arrays are copies.
   void OnCertified(const certified_plan_t& certified, const LogReference& event) override {
-    const candidate_plan_t& plan = certified.plan;
-    if (!HasCounts(plan)) {
+    if (!Next()) return;
+    if (!HasCounts(certified.plan))
       ++result.left_out;
-      return;
-    }
+    else if (IsShard())
+      Keep({nlohmann::json::binary(Encode(certified)), event.log_file, event.event_number});
+    else
+      Add(certified, event.log_file, event.event_number);
+  }
+  void Put(const nlohmann::json& piece) override {
+    const auto certified = Decoded<certified_plan_t>(piece.at(2).get_binary());
+    if (certified && HasCounts(certified->plan)) Add(*certified, piece.at(3), piece.at(4));
+  }
+  void Finish() override { arrays_->Finish(); }
+
+ private:
+  void Add(const certified_plan_t& certified, const std::string& log_file, std::int64_t event_number) {
+    const candidate_plan_t& plan = certified.plan;
     ++result.tubes;
     const auto n = static_cast<std::size_t>(plan.num_states), m = static_cast<std::size_t>(plan.num_inputs);
     for (int t = 0; t <= plan.num_steps; ++t) {
-      arrays_.AddRow("slice_lower", std::span(certified.slice_lower[t], n));
-      arrays_.AddRow("slice_upper", std::span(certified.slice_upper[t], n));
+      arrays_->AddRow("slice_lower", std::span(certified.slice_lower[t], n));
+      arrays_->AddRow("slice_upper", std::span(certified.slice_upper[t], n));
     }
-    for (int t = 0; t < plan.num_steps; ++t) arrays_.AddRow("controls", std::span(plan.control[t], m));
-    arrays_.AddRow("initial_center", std::span(plan.initial_center, n));
-    arrays_.AddRow("initial_half_width", std::span(plan.initial_half_width, n));
+    for (int t = 0; t < plan.num_steps; ++t) arrays_->AddRow("controls", std::span(plan.control[t], m));
+    arrays_->AddRow("initial_center", std::span(plan.initial_center, n));
+    arrays_->AddRow("initial_half_width", std::span(plan.initial_half_width, n));
     for (const auto& [name, value] : {std::pair{"plan_id", plan.plan_id},
                                       {"utime", certified.utime},
                                       {"start_utime", plan.start_utime},
                                       {"step_us", plan.step_us},
                                       {"expires_utime", certified.expires_utime},
-                                      {"event_number", event.event_number}})
-      arrays_.Add(name, value);
-    arrays_.Add("num_states", std::int64_t{plan.num_states});
-    arrays_.Add("num_inputs", std::int64_t{plan.num_inputs});
-    arrays_.Add("num_steps", std::int64_t{plan.num_steps});
-    arrays_.Add("robot", Printable(robot));
-    arrays_.Add("source", GetText(plan.source));
-    arrays_.Add("log_file", Printable(event.log_file));
-    arrays_.Add("plan_digest", ToHex(GetDigest(certified.plan_digest)));
+                                      {"event_number", event_number}})
+      arrays_->Add(name, value);
+    arrays_->Add("num_states", std::int64_t{plan.num_states});
+    arrays_->Add("num_inputs", std::int64_t{plan.num_inputs});
+    arrays_->Add("num_steps", std::int64_t{plan.num_steps});
+    arrays_->Add("robot", Printable(robot));
+    arrays_->Add("source", GetText(plan.source));
+    arrays_->Add("log_file", Printable(log_file));
+    arrays_->Add("plan_digest", ToHex(GetDigest(certified.plan_digest)));
     slices_ += plan.num_steps + 1;
     controls_ += plan.num_steps;
     AddBegins();
   }
-  void Finish() override { arrays_.Finish(); }
-
- private:
   // Where the next plan's rows begin: one entry more than there are plans.
   void AddBegins() {
-    arrays_.Add("slice_begin", slices_);
-    arrays_.Add("control_begin", controls_);
+    arrays_->Add("slice_begin", slices_);
+    arrays_->Add("control_begin", controls_);
   }
 
-  NpzWriter arrays_;
+  std::optional<NpzWriter> arrays_;
   std::int64_t slices_ = 0, controls_ = 0;
 };
 
@@ -167,54 +226,74 @@ class NpzSink final : public Sink {
 
 class McapSink final : public Sink {
  public:
-  McapSink(const std::string& name, bool names_robot, const std::string& path)
-      : Sink(name), prefix_(names_robot ? Printable(name) + "/" : ""), file_(FileOf(path)) {}
+  McapSink(const std::string& name, ShardFile* shard, bool names_robot, const std::vector<std::string>& files)
+      : Sink(name, shard), prefix_(names_robot ? Printable(name) + "/" : "") {
+    if (!shard) file_.emplace(FileOf(files.at(0)));
+  }
 
   void OnMessage(const LogEvent& event) override {
+    if (!Next()) return;
     const auto message = ToJsonMessage(event.message());
-    const auto channel = message ? ChannelOf(event.channel, message->type) : std::nullopt;
+    if (!message) {
+      ++result.left_out;
+      return;
+    }
+    const std::int64_t published = message->utime > 0 ? message->utime : event.utime;
+    if (IsShard())
+      Keep({event.channel, message->type, message->sequence, event.utime, published, message->json});
+    else
+      Put(event.channel, message->type, message->sequence, event.utime, published, message->json);
+  }
+  void Put(const nlohmann::json& piece) override {
+    Put(piece.at(2), piece.at(3).get<std::string>(), piece.at(4), piece.at(5), piece.at(6),
+        piece.at(7).get<std::string>());
+  }
+  void Finish() override { file_->Finish(); }
+
+ private:
+  static constexpr std::size_t kChannels = 256;  // invented names must not fill the memory
+
+  void Put(const std::string& name, std::string_view type, std::int64_t sequence, std::int64_t utime,
+           std::int64_t published, std::string_view json) {
+    const auto channel = ChannelOf(name, type);
     if (!channel) {
       ++result.left_out;
       return;
     }
     ++result.messages;
-    file_.Write(*channel, static_cast<std::uint32_t>(message->sequence), event.utime,
-                message->utime > 0 ? message->utime : event.utime, message->json);
+    file_->Write(*channel, static_cast<std::uint32_t>(sequence), utime, published, json);
   }
-  void Finish() override { file_.Finish(); }
-
- private:
-  static constexpr std::size_t kChannels = 256;  // invented names must not fill the memory
-
   // A channel of the log with messages of several types is as many channels of the file.
-  std::optional<std::uint16_t> ChannelOf(const std::string& name, std::string_view type) {
+  std::optional<std::uint16_t> ChannelOf(const std::string& name, std::string_view of_type) {
+    const std::string type(of_type);
     const auto found = channels_.find({name, type});
     if (found != channels_.end()) return found->second;
     if (channels_.size() == kChannels) return std::nullopt;
     auto schema = schemas_.find(type);
     if (schema == schemas_.end())
-      schema = schemas_.emplace(type, file_.AddSchema("forereach." + std::string(type), SchemaOf(type))).first;
+      schema = schemas_.emplace(type, file_->AddSchema("forereach." + type, SchemaOf(type))).first;
     std::string topic = prefix_ + Printable(name);
-    if (!topics_.insert(topic).second) topics_.insert(topic += " (" + std::string(type) + ")");
+    if (!topics_.insert(topic).second) topics_.insert(topic += " (" + type + ")");
     return channels_
-        .emplace(std::pair(name, type), file_.AddChannel(schema->second, topic, {{"robot", Printable(robot)}}))
+        .emplace(std::pair(name, type), file_->AddChannel(schema->second, topic, {{"robot", Printable(robot)}}))
         .first->second;
   }
 
   const std::string prefix_;  // of all channels
-  McapWriter file_;
-  std::map<std::string_view, std::uint16_t> schemas_;
-  std::map<std::pair<std::string, std::string_view>, std::uint16_t> channels_;
+  std::optional<McapWriter> file_;
+  std::map<std::string, std::uint16_t> schemas_;
+  std::map<std::pair<std::string, std::string>, std::uint16_t> channels_;
   std::set<std::string> topics_;
 };
 
+// @param files in the order of ExportFiles; none for a shard.
 std::unique_ptr<Sink> SinkOf(const std::string& robot, const ExportOptions& options,
-                             const std::vector<std::string>& files) {
+                             const std::vector<std::string>& files, ShardFile* shard = nullptr) {
   switch (options.format) {
-    case ExportFormat::kCsv: return std::make_unique<CsvSink>(robot, files);
-    case ExportFormat::kJsonLines: return std::make_unique<JsonLinesSink>(robot, files.at(0));
-    case ExportFormat::kNpz: return std::make_unique<NpzSink>(robot, files.at(0));
-    case ExportFormat::kMcap: return std::make_unique<McapSink>(robot, options.names_robot, files.at(0));
+    case ExportFormat::kCsv: return std::make_unique<CsvSink>(robot, shard, files);
+    case ExportFormat::kJsonLines: return std::make_unique<JsonLinesSink>(robot, shard, files);
+    case ExportFormat::kNpz: return std::make_unique<NpzSink>(robot, shard, files);
+    case ExportFormat::kMcap: return std::make_unique<McapSink>(robot, shard, options.names_robot, files);
   }
   throw std::invalid_argument("no format of an export");
 }
@@ -260,15 +339,66 @@ ExportResult& ExportResult::operator+=(const ExportResult& other) {
   return *this;
 }
 
-ExportResult ExportRun(const RunLogs& run, const ExportOptions& options, const std::vector<std::string>& files,
-                       const std::function<void(std::int64_t)>& on_bytes) {
-  const std::unique_ptr<Sink> sink = SinkOf(run.robot, options, files);
+namespace {
+
+void ReadRun(const RunLogs& run, const ExportOptions& options, const std::function<void(std::int64_t)>& on_bytes,
+             Sink& sink) {
   if (!run.missing.empty()) {
     Database database(run.database);
     for (const RunRow& missing : run.missing)
-      database.ReadInBlocks(missing.log_file, [&](const Rows& rows) { TakeRows(rows, *sink); });
+      database.ReadInBlocks(missing.log_file, [&](const Rows& rows) { TakeRows(rows, sink); });
   }
-  if (!run.logs.empty()) ReadLogs(run.logs, options, on_bytes, *sink);
+  if (!run.logs.empty()) ReadLogs(run.logs, options, on_bytes, sink);
+}
+
+}  // namespace
+
+ExportResult ExportRun(const RunLogs& run, const ExportOptions& options, const std::vector<std::string>& files,
+                       const std::function<void(std::int64_t)>& on_bytes) {
+  const std::unique_ptr<Sink> sink = SinkOf(run.robot, options, files);
+  ReadRun(run, options, on_bytes, *sink);
+  sink->Finish();
+  sink->result.files = files;
+  return std::move(sink->result);
+}
+
+CaseResults<ExportResult> ExportShard(const RunLogs& run, std::int64_t number, const ExportOptions& options,
+                                      const Shard& shard, const std::string& file,
+                                      const std::function<void(std::int64_t)>& on_bytes) {
+  ShardFile kept{number, shard, FileOf(file)};
+  const std::unique_ptr<Sink> sink = SinkOf(run.robot, options, {}, &kept);
+  ReadRun(run, options, on_bytes, *sink);
+  kept.file.Close();
+  CaseResults<ExportResult> results;
+  results.cases = sink->cases;
+  results.of_run.damage = std::exchange(sink->result.damage, {});
+  results.of_run.passed_over = std::exchange(sink->result.passed_over, {});
+  results.of_run.has_messages = std::exchange(sink->result.has_messages, false);
+  results.counts = std::move(sink->result);
+  return results;
+}
+
+ShardPieces::ShardPieces(const std::string& path) : path_(path), in_(path) {
+  std::string header;
+  std::getline(in_, header);
+}
+
+nlohmann::json ShardPieces::Take(std::int64_t run, std::int64_t number) try {
+  if (next_.is_null() && in_.peek() != '}') next_ = nlohmann::json::from_cbor(in_, false);
+  if (next_.is_null() || next_.at(0) != run || next_.at(1) != number) return nullptr;
+  return std::exchange(next_, nullptr);
+} catch (const nlohmann::json::exception&) {
+  throw OutputError(path_ + ": has no pieces of an export");
+}
+
+ExportResult ExportPieces(const std::string& robot, std::int64_t number, std::int64_t cases,
+                          const ExportOptions& options, std::vector<ShardPieces>& shards,
+                          const std::vector<std::string>& files) {
+  const std::unique_ptr<Sink> sink = SinkOf(robot, options, files);
+  for (std::int64_t i = 0; i < cases; ++i) {
+    ShardPieces& shard = shards[static_cast<std::size_t>(i) % shards.size()];
+    for (nlohmann::json piece; !(piece = shard.Take(number, i)).is_null();) sink->Put(piece);
+  }
   sink->Finish();
   sink->result.files = files;
   return std::move(sink->result);

@@ -5,13 +5,17 @@ Memory does not grow with the logs. Nothing in a log names a file that is writte
 #pragma once
 
 #include <cstdint>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "records/event_log.h"
 #include "records/log_trust.h"
 #include "records/run_logs.h"
+#include "records/shard.h"
 
 namespace forereach {
 
@@ -52,6 +56,32 @@ struct ExportResult {
 [[nodiscard]] ExportResult ExportRun(const RunLogs& run, const ExportOptions& options,
                                      const std::vector<std::string>& files,
                                      const std::function<void(std::int64_t)>& on_bytes = {});
+
+/** The same of a shard of the run's cases (its messages for mcap, otherwise its records): writes to one file what was
+made of each, as CBOR: [number of the run, of the case, what...]. The result has no files. */
+[[nodiscard]] CaseResults<ExportResult> ExportShard(const RunLogs& run, std::int64_t number,
+                                                    const ExportOptions& options, const Shard& shard,
+                                                    const std::string& file,
+                                                    const std::function<void(std::int64_t)>& on_bytes = {});
+
+/** Reads the file of a shard behind its first line: what ExportShard has made of each run, and "}". */
+class ShardPieces final {
+ public:
+  explicit ShardPieces(const std::string& path);
+  /** The next piece if it is of this case; otherwise null. @throws BadInput if it is no piece. */
+  [[nodiscard]] nlohmann::json Take(std::int64_t run, std::int64_t number);
+
+ private:
+  const std::string path_;
+  std::ifstream in_;
+  nlohmann::json next_;
+};
+
+/** Writes the files of one run out of the pieces of all its shards, in the order of their numbers. The result has no
+more than the pieces tell. @throws BadInput. */
+[[nodiscard]] ExportResult ExportPieces(const std::string& robot, std::int64_t number, std::int64_t cases,
+                                        const ExportOptions& options, std::vector<ShardPieces>& shards,
+                                        const std::vector<std::string>& files);
 
 /** Joins the files of several runs, in their order, to a new one: tables have one line of names, the first one's.
 @pre format is kCsv or kJsonLines. @throws OutputError if the file exists or cannot be written. */

@@ -5,6 +5,7 @@
 
 #include "bus/authentic.h"
 #include "records/event_log.h"
+#include "records/export.h"
 #include "records/log_trust.h"
 #include "records/replay.h"
 #include "records/shard.h"
@@ -19,6 +20,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReplayResult, candidates, agreed, withdrawals
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WhyNot, outcome, cause, obstacle, step)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Comparison, candidates, certificates, circumstances, without_candidate, undecided,
                                    gained, lost, otherwise, refused_alike, lost_plans, corruptions, passed_over)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ExportResult, decisions, without_candidate, executions, withdrawals, gaps, tubes,
+                                   messages, left_out, damage, passed_over, has_messages)
 
 template <class Result>
 void to_json(nlohmann::json& json, const CaseResults<Result>& results) {

@@ -1,4 +1,4 @@
-// `--shard I/N` of replay and verify, and `forereach merge`: of all shards it makes what one command prints.
+// `--shard I/N` of commands over logs, and `forereach merge`: of all shards it makes what one command prints or writes.
 
 #include "lcmtypes/seal.h"
 #include "records/replay.h"
@@ -98,6 +98,21 @@ struct ShardsTest : testing::Test {
     return whole;
   }
 
+  /** Of each number of shards merge writes what the command writes, and prints the same. */
+  void ExpectSameExport(const std::string& what, const std::string& format, std::initializer_list<int> counts) {
+    const std::string whole = scratch_ / "whole", merged = scratch_ / "merged", command = what + " --format " + format;
+    const Output expected = Forereach("export " + command + " -o " + whole + " 2>&1");
+    for (const int count : counts) {
+      const Output output = Merge(WriteShards("export " + command, count) + "-o " + merged);
+      EXPECT_EQ(Replaced(output.text, merged, whole), expected.text) << command << ", " << count;
+      EXPECT_EQ(output.code, expected.code) << command << ", " << count;
+      const Output difference = Shell("diff -r " + whole + " " + merged);
+      EXPECT_EQ(difference.code, 0) << command << ", " << count << ": " << difference.text;
+      fs::remove_all(merged);
+    }
+    fs::remove_all(whole);
+  }
+
   const ScratchDirectory scratch_;
   const std::string config_ = " --config " + kCourseTask;
   std::string changed_, noisy_task_;
@@ -132,6 +147,72 @@ TEST_F(ShardsTest, OfManyRunsMakeTheWhole) {
   EXPECT_THAT(ExpectMergedAsWhole("verify " + night + config_, {3}), Exits(1, night + "/b: refuted: "));
   EXPECT_THAT(ExpectMergedAsWhole("replay " + night + " --compare --config " + noisy_task_, {3}),
               Exits(1, night + "/a: ", night + "/b: "));
+}
+
+TEST_F(ShardsTest, OfAdviceMakeTheWhole) {
+  EXPECT_THAT(ExpectMergedAsWhole("advise " + changed_ + config_, {2}),
+              Exits(1, "it would be certified", "where one more observation would turn most"));
+  EXPECT_THAT(ExpectMergedAsWhole("advise " + kCourseLog + config_ + " --all --inner", {7}),
+              Exits(0, "the inner bound", "not enough alone"));
+}
+
+TEST_F(ShardsTest, OfAnExportMakeTheSameFiles) {
+  for (const std::string format : {"csv", "jsonl", "npz", "mcap"}) {
+    ExpectSameExport(changed_ + config_, format, {1, 2, 7});
+    ExpectSameExport((scratch_ / "night") + config_, format, {2});
+  }
+}
+
+// More shards than cases.
+TEST_F(ShardsTest, WithoutCasesBelongToTheWhole) {
+  int decisions = 0;
+  const std::string log = scratch_ / "short.lcmlog";
+  CopyLog(kCourseLog, log, [&](LogEvent& event) {
+    decisions += Decoded<decision_t>(event.data).has_value();
+    return decisions < 3;
+  });
+  for (const std::string command : {"replay ", "verify ", "advise "})
+    ExpectMergedAsWhole(command + log + config_, {1, 2, 7});
+  ExpectMergedAsWhole("replay --compare " + log + config_, {1, 2, 7});
+  for (const std::string format : {"csv", "npz"}) ExpectSameExport(log + config_, format, {1, 2, 7});
+}
+
+TEST_F(ShardsTest, OfAnExportThatAreDamagedAreRefused) {
+  const std::string command = "export " + kCourseLog + config_ + " --format jsonl", file = PathOf(1);
+  WriteShards(command, 1);
+  const std::string whole = Read(file), out = scratch_ / "out", merge = file + " --out " + out;
+  EXPECT_THAT(Merge(file), Exits(2, "--out: is needed"));
+  EXPECT_THAT(Merge(merge + " --json"), Exits(2, "--out"));
+  std::string changed = whole;
+  changed[whole.size() / 2] ^= 1;
+  for (const std::string& damaged : {changed, whole.substr(0, whole.size() - 2), whole + "x"}) {
+    scratch_.Write("part1.json", damaged);
+    EXPECT_THAT(Merge(merge), Exits(2, file + ": is damaged"));
+  }
+  // Whole, and nonsense.
+  const std::size_t end = whole.find('\n') + 1;
+  auto document = nlohmann::json::parse(whole.substr(0, end));
+  const auto sealed = [&](const std::string& pieces) {
+    document.erase("digest");
+    document["pieces"] =
+        ToHex(ChainedDigest({}, Bytes(reinterpret_cast<const std::uint8_t*>(pieces.data()), pieces.size())));
+    document["digest"] = ToHex(DigestOf(document.dump()));
+    scratch_.Write("part1.json", document.dump() + "\n" + pieces);
+    return Merge(merge);
+  };
+  EXPECT_THAT(sealed("\xff\xff}\n"), Exits(2, file + ": has no "));
+  EXPECT_THAT(sealed("\x83\x00\x00\x01}\n"), Exits(2, file + ": has no "));
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_EQ(sealed(whole.substr(end)).code, 0);
+  EXPECT_THAT(Merge(merge), Exits(2, out));
+  WriteShards("replay " + kCourseLog + config_, 1);
+  EXPECT_THAT(Merge(merge), Exits(2, "--out: is for the shards of an export"));
+}
+
+TEST_F(ShardsTest, OfAdviceNeedTheirLogs) {
+  const std::string log = scratch_ / "night/a/one.lcmlog", files = WriteShards("advise " + log + config_, 2);
+  fs::copy(changed_, log, fs::copy_options::overwrite_existing);
+  EXPECT_THAT(Merge(files), Exits(2, "is of other logs than those that are there now"));
 }
 
 TEST_F(ShardsTest, CountOnceWhatIsPassedOver) {
@@ -246,15 +327,19 @@ TEST_F(ShardsTest, OptionsThatMakeNoShardAreRefused) {
   EXPECT_THAT(Forereach(replay + " --shard 1/3 2>&1"), Exits(2, "--out"));
   EXPECT_THAT(Forereach(replay + " --out " + PathOf(1) + " 2>&1"), Exits(2, "--shard"));
   EXPECT_THAT(Forereach(replay + " --json --shard 1/3 --out " + PathOf(1) + " 2>&1"), Exits(2, "--json"));
-  EXPECT_THAT(Forereach("advise " + kCourseLog + config_ + " --shard 1/3 2>&1"), Exits(2, "--shard"));
+  EXPECT_THAT(Forereach("advise " + kCourseLog + config_ + " --shard 1/3 2>&1"), Exits(2, "--out"));
+  EXPECT_THAT(
+      Forereach("advise " + kCourseLog + config_ + " --advice-seconds 9 --shard 1/3 --out " + PathOf(1) + " 2>&1"),
+      Exits(2, "--shard"));
   EXPECT_FALSE(fs::exists(PathOf(1)));
   const std::string decision = scratch_ / "decision.json";
   ASSERT_EQ(
       Forereach("certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > " + decision)
           .code,
       0);
-  EXPECT_THAT(Forereach("verify " + decision + " --shard 1/3 --out " + PathOf(1) + " 2>&1"),
-              Exits(2, "--shard divides logs, and this is a single decision"));
+  for (const std::string command : {"verify ", "advise "})
+    EXPECT_THAT(Forereach(command + decision + " --shard 1/3 --out " + PathOf(1) + " 2>&1"),
+                Exits(2, "--shard divides logs, and this is a single decision"));
 }
 
 TEST_F(ShardsTest, ANameThatIsNoTextIsRefused) {
