@@ -52,6 +52,7 @@ inline constexpr const char* kDatabaseAddress =
 [[nodiscard]] Command ReportCommand();
 [[nodiscard]] Command CheckLogCommand();
 [[nodiscard]] Command ExportCommand();
+[[nodiscard]] Command FleetImportCommand();
 [[nodiscard]] Command FleetReportCommand();
 [[nodiscard]] Command IngestCommand();
 [[nodiscard]] Command LogCommand();

@@ -2,5 +2,6 @@
 #include "cli/commands.h"
 
 int main(int argc, char** argv) {
-  return forereach::RunCommands({forereach::IngestCommand(), forereach::FleetReportCommand()}, argc, argv);
+  return forereach::RunCommands(
+      {forereach::IngestCommand(), forereach::FleetReportCommand(), forereach::FleetImportCommand()}, argc, argv);
 }

@@ -26,8 +26,8 @@ struct IngestArguments {
 
 void Print(const Ingested& sum) {
   std::cout << "ingest: " << sum.logs << " logs, " << sum.decisions << " decisions, " << sum.events
-            << " execution events, " << sum.gaps << " gaps sent; " << sum.added << " of them are new in the store"
-            << std::endl;
+            << " execution events, " << sum.gaps << " gaps, " << sum.transitions << " transitions sent; " << sum.added
+            << " of them are new in the store" << std::endl;
 }
 
 // Waits for SIGTERM or SIGINT, which are blocked. @return whether one came.

@@ -35,7 +35,7 @@ int Become(const char* path, char** argv) {
   return 1;
 }
 
-// `report --database` is of the fleet, too.
+// `report --database` and `import --database` are of the fleet, too.
 bool NamesStore(int argc, char** argv) {
   for (int i = 1; i < argc; ++i)
     if (std::string_view(argv[i]).starts_with("--database")) return true;
@@ -49,9 +49,10 @@ int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands;
   for (const OfflineCommand& each : kOfflineCommands) {
-    const bool is_of_fleet = each.name == std::string_view("report") && NamesStore(argc, argv);
+    const std::string_view name = each.name;
+    const bool is_of_fleet = (name == "report" || name == "import") && NamesStore(argc, argv);
     const char* const program = kPrograms[static_cast<int>(is_of_fleet ? OfflineProgram::kFleet : each.program)];
-    if (argc > 1 && each.name == std::string_view(argv[1])) return Become(program, argv);
+    if (argc > 1 && name == argv[1]) return Become(program, argv);
     commands.push_back({.name = each.name, .run = [=] { return Become(program, argv); }});
   }
   for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),

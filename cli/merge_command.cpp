@@ -153,7 +153,7 @@ ShardFile ReadShard(const std::string& path) {
     if (file["program"] != DigestOfProgram()) RefuseShard(path, "another version of this program wrote it");
     if (file.number() < 1 || file.number() > file.count() || file.count() > kMostShards ||
         file["results"].size() != file["runs"].size() ||
-        !(file["command"] == kExport.name || kMerged.contains(file["command"].get<std::string>())))
+        !(file["command"] == "export" || kMerged.contains(file["command"].get<std::string>())))
       RefuseShard(path, "no shard is such");
     return file;
   } catch (const nlohmann::json::exception& error) {
@@ -198,7 +198,7 @@ struct MergeArguments {
 
 int Merge(const MergeArguments& options) try {
   const Shards shards(options.files);
-  const bool is_export = shards.name() == kExport.name;
+  const bool is_export = shards.name() == "export";
   if (is_export == options.out.empty())
     throw ConfigError(is_export ? "--out: is needed, since these are the shards of an export"
                                 : "--out: is for the shards of an export, and these are of " + shards.name());
@@ -295,6 +295,7 @@ Command MergeCommand() {
               "  forereach replay run/log --shard 2/2 --out part2.json\n"
               "  forereach merge part1.json part2.json\n"
               "  forereach export run/log --format csv --shard 1/2 --out part1\n"
+              "  forereach export run/log --format csv --shard 2/2 --out part2\n"
               "  forereach merge part1 part2 --out tables",
           .options = {Required({"files", &options->files, "FILE", "The files of all shards, in any order"}),
                       {"-o,--out", &options->out, "FILE|DIR", "Of an export: what is written, as by its own --out"},

@@ -1,6 +1,6 @@
 /** The commands that `forereach` leaves to other programs. Those of forereach-offline need no robot, and OMPL, SQLite,
 librsvg and MPFI, which the commands for a running system do not load. `live` is forereach-live, which loads a web
-server: the commands that stop and start a robot do without. `ingest` and `report --database` are
+server: the commands that stop and start a robot do without. `ingest`, `report --database` and `import --database` are
 forereach-fleet, which loads PostgreSQL's client and is a package of its own. `demo` is scripts/drive-demo. */
 #pragma once
 

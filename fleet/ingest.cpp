@@ -27,6 +27,7 @@ void Count(const Rows& rows, Ingested& sum) {
   sum.decisions += std::ssize(rows.decisions);
   sum.events += std::ssize(rows.events);
   sum.gaps += std::ssize(rows.gaps);
+  sum.transitions += std::ssize(rows.transitions);
 }
 
 void RequireRobot(const std::string& robot, const std::string& log) {
@@ -41,6 +42,7 @@ Ingested& Ingested::operator+=(const Ingested& more) {
   decisions += more.decisions;
   events += more.events;
   gaps += more.gaps;
+  transitions += more.transitions;
   added += more.added;
   return *this;
 }
@@ -110,6 +112,7 @@ std::map<std::string, Rows> DatabaseIngest::ToSend(Rows rows) {
   divide(rows.decisions, &Rows::decisions);
   divide(rows.events, &Rows::events);
   divide(rows.gaps, &Rows::gaps);
+  divide(rows.transitions, &Rows::transitions);
   return by_robot;
 }
 
@@ -143,6 +146,7 @@ Ingested IngestLogs(const RunLogs& run, Store& store, const IngestOptions& optio
       KeepOf(options.shard, rows.decisions);
       KeepOf(options.shard, rows.events);
       KeepOf(options.shard, rows.gaps);
+      KeepOf(options.shard, rows.transitions);
       sum.added += store.Write(robot, rows, states);
       Count(std::exchange(rows, {}), sum);
     };

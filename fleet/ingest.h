@@ -29,7 +29,7 @@ struct IngestOptions {
 
 /** What was sent. */
 struct Ingested {
-  std::int64_t logs = 0, decisions = 0, events = 0, gaps = 0;
+  std::int64_t logs = 0, decisions = 0, events = 0, gaps = 0, transitions = 0;
   std::int64_t added = 0;  ///< The rows that were not in the store before.
 
   Ingested& operator+=(const Ingested& more);

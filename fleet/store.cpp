@@ -41,6 +41,7 @@ constexpr const char* kAroundTables = R"sql(
   CREATE TABLE decisions_other PARTITION OF decisions DEFAULT;
   CREATE TABLE execution_events_other PARTITION OF execution_events DEFAULT;
   CREATE TABLE gaps_other PARTITION OF gaps DEFAULT;
+  CREATE TABLE transitions_other PARTITION OF transitions DEFAULT;
   CREATE VIEW runs WITH (security_invoker = true) AS
     SELECT DISTINCT ON (robot, log_file) * FROM run_states
     ORDER BY robot, log_file, end_utime IS NULL, events DESC, log_deleted_utime NULLS LAST;
@@ -58,7 +59,7 @@ constexpr const char* kAroundTables = R"sql(
         bounds[i] := extract(epoch FROM make_timestamptz((month + i) / 12, (month + i) % 12 + 1, 1, 0, 0, 0, 'UTC'))
                      * 1000000;
       END LOOP;
-      FOREACH base IN ARRAY ARRAY['decisions', 'execution_events', 'gaps'] LOOP
+      FOREACH base IN ARRAY ARRAY['decisions', 'execution_events', 'gaps', 'transitions'] LOOP
         part := format('%s_%s_%s', base, month / 12, lpad((month % 12 + 1)::TEXT, 2, '0'));
         IF NOT EXISTS (SELECT FROM pg_tables WHERE schemaname = 'public' AND tablename = part) THEN
           BEGIN
@@ -80,7 +81,7 @@ constexpr const char* kAroundTables = R"sql(
         EXCEPTION WHEN duplicate_object THEN NULL;
         END;
       END LOOP;
-      FOREACH name IN ARRAY ARRAY['run_states', 'decisions', 'execution_events', 'gaps'] LOOP
+      FOREACH name IN ARRAY ARRAY['run_states', 'decisions', 'execution_events', 'gaps', 'transitions'] LOOP
         EXECUTE format('ALTER TABLE %I ENABLE ROW LEVEL SECURITY', name);
         EXECUTE format('CREATE POLICY own ON %I TO forereach_robot USING (robot = current_user) '
                        'WITH CHECK (robot = current_user)', name);
@@ -104,6 +105,7 @@ constexpr const char* kCopies = R"sql(
   CREATE TEMP TABLE new_decisions (LIKE decisions) ON COMMIT DELETE ROWS;
   CREATE TEMP TABLE new_execution_events (LIKE execution_events) ON COMMIT DELETE ROWS;
   CREATE TEMP TABLE new_gaps (LIKE gaps) ON COMMIT DELETE ROWS;
+  CREATE TEMP TABLE new_transitions (LIKE transitions) ON COMMIT DELETE ROWS;
   CREATE TEMP TABLE new_run_states (LIKE run_states) ON COMMIT DELETE ROWS;
 )sql";
 
@@ -454,7 +456,7 @@ void Store::MakeMonths(Connection& connection, const Rows& rows) {
   const auto note = [&months](const auto& all) {
     for (const auto& row : all) months.insert(MonthOf(row.event.utime));
   };
-  note(rows.decisions), note(rows.events), note(rows.gaps);
+  note(rows.decisions), note(rows.events), note(rows.gaps), note(rows.transitions);
   for (const int month : months) {
     if (month == 0 || months_.contains(month)) continue;
     pqxx::work work(connection.server);
@@ -474,6 +476,7 @@ std::int64_t Store::Write(const std::string& robot, const Rows& rows, const std:
     std::int64_t added = Add(work, "decisions", robot, rows.decisions);
     added += Add(work, "execution_events", robot, rows.events);
     added += Add(work, "gaps", robot, rows.gaps);
+    added += Add(work, "transitions", robot, rows.transitions);
     Add(work, "run_states", robot, states);
     work.commit();
     connection.has_copies = true;
@@ -498,7 +501,7 @@ RowCounts Store::Count(const std::string& robot, const std::string& log_file) {
                        ToStoredText(robot), ToStoredText(log_file))[0][0]
           .template as<std::int64_t>();
     };
-    return RowCounts{count("decisions"), count("execution_events"), count("gaps")};
+    return RowCounts{count("decisions"), count("execution_events"), count("gaps"), count("transitions")};
   });
 }
 
@@ -507,7 +510,28 @@ Rows Store::Read(const std::string& robot, const std::string& log_file) {
     pqxx::work work(connection.server);
     return Rows{Select<DecisionRow>(work, "decisions", robot, log_file),
                 Select<EventRow>(work, "execution_events", robot, log_file),
-                Select<GapRow>(work, "gaps", robot, log_file)};
+                Select<GapRow>(work, "gaps", robot, log_file),
+                Select<TransitionRow>(work, "transitions", robot, log_file)};
+  });
+}
+
+std::vector<Store::OfRobot> Store::ReadTransitions(const WhichTransitions& which, const OfRobot* after, int most) {
+  const std::string robot = ToStoredText(which.robot), last_robot = after ? ToStoredText(after->first) : "";
+  const LogReference last = after ? after->second.event : LogReference{.log_file = "", .event_number = INT64_MIN};
+  return With([&](Connection& connection) {
+    pqxx::work work(connection.server);
+    std::vector<OfRobot> found;
+    for (Values& values : ValuesOf(work.exec_params(
+             "SELECT * FROM transitions WHERE ($1 = '' OR robot = $1) AND event_utime >= $2 AND event_utime < $3 AND "
+             "(robot, log_file, event_number, event_utime) > ($4, $5, $6, $7) "
+             "ORDER BY robot, log_file, event_number, event_utime LIMIT $8",
+             robot, which.from, which.until, last_robot, ToStoredText(last.log_file), last.event_number,
+             after ? last.utime : INT64_MIN, most))) {
+      OfRobot& row = found.emplace_back(FromStoredText(values.at(0).value_or("")), TransitionRow{});
+      values.erase(values.begin());
+      RowReader(values).Read(row.second);
+    }
+    return found;
   });
 }
 

@@ -17,6 +17,7 @@ printable ASCII, and the backslash, is written as \xHH. A number that is not one
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lcmtypes/bad_input.h"
@@ -60,6 +61,15 @@ class Store final {
   [[nodiscard]] RowCounts Count(const std::string& robot, const std::string& log_file);
   /** In the order of their events. */
   [[nodiscard]] Rows Read(const std::string& robot, const std::string& log_file);
+
+  /** The next transitions of all robots, each behind its robot's name, in the order of robot, log and event.
+  @param after the last one of the call before; none: from the first one on. */
+  using OfRobot = std::pair<std::string, TransitionRow>;
+  struct WhichTransitions {
+    std::string robot;                                 ///< Empty: of all robots.
+    std::int64_t from = INT64_MIN, until = INT64_MAX;  ///< The events' own times: from <= time < until.
+  };
+  [[nodiscard]] std::vector<OfRobot> ReadTransitions(const WhichTransitions& which, const OfRobot* after, int most);
 
   /** The rows of a query, as PostgreSQL writes values; no value is NULL. Nothing is written. */
   using Values = std::vector<std::optional<std::string>>;

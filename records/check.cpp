@@ -44,6 +44,7 @@ class RecordedRows {
       for (const auto& row : rows_.decisions) references_.emplace(row.event.event_number, row.event.digest);
       for (const auto& row : rows_.events) references_.emplace(row.event.event_number, row.event.digest);
       for (const auto& row : rows_.gaps) references_.emplace(row.event.event_number, row.event.digest);
+      for (const auto& row : rows_.transitions) references_.emplace(row.event.event_number, row.event.digest);
     }
     return rows_;
   }

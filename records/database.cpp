@@ -176,6 +176,8 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
       (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     insert_gap_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO gaps VALUES
       (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
+    insert_transition_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO transitions VALUES
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     set_events_ = std::make_unique<Statement>(handle, "UPDATE runs SET events = ? WHERE log_file = ?");
     static_cast<void>(FindDisplaced());
   } catch (const DatabaseError& error) {
@@ -237,6 +239,7 @@ std::optional<int> Database::Write(const Rows& rows, const std::string& log_file
     for (const DecisionRow& row : rows.decisions) written += Insert(*insert_decision_, row);
     for (const EventRow& row : rows.events) written += Insert(*insert_event_, row);
     for (const GapRow& row : rows.gaps) written += Insert(*insert_gap_, row);
+    for (const TransitionRow& row : rows.transitions) written += Insert(*insert_transition_, row);
     set_events_->Bind(events, log_file).Run();
     Execute("COMMIT");
     return written;
@@ -302,13 +305,15 @@ Rows Database::ReadRange(const std::string& log_file, std::int64_t first, std::i
   };
   return {Select<DecisionRow>(sql("decisions").c_str(), log_file, first, last),
           Select<EventRow>(sql("execution_events").c_str(), log_file, first, last),
-          Select<GapRow>(sql("gaps").c_str(), log_file, first, last)};
+          Select<GapRow>(sql("gaps").c_str(), log_file, first, last),
+          Select<TransitionRow>(sql("transitions").c_str(), log_file, first, last)};
 }
 
 std::vector<std::int64_t> Database::EventBlocks(const std::string& log_file, std::int64_t size) {
   return Select<std::int64_t>(R"sql(
       SELECT DISTINCT event_number / ?2 AS block FROM decisions WHERE log_file = ?1
       UNION SELECT DISTINCT event_number / ?2 FROM execution_events WHERE log_file = ?1
+      UNION SELECT DISTINCT event_number / ?2 FROM transitions WHERE log_file = ?1
       UNION SELECT DISTINCT event_number / ?2 FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
       ORDER BY block)sql",
                               log_file, size);
@@ -317,7 +322,7 @@ std::vector<std::int64_t> Database::EventBlocks(const std::string& log_file, std
 std::vector<std::string> Database::LogsWithoutRun() {
   return Select<std::string>(R"sql(
       SELECT log_file FROM (SELECT log_file FROM decisions UNION SELECT log_file FROM execution_events
-                            UNION SELECT log_file FROM gaps)
+                            UNION SELECT log_file FROM gaps UNION SELECT log_file FROM transitions)
       WHERE log_file NOT IN (SELECT log_file FROM runs))sql");
 }
 
@@ -347,7 +352,9 @@ Rows Database::Read(const std::string& log_file) {
                               log_file),
           Select<EventRow>("SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
                            log_file),
-          Select<GapRow>("SELECT * FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid", log_file)};
+          Select<GapRow>("SELECT * FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid", log_file),
+          Select<TransitionRow>("SELECT * FROM transitions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
+                                log_file)};
 }
 
 void Database::ReadInBlocks(const std::string& log_file, const std::function<void(const Rows&)>& take) {
@@ -366,6 +373,7 @@ void Database::ReadInBlocks(const std::string& log_file, const std::function<voi
   read("SELECT * FROM decisions WHERE log_file = ? ORDER BY event_number", &Rows::decisions);
   read("SELECT * FROM execution_events WHERE log_file = ? ORDER BY event_number", &Rows::events);
   read("SELECT * FROM gaps WHERE log_file = ? ORDER BY rowid", &Rows::gaps);
+  read("SELECT * FROM transitions WHERE log_file = ? ORDER BY event_number", &Rows::transitions);
 }
 
 RowCounts Database::Count(const std::string& log_file) {
@@ -373,7 +381,7 @@ RowCounts Database::Count(const std::string& log_file) {
     return Select<std::int64_t>(fmt::format("SELECT count(*) FROM {} WHERE log_file = ?", table).c_str(), log_file)
         .at(0);
   };
-  return {count("decisions"), count("execution_events"), count("gaps")};
+  return {count("decisions"), count("execution_events"), count("gaps"), count("transitions")};
 }
 
 Rows Database::ReadNext(RowMarks& marks, int most) {
@@ -390,6 +398,7 @@ Rows Database::ReadNext(RowMarks& marks, int most) {
   read("decisions", rows.decisions, marks.decisions);
   read("execution_events", rows.events, marks.events);
   read("gaps", rows.gaps, marks.gaps);
+  read("transitions", rows.transitions, marks.transitions);
   return rows;
 }
 

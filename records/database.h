@@ -1,9 +1,9 @@
 /** The decision database: SQLite, one file for all runs of a directory. Only its source file and schema.h see SQL.
 
-Tables: `decisions`, `execution_events` and `gaps` as in rows.h, and `runs` with one row for each log file. The journal
-is a write-ahead log, so after a kill or a power failure each transaction is there either whole or not at all. When a
-call that writes to `runs` returns, its row and all earlier rows are on the disk. A power failure may lose rows written
-since. The event log is always written first, so those rows can be made again. */
+Tables: `decisions`, `execution_events`, `gaps` and `transitions` as in rows.h, and `runs` with one row for each log
+file. The journal is a write-ahead log, so after a kill or a power failure each transaction is there either whole or not
+at all. When a call that writes to `runs` returns, its row and all earlier rows are on the disk. A power failure may
+lose rows written since. The event log is always written first, so those rows can be made again. */
 #pragma once
 
 #include <cstdint>
@@ -43,12 +43,12 @@ struct RunRow {
 
 /** How far the rows of a database have been read. */
 struct RowMarks {
-  std::int64_t decisions = 0, events = 0, gaps = 0;
+  std::int64_t decisions = 0, events = 0, gaps = 0, transitions = 0;
 };
 
 class Database final {
  public:
-  static constexpr int kSchemaVersion = 5;  ///< PRAGMA user_version: another one after every change of the tables.
+  static constexpr int kSchemaVersion = 6;  ///< PRAGMA user_version: another one after every change of the tables.
 
   /** Creates the file, or opens it.
   @throws DatabaseError if it cannot be opened, belongs to another program or has another schema. */
@@ -74,7 +74,7 @@ class Database final {
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
 
-  /** The same of one log file, in blocks: all decisions, then all events, then all gaps. */
+  /** The same of one log file, in blocks: all decisions, then all events, all gaps, all transitions. */
   void ReadInBlocks(const std::string& log_file, const std::function<void(const Rows&)>& take);
 
   /** How many rows of one log file there are. @throws DatabaseError. */
@@ -124,7 +124,7 @@ class Database final {
   std::string path_, problem_;
   std::map<std::string, FileIdentity> files_;  // of the database, by the end of their names; as they were first seen
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
-  std::unique_ptr<Statement> insert_decision_, insert_event_, insert_gap_, set_events_;
+  std::unique_ptr<Statement> insert_decision_, insert_event_, insert_gap_, insert_transition_, set_events_;
 };
 
 }  // namespace forereach

@@ -67,6 +67,17 @@ EventRow MakeRow(const execution_event_t& event, LogReference reference) {
   return row;
 }
 
+TransitionRow MakeRow(const transition_t& transition, LogReference reference) {
+  const int n = std::clamp<int>(transition.num_states, 0, 16), m = std::clamp<int>(transition.num_inputs, 0, 8);
+  return {.event = std::move(reference),
+          .utime = transition.utime,
+          .sequence = transition.sequence,
+          .duration_us = transition.duration_us,
+          .state = {transition.state, transition.state + n},
+          .input = {transition.input, transition.input + m},
+          .next_state = {transition.next_state, transition.next_state + n}};
+}
+
 }  // namespace
 
 Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys)
@@ -117,6 +128,9 @@ void Interpreter::Observe(const LogEvent& event, Rows& rows) {
   } else if (event.channel == channels_.event) {
     if (const auto execution = Decoded<execution_event_t>(event.message()))
       rows.events.push_back(MakeRow(*execution, reference()));
+  } else if (event.channel == channels_.transition) {
+    if (const auto transition = Decoded<transition_t>(event.message()))
+      rows.transitions.push_back(MakeRow(*transition, reference()));
   }
 }
 

@@ -12,6 +12,10 @@ namespace forereach {
 namespace {
 
 Cells ExportedCells(const DecisionRow& row) { return CellsOf("", row, nullptr); }
+Cells ExportedCells(const TransitionRow& row) {
+  return {{"utime", row.utime}, {"sequence", row.sequence},     {"duration_us", row.duration_us},  {"state", row.state},
+          {"input", row.input}, {"next_state", row.next_state}, {"event_digest", row.event.digest}};
+}
 Cells ExportedCells(const auto& row) { return CellsOf("", row); }
 Cells CellsOfRow(const auto& row) {
   Cells cells = ExportedCells(row);
@@ -36,7 +40,10 @@ std::string DescribeDifference(const Cells& recorded, const Cells& derived) {
 }
 
 // What is derived, with what does not follow from the log if the order of its messages is not known.
-EventRow Adjusted(EventRow derived, const EventRow&) { return derived; }
+template <class Row>
+Row Adjusted(Row derived, const Row&) {
+  return derived;
+}
 DecisionRow Adjusted(DecisionRow derived, const DecisionRow& recorded) {
   if (std::isnan(derived.latency_us)) derived.latency_us = recorded.latency_us;
   return derived;
@@ -68,6 +75,7 @@ void RowComparison::Compare(Table& table, const std::vector<Row>& derived, const
 void RowComparison::Take(const Rows& derived, const Rows& recorded) {
   Compare(decisions_, derived.decisions, recorded.decisions);
   Compare(events_, derived.events, recorded.events);
+  Compare(transitions_, derived.transitions, recorded.transitions);
 }
 
 void RowComparison::TakeRecorded(const Rows& recorded) {
@@ -83,11 +91,13 @@ void RowComparison::TakeRecorded(const Rows& recorded) {
   };
   take(decisions_, recorded.decisions);
   take(events_, recorded.events);
+  take(transitions_, recorded.transitions);
 }
 
 std::vector<std::string> RowComparison::Finish() const {
   std::vector<std::string> sentences;
-  for (const auto& [name, table] : {std::pair("decisions", &decisions_), {"execution_events", &events_}}) {
+  for (const auto& [name, table] :
+       {std::pair("decisions", &decisions_), {"execution_events", &events_}, {"transitions", &transitions_}}) {
     const auto say = [&, name = name](std::int64_t event, const std::string& what) {
       if (!what.empty() && !grounds_.damaged.contains(event))
         sentences.push_back(fmt::format("{}, event {}: {}", name, event, what));

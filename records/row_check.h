@@ -1,5 +1,6 @@
-/** Compares the decisions and execution events that a database has of a log with those that the interpreter makes of
-its events again. Gaps are not compared: how many messages are missing depends on what else reached the logger. */
+/** Compares the decisions, execution events and transitions that a database has of a log with those that the
+interpreter makes of its events again. Gaps are not compared: how many messages are missing depends on what else reached
+the logger. */
 #pragma once
 
 #include <bitset>
@@ -70,7 +71,7 @@ class RowComparison final {
   void Compare(Table& table, const std::vector<Row>& derived, const std::vector<Row>& recorded);
 
   const RowGrounds& grounds_;
-  Table decisions_, events_;
+  Table decisions_, events_, transitions_;
 };
 
 }  // namespace forereach

@@ -46,6 +46,13 @@ struct EventRow {
   double value = kNoNumber;
 };
 
+/** A transition_t: an executed step. */
+struct TransitionRow {
+  LogReference event;
+  std::int64_t utime = 0, sequence = 0, duration_us = 0;
+  std::vector<double> state, input, next_state;
+};
+
 /** A gap in a stream: missing messages, or a restart of their sender. */
 struct GapRow {
   LogReference event;  ///< The first message behind the gap; event_number is -1 if there is none.
@@ -70,14 +77,15 @@ struct Rows {
   std::vector<DecisionRow> decisions;
   std::vector<EventRow> events;
   std::vector<GapRow> gaps;
+  std::vector<TransitionRow> transitions;
 
-  [[nodiscard]] std::size_t size() const { return decisions.size() + events.size() + gaps.size(); }
+  [[nodiscard]] std::size_t size() const { return decisions.size() + events.size() + gaps.size() + transitions.size(); }
   [[nodiscard]] bool empty() const { return size() == 0; }
 };
 
 /** The numbers of rows of one log file. */
 struct RowCounts {
-  std::int64_t decisions = 0, events = 0, gaps = 0;
+  std::int64_t decisions = 0, events = 0, gaps = 0, transitions = 0;
   bool operator==(const RowCounts&) const = default;
 };
 

@@ -47,6 +47,11 @@ inline constexpr Migration kMigrations[] = {{Database::kSchemaVersion, R"sql(
     channel TEXT NOT NULL, source TEXT NOT NULL,
     expected BIGINT, got BIGINT, lost BIGINT NOT NULL, utime BIGINT NOT NULL, reason TEXT NOT NULL,
     event_digest TEXT NOT NULL, {unique} ({gap_key})){partitioned};
+  CREATE TABLE transitions ({robot}
+    log_file TEXT NOT NULL, event_number BIGINT NOT NULL, event_utime BIGINT NOT NULL,
+    utime BIGINT NOT NULL, sequence BIGINT NOT NULL, duration_us BIGINT NOT NULL,
+    state TEXT NOT NULL, input TEXT NOT NULL, next_state TEXT NOT NULL,
+    event_digest TEXT NOT NULL, {unique} ({key})){partitioned};
 )sql"}};
 
 /** In what the engines differ. SQLite's database is one robot's, and its rows change with it; in PostgreSQL several
@@ -101,6 +106,9 @@ auto ColumnsOf(auto& row) {
                           std::tie(row.event.utime, row.channel, row.source),
                           std::tuple(OrNull{row.expected}, OrNull{row.got}),
                           std::tie(row.lost, row.utime, row.reason, row.event.digest));
+  else if constexpr (std::is_same_v<Row, TransitionRow>)
+    return std::tie(row.event.log_file, row.event.event_number, row.event.utime, row.utime, row.sequence,
+                    row.duration_us, row.state, row.input, row.next_state, row.event.digest);
   else if constexpr (std::is_same_v<Row, RunRow>)
     return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.recovered, row.continues,
                     row.log_deleted_utime, row.robot);

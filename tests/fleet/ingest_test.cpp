@@ -38,6 +38,7 @@ class IngestTest : public PostgresTest {
       std::ranges::move(more.decisions, std::back_inserter(rows.decisions));
       std::ranges::move(more.events, std::back_inserter(rows.events));
       std::ranges::move(more.gaps, std::back_inserter(rows.gaps));
+      std::ranges::move(more.transitions, std::back_inserter(rows.transitions));
     }
     return rows;
   }
@@ -73,7 +74,8 @@ TEST_F(IngestTest, OfALogGivesTheRowsOfItsLogger) {
   const Ingested of_log = IngestLogs({.robot = {}, .logs = {scratch_ / kName}, .database = {}, .missing = {}}, store,
                                      {.robot = "r2", .config = kCourseTask, .key = {}, .shard = {}});
   EXPECT_EQ(of_directory.decisions, kCourseDecisions);
-  EXPECT_EQ(of_directory.added, of_directory.decisions + of_directory.events + of_directory.gaps);
+  EXPECT_EQ(of_directory.added,
+            of_directory.decisions + of_directory.events + of_directory.gaps + of_directory.transitions);
   EXPECT_EQ(of_log.added, of_directory.added);
   EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), RowsOfDirectory()), "");
   EXPECT_EQ(DifferenceOf(RowsOfStore("r2"), RowsOfDirectory()), "");

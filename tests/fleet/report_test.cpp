@@ -62,6 +62,17 @@ TEST_F(FleetReportTest, CountsEachRobotCauseDeclarationAndDay) {
   EXPECT_THAT(tables.at("Runs").front(), (Row{"r1", "b.lcmlog", "10", "50.0", "2"}));
 }
 
+// The query of docs/fleet.md.
+TEST_F(FleetReportTest, OneQueryFindsTheRefutedDeclarationsAndTheirRobots) {
+  AddFleet();
+  Add("r4", "a.lcmlog", 3, 4, 0, 4, "aaaaaaaaaaaa");
+  const std::string text = Read(FOREREACH_SOURCE_DIR "/docs/fleet.md");
+  const std::size_t at = text.find("```sql\n");
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_EQ(server_->Sql(text.substr(at + 7, text.find("```\n", at + 7) - at - 7)).text,
+            "aaaaaaaaaaaa|r4|r1 r2 r4\nbbbbbbbbbbbb|r1|<b>r3</b> r1\n");
+}
+
 TEST_F(FleetReportTest, OfAnEmptyStoreHasNoRows) {
   for (const auto& [title, rows] : Tables()) EXPECT_TRUE(rows.empty()) << title;
 }

@@ -39,6 +39,7 @@ inline std::vector<std::string> TextsOf(const Rows& rows) {
   add("decision", rows.decisions);
   add("event", rows.events);
   add("gap", rows.gaps);
+  add("transition", rows.transitions);
   std::ranges::sort(texts);
   return texts;
 }

@@ -34,6 +34,11 @@ Rows ExtremeRows(const std::string& log = "a.lcmlog") {
     event.kind = hostile;
     event.state = {NAN, 5e-324, 1.7976931348623157e308, 0.1};
     event.value = numbers[i];
+    TransitionRow& transition = rows.transitions.emplace_back();
+    transition.event = row.event;
+    transition.duration_us = kLeast;
+    transition.state = transition.next_state = event.state;
+    transition.input = {numbers[3]};
     GapRow& gap = rows.gaps.emplace_back();
     gap.event = {log, i < 3 ? -1 : i, "", kDay + i};
     gap.channel = gap.source = gap.reason = hostile;
@@ -96,11 +101,11 @@ TEST_F(StoreTest, KeepsEachRowAsSqliteDoes) {
 TEST_F(StoreTest, HasEachRowOnceHoweverOftenItIsSent) {
   Store store(server_->Address()), other(server_->Address());
   Rows rows = ExtremeRows(), first = rows;
-  first.decisions.resize(2), first.events.resize(3), first.gaps.resize(4);
-  EXPECT_EQ(store.Write("r1", first), 9);
-  EXPECT_EQ(other.Write("r1", rows), rows.size() - 9);
+  first.decisions.resize(2), first.events.resize(3), first.gaps.resize(4), first.transitions.resize(5);
+  EXPECT_EQ(store.Write("r1", first), 14);
+  EXPECT_EQ(other.Write("r1", rows), rows.size() - 14);
   EXPECT_EQ(store.Write("r1", rows), 0);
-  EXPECT_EQ(store.Count("r1", "a.lcmlog"), (RowCounts{7, 7, 7}));
+  EXPECT_EQ(store.Count("r1", "a.lcmlog"), (RowCounts{7, 7, 7, 7}));
   EXPECT_EQ(store.Write("r2", rows), rows.size()) << "another robot's log of the same name";
   EXPECT_EQ(store.Write("r1", ExtremeRows("b.lcmlog")), rows.size()) << "another log";
 }
@@ -179,8 +184,8 @@ TEST_F(StoreTest, ARobotAddsItsOwnRowsAndChangesNone) {
   EXPECT_EQ(reader.Read("r2", "a.lcmlog").size(), rows.size());
   EXPECT_EQ(Thrown<StoreError>([&] { static_cast<void>(reader.Write("analyst", rows)); }), refused);
   EXPECT_EQ(Thrown<StoreError>([&] { static_cast<void>(stranger.Read("r1", "a.lcmlog")); }), refused);
-  for (const std::string table : {"decisions", "execution_events", "gaps", "run_states", "decisions_2026_01",
-                                  "decisions_other", "forereach_schema"})
+  for (const std::string table : {"decisions", "execution_events", "gaps", "transitions", "run_states",
+                                  "decisions_2026_01", "decisions_other", "forereach_schema"})
     for (const std::string user : {"r1", "analyst", "stranger"})
       for (const std::string& statement :
            {"UPDATE " + table + " SET " + (table == "forereach_schema" ? "version = 0" : "robot = 'r1'"),
@@ -211,7 +216,7 @@ TEST_F(StoreTest, SaysInItsOwnWordsWhyItRefuses) {
               HasSubstr("refuses this user, password or database"));
   server_->Sql("UPDATE forereach_schema SET version = 9");
   EXPECT_THAT(Thrown<StoreError>([&] { static_cast<void>(Store(server_->Address()).Runs("r1")); }),
-              HasSubstr("schema version 9, this program knows version 5"));
+              HasSubstr("schema version 9, this program knows version 6"));
 }
 
 TEST_F(StoreTest, GoesOnAfterTheServerWasKilled) {
@@ -221,8 +226,8 @@ TEST_F(StoreTest, GoesOnAfterTheServerWasKilled) {
   EXPECT_THROW(static_cast<void>(store.Write("r1", ExtremeRows("b.lcmlog"))), StoreAway);
   EXPECT_THROW(static_cast<void>(store.Write("r1", ExtremeRows("b.lcmlog"))), StoreAway);
   server_->Start();
-  EXPECT_EQ(store.Write("r1", ExtremeRows("b.lcmlog")), 21);
-  EXPECT_EQ(store.Read("r1", "a.lcmlog").size(), 21u) << "what was confirmed is lost";
+  EXPECT_EQ(store.Write("r1", ExtremeRows("b.lcmlog")), 28);
+  EXPECT_EQ(store.Read("r1", "a.lcmlog").size(), 28u) << "what was confirmed is lost";
 }
 
 }  // namespace forereach::store_test

@@ -25,7 +25,14 @@ Rows SampleRows() {
                          .elapsed_us = 1.5,
                          .plan_digest = "00ff"}},
           .events = {{.event = {"a.lcmlog", 8, "e8"}, .kind = "goal_reached", .state = {0.1, -2, 1e300}, .value = 0.7}},
-          .gaps = {{{"a.lcmlog", 9, "f9"}, "C", "s", 4, 6, 2, 15, "bus"}}};
+          .gaps = {{{"a.lcmlog", 9, "f9"}, "C", "s", 4, 6, 2, 15, "bus"}},
+          .transitions = {{.event = {"a.lcmlog", 7, "a7"},
+                           .utime = 3,
+                           .sequence = 4,
+                           .duration_us = 100'000,
+                           .state = {0.1, -2},
+                           .input = {1e300},
+                           .next_state = {5, 6}}}};
 }
 
 struct DatabaseTest : testing::Test {
@@ -36,7 +43,7 @@ struct DatabaseTest : testing::Test {
 
 TEST_F(DatabaseTest, RowsSurviveARoundTrip) {
   database_.BeginRun("a.lcmlog", 10);
-  EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 3);
+  EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 4);
   const Rows rows = database_.Read("a.lcmlog");
   const DecisionRow& decision = Only(rows.decisions);
   EXPECT_FIELDS(decision, (event.event_number, 7), (utime, 11), (candidate_utime, 12), (sequence, 13), (plan_id, 14),
@@ -48,6 +55,9 @@ TEST_F(DatabaseTest, RowsSurviveARoundTrip) {
   EXPECT_FIELDS(decision, (plan_digest, "00ff"), (event.digest, "d7"));
   EXPECT_FIELDS(Only(rows.events), (kind, "goal_reached"), (state, (std::vector<double>{0.1, -2, 1e300})), (value, 0.7),
                 (event.digest, "e8"));
+  EXPECT_FIELDS(Only(rows.transitions), (utime, 3), (sequence, 4), (duration_us, 100'000),
+                (state, (std::vector<double>{0.1, -2})), (input, std::vector<double>{1e300}),
+                (next_state, (std::vector<double>{5, 6})), (event.digest, "a7"));
   EXPECT_FIELDS(Only(rows.gaps), (expected, 4), (got, 6), (lost, 2), (reason, "bus"), (event.digest, "f9"));
   EXPECT_TRUE(database_.Read("b.lcmlog").empty());
 }
@@ -61,7 +71,7 @@ TEST_F(DatabaseTest, WhatDoesNotApplyIsNullInAQueryAndAsBeforeInARow) {
   rows.events[0].plan_id = -1;
   decision.obstacle = -7;  // no row of ours has it, and it stays what it is
   database_.BeginRun("a.lcmlog", 10);
-  ASSERT_EQ(database_.Write(rows, "a.lcmlog", 10), 3);
+  ASSERT_EQ(database_.Write(rows, "a.lcmlog", 10), 4);
   const Rows read = database_.Read("a.lcmlog");
   EXPECT_FIELDS(read, (decisions[0].step, -1), (decisions[0].second_observation, -1), (decisions[0].obstacle, -7),
                 (events[0].plan_id, -1), (events[0].coordinate, -1));
@@ -73,7 +83,7 @@ TEST_F(DatabaseTest, WhatDoesNotApplyIsNullInAQueryAndAsBeforeInARow) {
 }
 
 TEST_F(DatabaseTest, WritesARowOnce) {
-  EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 3);
+  EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 4);
   EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 0);
   EXPECT_EQ(database_.Read().decisions.size(), 1u);
 }
@@ -109,7 +119,7 @@ TEST_F(DatabaseTest, ReadsTheRowsOfSomeEvents) {
   rows.gaps[1].event = {"a.lcmlog", -1, ""};
   rows.decisions[0].event = {"a.lcmlog", 9, "f9"};  // the event of the gap
   ASSERT_TRUE(database_.Write(rows, "a.lcmlog", 10));
-  EXPECT_EQ(database_.ReadRange("a.lcmlog", 0, 9).size(), 3u) << "a gap without event is of none";
+  EXPECT_EQ(database_.ReadRange("a.lcmlog", 0, 9).size(), 4u) << "a gap without event is of none";
   EXPECT_EQ(database_.ReadRange("a.lcmlog", 0, 8).events.size(), 1u);
   EXPECT_TRUE(database_.ReadRange("a.lcmlog", 0, 8).decisions.empty());
   EXPECT_TRUE(database_.ReadRange("b.lcmlog", 0, 9).empty());
@@ -143,7 +153,7 @@ TEST_F(DatabaseTest, WritesAllOrNothing) {
   EXPECT_THAT(database_.problem(), HasSubstr("d.sqlite: it refuses a row"));
   EXPECT_TRUE(database_.Read().empty());
   Sql(path_, "DROP TRIGGER full");
-  EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 3);
+  EXPECT_EQ(database_.Write(SampleRows(), "a.lcmlog", 10), 4);
 }
 
 }  // namespace forereach::database_test

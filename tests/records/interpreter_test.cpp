@@ -1,4 +1,4 @@
-// Sequence numbers: missing, late and repeated messages, and restarts.
+// Sequence numbers: missing, late and repeated messages, and restarts; rows of executed steps.
 #include "records/interpreter.h"
 
 #include "tests/records/logs.h"
@@ -23,6 +23,20 @@ struct InterpreterTest : testing::Test {
   Rows rows_;
   std::int64_t number_ = 0;
 };
+
+TEST_F(InterpreterTest, AnExecutedStepIsARowWhateverItsCounts) {
+  transition_t step{.utime = 5, .sequence = 6, .duration_us = 7, .num_states = 2, .num_inputs = 1};
+  step.state[1] = 1, step.input[0] = 2, step.next_state[0] = 3;
+  for (const std::int16_t states : {2, -1, 32767}) {
+    step.num_states = states;
+    interpreter_.Observe({number_++, kNow, "TRANSITION", Encode(step)}, rows_);
+  }
+  ASSERT_EQ(rows_.transitions.size(), 3u);
+  EXPECT_FIELDS(rows_.transitions[0], (utime, 5), (sequence, 6), (duration_us, 7), (state, (std::vector<double>{0, 1})),
+                (input, std::vector<double>{2}), (next_state, (std::vector<double>{3, 0})), (event.event_number, 0));
+  EXPECT_TRUE(rows_.transitions[1].state.empty());
+  EXPECT_EQ(rows_.transitions[2].next_state.size(), 16u);
+}
 
 TEST_F(InterpreterTest, AMessageThatComesTwiceIsNoLoss) {
   for (const std::int64_t sequence : {49'999, 50'000, 50'000, 50'001, 49'999, 50'002}) Hear(sequence, sequence);

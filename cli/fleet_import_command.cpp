@@ -1,0 +1,99 @@
+#include <charconv>
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/offline.h"
+#include "fleet/transitions.h"
+#include "lcmtypes/printable.h"
+#include "task/config.h"
+#include "task/json_text.h"
+
+namespace forereach {
+namespace {
+
+struct FleetImportArguments {
+  std::string config, database, day, by = "robot", out;
+  Store::WhichTransitions which;
+  bool json = false;
+};
+
+// The times of a day, UTC.
+void SetDay(const std::string& text, Store::WhichTransitions& which) {
+  int year = 0, month = 0, day = 0;
+  const char* const end = text.data() + text.size();
+  const bool is_date = text.size() == 10 && text[4] == '-' && text[7] == '-' &&
+                       std::from_chars(text.data(), end - 6, year).ptr == end - 6 &&
+                       std::from_chars(end - 5, end - 3, month).ptr == end - 3 &&
+                       std::from_chars(end - 2, end, day).ptr == end;
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!is_date || !date.ok()) throw ConfigError("--day: " + Printable(text) + " is no day, for example 2026-01-31");
+  using std::chrono::microseconds;
+  which.from = std::chrono::duration_cast<microseconds>(std::chrono::sys_days(date).time_since_epoch()).count();
+  which.until = which.from + microseconds(std::chrono::days(1)).count();
+}
+
+FleetTransitions Read(const FleetImportArguments& options, const Config& task) try {
+  Store store(options.database);
+  return ReadTransitions(store, *task.problem, options.which,
+                         options.by == "day" ? TransitionsBy::kDay : TransitionsBy::kRobot);
+} catch (const std::invalid_argument& error) {  // a task that no certifier accepts
+  throw ConfigError(task.path + ": " + error.what());
+}
+
+int ImportFromFleet(FleetImportArguments options) {
+  if (!options.day.empty()) SetDay(options.day, options.which);
+  const Config task = LoadConfig(options.config, TransitionsFile::kIgnore);
+  const FleetTransitions found = Read(options, task);
+  const int count = found.transitions.size();
+  const bool is_written = !options.out.empty() && count > 0;
+  if (is_written) SaveTransitions(options.out, *task.problem->model, found.transitions);
+  const std::vector<FleetTable> tables{found.residuals, found.refused, found.contradictions};
+  if (options.json) {
+    std::cout << JsonText(ToJson(tables)) << std::endl;
+  } else {
+    std::cout << ToText(tables) << "import: " << count << " transitions of " << task.period << " s"
+              << (is_written ? " in " + Printable(options.out) : "");
+    if (count > 0)
+      std::cout << fmt::format(
+          "\nSteps lasted up to {:g} s longer or shorter: declaration.noise_bound has to include how far states move "
+          "in "
+          "that time",
+          found.longer);
+    std::cout << std::endl;
+  }
+  return count > 0 && found.contradictions.rows.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+Command FleetImportCommand() {
+  const auto options = std::make_shared<FleetImportArguments>();
+  return {.name = kImport.name,
+          .purpose =
+              "Make a task's transitions of the steps that all robots have executed, and show what differs between "
+              "robots: exit 0, 1 if there are none or they contradict the task's declaration, 2 bad input",
+          .footer =
+              "The file is for `transitions` of a task: forereach fit and forereach declare --from-data read it.\n\n"
+              "Example:\n  forereach import --config task.yaml --database postgresql://fleet.example/forereach "
+              "--out fleet.csv",
+          .options = {ConfigOption(options->config),
+                      Required({"--database", &options->database, "URL", kDatabaseAddress}),
+                      {"--robot", &options->which.robot, "NAME", "Of this robot alone"},
+                      {"--day", &options->day, "YYYY-MM-DD", "Of this day alone, UTC"},
+                      {.name = "--by",
+                       .variable = &options->by,
+                       .help = "What the table of residuals compares",
+                       .one_of = {"robot", "day"}},
+                      {"-o,--out", &options->out, "FILE.csv", "The transitions"},
+                      JsonFlag(options->json)},
+          .run = [options] { return ImportFromFleet(*options); }};
+}
+
+}  // namespace forereach

@@ -1,0 +1,141 @@
+// `forereach import --database`: the transitions of all robots, and what differs between them.
+#include "fleet/transitions.h"
+
+#include "fleet/ingest.h"
+#include "forereach/transition_t.hpp"
+#include "tests/cli/program.h"
+#include "tests/fleet/postgres.h"
+#include "tests/records/course.h"
+#include "tests/records/logs.h"
+
+namespace forereach::transitions_test {
+
+class FleetImportTest : public PostgresTest {
+ protected:
+  // The recorded course as a robot's log, with its transitions changed.
+  void Add(const std::string& robot, const std::function<void(int number, transition_t&)>& change = {}) {
+    const std::string log = scratch_ / (robot + ".lcmlog");
+    int number = 0;
+    CopyLog(kCourseLog, log, [&](LogEvent& event) {
+      auto transition = Decoded<transition_t>(event.data);
+      if (transition && change) {
+        change(number++, *transition);
+        event.data = Encode(*transition);
+      }
+      return true;
+    });
+    Store store(server_->Address());
+    static_cast<void>(IngestLogs({.robot = {}, .logs = {log}, .database = {}, .missing = {}}, store,
+                                 {.robot = robot, .config = kCourseTask, .key = {}, .shard = {}}));
+  }
+  static std::vector<transition_t> OfCourse() {
+    std::vector<transition_t> all;
+    for (const LogEvent& event : ReadLog(kCourseLog).events)
+      if (const auto transition = Decoded<transition_t>(event.data)) all.push_back(*transition);
+    return all;
+  }
+  Output Import(const std::string& options) const {
+    return Forereach("import --config " + kCourseTask + " --database '" + server_->Address() + "' " + options +
+                     " 2>&1");
+  }
+  nlohmann::json Tables(const std::string& options = "") const {
+    return nlohmann::json::parse(Import("--json " + options).text);
+  }
+
+  const ScratchDirectory scratch_;
+  const std::string out_ = scratch_ / "fleet.csv";
+};
+
+TEST_F(FleetImportTest, WritesWhatEachRobotHasExecuted) {
+  const std::vector<transition_t> of_course = OfCourse();
+  ASSERT_GT(of_course.size(), 10u);
+  Add("r1");
+  Add("r2");
+  EXPECT_THAT(Import("--out " + out_),
+              Exits(0, "import: " + std::to_string(2 * of_course.size()) + " transitions of 0.1 s in "));
+  const Config config = LoadConfig(kCourseTask);
+  const NominalModel& model = *config.problem->model;
+  const Transitions all = LoadTransitions(out_, model);
+  ASSERT_EQ(all.size(), 2 * std::ssize(of_course));
+  for (Eigen::Index i = 0; i < all.size(); ++i) {
+    const transition_t& expected = of_course[static_cast<std::size_t>(i) % of_course.size()];
+    for (int k = 0; k < model.num_states(); ++k) {
+      EXPECT_EQ(all.z(i, k), expected.state[k]);
+      EXPECT_EQ(all.x_next(i, k), expected.next_state[k]);
+    }
+    for (int l = 0; l < model.num_inputs(); ++l) EXPECT_EQ(all.z(i, model.num_states() + l), expected.input[l]);
+  }
+  // It is what other commands read.
+  const std::string task = scratch_.Write(
+      "task.yaml", Replaced(Read(kCourseTask), "transitions: course_transitions.csv", "transitions: fleet.csv"));
+  EXPECT_THAT(Forereach("declare --from-data --by v,delta --config " + task + " 2>&1"),
+              Exits(0, "from " + std::to_string(2 * of_course.size()) + " transitions"));
+}
+
+TEST_F(FleetImportTest, TakesOneRobotOrDay) {
+  const std::string count = std::to_string(OfCourse().size());
+  Add("r1");
+  Add("r2");
+  EXPECT_THAT(Import("--robot r2"), Exits(0, "import: " + count + " transitions"));
+  EXPECT_THAT(Import("--robot r3"), Exits(1, "import: 0 transitions"));
+  const auto days = Tables("--by day")["Residuals"]["rows"];
+  ASSERT_EQ(days.size(), 1u);
+  EXPECT_EQ(days[0][1], std::to_string(2 * OfCourse().size()));
+  EXPECT_THAT(Import("--robot r1 --day " + days[0][0].get<std::string>()),
+              Exits(0, "import: " + count + " transitions"));
+  EXPECT_THAT(Import("--day 2001-01-01"), Exits(1, "import: 0 transitions"));
+  for (const std::string day : {"2001-13-01", "2001-02-29", "2001-1-1", "today", "2001-01-01x", "+001-01-01"})
+    EXPECT_THAT(Import("--day " + day), Exits(2, "--day: "));
+}
+
+// By name, of a row of the table of residuals.
+double CellOf(const nlohmann::json& table, std::size_t row, const std::string& column) {
+  const auto columns = table["columns"].get<std::vector<std::string>>();
+  const auto at = static_cast<std::size_t>(std::ranges::find(columns, column) - columns.begin());
+  return std::stod(table["rows"].at(row).at(at).get<std::string>());
+}
+
+TEST_F(FleetImportTest, ShowsWhatDiffersBetweenRobots) {
+  Add("r1");
+  Add("r2", [](int, transition_t& transition) { transition.next_state[3] += 0.25; });
+  const auto table = Tables()["Residuals"];
+  EXPECT_NEAR(CellOf(table, 1, "v mean") - CellOf(table, 0, "v mean"), 0.25, 1e-3);
+  EXPECT_NEAR(CellOf(table, 1, "v deviation"), CellOf(table, 0, "v deviation"), 1e-3);
+  EXPECT_EQ(CellOf(table, 1, "x mean"), CellOf(table, 0, "x mean"));
+}
+
+TEST_F(FleetImportTest, NamesTheRobotsThatRefuteTheDeclaration) {
+  Add("r1");
+  Add("r2");
+  EXPECT_TRUE(Tables()["Contradictions of the declaration"]["rows"].empty());
+  // Each is consistent with itself: the declaration says that the residual of x is a constant.
+  Add("r3", [](int, transition_t& transition) { transition.next_state[0] += 0.5; });
+  EXPECT_THAT(Import("--robot r3"), Exits(0));
+  auto rows = Tables()["Contradictions of the declaration"]["rows"];
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0][0], "x");
+  EXPECT_THAT((std::set<std::string>{rows[0][3], rows[0][6]}), Contains("r3"));
+  EXPECT_NE(rows[0][3], rows[0][6]);
+  // And one that is not.
+  Add("r4", [](int number, transition_t& transition) { transition.next_state[0] += number == 4 ? 0.01 : 0; });
+  EXPECT_THAT(Import(""), Exits(1, "Contradictions of the declaration"));
+  rows = Tables()["Contradictions of the declaration"]["rows"];
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0][3], "r4");
+  EXPECT_EQ(rows[0][6], "r4");
+  EXPECT_EQ(Import("--out " + out_).code, 1);
+  EXPECT_TRUE(std::filesystem::exists(out_)) << "they are the data that say it";
+}
+
+TEST_F(FleetImportTest, LeavesOutWhatNoCertifierLearns) {
+  Add("r1", [](int number, transition_t& transition) {
+    if (number == 0) transition.num_states = 4;
+    if (number == 1) transition.next_state[0] = NAN;
+    if (number == 2 || number == 3) transition.state[0] = 1e6;
+  });
+  const auto tables = Tables();
+  EXPECT_EQ(tables["Residuals"]["rows"][0][2], "4");
+  EXPECT_EQ(tables["Refused"]["rows"].size(), 3u) << tables["Refused"];
+}
+
+}  // namespace forereach::transitions_test
