@@ -3,12 +3,14 @@
 // Two processes answer candidates on loopback UDP multicast, each on a port of its own: the certifier's node with its
 // gate, and an echo that sends messages of the same sizes back without looking at what came. This process asks one,
 // then the other, and so on, so both see the same machine. Two questions: a plan that is certified (the answer is
-// decision_t and certified_plan_t) and one that is not (decision_t alone).
+// decision_t and certified_plan_t) and one that is not (decision_t alone). Then the first question after pauses.
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/candidates.h"
@@ -98,6 +100,10 @@ class Asker {
   std::unique_ptr<Bus> bus_;
 };
 
+std::string PortUrl(int offset) {
+  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 8 + offset) % 20'000) + "?ttl=0";
+}
+
 struct Results {
   Latencies echo, certifier, gate;
   int lost = 0, unexpected = 0;
@@ -143,6 +149,35 @@ nlohmann::json Compare(const Task& task, bool certifies, int rounds, int ports) 
           {"unexpected", certifier.unexpected()}};
 }
 
+// Uses the caches as a planner does between two candidates.
+void Search(std::vector<char>& memory) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(10);
+  for (std::size_t i = 0; std::chrono::steady_clock::now() < end; i = (i + 64) % memory.size()) ++memory[i];
+}
+
+// The gate's work on candidates that come one after a search each; to a certifier that keeps warm, and to one that does
+// not, in turn.
+nlohmann::json AfterPauses(const Task& task, int rounds, int ports) {
+  Config config = MakeConfig(task);
+  const std::string cold_url = PortUrl(ports), warm_url = PortUrl(ports + 1);
+  const auto make = [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); };
+  const Answerer cold_process(cold_url, make);
+  config.realtime.keep_warm = true;
+  const Answerer warm_process(warm_url, make);
+  Asker cold(cold_url, config.bus, decision_t::CERTIFIED), warm(warm_url, config.bus, decision_t::CERTIFIED);
+  candidate_plan_t candidate = MakeCandidate(task);
+  cold.Reach(candidate);
+  warm.Reach(candidate);
+  std::vector<char> memory(std::size_t{32} << 20);
+  Latencies of_cold(static_cast<std::size_t>(rounds)), of_warm(static_cast<std::size_t>(rounds));
+  for (int round = 0; round < rounds; ++round)
+    for (const auto& [asker, latencies] : {std::pair(&cold, &of_cold), {&warm, &of_warm}}) {
+      Search(memory);
+      if (asker->Ask(candidate) >= 0) latencies->Add(asker->gate_us());
+    }
+  return {{"cold", of_cold.ToJson()}, {"kept_warm", of_warm.ToJson()}};
+}
+
 }  // namespace
 }  // namespace forereach::bench
 
@@ -158,6 +193,7 @@ int main(int argc, char** argv) {
             {"decision_bytes", EncodedSize<decision_t>()},
             {"certified_bytes", EncodedSize<certified_plan_t>()},
             {"certified", Compare(MakeTask(Scenario::kBicycle, kObservations), true, rounds, 0)},
-            {"abstained", Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2)}};
+            {"abstained", Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2)},
+            {"after_pauses", AfterPauses(MakeTask(Scenario::kBicycle, kObservations), std::max(rounds / 20, 5), 4)}};
   });
 }

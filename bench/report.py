@@ -121,6 +121,7 @@ class Report:
             at_most("p99 of the bus with the certifier over a bare echo, certificates",
                     self.bus_data["certified"]["ratio_p99"], 1.2),
             at_most("the same, abstentions", self.bus_data["abstained"]["ratio_p99"], 1.2),
+            at_most("a decision after a pause, kept warm, over one in a loop, p50", ratio(*self.pauses("kept_warm")), 2),
             at_most("dense declaration, N = 400, microseconds", self.cpu("certify/dense/400"), 100),
             at_least(f"batch on {threads} cores over one core", scaling, 0.9 * threads,
                      "an idle machine: two processes at once are 2 % slower each"),
@@ -239,6 +240,15 @@ class Report:
         found = {label: self.benchmarks[f"{group}/{name}"] for name, label in labels.items() if f"{group}/{name}" in self.benchmarks}
         first = self.benchmarks.get(f"{group}/{next(iter(labels))}")
         return table(["", "us", header], [[label, number(each.cpu), f"{each.cpu / first.cpu:.2f}"] for label, each in found.items()])
+
+    # The gate's work after pauses and in a loop.
+    def pauses(self, kind):
+        return self.bus_data["after_pauses"][kind]["p50"], self.bus_data["certified"]["gate"]["p50"]
+
+    def cold(self):
+        (cold, loop), (warm, _) = self.pauses("cold"), self.pauses("kept_warm")
+        return (f"After 10 ms in which another program has used the caches, a decision takes {number(cold)} us at the median, with "
+                f"`realtime.keep_warm` {number(warm)}, and in a loop {number(loop)}.")
 
     def worlds(self):
         return self.beside("world", "beside the point", {

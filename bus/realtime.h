@@ -8,6 +8,8 @@ struct RealtimeOptions {
   Lock lock_memory = Lock::kTry;
   int fifo_priority = 0;  ///< SCHED_FIFO, 1..99; 0 leaves the scheduler alone.
 
+  bool keep_warm = false;  ///< Gate::KeepWarm while nothing waits.
+
   friend bool operator==(const RealtimeOptions&, const RealtimeOptions&) = default;
 };
 

@@ -75,7 +75,7 @@ int ImportFromFleet(FleetImportArguments options) {
 
 Command FleetImportCommand() {
   const auto options = std::make_shared<FleetImportArguments>();
-  return {.name = kImport.name,
+  return {.name = "import",
           .purpose =
               "Make a task's transitions of the steps that all robots have executed, and show what differs between "
               "robots: exit 0, 1 if there are none or they contradict the task's declaration, 2 bad input",

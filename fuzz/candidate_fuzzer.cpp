@@ -132,7 +132,7 @@ bool Try(Bytes data) {
     const GateAnswer answer = gate.Decide(message, now);
     Require(answer.decision.sequence == decided && answer.decision.utime == now);
     const Digest plan = GetDigest(answer.decision.plan_digest);
-    Require(DigestOf(CandidateIn(message, plan)) == plan);
+    Require(PlanDigest(Bytes(CandidateIn(message, plan))) == plan);
     const std::vector<std::uint8_t> bytes = CandidateIn(message, plan);
     Require(answer.certified.has_value() == (answer.decision.outcome == decision_t::CERTIFIED));
     Require(answer.decision.cause != decision_t::CAUSE_INTERNAL_ERROR);

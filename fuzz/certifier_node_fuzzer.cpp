@@ -42,7 +42,7 @@ class WitnessBus final : public Bus {
   }
 
   void Deliver(const std::string& channel, Bytes bytes, std::int64_t now_us) {
-    if (channel == "PLAN_CANDIDATE") ++unanswered_[DigestOf(bytes)];
+    if (channel == "PLAN_CANDIDATE") ++unanswered_[PlanDigest(bytes)];
     handlers_.at(channel)({channel, bytes, now_us, bytes});
   }
 

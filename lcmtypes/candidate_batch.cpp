@@ -1,4 +1,5 @@
 #include "lcmtypes/candidate_batch.h"
+#include "lcmtypes/seal.h"
 
 #include <algorithm>
 #include <iterator>
@@ -106,7 +107,7 @@ bool Append(candidate_batch_t& batch, const candidate_plan_t& candidate) {
 
 Digest KeyOfCandidates(Bytes message) {
   const auto batch = BatchIn(message);
-  return batch ? BatchKey(batch->source, batch->utime) : DigestOf(message);
+  return batch ? BatchKey(batch->source, batch->utime) : PlanDigest(message);
 }
 
 Digest BatchKey(const std::uint8_t (&source)[32], std::int64_t utime) {
@@ -119,7 +120,7 @@ Digest BatchKey(const std::uint8_t (&source)[32], std::int64_t utime) {
 std::vector<std::uint8_t> CandidateIn(Bytes message, const Digest& plan) {
   if (const auto batch = BatchIn(message))
     for (int k = 0; k < batch->num_candidates; ++k)
-      if (std::vector<std::uint8_t> bytes = Encode(CandidateOf(*batch, k)); DigestOf(bytes) == plan) return bytes;
+      if (std::vector<std::uint8_t> bytes = Encode(CandidateOf(*batch, k)); PlanDigest(bytes) == plan) return bytes;
   return {message.begin(), message.end()};
 }
 

@@ -26,8 +26,10 @@ using Digest = std::array<std::uint8_t, 32>;
 
 [[nodiscard]] Digest DigestOf(Bytes bytes);
 [[nodiscard]] Digest DigestOf(std::string_view text);
+/** Of both, one after the other. */
+[[nodiscard]] Digest DigestOf(Bytes first, Bytes second);
 /** The digest of `before` followed by `bytes`, for data that grows. */
-[[nodiscard]] Digest ChainedDigest(const Digest& before, Bytes bytes);
+[[nodiscard]] inline Digest ChainedDigest(const Digest& before, Bytes bytes) { return DigestOf(before, bytes); }
 /** Lower-case hexadecimal, 64 characters. */
 [[nodiscard]] std::string ToHex(const Digest& digest);
 inline constexpr std::size_t kHexDigits = 64;  ///< of a digest

@@ -1,7 +1,10 @@
 #include "lcmtypes/seal.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdio>
+#include <cstring>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -52,11 +55,22 @@ std::optional<SealFault> FindUnusedEntry(const certified_plan_t& certified, InUs
 
 }  // namespace
 
+Digest PlanDigest(Bytes candidate) {
+  const auto number = BigEndian(std::uint64_t{candidate.size()});
+  // By blocks as far as they are zero: a byte at a time takes longer than the digest.
+  static constexpr std::array<std::uint8_t, 256> kZeros{};
+  std::size_t used = candidate.size();
+  while (used >= kZeros.size() && std::memcmp(&candidate[used - kZeros.size()], kZeros.data(), kZeros.size()) == 0)
+    used -= kZeros.size();
+  while (used > 0 && candidate[used - 1] == 0) --used;
+  return DigestOf(number, candidate.first(used));
+}
+
 Digest CertificateDigest(const certified_plan_t& certified) {
   const InUse in_use = InUseBy(certified.plan);
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(EncodedSize<certified_plan_t>());
-  const auto append = [&bytes](const auto& part) { bytes.insert(bytes.end(), std::begin(part), std::end(part)); };
+  std::array<std::uint8_t, sizeof(certified_plan_t)> bytes;  // those in use are set; larger than the bytes of all parts
+  std::uint8_t* end = bytes.data();
+  const auto append = [&end](const auto& part) { end = std::copy(std::begin(part), std::end(part), end); };
   for (const std::int64_t number :
        {certified_plan_t::getHash(), certified.utime, certified.sequence, certified.expires_utime})
     append(BigEndian(number));
@@ -72,7 +86,7 @@ Digest CertificateDigest(const certified_plan_t& certified) {
   append(certified.observations_digest);
   append(certified.obstacles_digest);
   append(certified.transitions_digest);
-  return DigestOf(bytes);
+  return DigestOf(Bytes(bytes.data(), end));
 }
 
 std::vector<SealFault> FindSealFaults(const certified_plan_t& certified) {
@@ -80,7 +94,7 @@ std::vector<SealFault> FindSealFaults(const certified_plan_t& certified) {
   const auto hold = [&](SealFault::Kind kind, const char* field, const Digest& expected, const Digest& found) {
     if (expected != found) faults.push_back({kind, field, ToHex(expected), ToHex(found)});
   };
-  hold(SealFault::Kind::kPlanDigest, "plan_digest", DigestOf(Encode(certified.plan)), GetDigest(certified.plan_digest));
+  hold(SealFault::Kind::kPlanDigest, "plan_digest", PlanDigest(certified.plan), GetDigest(certified.plan_digest));
   hold(SealFault::Kind::kCertificateDigest, "certificate_digest", CertificateDigest(certified),
        GetDigest(certified.certificate_digest));
   if (auto unused = FindUnusedEntry(certified, InUseBy(certified.plan))) faults.push_back(*std::move(unused));

@@ -2,7 +2,7 @@
 
 `certificate_digest` is the BLAKE2b-256 of the message's bytes in their order on the bus, big-endian and with the
 fingerprint, without three parts:
-- `plan`; it is represented by `plan_digest`, the BLAKE2b-256 of its bytes as a candidate_plan_t;
+- `plan`; it is represented by `plan_digest`, the PlanDigest of its bytes as a candidate_plan_t;
 - the unused entries: those of slices with t > plan.num_steps or k >= plan.num_states, of state_error with
   k >= plan.num_states;
 - `certificate_digest` itself.
@@ -19,6 +19,15 @@ The seal detects damage and mix-ups. It is not a signature: every writer of a me
 #include "lcmtypes/codec.h"
 
 namespace forereach {
+
+/** What represents a candidate: BLAKE2b-256 of the number of its bytes, 8 bytes big-endian, and of these bytes without
+the zeros at their end. Both together determine all bytes, so different bytes have different digests as surely as with
+all of them. Most of a candidate are controls that are not in use, and zero. Cost: a digest of the bytes up to the last
+that is not zero, and a look at the others. */
+[[nodiscard]] Digest PlanDigest(Bytes candidate);
+[[nodiscard]] inline Digest PlanDigest(const candidate_plan_t& candidate) {
+  return PlanDigest(Bytes(Encode(candidate)));
+}
 
 /** The correct value of `certificate_digest`. Cost: a digest of 264 bytes, plus 8 bytes for each state, and 16 for each
 state of each slice. */

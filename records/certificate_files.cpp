@@ -148,7 +148,7 @@ class CertificateReader final : public TimelineUser {
                         ToHex(GetDigest(certified.transitions_digest)));
     if (!recorded.has_candidate) certificate.Compare("its candidate is in the log", "a candidate", "none");
     open.basis = recorded.basis;
-    open.plan = DigestOf(Encode(certified.plan));
+    open.plan = PlanDigest(certified.plan);
     open.candidate = certified.plan;
     open.grounds = GroundsOf(certified);
     plans_.push_back({GetDigest(certified.certificate_digest), certified.plan, UpheldBy(certified)});

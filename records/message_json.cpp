@@ -11,6 +11,7 @@
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/message_fields.h"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -158,7 +159,7 @@ void WithMessage(Bytes bytes, Use use) {
 
 void Describe(const candidate_plan_t& m, Bytes bytes, MessageSummary& summary) {
   summary.plan_id = m.plan_id;
-  summary.plan = DigestOf(bytes);
+  summary.plan = PlanDigest(bytes);
   summary.is_of_plan = true;
 }
 void Describe(const candidate_batch_t& m, Bytes, MessageSummary& summary) { summary.plan_id = m.plan_id; }

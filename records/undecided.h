@@ -14,6 +14,7 @@
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/seal.h"
 
 namespace forereach {
 
@@ -25,7 +26,7 @@ struct PlanKeys {
   explicit PlanKeys(const decision_t& decision)
       : plan(GetDigest(decision.plan_digest)), batch(BatchKey(decision.source, decision.candidate_utime)) {}
   explicit PlanKeys(const candidate_plan_t& candidate)
-      : plan(DigestOf(Encode(candidate))), batch(BatchKey(candidate.source, candidate.utime)) {}
+      : plan(PlanDigest(candidate)), batch(BatchKey(candidate.source, candidate.utime)) {}
 };
 
 /** Pairs messages with decisions. Of equal messages, the one that was sent first is paired first. `Entry` is a reader's

@@ -115,6 +115,10 @@ std::vector<Key> RealtimeKeys() {
       realtime.Integer(
           "fifo_priority", Between(0, 99), &RealtimeOptions::fifo_priority,
           "Priority under SCHED_FIFO; 0 keeps the scheduler. If it is not allowed, the certifier does not start."),
+      realtime.Word<bool>(
+          "keep_warm", {{"false", false}, {"true", true}}, &RealtimeOptions::keep_warm,
+          "true: while nothing waits, the certifier repeats its last certificate up to a thousand times "
+          "a second, so that the next decision does not wait for memory. Takes some per cent of a core."),
   };
 }
 

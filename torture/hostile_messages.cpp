@@ -136,7 +136,7 @@ std::span<const CandidateFlaw> CandidateFlaws() { return kCandidateFlaws; }
 std::span<const CertificateFlaw> CertificateFlaws() { return kCertificateFlaws; }
 
 certified_plan_t Sealed(certified_plan_t certified) {
-  SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
+  SetDigest(certified.plan_digest, PlanDigest(certified.plan));
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
   return certified;
 }

@@ -21,6 +21,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "torture/hostile_messages.h"
 
 namespace forereach {
@@ -161,7 +162,7 @@ class Torturer final {
     TortureRow unused;
     row_ = &unused;
     const auto bytes = Encode(Honest());
-    const Asked& asked = asked_[DigestOf(bytes)];
+    const Asked& asked = asked_[PlanDigest(Bytes(bytes))];
     Send(config_.bus.candidate, bytes);
     Listen(options_.patience_s, [&] { return !asked.text.empty(); });
     return {asked.text, asked.judged > 0};
@@ -175,7 +176,7 @@ class Torturer final {
 
   // Notes a candidate of this attack, of which no more copies than `may_be_judged` may be judged.
   void Expect(Bytes candidate, int may_be_judged) {
-    Asked& asked = asked_[DigestOf(candidate)];
+    Asked& asked = asked_[PlanDigest(candidate)];
     asked.attack = report_.rows.size();
     asked.may_be_judged = may_be_judged;
   }

@@ -53,7 +53,8 @@ Gate::Gate(const Config& config)
       transitions_(config.grounds.observations),
       obstacles_(config),
       sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)),
-      pieces_(config.gate.max_pieces > 1 ? std::make_unique<Pieces>() : nullptr) {}
+      pieces_(config.gate.max_pieces > 1 ? std::make_unique<Pieces>() : nullptr),
+      rehearsal_(config.realtime.keep_warm ? std::make_unique<Rehearsal>() : nullptr) {}
 
 void Gate::Inherit(const Gate& before) {
   obstacles_.Inherit(before.obstacles_);
@@ -138,7 +139,7 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
   decision.step = decision.coordinate = decision.obstacle = -1;
   decision.first_observation = decision.second_observation = -1;
   SetGrounds(decision, grounds());
-  SetDigest(decision.plan_digest, DigestOf(bytes));
+  SetDigest(decision.plan_digest, PlanDigest(bytes));
   try {
     candidate_plan_t candidate{};
     Zonotope initial_set;
@@ -156,6 +157,10 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
     } else {
       Certify(candidate, initial_set, clock, answer);
       DropIfLate(answer, clock());
+      if (rehearsal_ && answer.certified) {
+        rehearsal_->bytes.assign(bytes.begin(), bytes.end());
+        rehearsal_->initial_set.Assign(initial_set);
+      }
     }
   } catch (const std::exception& error) {
     decision.outcome = decision_t::REJECTED;
@@ -327,6 +332,19 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
   } catch (const std::exception&) {
     return {};
   }
+}
+
+void Gate::KeepWarm() noexcept {
+  if (!rehearsal_ || rehearsal_->bytes.empty()) return;
+  const auto& [bytes, initial_set] = *rehearsal_;
+  GateAnswer answer;  // where the next one will be, about: its memory counts, too
+  decision_t& decision = answer.decision;
+  SetDigest(decision.plan_digest, PlanDigest(bytes));
+  candidate_plan_t candidate;
+  if (Decode(Bytes(bytes), candidate) != DecodeStatus::kOk) return;
+  const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
+  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.indexed(), tube_);
+  if (verdict.outcome == Outcome::kCertified) Attest(candidate, decision, answer.certified.emplace());
 }
 
 std::optional<Gate::Again> Gate::CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {

@@ -21,6 +21,7 @@ namespace forereach {
 namespace {
 
 constexpr int kUnindexedAtMost = 128;
+constexpr std::int64_t kWarmUs = 1000;
 // An index of so many is built in about a millisecond; of more it is built in a thread of its own.
 constexpr std::size_t kIndexedAtOnce = 4096;
 
@@ -416,6 +417,15 @@ void CertifierNode::Tick(std::int64_t now_us) {
   CompactIfDue();
   if (reporter_.IsDue(clocks_.steady())) Heartbeat(now_us);
   if (was_idle) GiveAdvice();
+  if (was_idle) KeepWarm();
+}
+
+// Only where there is nothing else to do. What arrives meanwhile waits for less than it would take longer without.
+void CertifierNode::KeepWarm() {
+  const std::int64_t now = clocks_.steady();
+  if (!config_.realtime.keep_warm || !is_in_charge() || busy() || bus_.has_waiting() || now < next_warm_us_) return;
+  next_warm_us_ = now + kWarmUs;
+  gate_->KeepWarm();
 }
 
 void CertifierNode::WithdrawPlans(std::int64_t now_us) {

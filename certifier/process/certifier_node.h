@@ -134,6 +134,7 @@ class CertifierNode final : public Node {
   [[nodiscard]] GateAnswer Decide(Bytes candidate);
   void Answer(Bytes candidate, bool displaced);
   void GiveAdvice();
+  void KeepWarm();
   void CompactIfDue();
   void TakeReload();
   /** Latches and announces, unless a fault as grave is latched already. */
@@ -171,7 +172,7 @@ class CertifierNode final : public Node {
   Contradictions contradictions_;
   FaultLatch latch_;
   StatusReporter reporter_;
-  std::int64_t next_warning_us_ = 0;  // by the steady clock
+  std::int64_t next_warning_us_ = 0, next_warm_us_ = 0;  // by the steady clock
 };
 
 }  // namespace forereach

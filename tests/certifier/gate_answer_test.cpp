@@ -5,6 +5,7 @@
 #include "certifier/gate/gate.h"
 #include "lcmtypes/seal.h"
 #include "tests/certifier/small_task.h"
+#include "tests/oracle/random.h"
 
 namespace forereach::gate_answer_test {
 
@@ -29,6 +30,33 @@ TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
   candidate_plan_t brakes = Candidate(2);
   for (int t = 0; t < 10; ++t) brakes.control[t][0] = -1 / 1.5;
   EXPECT_TRUE(gate.Decide(Encode(brakes), kNow).certified);
+}
+
+// Two gates hear the same; one of them also repeats its last certificate at any time.
+TEST(GateKeepWarm, ChangesNoBitOfALaterAnswer) {
+  Config config = SmallTask();
+  Gate plain(config);
+  config.realtime.keep_warm = true;
+  Gate warm(config);
+  std::map<int, int> causes;
+  Random random(20261128);
+  for (int i = 1; i <= 300; ++i) {
+    SCOPED_TRACE(i);
+    candidate_plan_t candidate = Candidate(random.Integer(1, i), 0, kNow + i);
+    for (int t = 0; t < candidate.num_steps; ++t) candidate.control[t][0] = random.Uniform(-0.5, 0.5);
+    if (random.Coin(0.1)) candidate.num_steps = static_cast<std::int16_t>(random.Integer(-1, 12));
+    if (random.Coin(0.2)) candidate.control[random.Below(10)][1] = random.Uniform(-9, 9);
+    const std::vector<std::uint8_t> bytes = Encode(candidate);
+    for (int k = random.Below(3); k > 0; --k) warm.KeepWarm();
+    const GateAnswer a = plain.Decide(bytes, kNow + i), b = warm.Decide(bytes, kNow + i);
+    EXPECT_EQ(Encode(a.decision), Encode(b.decision));
+    ASSERT_EQ(a.certified.has_value(), b.certified.has_value());
+    if (a.certified) EXPECT_EQ(Encode(*a.certified), Encode(*b.certified));
+    EXPECT_EQ(Encode(plain.Status(kNow)), Encode(warm.Status(kNow)));
+    ++causes[a.decision.cause];
+  }
+  EXPECT_GE(causes.size(), 4u);
+  EXPECT_GT(causes[0], 20) << "certificates";
 }
 
 TEST(GateLimit, AbstainsFromAPlanThatMayExceedALimit) {
@@ -69,14 +97,14 @@ TEST_F(GateAnswerTest, CertifiesAGoodPlanWithEveryFieldSet) {
   EXPECT_FIELDS(decision, (utime, kNow), (plan_id, 7), (candidate_utime, candidate.utime));
   EXPECT_EQ(GetText(decision.source), "test");
   EXPECT_THAT(GetText(decision.message), HasSubstr("certified"));
-  EXPECT_EQ(GetDigest(decision.plan_digest), DigestOf(Encode(candidate)));
+  EXPECT_EQ(GetDigest(decision.plan_digest), PlanDigest(candidate));
   ExpectDigestsOf(config_, decision);
 
   ASSERT_TRUE(answer.certified);
   const certified_plan_t& certified = *answer.certified;
   EXPECT_FIELDS(certified, (utime, kNow), (expires_utime, kNow + 2'000'000));
   EXPECT_EQ(Encode(certified.plan), Encode(candidate));
-  EXPECT_EQ(GetDigest(certified.plan_digest), DigestOf(Encode(candidate)));
+  EXPECT_EQ(GetDigest(certified.plan_digest), PlanDigest(candidate));
   EXPECT_THAT(FindSealFaults(certified), IsEmpty());
   ExpectDigestsOf(config_, certified);
   EXPECT_EQ(GetDigest(certified.transitions_digest), config_.grounds.observations);
@@ -160,7 +188,7 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
   for (const auto& bytes : sent) {
     const GateAnswer answer = gate_.Decide(bytes, kNow);
     EXPECT_EQ(answer.decision.sequence, sequence++);
-    EXPECT_EQ(GetDigest(answer.decision.plan_digest), DigestOf(Bytes(bytes)));
+    EXPECT_EQ(GetDigest(answer.decision.plan_digest), PlanDigest(Bytes(bytes)));
     if (answer.certified) EXPECT_EQ(answer.certified->sequence, certificates++);
   }
   const certifier_status_t status = gate_.Status(kNow + 5);
@@ -281,7 +309,7 @@ TEST_F(GateAdviceTest, SaysHowFarAPlanHasToGiveWay) {
   const auto advice = AdviceOn(gate_, candidate).value();
   EXPECT_FIELDS(advice, (plan_id, 1), (candidate_utime, candidate.utime));
   EXPECT_EQ(GetText(advice.source), "test");
-  EXPECT_EQ(GetDigest(advice.plan_digest), DigestOf(Encode(candidate)));
+  EXPECT_EQ(GetDigest(advice.plan_digest), PlanDigest(candidate));
   EXPECT_EQ(GroundsOf(advice), gate_.grounds());
   EXPECT_EQ(std::tuple(advice.outcome, advice.cause, advice.num_changes),
             std::tuple(decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE, 1));

@@ -54,7 +54,7 @@ TEST(CandidateBatch, GivesBackWhatWasAppended) {
   for (int k = 0; k < 30; ++k) {
     const std::vector<std::uint8_t> alone = Encode(candidates[static_cast<std::size_t>(k)]);
     EXPECT_EQ(Encode(CandidateOf(batch, k)), alone) << k;
-    EXPECT_EQ(CandidateIn(bytes, DigestOf(alone)), alone) << k;
+    EXPECT_EQ(CandidateIn(bytes, PlanDigest(Bytes(alone))), alone) << k;
   }
 }
 
@@ -75,8 +75,8 @@ TEST(CandidateBatch, TakesNoMoreThanThereIsRoomFor) {
 TEST(CandidateBatch, AnyOtherMessageStandsForItself) {
   const std::vector<std::uint8_t> candidate = Encode(Candidate(1)), empty = Encode(candidate_batch_t{});
   for (const std::vector<std::uint8_t>& bytes : {candidate, empty, {}, {1, 2, 3}}) {
-    EXPECT_EQ(KeyOfCandidates(bytes), DigestOf(Bytes(bytes)));
-    EXPECT_EQ(CandidateIn(bytes, DigestOf(Bytes(bytes))), bytes);
+    EXPECT_EQ(KeyOfCandidates(bytes), PlanDigest(Bytes(bytes)));
+    EXPECT_EQ(CandidateIn(bytes, PlanDigest(Bytes(bytes))), bytes);
   }
 }
 
@@ -153,7 +153,7 @@ TEST_F(GateBatchTest, BytesOfAnotherLengthAreRefused) {
   EXPECT_EQ(gate_.Decide(bytes, kNow).decision.cause, decision_t::CAUSE_TRAILING_BYTES);
   bytes.resize(bytes.size() - 2);
   EXPECT_EQ(gate_.Decide(bytes, kNow).decision.cause, decision_t::CAUSE_WRONG_LENGTH);
-  EXPECT_EQ(GetDigest(gate_.Decide(bytes, kNow).decision.plan_digest), DigestOf(Bytes(bytes)));
+  EXPECT_EQ(GetDigest(gate_.Decide(bytes, kNow).decision.plan_digest), PlanDigest(Bytes(bytes)));
 }
 
 TEST_F(GateBatchTest, IsARepetitionIfAnIdOfItWasDecidedOn) {

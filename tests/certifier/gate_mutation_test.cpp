@@ -4,6 +4,7 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
+#include "lcmtypes/seal.h"
 #include "tests/certifier/small_task.h"
 
 namespace forereach::gate_mutation_test {
@@ -122,7 +123,7 @@ TEST(GateMutationTest, EveryAnswerIsADecisionAndOnlyWhatIsCertifiableIsCertified
       ASSERT_EQ(decision.sequence, i);
       ASSERT_TRUE(decision_t::CERTIFIED <= decision.outcome && decision.outcome <= decision_t::ABSTAIN_DEADLINE);
       ASSERT_NE(decision.cause, decision_t::CAUSE_INTERNAL_ERROR) << GetText(decision.message);
-      ASSERT_EQ(GetDigest(decision.plan_digest), DigestOf(Bytes(bytes)));
+      ASSERT_EQ(GetDigest(decision.plan_digest), PlanDigest(Bytes(bytes)));
       const bool certified = decision.outcome == decision_t::CERTIFIED;
       ASSERT_EQ(decision.cause == decision_t::CAUSE_NONE, certified);
       ASSERT_EQ(answer.certified.has_value(), certified);

@@ -5,6 +5,7 @@
 
 #include "certifier/gate/gate.h"
 #include "lcmtypes/freshness.h"
+#include "lcmtypes/seal.h"
 #include "tests/certifier/small_task.h"
 
 namespace forereach::gate_refusal_test {
@@ -29,7 +30,7 @@ struct GateRefusalTest : testing::Test {
     EXPECT_EQ(decision.cause, cause) << GetText(decision.message);
     EXPECT_THAT(GetText(decision.message), HasSubstr("rejected: "));
     EXPECT_EQ(decision.step, -1);
-    EXPECT_EQ(GetDigest(decision.plan_digest), DigestOf(Bytes(bytes)));
+    EXPECT_EQ(GetDigest(decision.plan_digest), PlanDigest(Bytes(bytes)));
     EXPECT_EQ(Decide(Candidate(next_plan_id_++)).outcome, decision_t::CERTIFIED) << "good again";
   }
   void ExpectRefused(const candidate_plan_t& candidate, int cause) { ExpectRefused(Encode(candidate), cause); }

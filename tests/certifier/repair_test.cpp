@@ -3,6 +3,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/repair.h"
+#include "lcmtypes/seal.h"
 #include "tests/certifier/small_task.h"
 
 namespace forereach::repair_test {
@@ -92,7 +93,7 @@ TEST_F(BrakingRepairTest, ProposesAPlanThatTheGateCertifies) {
     ASSERT_TRUE(advice && advice->changed != 0) << acceleration;
     EXPECT_TRUE(Sent(*advice).certified) << acceleration;
     EXPECT_EQ(std::tuple(advice->plan_id, advice->candidate_utime, GetDigest(advice->plan_digest)),
-              std::tuple(candidate.plan_id, candidate.utime, DigestOf(Encode(candidate))));
+              std::tuple(candidate.plan_id, candidate.utime, PlanDigest(candidate)));
     EXPECT_EQ(GroundsOf(*advice), gate_->grounds());
     EXPECT_EQ(advice->num_changes, 0);
     const candidate_plan_t& proposal = advice->proposal;

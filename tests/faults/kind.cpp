@@ -6,6 +6,7 @@
 
 #include "bus/process.h"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "tests/faults/demo_task.h"
 #include "tests/messages.h"
 
@@ -135,7 +136,7 @@ std::optional<std::int16_t> Kind::CauseOfACandidate(Rig& rig) {
   candidate_plan_t candidate = CandidateFor(rig.config(), next_own_id_++, Eigen::Vector2d(0, 0), 6, milliseconds(400));
   SetText(candidate.source, "campaign");
   rig.bus().Publish(rig.config().bus.candidate, candidate);
-  const Digest digest = DigestOf(Encode(candidate));
+  const Digest digest = PlanDigest(candidate);
   static_cast<void>(rig.ListenUntil([&] { return rig.witness().CauseOf(digest).has_value(); }, milliseconds(600)));
   return rig.witness().CauseOf(digest);
 }

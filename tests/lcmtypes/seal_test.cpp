@@ -1,6 +1,8 @@
 // The seal of a certified plan: its parts, and that every change of the message breaks it.
 #include "lcmtypes/seal.h"
 
+#include <set>
+
 #include "tests/test.h"
 
 #include "tests/robot/sealed_plan.h"
@@ -45,6 +47,41 @@ TEST(Seal, HoldsFromTheSmallestPlanToTheLargest) {
     EXPECT_THAT(FindSealFaults(Plan(states, steps)), IsEmpty()) << states << " " << steps;
 }
 
+// The definition in other words: the digest of the length and of the bytes without the zeros at their end.
+Digest PlanDigestAsDefined(Bytes bytes) {
+  const auto number = BigEndian(std::int64_t{std::ssize(bytes)});
+  std::vector<std::uint8_t> all(number.begin(), number.end());
+  all.insert(all.end(), bytes.begin(), bytes.end());
+  while (all.size() > number.size() && all.back() == 0) all.pop_back();
+  return DigestOf(all);
+}
+
+TEST(PlanDigest, IsOfTheLengthAndTheBytesUpToTheLastThatIsNotZero) {
+  for (std::size_t size : {0, 1, 255, 256, 257, 511, 512, 513, 8536})
+    for (std::size_t last : {0, 1, 8, 255, 256, 257, 511, 512, 513, 8535}) {
+      std::vector<std::uint8_t> bytes(size);
+      EXPECT_EQ(PlanDigest(Bytes(bytes)), PlanDigestAsDefined(bytes)) << size;
+      if (last < size) bytes[last] = 1;
+      EXPECT_EQ(PlanDigest(Bytes(bytes)), PlanDigestAsDefined(bytes)) << size << " " << last;
+    }
+}
+
+TEST(PlanDigest, ChangesWithEachByteOfACandidate) {
+  const std::vector<std::uint8_t> bytes = Encode(Plan(6, 12).plan);
+  std::set<Digest> digests{PlanDigest(Bytes(bytes))};
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    std::vector<std::uint8_t> changed = bytes;
+    changed[i] ^= 1;
+    EXPECT_TRUE(digests.insert(PlanDigest(Bytes(changed))).second) << "byte " << i;
+  }
+}
+
+TEST(PlanDigest, ChangesWithZerosAtTheEnd) {
+  std::set<Digest> digests;
+  for (std::size_t size = 0; size < 600; ++size)
+    EXPECT_TRUE(digests.insert(PlanDigest(Bytes(std::vector<std::uint8_t>(size)))).second) << size;
+}
+
 // The definition, read off the message as it is on the bus.
 TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
   for (const auto& [states, steps] : {std::pair(1, 1), {6, 12}, {16, 128}}) {
@@ -69,7 +106,7 @@ TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
 
 // Fast for good: other implementations have to come to the same.
 TEST(Seal, DigestOfAnExampleIsTheRecordedOne) {
-  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "704b3d9cc3c2eda473dd2c747c3c9591ad814d0c620814205ffeab694058e1dd");
+  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "5c328cfd05dfad8ea0da3d8809d788b1524452c5e51970e085c7ed46c626fa94");
 }
 
 // Of a small plan each byte, of the largest one in eight at random.
@@ -126,7 +163,7 @@ TEST(Seal, BreaksWhenThePlanChanges) {
   EXPECT_THAT(FaultsAfter([](auto& c) { c.plan.control[100][7] = 1; }), ElementsAre(Kind::kPlanDigest)) << "unused";
   const auto with_its_digest = [](auto& c) {
     c.plan.control[4][0] = 1;
-    SetDigest(c.plan_digest, DigestOf(Encode(c.plan)));
+    SetDigest(c.plan_digest, PlanDigest(c.plan));
   };
   EXPECT_THAT(FaultsAfter(with_its_digest), ElementsAre(Kind::kCertificateDigest));
 }

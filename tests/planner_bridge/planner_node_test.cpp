@@ -4,6 +4,7 @@
 
 #include "bus/log.h"
 #include "forereach/numerics/directed.h"
+#include "lcmtypes/seal.h"
 #include "task/canonical.h"
 #include "tests/messages.h"
 #include "tests/planner_bridge/tasks.h"
@@ -312,14 +313,14 @@ struct AdvisedPlannerTest : PlannerNodeTest {
   // As an answer to the last candidate.
   void AbstainOn(const candidate_plan_t& candidate) {
     decision_t decision = Decision(candidate, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
-    SetDigest(decision.plan_digest, DigestOf(Encode(candidate)));
+    SetDigest(decision.plan_digest, PlanDigest(candidate));
     Say(decision);
   }
   // Half a metre more to every obstacle.
   advice_t Advice() {
     advice_t advice{};
     SetText(advice.source, PlannerNode::kSource);
-    SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
+    SetDigest(advice.plan_digest, PlanDigest(candidates_.back()));
     SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
     for (std::size_t o = 0; o < std::min<std::size_t>(config_.obstacles.size(), 8); ++o) {
       advice_change_t& change = advice.change[advice.num_changes++];
@@ -406,7 +407,7 @@ struct RepairingPlannerTest : AdvisedPlannerTest {
   advice_t Proposal(double nearness, double control) {
     advice_t advice{.changed = 4, .nearness = {nearness, nearness}};
     SetText(advice.source, PlannerNode::kSource);
-    SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
+    SetDigest(advice.plan_digest, PlanDigest(candidates_.back()));
     SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
     advice.proposal = candidates_.back();
     advice.proposal.plan_id = advice.proposal.start_utime = 1;

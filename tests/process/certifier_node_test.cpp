@@ -85,6 +85,40 @@ TEST_F(CertifierNodeTest, ACertificateComesBeforeItsDecision) {
   EXPECT_EQ(Only(certified_).plan.plan_id, 1);
 }
 
+// Seen by the tube, which a repeated certificate leaves behind.
+TEST_F(CertifierNodeTest, RepeatsItsLastCertificateWhileNothingWaits) {
+  for (const bool keeps_warm : {false, true}) {
+    config_.realtime.keep_warm = keeps_warm;
+    Restart();
+    const auto length = [&] { return node_->gate().tube().length(); };
+    ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+    const int whole = length();
+    candidate_plan_t leaves = Candidate(next_plan_id_++, 0, now_us_);
+    leaves.control[3][0] = 100;
+    bus_->Publish("PLAN_CANDIDATE", leaves);
+    Run();
+    ASSERT_EQ(decisions_.back().outcome, decision_t::ABSTAIN_DOMAIN);
+    EXPECT_EQ(length(), 3) << "the tick that answers repeats nothing";
+    node_->Tick(now_us_ += 1000);
+    EXPECT_EQ(length(), keeps_warm ? whole : 3);
+    const std::size_t sent = decisions_.size() + certified_.size();
+    bus_->Dispatch(0);
+    EXPECT_EQ(decisions_.size() + certified_.size(), sent) << "a repetition is not sent";
+
+    bus_->Publish("PLAN_CANDIDATE", leaves);  // refused, for its plan_id was used
+    leaves.plan_id = next_plan_id_++;
+    bus_->Publish("PLAN_CANDIDATE", leaves);
+    Run();
+    ASSERT_EQ(length(), 3);
+    bus_->Publish("PLAN_CANDIDATE", leaves);
+    node_->Tick(now_us_ += 1000);
+    EXPECT_EQ(length(), 3) << "something waits";
+    Run();
+    node_->Tick(now_us_ += 1000);
+    EXPECT_EQ(length(), keeps_warm ? whole : 3);
+  }
+}
+
 // What comes after a decision: an advice, where the task asks for it, or a repair, where the candidate does.
 struct AdvisingCertifierTest : CertifierNodeTest {
   AdvisingCertifierTest() { Begin(true); }

@@ -21,7 +21,7 @@ struct CertifierProcessTest : testing::Test {
   void SetUp() override { ASSERT_TRUE(certifier_.WaitForLog("ready on")) << certifier_.error(); }
 
   void Send(const std::vector<std::uint8_t>& bytes, int expected_cause) {
-    expected_[ToHex(DigestOf(Bytes(bytes)))] = CauseName(static_cast<std::int16_t>(expected_cause));
+    expected_[ToHex(PlanDigest(Bytes(bytes)))] = CauseName(static_cast<std::int16_t>(expected_cause));
     ASSERT_TRUE(probe_.bus().Publish("PLAN_CANDIDATE", Bytes(bytes)));
   }
   void Send(const candidate_plan_t& candidate, int expected_cause) { Send(Encode(candidate), expected_cause); }
@@ -114,7 +114,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   const auto certified = probe_.Heard<certified_plan_t>("PLAN_CERTIFIED");
   ASSERT_EQ(certified.size(), 3u);
   for (const certified_plan_t& plan : certified) {
-    EXPECT_EQ(expected_.at(ToHex(DigestOf(Encode(plan.plan)))), "none");
+    EXPECT_EQ(expected_.at(ToHex(PlanDigest(plan.plan))), "none");
     EXPECT_TRUE(FindSealFaults(plan).empty());
     EXPECT_EQ(GetDigest(plan.config_digest), config_.grounds.config);
   }

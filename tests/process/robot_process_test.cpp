@@ -80,7 +80,7 @@ TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {
   certified_plan_t tampered = good;
   tampered.plan.control[0][0] = 2.9;
   probe_.bus().Publish("PLAN_CERTIFIED", tampered);  // another plan under an old certificate
-  SetDigest(tampered.plan_digest, DigestOf(Encode(tampered.plan)));
+  SetDigest(tampered.plan_digest, PlanDigest(tampered.plan));
   probe_.bus().Publish("PLAN_CERTIFIED", tampered);  // and with its own plan digest
   tampered = good;
   tampered.slice_upper[3][0] += 1;

@@ -9,6 +9,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "lcmtypes/seal.h"
 #include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 #include "torture/hostile_messages.h"
@@ -72,7 +73,7 @@ class Believer final {
   void Run() {
     bus_->Subscribe("PLAN_CANDIDATE", [this](const Received& received) {
       decision_t decision{.outcome = decision_t::CERTIFIED};
-      SetDigest(decision.plan_digest, DigestOf(WithoutSignature(received.bytes)));
+      SetDigest(decision.plan_digest, PlanDigest(WithoutSignature(received.bytes)));
       bus_->Publish("PLAN_DECISION", decision);
     });
     bus_->Subscribe("PLAN_CERTIFIED", [this](const Received& received) {

@@ -5,6 +5,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/seal.h"
 #include "records/event_log.h"
 #include "records/interpreter.h"
 #include "tests/test.h"
@@ -93,7 +94,7 @@ inline decision_t MakeDecision(const candidate_plan_t& candidate, std::int64_t s
   SetText(decision.source, GetText(candidate.source));
   decision.outcome = outcome;
   decision.cause = cause;
-  SetDigest(decision.plan_digest, DigestOf(Encode(candidate)));
+  SetDigest(decision.plan_digest, PlanDigest(candidate));
   return decision;
 }
 

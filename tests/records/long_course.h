@@ -54,11 +54,11 @@ inline void WriteLongCourse(const std::string& path, std::int64_t rounds, Databa
       };
       const auto change_only = [&](auto message) { return change(message, [](auto&) {}); };
       const auto of = [&](const auto& answer) { return candidates.at(GetDigest(answer.plan_digest)); };
-      const auto digest_of = [&](const auto& answer) { return DigestOf(Encode(of(answer))); };
+      const auto digest_of = [&](const auto& answer) { return PlanDigest(of(answer)); };
       // Transitions are sent as they were: decisions name the digest of these bytes.
       static_cast<void>(
           change(Decoded<candidate_plan_t>(event.data),
-                 [&](const candidate_plan_t& plan) { candidates[DigestOf(Bytes(event.data))] = plan; }) ||
+                 [&](const candidate_plan_t& plan) { candidates[PlanDigest(Bytes(event.data))] = plan; }) ||
           change(Decoded<decision_t>(event.data),
                  [&](decision_t& decision) { SetDigest(decision.plan_digest, digest_of(decision)); }) ||
           change(Decoded<certified_plan_t>(event.data),

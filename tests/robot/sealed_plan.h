@@ -15,7 +15,7 @@ namespace forereach {
 /** Sets plan_digest and certificate_digest to what they have to be. */
 template <class Certified>
 void Seal(Certified& certified) {
-  SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
+  SetDigest(certified.plan_digest, PlanDigest(certified.plan));
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 
