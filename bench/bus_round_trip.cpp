@@ -100,10 +100,6 @@ class Asker {
   std::unique_ptr<Bus> bus_;
 };
 
-std::string PortUrl(int offset) {
-  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 8 + offset) % 20'000) + "?ttl=0";
-}
-
 struct Results {
   Latencies echo, certifier, gate;
   int lost = 0, unexpected = 0;

@@ -25,7 +25,7 @@ namespace forereach::bench {
 
 /** A bus on a port of this process's own, one of four. */
 [[nodiscard]] inline std::string PortUrl(int which) {
-  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 4 + which) % 20'000) + "?ttl=0";
+  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 8 + which) % 20'000) + "?ttl=0";
 }
 
 /** A child process that runs a node until this object goes. It writes nothing on standard output, which is the

@@ -11,6 +11,7 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/tasks.h"
+#include "forereach/certify/extender.h"
 #include "forereach/reach/propagator.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/lipschitz_envelope.h"
@@ -136,6 +137,19 @@ void RunSeparation(State& state, const Midway& midway) {
   for (auto _ : state) benchmark::DoNotOptimize(Separate(projected, midway.task.obstacles.front()));
 }
 
+// The same step of a tree, with the tests of its slice.
+void RunExtension(State& state, const Midway& midway) {
+  const Certifier certifier(midway.task.problem);
+  Tube tube;
+  Extender extender(certifier, midway.task.obstacles, midway.task.schedule, tube, false);
+  TubeNode node, next;
+  bool proven = extender.Begin(midway.task.initial_set(), node).outcome == Outcome::kNone;
+  for (int t = 0; t < kStep && proven; ++t)
+    proven = extender.Extend(node, midway.task.plan().input(t), node).outcome == Outcome::kNone;
+  if (!proven) return state.SkipWithError("not the task's tube");
+  for (auto _ : state) benchmark::DoNotOptimize(extender.Extend(node, midway.input(), next));
+}
+
 using Run = void (*)(State&, const Midway&);
 
 void Register(const char* stage, Scenario scenario, int observations, Run run) {
@@ -186,6 +200,7 @@ void RegisterStages(int observations) {
     Register("envelope", scenario, observations, RunEnvelope);
   }
   Register("step", Scenario::kBicycle, observations, RunStep);
+  Register("extension", Scenario::kBicycle, observations, RunExtension);
   RegisterInsertion(observations);
   if (observations != 400) return;  // the others do not look at observations
   Register("expansion", Scenario::kBicycle, observations, RunExpand);

@@ -121,8 +121,8 @@ class Gate final {
   [[nodiscard]] std::string CheckFresh(std::int64_t utime, std::int64_t now_us) const;
 
   /** With realtime.keep_warm: repeats what the last certificate took and drops it, so that the next decision finds its
-  code and data in the processor's caches. No later answer depends on it. It allocates nothing. Cost: less than a
-  decision; nothing before the first certificate. */
+  code and data in the processor's caches. No later answer depends on it; tube() is that of this candidate. It allocates
+  nothing. Cost: less than a decision; nothing before the first certificate. */
   void KeepWarm() noexcept;
 
   /** As Certifier's. */
