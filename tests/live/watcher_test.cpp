@@ -3,6 +3,7 @@
 #include "tests/test.h"
 
 #include "bus/authentic.h"
+#include "lcmtypes/seal.h"
 #include "tests/keys.h"
 #include "tests/live/live_fixture.h"
 #include "tests/messages.h"
@@ -79,7 +80,7 @@ TEST(WatcherTest, DrawsTheBoxesOfACertificateWhoseCandidateItLacks) {
   for (const LogEvent& event : events) {
     if (event.channel == "PLAN_CANDIDATE")
       if (const auto candidate = Decoded<candidate_plan_t>(event.message()))
-        candidates[DigestOf(event.message())] = *candidate;
+        candidates[PlanDigest(event.message())] = *candidate;
     const auto decision = event.channel == "PLAN_DECISION" ? Decoded<decision_t>(event.message()) : std::nullopt;
     if (!decision || decision->outcome != decision_t::CERTIFIED) continue;
     certified_plan_t certified{};
