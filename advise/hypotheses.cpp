@@ -152,9 +152,9 @@ std::vector<Hypothesis> HypothesesOf(const Config& config) {
                                 : "that of the other states changes by no more than declaration.lipschitz, likewise",
                    falsify});
   if (!declaration.regions.empty())
-    all.push_back(
-        {"it changes by less in " + std::to_string(declaration.regions.size()) + " boxes, as declaration.regions says",
-         falsify});
+    all.push_back({"in " + std::to_string(declaration.regions.size()) +
+                       " boxes it changes by less, or less is uncertain, as declaration.regions says",
+                   falsify});
   if (!declaration.noise_bound.isZero(0))
     all.push_back(
         {"recorded successors are off by at most " + NamedBounds(model.state_names(), declaration.noise_bound),

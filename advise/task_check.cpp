@@ -397,7 +397,7 @@ class Examination final {
       return;
     }
     if (certifier->violation()) {
-      if (certifier->violation()->second >= 0) ExplainViolation(*certifier->violation());  // else ExamineRates did
+      if (certifier->violation()->second != -1) ExplainViolation(*certifier->violation());  // else ExamineRates did
       return;
     }
     RemarkOnSlack();
@@ -421,11 +421,18 @@ class Examination final {
     if (problem_.projection.rows() == 2) AddTube(*certifier, tube);
   }
 
-  // Of a pair that contradicts the declaration.
+  // Of a pair, or of one step in a region, that contradicts the declaration.
   void ExplainViolation(const Violation& violation) {
     const auto k = ToSize(violation.coordinate);
     const std::string& name = result_.states[k];
     const double sigma = problem_.declaration.noise_bound[violation.coordinate];
+    if (const int region = Violation::RegionOf(violation.second); region >= 0)
+      return Add(
+          fmt::format("declaration.regions[{}].bound.{}", region, name),
+          fmt::format("line {} of {} shows a residual of at least {} in size, and {} is declared: one of these is "
+                      "false, and nothing can be certified",
+                      FileLine(violation.first), result_.data, Down(violation.difference), ToText(violation.bound)),
+          "look at this line. If it is right, declare more, or end the box before it");
     if (problem_.declaration.affine.Contains(violation.coordinate))
       return Add(
           "declaration.affine",

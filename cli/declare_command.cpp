@@ -329,6 +329,9 @@ std::vector<CoverFinding> CheckRegions(const Config& config, std::size_t& count)
     const Region& region = problem.declaration.regions[i];
     const std::optional<Domain> part = PartIn(problem.domain, region);
     if (!part) continue;
+    if (region.bound.size() > 0)
+      findings.push_back({verifier::Answer::kUnknown, "declaration.regions[" + std::to_string(i) + "].bound",
+                          "nothing is proven of it here, only of slopes"});
     const verifier::CoverChecker checker(*part, *config.residual);
     for (const auto& [row, column] : checker.Entries()) {
       const double slope = region.lipschitz(row, column);
@@ -403,7 +406,8 @@ Examples:
            {"--max-boxes", &options->search.max_boxes, "",
             "Stop after this many boxes for each bound; the bound found by then is valid", NumberRange{1, 100'000'000}},
            {"--regions", &options->regions, "",
-            "Also cut the domain into up to so many cells, where that pays, with proven slopes in each",
+            "Also cut the domain into up to so many cells, where that pays, with proven slopes in each; with --from-data "
+            "up to 256, with what their transitions need of a disturbance",
             NumberRange{1, 1024}},
            Excluding("--between", {"--cover", &options->cover, "FILE.json",
                                    "The file for the proof: the boxes, and a bound for each"}),
@@ -461,6 +465,11 @@ Examples:
           data.estimate_disturbance = options->disturbance == "estimated";
           data.json = options->json;
           data.jobs = options->jobs;
+          data.regions = options->regions;
+          if (data.regions > 1 && data.hold_out)
+            throw ConfigError("--regions: --hold-out judges what holds in the whole domain");
+          if (data.regions > static_cast<int>(Region::kMaxRegions))
+            throw ConfigError("--regions: has to be at most 256 with --from-data");
           return data.hold_out ? DeclareHoldOut(data) : DeclareFromData(data);
         }
         return options->check.empty() ? Declare(*options) : CheckCover(*options);

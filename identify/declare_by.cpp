@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include <fmt/format.h>
+
 #include "command_line/nearest.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -90,6 +92,17 @@ std::string DeclarationYaml(const Declaration& declaration, const NominalModel& 
         text += "    " + states[ToSize(k)] + ": " + bound + "\n";
   } else if (declaration.IsDisturbed()) {
     text += "  disturbance: " + List(declaration.disturbance) + "\n";
+  }
+  if (!declaration.regions.empty()) text += "  regions:\n";
+  for (const Region& region : declaration.regions) {
+    std::string box, bounds;
+    for (const auto& [variable, range] : region.box)
+      box += fmt::format("{}{}: [{}, {}]", box.empty() ? "" : ", ", variables[ToSize(variable)], ToText(range.lower),
+                         ToText(range.upper));
+    for (Eigen::Index k = 0; k < region.disturbance.size(); ++k)
+      if (const double w = region.disturbance[k]; w < kInfinity)
+        bounds += (bounds.empty() ? "" : ", ") + states[ToSize(k)] + ": " + ToText(w);
+    text += "    - {in: {" + box + "}, disturbance: {" + bounds + "}}\n";
   }
   if (declaration.DeclaresStateError()) text += "  state_error: " + List(declaration.state_error) + "\n";
   if (declaration.input_error.size() > 0) text += "  input_error: " + List(declaration.input_error) + "\n";

@@ -19,8 +19,8 @@ namespace forereach {
 /** @throws ConfigError if rows of the residual are declared affine, or regions: no slopes are proposed beside them. */
 void RequireSlopes(const Config& config);
 
-/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", or by names, a line each,
-indented by two. */
+/** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", or by names, and the disturbances of
+regions, a line each, indented by two. */
 [[nodiscard]] std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model);
 
 }  // namespace forereach

@@ -1,5 +1,6 @@
 #include "identify/declare_data.h"
 
+#include <algorithm>
 #include <iostream>
 #include <sstream>
 
@@ -11,7 +12,9 @@
 #include "command_line/progress.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/residual/consistency.h"
 #include "forereach/residual/observations.h"
+#include "identify/calm_regions.h"
 #include "identify/declare_by.h"
 #include "identify/smallest_row.h"
 #include "task/json_text.h"
@@ -167,6 +170,37 @@ void PrintMeaning(const Proposal& proposal, const NominalModel& model, const Dat
   out << "How often fresh transitions contradict such a declaration: --hold-out.\n";
 }
 
+// Cells with less disturbance. None if two transitions contradict them.
+std::vector<CalmRegion> RegionsFor(const Problem& problem, Declaration& proposed, const ProposalOptions& options,
+                                   int most) {
+  std::vector<int> variables;
+  for (const std::vector<int>& columns : options.columns)
+    for (const int l : columns) {
+      Problem one = problem;
+      one.declaration.regions = {{{{l, {0, 1}}}, proposed.lipschitz}};
+      const bool varies = problem.transitions.z.col(l).minCoeff() < problem.transitions.z.col(l).maxCoeff();
+      if (varies && std::ranges::count(variables, l) == 0 && FindCoupledRegion(one).empty()) variables.push_back(l);
+    }
+  Problem with = problem;
+  with.declaration = proposed;
+  std::vector<CalmRegion> found = FindCalmRegions(proposed, ObserveForProposal(with, problem.transitions), variables,
+                                                  {.most_cells = most, .factor = options.factor});
+  for (const CalmRegion& calm : found) with.declaration.regions.push_back(calm.region);
+  if (FindViolation(with.declaration, ObserveForProposal(with, problem.transitions))) return {};
+  proposed.regions = with.declaration.regions;
+  return found;
+}
+
+void PrintRegions(const std::vector<CalmRegion>& regions, const DataCommand& command, std::ostream& out) {
+  if (command.regions <= 1) return;
+  if (regions.empty()) out << "No region needs less disturbance than the whole domain.\n";
+  for (std::size_t i = 0; i < regions.size(); ++i)
+    out << (i == 0 ? "Transitions in each region, whose disturbance is " + ToText(command.factor) +
+                         " times what they need there: "
+                   : ", ")
+        << regions[i].observations << (i + 1 == regions.size() ? ".\n" : "");
+}
+
 void Warn(const HeldOutSteps& found) {
   if (const std::string warning = WarningOf(found); !warning.empty())
     std::cerr << "forereach: warning: " << warning << std::endl;
@@ -249,7 +283,9 @@ int DeclareFromData(const DataCommand& command) {
                                 ColumnsBy(command.by, *problem.model), [&] { progress->Advance(); }};
   try {
     const Observations observations = ObserveForProposal(problem, problem.transitions);
-    const Proposal proposal = Propose(problem.declaration, observations, options);
+    Proposal proposal = Propose(problem.declaration, observations, options);
+    std::vector<CalmRegion> regions;
+    if (command.regions > 1) regions = RegionsFor(problem, proposal.declaration, options, command.regions);
     progress.reset();
     LoneSlopes lone_slopes;
     for (int k = 0; k < problem.model->num_states(); ++k)
@@ -269,6 +305,7 @@ int DeclareFromData(const DataCommand& command) {
     PrintErrors(proposal, *problem.model, text);
     PrintTrades(proposal, *problem.model, text);
     PrintMeaning(proposal, *problem.model, command, text);
+    PrintRegions(regions, command, text);
     if (held_out.slices > 0)
       text << fmt::format(
           "With every other block of time as observations, {} of {} recorded steps of the others lie in their "

@@ -14,6 +14,7 @@ struct DataCommand {
   std::vector<std::string> by;  ///< "v,omega" for every state, or "theta=v,omega" for one.
   double factor = 1.5;
   bool estimate_noise = false, estimate_disturbance = true, json = false;
+  int regions = 1;  ///< More: cells with a disturbance of their own, at most so many.
   // --hold-out
   bool hold_out = false;
   int blocks = 20, steps = 10;

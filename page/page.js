@@ -627,7 +627,8 @@ const showDetail = (run, i) => drawPart('the chosen decision', ['detail'], () =>
     ['Obstacle', nameAt(d.obstacle, i)],
     ['Part of the body', detail?.part >= 0 && run.raw.tasks[detail.task]?.parts > 1 ? String(detail.part) : ''],
     ['Coordinate', coordinateText(d, i, task)],
-    ['Observations', d.first.values[i] >= 0 ? `${d.first.values[i]} and ${d.second.values[i]} contradict each other` : ''],
+    ['Observations', d.first.values[i] < 0 ? '' : d.second.values[i] < 0 ? `${d.first.values[i]} contradicts a bound` :
+      `${d.first.values[i]} and ${d.second.values[i]} contradict each other`],
     ['Value, bound', `${number(margin)}, ${number(threshold)}; margin ${number(margin - threshold)}`],
     ['Task', task ? `${task.name}; certificates hold ${task.holds === 'all_times' ? 'at all times' : 'at the samples'}` : 'not known'],
     ['Log', `${nameAt(d.log, i)} event ${d.event.values[i]}`],

@@ -22,7 +22,9 @@ Disturbance::Disturbance(const Eigen::VectorXd& bounds, std::shared_ptr<const Gr
 Disturbance::Disturbance(const Declaration& declaration, const RobotOptions& options)
     : Disturbance(declaration.disturbance.size() == 0 ? Eigen::VectorXd::Zero(declaration.noise_bound.size())
                                                       : declaration.disturbance,
-                  declaration.growing, options.disturbance, static_cast<std::uint64_t>(options.disturbance_seed)) {}
+                  declaration.growing, options.disturbance, static_cast<std::uint64_t>(options.disturbance_seed)) {
+  regions_ = declaration.regions;
+}
 
 Disturbance Disturbance::OfMeasurements(const Declaration& declaration, const RobotOptions& options) {
   constexpr std::uint64_t kOtherNumbers = std::uint64_t{1} << 32;
@@ -38,9 +40,16 @@ void Disturbance::Add(std::span<double> next, std::span<const double> z) {
     steps_left_ = static_cast<int>(random_() % kLongestHold);
     for (double& sign : signs_) sign = random_() >> 63 == 0 ? 1 : -1;
   }
+  std::vector<double> bounds(bounds_.begin(), bounds_.end());
+  for (const Region& region : regions_)
+    if (region.disturbance.size() != 0 && std::ranges::all_of(region.box, [&](const Region::Side& side) {
+          return side.range.Contains(z[ToSize(side.variable)]);
+        }))
+      for (std::size_t k = 0; k < bounds.size(); ++k)
+        bounds[k] = std::min(bounds[k], region.disturbance[static_cast<Eigen::Index>(k)]);
   for (std::size_t k = 0; k < next.size(); ++k) {
     const double share = Share(k), unit = NextUp(std::abs(next[k])) - std::abs(next[k]);
-    const double bound = AddDown(bounds_[static_cast<Eigen::Index>(k)], grown[k].lower);
+    const double bound = AddDown(bounds[k], grown[k].lower);
     next[k] += share * std::max(0.0, SubDown(bound, unit));
   }
 }

@@ -27,10 +27,10 @@ class Disturbance final {
   /** The error of a measurement: likewise by robot.sensor_error. */
   [[nodiscard]] static Disturbance OfMeasurements(const Declaration& declaration, const RobotOptions& options);
 
-  /** Adds w to f0 + r of the step at z, or the error to the true state, n entries. z is read only where the bound grows
-  with state and input. random: each w_k is uniform in [-bound, bound].
-  adversarial: w_k = bound or -bound; all signs are drawn anew after 1 to kLongestHold steps, so that the errors of many
-  steps add up. The draws depend on the seed and the number of calls only, not on the standard library. */
+  /** Adds w to f0 + r of the step at z, or the error to the true state, n entries. z is read only where the bound
+  depends on state and input. random: each w_k is uniform in [-bound, bound]. adversarial: w_k = bound or -bound; all
+  signs are drawn anew after 1 to kLongestHold steps, so that the errors of many steps add up. The draws depend on the
+  seed and the number of calls only, not on the standard library. */
   void Add(std::span<double> next, std::span<const double> z = {});
 
  private:
@@ -40,6 +40,7 @@ class Disturbance final {
 
   const Eigen::VectorXd bounds_;
   const std::shared_ptr<const GrowingDisturbance> growing_;  // or null
+  std::vector<Region> regions_;
   const bool acts_, adversarial_;
   std::mt19937_64 random_;
   std::vector<double> signs_;

@@ -93,6 +93,13 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
       }
       bytes.Numbers(region.lipschitz);
     }
+    for (const auto& [of, name] :
+         {std::pair(&Region::disturbance, "disturbance in regions"),
+          std::pair(&Region::noise_bound, "noise in regions"), std::pair(&Region::bound, "bounds in regions")}) {
+      if (!declaration.AnyRegionHas(of)) continue;
+      bytes.Text(name);
+      for (const Region& region : declaration.regions) bytes.Numbers(region.*of);
+    }
   }
   return bytes.digest();
 }

@@ -183,6 +183,19 @@ void ReadAffine(const Field& at, TaskDraft& draft) {
                                        draft.scope.variables[ToSize(l)], draft.scope.states[ToSize(k)]));
 }
 
+// Numbers by states, at most `everywhere` where that has entries; infinite for the others.
+void ReadRegionBound(const Field& at, const char* key, const Eigen::VectorXd& everywhere, const SchemaScope& scope,
+                     Eigen::VectorXd& bounds) {
+  for (const Field& bound : at.Entries(key)) {
+    if (bounds.size() == 0) bounds.setConstant(std::ssize(scope.states), kInfinity);
+    const int k = IndexOf(scope.states, bound.name());
+    if (everywhere.size() != 0 && bound.Number() > everywhere[k])
+      bound.Fail(fmt::format("{} is above declaration.{}, {}, which holds in the whole domain", ToText(bound.Number()),
+                             key, ToText(everywhere[k])));
+    bounds[k] = bound.Number();
+  }
+}
+
 // Rows as those of declaration.lipschitz; L in the others.
 void ReadRegion(const Field& at, TaskDraft& draft) {
   const SchemaScope& scope = draft.scope;
@@ -194,6 +207,8 @@ void ReadRegion(const Field& at, TaskDraft& draft) {
       range.Fail(fmt::format("[{}, {}] is no range, has to be [least, largest]", ToText(ends[0]), ToText(ends[1])));
     region.box.push_back({IndexOf(scope.variables, range.name()), {ends[0], ends[1]}});
   }
+  if (!at.Has("lipschitz") && !at.Has("disturbance") && !at.Has("noise_bound") && !at.Has("bound"))
+    at.Fail("says nothing: lipschitz, disturbance, noise_bound or bound");
   if (region.box.empty())
     at.Fail("in", "names no state or input; what holds everywhere belongs to declaration.lipschitz");
   std::ranges::sort(region.box, {}, &Region::Side::variable);
@@ -208,6 +223,14 @@ void ReadRegion(const Field& at, TaskDraft& draft) {
       region.lipschitz(k, l) = slope.Number();
     }
   }
+  const Eigen::VectorXd no_disturbance = Eigen::VectorXd::Zero(std::ssize(scope.states));
+  ReadRegionBound(at, "disturbance", declaration.disturbance.size() == 0 ? no_disturbance : declaration.disturbance,
+                  scope, region.disturbance);
+  ReadRegionBound(at, "noise_bound", declaration.noise_bound, scope, region.noise_bound);
+  ReadRegionBound(at, "bound", {}, scope, region.bound);
+  for (const int k : declaration.affine.rows)
+    if (region.bound.size() != 0 && region.bound[k] < kInfinity)
+      at["bound"][scope.states[ToSize(k)]].Fail("bounds a row of declaration.affine");
   declaration.regions.push_back(std::move(region));
 }
 
@@ -225,9 +248,10 @@ std::vector<Key> DeclarationKeys() {
   Key range = Vector("declaration.regions[].in.<variable>", "of the variable", kReal, Size::kAny,
                      "[least, largest]; both may lie outside the domain.");
   range.count = Between(2, 2);
-  Key regions = List("declaration.regions", Between(0, Region::kMaxRegions),
-                     "Boxes in which the residual changes less than declaration.lipschitz says. Where boxes overlap, "
-                     "the least of their slopes holds, entry by entry.");
+  Key regions =
+      List("declaration.regions", Between(0, Region::kMaxRegions),
+           "Boxes in which the residual changes less than declaration.lipschitz says, or less is uncertain. Where "
+           "boxes overlap, the least of their numbers holds, entry by entry; in none, the declaration's.");
   regions.read = CheckRegions;
   const auto state_error = ErrorKeys(
       "state", Size::kStates, &Declaration::state_error, &SchemaScope::states,
@@ -256,18 +280,6 @@ std::vector<Key> DeclarationKeys() {
       Required(Names("declaration.affine.rows", Between(1, kMaxStates), Size::kStates, "Their states.")),
       Required(Names("declaration.affine.columns", Between(1, AffineRows::kMaxColumns), Size::kVariables,
                      "The states and inputs that they depend on.")),
-      Optional(std::move(regions), "[]"),
-      Map("declaration.regions[]", "One box.", ReadRegion),
-      Required(Map("declaration.regions[].in",
-                   "The box: ranges of states and inputs, of at most three in all regions. No inequality and no ball "
-                   "of the domain names one of these.")),
-      std::move(range),
-      Required(Map("declaration.regions[].lipschitz",
-                   "L in the box, by names, at most declaration.lipschitz. A state that is not named has that; in the "
-                   "row of one that is, what is not named is zero.")),
-      Map("declaration.regions[].lipschitz.<state>", "Row k: the residual of this state."),
-      Number("declaration.regions[].lipschitz.<state>.<variable>", "of the state per that of the coordinate",
-             kNotNegative, "L_kl in the box."),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
                       "sigma: the largest error of a recorded successor, beside its last bit and state_error.",
                       [](const Field& at, TaskDraft& draft) { draft.problem.declaration.noise_bound = at.Vector(); })),
@@ -288,11 +300,40 @@ std::vector<Key> DeclarationKeys() {
       input_error[0],
       input_error[1],
       input_error[2],
-      Required(Text(
-          "transitions",
-          "CSV of observed steps, relative to this file: a column for each state, each input and each `<state>_next`, "
-          "all inside the domain, at least one row. Those whose declared errors may take them out are left out.",
-          [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
+      Optional(std::move(regions), "[]"),
+      Map("declaration.regions[]", "One box.", ReadRegion),
+      Required(
+          Map("declaration.regions[].in",
+              "The box: ranges of states and inputs, of at most three in all regions. No inequality and no ball of "
+              "the domain names one of these.")),
+      std::move(range),
+      Optional(Map("declaration.regions[].lipschitz",
+                   "L in the box, by names, at most declaration.lipschitz. A state that is not named has that; in the "
+                   "row of one that is, what is not named is zero."),
+               "declaration.lipschitz"),
+      Map("declaration.regions[].lipschitz.<state>", "Row k: the residual of this state."),
+      Number("declaration.regions[].lipschitz.<state>.<variable>", "of the state per that of the coordinate",
+             kNotNegative, "L_kl in the box."),
+      Optional(
+          Map("declaration.regions[].disturbance",
+              "w of steps from the box, by names, at most the number of declaration.disturbance, in whose place it "
+              "comes; an expression there adds to it. A tube that touches a side of the box counts both sides."),
+          "declaration.disturbance"),
+      Number("declaration.regions[].disturbance.<state>", "of the state", kNotNegative, "Of this state."),
+      Optional(Map("declaration.regions[].noise_bound",
+                   "sigma of successors of states and inputs in the box, by names, at most declaration.noise_bound."),
+               "declaration.noise_bound"),
+      Number("declaration.regions[].noise_bound.<state>", "of the state", kNotNegative, "Of this state."),
+      Optional(Map("declaration.regions[].bound",
+                   "The residual is at most this in size in the box, by names; of no affine row. A transition that "
+                   "shows more falsifies it (F)."),
+               "none"),
+      Number("declaration.regions[].bound.<state>", "of the state", kNotNegative, "Of this state."),
+      Required(Text("transitions",
+                    "CSV of observed steps, relative to this file: a column for each state, each input and each "
+                    "`<state>_next`, all inside the domain, at least one row. Those whose declared errors may take "
+                    "them out are left out.",
+                    [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
       Optional(Word("declaration.transitions_are", {"measured", "exact"},
                     "measured: state_error and input_error are those of the file's transitions, too. exact: the file's "
                     "are exact, as a simulation makes them, and the errors are those of the robot on the bus alone.",

@@ -361,6 +361,13 @@ double UpperDouble(const Real& range) {
   return bound;
 }
 
+// Around ranges.
+Ways::Box DoublesAround(std::span<const Real> ranges) {
+  Ways::Box box;
+  for (const Real& range : ranges) box.emplace_back(-UpperDouble(-range), UpperDouble(range));
+  return box;
+}
+
 // Replaces a number by a point, and adds to `slack` how far it may be away.
 void Round(Real& number, Real& slack) {
   const Real point = number.middle();
@@ -491,15 +498,16 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
 void TubeMaker::Learn() {
   const Transitions& data = problem_.transitions;
   for (int i = static_cast<int>(residuals_.size()); i < data.size(); ++i) {
-    if (const auto failure = WhyTooFast(i)) too_fast_.emplace_back(i, *failure);
+    if (const auto failure = WhyTooFast(i)) too_much_.emplace_back(i, *failure);
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
     const std::vector<Real> nominal = equations_.Value(z);
     std::vector<Real> errors(ToSize(problem_.model->num_states()));
     const bool is_exact = problem_.declaration.given_are_exact && !data.IsLearned(i);
     if (!is_exact) errors = RecordErrors(z);
-    const std::vector<Real> disturbance = DisturbanceOver(is_exact ? z : BoxAround(problem_.declaration, z));
-    AddDuration(i, z, nominal, disturbance, errors);
+    const std::vector<Real> around = is_exact ? z : BoxAround(problem_.declaration, z);
+    const std::vector<Real> disturbance = DisturbanceOver(around), noise = NoiseOver(around);
+    AddDuration(i, z, nominal, disturbance, noise, errors);
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
@@ -507,7 +515,7 @@ void TubeMaker::Learn() {
       const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
       const Real& error = errors[ToSize(k)];
       const Real& w = disturbance[ToSize(k)];
-      const Real allowed = Real(unit) + Real(problem_.declaration.noise_bound[k]) + w + error;
+      const Real allowed = Real(unit) + noise[ToSize(k)] + w + error;
       const Real difference = Real(x_next) - nominal[ToSize(k)];
       const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
       const Bounds bounds{observed - allowed, observed + allowed};
@@ -525,11 +533,29 @@ void TubeMaker::Learn() {
       sizes.push_back(abs(Real(data.x_next(i, k))) + errors[ToSize(k)]);
     for (const auto& [output, variable, value] : equations_.First(z))
       sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
+    if (const auto failure = WhyTooLarge(i)) too_much_.emplace_back(i, *failure);
   }
 }
 
-std::optional<Failure> TubeMaker::FindTooFast(const KnownRows& known) const {
-  for (const auto& [i, failure] : too_fast_)
+// What an observation shows of the residual, against what the regions around it say.
+std::optional<Failure> TubeMaker::WhyTooLarge(int i) const {
+  Ways::Box at;
+  for (const double value : problem_.transitions.z.row(i)) at.emplace_back(value, value);
+  for (std::size_t k = 0; k < residuals_[ToSize(i)].size(); ++k) {
+    const double most = ways_.Largest(&Region::bound, static_cast<int>(k), kNone, at);
+    const auto& [lower, upper] = residuals_[ToSize(i)][k];
+    if (most == kNone || !CertainlyBelow(Real(most) + Real(kSeenInDoubles) * sizes_[ToSize(i)][k], max(lower, -upper)))
+      continue;
+    return Failure{-1,
+                   "no known transition has a residual of " + problem_.model->state_names()[k] +
+                       " above what declaration.regions says",
+                   max(lower, -upper).text(), "at most " + Real(most).text(), true};
+  }
+  return std::nullopt;
+}
+
+std::optional<Failure> TubeMaker::FindTooMuch(const KnownRows& known) const {
+  for (const auto& [i, failure] : too_much_)
     if (known.Contains(i)) return failure;
   return std::nullopt;
 }
@@ -604,11 +630,26 @@ Real TubeMaker::Growth(const Real& share) const {
 // nothing bounds it.
 std::vector<Real> TubeMaker::DisturbanceOver(std::span<const Real> box) const {
   std::vector<Real> sum = disturbance_;
+  if (problem_.declaration.AnyRegionHas(&Region::disturbance))
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+      const double everywhere = problem_.declaration.DisturbanceBound(static_cast<Eigen::Index>(k));
+      sum[k] = Real(ways_.Largest(&Region::disturbance, static_cast<int>(k), everywhere, DoublesAround(box)));
+    }
   if (!growing_) return sum;
   const std::vector<Real> grown = growing_->At(box);
   for (std::size_t k = 0; k < sum.size(); ++k)
     sum[k] += grown[k].IsFinite() ? grown[k].magnitude() : Real::Everything();
   return sum;
+}
+
+// The largest error of a recorded successor, likewise.
+std::vector<Real> TubeMaker::NoiseOver(std::span<const Real> box) const {
+  const Eigen::VectorXd& sigma = problem_.declaration.noise_bound;
+  std::vector<Real> noise(sigma.begin(), sigma.end());
+  if (problem_.declaration.AnyRegionHas(&Region::noise_bound))
+    for (int k = 0; k < std::ssize(noise); ++k)
+      noise[ToSize(k)] = Real(ways_.Largest(&Region::noise_bound, k, sigma[k], DoublesAround(box)));
+  return noise;
 }
 
 // What inputs that are off by their errors add to f0: the largest slopes over all that may act, times the errors. Not
@@ -630,7 +671,8 @@ std::vector<Real> TubeMaker::InputSpread(const Query& query) const {
 // at most what is seen of it, what hides it, and that growth itself. Of an angle it must not hide three quarters of a
 // turn.
 void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
-                            const std::vector<Real>& disturbance, std::vector<Real>& errors) const {
+                            const std::vector<Real>& disturbance, const std::vector<Real>& noise,
+                            std::vector<Real>& errors) const {
   if (problem_.transitions.Longer(i) == 0) return;
   const Declaration& declaration = problem_.declaration;
   const Real longer(problem_.transitions.Longer(i)), dt(StepOf(*problem_.model)), growth = Growth(longer / dt);
@@ -649,7 +691,7 @@ void TubeMaker::AddDuration(int i, const std::vector<Real>& z, const std::vector
     const Real seen = is_angle && difference.IsFinite() ? WithoutTurns(difference, errors[k]) : difference;
     const Real moved = longer * rate[k].magnitude(),
                unit(is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next));
-    const Real off = unit + Real(declaration.noise_bound[row]) + disturbance[k];
+    const Real off = unit + noise[k] + disturbance[k];
     const Real hidden = errors[k] + off + moved + growth * disturbance[k];
     const Real most = (seen.magnitude() + hidden) / (Real(1.0) - growth);
     const Real turned = errors[k] + moved + growth * (Real(1.5) * Real::Pi() + off + disturbance[k]);
@@ -1188,13 +1230,17 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
   return {bounds, contradicts(bounds) && contradicts(intersect(true))};
 }
 
-// `bounds` narrowed by ways through the regions. Doubles choose those that may narrow them.
+// `bounds` narrowed by what regions say of the residual, and by ways through them. Doubles choose those that may narrow
+// them.
 void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const {
+  if (problem_.declaration.AnyRegionHas(&Region::bound)) {
+    const double most = ways_.Largest(&Region::bound, k, kNone, DoublesAround(query.hull));
+    if (most < kNone) bounds = {max(bounds.lower, Real(-most)), min(bounds.upper, Real(most))};
+  }
   if (!ways_.Narrow(k)) return;
   const Row row(problem_.declaration, query, k);
   const Transitions& data = problem_.transitions;
-  Ways::Box hull;
-  for (const Real& range : query.hull) hull.emplace_back(-UpperDouble(-range), UpperDouble(range));
+  Ways::Box hull = DoublesAround(query.hull);
   ways_.Cut(hull);
   for (int i = 0; i < data.size(); ++i) {
     if (!known.Contains(i)) continue;

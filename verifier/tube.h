@@ -125,8 +125,9 @@ class TubeMaker final {
   [[nodiscard]] std::optional<Tube> Follow(const InitialSet& start, const Eigen::MatrixXd& controls,
                                            const std::vector<bool>& upper, const KnownRows& known) const;
 
-  /** A known transition in which a state changes faster than is declared, by more than the certifier's rounding. */
-  [[nodiscard]] std::optional<Failure> FindTooFast(const KnownRows& known) const;
+  /** A known transition in which a state changes faster than is declared, or whose residual is larger than a region
+  says, by more than the certifier's rounding. */
+  [[nodiscard]] std::optional<Failure> FindTooMuch(const KnownRows& known) const;
 
  private:
   struct Query;
@@ -136,12 +137,14 @@ class TubeMaker final {
   [[nodiscard]] bool CanExtend(const std::vector<int>& rows) const;
   [[nodiscard]] Real Extension(const std::vector<int>& rows, int k, bool upper, const std::vector<Real>& z) const;
   [[nodiscard]] std::optional<Failure> WhyTooFast(int i) const;
+  [[nodiscard]] std::optional<Failure> WhyTooLarge(int i) const;
   [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,
                                                     const std::vector<Real>& half_width) const;
   [[nodiscard]] std::vector<Real> RecordErrors(const std::vector<Real>& z) const;
   [[nodiscard]] Real Growth(const Real& share) const;
   [[nodiscard]] std::vector<Real> DisturbanceOver(std::span<const Real> box) const;
+  [[nodiscard]] std::vector<Real> NoiseOver(std::span<const Real> box) const;
   [[nodiscard]] std::vector<Real> InputSpread(const Query& query) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
@@ -149,7 +152,8 @@ class TubeMaker final {
   void AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const;
   [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
-                   const std::vector<Real>& disturbance, std::vector<Real>& errors) const;
+                   const std::vector<Real>& disturbance, const std::vector<Real>& noise,
+                   std::vector<Real>& errors) const;
   struct Offset;
   [[nodiscard]] std::vector<Real> Rates(const Query& query, const std::vector<Bounds>& remainder,
                                         const std::vector<Real>& input_spread) const;
@@ -179,7 +183,7 @@ class TubeMaker final {
   std::vector<RoughResiduals> rough_residuals_;  // of each state
   /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
-  std::vector<std::pair<int, Failure>> too_fast_;  ///< The transitions of FindTooFast, in their order.
+  std::vector<std::pair<int, Failure>> too_much_;  ///< The transitions of FindTooMuch, in their order.
   /** The rounding error that the remainder may have added to the certifier's columns. */
   double remainder_rounding_;
 };

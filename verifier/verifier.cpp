@@ -233,7 +233,7 @@ std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate
     return tube.failure ? tube.failure : FindFalseClaim(*problem_, certificate, *functions_, tube);
   };
   const KnownRows& known = certificate.known;
-  if (auto too_fast = maker.FindTooFast(known)) return too_fast;
+  if (auto too_much = maker.FindTooMuch(known)) return too_much;
   const std::optional<Failure> failure = attempt({.known = known});
   if (!failure || !attempt({.ranks_rounding = true, .known = known})) return std::nullopt;
   std::vector<RecordedSet> recorded;

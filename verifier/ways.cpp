@@ -1,6 +1,7 @@
 #include "verifier/ways.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -94,24 +95,37 @@ Number Ways::Along(int k, int variable, const Box& at, double end) const {
   return sum;
 }
 
+double Ways::LargestSlope(int k, int variable, const Box& box) const {
+  return LargestOf([=](const Region& region) { return region.lipschitz(k, variable); },
+                   problem_.declaration.lipschitz(k, variable), box);
+}
+
+double Ways::Largest(Eigen::VectorXd Region::*bound, int k, double everywhere, Box box) const {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  for (auto& [lower, upper] : box) lower = std::nextafter(lower, -kNone), upper = std::nextafter(upper, kNone);
+  Cut(box);
+  return LargestOf([=](const Region& region) { return (region.*bound).size() == 0 ? kNone : (region.*bound)[k]; },
+                   everywhere, std::move(box));
+}
+
 // By halves at a side that crosses the box, until none does: then a region contains all of it or no inner point.
-double Ways::LargestSlope(int k, int variable, Box box) const {
+template <class BoundOf>
+double Ways::LargestOf(const BoundOf& bound_of, double everywhere, Box box) const {
   for (std::size_t l = 0; l < box.size(); ++l) {
     const auto [lower, upper] = box[l];
     const auto side = std::upper_bound(sides_[l].begin(), sides_[l].end(), lower);
     if (side == sides_[l].end() || !(*side < upper)) continue;
     Box above = box;
     box[l].second = above[l].first = *side;
-    return std::max(LargestSlope(k, variable, std::move(box)), LargestSlope(k, variable, std::move(above)));
+    return std::max(LargestOf(bound_of, everywhere, std::move(box)), LargestOf(bound_of, everywhere, std::move(above)));
   }
-  double least = problem_.declaration.lipschitz(k, variable);
   for (const Region& region : problem_.declaration.regions)
     if (std::ranges::all_of(region.box, [&](const Region::Side& side) {
           const auto& [lower, upper] = box[ToSize(side.variable)];
           return side.range.lower <= lower && upper <= side.range.upper;
         }))
-      least = std::min(least, region.lipschitz(k, variable));
-  return least;
+      everywhere = std::min(everywhere, bound_of(region));
+  return everywhere;
 }
 
 }  // namespace forereach::verifier

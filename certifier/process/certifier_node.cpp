@@ -88,7 +88,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
         config.left_out);
   if (const auto& violation = gate_->certifier().violation())
     logging::Warn("{}: every candidate will be answered ABSTAIN_FALSIFIED (F)",
-                  violation->second < 0 ? fmt::format("transition {} contradicts a declared rate", violation->first)
+                  violation->second < 0 ? fmt::format("transition {} contradicts a declared bound", violation->first)
                                         : fmt::format("observations {} and {} contradict the declaration",
                                                       violation->first, violation->second));
   if (gate_->certifier().uses_hull_distance())

@@ -39,7 +39,13 @@ FoundFault UncertifiedPlan(const PlanLedger::Stranger& stranger) {
 FoundFault DeclarationFalsified(const Violation& violation, const AffineRows& affine) {
   const auto& [first, second, coordinate, difference, bound] = violation;
   std::string why;
-  if (second < 0)
+  if (const int region = Violation::RegionOf(second); region >= 0)
+    why = fmt::format(
+        "the executed transition {} contradicts declaration.regions[{}]: residual coordinate {} is at least {} in "
+        "size, "
+        "{} is declared",
+        first, region, coordinate, difference, bound);
+  else if (second < 0)
     why = fmt::format(
         "the executed transition {} contradicts a declared rate: state coordinate {} changes by at least {} a second, "
         "{} is declared",

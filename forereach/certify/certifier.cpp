@@ -249,6 +249,17 @@ void Certifier::ForgetDropped() {
   });
 }
 
+namespace {
+
+// What bounds a step's disturbance by regions; null if none does.
+std::shared_ptr<const RegionGrid> DisturbedRegions(const Problem& problem) {
+  if (!problem.declaration.AnyRegionHas(&Region::disturbance)) return nullptr;
+  const auto [lower, upper] = problem.domain.Corners();
+  return std::make_shared<const RegionGrid>(problem.declaration, lower, upper);
+}
+
+}  // namespace
+
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
@@ -260,7 +271,8 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing,
                   ActedInputs(problem_->declaration), problem_->declaration.growing,
                   // The slope of an affine row ties its columns to others.
-                  problem_->declaration.affine.rows.empty() ? safety_.placement().SeparableStates() : 0) {
+                  problem_->declaration.affine.rows.empty() ? safety_.placement().SeparableStates() : 0,
+                  DisturbedRegions(*problem_)) {
   TestRates();
 }
 

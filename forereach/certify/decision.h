@@ -36,7 +36,7 @@ struct Decision {
   DomainExit exit{};  ///< D by domain exit.
   /** F: residual coordinate. D: coordinate of z, or state without a finite enclosure. S by kLimit: the limit. */
   int coordinate = -1;
-  int first_observation = -1, second_observation = -1;  ///< F: the violating pair; by kBound the first alone.
+  int first_observation = -1, second_observation = -1;  ///< F: the violating pair; by kBound see Violation.
   int obstacle = -1;                                    ///< S by kObstacle, and certificate: the closest obstacle.
   /** Likewise the part of the body that the margin and the threshold are of; -1: they are of the whole body. */
   int part = -1;
@@ -51,7 +51,7 @@ struct Decision {
   limit's function may reach, infinite if it has no bound, and the limit's bound. D: extreme value of the hull, and the
   bound of the domain or of rest; by kBetween the least change from X_t to X_{t+1} and the largest that is declared, in
   the state's unit. F: difference of two residuals, and the difference that the declaration allows; by kBound the least
-  rate that a transition shows, and the declared one, per second. */
+  rate that a transition shows, and the declared one, per second, or the least residual and a region's bound. */
   double margin = 0, threshold = 0;
 
   /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than

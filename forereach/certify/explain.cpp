@@ -37,8 +37,25 @@ std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
   return "no constraint of the domain is violated";
 }
 
+// "for v in [0, 4], delta in [-1, 1]".
+std::string BoxText(const std::vector<Region>& regions, int i, const NominalModel& model) {
+  std::string text;
+  for (std::size_t s = 0; ToSize(i) < regions.size() && s < regions[ToSize(i)].box.size(); ++s) {
+    const auto& [variable, range] = regions[ToSize(i)].box[s];
+    text += (s == 0 ? "for " : ", ") + VariableName(model, variable) + " in [" + ToText(range.lower) + ", " +
+            ToText(range.upper) + "]";
+  }
+  return text;
+}
+
 std::string ExplainFalsified(const Decision& decision, const Problem& problem) {
   const std::string coordinate = VariableName(*problem.model, decision.coordinate);
+  if (const int region = Violation::RegionOf(decision.second_observation);
+      decision.cause == Cause::kBound && region >= 0)
+    return "abstain F: transition " + std::to_string(decision.first_observation) + " shows a residual of " +
+           coordinate + " of at least " + RoundedDown(decision.margin) + " in size, declaration.regions[" +
+           std::to_string(region) + "].bound, " + BoxText(problem.declaration.regions, region, *problem.model) +
+           ", declares " + ToText(decision.threshold) + " at most";
   if (decision.cause == Cause::kBound)
     return "abstain F: in transition " + std::to_string(decision.first_observation) + " " + coordinate +
            " changes by at least " + RoundedDown(decision.margin) + " a second, " +

@@ -49,17 +49,19 @@ unsigned LastingAxes(const Program& program) {
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
                        InstructionSet instructions, const StepTiming& timing, ActedInputs inputs,
-                       std::shared_ptr<const GrowingDisturbance> growing, unsigned separable)
+                       std::shared_ptr<const GrowingDisturbance> growing, unsigned separable,
+                       std::shared_ptr<const RegionGrid> regions)
     : model_(model),
       domain_(domain, inputs.error),
       residual_(residual),
       inputs_(std::move(inputs)),
       growing_(std::move(growing)),
+      regions_(std::move(regions)),
       offsets_(model, timing),
       order_(zonotope_order),
       method_(method),
       instructions_(instructions) {
-  std::ranges::copy(disturbance, unexpected_.begin());
+  if (!regions_) std::ranges::copy(disturbance, unexpected_.begin());
   for (std::size_t k = 0; k < ToSize(model.num_states()) && !inputs_.AreExact(); ++k)
     unexpected_[k] = AddUp(unexpected_[k], inputs_.of_residual[k]);
   const std::vector<Interval> box = domain.Ranges();
@@ -99,8 +101,12 @@ void Propagator::Disturb(std::span<const PlainInterval> hull, Disturbed& all) co
   all.unexpected = unexpected_;
   std::array<Interval, kMaxStates> sizes;
   if (growing_) growing_->Enclose({box.data(), hull.size()}, sizes);
+  RegionGrid::Box at;
+  for (std::size_t l = 0; l < hull.size(); ++l) at.lower[l] = box[l].lower, at.upper[l] = box[l].upper;
   for (std::size_t k = 0; k < n; ++k) {
     if (growing_) all.unexpected[k] = AddUp(unexpected_[k], sizes[k].upper);
+    if (regions_)
+      all.unexpected[k] = AddUp(all.unexpected[k], regions_->LargestBound(RegionBound::kDisturbance, k, at));
     all.by_all[k] = AddUp(all.unexpected[k], all.of_model[k]);
   }
 }
@@ -277,7 +283,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   OffsetSpread offset;
   static constexpr std::array<double, kMaxStates> kNothing{};
   Disturbed disturbed;
-  const bool is_punctual = offsets_.AreZero(), is_constant = inputs_.AreExact() && !growing_;
+  const bool is_punctual = offsets_.AreZero(), is_constant = inputs_.AreExact() && !growing_ && !regions_;
   if (!is_constant) Disturb(hull, disturbed);
   const double* const disturbance = is_constant ? unexpected_.data() : disturbed.by_all.data();
   if (!is_punctual) {

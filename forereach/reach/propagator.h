@@ -7,7 +7,7 @@ middle, half-width and slope of the residual's bounds. The slope is zero for the
 w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
 defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
 f0(c), J and (J + A) G. Where boundaries of steps may be off their times, step_offsets.h says what is added; where the
-inputs that act may be off the plan's, acted_inputs.h does. Where the bound on the disturbance grows with state and
+inputs that act may be off the plan's, acted_inputs.h does. Where the bound on the disturbance depends on state and
 input, w^ is its sup over the hull of Z_t, with the inputs that act. */
 #pragma once
 
@@ -24,6 +24,7 @@ input, w^ is its sup over the hull of Z_t, with the inputs that act. */
 #include "forereach/reach/step_offsets.h"
 #include "forereach/residual/enclosure.h"
 #include "forereach/residual/growing_disturbance.h"
+#include "forereach/residual/region_grid.h"
 #include "forereach/sets/zonotope.h"
 
 namespace forereach {
@@ -54,13 +55,15 @@ class Propagator final {
   slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
   @param disturbance w^, n entries or none. @param instructions changes the computing time only. @param inputs how far
   those that act may be off. @param growing what w^ has beyond that (Declaration::growing), or null.
+  @param regions bound the disturbance instead of w^ (region_grid.h), or null.
   @param separable a bit for each state that may be apart from others: where every step maps e_k to itself, generators
   along it become slack (AppendAndReduce).
   @throws std::invalid_argument as StepOffsets. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
              const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
              InstructionSet instructions = BestInstructionSet(), const StepTiming& timing = {}, ActedInputs inputs = {},
-             std::shared_ptr<const GrowingDisturbance> growing = {}, unsigned separable = ~0u);
+             std::shared_ptr<const GrowingDisturbance> growing = {}, unsigned separable = ~0u,
+             std::shared_ptr<const RegionGrid> regions = {});
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
@@ -81,8 +84,8 @@ class Propagator final {
                                                           std::span<const PlainInterval> hull, StepRecord& record,
                                                           Zonotope& next, double* next_half_width,
                                                           bool is_first) const noexcept;
-  // What disturbs one step whose inputs have errors, or whose disturbance grows: unexpected_ with that, what the inputs
-  // add to f0, and both.
+  // What disturbs one step whose inputs have errors, or whose disturbance depends on it: unexpected_ with that, what
+  // the inputs add to f0, and both.
   struct Disturbed {
     std::array<double, kMaxStates> unexpected, of_model, by_all;
     std::array<PlainInterval, kMaxVariables> hull;  // with the inputs that may act
@@ -105,6 +108,7 @@ class Propagator final {
   std::array<double, kMaxStates> unexpected_{};  // w^, and what the errors of the inputs add to the residual
   ActedInputs inputs_;
   std::shared_ptr<const GrowingDisturbance> growing_;
+  std::shared_ptr<const RegionGrid> regions_;  // then w^ is not in unexpected_
   StepOffsets offsets_;
   int order_;
   Method method_;

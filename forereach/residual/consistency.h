@@ -13,10 +13,15 @@ class LipschitzEnvelope;
 /** A proof that observations i = first and j = second contradict the declaration in coordinate k:
     |r~_ik - r~_jk| >= difference > bound >= sum_l L_kl |z_il - z_jl| + 2 (sigma_k + w^_k).
 Each observation has its own error and its own disturbance, so both count twice. With second = -1 it is a proof that
-transition i alone contradicts a declared bound on a rate of state k (certify/rates.h). */
+transition i alone contradicts a declared bound on a rate of state k (certify/rates.h), with -2 - j that it contradicts
+that of region j: |r_k(z_i)| >= difference > bound. */
 struct Violation {
   int first, second, coordinate;
   double difference, bound;
+
+  [[nodiscard]] static constexpr int OfRegion(int j) { return -2 - j; }
+  /** j, or negative; of `second`. */
+  [[nodiscard]] static constexpr int RegionOf(int second) { return -2 - second; }
 };
 
 /** Tests one pair in one coordinate. Rounding favours the declaration, so a returned violation holds in real

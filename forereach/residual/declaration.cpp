@@ -79,6 +79,14 @@ void ValidateRegions(const Declaration& declaration) {
     RequireRegion(slopes.rows() == L.rows() && slopes.cols() == L.cols(), i, "its lipschitz has not the size of L");
     RequireRegion((slopes.array() >= 0 && slopes.array() < kInfinity).all(), i,
                   "an entry of its lipschitz is negative or not finite");
+    for (const auto& [bounds, name] :
+         {std::pair(&regions[i].disturbance, "disturbance"), std::pair(&regions[i].noise_bound, "noise_bound"),
+          std::pair(&regions[i].bound, "bound")})
+      RequireRegion(bounds->size() == 0 || (bounds->size() == L.rows() && (bounds->array() >= 0).all()), i,
+                    std::string("its ") + name + " has not an entry for each state, or one that is negative or NaN");
+    for (const int k : declaration.affine.rows)
+      RequireRegion(regions[i].bound.size() == 0 || regions[i].bound[k] == kInfinity, i,
+                    "bounds row " + std::to_string(k) + ", which is affine");
   }
   const RegionGrid grid(declaration);
   if (grid.num_cells() > Region::kMaxCells || grid.variables().size() > Region::kMaxVariables)
@@ -113,7 +121,19 @@ std::string Declaration::DisturbanceText(Eigen::Index k) const {
   return constant == 0 ? text : ToText(constant) + " + abs(" + text + ")";
 }
 
-double Declaration::ObservationError(Eigen::Index k) const { return AddUp(noise_bound[k], DisturbanceBound(k)); }
+double Declaration::LeastOf(Eigen::VectorXd Region::*bound, Eigen::Index k, double everywhere) const {
+  for (const Region& region : regions)
+    if ((region.*bound).size() != 0) everywhere = std::min(everywhere, (region.*bound)[k]);
+  return everywhere;
+}
+
+bool Declaration::AnyRegionHas(Eigen::VectorXd Region::*bound) const {
+  return std::ranges::any_of(regions, [&](const Region& region) { return (region.*bound).size() != 0; });
+}
+
+double Declaration::ObservationError(Eigen::Index k) const {
+  return AddUp(LeastOf(&Region::noise_bound, k, noise_bound[k]), LeastOf(&Region::disturbance, k, DisturbanceBound(k)));
+}
 
 void Declaration::Validate(int num_states, int num_variables) const {
   if (lipschitz.rows() != num_states || lipschitz.cols() != num_variables || noise_bound.size() != num_states)

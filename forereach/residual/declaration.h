@@ -27,9 +27,10 @@ struct AffineRows {
   [[nodiscard]] bool Contains(Eigen::Index k) const { return std::ranges::binary_search(rows, static_cast<int>(k)); }
 };
 
-/** A box in some variables of z in which the residual changes by less than L says: for all z, z' of it in Z_cert
-    |r_k(z) - r_k(z')| <= sum_l min(L'_kl, L_kl) |z_l - z'_l|.
-Where no region lies, L alone holds. For z, z' in several regions the least of their slopes holds, entry by entry. */
+/** A box in some variables of z in which less holds than in the whole domain: for all z, z' of it in Z_cert
+    |r_k(z) - r_k(z')| <= sum_l min(L'_kl, L_kl) |z_l - z'_l|,   |r_k(z)| <= bound_k,
+and w^_k, sigma_k are at most these of a step from z. Where no region lies, the declaration alone holds; where several
+do, the least of their numbers, entry by entry. The sides of a box belong to it. */
 struct Region {
   static constexpr std::size_t kMaxRegions = 256, kMaxVariables = 3, kMaxCells = 1024;
 
@@ -39,6 +40,8 @@ struct Region {
   };
   std::vector<Side> box;      ///< The other variables have no bound here.
   Eigen::MatrixXd lipschitz;  ///< L', as L.
+  /** n entries, not negative, infinite where nothing is said of a state; or none. No bound of an affine row. */
+  Eigen::VectorXd disturbance = {}, noise_bound = {}, bound = {};
 };
 
 struct Declaration {
@@ -70,7 +73,7 @@ struct Declaration {
   /** w^_k + |d_k| as a task file has it: an expression if d_k is given, of which the absolute value counts, otherwise a
   number. */
   [[nodiscard]] std::string DisturbanceText(Eigen::Index k) const;
-  /** w^_k, without d_k. */
+  /** w^_k, without d_k, where no region says less. */
   [[nodiscard]] double DisturbanceBound(Eigen::Index k) const { return disturbance.size() == 0 ? 0 : disturbance[k]; }
   /** Whether a bound on the error of recorded states is declared, be it zero. */
   [[nodiscard]] bool DeclaresStateError() const { return state_error.size() != 0; }
@@ -80,8 +83,13 @@ struct Declaration {
   [[nodiscard]] double VariableError(Eigen::Index l) const;
   /** The box of the true z of what was recorded as z: z_l +- e_l rounded outward, z_l itself where e_l is zero. */
   [[nodiscard]] std::vector<Interval> BoxAround(std::span<const double> z) const;
+  /** The least that `everywhere`, the declaration's own number, and any region say of state k. */
+  [[nodiscard]] double LeastOf(Eigen::VectorXd Region::*bound, Eigen::Index k, double everywhere) const;
+  /** Whether a region says any such thing. */
+  [[nodiscard]] bool AnyRegionHas(Eigen::VectorXd Region::*bound) const;
   /** sigma_k + w^_k rounded up: how far an observed residual may lie from r_k, apart from the successor's last bit. It
-  is sigma_k itself if w^_k is zero. What d_k adds is in the observation (observations.h). */
+  is sigma_k itself if w^_k is zero. With regions it is the least of these anywhere: what the place of an observation
+  adds, and d_k, is in the observation (observations.h). */
   [[nodiscard]] double ObservationError(Eigen::Index k) const;
 
   /** @throws std::invalid_argument if L is not n-by-d_z, sigma has not n entries, w^ or e has another number of entries

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +15,7 @@
 #include "forereach/residual/growing_disturbance.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/recorded_successor.h"
+#include "forereach/residual/region_grid.h"
 
 namespace forereach {
 namespace {
@@ -51,6 +53,8 @@ class Observer final {
   Observer(const NominalModel& model, const Declaration& declaration, const StepTiming& timing)
       : model_(model), declaration_(declaration), timing_(timing), has_errors_(declaration.HasErrorInZ()) {
     grown_.fill(0);
+    if (declaration.AnyRegionHas(&Region::disturbance) || declaration.AnyRegionHas(&Region::noise_bound))
+      regions_.emplace(declaration);
   }
 
   // An enclosure for each state, valid until the next call. The step lasted by up to `longer` longer than dt or
@@ -66,9 +70,8 @@ class Observer final {
     }
     if (has_errors_ && is_exact) error_.fill(0);
     if (has_errors_ && !is_exact) BoundErrors(z);
-    if (declaration_.growing)
-      declaration_.growing->Enclose(is_exact ? std::vector<Interval>(z.begin(), z.end()) : declaration_.BoxAround(z),
-                                    grown_);
+    if (declaration_.growing || regions_)
+      BoundDisturbance(is_exact ? std::vector<Interval>(z.begin(), z.end()) : declaration_.BoxAround(z));
     if (longer > 0) EncloseRate(z, longer);
     for (std::size_t k = 0; k < x_next.size(); ++k) {
       if (error_[k] > 0) residual_[k] += Interval(-error_[k], error_[k]);
@@ -97,6 +100,20 @@ class Observer final {
     for (const auto& [k, l, slope] : linear_.jacobian())
       if (const double e = declaration_.VariableError(l); e > 0)
         error_[ToSize(k)] = AddUp(error_[ToSize(k)], MulUp(slope.Magnitude(), e));
+  }
+
+  // What may have disturbed the step or its record beyond eps, if the true z is in the box.
+  void BoundDisturbance(const std::vector<Interval>& box) {
+    grown_.fill(0);
+    if (declaration_.growing) declaration_.growing->Enclose(box, grown_);
+    if (!regions_) return;
+    RegionGrid::Box at;
+    for (std::size_t l = 0; l < box.size(); ++l) at.lower[l] = box[l].lower, at.upper[l] = box[l].upper;
+    for (std::size_t k = 0; k < ToSize(model_.num_states()); ++k) {
+      const double error = AddUp(regions_->LargestBound(RegionBound::kDisturbance, k, at),
+                                 regions_->LargestBound(RegionBound::kNoise, k, at));
+      grown_[k] += Interval(0, SubUp(error, declaration_.ObservationError(static_cast<Eigen::Index>(k))));
+    }
   }
 
   // w^_k + |d_k|, at most.
@@ -157,7 +174,8 @@ class Observer final {
   Linearization linear_;
   std::array<Interval, kMaxStates> residual_;
   std::array<double, kMaxStates> error_{};
-  std::array<Interval, kMaxStates> grown_;  // |d_k| over the box of the true z
+  std::optional<RegionGrid> regions_;       // where they say something of errors
+  std::array<Interval, kMaxStates> grown_;  // |d_k| over the box of the true z, and what regions say beyond the least
 };
 
 }  // namespace

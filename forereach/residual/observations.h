@@ -11,7 +11,8 @@ belongs to. By the mean value theorem and by L, [lower, upper] then contains in 
 and the inequality above holds at the recorded z_i. That box has to lie in the domain (docs/soundness.md, 3.16).
 
 Where the bound on the disturbance grows (Declaration::growing), [lower, upper] contains sup |d_k| over that box, too,
-and the inequality holds with what is left in eps_k.
+and what the regions that the box meets say of w^_k and sigma_k beyond the least of all regions; the inequality holds
+with what is left in eps_k.
 
 A step that lasted by up to delta longer or shorter than dt (Transitions::longer) may have moved the state by delta |d
 f0 / d dt| more or less, and the residual may have done delta / dt of itself more: [lower, upper] contains that, too

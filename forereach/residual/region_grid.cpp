@@ -64,6 +64,22 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
       return side.range.lower <= lower && upper <= side.range.upper;
     });
   };
+  for (Eigen::Index k = 0; k < declaration.lipschitz.rows(); ++k) {
+    const double sigma = declaration.noise_bound.size() == 0 ? 0 : declaration.noise_bound[k];
+    std::size_t which = 0;
+    for (const auto& [of, everywhere] :
+         {std::pair(&Region::disturbance, declaration.DisturbanceBound(k)), std::pair(&Region::noise_bound, sigma),
+          std::pair(&Region::bound, kInfinity)}) {
+      auto& [by_state, in_cells] = bounds_[which++];
+      by_state.push_back(everywhere);
+      for (std::size_t cell = 0; cell < num_cells_ && declaration.AnyRegionHas(of); ++cell) {
+        double bound = everywhere;
+        for (const Region& region : regions)
+          if ((region.*of).size() != 0 && lies_in(cell, region)) bound = std::min(bound, (region.*of)[k]);
+        in_cells.push_back(bound);
+      }
+    }
+  }
   std::vector<Eigen::MatrixXd> least(num_cells_, declaration.lipschitz);
   for (std::size_t cell = 0; cell < num_cells_; ++cell)
     for (const Region& region : regions)
@@ -97,6 +113,24 @@ void RegionGrid::Find(Box& box) const noexcept {
     box.place.first[a] = static_cast<std::uint16_t>(std::min(first, last));
     box.place.on_cut[a] = first > last;
   }
+}
+
+double RegionGrid::LargestBound(RegionBound which, std::size_t k, const Box& box) const noexcept {
+  const auto& [everywhere, in_cells] = bounds_[static_cast<std::size_t>(which)];
+  if (in_cells.empty()) return everywhere[k];
+  std::array<std::size_t, kMaxAxes> first{}, last{};
+  for (std::size_t a = 0; a < num_axes_; ++a) {
+    const auto l = ToSize(variables_[a]);
+    const Slopes& cuts = cuts_[a];
+    first[a] = ToSize(std::lower_bound(cuts.begin(), cuts.end(), box.lower[l]) - cuts.begin());
+    last[a] = ToSize(std::upper_bound(cuts.begin(), cuts.end(), box.upper[l]) - cuts.begin());
+  }
+  double largest = 0;
+  for (std::size_t i = first[0]; i <= last[0]; ++i)
+    for (std::size_t j = first[1]; j <= last[1]; ++j)
+      for (std::size_t m = first[2]; m <= last[2]; ++m)
+        largest = std::max(largest, in_cells[k * num_cells_ + i * stride_[0] + j * stride_[1] + m * stride_[2]]);
+  return largest;
 }
 
 // On a cut both strips hold: the lesser slope counts.

@@ -8,7 +8,10 @@ that has not is where it was, so the cells that a move may meet are known, and i
 
     sum over the strips across its way of (length of the way in the strip) (largest slope of those cells there).
 
-The least over all orders of the moves is returned; docs/soundness.md, 3.20. */
+The least over all orders of the moves is returned; docs/soundness.md, 3.20.
+
+What else regions bound is a number in each cell. Over a box the largest of those counts whose cells it meets or as much
+as touches. */
 #pragma once
 
 #include <array>
@@ -22,6 +25,9 @@ The least over all orders of the moves is returned; docs/soundness.md, 3.20. */
 #include "forereach/residual/declaration.h"
 
 namespace forereach {
+
+/** What a region may bound beside slopes. */
+enum class RegionBound { kDisturbance, kNoise, kResidual };
 
 class RegionGrid final {
  public:
@@ -61,6 +67,10 @@ class RegionGrid final {
   [[nodiscard]] double CostUpper(std::size_t row, const Box& from, const Box& to,
                                  double enough = std::numeric_limits<double>::infinity()) const noexcept;
 
+  /** The largest bound on state k of a step, a record or the residual at any z of the box: w^_k or sigma_k where no
+  region says less, infinity for the residual. Its place is not read, and NaN counts as anywhere. */
+  [[nodiscard]] double LargestBound(RegionBound which, std::size_t k, const Box& box) const noexcept;
+
  private:
   struct Column {
     int variable = -1;
@@ -85,6 +95,10 @@ class RegionGrid final {
   std::string size_text_;
   std::vector<int> rows_;
   std::vector<Row> slopes_;
+  struct Bounds {
+    std::vector<double> everywhere, in_cells;  // by state; by state and cell, empty if no region says any
+  };
+  std::array<Bounds, 3> bounds_;  // by RegionBound
 };
 
 }  // namespace forereach

@@ -13,33 +13,44 @@ std::span<const double> EntriesOfRow(const Eigen::VectorXd& entries) {
   return {entries.data(), ToSize(entries.size())};
 }
 
+RegionGrid::Box PlaceOf(std::span<const double> z, const RegionGrid& grid) {
+  RegionGrid::Box at{};
+  std::ranges::copy(z, at.lower.begin());
+  std::ranges::copy(z, at.upper.begin());
+  grid.Find(at);
+  return at;
+}
+
 }  // namespace
 
 RegionalEnclosure::RegionalEnclosure(const Declaration& declaration, const Observations& observations,
                                      std::span<const double> domain_lower, std::span<const double> domain_upper,
                                      const ResidualEnclosure& others)
-    : grid_(declaration, domain_lower, domain_upper), others_(others) {
-  for (const int k : grid_.rows()) error_.push_back(declaration.ObservationError(k));
+    : grid_(declaration, domain_lower, domain_upper), regions_(declaration.regions), others_(others) {
+  for (int k = 0; k < observations.num_states(); ++k) error_.push_back(declaration.ObservationError(k));
+  const auto with_row = [&](int i, const auto& use) {
+    const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
+                          upper = observations.upper.row(i);
+    use(EntriesOfRow(z), EntriesOfRow(lower), EntriesOfRow(upper));
+  };
+  for (int i = 0; i < observations.size() && declaration.AnyRegionHas(&Region::bound); ++i)
+    with_row(i, [&](auto z, auto lower, auto upper) { TestBounds(i, PlaceOf(z, grid_), lower, upper); });
   const int tried = std::min(observations.size(), kMostTried);
   for (int t = 0; t < tried; ++t) {
     const auto i = static_cast<int>(static_cast<std::int64_t>(t) * observations.size() / tried);
-    const Eigen::VectorXd z = observations.z.row(i), lower = observations.lower.row(i),
-                          upper = observations.upper.row(i);
-    Add(i, EntriesOfRow(z), EntriesOfRow(lower), EntriesOfRow(upper));
+    with_row(i, [&](auto z, auto lower, auto upper) { Add(i, z, lower, upper); });
   }
 }
 
 void RegionalEnclosure::Add(int id, std::span<const double> z, std::span<const double> lower,
                             std::span<const double> upper) {
-  Kept one{id, {}, {}, {}};
-  std::ranges::copy(z, one.at.lower.begin());
-  std::ranges::copy(z, one.at.upper.begin());
-  grid_.Find(one.at);
-  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
-    const auto k = ToSize(grid_.rows()[i]);
-    one.floor.push_back(SubDown(lower[k], error_[i]));
-    one.ceiling.push_back(AddUp(upper[k], error_[i]));
+  Kept one{id, PlaceOf(z, grid_), {}, {}};
+  for (const int row : grid_.rows()) {
+    const auto k = ToSize(row);
+    one.floor.push_back(SubDown(lower[k], error_[k]));
+    one.ceiling.push_back(AddUp(upper[k], error_[k]));
   }
+  TestBounds(id, one.at, lower, upper);
   if (!violation_) Test(one);
   bool narrows = false;
   for (std::size_t i = 0; i < grid_.rows().size() && !narrows; ++i) {
@@ -58,11 +69,30 @@ void RegionalEnclosure::Test(const Kept& one) {
       const double apart = std::max(SubDown(one.floor[i], other.ceiling[i]), SubDown(other.floor[i], one.ceiling[i]));
       if (!(apart > 0)) continue;
       const double cost = grid_.CostUpper(i, other.at, one.at);
-      const double errors = MulUp(2, error_[i]), difference = AddDown(apart, errors), bound = AddUp(cost, errors);
+      const double errors = MulUp(2, error_[ToSize(grid_.rows()[i])]), difference = AddDown(apart, errors),
+                   bound = AddUp(cost, errors);
       if (!(difference > bound)) continue;
       violation_ = Violation{other.id, one.id, grid_.rows()[i], difference, bound};
       return;
     }
+}
+
+// What an observation shows of the residual, against the bound where it is; the region named is one that says so.
+void RegionalEnclosure::TestBounds(int id, const RegionGrid::Box& at, std::span<const double> lower,
+                                   std::span<const double> upper) {
+  for (std::size_t k = 0; k < error_.size() && !violation_; ++k) {
+    const double bound = grid_.LargestBound(RegionBound::kResidual, k, at);
+    const double least = std::max(SubDown(lower[k], error_[k]), SubDown(-upper[k], error_[k]));
+    if (!(least > bound)) continue;
+    const auto says = std::ranges::find_if(regions_, [&](const Region& region) {
+      return region.bound.size() != 0 && region.bound[static_cast<Eigen::Index>(k)] == bound &&
+             std::ranges::all_of(region.box, [&](const Region::Side& side) {
+               return side.range.Contains(at.lower[ToSize(side.variable)]);
+             });
+    });
+    const int region = static_cast<int>(says - regions_.begin());
+    violation_ = Violation{id, Violation::OfRegion(region), static_cast<int>(k), least, bound};
+  }
 }
 
 // `bounds` narrowed by what is kept.
@@ -94,6 +124,11 @@ void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) c
     const Interval narrower = Bound(i, hull, {bounds.lower[k], bounds.upper[k]});
     bounds.lower[k] = narrower.lower;
     bounds.upper[k] = narrower.upper;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    const double bound = grid_.LargestBound(RegionBound::kResidual, k, hull);
+    bounds.lower[k] = std::max(bounds.lower[k], -bound);
+    bounds.upper[k] = std::min(bounds.upper[k], bound);
   }
 }
 

@@ -1,7 +1,8 @@
 /** The enclosure of a residual that changes less in some regions of the domain (Declaration::regions):
     max_i [r~_ik - eps_k - D_ik(Z)] <= r_k <= min_i [r~_ik + eps_k + D_ik(Z)],
 with D_ik(Z) the cost of a path from observation i to the hull of Z (RegionGrid::CostUpper), intersected with the bounds
-of another enclosure, which knows L alone: that sees the zonotope, this one its hull.
+on |r_k| of the regions that the hull meets, and with those of another enclosure, which knows L alone: that sees the
+zonotope, this one its hull.
 
 Work. Any subset of the observations gives sound bounds. Kept are those that narrow a bound at their own location when
 they are added, and of these the last kMostKept; of more than kMostTried given at once, so many are tried, evenly. */
@@ -40,7 +41,8 @@ class RegionalEnclosure final : public ResidualEnclosure {
   void Add(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
   /** The first pair found that contradicts the regions: |r~_ik - r~_jk| >= difference > bound >= D + 2 eps_k, in real
-  arithmetic. Another pair may be missed: some are not kept, and some paths are shorter than those along the axes. */
+  arithmetic. Another pair may be missed: some are not kept, and some paths are shorter than those along the axes. Or
+  the first observation found that contradicts a region's bound by itself; none of these is missed. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
   [[nodiscard]] const RegionGrid& grid() const { return grid_; }
   [[nodiscard]] bool Keeps(int id) const;
@@ -54,9 +56,11 @@ class RegionalEnclosure final : public ResidualEnclosure {
 
   [[nodiscard]] Interval Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept;
   void Test(const Kept& one);
+  void TestBounds(int id, const RegionGrid::Box& at, std::span<const double> lower, std::span<const double> upper);
 
   RegionGrid grid_;
-  std::vector<double> error_;  // eps, of grid_.rows()
+  std::vector<Region> regions_;
+  std::vector<double> error_;  // eps, of each state
   const ResidualEnclosure& others_;
   std::vector<Kept> kept_;
   std::optional<Violation> violation_;

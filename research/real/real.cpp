@@ -147,6 +147,9 @@ struct Study {
     Add("leave one out", stamped, at_stamps[i], "w that grows, commands where the log has them",
         Learn(FitTo(driving, stamped), {.quantile = kChosen, .growing = true}));
     Add("leave one out", rest, out, kGrowing, Learn(fitted, {.quantile = kChosen, .growing = true}));
+    constexpr double kMore = 0.99;  // regions take some of it back
+    Add("leave one out", rest, out, "w that grows, less in 3 regions, quantile 0.99",
+        Learn(fitted, {.quantile = kMore, .growing = true, .cells = 3}), kMore);
     Add("leave one out", rest, out, "w that grows, in a domain widened to this drive",
         Learn(fitted, {.quantile = kChosen, .growing = true, .domain_of = AllBut(drives, "")}));
     Add("leave one out", Whole(out), out, kConstant, Learn(own, {.quantile = kChosen}));

@@ -12,6 +12,7 @@
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/growing_disturbance.h"
+#include "identify/calm_regions.h"
 #include "identify/hold_out.h"
 #include "identify/noise_floor.h"
 #include "identify/proposal.h"
@@ -213,6 +214,16 @@ void KeepOnly(const std::vector<int>& rows, Problem& problem) {
   problem.transitions = RowsAt(problem.transitions, rows);
 }
 
+// Less disturbance in regions; x and y have one there, too.
+void Calm(Problem& problem, const std::vector<int>& felt, const LearnOptions& options) {
+  const Observations seen = Observe(*problem.model, problem.declaration, problem.transitions);
+  for (CalmRegion& calm :
+       FindCalmRegions(problem.declaration, seen, felt, {.most_cells = options.cells, .factor = options.calm_factor})) {
+    calm.region.disturbance.head(2).setConstant(calm.region.disturbance.head(2).maxCoeff());
+    problem.declaration.regions.push_back(std::move(calm.region));
+  }
+}
+
 // ---- judging
 
 // Whether transition i begins where the one before it ends.
@@ -328,6 +339,7 @@ Learned Learn(const Fitted& fitted, const LearnOptions& options) {
     for (const double growth : learned.growth) bounds.push_back({ToText(growth) + "*" + kHasty});
     declaration.growing = std::make_shared<const GrowingDisturbance>(*problem->model, std::move(bounds));
     KeepOnly(RowsWithoutResidual(*problem), *problem);
+    if (options.cells > 1) Calm(*problem, fitted.felt, options);
   } else {
     declaration.noise_bound = fitted.state_error.array() + kRounding;
     declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);

@@ -58,6 +58,9 @@ struct LearnOptions {
   the car may head anywhere. State errors are declared as such, and the transitions stay that do not contradict a
   residual of zero. */
   bool growing = false;
+  /** And less of the s_k a_k in up to so many regions, where the transitions that stay need less, by this factor. */
+  int cells = 1;
+  double calm_factor = 1.5;
   /** The domain's ranges are those of these; empty: of those that the model was fitted to. */
   std::vector<Stretch> domain_of = {};
 };

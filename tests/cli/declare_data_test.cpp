@@ -1,6 +1,7 @@
 // `forereach declare --from-data` and `--hold-out`: what they propose goes into a task file, and what they say is true.
 
 #include "forereach/certify/certifier.h"
+#include "forereach/residual/region_grid.h"
 #include "tests/cli/program.h"
 #include "tests/task/task_files.h"
 
@@ -64,6 +65,47 @@ TEST_F(DeclareDataTest, KeepsAnExpressionOfTheDisturbanceAndJudgesByIt) {
   const Config config = LoadConfig(task_);
   EXPECT_EQ(config.problem->declaration.DisturbanceText(2), "0.03*vx");
   EXPECT_FALSE(Certifier(config.problem).violation());
+}
+
+// Steps from above 1 m/s are disturbed twenty times as much.
+TEST_F(DeclareDataTest, ProposesRegionsWithTheDisturbanceThatTheyNeed) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::ostringstream rows;
+  rows.precision(17);
+  rows << "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n";
+  for (int i = 0; i < 400; ++i) {
+    const double vx = 2 * uniform(random), ax = uniform(random);
+    rows << "0,0," << vx << ",0," << ax << ",0," << 0.15 * vx + 0.5 * 0.15 * 0.15 * ax << ",0,"
+         << vx + 0.15 * ax + (vx > 1 ? 0.02 : 0.001) * uniform(random) << ",0\n";
+  }
+  scratch_.Write("steps.csv", rows.str());
+  const std::string task = Replaced(kTask, "[0, 0, 0.01, 0.01]", "[0.001, 0, 1e-9, 0.01]");
+  std::ofstream(task_) << task;
+  const Json document = Json::parse(Declare("--by vx --regions 4 --json").text);
+  const std::size_t begin = task.find("declaration:"), end = task.find("transitions:");
+  std::ofstream(task_) << task.substr(0, begin) + document["yaml"].get<std::string>() + task.substr(end);
+  const Config config = LoadConfig(task_);
+  const Declaration& declaration = config.problem->declaration;
+  EXPECT_GT(declaration.DisturbanceBound(2), 0.02);
+  ASSERT_FALSE(declaration.regions.empty());
+  const RegionGrid grid(declaration);
+  const auto at = [&](double vx) {
+    RegionGrid::Box box{};
+    box.lower[2] = box.upper[2] = vx;
+    return grid.LargestBound(RegionBound::kDisturbance, 2, box);
+  };
+  EXPECT_LT(at(-1.5), 0.004);
+  EXPECT_LT(at(0.5), 0.004);
+  EXPECT_GT(at(0.5), 0.001);
+  EXPECT_GT(at(1.5), 0.02);
+  EXPECT_EQ(at(-3), declaration.DisturbanceBound(2)) << "nothing is said of where the robot has not been";
+  EXPECT_FALSE(Certifier(config.problem).violation());
+  EXPECT_THAT(Declare("--regions 2").text, HasSubstr("Take the regions out first"));
+  std::ofstream(task_) << task;
+  EXPECT_THAT(Declare("--by vx --regions 4").text, HasSubstr("Transitions in each region"));
+  EXPECT_THAT(Declare("--by vx --regions 4 --hold-out").text, HasSubstr("--regions: --hold-out judges"));
+  EXPECT_THAT(Declare("--by vx --regions 257").text, HasSubstr("--regions: has to be at most 256"));
 }
 
 // The first of the rows lies next to the domain's edge.

@@ -117,6 +117,8 @@ TEST_F(DeclareTest, RegionsAreProvenAndCheckedInTheTask) {
               Exits(1, "declaration.regions[0]: theta by v: a box's bound is 0", "check: refuted"));
   EXPECT_THAT(with("{in: {v: [20, 30]}, lipschitz: {theta: {v: 0.01, delta: 0.3}}}"),
               Exits(1, "declaration.regions[0]: theta by delta: a box's bound is 0.3", "check: refuted"));
+  EXPECT_THAT(with("{in: {v: [0, 6]}, bound: {theta: 0.1}}"),
+              Exits(1, "declaration.regions[0].bound: nothing is proven of it here", "check: cannot verify"));
 }
 
 TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {

@@ -1,7 +1,10 @@
 // Regions in the certifier: what they narrow, what contradicts them, and what is refused.
 #include "tests/test.h"
 
+#include <cmath>
+
 #include "forereach/certify/certifier.h"
+#include "forereach/certify/explain.h"
 #include "tests/worlds.h"
 
 namespace forereach::regions_test {
@@ -103,6 +106,132 @@ TEST_F(Regions, AreNarrowedAndContradictedByWhatIsLearned) {
   EXPECT_FIELDS(certifier, (violation()->second, 2), (Contradiction().num_learned, 1));
 }
 
+// The same world, of which a step is disturbed by up to 1/8 m/s, within 4 m/s by up to 1/64.
+Problem GustyPointMass() {
+  Problem problem = SlippingPointMass();
+  Declaration& declaration = problem.declaration;
+  declaration.lipschitz.setZero();
+  declaration.disturbance = Eigen::Vector4d(0, 0, 0.125, 0);
+  declaration.regions[0].lipschitz = declaration.lipschitz;
+  declaration.regions[0].disturbance = Eigen::Vector4d(kInfinity, kInfinity, 0x1p-6, kInfinity);
+  return problem;
+}
+
+// Half the width that a step adds to vx: what the observation and the step itself were disturbed by.
+TEST_F(Regions, DisturbAStepByWhatTheCellsThatItsHullTouchesSay) {
+  const Certifier certifier(SharedOf(GustyPointMass()));
+  const auto added = [&](double vx) {
+    static_cast<void>(Certify(certifier, vx));
+    return tube_.half_width(1)[2] - tube_.half_width(0)[2];
+  };
+  const double calm = 2 * 0x1p-6, gusty = 0x1p-6 + 0.125;  // what is known was observed within 4 m/s
+  EXPECT_NEAR(added(0), calm, 1e-12);
+  EXPECT_NEAR(added(3.874), calm, 1e-12);
+  EXPECT_NEAR(added(3.875), gusty, 1e-12) << "the hull ends at the side";
+  EXPECT_NEAR(added(4.125), gusty, 1e-12) << "and begins there";
+  EXPECT_NEAR(added(6), gusty, 1e-12);
+  EXPECT_GE(added(3.875), gusty);
+}
+
+TEST_F(Regions, TakeAnObservationForAsDisturbedAsItsPlaceAllows) {
+  const auto envelope = [&](double vx) {
+    Problem problem = GustyPointMass();
+    problem.transitions = {};
+    problem.transitions = {Eigen::MatrixXd(0, 6), Eigen::MatrixXd(0, 4)};
+    Append(problem, vx, 0);
+    static_cast<void>(Certify(Certifier(SharedOf(problem)), 0));
+    return tube_.step(0).envelope.upper[2];
+  };
+  EXPECT_NEAR(envelope(-3), 0x1p-6, 1e-12);
+  EXPECT_NEAR(envelope(-4), 0.125, 1e-12) << "on the side";
+  EXPECT_NEAR(envelope(NextUp(-4)), 0x1p-6, 1e-12);
+  EXPECT_NEAR(envelope(-5), 0.125, 1e-12);
+  Problem problem = GustyPointMass();
+  problem.declaration.disturbance.setZero();
+  problem.declaration.noise_bound[2] = 0.125;
+  std::swap(problem.declaration.regions[0].noise_bound, problem.declaration.regions[0].disturbance);
+  Append(problem, 5, 0.140625);
+  EXPECT_FALSE(Certifier(SharedOf(problem)).violation()) << "1/64 and 1/8";
+  problem.transitions.x_next(1, 2) += 0x1p-40;
+  EXPECT_TRUE(Certifier(SharedOf(problem)).violation());
+}
+
+// Two pairs of steps within 4 m/s may differ by 1/32, and those beyond by 1/4; to the last bits of the successors.
+TEST_F(Regions, AllowADifferenceByWhereBothStepsAre) {
+  for (const auto& [first, second, most] :
+       {std::tuple(1.0, 2.0, 0x1p-5), std::tuple(1.0, 5.0, 0.140625), std::tuple(-5.0, 5.0, 0.25)})
+    for (const bool exceeds : {false, true}) {
+      Problem problem = GustyPointMass();
+      problem.transitions = {Eigen::MatrixXd(0, 6), Eigen::MatrixXd(0, 4)};
+      Append(problem, first, 0);
+      Append(problem, second, most + (exceeds ? 0x1p-40 : -0x1p-40));
+      EXPECT_EQ(Certifier(SharedOf(problem)).violation().has_value(), exceeds) << first << " " << second;
+    }
+}
+
+// r_vx is at most 1/64 in size within 4 m/s, and by slopes alone it is not.
+Problem BoundedPointMass() {
+  Problem problem = SlippingPointMass();
+  problem.declaration.regions[0].lipschitz = problem.declaration.lipschitz;
+  problem.declaration.regions[0].bound = Eigen::Vector4d(kInfinity, kInfinity, 0x1p-6, kInfinity);
+  return problem;
+}
+
+TEST_F(Regions, BoundTheResidualWhereTheHullMeetsNoOtherCell) {
+  const Certifier certifier(SharedOf(BoundedPointMass()));
+  static_cast<void>(Certify(certifier, 3));
+  EXPECT_EQ(tube_.step(0).envelope.upper[2], 0x1p-6);
+  EXPECT_EQ(tube_.step(0).envelope.lower[2], -0x1p-6);
+  static_cast<void>(Certify(certifier, 3.875));
+  EXPECT_NEAR(tube_.step(0).envelope.upper[2], 0.2, 1e-12) << "it ends at the side: L alone counts";
+  Problem both = BoundedPointMass();
+  both.declaration.regions.push_back({{{2, {3, 7}}}, both.declaration.lipschitz, {}, {}, Eigen::Vector4d::Constant(1)});
+  both.declaration.regions.back().bound[2] = 0x1p-5;
+  static_cast<void>(Certify(Certifier(SharedOf(both)), 3.5));
+  EXPECT_EQ(tube_.step(0).envelope.upper[2], 0x1p-6) << "of overlapping boxes the least";
+  static_cast<void>(Certify(Certifier(SharedOf(both)), 4));
+  EXPECT_EQ(tube_.step(0).envelope.upper[2], 0x1p-5) << "of two that a hull meets the largest";
+  both.declaration.regions.back().box[0].range.lower = NextUp(4.0);
+  static_cast<void>(Certify(Certifier(SharedOf(both)), 4));
+  EXPECT_NEAR(tube_.step(0).envelope.upper[2], 0.20625, 1e-12) << "nothing is said of the gap";
+}
+
+TEST_F(Regions, AreContradictedByOneStepThatShowsMoreThanTheirBound) {
+  for (const bool exceeds : {false, true}) {
+    Problem problem = BoundedPointMass();
+    Append(problem, 2, 0x1p-6 + (exceeds ? 0x1p-40 : -0x1p-40));
+    Append(problem, 4, 0x1p-4);
+    const Certifier certifier(SharedOf(problem));
+    ASSERT_EQ(certifier.violation().has_value(), exceeds) << "on the side nothing is said";
+    if (!exceeds) continue;
+    EXPECT_FIELDS(*certifier.violation(), (first, 1), (second, -2), (coordinate, 2), (bound, 0x1p-6));
+    EXPECT_EQ(certifier.Contradiction().size(), 1);
+    const Decision decision = Certify(certifier, 6);
+    EXPECT_FIELDS(decision, (outcome, Outcome::kFalsified), (cause, Cause::kBound), (first_observation, 1));
+    EXPECT_THAT(Explain(decision, problem, {}), HasSubstr("transition 1 shows a residual of vx of at least 0.015625"));
+    EXPECT_THAT(Explain(decision, problem, {}),
+                HasSubstr("declaration.regions[0].bound, for vx in [-4, 4], declares 0.015625 at most"));
+  }
+  Certifier certifier(SharedOf(BoundedPointMass()));
+  const auto [z, next] = StepFrom(certifier.problem(), -1, -0.03125);
+  ASSERT_EQ(certifier.Learn({z.data(), 6}, {next.data(), 4}), Learned::kAdded);
+  ASSERT_TRUE(certifier.violation());
+  EXPECT_FIELDS(certifier, (violation()->first, 1), (violation()->second, -2), (Contradiction().num_learned, 1));
+}
+
+// A step from 4.5 m/s that slipped by 1/16 leaves 1/16 - 1/40 at 4 m/s, which is more than 1/64.
+TEST_F(Regions, AreContradictedByAStepNearbyOnlyWhereTheEnvelopeIsAsked) {
+  Problem problem = BoundedPointMass();
+  problem.transitions = {Eigen::MatrixXd(0, 6), Eigen::MatrixXd(0, 4)};
+  Append(problem, 4.5, 0x1p-4);
+  const Certifier certifier(SharedOf(problem));
+  EXPECT_FALSE(certifier.violation());
+  EXPECT_EQ(Certify(certifier, 0).outcome, Outcome::kCertified);
+  const Zonotope point = Zonotope::FromBox(Eigen::Vector4d(0, 0, 3.99, 0), Eigen::Vector4d::Zero());
+  const Decision decision = certifier.Certify({controls_.data(), 2, 8, 2}, point, {}, tube_);
+  EXPECT_FIELDS(decision, (outcome, Outcome::kFalsified), (cause, Cause::kPairwise), (step, 0), (coordinate, 2));
+}
+
 // Steps that say nothing new are not kept, and of many the last are.
 TEST(RegionalObservations, AreKeptWhereTheyNarrowABound) {
   Problem problem = SlippingPointMass();
@@ -142,6 +271,17 @@ TEST(RegionsOfADeclaration, AreRefusedWhereTheyAreNotBuilt) {
   EXPECT_THAT(refusal([&](Problem& p) { region(p).box[0].range = {4, 4}; }), HasSubstr("region 0: 4 to 4"));
   EXPECT_THAT(refusal([&](Problem& p) { region(p).lipschitz(1, 1) = -1; }), HasSubstr("region 0: an entry"));
   EXPECT_THAT(refusal([&](Problem& p) { region(p).lipschitz.resize(4, 4); }), HasSubstr("has not the size of L"));
+  EXPECT_THAT(refusal([&](Problem& p) { region(p).disturbance = Eigen::Vector3d::Zero(); }),
+              HasSubstr("region 0: its disturbance has not"));
+  EXPECT_THAT(refusal([&](Problem& p) { region(p).noise_bound = Eigen::Vector4d(0, 0, -1e-300, 0); }),
+              HasSubstr("region 0: its noise_bound has not"));
+  EXPECT_THAT(refusal([&](Problem& p) { region(p).bound = Eigen::Vector4d(0, 0, std::nan(""), 0); }),
+              HasSubstr("region 0: its bound has not"));
+  EXPECT_THAT(refusal([&](Problem& p) {
+                p.declaration.affine = {{3}, {3}};
+                region(p).bound = Eigen::Vector4d::Constant(1);
+              }),
+              HasSubstr("region 0: bounds row 3, which is affine"));
   EXPECT_THAT(refusal([&](Problem& p) {
                 p.domain.balls.push_back({{2, 3}, Eigen::Vector2d::Zero(), 5});
               }),

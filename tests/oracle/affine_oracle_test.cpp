@@ -218,7 +218,7 @@ TEST(AffineSetOracle, AContradictionIsAProofAndNoneIsMissed) {
   EXPECT_GT(agreed, 20);
 }
 
-// The model, whether steps are disturbed, and whether they may be off their times.
+// The model, whether steps are disturbed, of some by less in some places, and whether they may be off their times.
 class AffineContainment : public testing::TestWithParam<std::tuple<bool, bool, bool>> {};
 
 TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
@@ -228,6 +228,12 @@ TEST_P(AffineContainment, NoAdmissibleRolloutLeavesTheTube) {
   for (int trial = 0; trial < 60; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
     const auto problem = AnyProblem(random, bicycle, random.Integer(6, 24));
+    if (disturbed && records.Coin()) {  // by less in boxes of a coordinate that no ball of the domain names
+      const int l = random.Coin() ? 0 : problem->model->num_states();
+      const double side = problem->domain.Ranges()[static_cast<std::size_t>(l)].upper * random.Uniform(-0.5, 0.5);
+      problem->declaration.regions = {{{{l, {-1e3, side}}}, problem->declaration.lipschitz}};
+      if (random.Coin()) problem->declaration.regions.push_back({{{l, {side, 1e3}}}, problem->declaration.lipschitz});
+    }
     if (disturbed) Disturb(random, *problem);
     const AffineTruth truth = MakeAffine(random, *problem);
     if (shifted) Shift(random, *problem);

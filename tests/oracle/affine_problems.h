@@ -26,7 +26,7 @@ inline std::pair<Real, Real> AffineBounds(const Problem& problem, int i, int k) 
   const double next = problem.transitions.x_next(i, k);
   const Real seen = Real(next) - NominalSuccessor(bicycle, {z.begin(), z.end()})[static_cast<std::size_t>(k)];
   const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) + Real(problem.declaration.noise_bound[k]) +
-                     Real(problem.declaration.DisturbanceBound(k));
+                     DisturbanceAt(problem, {z.begin(), z.end()}, k);
   return {seen - slack, seen + slack};
 }
 
@@ -64,10 +64,11 @@ inline AffineTruth MakeAffine(Random& random, Problem& problem) {
   return truth;
 }
 
-/** Declares of each slope that it is at most twice what MakeAffine makes it. */
+/** Declares of each slope that it is at most twice what MakeAffine makes it, in regions, too. */
 inline void DeclareSlopes(Problem& problem) {
   for (const int k : problem.declaration.affine.rows)
     for (const int l : problem.declaration.affine.columns) problem.declaration.lipschitz(k, l) = 0.04;
+  for (Region& region : problem.declaration.regions) region.lipschitz = problem.declaration.lipschitz;
 }
 
 /** The same as a robot records it (Recorded), with the slopes declared. */

@@ -139,9 +139,28 @@ inline Real GrowthAt(const Problem& problem, const std::vector<Real>& z, Eigen::
   return abs(Evaluate<Real>(text, z, [](double number) { return Real(number); }));
 }
 
+/** What the regions around z bound, or `everywhere`. */
+inline double BoundAt(const Declaration& declaration, Eigen::VectorXd Region::*bound, const std::vector<Real>& z,
+                      Eigen::Index k, double everywhere) {
+  for (const Region& region : declaration.regions)
+    if ((region.*bound).size() != 0 && std::ranges::all_of(region.box, [&](const Region::Side& side) {
+          const Real& at = z[static_cast<std::size_t>(side.variable)];
+          return Real(side.range.lower) <= at && at <= Real(side.range.upper);
+        }))
+      everywhere = std::min(everywhere, (region.*bound)[k]);
+  return everywhere;
+}
+
 /** The bound on the disturbance of state k in a step at z. */
 inline Real DisturbanceAt(const Problem& problem, const std::vector<Real>& z, Eigen::Index k) {
-  return Real(problem.declaration.DisturbanceBound(k)) + GrowthAt(problem, z, k);
+  const Declaration& declaration = problem.declaration;
+  return Real(BoundAt(declaration, &Region::disturbance, z, k, declaration.DisturbanceBound(k))) +
+         GrowthAt(problem, z, k);
+}
+
+/** The bound on the error of its recorded successor. */
+inline double NoiseAt(const Declaration& declaration, const std::vector<Real>& z, Eigen::Index k) {
+  return BoundAt(declaration, &Region::noise_bound, z, k, declaration.noise_bound[k]);
 }
 
 /** Declares that the disturbance of about half of the coordinates grows with state and input, by expressions with and
@@ -169,8 +188,20 @@ inline void Grow(Random& random, Problem& problem) {
   problem.declaration.growing = std::make_shared<const GrowingDisturbance>(*problem.model, std::move(bounds));
 }
 
-/** Declares a disturbance in about half of the coordinates, in some problems one that grows, and disturbs every
-observation within it, many of them by the bound. The margin of 1e-6 is for the rounding of the successors. */
+/** Shares of a bound, or nothing, for each of some regions. */
+inline void BoundInRegions(Random& random, Declaration& declaration, Eigen::VectorXd Region::*bound,
+                           const Eigen::VectorXd& everywhere) {
+  for (Region& region : declaration.regions) {
+    if (random.Coin(0.3)) continue;
+    region.*bound = everywhere;
+    for (double& entry : region.*bound)
+      entry = random.Coin(0.2) ? kInfinity : random.Coin(0.2) ? 0 : random.Uniform(0, 1) * entry;
+  }
+}
+
+/** Declares a disturbance in about half of the coordinates, in some problems one that grows, less in some of the
+regions if there are any, and disturbs every observation within it, many of them by the bound. The margin of 1e-6 is for
+the rounding of the successors. */
 inline void Disturb(Random& random, Problem& problem) {
   const int n = problem.model->num_states();
   Eigen::VectorXd& bound = problem.declaration.disturbance;
@@ -178,6 +209,7 @@ inline void Disturb(Random& random, Problem& problem) {
   for (int k = 0; k < n; ++k)
     if (random.Coin()) bound[k] = std::ldexp(random.Uniform(0.5, 1), -random.Integer(6, 16));
   if (random.Coin(0.4)) Grow(random, problem);
+  BoundInRegions(random, problem.declaration, &Region::disturbance, bound);
   for (int i = 0; i < problem.transitions.size(); ++i) {
     const Eigen::VectorXd z = problem.transitions.z.row(i);
     for (int k = 0; k < n; ++k)

@@ -75,6 +75,18 @@ class RegionalFunction {
     const Number signed_value = Number(sign_) * value;
     values_[node] = std::min(values_[node], signed_value);
   }
+  /** At all nodes in a region: at most `value` in size, on the side to which the function is extreme. */
+  void SetWithin(const Region& region, const Number& value) {
+    for (std::size_t node = 0; node < values_.size(); ++node)
+      if (IsWithin(region, node)) values_[node] = std::min(values_[node], value);
+  }
+  /** The largest size in a region, which its sides' nodes have; 0 where the region is outside the domain. */
+  [[nodiscard]] Number LargestWithin(const Region& region) const {
+    Number largest(0.0);
+    for (std::size_t node = 0; node < values_.size(); ++node)
+      if (IsWithin(region, node)) largest = std::max({largest, values_[node], Number(-values_[node])});
+    return largest;
+  }
   /** After all values are set: Bellman and Ford. */
   void Spread() {
     for (bool changed = true; changed;) {
@@ -119,6 +131,12 @@ class RegionalFunction {
  private:
   inline static const Number kFar{1000.0};  // more than any way
 
+  [[nodiscard]] bool IsWithin(const Region& region, std::size_t node) const {
+    return std::ranges::all_of(region.box, [&](const Region::Side& side) {
+      const auto a = static_cast<std::size_t>(std::ranges::find(variables_, side.variable) - variables_.begin());
+      return side.range.Contains(ticks_[a][Tick(node, a)]);
+    });
+  }
   [[nodiscard]] std::size_t Tick(std::size_t node, std::size_t a) const {
     return node / strides_[a] % ticks_[a].size();
   }
@@ -159,7 +177,7 @@ inline std::vector<int> VariablesOf(const Declaration& declaration, int k) {
 }
 
 /** AnyProblem with regions in one or two variables, larger slopes in these, at most one other slope in a row, and data
-from a residual within. */
+from a residual within; some regions bound it, its records and, if `disturbed`, its disturbance. */
 inline std::shared_ptr<Problem> AnyRegionalProblem(Random& random, bool bicycle, int count, bool disturbed) {
   const auto problem = AnyProblem(random, bicycle, count);
   problem->domain.balls.clear();
@@ -176,16 +194,22 @@ inline std::shared_ptr<Problem> AnyRegionalProblem(Random& random, bool bicycle,
       if (random.Coin()) declaration.lipschitz(k, l) = random.Uniform(0, 0.05);
   }
   AddRegions(random, declaration, Eigen::Map<const Eigen::VectorXd>(upper.data(), d), random.Integer(1, 3), chosen);
+  BoundInRegions(random, declaration, &Region::noise_bound, declaration.noise_bound);
+  for (Region& region : declaration.regions)
+    if (random.Coin()) region.bound.setConstant(n, kInfinity);
   for (int k = 0; k < n; ++k) {
     RegionalFunction<Real> truth(declaration, k, VariablesOf(declaration, k), lower, upper, problem->transitions.z,
                                  random.Sign());
     for (int s = random.Integer(1, 3); s > 0; --s) truth.SetAnyNode(random, Real(random.Uniform(-0.05, 0.05)));
     truth.Spread();
+    for (Region& region : declaration.regions)
+      if (region.bound.size() != 0 && random.Coin())
+        region.bound[k] = NextUp(truth.LargestWithin(region).ToDouble()) * (random.Coin() ? 1 : 2);
     for (int i = 0; i < count; ++i) {
       const Eigen::VectorXd z = problem->transitions.z.row(i);
       const std::vector<Real> at(z.begin(), z.end());
       const double noise =
-          declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1)) * (1 - 1e-6);
+          NoiseAt(declaration, at, k) * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1)) * (1 - 1e-6);
       problem->transitions.x_next(i, k) =
           (NominalSuccessor(bicycle, at)[static_cast<std::size_t>(k)] + truth(at) + Real(noise)).ToDouble();
     }
@@ -194,7 +218,7 @@ inline std::shared_ptr<Problem> AnyRegionalProblem(Random& random, bool bicycle,
   return problem;
 }
 
-/** Of each state the largest or the least residual that data, L and regions admit. */
+/** Of each state the largest or the least residual that data, L and regions admit, with what these bound. */
 inline std::vector<RegionalFunction<Real>> AnyAdmissible(Random& random, const Problem& problem) {
   const bool bicycle = problem.model->num_states() == 6;
   const auto [lower, upper] = problem.domain.Corners();
@@ -208,9 +232,11 @@ inline std::vector<RegionalFunction<Real>> AnyAdmissible(Random& random, const P
       const std::vector<Real> at(z.begin(), z.end());
       const double next = problem.transitions.x_next(i, k);
       const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) +
-                         Real(problem.declaration.noise_bound[k]) + DisturbanceAt(problem, at, k);
+                         Real(NoiseAt(problem.declaration, at, k)) + DisturbanceAt(problem, at, k);
       residual.Set(z, Real(next) - NominalSuccessor(bicycle, at)[static_cast<std::size_t>(k)] + Real(sign) * slack);
     }
+    for (const Region& region : problem.declaration.regions)
+      if (region.bound.size() != 0 && region.bound[k] < kInfinity) residual.SetWithin(region, Real(region.bound[k]));
     residual.Spread();
   }
   return all;

@@ -221,6 +221,48 @@ TEST(RegionsOracle, TheCostIsThatOfTheCheapestOrderRoundedUp) {
   EXPECT_GT(compared, 500);
 }
 
+// Against the definition at points: one in each cell that the box meets or touches, and on all sides between them.
+TEST(RegionsOracle, TheLargestBoundIsThatOfTheCellsThatABoxTouches) {
+  int less = 0;
+  for (TracedRandom random(2103); random.Again(500);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
+    Scene scene = AnyScene(random);
+    Declaration& declaration = scene.declaration;
+    declaration.disturbance = Eigen::VectorXd::Ones(scene.variables);
+    BoundInRegions(random, declaration, &Region::disturbance, declaration.disturbance);
+    BoundInRegions(random, declaration, &Region::bound, declaration.disturbance);
+    const RegionGrid grid(declaration, scene.lower, scene.upper);
+    RegionGrid::Box box;
+    std::vector<std::vector<double>> places{{}};  // of each axis so far
+    for (std::size_t l = 0; l < static_cast<std::size_t>(scene.variables); ++l) {
+      box.lower[l] = AnyPlace(random);
+      box.upper[l] = random.Coin(0.3) ? box.lower[l] : std::max(box.lower[l], AnyPlace(random));
+      std::vector<double> along{box.lower[l], box.upper[l], NextDown(box.lower[l]), NextUp(box.upper[l])};
+      for (const Region& region : declaration.regions)
+        for (const auto& [variable, range] : region.box)
+          if (static_cast<std::size_t>(variable) == l)
+            for (const double side : {range.lower, range.upper})
+              if (box.lower[l] <= side && side <= box.upper[l])
+                along.insert(along.end(), {NextDown(side), NextUp(side)});
+      std::erase_if(along, [](double at) { return std::abs(at) > kReach; });
+      std::vector<std::vector<double>> next;
+      for (const std::vector<double>& place : places)
+        for (const double at : along) next.push_back(place), next.back().push_back(at);
+      places = std::move(next);
+    }
+    for (const auto& [of, which, everywhere] : {std::tuple(&Region::disturbance, RegionBound::kDisturbance, 1.0),
+                                                std::tuple(&Region::bound, RegionBound::kResidual, kInfinity)})
+      for (int k = 0; k < scene.variables; ++k) {
+        double largest = 0;
+        for (const std::vector<double>& place : places)
+          largest = std::max(largest, BoundAt(declaration, of, {place.begin(), place.end()}, k, everywhere));
+        ASSERT_EQ(grid.LargestBound(which, static_cast<std::size_t>(k), box), largest);
+        less += largest < everywhere;
+      }
+  }
+  EXPECT_GT(less, 300);
+}
+
 // Residuals on the edge of what data, L and regions admit, in 256 bits: the model, and whether steps are disturbed.
 class RegionalContainment : public testing::TestWithParam<std::tuple<bool, bool>> {};
 

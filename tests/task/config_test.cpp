@@ -121,7 +121,7 @@ TEST_F(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
   EXPECT_THAT(error("[0, 0.5]", "[0, 0.5, 1]"), HasSubstr("declaration.regions[0].in.vx: "));
   EXPECT_THAT(error("vy: [-1, 1]", "speed: [-1, 1]"), HasSubstr("declaration.regions[0].in.speed: unknown key"));
   EXPECT_THAT(error("{vy: [-1, 1], vx: [0, 0.5]}", "{}"), HasSubstr("declaration.regions[0].in: names no state"));
-  EXPECT_THAT(error(", lipschitz: {vx: {vy: 0.01}}", ""), HasSubstr("declaration.regions[0].lipschitz: missing"));
+  EXPECT_THAT(error(", lipschitz: {vx: {vy: 0.01}}", ""), HasSubstr("declaration.regions[0]: says nothing"));
   EXPECT_THAT(files_.Error(text(Replaced(good, "vx: [0, 0.5]", "px: [0, 1], py: [0, 1], vx: [0, 0.5]"))),
               HasSubstr("declaration.regions: cut 4 variables and 3 x 3 x 3 x 3 = 81 cells, has to be at most 3"));
   std::string fine;
@@ -129,6 +129,42 @@ TEST_F(LoadConfig, ReadsRegionsAndRefusesWhatIsNone) {
     fine += fmt::format("    - {{in: {{vx: [0, {}], vy: [0, {}]}}, lipschitz: {{vx: {{}}}}}}\n", 0.01 * i, 0.02 * i);
   EXPECT_THAT(files_.Error(text(fine)),
               HasSubstr("35 x 35 = 1225 cells, has to be at most 3 variables and 1024 cells"));
+}
+
+TEST_F(LoadConfig, ReadsWhatRegionsBoundBesideSlopes) {
+  const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n",
+                    good = "{in: {vx: [0, 0.5]}, disturbance: {vx: 0.001}, noise_bound: {vy: 0}, bound: {vx: 0.25}}";
+  const auto text = [&](const std::string& region) {
+    return Replaced(kTask, line, line + "  disturbance: {vx: 0.002, vy: \"vx\"}\n  regions:\n    - " + region + "\n");
+  };
+  const Config config = files_.Load(text(good));
+  const Declaration& declaration = config.problem->declaration;
+  const Region& region = declaration.regions.at(0);
+  EXPECT_EQ(region.lipschitz, declaration.lipschitz) << "no slopes are those of the whole domain";
+  EXPECT_EQ(region.disturbance, Numbers({kInfinity, kInfinity, 0.001, kInfinity}));
+  EXPECT_EQ(region.noise_bound, Numbers({kInfinity, kInfinity, kInfinity, 0}));
+  EXPECT_EQ(region.bound, Numbers({kInfinity, kInfinity, 0.25, kInfinity}));
+  EXPECT_EQ(declaration.ObservationError(2), AddUp(0.01, 0.001)) << "the least anywhere";
+  EXPECT_EQ(declaration.ObservationError(3), 0);
+  EXPECT_EQ(declaration.DisturbanceBound(2), 0.002);
+  for (const auto& [from, to] : {std::pair("0.001", "0.0015"), std::pair("{vy: 0}", "{vx: 0}"),
+                                 std::pair("0.25", "0.26"), std::pair(", bound: {vx: 0.25}", "")})
+    EXPECT_NE(files_.Load(text(Replaced(good, from, to))).grounds.declaration, config.grounds.declaration) << to;
+
+  const auto error = [&](const std::string& from, const std::string& to) {
+    return files_.Error(text(Replaced(good, from, to)));
+  };
+  EXPECT_THAT(error("0.001", "0.003"), HasSubstr("declaration.regions[0].disturbance.vx: 0.003 is above "
+                                                 "declaration.disturbance, 0.002, which holds in the whole domain"));
+  EXPECT_THAT(error("disturbance: {vx: 0.001}", "disturbance: {vy: 0.001}"), HasSubstr("0.001 is above"))
+      << "an expression is not replaced";
+  EXPECT_THAT(error("{vy: 0}", "{vy: 0.02}"), HasSubstr("regions[0].noise_bound.vy: 0.02 is above"));
+  EXPECT_THAT(error("0.25", "-0.25"), HasSubstr("declaration.regions[0].bound.vx: -0.25"));
+  EXPECT_THAT(error("0.25", ".nan"), HasSubstr("declaration.regions[0].bound.vx: "));
+  EXPECT_THAT(error("0.25", ".inf"), HasSubstr("declaration.regions[0].bound.vx: "));
+  EXPECT_THAT(error("bound: {vx", "bound: {speed"), HasSubstr("declaration.regions[0].bound.speed: unknown key"));
+  EXPECT_THAT(files_.Error(Replaced(text(good), "  disturbance: {vx: 0.002, vy: \"vx\"}\n", "")),
+              HasSubstr("0.001 is above declaration.disturbance, 0, which"));
 }
 
 TEST_F(LoadConfig, LeavesOutTransitionsThatTheirErrorsMayTakeOutOfTheDomain) {

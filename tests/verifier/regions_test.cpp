@@ -56,6 +56,31 @@ TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotD
   EXPECT_GT(falsified, 2);
 }
 
+TEST(Ways, BoundWhatTheGridSays) {
+  for (TracedRandom random(2123); random.Again(300);) {
+    const auto problem = AnyRegionalProblem(random, random.Coin(), 1, true);
+    const Declaration& declaration = problem->declaration;
+    const auto [lower, upper] = problem->domain.Corners();
+    const RegionGrid grid(declaration, lower, upper);
+    const Ways ways(*problem);
+    RegionGrid::Box box;
+    Ways::Box same;
+    for (std::size_t l = 0; l < lower.size(); ++l) {
+      box.lower[l] = random.Coin(0.3) ? random.Integer(-2, 2) * upper[l] / 2 : random.Uniform(lower[l], upper[l]);
+      box.upper[l] = random.Coin(0.3) ? box.lower[l] : random.Uniform(box.lower[l], upper[l]);
+      same.emplace_back(box.lower[l], box.upper[l]);
+    }
+    for (int k = 0; k < problem->model->num_states(); ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      EXPECT_EQ(ways.Largest(&Region::disturbance, k, declaration.DisturbanceBound(k), same),
+                grid.LargestBound(RegionBound::kDisturbance, at, box));
+      EXPECT_EQ(ways.Largest(&Region::noise_bound, k, declaration.noise_bound[k], same),
+                grid.LargestBound(RegionBound::kNoise, at, box));
+      EXPECT_EQ(ways.Largest(&Region::bound, k, kInfinity, same), grid.LargestBound(RegionBound::kResidual, at, box));
+    }
+  }
+}
+
 // The grid's costs are never below those of the ways, and both find the same where no point lies on a side.
 TEST(Ways, CostWhatTheGridSays) {
   int equal = 0;
