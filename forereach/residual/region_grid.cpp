@@ -117,7 +117,7 @@ void RegionGrid::Find(Box& box) const noexcept {
 
 double RegionGrid::LargestBound(RegionBound which, std::size_t k, const Box& box) const noexcept {
   const auto& [everywhere, in_cells] = bounds_[static_cast<std::size_t>(which)];
-  if (in_cells.empty()) return everywhere[k];
+  if (in_cells.empty()) return everywhere.empty() ? kInfinity : everywhere[k];  // of more cells than are allowed
   std::array<std::size_t, kMaxAxes> first{}, last{};
   for (std::size_t a = 0; a < num_axes_; ++a) {
     const auto l = ToSize(variables_[a]);

@@ -154,6 +154,16 @@ TEST_F(Allocation, CertifyAllocatesNothingForExpressions) {
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 
+TEST_F(Allocation, CertifyAllocatesNothingForRegions) {
+  Problem problem = BicycleProblem();
+  Declaration& declaration = problem.declaration;
+  declaration.disturbance = Eigen::VectorXd::Constant(6, 1e-4);
+  const Eigen::VectorXd less = 0.5 * declaration.disturbance;
+  declaration.regions = {{{{4, {-4, 0}}, {5, {-1, 0}}}, 0.5 * declaration.lipschitz, less, {}, less}};
+  certifier_.emplace(std::make_shared<Problem>(problem));
+  EXPECT_EQ(Count(10, 0, {}, Outcome::kCertified), 0);
+}
+
 TEST_F(Allocation, ABatchAllocatesNothingForAStep) {
   const Eigen::VectorXd center = (Eigen::VectorXd(6) << 0, 0, 0, 10, 0, 0).finished();
   const Zonotope start = Zonotope::FromBox(center, Eigen::VectorXd::Constant(6, 0.01));

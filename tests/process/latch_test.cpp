@@ -378,6 +378,33 @@ TEST_F(LatchTest, ADeclaredRateThatATransitionContradictsStaysSoOverRestartsAndR
   ExpectArmed();
 }
 
+TEST_F(LatchTest, ABoundOfARegionThatATransitionContradictsStaysSoOverRestartsAndResets) {
+  const auto declare = [&](double bound) {
+    Declaration& declaration = Own(config_.problem).declaration;
+    declaration.lipschitz(2, 2) = 0.1;
+    declaration.regions = {{{{2, {-0.5, 0.5}}}, declaration.lipschitz}};
+    declaration.regions[0].bound = Vec({kInfinity, kInfinity, bound, kInfinity});
+  };
+  declare(0.005);
+  Begin();
+  SayState();
+  bus_->Publish("TRANSITION", Executed(*config_.problem->model, Vec({0, 0, 0, 0, 0, 0}), 0.01));
+  Run();
+  ASSERT_FALSE(faults_.empty());
+  EXPECT_EQ(faults_.back().cause, fault_t::DECLARATION_FALSIFIED);
+  EXPECT_THAT(GetText(faults_.back().message), HasSubstr("contradicts declaration.regions[0]: residual coordinate 2"));
+  EXPECT_EQ(faults_.back().second_observation, -2);
+  Reset();
+  SayState();
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_BOUND);
+  EXPECT_TRUE(IsFalsifiedAfterARestart());
+  declare(0.01 - 1e-9);
+  ExpectFalsified();
+  declare(0.01 + 1e-9);
+  Begin();
+  ExpectArmed();
+}
+
 TEST_F(LatchTest, RefusesADirectoryThatAnotherCertifierUses) {
   Begin();
   EXPECT_THAT([&] { const LatchFile second(directory_); },
