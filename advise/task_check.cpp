@@ -24,6 +24,7 @@
 #include "forereach/residual/observations.h"
 #include "forereach/residual/recorded_successor.h"
 #include "forereach/safety/clearance.h"
+#include "forereach/safety/grid_map.h"
 #include "planner_bridge/reference.h"
 #include "records/decision_json.h"
 #include "records/outlines.h"
@@ -793,7 +794,9 @@ class Examination final {
     for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
       const Obstacle& obstacle = config_.obstacles[i];
       if (obstacle.kind() == Obstacle::Kind::kHalfSpace || IsOutside(obstacle)) continue;  // more is behind a piece
-      const double thickness = LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
+      const double thickness = obstacle.grid()
+                                   ? MapOf(obstacle).resolution
+                                   : LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
       if (step <= thickness + body) continue;
       Add("task.between",
           fmt::format("the robot moves by up to {} m in one step of {} s, and {} is {} m thick: with "

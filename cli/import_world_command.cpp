@@ -25,7 +25,7 @@ namespace forereach {
 namespace {
 
 struct ImportWorldArguments {
-  std::string file, out, format = "auto", unknown = "occupied", task, region, origin;
+  std::string file, out, format = "auto", unknown = "occupied", as = "grid", task, region, origin;
   int coarsen = 1, steps_per_window = 1;
   double thickness = CommonRoadOptions{}.thickness;
   std::optional<double> line_width, point_radius;
@@ -72,7 +72,8 @@ std::optional<Box> RegionOfOptions(const ImportWorldArguments& options) {
 }
 
 World Read(const ImportWorldArguments& options, const std::string& format) {
-  if (format == "ros") return ReadOccupancyMap(options.file, {options.unknown == "free", options.coarsen});
+  if (format == "ros")
+    return ReadOccupancyMap(options.file, {options.unknown == "free", options.coarsen, options.as == "rectangles"});
   if (format == "commonroad") return ReadCommonRoad(options.file, {options.thickness, options.steps_per_window});
   GeoJsonOptions drawing{{}, options.metres, options.keep_in, options.line_width, options.point_radius};
   if (!options.origin.empty()) {
@@ -119,7 +120,7 @@ int RunImportWorld(const ImportWorldArguments& options) {
         "forereach: {} obstacles, and a task takes {}: nothing is written. --task or --region keeps what lies where "
         "the robot drives; {} makes fewer and larger pieces.\n",
         count, kMostObstacles,
-        format == "ros"          ? "--coarsen"
+        format == "ros"          ? "--as grid"
         : format == "commonroad" ? "--thickness or --steps-per-window"
                                  : "a simpler drawing");
   return fits ? 0 : 1;
@@ -152,6 +153,8 @@ Command ImportWorldCommand() {
                   {"--region", &options->region, "XMIN,YMIN,XMAX,YMAX", "The same for a box, in metres"},
                   OneOf({"occupied", "free"},
                         {"--unknown", &options->unknown, "", "ros: what unknown cells are, and all beyond the image"}),
+                  OneOf({"grid", "rectangles"},
+                        {"--as", &options->as, "", "ros: one grid, or its occupied cells as rectangles"}),
                   {"--coarsen", &options->coarsen, "N", "ros: a block of N by N cells is occupied if one of them is",
                    NumberRange{1, 1000}},
                   {"--thickness", &options->thickness, "M",

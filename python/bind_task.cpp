@@ -141,12 +141,13 @@ py::dict PictureDict(const Judgement& judgement) {
   std::vector<Picture::Polygon> obstacles, predictions;
   for (const Obstacle& obstacle : picture.obstacles) {
     const std::int64_t stamp = obstacle.motion() ? obstacle.motion()->stamp_us : 0;
-    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
-      const auto& normal = obstacle.points()[0];
-      half_planes.append(py::make_tuple(normal.x(), normal.y(), obstacle.offset()));
-    } else if (const auto place = PlaceOf(obstacle, static_cast<double>(stamp))) {
-      obstacles.push_back(HullOf(place->points, place->radius));
-    }
+    for (const Obstacle& convex : obstacle.convex())
+      if (convex.kind() == Obstacle::Kind::kHalfSpace) {
+        const auto& normal = convex.points()[0];
+        half_planes.append(py::make_tuple(normal.x(), normal.y(), convex.offset()));
+      } else if (const auto place = PlaceOf(convex, static_cast<double>(stamp))) {
+        obstacles.push_back(HullOf(place->points, place->radius));
+      }
     std::ranges::move(PredictionOf(obstacle, stamp), std::back_inserter(predictions));
   }
   using namespace py::literals;

@@ -138,6 +138,12 @@ std::vector<Svg::Points> BodyOutlines::At(const Eigen::VectorXd& x) const {
 
 std::optional<ObstaclePlace> PlaceOf(const Obstacle& obstacle, double time_us) {
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return std::nullopt;
+  if (obstacle.grid()) {
+    std::vector<Vector2d> corners;
+    for (const Obstacle& block : obstacle.convex())
+      for (const Eigen::Vector3d& point : block.hull()) corners.push_back(point.head<2>());
+    return ObstaclePlace{HullOf(corners), Vector2d::Zero(), 0};
+  }
   ObstaclePlace place{{}, Vector2d::Zero(), obstacle.radius()};
   if (const auto& motion = obstacle.motion()) {
     if (time_us < static_cast<double>(motion->from_us) || static_cast<double>(motion->until_us) < time_us)
@@ -188,6 +194,12 @@ void DrawObstacle(const Obstacle& obstacle, const std::vector<double>& times_us,
                   std::string_view name, Svg& svg) {
   if (obstacle.dim() != 2) return;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return DrawHalfPlane(obstacle, frame, svg);
+  if (obstacle.grid()) {
+    for (const Obstacle& block : obstacle.convex())
+      if (frame.intersects({block.lower().head<2>(), block.upper().head<2>()}))
+        DrawObstacle(block, {0}, frame, "", svg);
+    return;
+  }
   std::vector<std::optional<ObstaclePlace>> places;
   for (const double time : times_us) places.push_back(PlaceOf(obstacle, time));
   const auto found = std::ranges::find_if(places, [](const auto& place) { return place.has_value(); });

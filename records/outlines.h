@@ -45,15 +45,16 @@ struct ObstaclePlace {
   Eigen::Vector2d shift;
   double radius;
 };
-/** Nothing for a half-space, and at a time at which it is nowhere. @pre p = 2. */
+/** Nothing for a half-space, and at a time at which it is nowhere. Of a grid, the hull of its cells. @pre p = 2. */
 [[nodiscard]] std::optional<ObstaclePlace> PlaceOf(const Obstacle& obstacle, double time_us);
 
 /** An obstacle that moves, grown, each half second from a time for two seconds, as far as it is there. Nothing for one
 that stands and for a half-space. @pre p = 2. */
 [[nodiscard]] std::vector<Svg::Points> PredictionOf(const Obstacle& obstacle, std::int64_t from_us);
 
-/** Draws an obstacle and its name, if it has one. One that moves is drawn as it is at each of the times, one a second
-of the drawing's own clock, and if there is one time as it is then. Nothing for an obstacle of another dimension.
+/** Draws an obstacle and its name, if it has one; of a grid its blocks in the frame. One that moves is drawn as it is
+at each of the times, one a second of the drawing's own clock, and if there is one time as it is then. Nothing for an
+obstacle of another dimension.
 @param frame half-planes are much larger than it. */
 void DrawObstacle(const Obstacle& obstacle, const std::vector<double>& times_us, const Eigen::AlignedBox2d& frame,
                   std::string_view name, Svg& svg);

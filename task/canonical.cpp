@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "forereach/residual/growing_disturbance.h"
+#include "forereach/safety/grid_map.h"
 
 namespace forereach {
 namespace {
@@ -120,6 +121,14 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
     for (const Eigen::VectorXd& point : obstacle.points()) bytes.Numbers(point);
     bytes.Number(obstacle.radius());
     bytes.Number(obstacle.offset());
+    if (obstacle.grid()) {
+      const GridMap& map = MapOf(obstacle);
+      for (const double number : {map.resolution, map.origin[0], map.origin[1], map.yaw}) bytes.Number(number);
+      for (const int count : {map.width, map.height, map.outside_is_free ? 1 : 0}) bytes.Count(count);
+      std::string cells;
+      for (const bool is_occupied : map.occupied) cells += is_occupied ? '#' : '.';
+      bytes.Text(cells);
+    }
     if (!obstacle.name().empty()) {
       bytes.Text("named");
       bytes.Text(obstacle.name());

@@ -1,4 +1,5 @@
 // The rows of a task file that say what is certified: domain, declaration, residual, task, certifier.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -16,6 +17,7 @@
 #include "forereach/residual/growing_disturbance.h"
 #include "forereach/residual/region_grid.h"
 #include "forereach/safety/clearance.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "task/keep_in.h"
 #include "task/key_rows.h"
 #include "task/most_obstacles.h"
@@ -469,8 +471,11 @@ void ReadBetween(const Field& at, TaskDraft& draft) {
 // A row of an obstacle's kind: what `make` gives of the map at `key` is one of the task's obstacles.
 template <class Make>
 Key ObstacleKind(const char* name, const char* meaning, Make make) {
-  return Map(std::string("task.obstacles[].") + name, meaning,
-             [make](const Field& at, TaskDraft& draft) { draft.config.obstacles.push_back(make(at)); });
+  return Map(std::string("task.obstacles[].") + name, meaning, [make](const Field& at, TaskDraft& draft) {
+    const Obstacle& made = draft.config.obstacles.emplace_back(make(at));
+    if (draft.scope.safety_dim != 0 && made.dim() != draft.scope.safety_dim)
+      at.Fail(fmt::format("is for {} safety coordinates, there are {}", made.dim(), draft.scope.safety_dim));
+  });
 }
 
 Obstacle ReadCircle(const Field& at) { return Obstacle::Circle(at["center"].Vector(), at["radius"].Number()); }
@@ -481,6 +486,44 @@ Obstacle ReadAxisBox(const Field& at) {
 }
 
 Obstacle ReadPolygon(const Field& at) { return Obstacle::Polygon(at["vertices"].Vectors()); }
+
+// Which cells the lines of a text say are occupied; the last line is the lowest row.
+void ReadRows(const Field& at, bool unknown_is_free, OccupancyGrid::Map& map) {
+  const std::string text = at.Text();
+  std::vector<std::string_view> rows;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    rows.push_back(std::string_view(text).substr(begin, end - begin));
+    begin = end + 1;
+  }
+  map.width = static_cast<int>(rows.front().size());
+  map.height = static_cast<int>(rows.size());
+  map.occupied.reserve(text.size());
+  for (std::size_t row = rows.size(); row-- > 0;) {
+    const auto fail = [&](const std::string& what) { at.Fail(fmt::format("line {} of the rows {}", row + 1, what)); };
+    if (rows[row].size() != rows.front().size())
+      fail(fmt::format("has {} cells, the first one has {}", rows[row].size(), map.width));
+    for (const char& cell : rows[row]) {
+      if (std::string_view("#.?").find(cell) == std::string_view::npos)
+        fail(
+            fmt::format("has byte {} as cell {}, a cell is one of # (occupied), . (free) and ? (unknown); write the "
+                        "rows as a block, `rows: |`",
+                        static_cast<int>(static_cast<unsigned char>(cell)), &cell - rows[row].data() + 1));
+      map.occupied.push_back(cell == '#' || (cell == '?' && !unknown_is_free));
+    }
+  }
+}
+
+Obstacle ReadGrid(const Field& at) {
+  OccupancyGrid::Map map{.resolution = at["resolution"].Number(),
+                         .origin = {},
+                         .outside_is_free = at.Has("unknown") && at["unknown"].Text() == "free"};
+  const Eigen::VectorXd origin = at["origin"].Vector();
+  map.origin = {origin[0], origin[1]};
+  map.yaw = origin.size() > 2 ? origin[2] : 0;
+  ReadRows(at["rows"], map.outside_is_free, map);
+  return Obstacle::Grid(std::make_shared<const OccupancyGrid>(std::move(map)));
+}
 
 Obstacle ReadHalfPlane(const Field& at) { return Obstacle::HalfSpace(at["normal"].Vector(), at["offset"].Number()); }
 
@@ -507,7 +550,11 @@ void ReadObstacle(const Field& at, TaskDraft& draft) {
   ++draft.config.num_listed;
   const bool moves = at.Has("motion"), is_named = at.Has("name");
   if (const std::size_t kinds = at.Keys().size() - (moves ? 1 : 0) - (is_named ? 1 : 0); kinds != 1)
-    at.Fail(fmt::format("has {} keys of a shape, has to have one of circle, box, polygon, half_plane", kinds));
+    at.Fail(fmt::format("has {} keys of a shape, has to have one of circle, box, polygon, half_plane, grid", kinds));
+  if (const auto grids =
+          std::ranges::count_if(draft.config.obstacles, [](const Obstacle& each) { return !!each.grid(); });
+      grids > ConvexNumbers::kMostGrids)
+    at.Fail(fmt::format("is the {}th grid, at most {} are taken", grids, ConvexNumbers::kMostGrids));
   if (moves) ReadMotion(at["motion"], draft);
   if (!is_named) return;
   const std::string name = at["name"].Text();
@@ -664,14 +711,19 @@ std::vector<Key> LimitKeys() {
 }
 
 std::vector<Key> ObstacleKeys() {
+  Key origin = Vector("task.obstacles[].grid.origin", "m, m, rad", Between(-1e9, 1e9), Size::kAny,
+                      "x and y of the lower left corner, and yaw; 0 if it is left out.");
+  origin.count = Between(2, 3);
   return {
       Required(List("task.obstacles", Between(0, kMostObstacles),
                     "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
-      Map("task.obstacles[]", "One of circle, box, polygon and half_plane; motion if it moves; a name.", ReadObstacle),
-      Text("task.obstacles[].name",
-           fmt::format("For messages, instead of its number: a letter, then letters, digits and any of `_-.:/`, at "
-                       "most {} in all. Pieces of one thing may share it.",
-                       kMaxObstacleName)),
+      Map("task.obstacles[]", "One of circle, box, polygon, half_plane and grid; motion if it moves; a name.",
+          ReadObstacle),
+      Text(
+          "task.obstacles[].name",
+          fmt::format("For messages, instead of its number: a letter, then letters, digits and any of `_-.:/`, at most "
+                      "{} in all. Pieces of one thing may share it.",
+                      kMaxObstacleName)),
       ObstacleKind("circle", "A disc; for two safety coordinates.", ReadCircle),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
       Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),
@@ -685,6 +737,17 @@ std::vector<Key> ObstacleKeys() {
       Required(Vector("task.obstacles[].half_plane.normal", "", kReal, Size::kSafety,
                       "Points into the unsafe side; not zero.")),
       Required(Number("task.obstacles[].half_plane.offset", "m", kReal, "In metres if the normal has length 1.")),
+      ObstacleKind("grid", "The occupied cells of a map, closed squares; for two safety coordinates. It does not move.",
+                   ReadGrid),
+      Required(Number("task.obstacles[].grid.resolution", "m", {0, 1e6, true, false}, "The side of a cell.")),
+      Required(origin),
+      Optional(
+          Word("task.obstacles[].grid.unknown", {"occupied", "free"}, "What a cell `?` is, and all beyond the map."),
+          "occupied"),
+      Required(Text("task.obstacles[].grid.rows",
+                    fmt::format("A line for each row, the lowest last: `#` occupied, `.` free, `?` unknown. At most {} "
+                                "cells, of which the occupied ones make up at most {} rectangles.",
+                                OccupancyGrid::kMostCells, OccupancyGrid::kMostBlocks))),
       Map("task.obstacles[].motion",
           "At time t it has moved by velocity t, and lies within uncertainty + growth |t| + growth_rate t^2 / 2 of "
           "there. Times are seconds from the start of the plan or of the sender (`forereach obstacles`, `run "

@@ -261,7 +261,7 @@ class SliceCheck {
       if (!passage.is_there) continue;
       for (std::size_t p = 0; p < sweeps.size() && !failure_; ++p) {
         Real best;
-        const Answer answer = IsClearOfAny(sweeps[p], obstacle, claimed, best, passage);
+        const Answer answer = IsClear(sweeps[p], obstacle, claimed, best, passage);
         claims_.Judge(
             answer, best, claimed, abs(best) + Real(obstacle.radius()), claimed > 0 ? "at least" : "above", [&] {
               return std::string(is_swept ? "the motion to the next sample" : "the slice") + " keeps clear of " + name +
@@ -284,20 +284,6 @@ class SliceCheck {
     }
     claims_.Judge(answer, best, 0.0, abs(best), "above",
                   [&] { return "part " + std::to_string(part) + " of the body stays in " + area.name; });
-  }
-
-  // The part lies in every one of the sweeps: one that is clear is enough.
-  static Answer IsClearOfAny(const std::vector<Sweep>& sweeps, const Obstacle& obstacle, double claimed, Real& best,
-                             const Passage& passage) {
-    Answer answer = sweeps.empty() ? Answer::kUnknown : Answer::kNo;
-    for (std::size_t i = 0; i < sweeps.size(); ++i) {
-      Real found;
-      const Answer of_this = IsClear(sweeps[i], obstacle, claimed, found, passage);
-      best = i == 0 ? found : max(best, found);
-      if (of_this == Answer::kYes) return of_this;
-      if (of_this == Answer::kUnknown) answer = of_this;
-    }
-    return answer;
   }
 
   inline static const RecordedSlice nothing_{};

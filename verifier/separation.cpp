@@ -4,10 +4,12 @@
 #include <array>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include <Eigen/Core>
 
 #include "forereach/numerics/size.h"
+#include "forereach/safety/grid_map.h"
 
 namespace forereach::verifier {
 namespace {
@@ -37,19 +39,29 @@ RealVector Middle(RealVector vector) {
 
 bool IsPositive(const Real& x) { return CertainlyBelow(Real(), x); }
 
-// The points whose convex hull is the obstacle's core.
-std::vector<RealVector> CorePoints(const Obstacle& obstacle) {
+// {y : |y - w| <= radius, w in the hull of the points}; without points, {y : normal . y >= offset}.
+struct Core {
   std::vector<RealVector> points;
+  RealVector normal;
+  Real offset, radius;
+};
+
+Core CoreOf(const Obstacle& obstacle) {
+  Core core;
+  core.radius = Real(obstacle.radius());
   const auto& given = obstacle.points();
-  if (obstacle.kind() != Obstacle::Kind::kBox) {
-    for (const Eigen::VectorXd& point : given) points.emplace_back(point.begin(), point.end());
-    return points;
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+    core.normal = RealVector(given[0].begin(), given[0].end());
+    core.offset = Real(obstacle.offset());
+  } else if (obstacle.kind() != Obstacle::Kind::kBox) {
+    for (const Eigen::VectorXd& point : given) core.points.emplace_back(point.begin(), point.end());
+  } else {
+    for (int corner = 0; corner < 1 << obstacle.dim(); ++corner) {
+      RealVector& point = core.points.emplace_back();
+      for (int k = 0; k < obstacle.dim(); ++k) point.emplace_back(given[corner >> k & 1 ? 1 : 0][k]);
+    }
   }
-  for (int corner = 0; corner < 1 << obstacle.dim(); ++corner) {
-    RealVector& point = points.emplace_back();
-    for (int k = 0; k < obstacle.dim(); ++k) point.emplace_back(given[corner >> k & 1 ? 1 : 0][k]);
-  }
-  return points;
+  return core;
 }
 
 // Weights w, sum 1, that minimise |sum w_i p_i|, by Gauss's elimination; empty where the points are dependent.
@@ -81,11 +93,12 @@ RealVector AffineMinimum(const std::vector<RealVector>& points) {
 
 // A lower bound on the distance from a box around the sweep, along the best axis, less the distances to be kept. Most
 // obstacles are far away, and this is enough for them.
-Real DistanceAlongAnAxis(const Sweep& sweep, const Obstacle& obstacle, const Passage& passage) {
+Real DistanceAlongAnAxis(const Sweep& sweep, const Core& core, const Passage& passage) {
   Real largest(-std::numeric_limits<double>::infinity());
-  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return largest;
-  for (int k = 0; k < obstacle.dim(); ++k) {
-    const auto [low, high] = std::ranges::minmax(obstacle.points(), {}, [k](const auto& point) { return point[k]; });
+  if (core.points.empty()) return largest;
+  for (int k = 0; k < sweep.dim(); ++k) {
+    Real low = core.points.front()[ToSize(k)], high = low;
+    for (const RealVector& point : core.points) low = min(low, point[ToSize(k)]), high = max(high, point[ToSize(k)]);
     std::optional<Real> below, above;  // of the places, seen from the obstacle
     for (std::size_t sample = 0; sample < 2; ++sample) {
       if (sweep.boxes()[sample].empty()) continue;
@@ -95,20 +108,17 @@ Real DistanceAlongAnAxis(const Sweep& sweep, const Obstacle& obstacle, const Pas
       below = below ? max(*below, box.upper) : box.upper;
       above = above ? min(*above, box.lower) : box.lower;
     }
-    largest = max(largest, max(Real(low[k]) - *below, *above - Real(high[k])));
+    largest = max(largest, max(low - *below, *above - high));
   }
-  return (largest - Real(obstacle.radius()) - passage.growth - sweep.radius()).lower();
+  return (largest - core.radius - passage.growth - sweep.radius()).lower();
 }
 
 // The dual bound along directions, the best of which leads to the point of {core - sweep} nearest to the origin. The
 // sweep is taken without its radius and without the smallest of its balls: these are distances to be kept.
 class SeparationSearch {
  public:
-  SeparationSearch(const Sweep& sweep, const Obstacle& obstacle, double clearance, const Passage& passage)
-      : sweep_(sweep),
-        obstacle_(obstacle),
-        clearance_(clearance),
-        kept_(Real(obstacle.radius()) + passage.growth + sweep.radius()) {
+  SeparationSearch(const Sweep& sweep, const Core& core, double clearance, const Passage& passage)
+      : sweep_(sweep), obstacle_(core), clearance_(clearance), kept_(core.radius + passage.growth + sweep.radius()) {
     const std::vector<Place>& places = sweep.places();
     Real least = places.front().ball;
     for (const Place& place : places) least = min(least, place.ball);
@@ -123,15 +133,12 @@ class SeparationSearch {
       balls_.push_back(place.ball - least);
     }
     if (IsHalfSpace()) return;
-    for (const RealVector& point : CorePoints(obstacle)) core_.push_back(Minus(point, reference));
+    for (const RealVector& point : core.points) core_.push_back(Minus(point, reference));
   }
 
   /** True once a direction proves the clearance. */
   bool Run() {
-    if (IsHalfSpace()) {
-      const Eigen::VectorXd& normal = obstacle_.points()[0];
-      return Try(RealVector(normal.begin(), normal.end()));
-    }
+    if (IsHalfSpace()) return Try(obstacle_.normal);
     const auto nearest = std::ranges::min_element(
         core_, [](const RealVector& a, const RealVector& b) { return CertainlyBelow(Dot(a, a), Dot(b, b)); });
     if (Try(*nearest)) return true;
@@ -156,7 +163,7 @@ class SeparationSearch {
     bool is_proof = false;  ///< The nearest point is a direction that proves the clearance.
   };
 
-  [[nodiscard]] bool IsHalfSpace() const { return obstacle_.kind() == Obstacle::Kind::kHalfSpace; }
+  [[nodiscard]] bool IsHalfSpace() const { return obstacle_.points.empty(); }
   [[nodiscard]] Real Needed() const { return Real(clearance_) + kept_; }
 
   // max {d . y : y in place i}, |d| = length.
@@ -178,7 +185,7 @@ class SeparationSearch {
     for (std::size_t i = 1; i < offsets_.size(); ++i) reach = max(reach, Support(i, d, length));
     Real gap;
     if (IsHalfSpace()) {
-      gap = Real(obstacle_.offset()) - reach;
+      gap = obstacle_.offset - reach;
     } else {
       gap = Dot(d, core_.front());
       for (const RealVector& point : core_) gap = min(gap, Dot(d, point));
@@ -316,7 +323,7 @@ class SeparationSearch {
   }
 
   const Sweep& sweep_;
-  const Obstacle& obstacle_;
+  const Core& obstacle_;
   const double clearance_;
   Real kept_;                        // the radii and the smallest ball: the distance to be kept besides the clearance
   std::vector<RealVector> offsets_;  // the centers of the places, relative to the first's, seen from the obstacle
@@ -346,16 +353,115 @@ Answer IsAround(const Rings& rings, const RealVector& p) {
   return is_odd ? Answer::kYes : Answer::kNo;
 }
 
-}  // namespace
-
-Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best, const Passage& passage) {
-  best = DistanceAlongAnAxis(sweep, obstacle, passage);
+Answer IsClearOf(const Core& core, const Sweep& sweep, double clearance, Real& best, const Passage& passage) {
+  best = DistanceAlongAnAxis(sweep, core, passage);
   if (CertainlyBelow(clearance, best)) return Answer::kYes;
-  SeparationSearch search(sweep, obstacle, clearance, passage);
+  SeparationSearch search(sweep, core, clearance, passage);
   const bool proven = search.Run();
   best = search.best() ? *search.best() : Real(-std::numeric_limits<double>::infinity());
   if (proven) return Answer::kYes;
   return search.undecided() ? Answer::kUnknown : Answer::kNo;
+}
+
+Answer IsClearOf(const Core& core, std::span<const Sweep> sweeps, double clearance, Real& best,
+                 const Passage& passage) {
+  Answer answer = sweeps.empty() ? Answer::kUnknown : Answer::kNo;
+  for (std::size_t i = 0; i < sweeps.size(); ++i) {
+    Real found;
+    const Answer of_this = IsClearOf(core, sweeps[i], clearance, found, passage);
+    best = i == 0 ? found : max(best, found);
+    if (of_this == Answer::kYes) return of_this;
+    if (of_this == Answer::kUnknown) answer = of_this;
+  }
+  return answer;
+}
+
+// Cell by cell: halves of the map, of the halves and so on, until a half is clear along an axis, or has no cell that is
+// occupied. It reads the map alone, not what the certifier made of it.
+class GridSearch {
+ public:
+  GridSearch(const GridMap& map, std::span<const Sweep> sweeps, double clearance)
+      : map_(map), sweeps_(sweeps), clearance_(clearance) {
+    const Real cosine = cos(Real(map.yaw)), sine = sin(Real(map.yaw));
+    axes_ = {RealVector{cosine, sine}, RealVector{-sine, cosine}};
+  }
+
+  Answer Run(Real& best) {
+    LookAt({0, 0, map_.width, map_.height});
+    for (std::size_t k = 0; k < 2 && !map_.outside_is_free; ++k) {
+      const RealVector &axis = axes_[k], opposite = Minus(RealVector(2), axis);
+      const Real begin = Dot(axis, {map_.origin[0], map_.origin[1]});
+      const Real end = begin + Real(map_.resolution) * Real(k == 0 ? map_.width : map_.height);
+      Consider({{}, axis, end, Real()});
+      Consider({{}, opposite, -begin, Real()});
+    }
+    best = best_;
+    return answer_;
+  }
+
+ private:
+  struct Cells {
+    int column, row, width, height;
+  };
+
+  [[nodiscard]] Core CoreOf(const Cells& cells) const {
+    Core core;
+    for (const int right : {0, cells.width})
+      for (const int high : {0, cells.height}) {
+        const Real u = Real(map_.resolution) * Real(cells.column + right),
+                   v = Real(map_.resolution) * Real(cells.row + high);
+        RealVector& point = core.points.emplace_back();
+        for (std::size_t k = 0; k < 2; ++k) point.push_back(Real(map_.origin[k]) + axes_[0][k] * u + axes_[1][k] * v);
+      }
+    return core;
+  }
+
+  void LookAt(const Cells& cells) {
+    if (answer_ == Answer::kNo) return;
+    const auto& [column, row, width, height] = cells;
+    const bool is_cell = width == 1 && height == 1;
+    const Core core = CoreOf(cells);
+    if (!is_cell)
+      for (const Sweep& sweep : sweeps_)
+        if (const Real found = DistanceAlongAnAxis(sweep, core, {}); CertainlyBelow(clearance_, found)) {
+          best_ = min(best_, found);
+          return;
+        }
+    bool is_free = true;
+    for (int j = row; j < row + height && is_free; ++j)
+      for (int i = column; i < column + width && is_free; ++i) is_free = !map_.IsOccupied(i, j);
+    if (is_free) return;
+    if (is_cell) return Consider(core);
+    if (width > height) {
+      LookAt({column, row, width / 2, height});
+      LookAt({column + width / 2, row, width - width / 2, height});
+    } else {
+      LookAt({column, row, width, height / 2});
+      LookAt({column, row + height / 2, width, height - height / 2});
+    }
+  }
+
+  void Consider(const Core& core) {
+    Real found;
+    const Answer answer = IsClearOf(core, sweeps_, clearance_, found, {});
+    best_ = min(best_, found);
+    if (answer == Answer::kNo || answer_ == Answer::kYes) answer_ = answer;
+  }
+
+  const GridMap& map_;
+  const std::span<const Sweep> sweeps_;
+  const double clearance_;
+  std::array<RealVector, 2> axes_;  // of the map
+  Real best_{std::numeric_limits<double>::infinity()};
+  Answer answer_ = Answer::kYes;
+};
+
+}  // namespace
+
+Answer IsClear(std::span<const Sweep> sweeps, const Obstacle& obstacle, double clearance, Real& best,
+               const Passage& passage) {
+  if (obstacle.grid()) return GridSearch(MapOf(obstacle), sweeps, clearance).Run(best);
+  return IsClearOf(CoreOf(obstacle), sweeps, clearance, best, passage);
 }
 
 Answer IsWithin(const Sweep& sweep, const Rings& rings, Real& margin) {

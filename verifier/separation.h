@@ -6,7 +6,7 @@ maximises the left side. Wolfe's algorithm finds it with the bits of Precision, 
 doubles can separate. */
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "forereach/safety/obstacle.h"
 #include "verifier/answer.h"
@@ -14,11 +14,17 @@ doubles can separate. */
 
 namespace forereach::verifier {
 
-/** Whether the distance from a sweep to an obstacle is positive and at least `clearance` (metres). kYes is a proof. kNo
-means that the best direction gives no proof. @param best is set to the largest lower bound found.
+/** Whether the distance to an obstacle of something that lies in every one of the sweeps is positive and at least
+`clearance` (metres): one that is clear is enough, of a grid for each cell. kYes is a proof. kNo means that the best
+direction gives no proof; without sweeps it is kUnknown. @param best is set to the largest lower bound found; of a grid,
+to the least of those for its cells.
 @pre passage.is_there. The obstacle's motion is that of `passage`. */
-[[nodiscard]] Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best,
+[[nodiscard]] Answer IsClear(std::span<const Sweep> sweeps, const Obstacle& obstacle, double clearance, Real& best,
                              const Passage& passage = {});
+[[nodiscard]] inline Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best,
+                                    const Passage& passage = {}) {
+  return IsClear(std::span(&sweep, 1), obstacle, clearance, best, passage);
+}
 
 /** Whether a sweep in the plane lies inside of rings: it is connected, meets none of their sides, and the rings go an
 odd number of times around one of its points. @param margin is set to the largest lower bound found on its distance from

@@ -8,19 +8,19 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "task/config_error.h"
 #include "task/document.h"
 #include "task/draft.h"
 #include "task/files.h"
 #include "task/key_rows.h"
-#include "worlds/placed.h"
 
 namespace forereach {
 namespace {
@@ -156,167 +156,36 @@ MapFile ReadMapFile(const std::string& path) {
 // ---- Cells
 
 // What map_saver writes for unknown cells. Its free_thresh of 0.25 would take it for free.
-bool IsSaversUnknown(const GrayImage& image, const MapFile& map, int value) {
-  return map.mode == "trinary" && !map.is_negated && 255 * value == 205 * image.largest;
+bool IsSaversUnknown(const GrayImage& image, const MapFile& file, int value) {
+  return file.mode == "trinary" && !file.is_negated && 255 * value == 205 * image.largest;
 }
 
-std::vector<bool> OccupiedCells(const GrayImage& image, const MapFile& map, bool unknown_is_free) {
+OccupancyGrid::Map CellsOf(const GrayImage& image, const MapFile& file, const MapOptions& options) {
   // By gray value, since there are few of them.
   std::vector<bool> is_occupied(ToSize(image.largest) + 1);
   for (int value = 0; value <= image.largest; ++value) {
-    const double dark = static_cast<double>(map.is_negated ? value : image.largest - value) / image.largest;
-    const bool takes_unknown = unknown_is_free && map.mode == "trinary";
-    is_occupied[ToSize(value)] = map.mode == "raw"                    ? value != (map.is_negated ? image.largest : 0)
-                                 : takes_unknown                      ? dark > map.occupied
-                                 : IsSaversUnknown(image, map, value) ? true
-                                                                      : !(dark < map.free);
+    const double dark = static_cast<double>(file.is_negated ? value : image.largest - value) / image.largest;
+    const bool takes_unknown = options.unknown_is_free && file.mode == "trinary";
+    is_occupied[ToSize(value)] = file.mode == "raw"    ? value != (file.is_negated ? image.largest : 0)
+                                 : takes_unknown       ? dark > file.occupied
+                                 : IsSaversUnknown(image, file, value) ? true
+                                                       : !(dark < file.free);
   }
-  std::vector<bool> cells(image.values.size());
-  const auto width = ToSize(image.width), height = ToSize(image.height);
-  for (std::size_t row = 0; row < height; ++row)  // the lowest first
-    for (std::size_t column = 0; column < width; ++column)
-      cells[row * width + column] = is_occupied[image.values[(height - 1 - row) * width + column]];
-  return cells;
-}
-
-struct Grid {
-  int width = 0, height = 0;
-  std::vector<bool> occupied;
-};
-
-Grid Coarsened(Grid fine, int factor) {
-  if (factor == 1) return fine;
-  Grid coarse{(fine.width + factor - 1) / factor, (fine.height + factor - 1) / factor, {}};
-  coarse.occupied.resize(ToSize(coarse.width) * ToSize(coarse.height));
-  for (int row = 0; row < fine.height; ++row)
-    for (int column = 0; column < fine.width; ++column)
-      if (fine.occupied[ToSize(row) * ToSize(fine.width) + ToSize(column)])
-        coarse.occupied[ToSize(row / factor) * ToSize(coarse.width) + ToSize(column / factor)] = true;
-  return coarse;
-}
-
-class BlockFinder {
- public:
-  BlockFinder(const std::vector<bool>& occupied, int width, int height)
-      : occupied_(occupied), width_(width), height_(height), covered_(occupied.size()) {}
-
-  std::vector<CellBlock> Find() {
-    std::vector<CellBlock> blocks;
-    for (int row = 0; row < height_; ++row)
-      for (int column = 0; column < width_; ++column) {
-        if (!occupied_[At(column, row)] || covered_[At(column, row)]) continue;
-        const CellBlock wide = Wide(column, row), high = High(column, row);
-        const CellBlock& best = Uncovered(wide) >= Uncovered(high) ? wide : high;
-        ForEach(best, [this](std::size_t cell) { covered_[cell] = true; });
-        blocks.push_back(best);
-      }
-    return blocks;
-  }
-
- private:
-  [[nodiscard]] std::size_t At(int column, int row) const { return ToSize(row) * ToSize(width_) + ToSize(column); }
-
-  [[nodiscard]] bool IsFull(const CellBlock& block) const {
-    for (int row = block.row; row < block.row + block.height; ++row)
-      for (int column = block.column; column < block.column + block.width; ++column)
-        if (!occupied_[At(column, row)]) return false;
-    return true;
-  }
-
-  template <class Use>
-  void ForEach(const CellBlock& block, const Use& use) const {
-    for (int row = block.row; row < block.row + block.height; ++row)
-      for (int column = block.column; column < block.column + block.width; ++column) use(At(column, row));
-  }
-
-  [[nodiscard]] std::int64_t Uncovered(const CellBlock& block) const {
-    std::int64_t count = 0;
-    ForEach(block, [&](std::size_t cell) { count += covered_[cell] ? 0 : 1; });
-    return count;
-  }
-
-  // Rows and columns next to the block are added while they are full.
-  void AddColumns(CellBlock& block) const {
-    while (block.column > 0 && IsFull({block.column - 1, block.row, 1, block.height})) --block.column, ++block.width;
-    while (block.column + block.width < width_ && IsFull({block.column + block.width, block.row, 1, block.height}))
-      ++block.width;
-  }
-  void AddRows(CellBlock& block) const {
-    while (block.row > 0 && IsFull({block.column, block.row - 1, block.width, 1})) --block.row, ++block.height;
-    while (block.row + block.height < height_ && IsFull({block.column, block.row + block.height, block.width, 1}))
-      ++block.height;
-  }
-
-  [[nodiscard]] CellBlock Wide(int column, int row) const {
-    CellBlock block{column, row, 1, 1};
-    AddColumns(block);
-    AddRows(block);
-    return block;
-  }
-  [[nodiscard]] CellBlock High(int column, int row) const {
-    CellBlock block{column, row, 1, 1};
-    AddRows(block);
-    AddColumns(block);
-    return block;
-  }
-
-  const std::vector<bool>& occupied_;
-  const int width_, height_;
-  std::vector<bool> covered_;
-};
-
-// ---- Places
-
-// Where the corners of cells are, in metres.
-class Placing {
- public:
-  // @param cells how many of the map's are a side of one here.
-  Placing(const MapFile& map, int cells) : map_(map), cells_(cells) {}
-
-  [[nodiscard]] bool IsTurned() const { return map_.origin[2] != 0; }
-  [[nodiscard]] double Lower(int axis, int cell) const {
-    return AddDown(map_.origin[ToSize(axis)], MulDown(MulDown(map_.resolution, cells_), cell));
-  }
-  [[nodiscard]] double Upper(int axis, int cell) const {
-    return AddUp(map_.origin[ToSize(axis)], MulUp(MulUp(map_.resolution, cells_), cell));
-  }
-
-  // The corners of a convex set that contains the block.
-  [[nodiscard]] std::vector<PlanePoint> Corners(const CellBlock& block) const {
-    if (!IsTurned()) {
-      const double left = Lower(0, block.column), right = Upper(0, block.column + block.width),
-                   low = Lower(1, block.row), high = Upper(1, block.row + block.height);
-      return {{left, low}, {right, low}, {right, high}, {left, high}};
+  OccupancyGrid::Map map{
+      file.resolution,        {file.origin[0], file.origin[1]}, file.origin[2], image.width, image.height, {},
+      options.unknown_is_free};
+  map.occupied.resize(image.values.size());
+  const int n = options.coarsen;
+  const auto at = [&](int column, int row) { return ToSize(row) * ToSize(map.width) + ToSize(column); };
+  for (int row = 0; row < map.height; ++row)  // the lowest first
+    for (int column = 0; column < map.width; ++column) {
+      if (!is_occupied[image.values[at(column, map.height - 1 - row)]]) continue;
+      const int left = column / n * n, low = row / n * n;
+      if (map.occupied[at(left, low)] && n > 1) continue;  // so is all of its block
+      for (int j = low; j < std::min(low + n, map.height); ++j)
+        for (int i = left; i < std::min(left + n, map.width); ++i) map.occupied[at(i, j)] = true;
     }
-    // In the frame of the map, with the rounding of the products.
-    const double side = map_.resolution * cells_;
-    const double left = side * block.column, right = side * (block.column + block.width), low = side * block.row,
-                 high = side * (block.row + block.height);
-    const double error = 4 * kUnitRoundoff * (std::abs(left) + std::abs(right) + std::abs(low) + std::abs(high));
-    const Pose pose{map_.origin[0], map_.origin[1], map_.origin[2]};
-    const Placed placed = Place({{left, low}, {right, low}, {right, high}, {left, high}}, pose);
-    return Grown(placed.points, AddUp(placed.error, 2 * error));
-  }
-
- private:
-  const MapFile& map_;
-  const int cells_;
-};
-
-void AddOutside(World& world, const Placing& placing, const GrayImage& grid) {
-  const std::string name = "beyond the map";
-  if (!placing.IsTurned()) {
-    world.AddBeyond(0, -1, placing.Upper(0, 0), name);
-    world.AddBeyond(1, -1, placing.Upper(1, 0), name);
-    world.AddBeyond(0, 1, placing.Lower(0, grid.width), name);
-    world.AddBeyond(1, 1, placing.Lower(1, grid.height), name);
-    return;
-  }
-  const int thick = std::max(grid.width, grid.height), all = grid.width + 2 * thick;
-  world.Add(name, placing.Corners({-thick, -thick, all, thick}));
-  world.Add(name, placing.Corners({-thick, grid.height, all, thick}));
-  world.Add(name, placing.Corners({-thick, 0, thick, grid.height}));
-  world.Add(name, placing.Corners({grid.width, 0, thick, grid.height}));
+  return map;
 }
 
 }  // namespace
@@ -364,40 +233,34 @@ GrayImage ReadPng(const std::string& file, std::string_view bytes) {
 
 GrayImage ReadPgm(const std::string& file, std::string_view bytes) { return PgmReader(file, bytes).Read(); }
 
-std::vector<CellBlock> Blocks(const std::vector<bool>& occupied, int width, int height) {
-  return BlockFinder(occupied, width, height).Find();
-}
-
-World ReadOccupancyMap(const std::string& path, const MapOptions& options) {
-  const MapFile map = ReadMapFile(path);
-  const std::string image_path = (std::filesystem::path(path).parent_path() / map.image).string();
+World ReadOccupancyMap(const std::string& path, const MapOptions& options) try {
+  const MapFile file = ReadMapFile(path);
+  const std::string image_path = (std::filesystem::path(path).parent_path() / file.image).string();
   const std::string bytes = ReadWhole(image_path, 12 * kMaxPixels, path + ": image: ");
   const bool is_png = bytes.starts_with("\x89PNG\r\n\x1a\n");
   const GrayImage image = is_png ? ReadPng(image_path, bytes) : ReadPgm(image_path, bytes);
-  const Grid grid =
-      Coarsened({image.width, image.height, OccupiedCells(image, map, options.unknown_is_free)}, options.coarsen);
-  const Placing placing(map, options.coarsen);
+  const OccupancyGrid::Map map = CellsOf(image, file, options);
+  const auto grid = std::make_shared<const OccupancyGrid>(map);
   World world;
-  for (const CellBlock& block : Blocks(grid.occupied, grid.width, grid.height))
-    world.Add(fmt::format("{} by {} cells at column {}, row {}", block.width, block.height, block.column, block.row),
-              placing.Corners(block));
-  world.notes.push_back(fmt::format("{} by {} cells of {} m, {} of them occupied; rows count from below.", grid.width,
-                                    grid.height, ToText(map.resolution * options.coarsen),
-                                    std::ranges::count(grid.occupied, true)));
+  if (!options.as_rectangles) world.Add(std::filesystem::path(path).stem().string(), Obstacle::Grid(grid));
+  for (int block = 0; options.as_rectangles && block < std::ssize(grid->blocks()); ++block)
+    world.Add(grid->cells(block).width > 0 ? "" : "beyond the map", grid->blocks()[ToSize(block)]);
+  world.notes.push_back(fmt::format("{} by {} cells of {} m, {} of them occupied.", map.width, map.height,
+                                    ToText(map.resolution), std::ranges::count(map.occupied, true)));
   if (options.coarsen > 1)
-    world.notes.push_back(
-        fmt::format("A cell is {0} by {0} of the map's, occupied if one of them is.", options.coarsen));
+    world.notes.push_back(fmt::format("{0} by {0} cells are occupied if one of them is.", options.coarsen));
   world.notes.push_back(options.unknown_is_free ? "Unknown cells are free, and so is all beyond the image."
                                                 : "Unknown cells are occupied, and so is all beyond the image.");
-  if (!options.unknown_is_free && (255 - 205) / 255.0 < map.free && map.mode == "trinary" && !map.is_negated)
+  if (!options.unknown_is_free && (255 - 205) / 255.0 < file.free && file.mode == "trinary" && !file.is_negated)
     world.notes.push_back(
         "Gray 205, which map_saver writes for unknown cells, is unknown here; by the file's free_thresh it would be "
         "free.");
-  if (map.mode == "raw") world.notes.push_back("Mode raw: what has a cost above 0 is occupied.");
-  if (map.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
-  for (const std::string& key : map.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
-  if (!options.unknown_is_free) AddOutside(world, Placing(map, 1), image);
+  if (file.mode == "raw") world.notes.push_back("Mode raw: what has a cost above 0 is occupied.");
+  if (file.mode == "scale") world.notes.push_back("Mode scale: what is neither free nor occupied is occupied.");
+  for (const std::string& key : file.unknown_keys) world.notes.push_back("Ignored: " + key + " of the map's file.");
   return world;
+} catch (const std::invalid_argument& error) {
+  throw ConfigError(path + ": " + error.what());
 }
 
 }  // namespace forereach

@@ -16,6 +16,7 @@ struct MapOptions {
   bool unknown_is_free = false;
   /** A block of so many cells by so many is occupied if one of its cells is. */
   int coarsen = 1;
+  bool as_rectangles = false;
 };
 
 /** Gray values, the rows from top to bottom. */
@@ -36,22 +37,11 @@ has a value above the largest. */
 @throws ConfigError if it is none that can be read, has more than kMaxPixels, or a pixel is not opaque. */
 [[nodiscard]] GrayImage ReadPng(const std::string& file, std::string_view bytes);
 
-/** Cells column..column + width - 1 of the rows row..row + height - 1, and which cells are occupied, row by row. */
-struct CellBlock {
-  int column = 0, row = 0, width = 0, height = 0;
-};
-
-/** Blocks whose union is exactly the occupied cells. They may overlap: each is made as large as it can be, first along
-its row or along its column, whichever covers more that was not covered. Cost: of a block, its cells.
-@pre occupied.size() == width * height. */
-[[nodiscard]] std::vector<CellBlock> Blocks(const std::vector<bool>& occupied, int width, int height);
-
-/** The occupied cells of a map as boxes, or as polygons if its origin is turned. Each covers its cells and at most the
-rounding of its corners more. With unknown cells occupied, so is all beyond the image: half-planes, or bars as thick as
-the map if it is turned.
-A cell is occupied, free or unknown as for map_server in mode trinary, but gray 205 of 255, which map_saver writes for
-unknown, is unknown whatever the thresholds say. In mode scale, what is neither free nor occupied is occupied; in mode
-raw, what has a cost. @throws ConfigError with file, line, key and value. */
+/** The occupied cells of a map as a grid that is named as the file is, or as rectangles: boxes, or polygons if its
+origin is turned, each with its cells and at most the rounding of its corners more. With unknown cells occupied, so is
+all beyond the image. A cell is occupied, free or unknown as for map_server in mode trinary, but gray 205 of 255, which
+map_saver writes for unknown, is unknown whatever the thresholds say. In mode scale, what is neither free nor occupied is
+occupied; in mode raw, what has a cost. @throws ConfigError with file, line, key and value. */
 [[nodiscard]] World ReadOccupancyMap(const std::string& path, const MapOptions& options);
 
 }  // namespace forereach

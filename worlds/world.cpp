@@ -8,6 +8,7 @@
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/text.h"
+#include "forereach/safety/grid_map.h"
 #include "lcmtypes/printable.h"
 #include "task/config_error.h"
 #include "task/keep_in.h"
@@ -17,7 +18,19 @@ namespace {
 
 std::string Numbers(const Eigen::VectorXd& y) { return fmt::format("[{}, {}]", ToText(y[0]), ToText(y[1])); }
 
-std::string ShapeText(const Obstacle& obstacle) {
+// The rows of a map are a block, whose lines stand further in than its key.
+std::string GridText(const GridMap& map, const std::string& indent) {
+  std::string text = fmt::format("grid:\n{0}resolution: {1}\n{0}origin: [{2}, {3}, {4}]\n{0}unknown: {5}\n{0}rows: |",
+                                 indent, ToText(map.resolution), ToText(map.origin[0]), ToText(map.origin[1]),
+                                 ToText(map.yaw), map.outside_is_free ? "free" : "occupied");
+  for (int row = map.height; row-- > 0;) {
+    text += "\n" + indent + "  ";
+    for (int column = 0; column < map.width; ++column) text += map.IsOccupied(column, row) ? '#' : '.';
+  }
+  return text;
+}
+
+std::string ShapeText(const Obstacle& obstacle, const std::string& indent) {
   const std::vector<Eigen::VectorXd>& points = obstacle.points();
   switch (obstacle.kind()) {
     case Obstacle::Kind::kCircle:
@@ -26,6 +39,7 @@ std::string ShapeText(const Obstacle& obstacle) {
       return fmt::format("box: {{lower: {}, upper: {}}}", Numbers(points[0]), Numbers(points[1]));
     case Obstacle::Kind::kHalfSpace:
       return fmt::format("half_plane: {{normal: {}, offset: {}}}", Numbers(points[0]), ToText(obstacle.offset()));
+    case Obstacle::Kind::kGrid: return GridText(MapOf(obstacle), indent + "      ");
     case Obstacle::Kind::kPolygon: break;
   }
   std::string vertices;
@@ -43,7 +57,8 @@ std::string ListText(const World& world, const std::string& indent) {
   if (world.pieces.empty()) return indent + "obstacles: []\n";
   std::string text = indent + "obstacles:\n";
   for (const auto& [name, obstacle, window] : world.pieces) {
-    text += fmt::format("{}  - {}  # {}\n", indent, ShapeText(obstacle), Printable(name));
+    text += fmt::format("{}  - {}", indent, ShapeText(obstacle, indent));
+    text += obstacle.grid() || name.empty() ? "\n" : "  # " + Printable(name) + "\n";
     if (!obstacle.name().empty()) text += fmt::format("{}    name: {}\n", indent, obstacle.name());
     if (window)
       text += fmt::format("{}    motion: {{velocity: [0, 0], from: {}, until: {}}}\n", indent,

@@ -118,7 +118,7 @@ std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>
   std::vector<Obstacle> begun;
   for (const Obstacle& obstacle : obstacles) {
     if (!obstacle.motion()) {
-      begun.push_back(obstacle);
+      for (const Obstacle& convex : obstacle.convex()) begun.push_back(convex.Named(obstacle.name()));
       continue;
     }
     ObstacleMotion motion = *obstacle.motion();
@@ -146,7 +146,7 @@ void RequireSendable(const Config& config) try {
   for (const Obstacle& obstacle : config.obstacles)
     if (obstacle.motion()) changes.insert(std::max<std::int64_t>(obstacle.motion()->from_us, 0));
   for (const std::int64_t time_us : changes) {
-    const std::vector<Obstacle> seen = SeenBy(time_us, config.obstacles);
+    const std::vector<Obstacle> seen = SeenBy(time_us, BegunAt(0, config.obstacles));
     RequireRoom(seen.size());
     static_cast<void>(
         FromMessage(ToPieces(seen, time_us), time_us, static_cast<int>(config.problem->projection.rows())));

@@ -69,7 +69,7 @@ class ObstacleSender final {
   std::optional<std::int64_t> last_us_;      // nothing: due at once
 };
 
-/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on.
+/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on; of a grid its blocks.
 @pre |begin_us| and the obstacles' finite times are at most Schedule::kLatest. */
 [[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
 

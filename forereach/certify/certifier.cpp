@@ -345,6 +345,9 @@ void Certifier::Require(const Zonotope& initial_set, const ObstacleView& obstacl
   forereach::Require(initial_set.num_generators() <= most, "initial set: " + number(initial_set.num_generators()) +
                                                                " generators, must be at most " + number(most) +
                                                                ", the zonotope order times the states");
+  const auto grids = std::ranges::count_if(obstacles.all(), [](const Obstacle& each) { return !!each.grid(); });
+  forereach::Require(grids <= ConvexNumbers::kMostGrids,
+                     "obstacles: " + number(grids) + " grids, must be at most " + number(ConvexNumbers::kMostGrids));
   for (std::size_t o = 0; o < obstacles.size(); ++o)
     forereach::Require(obstacles[o].dim() == projection().dim(),
                        "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +

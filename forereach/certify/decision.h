@@ -38,6 +38,7 @@ struct Decision {
   int coordinate = -1;
   int first_observation = -1, second_observation = -1;  ///< F: the violating pair; by kBound see Violation.
   int obstacle = -1;                                    ///< S by kObstacle, and certificate: the closest obstacle.
+  int block = -1;                                       ///< Likewise, of an obstacle that is a grid.
   /** Likewise the part of the body that the margin and the threshold are of; -1: they are of the whole body. */
   int part = -1;
   /** Certificate: the step of the closest slice. If the problem has bounds between the samples: the step t after which

@@ -101,8 +101,8 @@ std::string ExplainSafety(const Decision& decision, const Problem& problem, std:
   if (decision.outcome == Outcome::kCertified)
     return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance}, obstacles);
   const std::string who = NamesPart(problem, decision.part) ? "part " + std::to_string(decision.part) : "the robot";
-  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " " + MayTouch(obstacles, decision.obstacle) +
-         " (by " + RoundedUp(-clearance) + " m)";
+  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " " +
+         MayTouch(obstacles, decision.obstacle, decision.block) + " (by " + RoundedUp(-clearance) + " m)";
 }
 
 std::string Sentence(const Decision& decision, const Problem& problem, std::span<const Obstacle> obstacles) {

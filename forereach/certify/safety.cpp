@@ -16,6 +16,7 @@
 #include "forereach/dynamics/text_program.h"
 #include "forereach/numerics/size.h"
 #include "forereach/safety/obstacle_index.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "forereach/safety/standing_cores.h"
 
 namespace forereach {
@@ -119,10 +120,14 @@ class Nearest {
   double left_out_ = kInfinity;
 };
 
-Decision Judged(Outcome outcome, const Closest& closest) {
+Decision Judged(Outcome outcome, const Closest& closest, const ConvexNumbers& numbers) {
   Decision decision;
   decision.outcome = outcome;
-  decision.obstacle = closest.obstacle;
+  if (closest.obstacle >= 0) {
+    const ConvexNumbers::Place place = numbers.PlaceOf(closest.obstacle);
+    decision.obstacle = place.obstacle;
+    decision.block = place.block;
+  }
   decision.part = closest.part;
   decision.closest_step = closest.step;
   decision.margin = closest.separation.distance;
@@ -249,9 +254,12 @@ class SafetyTest::Unit {
   }
 
   // The better of the bound by hulls and that of the best directions.
-  [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle,
-                                    const Encounter& meeting) noexcept {
-    const auto separate = [&](std::size_t i, double added) { return SeparatePart(i, obstacle, added, meeting); };
+  // Above the clearance `enough` it need not be the best.
+  [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle, const Encounter& meeting,
+                                    double enough = kInfinity) noexcept {
+    const auto separate = [&](std::size_t i, double added) {
+      return SeparatePart(i, obstacle, added, meeting, enough);
+    };
     return Better(ClosestPart(meeting, separate), by_hulls, placement().parts().size());
   }
 
@@ -351,7 +359,7 @@ class SafetyTest::Unit {
   }
 
   [[nodiscard]] Separation SeparatePart(std::size_t number, const Obstacle& obstacle, double added,
-                                        const Encounter& meeting) noexcept {
+                                        const Encounter& meeting, double enough) noexcept {
     const Placement::Part& part = placement().parts()[number];
     auto* const pieces = FOREREACH_ON_STACK(Piece, 2 * part.count);
     std::size_t count = 0;
@@ -360,7 +368,7 @@ class SafetyTest::Unit {
       for (int i = part.first; i < part.first + part.count; ++i)
         pieces[count++] = {&places[i], placement().turn(i), meeting.shift[ToSize(t - first_)]};
     }
-    return forereach::Separate({pieces, count}, obstacle, added, test_.instructions_);
+    return forereach::Separate({pieces, count}, obstacle, added, test_.instructions_, enough);
   }
 
   const SafetyTest& test_;
@@ -400,7 +408,17 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
   unit.EncloseHulls();
   const Encounter& meeting = unit.MeetIn(obstacle);
   if (!meeting.is_there) return {{kInfinity, 0}, -1};
-  return unit.Best(unit.ByDirections({unit.ByHulls(obstacle, meeting), -1}, obstacle, meeting), obstacle, meeting);
+  const auto separate = [&](const Obstacle& convex) {
+    return unit.Best(unit.ByDirections({unit.ByHulls(convex, meeting), -1}, convex, meeting), convex, meeting);
+  };
+  if (!obstacle.grid()) return separate(obstacle);
+  PartSeparation closest{{kInfinity, 0}, -1};
+  static_cast<void>(obstacle.grid()->LeastDistance(unit.hull(), [&](const Obstacle& block) {
+    const PartSeparation found = separate(block);
+    if (!IsBetter(found.separation, closest.separation)) closest = found;
+    return AddUp(found.separation.clearance(), placement_.reach());  // no block further from the hull is nearer
+  }));
+  return closest;
 }
 
 // Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
@@ -417,6 +435,7 @@ class SafetyTest::Judgement {
         units_(test.NumUnits(tube)),
         tube_(tube),
         schedule_(schedule),
+        numbers_(obstacles.index() == nullptr ? ConvexNumbers(obstacles.all()) : obstacles.index()->numbers()),
         touched_(units_),
         unit_(test, schedule, tube, tube.places_) {
     if (before.obstacle >= 0)
@@ -428,16 +447,17 @@ class SafetyTest::Judgement {
       obstacles_.index() == nullptr ? SeeAll() : SeeNear(*obstacles_.index());
       if (touched_ < units_) {
         const Separation& touch = touch_.separation;
-        return Judged(Outcome::kSafety, {touch.clearance(), touched_, touched_obstacle_, touch_.part, touch});
+        return Judged(Outcome::kSafety, {touch.clearance(), touched_, touched_obstacle_, touch_.part, touch}, numbers_);
       }
       FindClosest();
     }
-    return Judged(Outcome::kCertified, closest_);
+    return Judged(Outcome::kCertified, closest_, numbers_);
   }
 
  private:
   [[nodiscard]] bool is_at_frame() const { return test_.placement_.is_at_frame(); }
-  [[nodiscard]] const Obstacle& obstacle(int o) const { return obstacles_[ToSize(o)]; }
+  // By its number.
+  [[nodiscard]] const Obstacle& obstacle(int o) const { return numbers_.Find(obstacles_.all(), o); }
 
   void SeeAll() noexcept {
     if (is_at_frame()) {
@@ -450,15 +470,15 @@ class SafetyTest::Judgement {
     for (int t = first_; t < units_ && touched_ == units_; ++t) {
       std::span<double> cores(BoundsOf(t), cores_.size());
       const bool all_proven = std::ranges::find(cores, -kInfinity) == cores.end();
-      if (all_proven && cores.size() == obstacles_.size()) continue;
+      if (all_proven && std::ssize(cores) == numbers_.size()) continue;
       unit_.Enter(t);
       unit_.EncloseHulls();
-      for (std::size_t o = all_proven ? cores.size() : 0; o < obstacles_.size() && touched_ == units_; ++o) {
-        if (o < cores.size()) {
-          if (cores[o] > -kInfinity) continue;
-          cores[o] = kInfinity;  // seen now, and not again
+      for (int o = all_proven ? static_cast<int>(cores.size()) : 0; o < numbers_.size() && touched_ == units_; ++o) {
+        if (o < std::ssize(cores)) {
+          if (cores[ToSize(o)] > -kInfinity) continue;
+          cores[ToSize(o)] = kInfinity;  // seen now, and not again
         }
-        See(t, static_cast<int>(o));
+        See(t, o);
       }
     }
   }
@@ -557,7 +577,7 @@ class SafetyTest::Judgement {
           else if (to - from > 1)
             has_room = false;
           else
-            Refine(pair), SettleNear(index, pair), ConsiderNear(index, pair);
+            Refine(pair, WithTolerance(index, farthest())), SettleNear(index, pair), ConsiderNear(index, pair);
         });
     if (!has_room) {
       const int middle = (from + to) / 2;
@@ -570,15 +590,14 @@ class SafetyTest::Judgement {
         ToSize(std::remove_if(found.begin(), found.end(), [&](const Near& a) { return a.gap > farthest_of_all; }) -
                found.begin()));
     std::ranges::sort(found, [](const Near& a, const Near& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
-    for (Near& pair : found)
-      if (pair.gap <= WithTolerance(index, 0)) {
-        Refine(pair);
-        SettleNear(index, pair);
-      }
-    if (touched_ < units_ || found.empty()) return;
+    for (Near& pair : found) {
+      Refine(pair, WithTolerance(index, farthest()));
+      if (pair.gap <= WithTolerance(index, 0)) SettleNear(index, pair);
+      if (touched_ < units_) return;
+    }
     // The nearest first: they leave few of the others.
     std::ranges::sort(found, {}, &Near::gap);
-    for (Near& pair : found) ConsiderNear(index, pair);
+    for (const Near& pair : found) ConsiderNear(index, pair);
   }
 
   // What is further is not the closest. Where places of the body are not known before they are enclosed, not yet.
@@ -637,13 +656,27 @@ class SafetyTest::Judgement {
       }
       return std::sqrt(square);
     };
+    const Eigen::Vector3d center = (obstacle(o).lower() + obstacle(o).upper()) / 2;
     double least = kInfinity;
     if (!has_boxes()) {
       if (is_at_frame()) least = distance(poses_[ToSize(t - first_)].frame.center) - placement.parts().front().radius;
     } else {
-      for (const Placement::Part& part : placement.parts())
-        for (int i = part.first; i < part.first + part.count; ++i)
-          least = std::min(least, distance(placement.Middle(poses_[ToSize(t - first_)], i)) - part.radius);
+      for (const Placement::Part& part : placement.parts()) {
+        const int last = part.first + part.count - 1;
+        auto from = placement.Middle(poses_[ToSize(t - first_)], last);
+        for (int i = part.first; i <= last; ++i) {  // the point of a side next to the obstacle's middle
+          const auto to = placement.Middle(poses_[ToSize(t - first_)], i);
+          double along = 0, square = 0;
+          for (std::size_t k = 0; k < to.size(); ++k) {
+            along += (center[static_cast<Eigen::Index>(k)] - from[k]) * (to[k] - from[k]);
+            square += (to[k] - from[k]) * (to[k] - from[k]);
+          }
+          const double share = square > 0 ? std::clamp(along / square, 0.0, 1.0) : 1;
+          for (std::size_t k = 0; k < to.size(); ++k) from[k] += share * (to[k] - from[k]);
+          least = std::min(least, distance(from) - part.radius);
+          from = to;
+        }
+      }
     }
     constexpr double kRounding = 1e-12;
     return least - obstacle(o).radius() + kRounding * (tree_.size() + std::abs(least) + placement.reach());
@@ -718,7 +751,10 @@ class SafetyTest::Judgement {
   }
   void Consider(const Pair& pair) noexcept {
     unit_.Enter(pair.step);
-    PartSeparation best = unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle)));
+    const double enough =
+        closest_.clearance + 1e-9 * (1 + std::abs(closest_.clearance));  // so that none as close is lost
+    PartSeparation best =
+        unit_.Best(pair.bound, obstacle(pair.obstacle), unit_.MeetIn(obstacle(pair.obstacle)), enough);
     if (!best.separation.IsProven() && pair.boxed.IsProven()) best = {pair.boxed, -1};
     closest_.Consider(best, pair.step, pair.obstacle);
   }
@@ -728,11 +764,9 @@ class SafetyTest::Judgement {
     if (IsCloser(pair) && pair.IsProven()) Consider(pair);
   }
   // Of what stands, with an index: in the order of their cost.
-  void ConsiderNear(const ObstacleIndex& index, Near& pair) noexcept {
+  void ConsiderNear(const ObstacleIndex& index, const Near& pair) noexcept {
     const auto& [t, o, gap, towards] = pair;
-    const double far = WithTolerance(index, closest_.clearance);
-    if (gap > far) return;
-    if (gap > WithTolerance(index, 0)) Refine(pair);
+    const double far = WithTolerance(index, std::min(closest_.clearance, farthest_));
     if (gap > far) return;
     const Separation by_hulls = ByHulls(t, o);
     unit_.Enter(t);
@@ -744,18 +778,20 @@ class SafetyTest::Judgement {
     }
     if (unit_.ClearanceAlong({towards[0], towards[1], 0}, obstacle(o)) > far) return;
     const PartSeparation direct = unit_.ByDirections({by_hulls, -1}, obstacle(o), {});
-    const Separation boxed = by_hulls.IsProven() ? Separation{} : ByBox(t, o);
+    if (direct.separation.clearance() > far) return;
+    const Separation boxed = direct.separation.IsProven() ? Separation{} : ByBox(t, o);
     const double clearance = std::max(direct.separation.clearance(), boxed.clearance());
     if (clearance > far) return;
     if (direct.separation.IsProven() || boxed.IsProven()) return Consider({direct, boxed, clearance, t, o, true});
     if (gap > WithTolerance(index, 0)) Search(direct, t, o);  // otherwise SettleNear has searched
   }
 
-  // The points of a body's parts in the plane, in the middles of a unit's slices, with what is around them.
+  // The points of a body's parts in the plane, in the middles of a unit's slices, with what is around them; and the
+  // half-planes along the sides of each part, with all of the part over the unit: {y : (x, y) . y <= end}.
   struct Outline {
     static constexpr std::size_t kMost = std::size_t{2} * kMaxBodyPoints;
     int t = -1;
-    std::array<double, kMost> x, y, around;
+    std::array<double, kMost> x, y, around, side_x, side_y, side_end;
     std::array<std::array<double, 2>, 2> width;  // of the frame, at each sample
   };
 
@@ -774,17 +810,43 @@ class SafetyTest::Judgement {
           outline_.around[j] = placement.Around(pose, i) + part.radius;
         }
     }
+    for (std::size_t s = 0; s <= ToSize(span()); ++s)
+      for (const Placement::Part& part : placement.parts()) {
+        const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
+        for (std::size_t j = first; j < end && part.count > 1; ++j) {
+          const std::size_t next = j + 1 < end ? j + 1 : first;
+          const double across_x = outline_.y[next] - outline_.y[j], across_y = outline_.x[j] - outline_.x[next];
+          const double length = std::sqrt(across_x * across_x + across_y * across_y);
+          const double scale = length > 0x1p-300 ? 1 / length : 0;
+          outline_.side_x[j] = scale * across_x;
+          outline_.side_y[j] = scale * across_y;
+          outline_.side_end[j] = FarthestOf(part, outline_.side_x[j], outline_.side_y[j]);
+        }
+      }
+  }
+  // Of all of a part along a vector of length 1, or 0.
+  [[nodiscard]] double FarthestOf(const Placement::Part& part, double x, double y) const noexcept {
+    double farthest = -kInfinity;
+    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
+      const double width = std::abs(x) * outline_.width[s][0] + std::abs(y) * outline_.width[s][1];
+      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
+      for (std::size_t j = first; j < end; ++j)
+        farthest = std::max(farthest, x * outline_.x[j] + y * outline_.y[j] + outline_.around[j] + width);
+    }
+    return farthest;
   }
 
   // Raises the pair's gap to a lower bound on the distance from the body, up to rounding: by its outline, in the plane.
-  void Refine(Near& pair) noexcept {
+  // What is above `far` need not be raised further.
+  void Refine(Near& pair, double far) noexcept {
     if (!has_boxes() || test_.placement_.dim() != 2) return;
     SketchBody(pair.t);
+    const Obstacle& other = obstacle(pair.o);
     Along least;
     least.gap = kInfinity;
     for (const Placement::Part& part : test_.placement_.parts())
-      if (const Along along = GapAround(obstacle(pair.o), part); along.gap < least.gap) least = along;
-    pair.gap = std::max(pair.gap, least.gap - obstacle(pair.o).radius());
+      if (const Along along = GapAround(other, part, far + other.radius()); along.gap < least.gap) least = along;
+    pair.gap = std::max(pair.gap, least.gap - other.radius());
     pair.towards = least.towards;
   }
   // A bound by one direction.
@@ -792,17 +854,18 @@ class SafetyTest::Judgement {
     double gap = -kInfinity;
     std::array<double, 2> towards{};
   };
-  // From the nearest point to the box around the core, and across the sides of the body.
-  [[nodiscard]] Along GapAround(const Obstacle& other, const Placement::Part& part) const noexcept {
+  // Across the sides of the body, and from the nearest point to the box around the core.
+  [[nodiscard]] Along GapAround(const Obstacle& other, const Placement::Part& part, double far) const noexcept {
     const Eigen::Vector3d &lower = other.lower(), &upper = other.upper();
     const auto &x = outline_.x, &y = outline_.y;
     Along best;
-    const auto consider = [&](double to_x, double to_y) {
-      if (const double gap = GapAlong(other, part, to_x, to_y); gap > best.gap) best = {gap, {to_x, to_y}};
-    };
     double nearest = kInfinity, towards_x = 0, towards_y = 0;
     for (std::size_t s = 0; s <= ToSize(span()); ++s) {
       const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
+      for (std::size_t j = first; j < end && part.count > 1; ++j)
+        if (const double gap = LowestOf(other, outline_.side_x[j], outline_.side_y[j]) - outline_.side_end[j];
+            gap > best.gap && gap < kInfinity)
+          best = {gap, {outline_.side_x[j], outline_.side_y[j]}};
       for (std::size_t j = first; j < end; ++j) {
         const double to_x = std::max(lower[0] - x[j], 0.0) + std::min(upper[0] - x[j], 0.0),
                      to_y = std::max(lower[1] - y[j], 0.0) + std::min(upper[1] - y[j], 0.0);
@@ -812,38 +875,23 @@ class SafetyTest::Judgement {
           towards_y = to_y;
         }
       }
+      if (best.gap > far) return best;
     }
-    consider(towards_x, towards_y);
-    if (part.count == 1) return best;
-    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
-      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
-      for (std::size_t j = first; j < end; ++j) {
-        const std::size_t next = j + 1 < end ? j + 1 : first;
-        const double across_x = y[next] - y[j], across_y = x[j] - x[next];
-        const double middle = across_x * (lower[0] + upper[0] - 2 * x[j]) + across_y * (lower[1] + upper[1] - 2 * y[j]);
-        const double extent = std::abs(across_x) * (upper[0] - lower[0]) + std::abs(across_y) * (upper[1] - lower[1]);
-        if (std::abs(middle) > extent)  // all of the box is on one side
-          consider(middle > 0 ? across_x : -across_x, middle > 0 ? across_y : -across_y);
-      }
-    }
+    if (!(nearest > 0x1p-600)) return best;
+    const double scale = 1 / std::sqrt(nearest), to_x = scale * towards_x, to_y = scale * towards_y;
+    if (const double gap = LowestOf(other, to_x, to_y) - FarthestOf(part, to_x, to_y);
+        gap > best.gap && gap < kInfinity)
+      best = {gap, {to_x, to_y}};
     return best;
   }
-  [[nodiscard]] double GapAlong(const Obstacle& other, const Placement::Part& part, double x, double y) const noexcept {
-    double core = kInfinity, farthest = -kInfinity;
+  // Of the core along a vector.
+  [[nodiscard]] static double LowestOf(const Obstacle& other, double x, double y) noexcept {
     if (other.kind() == Obstacle::Kind::kBox)
-      core =
-          std::min(x * other.lower()[0], x * other.upper()[0]) + std::min(y * other.lower()[1], y * other.upper()[1]);
-    else
-      for (const Eigen::Vector3d& point : other.hull()) core = std::min(core, x * point[0] + y * point[1]);
-    const double length = std::sqrt(x * x + y * y);
-    for (std::size_t s = 0; s <= ToSize(span()); ++s) {
-      const double width = std::abs(x) * outline_.width[s][0] + std::abs(y) * outline_.width[s][1];
-      const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
-      for (std::size_t j = first; j < end; ++j)
-        farthest = std::max(farthest, x * outline_.x[j] + y * outline_.y[j] + length * outline_.around[j] + width);
-    }
-    const double gap = (core - farthest) / length;
-    return length > 0x1p-300 && gap < kInfinity ? gap : -kInfinity;  // so of a direction that is none
+      return std::min(x * other.lower()[0], x * other.upper()[0]) +
+             std::min(y * other.lower()[1], y * other.upper()[1]);
+    double core = kInfinity;
+    for (const Eigen::Vector3d& point : other.hull()) core = std::min(core, x * point[0] + y * point[1]);
+    return core;
   }
 
   void ConsiderIfCloser(const Separation& by_hulls, int t, int o) noexcept {
@@ -903,7 +951,7 @@ class SafetyTest::Judgement {
           if (!IsFurther(i, WithTolerance(*index, closest_.clearance))) Look(t, index->everywhere()[i]);
         continue;
       }
-      for (int o = static_cast<int>(cores_.size()); o < static_cast<int>(obstacles_.size()); ++o) Look(t, o);
+      for (int o = static_cast<int>(cores_.size()); o < numbers_.size(); ++o) Look(t, o);
     }
   }
   // @pre unit t is entered, with its hulls.
@@ -917,6 +965,7 @@ class SafetyTest::Judgement {
   const int first_, units_;
   const Tube& tube_;
   const Schedule& schedule_;
+  const ConvexNumbers numbers_;
   int touched_, touched_obstacle_ = -1;  // the first unit and obstacle that are not proven apart; units_: none
   PartSeparation touch_;                 // there
   Closest closest_;

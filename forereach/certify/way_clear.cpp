@@ -4,6 +4,8 @@
 
 #include "forereach/numerics/least.h"
 #include "forereach/numerics/size.h"
+#include "forereach/safety/obstacle_index.h"
+#include "forereach/safety/occupancy_grid.h"
 
 namespace forereach {
 namespace {
@@ -18,7 +20,10 @@ class WayClearSearch final {
 
   // The first step at which the obstacle may be touched, if there is one.
   [[nodiscard]] std::optional<Decision> Touch(const Obstacle& obstacle) const {
-    const Decision alone = certifier_.JudgeSafety(plan_, {&obstacle, 1}, tube_);
+    const ObstacleView only(&obstacle, 1);
+    const Decision alone = obstacle.grid()
+                               ? certifier_.JudgeSafety(plan_, {only.all(), ObstacleIndex(only.all())}, tube_)
+                               : certifier_.JudgeSafety(plan_, only, tube_);
     return alone.cause == Cause::kObstacle ? std::optional(alone) : std::nullopt;
   }
 
@@ -28,7 +33,8 @@ class WayClearSearch final {
     const double depth = std::max(touch.threshold - touch.margin, kLeastDepth);
     std::optional<double> least;
     Eigen::VectorXd shift;
-    for (const Eigen::VectorXd& direction : DirectionsAway(obstacle, touch.step)) {
+    const Obstacle& touched = obstacle.convex()[ToSize(std::max(touch.block, 0))];
+    for (const Eigen::VectorXd& direction : DirectionsAway(touched, touch.step)) {
       const auto amount = LeastFrom(depth, least.value_or(kFarthest * depth), effort_.halvings, [&](double distance) {
         return GoesOn() && !Touch(Shifted(obstacle, distance * direction));
       });
@@ -91,6 +97,8 @@ Obstacle Shifted(const Obstacle& obstacle, const Eigen::VectorXd& by) {
         for (const Eigen::VectorXd& vertex : points) vertices.push_back(vertex + by);
         return Obstacle::Polygon(vertices);
       }
+      case Obstacle::Kind::kGrid:
+        return Obstacle::Grid(std::make_shared<const OccupancyGrid>(obstacle.grid()->Shifted(by)));
       case Obstacle::Kind::kHalfSpace: break;
     }
     return Obstacle::HalfSpace(points[0], obstacle.offset() + points[0].dot(by));

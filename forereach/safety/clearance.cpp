@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "forereach/numerics/size.h"
+#include "forereach/safety/occupancy_grid.h"
 
 namespace forereach {
 namespace {
@@ -73,6 +74,15 @@ double HullDistance(const std::vector<Vector>& core, std::span<const Vector> poi
 
 // The distance from the hull of the points to the obstacle's core, by plain arithmetic: for planners, no proof.
 double CoreDistance(const Obstacle& obstacle, std::span<const Vector> points) {
+  if (obstacle.grid()) {
+    Hull hull{};
+    for (const int k : {0, 1}) {
+      const auto [lower, upper] = std::ranges::minmax(points, {}, [k](const Vector& point) { return point[k]; });
+      hull.center[ToSize(k)] = lower[k] / 2 + upper[k] / 2;
+      hull.half_width[ToSize(k)] = upper[k] / 2 - lower[k] / 2;
+    }
+    return obstacle.grid()->LeastDistance(hull, [&](const Obstacle& block) { return CoreDistance(block, points); });
+  }
   if (obstacle.kind() != Obstacle::Kind::kHalfSpace) return HullDistance(obstacle.hull(), points);
   double least = kInfinity;
   for (const Vector& point : points) least = std::min(least, ApproximateDistance(obstacle, point.head(obstacle.dim())));

@@ -8,6 +8,7 @@
 #include "forereach/numerics/require.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/safety/occupancy_grid.h"
 
 namespace forereach {
 namespace {
@@ -117,7 +118,24 @@ Obstacle Obstacle::HalfSpace(const Eigen::VectorXd& normal, double offset) {
   return half_space;
 }
 
+Obstacle Obstacle::Grid(std::shared_ptr<const OccupancyGrid> grid) {
+  Obstacle obstacle(Kind::kGrid, 2);
+  obstacle.grid_ = std::move(grid);
+  obstacle.lower_ = {kInfinity, kInfinity, 0};
+  obstacle.upper_ = -obstacle.lower_;
+  for (const Obstacle& block : obstacle.convex()) {
+    obstacle.lower_ = obstacle.lower_.cwiseMin(block.lower_);
+    obstacle.upper_ = obstacle.upper_.cwiseMax(block.upper_);
+  }
+  return obstacle;
+}
+
+std::span<const Obstacle> Obstacle::convex() const {
+  return grid_ ? grid_->blocks() : std::span<const Obstacle>(this, 1);
+}
+
 Obstacle Obstacle::Moving(const ObstacleMotion& motion) const {
+  Require(!grid_, "motion: a grid stands");
   Require(motion.velocity.allFinite(), "motion: velocity is not finite");
   for (int k = dim_; k < kMaxSafetyDim; ++k)
     Require(motion.velocity[k] == 0, "motion: velocity has an entry " + std::to_string(k) + ", the obstacle has " +
@@ -146,13 +164,14 @@ Obstacle Obstacle::Named(std::string_view name) const {
   return named;
 }
 
-std::string NameOf(std::span<const Obstacle> obstacles, int index) {
+std::string NameOf(std::span<const Obstacle> obstacles, int index, int block) {
+  if (block >= 0) return obstacles[ToSize(index)].grid()->NameOf(block) + " of " + NameOf(obstacles, index);
   const bool is_named = 0 <= index && index < std::ssize(obstacles) && !obstacles[ToSize(index)].name().empty();
   return is_named ? obstacles[ToSize(index)].name() : "obstacle " + std::to_string(index);
 }
 
-std::string MayTouch(std::span<const Obstacle> obstacles, int index) {
-  const std::string name = NameOf(obstacles, index);
+std::string MayTouch(std::span<const Obstacle> obstacles, int index, int block) {
+  const std::string name = NameOf(obstacles, index, block);
   return name.starts_with(kOutside) ? "may leave " + name.substr(kOutside.size()) : "may touch " + name;
 }
 
@@ -173,6 +192,9 @@ double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
       for (const Eigen::VectorXd& vertex : obstacle.points()) offsets.emplace_back(vertex - y);
       return HullDistance(offsets);
     }
+    case Obstacle::Kind::kGrid:
+      return obstacle.grid()->LeastDistance({{y[0], y[1], 0}, {}},
+                                            [&](const Obstacle& block) { return ApproximateDistance(block, y); });
   }
   throw std::logic_error("obstacle: kind " + std::to_string(static_cast<int>(obstacle.kind())) + " is unknown");
 }

@@ -1,17 +1,50 @@
 #include "forereach/safety/obstacle_index.h"
 
+#include <algorithm>
+
+#include "forereach/safety/occupancy_grid.h"
+
 namespace forereach {
 
-ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) {
+ConvexNumbers::ConvexNumbers(std::span<const Obstacle> all) noexcept {
+  for (const Obstacle& obstacle : all) {
+    const bool is_known = obstacle.grid() && num_grids_ < kMostGrids;
+    if (is_known) grids_[ToSize(num_grids_++)] = {size_, obstacle.convex()};
+    size_ += is_known ? static_cast<int>(obstacle.convex().size()) : 1;
+  }
+}
+
+ConvexNumbers::Place ConvexNumbers::PlaceOf(int number) const {
+  int obstacle = number;
+  for (int g = 0; g < num_grids_ && grids_[ToSize(g)].first <= number; ++g) {
+    const auto& [first, blocks] = grids_[ToSize(g)];
+    const int count = static_cast<int>(blocks.size());
+    if (number - first < count) return {obstacle - (number - first), number - first};
+    obstacle -= count - 1;
+  }
+  return {obstacle, -1};
+}
+
+const BoxTree& ObstacleIndex::tree_of(const OccupancyGrid& grid) { return grid.index().tree_; }
+
+ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obstacles) {
   std::vector<Bounds> boxes;
-  for (std::size_t o = 0; o < obstacles.size(); ++o) {
-    const Obstacle& obstacle = obstacles[o];
-    const bool is_bounded = obstacle.kind() != Obstacle::Kind::kHalfSpace;
-    if (!is_bounded || obstacle.motion()) {
-      everywhere_.push_back(static_cast<int>(o));
+  int number = 0;
+  for (const Obstacle& obstacle : obstacles) {
+    if (obstacle.grid() && grids_.size() < ConvexNumbers::kMostGrids) {
+      const ObstacleIndex& own = obstacle.grid()->index();
+      grids_.push_back({number, obstacle.grid()});
+      for (const int block : own.everywhere()) everywhere_.push_back(number + block);
+      size_ = std::max(size_, own.size());
+      number += own.numbers().size();
       continue;
     }
-    standing_.push_back(static_cast<int>(o));
+    const bool is_bounded = obstacle.kind() != Obstacle::Kind::kHalfSpace && !obstacle.grid();
+    if (!is_bounded || obstacle.motion()) {
+      everywhere_.push_back(number++);
+      continue;
+    }
+    standing_.push_back(number++);
     Bounds& box = boxes.emplace_back();
     for (int k = 0; k < obstacle.dim(); ++k) {
       box.lower[ToSize(k)] = SubDown(obstacle.lower()[k], obstacle.radius());
@@ -19,6 +52,7 @@ ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) {
     }
   }
   if (!boxes.empty()) tree_ = BoxTree(boxes, obstacles.front().dim());
+  size_ = std::max(size_, tree_.size());
 }
 
 }  // namespace forereach

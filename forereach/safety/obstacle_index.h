@@ -13,24 +13,38 @@ namespace forereach {
 class ObstacleIndex final {
  public:
   ObstacleIndex() = default;
-  /** Those that stand and have a size are in a tree of the boxes around them. Those that move, and half-spaces, are
-  near everything. @pre all have one dimension. Cost O(n log^2 n). */
+  /** Those that stand and have a size are in a tree of the boxes around them, and a grid has a tree of its own. Those
+  that move, and half-spaces, are near everything. Obstacles are known by ConvexNumbers. @pre all have one dimension.
+  Cost O(n log^2 n) for n obstacles that are no grids. */
   explicit ObstacleIndex(std::span<const Obstacle> obstacles);
 
-  /** Those that are near everything, by their indices. */
+  [[nodiscard]] const ConvexNumbers& numbers() const { return numbers_; }
+  /** Those that are near everything. */
   [[nodiscard]] std::span<const int> everywhere() const { return everywhere_; }
   /** An upper bound on the absolute values of the coordinates of the others, and on their radii. */
-  [[nodiscard]] double size() const { return tree_.size(); }
+  [[nodiscard]] double size() const { return size_; }
   /** BoxTree::ForEachNear of the others: visit(t, o). One that is left out is proven apart by SeparateHulls, with
   `reach` added, and its clearance there exceeds `within()`. */
   template <class Within, class Visit>
   void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
     tree_.ForEachNear(hulls, reach, within, [&](int t, int i) { visit(t, standing_[ToSize(i)]); });
+    for (const auto& [first, grid] : grids_)
+      tree_of(*grid).ForEachNear(hulls, reach, within, [&, from = first](int t, int i) { visit(t, from + i); });
   }
 
  private:
+  struct Grid {
+    int first;
+    std::shared_ptr<const OccupancyGrid> grid;
+  };
+  // Of its blocks, whose first ones have all a size.
+  [[nodiscard]] static const BoxTree& tree_of(const OccupancyGrid& grid);
+
+  ConvexNumbers numbers_;
   std::vector<int> everywhere_, standing_;
+  std::vector<Grid> grids_;
   BoxTree tree_;  // of those that stand
+  double size_ = 0;
 };
 
 }  // namespace forereach

@@ -1,6 +1,7 @@
 /** The obstacles of a call. */
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,41 @@
 namespace forereach {
 
 class ObstacleIndex;
+
+/** The convex sets of a list of obstacles, numbered in its order: an obstacle has one number, a grid one for each of
+its blocks. */
+class ConvexNumbers final {
+ public:
+  static constexpr int kMostGrids = 8;
+  ConvexNumbers() = default;
+  /** A grid after the first kMostGrids counts as one set, of which nothing is known but its bounding box. */
+  explicit ConvexNumbers(std::span<const Obstacle> all) noexcept;
+
+  /** How many there are. */
+  [[nodiscard]] int size() const { return size_; }
+  /** @param all the obstacles. */
+  [[nodiscard]] const Obstacle& Find(std::span<const Obstacle> all, int number) const {
+    int obstacle = number;
+    for (int g = 0; g < num_grids_ && grids_[g].first <= number; ++g) {
+      const auto& [first, blocks] = grids_[g];
+      if (number - first < std::ssize(blocks)) return blocks[static_cast<std::size_t>(number - first)];
+      obstacle -= static_cast<int>(blocks.size()) - 1;
+    }
+    return all[static_cast<std::size_t>(obstacle)];
+  }
+  struct Place {
+    int obstacle, block;  ///< -1: the obstacle is no grid.
+  };
+  [[nodiscard]] Place PlaceOf(int number) const;
+
+ private:
+  struct Grid {
+    int first;
+    std::span<const Obstacle> blocks;
+  };
+  int size_ = 0, num_grids_ = 0;
+  std::array<Grid, kMostGrids> grids_{};
+};
 
 /** Obstacles, and their index (obstacle_index.h) if they have one. It owns neither. With an index a call gives the same
 decision, sooner where obstacles are many. */

@@ -211,14 +211,15 @@ Vector NearestOnSegment(const Vector& a, const Vector& b) {
 // are, and their balls have no faces: such a search takes more steps and ends near its best.
 struct Effort {
   int steps;
-  double tolerance, threshold;
+  double tolerance, threshold, enough;
 
-  static Effort For(std::span<const Piece> pieces, double threshold) {
-    return pieces.size() == 1 && pieces.front().ball == 0 ? Effort{12, 1e-15, threshold} : Effort{50, 1e-7, threshold};
+  static Effort For(std::span<const Piece> pieces, double threshold, double enough) {
+    return pieces.size() == 1 && pieces.front().ball == 0 ? Effort{12, 1e-15, threshold, enough}
+                                                          : Effort{50, 1e-7, threshold, enough};
   }
   // A point of the set has been found at `length`, and a proof for `value`.
   [[nodiscard]] bool Suffices(double value, double length) const {
-    return value >= length * (1 - (value > threshold ? tolerance : 1e-15));
+    return value > enough || value >= length * (1 - (value > threshold ? tolerance : 1e-15));
   }
 };
 
@@ -283,23 +284,21 @@ void DescendInSpace(Search& search, const Effort& effort) noexcept {
   search.Consider(search.Corner(normal, -Turned(normal)));
 }
 
-Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold) noexcept {
+Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold, double enough) noexcept {
   Search search(pieces, obstacle);
-  DescendInPlane(search, Effort::For(pieces, threshold));
+  DescendInPlane(search, Effort::For(pieces, threshold, enough));
   if (pieces.size() == 1 && !(search.value() > threshold)) TryAllNormals(search, obstacle.hull());
   return search.best();
 }
 
 // In space disjoint polytopes are separated by a face normal of one, or the cross product of an edge of each. The edges
 // of a box are the axes; the faces of a zonotope lie along pairs of generators.
-[[gnu::noinline]] Vector BestSpatial(std::span<const Piece> pieces, const Obstacle& obstacle,
-                                     double threshold) noexcept {
+[[gnu::noinline]] Vector BestSpatial(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
+                                     double enough) noexcept {
   Search search(pieces, obstacle);
   for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
-  if (pieces.size() > 1 || threshold > 0) {  // such a normal may separate and still not show the distance
-    DescendInSpace(search, {50, 1e-7, threshold});
-    return search.best();
-  }
+  DescendInSpace(search, {50, 1e-7, threshold, enough});
+  if (pieces.size() > 1 || search.value() > threshold) return search.best();
   for (int j = 0; j < search.num_generators(); ++j) {
     const Vector g = search.generator(j);
     for (int k = 0; k < 3; ++k) search.Consider(g.cross(Vector::Unit(k)));
@@ -308,20 +307,22 @@ Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, doubl
   return search.best();
 }
 
-Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold) noexcept {
+Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
+                     double enough) noexcept {
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     Vector normal = Vector::Zero();
     normal.head(obstacle.dim()) = obstacle.points()[0];
     return normal;
   }
+  if (obstacle.hull().empty()) return Vector::Zero();  // of a grid: proves nothing
   switch (obstacle.dim()) {
     case 1: {
       Search search(pieces, obstacle);
       search.Consider(Vector::UnitX());
       return search.best();
     }
-    case 2: return BestPlanar(pieces, obstacle, threshold);
-    case 3: return BestSpatial(pieces, obstacle, threshold);
+    case 2: return BestPlanar(pieces, obstacle, threshold, enough);
+    case 3: return BestSpatial(pieces, obstacle, threshold, enough);
     default: return Vector::Zero();  // proves nothing
   }
 }
@@ -406,9 +407,9 @@ FOREREACH_INLINE double LeastOf(std::span<const Piece> pieces, Bound bound) noex
   return least;
 }
 
-FOREREACH_INLINE Separation SeparateInline(std::span<const Piece> pieces, const Obstacle& obstacle,
-                                           double threshold) noexcept {
-  const Vector direction = BestDirection(pieces, obstacle, threshold);
+FOREREACH_INLINE Separation SeparateInline(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
+                                           double enough) noexcept {
+  const Vector direction = BestDirection(pieces, obstacle, threshold, enough);
   if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46) {
     const auto plain = [&](const Piece& piece) __attribute__((always_inline)) {
       return PlainDistanceLower(piece, obstacle, direction);
@@ -420,9 +421,10 @@ FOREREACH_INLINE Separation SeparateInline(std::span<const Piece> pieces, const 
 
 }  // namespace
 
-Separation Separate(std::span<const Piece> pieces, const Obstacle& obstacle, double added,
-                    InstructionSet instructions) noexcept {
-  return Dispatch<&SeparateInline>(instructions, pieces, obstacle, AddUp(obstacle.radius(), added));
+Separation Separate(std::span<const Piece> pieces, const Obstacle& obstacle, double added, InstructionSet instructions,
+                    double enough) noexcept {
+  const double threshold = AddUp(obstacle.radius(), added);
+  return Dispatch<&SeparateInline>(instructions, pieces, obstacle, threshold, threshold + enough);
 }
 
 Separation Separate(const Zonotope& slice, const Obstacle& obstacle, InstructionSet instructions) noexcept {

@@ -71,8 +71,10 @@ nothing; for p = 3, O(m^3).
 space with a threshold, approaches the nearest point of {core - hull}; its distance is exact up to the search's
 tolerance, about 1e-7 of the distance. Cost O(m) for the generators of all pieces and each of at most some fifty
 directions.
-@param added what is added to the obstacle's radius as the threshold, metres, not negative. */
+@param added what is added to the obstacle's radius as the threshold, metres, not negative.
+@param enough a clearance above which the search may end, metres: what is farther is not of interest. */
 [[nodiscard]] Separation Separate(std::span<const Piece> pieces, const Obstacle& obstacle, double added,
-                                  InstructionSet instructions = BestInstructionSet()) noexcept;
+                                  InstructionSet instructions = BestInstructionSet(),
+                                  double enough = kInfinity) noexcept;
 
 }  // namespace forereach

@@ -10,7 +10,7 @@ namespace forereach {
 void StandingCores::Take(std::span<const Obstacle> obstacles, int dim, double added, std::size_t most) noexcept {
   dim_ = dim;
   for (const Obstacle& obstacle : obstacles.first(std::min({obstacles.size(), most, kMost}))) {
-    if (obstacle.motion() || obstacle.kind() == Obstacle::Kind::kHalfSpace) break;
+    if (obstacle.motion() || obstacle.hull().empty()) break;
     for (int k = 0; k < dim; ++k) {
       lower_[ToSize(k)][size_] = obstacle.lower()[k];
       upper_[ToSize(k)][size_] = obstacle.upper()[k];

@@ -14,7 +14,8 @@ class StandingCores final {
  public:
   static constexpr std::size_t kMost = 64;
 
-  /** Takes the first of the obstacles, at most `most` and kMost of them, up to one that moves or is a half-space.
+  /** Takes the first of the obstacles, at most `most` and kMost of them, up to one that moves, is a half-space or a
+  grid.
   @param added is added to the radii as the threshold, metres, not negative. @pre all have the dimension `dim`. */
   void Take(std::span<const Obstacle> obstacles, int dim, double added, std::size_t most) noexcept;
   [[nodiscard]] std::size_t size() const { return size_; }

@@ -47,11 +47,12 @@ robot: {step_error_ms: 0}
 
 TEST_F(ImportWorldTest, APlanIsCertifiedAmongTheObstaclesOfAMap) {
   EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --task " + scratch_ / "task.yaml --whole-task"),
-              Exits(0, "8 by 8 cells of 1 m", "Unknown cells are occupied", "import-world: 5 obstacles in"));
-  EXPECT_EQ(LoadConfig(scratch_ / "out.yaml").obstacles.size(), 5u) << "a wall and four half-planes";
+              Exits(0, "8 by 8 cells of 1 m", "Unknown cells are occupied", "import-world: 1 obstacles in"));
+  const Obstacle grid = LoadConfig(scratch_ / "out.yaml").obstacles.at(0);
+  EXPECT_EQ(grid.convex().size(), 7u) << "three rectangles and four half-planes";
   EXPECT_THAT(Certify("out.yaml"), Exits(0, "certified: the robot stays clear at all times"));
   scratch_.Write("plan.csv", "ax,ay\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n1,0\n");
-  EXPECT_THAT(Certify("out.yaml"), Exits(1, "may touch obstacle 0"));
+  EXPECT_THAT(Certify("out.yaml"), Exits(1, "may touch cells (6, 0) to (6, 5) of map"));
 }
 
 // The robot drives a metre along x. Messages, the check and the verifier know the area.
@@ -108,10 +109,10 @@ TEST_F(ImportWorldTest, AnAreaToStayInThatIsNoneIsAnError) {
 }
 
 TEST_F(ImportWorldTest, WritesAPartOfATaskFile) {
-  ASSERT_EQ(ImportWorld(scratch_ / "map.yaml" + " --unknown free").code, 0);
+  ASSERT_EQ(ImportWorld(scratch_ / "map.yaml" + " --unknown free --as rectangles").code, 0);
   const std::string text = Read(scratch_ / "out.yaml");
   EXPECT_THAT(text, StartsWith("# The obstacles of map.yaml, by forereach import-world.\n"));
-  EXPECT_THAT(text, HasSubstr("\ntask:\n  obstacles:\n    - box: {lower: [2, -4], upper: [3, 4]}  # 1 by 8 cells"));
+  EXPECT_THAT(text, HasSubstr("\ntask:\n  obstacles:\n    - box: {lower: [2, -4], upper: [3, 2]}\n"));
   EXPECT_THAT(ImportWorld(scratch_ / "map.yaml"), Exits(2, "the file exists, and is not changed"));
 }
 
@@ -120,11 +121,13 @@ TEST_F(ImportWorldTest, MoreThanATaskTakesAreNotWritten) {
   for (int i = 0; i < 3 * (2 * kMostObstacles + 2); ++i) image += i % 2 == 0 ? "0 " : "254 ";
   scratch_.Write("map.pgm", image);
   EXPECT_THAT(
-      ImportWorld(scratch_ / "map.yaml" + " --unknown free"),
+      ImportWorld(scratch_ / "map.yaml" + " --unknown free --as rectangles"),
       Exits(1, fmt::format("{} obstacles, and a task takes {}: nothing is written", kMostObstacles + 1, kMostObstacles),
-            "--task or --region", "--coarsen"));
+            "--task or --region", "--as grid"));
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "out.yaml"));
-  EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --unknown free --region 0,0,9,9"), Exits(0));
+  EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --unknown free --as rectangles --region 0,0,9,9"), Exits(0));
+  EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --unknown free --force"), Exits(0, "1 obstacles"));
+  EXPECT_THAT(Read(scratch_ / "out.yaml"), HasSubstr("    - grid:\n        resolution: 1\n"));
 }
 
 TEST_F(ImportWorldTest, SaysWhatIsWrongWithItsOptions) {

@@ -9,6 +9,7 @@
 
 #include "forereach/dynamics/models/named_residuals.h"
 #include "forereach/dynamics/models/residuals.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "task/schema.h"
 #include "tests/paths.h"
 #include "tests/task/task_files.h"
@@ -558,6 +559,27 @@ TEST_F(LoadConfig, ReadsEveryObstacle) {
   EXPECT_FIELDS(config, (obstacles[0].kind(), Obstacle::Kind::kBox), (obstacles[0].points()[1], Numbers({1, 4})),
                 (obstacles[1].points().size(), 3u), (obstacles[2].kind(), Obstacle::Kind::kHalfSpace),
                 (obstacles[2].offset(), 5));
+}
+
+TEST_F(LoadConfig, ReadsAMapFromItsTopRowDown) {
+  const auto load = [&](const std::string& more, const std::string& rows) {
+    return files_.Load(
+        Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
+                 "\n    - name: map\n      grid:\n        resolution: 0.5\n        origin: [1, 2, 0.25]\n" + more +
+                     "        rows: |\n          " + rows + "\n          ...\n"));
+  };
+  const Config config = load("", "#.?");
+  const OccupancyGrid::Map& map = Only(config.obstacles).grid()->map();
+  EXPECT_FIELDS(map, (resolution, 0.5), (origin, (std::array{1.0, 2.0})), (yaw, 0.25), (width, 3), (height, 2),
+                (outside_is_free, false), (occupied, (std::vector{false, false, false, true, false, true})));
+  EXPECT_EQ(NameOf(config.obstacles, 0, 1), "cell (2, 1) of map");
+  const Config free = load("        unknown: free\n", "#.?"), other = load("        unknown: free\n", "#..");
+  EXPECT_EQ(free.obstacles[0].grid()->map().occupied, (std::vector{false, false, false, true, false, false}));
+  EXPECT_TRUE(free.obstacles[0].grid()->map().outside_is_free);
+  EXPECT_NE(config.grounds.obstacles, free.grounds.obstacles);
+  EXPECT_EQ(free.grounds.obstacles, other.grounds.obstacles) << "the same cells";
+  EXPECT_NE(free.grounds.config, other.grounds.config);
+  EXPECT_NE(free.grounds.obstacles, load("        unknown: free\n", "##.").grounds.obstacles);
 }
 
 TEST_F(LoadConfig, ProjectionsHaveOneToThreeRows) {

@@ -236,7 +236,7 @@ TEST_F(ErrorTest, AMotionOfAnObstacleThatDoesNotFitIsAnError) {
   EXPECT_EQ(with("from: 1, until: 0.5"),
             "18: task.obstacles[0].motion.until: 0.5 is outside [1, inf), below task.obstacles[0].motion.from");
   EXPECT_EQ(With("{circle: {center: [3, 2], radius: 0.8}}", "{motion: {velocity: [1, 1]}}"),
-            "18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
+            "18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane, grid");
 }
 
 TEST_F(ErrorTest, AKeyOfAnotherModelIsAnError) {
@@ -489,7 +489,7 @@ TEST_F(ErrorTest, AnImpossibleObstacleIsAnError) {
     return With("{circle: {center: [3, 2], radius: 0.8}}", obstacle);
   };
   EXPECT_EQ(with("{}"),
-            "18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
+            "18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane, grid");
   EXPECT_THAT(with("{half_plane: {normal: [0, 0], offset: 1}}"), StartsWith("18: task.obstacles[0].half_plane: "));
   EXPECT_EQ(with("{box: {lower: [1, 2], upper: [2, 1]}}"),
             "18: task.obstacles[0].box.upper[1]: 1 is outside [2, inf), below task.obstacles[0].box.lower[1]");
@@ -503,8 +503,33 @@ TEST_F(ErrorTest, AnImpossibleObstacleIsAnError) {
     EXPECT_THAT(with("{name: " + name + ", circle: {center: [1, 1], radius: 1}}"),
                 StartsWith("18: task.obstacles[0].name: "));
   EXPECT_EQ(with("{name: oak}"),
-            "18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
+            "18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane, grid");
   EXPECT_EQ(with(many), "18: task.obstacles: has 4097 entries, which is outside [0, 4096]");
+}
+
+TEST_F(ErrorTest, AMapThatIsNoneIsAnError) {
+  const auto with = [&](const std::string& rest, const std::string& rows = "#.\\n.?") {
+    return With("{circle: {center: [3, 2], radius: 0.8}}", "{grid: {" + rest + ", rows: \"" + rows + "\"}}");
+  };
+  const std::string fine = "resolution: 0.5, origin: [0, 0]", at = "18: task.obstacles[0].grid";
+  EXPECT_EQ(with(fine), "");
+  EXPECT_EQ(with("resolution: 0, origin: [0, 0]"), at + ".resolution: 0 is outside (0, 1e+06]");
+  EXPECT_EQ(with("resolution: .nan, origin: [0, 0]"),
+            at + ".resolution: .nan is not a finite number; write a number in (0, 1e+06], its unit is m");
+  EXPECT_THAT(with("resolution: 1, origin: [0, .inf]"), StartsWith(at + ".origin[1]: .inf is not"));
+  EXPECT_EQ(with("resolution: 1, origin: [0]"), at + ".origin: has 1 entries, which is outside [2, 3]");
+  EXPECT_EQ(with("resolution: 1, origin: [0, 0, 8]"), at + ": grid: yaw 8 is outside [-7, 7]");
+  EXPECT_THAT(with(fine + ", unknown: maybe"), StartsWith(at + ".unknown: maybe is not known"));
+  EXPECT_EQ(with(fine, "#.\\n#"), at + ".rows: line 2 of the rows has 1 cells, the first one has 2");
+  EXPECT_THAT(with(fine, "#.\\n x"),
+              StartsWith(at + ".rows: line 2 of the rows has byte 32 as cell 1, a cell is one of"));
+  EXPECT_EQ(with(fine, "\\n"), at + ": grid: 0 by 1 cells, must be 1 to 16777216 in all");
+  std::string many = "{grid: {" + fine + ", rows: x}}";
+  many.replace(many.find(": x"), 3, ": \"#\"");
+  std::string all = many;
+  for (int i = 1; i < 9; ++i) all += ", " + many;
+  EXPECT_EQ(With("{circle: {center: [3, 2], radius: 0.8}}", all),
+            "18: task.obstacles[8]: is the 9th grid, at most 8 are taken");
 }
 
 TEST_F(ErrorTest, ATransitionOutsideTheDomainIsAnError) {

@@ -1,6 +1,7 @@
 // Distances known by hand: exactly this distance is confirmed, one last bit more is not.
 #include "tests/test.h"
 
+#include "forereach/safety/occupancy_grid.h"
 #include "verifier/separation.h"
 
 namespace forereach::verifier::separation_test {
@@ -69,6 +70,51 @@ TEST(Separation, RadiusIsThatOfTheFarthestCorner) {
   EXPECT_EQ(ProjectedSlice(BoxSlice({3, 4}), Eigen::Matrix2d::Identity()).Radius().ToDouble(), 5);
   EXPECT_EQ(ProjectedSlice(BoxSlice({3}), Eigen::MatrixXd::Identity(1, 1)).Radius().ToDouble(), 3);
   EXPECT_EQ(ProjectedSlice(BoxSlice({2, 3, 6}), Eigen::Matrix3d::Identity()).Radius().ToDouble(), 7);
+}
+
+// Cells are taken from the map alone; each is as far as its rectangle, and no cell is left out.
+TEST(Separation, AGridIsAsFarAsItsNearestCell) {
+  FreshRandom random;
+  const Precision precision(256);
+  for (int round = 0; round < 40; ++round) {
+    OccupancyGrid::Map map{.resolution = 0.25, .origin = {-2.0, 1.5}, .width = 9, .height = 7, .outside_is_free = true};
+    for (int i = 0; i < 63; ++i) map.occupied.push_back(random() % 6 == 0);
+    if (round % 3 == 0) map.yaw = 0.5;
+    const ProjectedSlice slice(BoxSlice({0.25, 0.5}), Eigen::MatrixXd::Identity(2, 2));
+    double least = kInfinity;
+    for (const Obstacle& block : OccupancyGrid(map).blocks()) {
+      Real best;
+      static_cast<void>(IsClear(slice, block, 0, best));
+      least = std::min(least, best.ToDouble());
+    }
+    const Obstacle grid = Obstacle::Grid(std::make_shared<const OccupancyGrid>(map));
+    Real best;
+    const Answer is_clear = IsClear(slice, grid, 0, best);
+    ASSERT_EQ(is_clear, least > 0 ? Answer::kYes : Answer::kNo) << "round " << round;
+    if (!(least > 0.01) || least == kInfinity) continue;
+    EXPECT_EQ(IsClear(slice, grid, least - 1e-9, best), Answer::kYes);
+    EXPECT_EQ(IsClear(slice, grid, least + 1e-9, best), Answer::kNo);
+  }
+}
+
+TEST(Separation, AllBeyondAGridIsOccupied) {
+  const Precision precision(256);
+  const ProjectedSlice slice(BoxSlice({0.25, 0.5}), Eigen::MatrixXd::Identity(2, 2));
+  OccupancyGrid::Map map{
+      .resolution = 1, .origin = {-2, -3}, .width = 4, .height = 6, .occupied = std::vector<bool>(24)};
+  const auto is_clear = [&](double clearance) {
+    Real best;
+    return IsClear(slice, Obstacle::Grid(std::make_shared<const OccupancyGrid>(map)), clearance, best);
+  };
+  EXPECT_EQ(is_clear(1.75), Answer::kYes);
+  EXPECT_EQ(is_clear(std::nextafter(1.75, 2)), Answer::kNo);
+  map.yaw = 0.25;
+  map.origin = {-2 * std::cos(0.25) + 3 * std::sin(0.25), -2 * std::sin(0.25) - 3 * std::cos(0.25)};
+  const double reach = 0.25 * std::cos(0.25) + 0.5 * std::sin(0.25);  // of the slice along the map's first axis
+  EXPECT_EQ(is_clear(2 - reach - 1e-12), Answer::kYes);
+  EXPECT_EQ(is_clear(2 - reach + 1e-12), Answer::kNo);
+  map.origin = {100, 0};
+  EXPECT_EQ(is_clear(0), Answer::kNo);
 }
 
 }  // namespace forereach::verifier::separation_test

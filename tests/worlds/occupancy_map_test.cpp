@@ -1,6 +1,7 @@
 // Maps of ROS: any bytes, and cells that are covered to the last bit.
 #include "worlds/occupancy_map.h"
 
+#include "forereach/safety/occupancy_grid.h"
 #include "task/config_error.h"
 #include "tests/test.h"
 #include "tests/worlds/in_pieces.h"
@@ -40,27 +41,6 @@ TEST(Pgm, RefusesWhatIsNoneAndAllocatesNothingForIt) {
   EXPECT_THAT(Refusal("P5 1 1 255"), HasSubstr("white space"));
 }
 
-TEST(Blocks, AreExactlyTheOccupiedCells) {
-  FreshRandom random;
-  for (int round = 0; round < 300; ++round) {
-    const int width = 1 + static_cast<int>(random() % 20), height = 1 + static_cast<int>(random() % 20);
-    std::vector<bool> occupied(static_cast<std::size_t>(width * height)), covered(occupied.size());
-    for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = random() % (1 + round % 5) == 0;
-    for (const CellBlock& block : Blocks(occupied, width, height))
-      for (int row = block.row; row < block.row + block.height; ++row)
-        for (int column = block.column; column < block.column + block.width; ++column)
-          covered[static_cast<std::size_t>(row * width + column)] = true;
-    ASSERT_EQ(covered, occupied);
-  }
-}
-
-TEST(Blocks, AreFew) {
-  EXPECT_THAT(Blocks({}, 0, 0), IsEmpty());
-  EXPECT_EQ(Blocks(std::vector<bool>(600, true), 30, 20).size(), 1u);
-  // A cross: one along, one across, over each other.
-  EXPECT_EQ(Blocks({false, true, false, true, true, true, false, true, false}, 3, 3).size(), 2u);
-}
-
 constexpr const char* kGrayPng =
     "iVBORw0KGgoAAAANSUhEUgAAAAMAAAACCAAAAAC4HznGAAAAEElEQVR4nGNgOPuP4d8/BgAOwgPIDrapNAAAAABJRU5E"
     "rkJggg==";
@@ -89,7 +69,15 @@ struct MapTest : testing::Test {
   MapTest() { scratch_.Write("map.pgm", "P2 3 2 255 0 205 254 254 254 0"); }
 
   World Map(const std::string& yaml, const MapOptions& options = {}) {
-    return ReadOccupancyMap(scratch_.Write("map.yaml", yaml), options);
+    MapOptions as_rectangles = options;
+    as_rectangles.as_rectangles = true;
+    const std::string path = scratch_.Write("map.yaml", yaml);
+    const World world = ReadOccupancyMap(path, as_rectangles);
+    const Obstacle grid = ReadOccupancyMap(path, options).pieces.at(0).obstacle;
+    EXPECT_EQ(grid.convex().size(), world.pieces.size());
+    for (std::size_t i = 0; i < world.pieces.size(); ++i)
+      EXPECT_EQ(grid.convex()[i].points(), world.pieces[i].obstacle.points());
+    return world;
   }
   std::string WhyNot(const std::string& yaml) {
     return scratch_.Cut(Thrown<ConfigError>([&] { static_cast<void>(Map(yaml)); }));
@@ -141,6 +129,10 @@ TEST_F(MapTest, ATurnedMapCoversItsCells) {
   const auto is_covered = [&](const Real& u, const Real& v) {
     const Real x = Real(-0.3) + cosine * u - sine * v, y = Real(0.7) + sine * u + cosine * v;
     return std::ranges::any_of(world.pieces, [&](const World::Piece& piece) {
+      if (piece.obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+        const auto& normal = piece.obstacle.points()[0];
+        return !(Real(normal[0]) * x + Real(normal[1]) * y < Real(piece.obstacle.offset()));
+      }
       const Ring hull = CornersOf(piece.obstacle);
       for (std::size_t i = 0; i < hull.size(); ++i) {
         const PlanePoint &a = hull[i], &b = hull[(i + 1) % hull.size()];
