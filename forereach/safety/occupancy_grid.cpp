@@ -1,7 +1,6 @@
 #include "forereach/safety/occupancy_grid.h"
 
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
 #include "forereach/numerics/interval.h"
@@ -60,7 +59,7 @@ class Frame final {
       const Interval at_x = Interval(x) + cosine_ * u - sine_ * v, at_y = Interval(y) + sine_ * u + cosine_ * v;
       corners.emplace_back(Eigen::Vector2d(at_x.Middle(), at_y.Middle()));
       const double error = AddUp(at_x.DistanceUpper(at_x.Middle()), at_y.DistanceUpper(at_y.Middle()));
-      if (!(error <= margin)) throw std::logic_error("grid: a corner is not known well enough");
+      Require(error <= margin, "grid: resolution " + ToText(map_.resolution) + " is too small for a turned map");
     }
     return Obstacle::Polygon(corners);
   }

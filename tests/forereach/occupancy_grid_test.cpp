@@ -118,11 +118,11 @@ TEST(OccupancyGrid, ATurnedMapContainsItsCellsAndAllBeyond) {
     const double far = std::ldexp(1, random.Integer(-30, 60)), along = random.Uniform(-1, 1) * far;
     const bool is_column = random.Coin(), is_after = random.Coin();
     const Real beyond = is_after ? s * Real(is_column ? map.width : map.height) + Real(far) : Real(-far);
-    const auto [x, y] = is_column ? place(beyond, Real(along)) : place(Real(along), beyond);
+    const std::array<Real, 2> point = is_column ? place(beyond, Real(along)) : place(Real(along), beyond);
     EXPECT_TRUE(std::ranges::any_of(grid.blocks(), [&](const Obstacle& block) {
       if (block.kind() != Obstacle::Kind::kHalfSpace) return false;
       const auto& normal = block.points()[0];
-      return Real(normal[0]) * x + Real(normal[1]) * y > Real(block.offset()) - Real(1e-60);
+      return Real(normal[0]) * point[0] + Real(normal[1]) * point[1] > Real(block.offset()) - Real(1e-60);
     })) << far;
   }
 }
@@ -241,6 +241,10 @@ TEST(OccupancyGrid, RefusesMapsThatAreNone) {
   for (const double x : {nan, kInfinity, -2e9})
     EXPECT_THAT(with(&Map::origin, std::array{0.0, x}), HasSubstr("grid: origin"));
   EXPECT_THAT(with(&Map::yaw, nan), HasSubstr("grid: yaw nan"));
+  Map tiny = fine;
+  tiny.resolution = 5e-324;
+  tiny.yaw = 1;
+  EXPECT_THAT(why_not(tiny), HasSubstr("is too small for a turned map"));
   EXPECT_THAT(with(&Map::width, 1 << 30), HasSubstr("1073741824 by 1 cells, must be 1 to 16777216 in all"));
   EXPECT_THAT(with(&Map::height, 0), HasSubstr("2 by 0 cells"));
   EXPECT_THAT(with(&Map::width, 3), HasSubstr("2 values of 3 cells"));

@@ -81,13 +81,13 @@ TEST(Separation, AGridIsAsFarAsItsNearestCell) {
     for (int i = 0; i < 63; ++i) map.occupied.push_back(random() % 6 == 0);
     if (round % 3 == 0) map.yaw = 0.5;
     const ProjectedSlice slice(BoxSlice({0.25, 0.5}), Eigen::MatrixXd::Identity(2, 2));
+    const Obstacle grid = Obstacle::Grid(std::make_shared<const OccupancyGrid>(map));
     double least = kInfinity;
-    for (const Obstacle& block : OccupancyGrid(map).blocks()) {
+    for (const Obstacle& block : grid.convex()) {
       Real best;
-      static_cast<void>(IsClear(slice, block, 0, best));
+      static_cast<void>(IsClear(slice, block, 1e9, best));  // so that all directions are tried
       least = std::min(least, best.ToDouble());
     }
-    const Obstacle grid = Obstacle::Grid(std::make_shared<const OccupancyGrid>(map));
     Real best;
     const Answer is_clear = IsClear(slice, grid, 0, best);
     ASSERT_EQ(is_clear, least > 0 ? Answer::kYes : Answer::kNo) << "round " << round;
