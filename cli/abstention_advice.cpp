@@ -21,8 +21,8 @@
 #include "forereach/numerics/text.h"
 #include "forereach/safety/clearance.h"
 #include "forereach/sets/zonogon.h"
-#include "verifier/verifier.h"
 #include "task/json_text.h"
+#include "verifier/verifier.h"
 
 namespace forereach {
 

@@ -406,7 +406,8 @@ Examples:
            {"--max-boxes", &options->search.max_boxes, "",
             "Stop after this many boxes for each bound; the bound found by then is valid", NumberRange{1, 100'000'000}},
            {"--regions", &options->regions, "",
-            "Also cut the domain into up to so many cells, where that pays, with proven slopes in each; with --from-data "
+            "Also cut the domain into up to so many cells, where that pays, with proven slopes in each; with "
+            "--from-data "
             "up to 256, with what their transitions need of a disturbance",
             NumberRange{1, 1024}},
            Excluding("--between", {"--cover", &options->cover, "FILE.json",

@@ -40,8 +40,8 @@ has a value above the largest. */
 /** The occupied cells of a map as a grid that is named as the file is, or as rectangles: boxes, or polygons if its
 origin is turned, each with its cells and at most the rounding of its corners more. With unknown cells occupied, so is
 all beyond the image. A cell is occupied, free or unknown as for map_server in mode trinary, but gray 205 of 255, which
-map_saver writes for unknown, is unknown whatever the thresholds say. In mode scale, what is neither free nor occupied is
-occupied; in mode raw, what has a cost. @throws ConfigError with file, line, key and value. */
+map_saver writes for unknown, is unknown whatever the thresholds say. In mode scale, what is neither free nor occupied
+is occupied; in mode raw, what has a cost. @throws ConfigError with file, line, key and value. */
 [[nodiscard]] World ReadOccupancyMap(const std::string& path, const MapOptions& options);
 
 }  // namespace forereach
