@@ -517,7 +517,7 @@ Rows Store::Read(const std::string& robot, const std::string& log_file) {
 
 std::vector<Store::OfRobot> Store::ReadTransitions(const WhichTransitions& which, const OfRobot* after, int most) {
   const std::string robot = ToStoredText(which.robot), last_robot = after ? ToStoredText(after->first) : "";
-  const LogReference last = after ? after->second.event : LogReference{.log_file = "", .event_number = INT64_MIN};
+  const LogReference last = after ? after->second.event : LogReference{"", INT64_MIN, "", 0};
   return With([&](Connection& connection) {
     pqxx::work work(connection.server);
     std::vector<OfRobot> found;

@@ -52,7 +52,7 @@ Rows WithoutEvents(Rows rows) {
     gap.event.digest.clear();
     gap.event.utime = gap.utime;
   }
-  return {{}, {}, std::move(rows.gaps)};
+  return {{}, {}, std::move(rows.gaps), {}};
 }
 
 // The entry of the map for losses of this reason and stream. Once the map is full, all new streams share one entry.
@@ -529,7 +529,7 @@ void Recorder::WriteRows() {
     told_events_ = events;
   } else if (flushed_rows_.size() > kMaxWaitingRows) {
     rows_lost_ = true;
-    flushed_rows_ = {{}, {}, MergedWithoutEvents(flushed_rows_.gaps)};
+    flushed_rows_ = {{}, {}, MergedWithoutEvents(flushed_rows_.gaps), {}};
   }
 }
 

@@ -275,7 +275,7 @@ class CertificateReader final : public TimelineUser {
     order_.pop_front();
   }
 
-  static std::string DigestOfInput(const char* name) { return std::string(kOtherInput) + "digest of the " + name; }
+  static std::string DigestOfInput(const char* name) { return fmt::format("{}digest of the {}", kOtherInput, name); }
 
   static void CompareGrounds(RecordedCertificate& certificate, const Grounds& expected, const Grounds& found) {
     for (const auto& [name, digest] : kGrounds)
