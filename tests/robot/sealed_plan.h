@@ -69,7 +69,7 @@ enum : std::int16_t {
   kRefused = execution_event_t::REFUSED,
   kStarted = execution_event_t::STARTED,
   kInside = execution_event_t::STEP_INSIDE,
-  kOutside = execution_event_t::STEP_OUTSIDE,
+  kLeft = execution_event_t::STEP_OUTSIDE,
   kTailBegun = execution_event_t::TAIL_BEGUN,
   kStanding = execution_event_t::STANDING,
   kGoalReached = execution_event_t::GOAL_REACHED,

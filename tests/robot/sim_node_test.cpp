@@ -387,7 +387,7 @@ TEST(RobotSim, AHaltThatComesLateNeedsAResetAfterIt) {
   const Config config = PointMassTask();
   DrivingRig rig(1, PlanThatIsLeft(config), config);
   rig.RunTo(6, 49 * kPeriod / 10);  // held up: boundary 3 is handled shortly before the sixth
-  ASSERT_EQ(rig.Count(kOutside), 1);
+  ASSERT_EQ(rig.Count(kLeft), 1);
   for (const int at : {4, 11}) {
     rig.Publish("COMMAND", ResetAt(BoundaryTime(at)));
     rig.RunTo(at + 8);
@@ -469,8 +469,8 @@ TEST(RobotSim, APlanThatArrivesAfterItsStartIsNotStarted) {
 TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
   const Config config = PointMassTask();
   DrivingRig rig(6, PlanThatIsLeft(config), config);
-  EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kOutside));
-  const execution_event_t& outside = rig.First(kOutside);
+  EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kLeft));
+  const execution_event_t& outside = rig.First(kLeft);
   EXPECT_FIELDS(outside, (step, 2), (coordinate, 2), (value, outside.state[2]));
   EXPECT_NEAR(outside.value, 0.3, 1e-12);
   EXPECT_EQ(GetText(outside.message).substr(0, 16), "emergency stop: ");
@@ -489,7 +489,7 @@ Config TaskWithBrake() {
 TEST(RobotSim, ComesToRestAsItsEmergencyStopSays) {
   Config config = TaskWithBrake();
   DrivingRig rig(8, PlanThatIsLeft(config), config);
-  EXPECT_EQ(rig.First(kOutside).utime, BoundaryTime(3));
+  EXPECT_EQ(rig.First(kLeft).utime, BoundaryTime(3));
   const double place = rig.StateAt(3)[0];
   EXPECT_NEAR(rig.StateAt(3)[2], 0.3, 1e-12);
   EXPECT_NEAR(rig.StateAt(4)[2], 0.15, 1e-12);
@@ -849,7 +849,7 @@ TEST(RobotSim, WrapsItsAnglesAndStaysInItsSlices) {
   rig.Send(certified);
   rig.RunTo(kSteps + 2);
   EXPECT_EQ(rig.Count(kInside), kSteps);
-  EXPECT_EQ(rig.Count(kOutside), 0);
+  EXPECT_EQ(rig.Count(kLeft), 0);
   EXPECT_EQ(rig.Count(kContact), 0);
   bool is_wrapped = false;
   for (const robot_state_t& state : rig.states) {

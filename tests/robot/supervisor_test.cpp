@@ -202,7 +202,7 @@ TEST_F(SupervisorTest, GoesOnWhereAStateIsConsistentAndStopsWhereItsSliceIsLeft)
   EXPECT_FIELDS(supervisor.counts(), (steps_consistent, 1), (steps_inside, 0));
   state_[0] = 12.6;
   EXPECT_TRUE(supervisor.Boundary(At(2), At(2)).empty());
-  EXPECT_EQ(events_.back().kind, kOutside);
+  EXPECT_EQ(events_.back().kind, kLeft);
   EXPECT_THAT(GetText(events_.back().message), HasSubstr("is 12.6 +- 0.5 at step 2, outside [-12, 12]"));
   EXPECT_TRUE(supervisor.halted());
   EXPECT_EQ(supervisor.counts().steps_consistent, 1);
@@ -284,7 +284,7 @@ TEST_F(SupervisorTest, AStepOutsideItsSliceStopsTheRobotUntilAReset) {
   EXPECT_TRUE(Boundary(1).empty());
   EXPECT_EQ(holds_, 1);
   EXPECT_TRUE(supervisor_.halted());
-  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kOutside));
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kLeft));
   EXPECT_THAT(ResetAt(At(1), At(1) + 10), HasSubstr("before the robot was halted"));
   EXPECT_EQ(ResetAt(At(1) + 1, At(1) + 10), "");
   EXPECT_FALSE(supervisor_.halted());
