@@ -18,7 +18,9 @@ int IndexOf(const std::string& name, const std::vector<std::string>& names) {
   return static_cast<int>(at - names.begin());
 }
 
-std::string List(const Eigen::VectorXd& values) { return "[" + Joined(values, [](double value) { return ToText(value); }) + "]"; }
+std::string List(const Eigen::VectorXd& values) {
+  return "[" + Joined(values, [](double value) { return ToText(value); }) + "]";
+}
 
 }  // namespace
 
