@@ -433,6 +433,7 @@ void Recorder::StartAnew(std::int64_t now_us) {
     move_to_new(rows_.decisions);
     move_to_new(rows_.events);
     move_to_new(rows_.gaps);
+    move_to_new(rows_.transitions);
     database().EndRun(lost, now_us, gone_.empty() ? "the log was lost while it was written" : gone_);
   } catch (const BadInput& error) {
     if (!is_log_lost_) {
@@ -500,6 +501,7 @@ bool Recorder::Flush(std::int64_t now_us) {
   std::ranges::move(rows_.decisions, std::back_inserter(flushed_rows_.decisions));
   std::ranges::move(rows_.events, std::back_inserter(flushed_rows_.events));
   std::ranges::move(rows_.gaps, std::back_inserter(flushed_rows_.gaps));
+  std::ranges::move(rows_.transitions, std::back_inserter(flushed_rows_.transitions));
   rows_ = {};
   WriteRows();
   flush_us_ = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begun).count();
