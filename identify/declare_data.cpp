@@ -43,7 +43,7 @@ std::string LinesOf(const Config& config, int first, int second) {
 
 // ---- for people
 
-void PrintSlopes(const Proposal& proposal, const Config& config, std::ostream& out) {
+void PrintSlopes(const ProposedDeclaration& proposal, const Config& config, std::ostream& out) {
   const std::vector<std::string> names = config.problem->model->variable_names();
   out << Line({"row", "column", "smallest", "at least", "proposed", "because of"});
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
@@ -81,7 +81,7 @@ void PrintLoneSlopes(const LoneSlopes& rows, const Config& config, std::ostream&
         << (flat == 1 ? " entry" : " entries") << ", pairs that differ in one column alone show no slope.\n";
 }
 
-void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+void PrintErrors(const ProposedDeclaration& proposal, const NominalModel& model, std::ostream& out) {
   out << "\n" << Line({"row", "noise_bound", "  repeated", "  deviation", "  Strongin", "  Knuth-Chou"});
   for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
     const ProposedRow& row = proposal.rows[k];
@@ -96,7 +96,7 @@ void PrintErrors(const Proposal& proposal, const NominalModel& model, std::ostre
 }
 
 // The smallest slopes of each row with scatter against its disturbance.
-void PrintTrades(const Proposal& proposal, const NominalModel& model, std::ostream& out) {
+void PrintTrades(const ProposedDeclaration& proposal, const NominalModel& model, std::ostream& out) {
   const std::vector<std::string> names = model.variable_names();
   std::string table;
   const auto line = [](const auto&... cells) { return fmt::format("  {:<12}{:<14}{:<14}{}\n", cells...); };
@@ -120,7 +120,7 @@ void PrintTrades(const Proposal& proposal, const NominalModel& model, std::ostre
 }
 
 // Rows whose declared error is below what the data show of it.
-std::vector<std::string> TooQuiet(const Proposal& proposal, const NominalModel& model) {
+std::vector<std::string> TooQuiet(const ProposedDeclaration& proposal, const NominalModel& model) {
   std::vector<std::string> names;
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
     if (const auto i = static_cast<Eigen::Index>(k);
@@ -129,7 +129,8 @@ std::vector<std::string> TooQuiet(const Proposal& proposal, const NominalModel& 
   return names;
 }
 
-void PrintMeaning(const Proposal& proposal, const NominalModel& model, const DataCommand& command, std::ostream& out) {
+void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model, const DataCommand& command,
+                  std::ostream& out) {
   std::vector<std::string> constant, scattered;
   for (const int l : proposal.constant) constant.push_back(model.variable_names()[ToSize(l)]);
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
@@ -220,7 +221,8 @@ Json ToJson(const HeldOutSteps& found) {
   return {{"stretches", found.stretches}, {"steps", found.steps}, {"slices", found.slices}, {"outside", found.outside}};
 }
 
-Json ToJson(const Proposal& proposal, const LoneSlopes& lone_slopes, const Config& config, const DataCommand& command) {
+Json ToJson(const ProposedDeclaration& proposal, const LoneSlopes& lone_slopes, const Config& config,
+            const DataCommand& command) {
   const NominalModel& model = *config.problem->model;
   const std::vector<std::string> names = model.variable_names();
   Json document{{"proven", false},
@@ -283,7 +285,7 @@ int DeclareFromData(const DataCommand& command) {
                                 ColumnsBy(command.by, *problem.model), [&] { progress->Advance(); }};
   try {
     const Observations observations = ObserveForProposal(problem, problem.transitions);
-    Proposal proposal = Propose(problem.declaration, observations, options);
+    ProposedDeclaration proposal = Propose(problem.declaration, observations, options);
     std::vector<CalmRegion> regions;
     if (command.regions > 1) regions = RegionsFor(problem, proposal.declaration, options, command.regions);
     progress.reset();

@@ -32,7 +32,7 @@ constexpr double kFactors[] = {1, 1.1, 1.25, 1.5, 2, 3, 5};
 // What one factor on the learned slopes gives on the held-out blocks.
 struct Trial {
   double factor = 1;
-  Contradictions found;
+  ContradictionCounts found;
   double block_upper = 1;  // of the probability that the next block has a contradiction
   int windows = 0, certified = 0;
   int states = 0;                 // recorded ones of all windows
@@ -53,7 +53,7 @@ struct Commands {
 std::vector<Commands> CommandsOf(const Transitions& transitions, const Split& split, int steps) {
   const Eigen::Index n = transitions.x_next.cols(), m = transitions.z.cols() - n;
   std::vector<Commands> all;
-  for (const Window& window : WindowsOf(transitions, split, steps)) {
+  for (const Stretch& window : WindowsOf(transitions, split, steps)) {
     Commands& commands = all.emplace_back();
     commands.controls = transitions.z.block(window.begin, n, steps, m).transpose();
     commands.states.resize(n, steps + 1);
@@ -155,7 +155,7 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
   table += contradictions("factor", "contradicting", "per thousand", "blocks", "next block") +
            plans("certified", "inside", "consistent", "left", "half-width") + "\n";
   for (const Trial& trial : trials) {
-    const Contradictions& found = trial.found;
+    const ContradictionCounts& found = trial.found;
     table += contradictions(ToText(trial.factor), fmt::format("{} of {}", found.contradicting, found.transitions),
                             RoundedUp(1000.0 * found.contradicting / found.transitions, 3),
                             fmt::format("{} of {}", found.blocks_contradicting, found.blocks),
@@ -250,7 +250,7 @@ int DeclareHoldOut(const DataCommand& command) {
                                    2 * ToSize(problem.model->num_states()) + std::size(kFactors));
   const ProposalOptions options{1, command.estimate_noise, command.estimate_disturbance,
                                 ColumnsBy(command.by, *problem.model), [&] { progress->Advance(); }};
-  Proposal learned;
+  ProposedDeclaration learned;
   try {
     learned =
         Propose(problem.declaration, ObserveForProposal(problem, RowsOf(problem.transitions, split.learn)), options);

@@ -73,13 +73,13 @@ Transitions RowsOf(const Transitions& transitions, const std::vector<Split::Bloc
   return part;
 }
 
-Contradictions CountContradictions(const Problem& problem, const Declaration& declaration, const Split& split) {
+ContradictionCounts CountContradictions(const Problem& problem, const Declaration& declaration, const Split& split) {
   const Observations learned = Observe(*problem.model, declaration, RowsOf(problem.transitions, split.learn));
   const Observations judged = Observe(*problem.model, declaration, RowsOf(problem.transitions, split.judge));
   const Observations all = Joined(learned, judged);
   std::vector<bool> contradicts(ToSize(judged.size()), false);
   for (int k = 0; k < all.num_states(); ++k) Mark(declaration, all, learned.size(), k, contradicts);
-  Contradictions found;
+  ContradictionCounts found;
   found.transitions = judged.size();
   found.contradicting = static_cast<int>(std::ranges::count(contradicts, true));
   auto at = contradicts.begin();
@@ -92,8 +92,8 @@ Contradictions CountContradictions(const Problem& problem, const Declaration& de
   return found;
 }
 
-std::vector<Window> WindowsOf(const Transitions& transitions, const Split& split, int steps) {
-  std::vector<Window> windows;
+std::vector<Stretch> WindowsOf(const Transitions& transitions, const Split& split, int steps) {
+  std::vector<Stretch> windows;
   const Eigen::Index n = transitions.x_next.cols();
   for (const Split::Block& block : split.judge)
     for (int begin = block.begin, i = begin; i < block.end; ++i) {

@@ -25,23 +25,23 @@ struct Split {
 
 /** What the judging blocks say against a declaration and the learning transitions. A transition counts if it provably
 contradicts one of the learning transitions; those among each other do not count. */
-struct Contradictions {
+struct ContradictionCounts {
   int transitions = 0, contradicting = 0;
   int blocks = 0, blocks_contradicting = 0;
 };
 
 /** Cost: one descent of a search tree over the learning transitions for each judging one and each row of L. */
-[[nodiscard]] Contradictions CountContradictions(const Problem& problem, const Declaration& declaration,
-                                                 const Split& split);
+[[nodiscard]] ContradictionCounts CountContradictions(const Problem& problem, const Declaration& declaration,
+                                                      const Split& split);
 
 /** A stretch of a block whose transitions follow one another: each begins in the state in which the one before it ends.
  */
-struct Window {
+struct Stretch {
   int begin = 0, steps = 0;
 };
 
 /** The stretches of exactly `steps` transitions in the judging blocks that do not overlap, in order. */
-[[nodiscard]] std::vector<Window> WindowsOf(const Transitions& transitions, const Split& split, int steps);
+[[nodiscard]] std::vector<Stretch> WindowsOf(const Transitions& transitions, const Split& split, int steps);
 
 /** Clopper & Pearson's upper bound: the largest p with P(X <= count) >= 1 - confidence for X ~ Binomial(trials, p),
 rounded up. In `trials` independent trials that each succeed with probability p, of which `count` did, p is at most the

@@ -13,7 +13,7 @@ namespace {
 constexpr int kMostForEstimators = 1000;
 
 // A double that is at least x and prints with few digits.
-double Rounded(double x) { return std::strtod(RoundedUp(x, Proposal::kDigits).c_str(), nullptr); }
+double Rounded(double x) { return std::strtod(RoundedUp(x, ProposedDeclaration::kDigits).c_str(), nullptr); }
 
 Observations Thinned(const Observations& observations, int most) {
   const int count = std::min(observations.size(), most);
@@ -66,10 +66,11 @@ Observations ObserveForProposal(const Problem& problem, const Transitions& trans
   return Observe(*problem.model, declaration, transitions);
 }
 
-Proposal Propose(const Declaration& declaration, const Observations& observations, const ProposalOptions& options) {
+ProposedDeclaration Propose(const Declaration& declaration, const Observations& observations,
+                            const ProposalOptions& options) {
   const int n = observations.num_states();
   const Eigen::RowVectorXd scales = ScalesOf(observations);
-  Proposal proposal{declaration, std::vector<ProposedRow>(ToSize(n)), {}};
+  ProposedDeclaration proposal{declaration, std::vector<ProposedRow>(ToSize(n)), {}};
   for (int l = 0; l < scales.size(); ++l)
     if (!(scales[l] > 0)) proposal.constant.push_back(l);
   Declaration& proposed = proposal.declaration;

@@ -41,7 +41,7 @@ struct ProposedRow {
   double strongin = 0, knuth_chou = 0;
 };
 
-struct Proposal {
+struct ProposedDeclaration {
   Declaration declaration;  ///< L = factor * smallest, sigma and w^, rounded up to kDigits; no pair contradicts it.
   std::vector<ProposedRow> rows;
   std::vector<int> constant;  ///< Columns of z that never vary: the data say nothing about their slopes, L has zeros.
@@ -64,7 +64,7 @@ that depends on the slopes, so the proposed ones may be larger than they have to
 /** @param declaration its sigma and disturbance are those of the task; its L is not read.
 @throws Unexplained if no row is consistent, which a w^ that is estimated always is. Cost: n (2 + columns) linear
 programs; the other estimators take at most 1000 observations, evenly chosen. */
-[[nodiscard]] Proposal Propose(const Declaration& declaration, const Observations& observations,
-                               const ProposalOptions& options);
+[[nodiscard]] ProposedDeclaration Propose(const Declaration& declaration, const Observations& observations,
+                                          const ProposalOptions& options);
 
 }  // namespace forereach

@@ -261,7 +261,7 @@ TEST_F(HoldOutTest, CountsEachFreshTransitionThatContradictsALearnedOne) {
   for (const double slope : {0.0, 0.005, 0.02, 0.1}) {
     declaration_.lipschitz(2, 2) = slope;
     const Split split = SplitByTime(120, 8);
-    const Contradictions found = CountContradictions(problem_, declaration_, split);
+    const ContradictionCounts found = CountContradictions(problem_, declaration_, split);
     EXPECT_FIELDS(found, (contradicting, Expected(split)), (transitions, 60), (blocks, 4));
     EXPECT_LE(found.contradicting, last);
     EXPECT_EQ(found.blocks_contradicting == 0, found.contradicting == 0);
@@ -285,9 +285,9 @@ TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 30).size(), 2u);
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 31).size(), 0u);
   problem_.transitions.z(45, 0) += 1e-12;
-  const std::vector<Window> windows = WindowsOf(problem_.transitions, split, 10);
+  const std::vector<Stretch> windows = WindowsOf(problem_.transitions, split, 10);
   std::vector<int> begins;
-  for (const Window& window : windows) begins.push_back(window.begin);
+  for (const Stretch& window : windows) begins.push_back(window.begin);
   EXPECT_THAT(begins, ElementsAre(30, 45, 90, 100, 110));
 }
 
