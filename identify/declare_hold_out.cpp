@@ -53,7 +53,7 @@ struct Commands {
 std::vector<Commands> CommandsOf(const Transitions& transitions, const Split& split, int steps) {
   const Eigen::Index n = transitions.x_next.cols(), m = transitions.z.cols() - n;
   std::vector<Commands> all;
-  for (const Stretch& window : WindowsOf(transitions, split, steps)) {
+  for (const HoldOutWindow& window : WindowsOf(transitions, split, steps)) {
     Commands& commands = all.emplace_back();
     commands.controls = transitions.z.block(window.begin, n, steps, m).transpose();
     commands.states.resize(n, steps + 1);

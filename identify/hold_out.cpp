@@ -92,8 +92,8 @@ ContradictionCounts CountContradictions(const Problem& problem, const Declaratio
   return found;
 }
 
-std::vector<Stretch> WindowsOf(const Transitions& transitions, const Split& split, int steps) {
-  std::vector<Stretch> windows;
+std::vector<HoldOutWindow> WindowsOf(const Transitions& transitions, const Split& split, int steps) {
+  std::vector<HoldOutWindow> windows;
   const Eigen::Index n = transitions.x_next.cols();
   for (const Split::Block& block : split.judge)
     for (int begin = block.begin, i = begin; i < block.end; ++i) {

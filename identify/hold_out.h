@@ -36,12 +36,12 @@ struct ContradictionCounts {
 
 /** A stretch of a block whose transitions follow one another: each begins in the state in which the one before it ends.
  */
-struct Stretch {
+struct HoldOutWindow {
   int begin = 0, steps = 0;
 };
 
 /** The stretches of exactly `steps` transitions in the judging blocks that do not overlap, in order. */
-[[nodiscard]] std::vector<Stretch> WindowsOf(const Transitions& transitions, const Split& split, int steps);
+[[nodiscard]] std::vector<HoldOutWindow> WindowsOf(const Transitions& transitions, const Split& split, int steps);
 
 /** Clopper & Pearson's upper bound: the largest p with P(X <= count) >= 1 - confidence for X ~ Binomial(trials, p),
 rounded up. In `trials` independent trials that each succeed with probability p, of which `count` did, p is at most the

@@ -242,7 +242,7 @@ int CountContradicting(const Problem& problem, const Transitions& judged) {
 }
 
 WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, const Transitions& judged,
-                         const Stretch& window, Tube& tube) {
+                         const HoldOutWindow& window, Tube& tube) {
   const int steps = window.steps, count = static_cast<int>(judged.x_next.cols()),
             inputs = static_cast<int>(judged.z.cols()) - count;
   Eigen::MatrixXd states(count, steps + 1);
@@ -431,7 +431,7 @@ Judgement Judge(const Learned& learned, const std::vector<Stretch>& stretches, i
   judgement.contradicting = CountContradicting(problem, judged);
   const Certifier certifier(learned.problem);
   Tube tube;
-  for (const Stretch& window : WindowsOf(judged, {{}, {{0, judged.size()}}}, steps))
+  for (const HoldOutWindow& window : WindowsOf(judged, {{}, {{0, judged.size()}}}, steps))
     judgement.windows.push_back(JudgeWindow(certifier, learned, judged, window, tube));
   return judgement;
 }

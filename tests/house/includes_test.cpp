@@ -60,6 +60,17 @@ TEST_F(IncludesTest, ATreeThatKeepsTheRulesPasses) {
   EXPECT_THAT(CheckIncludes(root_.string()), Exits(0, "14 files, 22 includes, 0 against the arrows"));
 }
 
+TEST_F(IncludesTest, TypesOfOneNameAreRefusedUnlessNoOtherFileSeesThem) {
+  const std::string of_all = "namespace forereach {\nstruct Window {\n};\n}  // namespace forereach\n";
+  const std::string of_file = "namespace forereach {\nnamespace {\nstruct Window {\n};\n}  // namespace\n}\n";
+  Write("records/window.h", of_all);
+  Write("identify/window.cpp", of_file);
+  EXPECT_EQ(CheckIncludes(root_.string()).code, 0);
+  Write("identify/window.h", of_all);
+  EXPECT_THAT(CheckIncludes(root_.string()),
+              Exits(1, "records/window.h:1: defines forereach::Window, as identify/window.h does"));
+}
+
 TEST_F(IncludesTest, TheDocumentHasEachFolderWithItsContentAndWhatItIncludes) {
   const std::string table = Shell("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' --table").text;
   EXPECT_THAT(table, AllOf(HasSubstr("| `forereach` | the proof as a library"), Not(HasSubstr("| ? |"))));

@@ -285,9 +285,9 @@ TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 30).size(), 2u);
   EXPECT_EQ(WindowsOf(problem_.transitions, split, 31).size(), 0u);
   problem_.transitions.z(45, 0) += 1e-12;
-  const std::vector<Stretch> windows = WindowsOf(problem_.transitions, split, 10);
+  const std::vector<HoldOutWindow> windows = WindowsOf(problem_.transitions, split, 10);
   std::vector<int> begins;
-  for (const Stretch& window : windows) begins.push_back(window.begin);
+  for (const HoldOutWindow& window : windows) begins.push_back(window.begin);
   EXPECT_THAT(begins, ElementsAre(30, 45, 90, 100, 110));
 }
 

@@ -13,7 +13,9 @@
 namespace forereach {
 
 inline std::vector<std::uint8_t> ReadBytes(const std::string& path) {
-  std::vector<std::uint8_t> bytes(std::filesystem::file_size(path));
+  std::error_code none;
+  const std::uintmax_t size = std::filesystem::file_size(path, none);
+  std::vector<std::uint8_t> bytes(none ? 0 : size);
   std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(bytes.data()), std::ssize(bytes));
   return bytes;
 }
