@@ -101,10 +101,11 @@ double Ways::LargestSlope(int k, int variable, const Box& box) const {
 }
 
 double Ways::Largest(Eigen::VectorXd Region::*bound, int k, double everywhere, Box box) const {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  for (auto& [lower, upper] : box) lower = std::nextafter(lower, -kNone), upper = std::nextafter(upper, kNone);
+  constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+  for (auto& [lower, upper] : box)
+    lower = std::nextafter(lower, -kUnbounded), upper = std::nextafter(upper, kUnbounded);
   Cut(box);
-  return LargestOf([=](const Region& region) { return (region.*bound).size() == 0 ? kNone : (region.*bound)[k]; },
+  return LargestOf([=](const Region& region) { return (region.*bound).size() == 0 ? kUnbounded : (region.*bound)[k]; },
                    everywhere, std::move(box));
 }
 

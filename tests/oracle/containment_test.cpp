@@ -90,7 +90,8 @@ bool Collides(const Obstacle& obstacle, const Eigen::MatrixXd& projection, const
              y[1] <= Real(points[1][1]);
     case Obstacle::Kind::kHalfSpace:
       return Real(points[0][0]) * y[0] + Real(points[0][1]) * y[1] >= Real(obstacle.offset());
-    case Obstacle::Kind::kPolygon: break;
+    case Obstacle::Kind::kPolygon:
+    case Obstacle::Kind::kGrid: break;  // none is made here
   }
   bool left = true, right = true;  // of every side of the triangle
   for (std::size_t i = 0; i < 3; ++i) {
