@@ -273,15 +273,8 @@ class SliceCheck {
   }
 
   void CheckStaysIn(const StayIn& area, const std::vector<Sweep>& sweeps, std::size_t part) {
-    Answer answer = sweeps.empty() ? Answer::kUnknown : Answer::kNo;
-    Real best(-std::numeric_limits<double>::infinity());
-    for (const Sweep& sweep : sweeps) {
-      Real margin;
-      const Answer of_this = IsWithin(sweep, area.rings, margin);
-      best = max(best, margin);
-      if (of_this == Answer::kYes) return;
-      if (of_this == Answer::kUnknown) answer = of_this;
-    }
+    Real best;
+    const Answer answer = IsWithin(sweeps, area.rings, best);
     claims_.Judge(answer, best, 0.0, abs(best), "above",
                   [&] { return "part " + std::to_string(part) + " of the body stays in " + area.name; });
   }

@@ -464,15 +464,18 @@ Answer IsClear(std::span<const Sweep> sweeps, const Obstacle& obstacle, double c
   return IsClearOf(CoreOf(obstacle), sweeps, clearance, best, passage);
 }
 
-Answer IsWithin(const Sweep& sweep, const Rings& rings, Real& margin) {
+Answer IsWithin(std::span<const Sweep> sweeps, const Rings& rings, Real& margin) {
   margin = 0.0;
-  if (const Answer inside = IsAround(rings, sweep.places().front().center); inside != Answer::kYes) return inside;
+  if (sweeps.empty()) return Answer::kUnknown;
+  // By Taylor's theorem a place has its center for the slice's center, so it is what the part sweeps.
+  const Place& place = sweeps[sweeps.size() / 2].places().front();
+  if (const Answer inside = IsAround(rings, place.center); inside != Answer::kYes) return inside;
   margin = std::numeric_limits<double>::infinity();
   for (const auto& ring : rings)
     for (std::size_t i = 0; i < ring.size(); ++i) {
       const Eigen::Vector2d &a = ring[i], &b = ring[(i + 1) % ring.size()];
       Real best;
-      const Answer clear = IsClear(sweep, Obstacle::Polygon({a, b, b}), 0, best);
+      const Answer clear = IsClear(sweeps, Obstacle::Polygon({a, b, b}), 0, best);
       margin = min(margin, best);
       if (clear != Answer::kYes) return clear;
     }

@@ -26,9 +26,11 @@ to the least of those for its cells.
   return IsClear(std::span(&sweep, 1), obstacle, clearance, best, passage);
 }
 
-/** Whether a sweep in the plane lies inside of rings: it is connected, meets none of their sides, and the rings go an
-odd number of times around one of its points. @param margin is set to the largest lower bound found on its distance from
-the sides, or to 0 if the point is outside. */
-[[nodiscard]] Answer IsWithin(const Sweep& sweep, const std::vector<std::vector<Eigen::Vector2d>>& rings, Real& margin);
+/** Whether what lies in every one of the sweeps in the plane, of SweepsOf, is inside of rings: it is connected, it is
+clear of each of their sides, and the rings go an odd number of times around one of its points; without sweeps it is
+kUnknown. @param margin is set to the largest lower bound found on its distance from the sides, or to 0 if the point is
+outside. */
+[[nodiscard]] Answer IsWithin(std::span<const Sweep> sweeps, const std::vector<std::vector<Eigen::Vector2d>>& rings,
+                              Real& margin);
 
 }  // namespace forereach::verifier

@@ -97,6 +97,26 @@ TEST(Separation, AGridIsAsFarAsItsNearestCell) {
   }
 }
 
+// Each of two sweeps sticks out of the square on other sides; what lies in both does not.
+TEST(Separation, EachSideOfAnAreaMayBeClearedByAnotherSweep) {
+  const Precision precision(256);
+  const auto box = [](double x, double y) -> Sweep {
+    return ProjectedSlice(BoxSlice({x, y}), Eigen::Matrix2d::Identity());
+  };
+  const auto is_within = [](const std::vector<Sweep>& sweeps, double half, double at = 0) {
+    Real margin;
+    return IsWithin(sweeps, {{{at - half, -half}, {at + half, -half}, {at + half, half}, {at - half, half}}}, margin);
+  };
+  const std::vector<Sweep> crossed{box(3, 0.5), box(0.5, 3)};
+  EXPECT_EQ(is_within(crossed, 1), Answer::kYes);
+  EXPECT_EQ(is_within(crossed, std::nextafter(0.5, 1)), Answer::kYes);
+  EXPECT_EQ(is_within(crossed, 0.5), Answer::kNo);
+  EXPECT_EQ(is_within({crossed[0]}, 1), Answer::kNo);
+  EXPECT_EQ(is_within({crossed[0], crossed[0]}, 1), Answer::kNo) << "nothing clears the sides to the left and right";
+  EXPECT_EQ(is_within(crossed, 1, 10), Answer::kNo) << "clear of all sides, and outside";
+  EXPECT_EQ(is_within({}, 1), Answer::kUnknown);
+}
+
 TEST(Separation, AllBeyondAGridIsOccupied) {
   const Precision precision(256);
   const ProjectedSlice slice(BoxSlice({0.25, 0.5}), Eigen::MatrixXd::Identity(2, 2));
