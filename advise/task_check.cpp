@@ -791,20 +791,29 @@ class Examination final {
   void ExamineSteps() {
     if (problem_.between) return;
     const double step = LongestStep(), body = BodyThickness();
-    for (std::size_t i = 0; i < config_.obstacles.size(); ++i) {
-      const Obstacle& obstacle = config_.obstacles[i];
-      if (obstacle.kind() == Obstacle::Kind::kHalfSpace || IsOutside(obstacle)) continue;  // more is behind a piece
-      const double thickness = obstacle.grid()
-                                   ? MapOf(obstacle).resolution
-                                   : LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
-      if (step <= thickness + body) continue;
+    const auto may_pass = [&](double thickness, const std::string& what) {
+      if (step <= thickness + body) return false;
       Add("task.between",
           fmt::format("the robot moves by up to {} m in one step of {} s, and {} is {} m thick: with "
                       "certificates at the samples only it may pass through between two of them",
-                      Up(step), ToText(config_.period), ObstacleText(i), Down(thickness)),
+                      Up(step), ToText(config_.period), what, Down(thickness)),
           "declare bounds on the motion between samples, `between: {acceleration: [...]}`; or a smaller step or speed");
-      return;
+      return true;
+    };
+    for (std::size_t i = 0; i < config_.num_listed; ++i) {  // behind a piece of the outside is more, but for a hole
+      const Obstacle& obstacle = config_.obstacles[i];
+      if (obstacle.kind() == Obstacle::Kind::kHalfSpace) continue;
+      const double thickness = obstacle.grid()
+                                   ? MapOf(obstacle).resolution
+                                   : LeastExtent(obstacle.lower(), obstacle.upper()) + 2 * obstacle.radius();
+      if (may_pass(thickness, ObstacleText(i))) return;
     }
+    for (const KeepIn& keep_in : config_.keep_in)
+      for (const Ring& hole : keep_in.area.holes) {
+        const auto [left, right] = std::ranges::minmax(hole, {}, &PlanePoint::x);
+        const auto [low, high] = std::ranges::minmax(hole, {}, &PlanePoint::y);
+        if (may_pass(LeastExtent({left.x, low.y, 0}, {right.x, high.y, 0}), "a hole of " + keep_in.name)) return;
+      }
   }
 
   // ---- The picture.
