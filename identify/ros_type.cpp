@@ -83,6 +83,7 @@ RosType::RosType(std::string name, std::string_view text) : name_(Short(name)) {
       if (!FindRosPrimitive(member.type) && !types_.contains(member.type))
         throw ConfigError(
             fmt::format("the schema of {} lacks the type {} of {}.{}", name_, member.type, user, member.name));
+  if (!types_.contains(name_)) throw ConfigError("a schema without a name");
 }
 
 void RosType::AddText(const std::string& type, std::string_view text, int line) {
