@@ -7,6 +7,7 @@
 #include <array>
 #include <concepts>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -57,7 +58,7 @@ class Fields {
 };
 
 // Sets `to` to what was compressed, if it has its size.
-void Unpack(const std::string& compression, std::string_view packed, std::string& to) {
+void Unpack(const std::string& compression, std::string_view packed, std::span<char> to) {
   std::size_t size = 0;
   if (compression == "zstd") {
     size = ZSTD_decompress(to.data(), to.size(), packed.data(), packed.size());
@@ -170,9 +171,10 @@ void McapReader::OpenChunk(std::string_view content) {
     throw Damage(fmt::format("a chunk of {} bytes, at most {} are read", size, kLargestRecord));
   std::string_view records = packed;
   if (!compression.empty()) {
-    chunk_.resize(static_cast<std::size_t>(size));
-    Unpack(compression, packed, chunk_);
-    records = chunk_;
+    if (chunk_.size() < size) chunk_.resize(static_cast<std::size_t>(size));
+    const std::span<char> to(chunk_.data(), static_cast<std::size_t>(size));
+    Unpack(compression, packed, to);
+    records = {to.data(), to.size()};
   }
   if (crc != 0 && mcap::Crc(0, records) != crc) throw Damage("a chunk with another checksum");
   rest_ = records;

@@ -12,12 +12,15 @@
 #include "identify/message_place.h"
 #include "identify/ros_type.h"
 #include "task/config_error.h"
+#include "task/files.h"
 #include "task/json_text.h"
 
 namespace forereach {
 namespace {
 
 using Json = nlohmann::json;
+
+constexpr std::int64_t kLargestJson = 16 * kMegabyte;  // of a message: in memory it is many times larger
 
 const Json* Find(const Json& object, const std::vector<PlaceStep>& place) {
   const Json* at = &object;
@@ -90,6 +93,7 @@ class McapTableReader {
   }
 
   std::optional<std::vector<double>> JsonValues() {
+    if (std::ssize(log_.bytes()) > kLargestJson) return std::nullopt;
     Json object;
     try {
       object = ParseJson(log_.bytes());

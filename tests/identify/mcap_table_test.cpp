@@ -196,6 +196,29 @@ TEST_F(McapTableTest, JsonIsRead) {
               HasSubstr("STATE: no message has a number z"));
 }
 
+// In memory it would be many times larger than in the file.
+TEST_F(McapTableTest, JsonOfManyMegabytesIsLost) {
+  const auto rows = [&](std::size_t size) {
+    std::string text = R"({"x": 1})";
+    text.insert(1, size - text.size(), ' ');
+    const LogTable table =
+        Table(File(Channel(1, 0, "/a", "json") + Message(1, 1, R"({"x": 2})") + Message(1, 2, text)), {"/a.x"});
+    return fmt::format("{} rows, {} lost", table.values.rows(), table.lost.count);
+  };
+  EXPECT_EQ(rows(16 << 20), "2 rows, 0 lost");
+  EXPECT_EQ(rows((16 << 20) + 1), "1 rows, 1 lost");
+}
+
+// The room of a larger chunk is kept.
+TEST_F(McapTableTest, AChunkIsNoLongerThanItSays) {
+  const std::string one = Message(1, 1, OdometryAt(1, 1, 0, 1)), two = Message(1, 2, OdometryAt(2, 2, 0, 1));
+  for (const std::string packing : {"lz4", "zstd"}) {
+    const LogTable table = Table(File(Described() + Chunk(packing, one + two) + Chunk(packing, one)), odometry_);
+    EXPECT_EQ(table.values.rows(), 3) << packing;
+    EXPECT_EQ(table.lost.count, 0) << packing;
+  }
+}
+
 TEST_F(McapTableTest, DamageIsLostAndSaid) {
   const std::string one = Message(1, 1, OdometryAt(1, 1, 0, 1)), two = Message(1, 2, OdometryAt(2, 2, 0, 1));
   const auto lost = [&](const std::string& file) {
@@ -262,6 +285,11 @@ TEST(RosType, ReadsConstantsArraysAndTexts) {
     EXPECT_FALSE(type.Read(places, cdr.bytes().substr(0, cut))) << cut;
   EXPECT_TRUE(type.Read(places, cdr.bytes() + std::string(3, '\0'))) << "padding";
   EXPECT_FALSE(type.Read(places, cdr.bytes() + std::string(4, '\0')));
+}
+
+TEST(RosType, WithoutANameIsRefused) {
+  EXPECT_THROW(RosType("", "float64 x"), ConfigError);
+  EXPECT_THROW(RosType("", ""), ConfigError);
 }
 
 // A type in itself, and lengths that lie.
