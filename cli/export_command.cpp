@@ -134,8 +134,9 @@ void Describe(const ExportArguments& options, const ExportResult& result, const 
 }
 
 void SetFormat(ExportArguments& options, bool is_many) {
-  options.what.format =
-      static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) - kExportFormats.begin());
+  const auto found = std::ranges::find(kExportFormats, options.format);
+  if (found == kExportFormats.end()) throw ConfigError("no format of an export is called " + options.format);
+  options.what.format = static_cast<ExportFormat>(found - kExportFormats.begin());
   options.what.names_robot = is_many;
   if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
 }
@@ -221,6 +222,8 @@ int WriteMergedExport(const Shards& shards, const std::string& out) {
                           FilesOf(options, parts, run));
     *result += std::move(*of_run).Sum();
   }
+  if (!named.is_many && (results.size() != 1 || !results.front()))
+    throw ConfigError(shards.files().front() + ": has not the result of one run");
   return Finish(options, named, results, parts);
 }
 

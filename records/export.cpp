@@ -383,12 +383,39 @@ ShardPieces::ShardPieces(const std::string& path) : path_(path), in_(path) {
   std::getline(in_, header);
 }
 
+void ShardPieces::Refuse() const { throw OutputError(path_ + ": has no pieces of an export"); }
+
+// The next piece, unless it is there: an array of at most 23 whole numbers, texts and byte strings, each in one part.
+// All else may nest, and nlohmann's reader recurses.
+void ShardPieces::Read() {
+  if (!next_.is_null() || in_.peek() == '}') return;
+  constexpr int kArray = 0x80, kMostEntries = 23, kArrayType = 4, kInParts = 31;
+  const int head = in_.get();
+  if (head < kArray || head > kArray + kMostEntries) Refuse();
+  next_ = nlohmann::json::array();
+  for (int i = kArray; i < head; ++i) {
+    const int entry = in_.peek();
+    if (entry < 0 || entry >> 5 >= kArrayType || (entry & kInParts) == kInParts) Refuse();
+    next_.push_back(nlohmann::json::from_cbor(in_, false));
+  }
+}
+
 nlohmann::json ShardPieces::Take(std::int64_t run, std::int64_t number) try {
-  if (next_.is_null() && in_.peek() != '}') next_ = nlohmann::json::from_cbor(in_, false);
+  Read();
   if (next_.is_null() || next_.at(0) != run || next_.at(1) != number) return nullptr;
   return std::exchange(next_, nullptr);
 } catch (const nlohmann::json::exception&) {
-  throw OutputError(path_ + ": has no pieces of an export");
+  Refuse();
+}
+
+std::int64_t ShardPieces::Next(std::int64_t run, std::int64_t first) try {
+  Read();
+  if (next_.is_null() || next_.at(0) != run) return INT64_MAX;
+  const auto number = next_.at(1).get<std::int64_t>();
+  if (number < first) Refuse();
+  return number;
+} catch (const nlohmann::json::exception&) {
+  Refuse();
 }
 
 ExportResult ExportPieces(const std::string& robot, std::int64_t number, std::int64_t cases,
@@ -396,6 +423,11 @@ ExportResult ExportPieces(const std::string& robot, std::int64_t number, std::in
                           const std::vector<std::string>& files) {
   const std::unique_ptr<Sink> sink = SinkOf(robot, options, files);
   for (std::int64_t i = 0; i < cases; ++i) {
+    if (i % std::ssize(shards) == 0) {  // past cases without pieces
+      std::int64_t next = cases;
+      for (ShardPieces& shard : shards) next = std::min(next, shard.Next(number, i));
+      i = next - next % std::ssize(shards);
+    }
     ShardPieces& shard = shards[static_cast<std::size_t>(i) % shards.size()];
     for (nlohmann::json piece; !(piece = shard.Take(number, i)).is_null();) sink->Put(piece);
   }

@@ -70,15 +70,21 @@ class ShardPieces final {
   explicit ShardPieces(const std::string& path);
   /** The next piece if it is of this case; otherwise null. @throws BadInput if it is no piece. */
   [[nodiscard]] nlohmann::json Take(std::int64_t run, std::int64_t number);
+  /** The number of the case of the next piece; the largest number if that is of another run, or there is none.
+  @throws BadInput if it is no piece, or its case is before `first`. */
+  [[nodiscard]] std::int64_t Next(std::int64_t run, std::int64_t first);
 
  private:
+  void Read();
+  [[noreturn]] void Refuse() const;
+
   const std::string path_;
   std::ifstream in_;
   nlohmann::json next_;
 };
 
 /** Writes the files of one run out of the pieces of all its shards, in the order of their numbers. The result has no
-more than the pieces tell. @throws BadInput. */
+more than the pieces tell. Cost: that of the pieces, whatever `cases` is. @throws BadInput. */
 [[nodiscard]] ExportResult ExportPieces(const std::string& robot, std::int64_t number, std::int64_t cases,
                                         const ExportOptions& options, std::vector<ShardPieces>& shards,
                                         const std::vector<std::string>& files);

@@ -202,6 +202,32 @@ TEST_F(ShardsTest, OfAnExportThatAreDamagedAreRefused) {
   };
   EXPECT_THAT(sealed("\xff\xff}\n"), Exits(2, file + ": has no "));
   EXPECT_THAT(sealed("\x83\x00\x00\x01}\n"), Exits(2, file + ": has no "));
+  for (const char nested : {'\x81', '\x7f', '\x5f', '\xa1', '\xc1'})  // deeper than a stack
+    for (const std::string head : {"", "\x84"}) {
+      EXPECT_THAT(sealed(head + std::string(20'000'000, nested)), Exits(2, file + ": has no ")) << head << nested;
+    }
+  const auto with = [&](const char* key, const nlohmann::json& value) {
+    const auto before = std::exchange(document, document);
+    document.merge_patch({{key, value}});
+    if (document.at("runs").empty()) document["results"] = nlohmann::json::array();
+    const Output output = sealed(whole.substr(end));
+    document = before;
+    return output;
+  };
+  EXPECT_THAT(with("options", {{"format", "xml"}}), Exits(2, "no format of an export is called xml"));
+  for (const std::string format : {"jsonl", "npz"}) {
+    document["options"]["format"] = format;
+    EXPECT_THAT(with("runs", nlohmann::json::array()), Exits(2, file + ": has not the result of one run"));
+    EXPECT_THAT(with("results", {nullptr}), Exits(2, file + ": has not the result of one run"));
+  }
+  document["options"]["format"] = "jsonl";
+  const std::int64_t cases = std::exchange(document["results"][0]["cases"], INT64_MAX);
+  EXPECT_EQ(sealed(whole.substr(end)).code, 0) << "in no more time than its pieces take";
+  fs::remove(out);
+  EXPECT_THAT(
+      sealed(std::string("\x84\x00\x1b\x7f\xff\xff\xff\xff\xff\xff\xfe\x61x\x61\n", 15) + "\x84\x00\x05\x61x\x61\n}\n"),
+      Exits(2, file + ": has no "));
+  document["results"][0]["cases"] = cases;
   EXPECT_FALSE(fs::exists(out));
   EXPECT_EQ(sealed(whole.substr(end)).code, 0);
   EXPECT_THAT(Merge(merge), Exits(2, out));
