@@ -40,16 +40,19 @@ std::string DayOf(std::int64_t utime) {
                      static_cast<unsigned>(date.day()));
 }
 
-transition_t MessageOf(const TransitionRow& row) {
+// The message of a row; none if it has other sizes than a message's: a robot may have put any rows there.
+std::optional<transition_t> MessageOf(const TransitionRow& row) {
   transition_t message{};
+  if (row.state.size() > std::size(message.state) || row.input.size() > std::size(message.input) ||
+      row.next_state.size() != row.state.size())
+    return std::nullopt;
   message.utime = row.utime;
   message.duration_us = row.duration_us;
-  message.num_states = static_cast<std::int16_t>(std::min<std::size_t>(row.state.size(), std::size(message.state)));
-  message.num_inputs = static_cast<std::int16_t>(std::min<std::size_t>(row.input.size(), std::size(message.input)));
-  std::copy_n(row.state.begin(), message.num_states, message.state);
-  std::copy_n(row.input.begin(), message.num_inputs, message.input);
-  std::copy_n(row.next_state.begin(), std::min(row.next_state.size(), std::size(message.next_state)),
-              message.next_state);
+  message.num_states = static_cast<std::int16_t>(row.state.size());
+  message.num_inputs = static_cast<std::int16_t>(row.input.size());
+  std::ranges::copy(row.state, message.state);
+  std::ranges::copy(row.input, message.input);
+  std::ranges::copy(row.next_state, message.next_state);
   return message;
 }
 
@@ -70,7 +73,12 @@ class Reading final {
     const std::string group = by_ == TransitionsBy::kRobot ? robot : DayOf(row.event.utime);
     const Place place{&*names_.insert(robot).first, &*names_.insert(row.event.log_file).first, row.event.event_number};
     Group& of_group = groups_[group];
-    const ExecutedTransition executed = Examine(MessageOf(row), problem_);
+    const std::optional<transition_t> message = MessageOf(row);
+    ExecutedTransition executed;
+    if (message)
+      executed = Examine(*message, problem_);
+    else
+      executed.refusal = "the row has other sizes than a message of a step";
     if (!executed.refusal.empty()) {
       ++of_group.refused;
       ++refused_.try_emplace(KindOf(executed.refusal), 0, place).first->second.first;

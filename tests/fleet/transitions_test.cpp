@@ -138,4 +138,22 @@ TEST_F(FleetImportTest, LeavesOutWhatNoCertifierLearns) {
   EXPECT_EQ(tables["Refused"]["rows"].size(), 3u) << tables["Refused"];
 }
 
+TEST_F(FleetImportTest, LeavesOutRowsThatNoMessageHas) {
+  Add("r1");
+  const std::string nth = "WHERE event_number = (SELECT event_number FROM transitions ORDER BY 1 OFFSET ";
+  const std::string many = "'[' || repeat('0,', 16) || '0]'";  // a message has 16 at most
+  EXPECT_EQ(server_
+                ->Sql("UPDATE transitions SET next_state = '[1, 2]' " + nth +
+                      "1 LIMIT 1); UPDATE transitions SET state = " + many + ", next_state = " + many + nth +
+                      "2 LIMIT 1); UPDATE transitions SET input = '[]' || '' " + nth + "3 LIMIT 1)")
+                .text,
+            "");
+  const auto tables = Tables();
+  EXPECT_EQ(tables["Residuals"]["rows"][0][2], "3");
+  const auto refused = tables["Refused"]["rows"];
+  ASSERT_EQ(refused.size(), 2u) << refused;
+  EXPECT_THAT((std::set<std::string>{refused[0][0], refused[1][0]}), testing::ElementsAre("1", "2"));
+  EXPECT_THAT(tables["Refused"].dump(), HasSubstr("the row has other sizes than a message of a step"));
+}
+
 }  // namespace forereach::transitions_test
