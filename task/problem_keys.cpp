@@ -522,6 +522,10 @@ Obstacle ReadGrid(const Field& at) {
   map.origin = {origin[0], origin[1]};
   map.yaw = origin.size() > 2 ? origin[2] : 0;
   ReadRows(at["rows"], map.outside_is_free, map);
+  // YAML takes a row that begins with # and stands too far left for a comment: a wall would be gone.
+  if (const Eigen::VectorXd size = at["size"].Vector(); size[0] != map.width || size[1] != map.height)
+    at["rows"].Fail(fmt::format("has {} by {} cells, size says {} by {}; indent all rows as the first one", map.width,
+                                map.height, size[0], size[1]));
   return Obstacle::Grid(std::make_shared<const OccupancyGrid>(std::move(map)));
 }
 
@@ -714,6 +718,8 @@ std::vector<Key> ObstacleKeys() {
   Key origin = Vector("task.obstacles[].grid.origin", "m, m, rad", Between(-1e9, 1e9), Size::kAny,
                       "x and y of the lower left corner, and yaw; 0 if it is left out.");
   origin.count = Between(2, 3);
+  Key size = Vector("task.obstacles[].grid.size", "cells", kPositive, Size::kAny, "Width and height of its rows.");
+  size.count = Between(2, 2);
   return {
       Required(List("task.obstacles", Between(0, kMostObstacles),
                     "The unsafe sets, closed; `[]` for none. With `gate.obstacles: bus` those received count too.")),
@@ -744,6 +750,7 @@ std::vector<Key> ObstacleKeys() {
       Optional(
           Word("task.obstacles[].grid.unknown", {"occupied", "free"}, "What a cell `?` is, and all beyond the map."),
           "occupied"),
+      Required(size),
       Required(Text("task.obstacles[].grid.rows",
                     fmt::format("A line for each row, the lowest last: `#` occupied, `.` free, `?` unknown. At most {} "
                                 "cells, of which the occupied ones make up at most {} rectangles.",

@@ -20,9 +20,10 @@ std::string Numbers(const Eigen::VectorXd& y) { return fmt::format("[{}, {}]", T
 
 // The rows of a map are a block, whose lines stand further in than its key.
 std::string GridText(const GridMap& map, const std::string& indent) {
-  std::string text = fmt::format("grid:\n{0}resolution: {1}\n{0}origin: [{2}, {3}, {4}]\n{0}unknown: {5}\n{0}rows: |",
-                                 indent, ToText(map.resolution), ToText(map.origin[0]), ToText(map.origin[1]),
-                                 ToText(map.yaw), map.outside_is_free ? "free" : "occupied");
+  std::string text = fmt::format(
+      "grid:\n{0}resolution: {1}\n{0}origin: [{2}, {3}, {4}]\n{0}unknown: {5}\n{0}size: [{6}, {7}]\n{0}rows: |", indent,
+      ToText(map.resolution), ToText(map.origin[0]), ToText(map.origin[1]), ToText(map.yaw),
+      map.outside_is_free ? "free" : "occupied", map.width, map.height);
   for (int row = map.height; row-- > 0;) {
     text += "\n" + indent + "  ";
     for (int column = 0; column < map.width; ++column) text += map.IsOccupied(column, row) ? '#' : '.';

@@ -563,10 +563,10 @@ TEST_F(LoadConfig, ReadsEveryObstacle) {
 
 TEST_F(LoadConfig, ReadsAMapFromItsTopRowDown) {
   const auto load = [&](const std::string& more, const std::string& rows) {
-    return files_.Load(
-        Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
-                 "\n    - name: map\n      grid:\n        resolution: 0.5\n        origin: [1, 2, 0.25]\n" + more +
-                     "        rows: |\n          " + rows + "\n          ...\n"));
+    return files_.Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
+                                "\n    - name: map\n      grid:\n        resolution: 0.5\n        size: [3, 2]\n"
+                                "        origin: [1, 2, 0.25]\n" +
+                                    more + "        rows: |\n          " + rows + "\n          ...\n"));
   };
   const Config config = load("", "#.?");
   const OccupancyGrid::Map& map = Only(config.obstacles).grid()->map();

@@ -509,7 +509,8 @@ TEST_F(ErrorTest, AnImpossibleObstacleIsAnError) {
 
 TEST_F(ErrorTest, AMapThatIsNoneIsAnError) {
   const auto with = [&](const std::string& rest, const std::string& rows = "#.\\n.?") {
-    return With("{circle: {center: [3, 2], radius: 0.8}}", "{grid: {" + rest + ", rows: \"" + rows + "\"}}");
+    return With("{circle: {center: [3, 2], radius: 0.8}}",
+                "{grid: {size: [2, 2], " + rest + ", rows: \"" + rows + "\"}}");
   };
   const std::string fine = "resolution: 0.5, origin: [0, 0]", at = "18: task.obstacles[0].grid";
   EXPECT_EQ(with(fine), "");
@@ -523,13 +524,30 @@ TEST_F(ErrorTest, AMapThatIsNoneIsAnError) {
   EXPECT_EQ(with(fine, "#.\\n#"), at + ".rows: line 2 of the rows has 1 cells, the first one has 2");
   EXPECT_THAT(with(fine, "#.\\n x"),
               StartsWith(at + ".rows: line 2 of the rows has byte 32 as cell 1, a cell is one of"));
-  EXPECT_EQ(with(fine, "\\n"), at + ": grid: 0 by 1 cells, must be 1 to 16777216 in all");
-  std::string many = "{grid: {" + fine + ", rows: x}}";
+  EXPECT_EQ(with(fine, "\\n"), at + ".rows: has 0 by 1 cells, size says 2 by 2; indent all rows as the first one");
+  std::string many = "{grid: {size: [1, 1], " + fine + ", rows: x}}";
   many.replace(many.find(": x"), 3, ": \"#\"");
   std::string all = many;
   for (int i = 1; i < 9; ++i) all += ", " + many;
   EXPECT_EQ(With("{circle: {center: [3, 2], radius: 0.8}}", all),
             "18: task.obstacles[8]: is the 9th grid, at most 8 are taken");
+}
+
+// For YAML it is a comment: without its size, the map would be one without its lowest wall.
+TEST_F(ErrorTest, AWallThatStandsTooFarLeftIsAnError) {
+  const auto with = [&](const std::string& size, const std::string& last) {
+    return With("[{circle: {center: [3, 2], radius: 0.8}}]", "\n    - grid:\n        resolution: 0.5\n" + size +
+                                                                 "        origin: [0, 0]\n        unknown: free\n"
+                                                                 "        rows: |\n          #..#\n" +
+                                                                 last + "####\n");
+  };
+  const std::string size = "        size: [4, 2]\n";
+  EXPECT_EQ(with(size, "          "), "");
+  for (const std::string left : {"", "      ", "        "})
+    EXPECT_THAT(with(size, left), HasSubstr("rows: has 4 by 1 cells, size says 4 by 2; indent")) << left.size();
+  EXPECT_THAT(with("        size: [4, 1.5]\n", "          "), HasSubstr("has 4 by 2 cells, size says 4 by 1.5"));
+  EXPECT_THAT(with("        size: [4]\n", "          "), HasSubstr("grid.size: has 1 entries"));
+  EXPECT_THAT(with("", "          "), HasSubstr("grid.size: missing"));
 }
 
 TEST_F(ErrorTest, ATransitionOutsideTheDomainIsAnError) {
