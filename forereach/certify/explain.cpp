@@ -173,6 +173,8 @@ std::string ObstacleNamedIn(std::string_view sentence) {
   for (const std::string_view before : {" may touch ", " may leave ", " m from "})
     if (const std::size_t at = sentence.find(before); at != std::string_view::npos) {
       std::string_view name = sentence.substr(at + before.size());
+      const std::size_t of = name.substr(0, name.find(" (by ")).find(" of ");
+      if (before != " m from " && of != std::string_view::npos) name.remove_prefix(of + 4);  // "cell (0, 1) of map"
       name = name.substr(0, name.find_first_of(" ,;"));
       if (!WhyNoName(name).empty() || name == "obstacle") return {};
       return std::string(before == " may leave " ? kOutside : "").append(name);

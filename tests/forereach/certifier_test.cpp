@@ -99,6 +99,14 @@ TEST(Certificate, CallsAnObstacleByItsName) {
   }
 }
 
+TEST(ObstacleNames, AreFoundInTheSentence) {
+  for (const std::string touched :
+       {"map", "cell (6, 0) of map", "cells (6, 0) to (6, 5) of map", "what is beyond of map"})
+    EXPECT_EQ(ObstacleNamedIn("abstain S: at step 3 the robot may touch " + touched + " (by 0.1 m)"), "map") << touched;
+  EXPECT_EQ(ObstacleNamedIn("abstain S: at step 3 part 1 may touch cell (by 0.1 m); of 3 trials"), "cell");
+  EXPECT_EQ(ObstacleNamedIn("abstain S: at step 3 the robot may touch cell (6, 0) of obstacle 2 (by 0.1 m)"), "");
+}
+
 TEST(ObstacleNames, CannotBreakALogLineAPageOrATerminal) {
   const Obstacle any = Obstacle::Circle(Vec({0, 0}), 1);
   const std::string longest(kMaxObstacleName, 'x');
