@@ -150,6 +150,8 @@ MapFile ReadMapFile(const std::string& path) {
   TaskDraft draft;
   document.Read(draft, keys);
   if (map.free > map.occupied) document.Fail("free_thresh", "is above occupied_thresh");
+  if (map.mode == "raw" && map.is_negated)
+    document.Fail("negate", "has no one meaning with mode raw: map_server of ROS 2 ignores it there; write negate: 0");
   return map;
 }
 
@@ -166,7 +168,7 @@ OccupancyGrid::Map CellsOf(const GrayImage& image, const MapFile& file, const Ma
   for (int value = 0; value <= image.largest; ++value) {
     const double dark = static_cast<double>(file.is_negated ? value : image.largest - value) / image.largest;
     const bool takes_unknown = options.unknown_is_free && file.mode == "trinary";
-    is_occupied[ToSize(value)] = file.mode == "raw"                    ? value != (file.is_negated ? image.largest : 0)
+    is_occupied[ToSize(value)] = file.mode == "raw"                    ? value != 0
                                  : takes_unknown                       ? dark > file.occupied
                                  : IsSaversUnknown(image, file, value) ? true
                                                                        : !(dark < file.free);
@@ -196,9 +198,13 @@ GrayImage ReadPng(const std::string& file, std::string_view bytes) {
     for (std::size_t i = at; i < at + 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[i]);
     return value;
   };
-  constexpr std::size_t kHead = 24;  // up to width and height
-  if (bytes.size() < kHead || std::uint64_t{number(16)} * number(20) > kMaxPixels)
+  constexpr std::size_t kHead = 25;  // up to width, height and bits
+  if (bytes.size() < kHead || bytes.substr(8, 8) != std::string_view("\0\0\0\rIHDR", 8) ||
+      std::uint64_t{number(16)} * number(20) > kMaxPixels)
     throw ConfigError(fmt::format("{}: has no size, or more than {} pixels", file, kMaxPixels));
+  if (bytes[24] == 16)
+    throw ConfigError(
+        file + ": has 16 bits a channel, of which 8 would be lost; `convert IMAGE map.pgm` of ImageMagick keeps them");
   const auto read = [](void* rest, unsigned char* to, unsigned count) noexcept {
     auto& from = *static_cast<std::string_view*>(rest);
     if (count > from.size()) return CAIRO_STATUS_READ_ERROR;

@@ -173,6 +173,7 @@ TEST_F(MapTest, OfARawMapWhatHasACostIsOccupied) {
   for (int column = 0; column < 3; ++column)
     for (int row = 0; row < 2; ++row)
       EXPECT_EQ(Contains(world, Middle(column, row)), row == 1 ? column > 0 : column == 1) << column << ", " << row;
+  EXPECT_THAT(WhyNot(Instead("negate", "negate: 1\nmode: raw")), HasSubstr("map.yaml:4: negate: has no one meaning"));
 }
 
 // Its own free_thresh, 0.25, would take 205 for free.
@@ -206,6 +207,13 @@ TEST_F(MapTest, APngImageIsRead) {
   EXPECT_THAT(WhyNot(yaml), HasSubstr("more than 67108864 pixels"));
   scratch_.Write("map.png", whole.substr(0, 20));
   EXPECT_THAT(WhyNot(yaml), HasSubstr("has no size"));
+  std::string other = whole;
+  scratch_.Write("map.png", other.replace(12, 4, "tEXt"));
+  EXPECT_THAT(WhyNot(yaml), HasSubstr("has no size")) << "another chunk comes before it";
+  std::string deep = whole;
+  deep[24] = 16;
+  scratch_.Write("map.png", deep);
+  EXPECT_THAT(WhyNot(yaml), HasSubstr("map.png: has 16 bits a channel"));
 }
 
 TEST_F(MapTest, WhatTheFileLacksIsSaid) {
