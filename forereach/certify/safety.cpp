@@ -439,7 +439,8 @@ class SafetyTest::Judgement {
         touched_(units_),
         unit_(test, schedule, tube, tube.places_) {
     if (before.obstacle >= 0)
-      closest_.Consider({{before.margin, before.threshold}, before.part}, before.closest_step, before.obstacle);
+      closest_.Consider({{before.margin, before.threshold}, before.part}, before.closest_step,
+                        numbers_.NumberOf({before.obstacle, before.block}));
   }
 
   [[nodiscard]] Decision Run() noexcept {
@@ -458,6 +459,10 @@ class SafetyTest::Judgement {
   [[nodiscard]] bool is_at_frame() const { return test_.placement_.is_at_frame(); }
   // By its number.
   [[nodiscard]] const Obstacle& obstacle(int o) const { return numbers_.Find(obstacles_.all(), o); }
+  // Whether an earlier pair may touch, so that this one does not count.
+  [[nodiscard]] bool IsAfterTouch(int t, int o) const noexcept {
+    return std::tie(touched_, touched_obstacle_) < std::tie(t, o);
+  }
 
   void SeeAll() noexcept {
     if (is_at_frame()) {
@@ -591,10 +596,11 @@ class SafetyTest::Judgement {
                found.begin()));
     std::ranges::sort(found, [](const Near& a, const Near& b) { return std::tie(a.t, a.o) < std::tie(b.t, b.o); });
     for (Near& pair : found) {
+      if (IsAfterTouch(pair.t, pair.o)) return;
       Refine(pair, WithTolerance(index, farthest()));
       if (pair.gap <= WithTolerance(index, 0)) SettleNear(index, pair);
-      if (touched_ < units_) return;
     }
+    if (touched_ < units_) return;
     // The nearest first: they leave few of the others.
     std::ranges::sort(found, {}, &Near::gap);
     for (const Near& pair : found) ConsiderNear(index, pair);
@@ -685,7 +691,7 @@ class SafetyTest::Judgement {
   // As Settle, of a pair that may touch. What is proven here may be the closest.
   void SettleNear(const ObstacleIndex& index, const Near& pair) noexcept {
     const auto& [t, o, gap, towards] = pair;
-    if (gap > WithTolerance(index, 0) || std::tie(touched_, touched_obstacle_) < std::tie(t, o)) return;
+    if (gap > WithTolerance(index, 0) || IsAfterTouch(t, o)) return;
     const Separation by_hulls = ByHulls(t, o);
     if (by_hulls.IsProven()) return;
     unit_.Enter(t);
@@ -711,7 +717,7 @@ class SafetyTest::Judgement {
 
   // A pair that hulls do not prove apart.
   void Settle(int t, int o, const Separation& by_hulls) noexcept {
-    if (std::tie(touched_, touched_obstacle_) < std::tie(t, o)) return;
+    if (IsAfterTouch(t, o)) return;
     if (const Separation boxed = ByBox(t, o); boxed.IsProven()) return nearest_.Add(by_hulls, -1, t, o, false, boxed);
     unit_.Enter(t);
     const Encounter& meeting = unit_.MeetIn(obstacle(o));
@@ -724,6 +730,7 @@ class SafetyTest::Judgement {
   void Search(const PartSeparation& direct, int t, int o) noexcept {
     const PartSeparation best = unit_.Best(direct, obstacle(o), unit_.MeetIn(obstacle(o)));
     if (best.separation.IsProven()) return closest_.Consider(best, t, o);
+    if (IsAfterTouch(t, o)) return;
     touched_ = t;
     touched_obstacle_ = o;
     touch_ = best;
@@ -831,7 +838,7 @@ class SafetyTest::Judgement {
       const double width = std::abs(x) * outline_.width[s][0] + std::abs(y) * outline_.width[s][1];
       const std::size_t first = s * kMaxBodyPoints + ToSize(part.first), end = first + ToSize(part.count);
       for (std::size_t j = first; j < end; ++j)
-        farthest = std::max(farthest, x * outline_.x[j] + y * outline_.y[j] + outline_.around[j] + width);
+        farthest = Larger(farthest, x * outline_.x[j] + y * outline_.y[j] + outline_.around[j] + width);
     }
     return farthest;
   }

@@ -25,6 +25,13 @@ ConvexNumbers::Place ConvexNumbers::PlaceOf(int number) const {
   return {obstacle, -1};
 }
 
+int ConvexNumbers::NumberOf(const Place& place) const {
+  int number = place.obstacle;
+  for (int g = 0; g < num_grids_ && grids_[ToSize(g)].first < number; ++g)
+    number += static_cast<int>(grids_[ToSize(g)].blocks.size()) - 1;
+  return number + std::max(place.block, 0);
+}
+
 const BoxTree& ObstacleIndex::tree_of(const OccupancyGrid& grid) { return grid.index().tree_; }
 
 ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obstacles) {

@@ -36,6 +36,8 @@ class ConvexNumbers final {
     int obstacle, block;  ///< -1: the obstacle is no grid.
   };
   [[nodiscard]] Place PlaceOf(int number) const;
+  /** @pre the obstacle is there, and so is the block of one that is a grid. */
+  [[nodiscard]] int NumberOf(const Place& place) const;
 
  private:
   struct Grid {

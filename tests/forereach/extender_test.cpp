@@ -6,6 +6,7 @@
 #include "tests/test.h"
 
 #include "forereach/safety/obstacle_index.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "tests/oracle/any_task.h"
 #include "tests/worlds.h"
 
@@ -146,6 +147,37 @@ TEST_F(ExtenderTest, KeepsANodeThatIsExtendedInPlace) {
   const Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(2, 5);
   EXPECT_EQ(Fields(SoFar(node)), Fields(certifier.Certify(PlanOf(controls, {}), start_, obstacles, whole)));
   ExpectSlice(node, whole);
+}
+
+// A grid counts as its blocks: those that come after it have other numbers.
+TEST_F(ExtenderTest, KeepsTheClosestBesideGrids) {
+  const auto grid = [](double y, bool is_empty) {
+    GridMap map{.origin = {4, y}, .width = 5, .height = 3, .occupied = std::vector<bool>(15), .outside_is_free = true};
+    for (std::size_t cell = 0; cell < 15 && !is_empty; cell += 2) map.occupied[cell] = true;  // eight blocks
+    return Obstacle::Grid(std::make_shared<const OccupancyGrid>(std::move(map)));
+  };
+  const Certifier certifier(problem_);
+  const Obstacle near = Obstacle::Circle(Vec({3, 4}), 1), far = Obstacle::Circle(Vec({3, 50}), 1);
+  for (const std::vector<Obstacle>& obstacles : {std::vector{grid(8, false), near},
+                                                 {grid(8, true), near},
+                                                 {grid(8, false), grid(8, true), near, far},
+                                                 {grid(8, true), grid(6, false), far},
+                                                 {far, grid(-9, false), grid(9, true), grid(6, false)}}) {
+    const ObstacleIndex index(obstacles);
+    for (const ObstacleView& view : {ObstacleView(obstacles), ObstacleView(obstacles, index)}) {
+      Extender extender(certifier, view, {}, tube_);
+      TubeNode node;
+      ASSERT_EQ(extender.Begin(start_, node).outcome, Outcome::kNone);
+      for (int t = 1; t <= 10; ++t) {
+        ASSERT_EQ(extender.Extend(node, coast_, node).outcome, Outcome::kNone);
+        Tube whole;
+        const Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(2, t);
+        const Decision expected = certifier.Certify(PlanOf(controls, {}), start_, view, whole);
+        EXPECT_EQ(Fields(SoFar(node)), Fields(expected)) << t;
+        EXPECT_EQ(node.closest().block, expected.block) << t;
+      }
+    }
+  }
 }
 
 TEST_F(ExtenderTest, DoesNotKnowWhetherThePlanEndsAtRest) {
