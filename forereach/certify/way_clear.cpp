@@ -1,6 +1,7 @@
 #include "forereach/certify/way_clear.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "forereach/numerics/least.h"
 #include "forereach/numerics/size.h"
@@ -31,11 +32,12 @@ class WayClearSearch final {
 
   std::optional<Eigen::VectorXd> LeastShift(const Obstacle& obstacle, const Decision& touch) {
     const double depth = std::max(touch.threshold - touch.margin, kLeastDepth);
+    const double farthest = FarthestOf(obstacle, depth);
     std::optional<double> least;
     Eigen::VectorXd shift;
     const Obstacle& touched = obstacle.convex()[ToSize(std::max(touch.block, 0))];
     for (const Eigen::VectorXd& direction : DirectionsAway(touched, touch.step)) {
-      const auto amount = LeastFrom(depth, least.value_or(kFarthest * depth), effort_.halvings, [&](double distance) {
+      const auto amount = LeastFrom(depth, least.value_or(farthest), effort_.halvings, [&](double distance) {
         return GoesOn() && !Touch(Shifted(obstacle, distance * direction));
       });
       if (!goes_on_) return std::nullopt;
@@ -47,6 +49,14 @@ class WayClearSearch final {
   }
 
  private:
+  // A grid is made anew for each shift, and stays where its origin may be. Clear of all of it, it is clear.
+  [[nodiscard]] static double FarthestOf(const Obstacle& obstacle, double depth) {
+    if (!obstacle.grid()) return kFarthest * depth;
+    const GridMap& map = MapOf(obstacle);
+    return std::min(2 * (depth + map.resolution * (map.width + map.height)),
+                    0.99e9 - std::max(std::abs(map.origin[0]), std::abs(map.origin[1])));
+  }
+
   [[nodiscard]] std::vector<Eigen::VectorXd> DirectionsAway(const Obstacle& obstacle, int step) const {
     if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return {obstacle.points()[0].normalized()};
     const Projection& projection = certifier_.projection();

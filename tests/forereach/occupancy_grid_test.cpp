@@ -3,6 +3,7 @@
 
 #include "tests/test.h"
 
+#include "forereach/certify/way_clear.h"
 #include "forereach/safety/clearance.h"
 #include "tests/oracle/any_surroundings.h"
 #include "tests/oracle/exact.h"
@@ -173,6 +174,28 @@ TEST(OccupancyGrid, DecidesAsARectangleForEachCell) {
   EXPECT_GT(between, 10);
 }
 
+// More blocks than a search keeps, beside a slice that is turned: its corners are free of the first ones.
+TEST(OccupancyGrid, TheFirstBlockThatIsTouchedIsNamedAmongMany) {
+  const Certifier certifier(std::make_shared<Problem>(PointMassInHalves()));
+  Zonotope start(Eigen::VectorXd::Zero(4), Eigen::MatrixXd::Zero(4, 2));
+  for (TracedRandom random(7); random.Again(20);) {
+    Map map{.resolution = 0.25, .origin = {-5, -5}, .width = 40, .height = 40, .outside_is_free = true};
+    for (int cell = 0; cell < 1600; ++cell) map.occupied.push_back(random.Coin());
+    const std::vector<Obstacle> all{GridOf(map)};
+    const double across = random.Uniform(1, 2.5), along = random.Uniform(1, 2.5);
+    Eigen::MatrixXd generators = Eigen::MatrixXd::Zero(4, 2);
+    generators.topRows(2) << across, along, across, -along;
+    start = Zonotope(Eigen::VectorXd::Zero(4), generators);
+    Tube tube;
+    const Eigen::MatrixXd controls(2, 0);
+    const Plan plan{controls.data(), 2, 0, 2, {}};
+    const Decision plain = certifier.Certify(plan, start, all, tube),
+                   indexed = certifier.Certify(plan, start, {all, ObstacleIndex(all)}, tube);
+    EXPECT_FIELDS(indexed, (outcome, Outcome::kSafety), (block, plain.block), (margin, plain.margin));
+    EXPECT_GT(plain.block, 0);
+  }
+}
+
 // The tube of a point mass in binary fractions is exact, and so is whether it touches a cell: zero slack.
 TEST(OccupancyGrid, IsClearOnlyOfWhatIsNotTouched) {
   const Certifier certifier(std::make_shared<Problem>(PointMassInHalves()));
@@ -251,6 +274,37 @@ TEST(OccupancyGrid, RefusesMapsThatAreNone) {
   Map board{.width = 1000, .height = 1000};
   for (int i = 0; i < 1'000'000; ++i) board.occupied.push_back((i + i / 1000) % 2 == 0);
   EXPECT_THAT(why_not(board), HasSubstr("make more than 131072 rectangles, 263 rows from below"));
+}
+
+TEST(OccupancyGrid, BlocksHaveTheNumbersThatFindThem) {
+  for (TracedRandom random(8); random.Again(100);) {
+    std::vector<Obstacle> all;
+    for (int o = random.Integer(1, 12); o > 0; --o)
+      all.push_back(random.Coin() ? GridOf(AnyMap(random, 4, random.Coin() ? 0 : 0.5))
+                                  : Obstacle::Circle(Vec({0, 0}), 1));
+    const ConvexNumbers numbers(all);
+    for (int number = 0; number < numbers.size(); ++number)
+      EXPECT_EQ(numbers.NumberOf(numbers.PlaceOf(number)), number);
+  }
+}
+
+// Also where it could not stand: far from its origin.
+TEST(OccupancyGrid, WayClearOfAMapIsFoundWithinItsSize) {
+  const Certifier certifier(std::make_shared<Problem>(PointMassInHalves()));
+  const Zonotope start = Zonotope::FromBox(Vec({0, 0, 2, 0}), Eigen::VectorXd::Constant(4, 0.01));
+  const Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(2, 4);
+  const Plan plan{controls.data(), 2, 4, 2, {}};
+  Map map{.resolution = 1e6, .origin = {-5e8, -5e5}, .width = 1000, .height = 1};
+  map.occupied.assign(1000, true);
+  for (const bool outside_is_free : {true, false}) {
+    map.outside_is_free = outside_is_free;
+    const std::vector<Obstacle> all{GridOf(map)};
+    Tube tube;
+    ASSERT_EQ(certifier.Certify(plan, start, all, tube).outcome, Outcome::kSafety);
+    const auto ways = FindWayClear(certifier, plan, all, tube);
+    ASSERT_EQ(ways.has_value(), outside_is_free);
+    if (ways) EXPECT_NEAR(ways->at(0).shift.norm(), 5e5, 1e4);
+  }
 }
 
 TEST(OccupancyGrid, DoesNotMoveAndThereAreFew) {
