@@ -244,6 +244,7 @@ void CheckRegions(const Field& at, TaskDraft& draft) {
                         Region::kMaxCells));
   if (const std::string coupled = FindCoupledRegion(draft.problem); !coupled.empty())
     at.Fail("are bounded by a variable that a constraint beyond the box of the domain names: " + coupled);
+  if (const std::string turning = FindTurningRegion(draft.problem); !turning.empty()) at.Fail(turning);
 }
 
 std::vector<Key> DeclarationKeys() {
@@ -307,7 +308,8 @@ std::vector<Key> DeclarationKeys() {
       Required(
           Map("declaration.regions[].in",
               "The box: ranges of states and inputs, of at most three in all regions. No inequality and no ball of "
-              "the domain names one of these.")),
+              "the domain names one of these. In a range of one of model.angles, only slopes may be bounded, unless "
+              "the domain's range of it is less than a turn.")),
       std::move(range),
       Optional(Map("declaration.regions[].lipschitz",
                    "L in the box, by names, at most declaration.lipschitz. A state that is not named has that; in the "

@@ -60,6 +60,8 @@ void ValidateObservations(const Problem& problem) {
   const std::string coupled = FindCoupledRegion(problem);
   Require(coupled.empty(),
           "declaration: " + coupled + ", by which a region is bounded: paths have to stay in the domain");
+  const std::string turning = FindTurningRegion(problem);
+  Require(turning.empty(), "declaration: " + turning);
 }
 
 // The domain's box over z = (x, u) envelops every query.

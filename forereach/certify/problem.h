@@ -51,4 +51,9 @@ struct Problem {
 "domain.balls[0] names v"; empty if none does. Without one, paths along the axes stay in the domain (region_grid.h). */
 [[nodiscard]] std::string FindCoupledRegion(const Problem& problem);
 
+/** The first region that bounds more than slopes in a range of an angle, of which the domain has one turn or more, as
+"regions[0].disturbance is bounded by theta, ..."; empty if none does. There another number may be the same
+configuration, of which the region says nothing. */
+[[nodiscard]] std::string FindTurningRegion(const Problem& problem);
+
 }  // namespace forereach

@@ -5,6 +5,7 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/dynamics/angles.h"
 #include "tests/worlds.h"
 
 namespace forereach::regions_test {
@@ -230,6 +231,35 @@ TEST_F(Regions, AreContradictedByAStepNearbyOnlyWhereTheEnvelopeIsAsked) {
   const Zonotope point = Zonotope::FromBox(Eigen::Vector4d(0, 0, 3.99, 0), Eigen::Vector4d::Zero());
   const Decision decision = certifier.Certify({controls_.data(), 2, 8, 2}, point, {}, tube_);
   EXPECT_FIELDS(decision, (outcome, Outcome::kFalsified), (cause, Cause::kPairwise), (step, 0), (coordinate, 2));
+}
+
+// A calm region of a heading says nothing of the same configuration a turn on.
+TEST(RegionsOfAnAngle, BoundSlopesAloneUnlessTheDomainHasLessThanATurn) {
+  const std::vector<Eigen::VectorXd Region::*> bounds{&Region::disturbance, &Region::noise_bound, &Region::bound};
+  const std::vector<std::string> keys{"disturbance", "noise_bound", "bound"};
+  const auto problem = [](double lower, double upper, Eigen::VectorXd Region::*bound, std::vector<int> angles) {
+    Problem made =
+        WorldOf(MakeKinematicBicycle(0.1, 2.5, std::move(angles)), Within({40, 40, 4, 25, 3, 0.48}), Within({20, 2}));
+    Eigen::VectorXd least = made.domain.state.lower(), most = made.domain.state.upper();
+    least[2] = lower;
+    most[2] = upper;
+    made.domain.state = Box(least, most);
+    Region& region = made.declaration.regions.emplace_back();
+    region = {{{2, {-1, 4}}}, made.declaration.lipschitz};
+    if (bound) region.*bound = Eigen::VectorXd::Zero(6);
+    return SharedOf(made);
+  };
+  const double turn = kTurn.lower, half = turn / 2;
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    EXPECT_NO_THROW(Certifier(problem(-half, half, bounds[i], {2})));
+    EXPECT_NO_THROW(Certifier(problem(0, turn, bounds[i], {2}))) << "the largest double below a turn";
+    EXPECT_NO_THROW(Certifier(problem(-4, 4, bounds[i], {}))) << "no angle";
+    for (const auto& [lower, upper] :
+         {std::pair(-half, NextUp(half)), std::pair(0.0, kTurn.upper), std::pair(-4.0, 4.0)})
+      EXPECT_THAT(Thrown<std::invalid_argument>([&] { Certifier(problem(lower, upper, bounds[i], {2})); }),
+                  HasSubstr("regions[0]." + keys[i] + " is bounded by theta, an angle, of which the domain has ["));
+  }
+  EXPECT_NO_THROW(Certifier(problem(-4, 4, nullptr, {2}))) << "slopes";
 }
 
 // Steps that say nothing new are not kept, and of many the last are.
