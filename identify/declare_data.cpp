@@ -10,6 +10,7 @@
 
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/consistency.h"
@@ -124,7 +125,9 @@ std::vector<std::string> TooQuiet(const ProposedDeclaration& proposal, const Nom
   std::vector<std::string> names;
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
     if (const auto i = static_cast<Eigen::Index>(k);
-        !proposal.declaration.Grows(i) && proposal.declaration.ObservationError(i) < proposal.rows[k].noise.deviation)
+        !proposal.declaration.Grows(i) &&
+        AddUp(proposal.declaration.noise_bound[i], proposal.declaration.DisturbanceBound(i)) <
+            proposal.rows[k].noise.deviation)
       names.push_back(model.state_names()[k]);
   return names;
 }
@@ -178,9 +181,11 @@ std::vector<CalmRegion> RegionsFor(const Problem& problem, Declaration& proposed
   for (const std::vector<int>& columns : options.columns)
     for (const int l : columns) {
       Problem one = problem;
-      one.declaration.regions = {{{{l, {0, 1}}}, proposed.lipschitz}};
+      one.declaration.regions = {{{{l, {0, 1}}}, proposed.lipschitz, proposed.noise_bound}};
       const bool varies = problem.transitions.z.col(l).minCoeff() < problem.transitions.z.col(l).maxCoeff();
-      if (varies && std::ranges::count(variables, l) == 0 && FindCoupledRegion(one).empty()) variables.push_back(l);
+      if (varies && std::ranges::count(variables, l) == 0 && FindCoupledRegion(one).empty() &&
+          FindTurningRegion(one).empty())
+        variables.push_back(l);
     }
   Problem with = problem;
   with.declaration = proposed;
