@@ -41,8 +41,8 @@ class Search final {
         variables_(variables),
         options_(options),
         compared_(Evenly(seen_.size(), kMostCompared)) {
-    for (int k = 0; k < seen_.num_states(); ++k)
-      if (declaration_.DisturbanceBound(k) > 0) rows_.push_back(k);
+    for (int k = 0; k < seen_.num_states(); ++k)  // beside an expression, a task file has no number
+      if (declaration_.DisturbanceBound(k) > 0 && !declaration_.Grows(k)) rows_.push_back(k);
     Cell all{{}, Evenly(seen_.size(), kMostCut), {}};
     for (Eigen::Index l = 0; l < seen_.z.cols(); ++l) {
       const double least = seen_.z.col(l).minCoeff(), most = seen_.z.col(l).maxCoeff(), room = kRoom * (most - least);
