@@ -420,12 +420,17 @@ void CertifierNode::Tick(std::int64_t now_us) {
   if (was_idle) KeepWarm();
 }
 
-// Only where there is nothing else to do. What arrives meanwhile waits for less than it would take longer without.
+// Only where there is nothing else to do, and for a twentieth of the time. What arrives meanwhile waits until it is
+// over: at most kWarmUs, but for once after each certificate.
 void CertifierNode::KeepWarm() {
-  const std::int64_t now = clocks_.steady();
-  if (!config_.realtime.keep_warm || !is_in_charge() || busy() || bus_.has_waiting() || now < next_warm_us_) return;
-  next_warm_us_ = now + kWarmUs;
+  const std::int64_t begin = clocks_.steady();
+  if (!config_.realtime.keep_warm || !warms_ || !is_in_charge() || busy() || bus_.has_waiting() ||
+      begin < next_warm_us_)
+    return;
   gate_->KeepWarm();
+  const std::int64_t end = clocks_.steady(), took = end - begin;
+  warms_ = took <= kWarmUs;
+  next_warm_us_ = end + std::max(kWarmUs, 20 * took);
 }
 
 void CertifierNode::WithdrawPlans(std::int64_t now_us) {
@@ -495,6 +500,7 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
   if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
   sender_.Send(channels_.decision, answer.decision);
   if (answer.certified) {
+    warms_ = true;
     const NominalModel& model = *config_.problem->model;
     plans_.Add(*answer.certified, clocks_.steady(), AnglesOf(model.angles(), model.num_states()));
   }

@@ -173,6 +173,7 @@ class CertifierNode final : public Node {
   FaultLatch latch_;
   StatusReporter reporter_;
   std::int64_t next_warning_us_ = 0, next_warm_us_ = 0;  // by the steady clock
+  bool warms_ = true;  // the last certificate is repeated fast enough, as far as is known
 };
 
 }  // namespace forereach

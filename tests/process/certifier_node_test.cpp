@@ -119,6 +119,39 @@ TEST_F(CertifierNodeTest, RepeatsItsLastCertificateWhileNothingWaits) {
   }
 }
 
+TEST_F(CertifierNodeTest, RepeatsACertificateForATwentiethOfTheTimeAndASlowOneOnce) {
+  config_.realtime.keep_warm = true;
+  std::int64_t look_us = 0;  // which a look at the clock takes, and so a repetition
+  clocks_.steady = [&] { return now_us_ += look_us; };
+  Restart();
+  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  const int whole = node_->gate().tube().length();
+  const auto repeats_at = [&](std::int64_t now_us) {
+    candidate_plan_t leaves = Candidate(next_plan_id_++, 0, now_us_);
+    leaves.control[3][0] = 100;
+    bus_->Publish("PLAN_CANDIDATE", leaves);
+    Run();
+    EXPECT_EQ(node_->gate().tube().length(), 3);
+    node_->Tick(now_us_ = now_us);
+    return node_->gate().tube().length() == whole;
+  };
+  EXPECT_TRUE(repeats_at(now_us_));
+  EXPECT_FALSE(repeats_at(now_us_ + 999));
+  EXPECT_TRUE(repeats_at(now_us_ + 1));
+  const auto repeats_in = [&](std::int64_t took_us) {
+    look_us = took_us;
+    node_->Tick(now_us_ += 1000);
+    look_us = 0;
+  };
+  repeats_in(1000);
+  EXPECT_FALSE(repeats_at(now_us_ + 19'999));
+  EXPECT_TRUE(repeats_at(now_us_ + 1));
+  repeats_in(1001);
+  EXPECT_FALSE(repeats_at(now_us_ + 100'000)) << "never again";
+  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  EXPECT_TRUE(repeats_at(now_us_)) << "but of the next certificate";
+}
+
 // What comes after a decision: an advice, where the task asks for it, or a repair, where the candidate does.
 struct AdvisingCertifierTest : CertifierNodeTest {
   AdvisingCertifierTest() { Begin(true); }
