@@ -7,9 +7,11 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "forereach/dynamics/angles.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/residual/growing_disturbance.h"
@@ -47,14 +49,27 @@ bool IsWithinAQuarterTurn(const Interval& residual) {
                                 "pi/2: how often it has turned cannot be told");
 }
 
+// The regions where the true z may be: for one transition a few cells of as many as there are. A side at an end is
+// within, so that both its cells count.
+RegionGrid GridAround(const Declaration& declaration, const Eigen::MatrixXd& z) {
+  const Eigen::VectorXd least = z.colwise().minCoeff(), most = z.colwise().maxCoeff();
+  std::vector<double> lower, upper;
+  for (const Interval& range : declaration.BoxAround({least.data(), ToSize(least.size())}))
+    lower.push_back(NextDown(range.lower));
+  for (const Interval& range : declaration.BoxAround({most.data(), ToSize(most.size())}))
+    upper.push_back(NextUp(range.upper));
+  return RegionGrid(declaration, lower, upper);
+}
+
 // Makes the observations of one transition after another.
 class Observer final {
  public:
-  Observer(const NominalModel& model, const Declaration& declaration, const StepTiming& timing)
+  Observer(const NominalModel& model, const Declaration& declaration, const StepTiming& timing,
+           const Transitions& transitions)
       : model_(model), declaration_(declaration), timing_(timing), has_errors_(declaration.HasErrorInZ()) {
     grown_.fill(0);
     if (declaration.AnyRegionHas(&Region::disturbance) || declaration.AnyRegionHas(&Region::noise_bound))
-      regions_.emplace(declaration);
+      regions_ = GridAround(declaration, transitions.z);
   }
 
   // An enclosure for each state, valid until the next call. The step lasted by up to `longer` longer than dt or
@@ -193,7 +208,7 @@ Observations Observe(const NominalModel& model, const Declaration& declaration, 
     throw std::invalid_argument("transitions: sizes do not fit the model " + model.name());
 
   Observations observations{transitions.z, Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
-  Observer observer(model, declaration, timing);
+  Observer observer(model, declaration, timing, transitions);
   for (int i = 0; i < count; ++i) {
     const Eigen::VectorXd z = transitions.z.row(i), x_next = transitions.x_next.row(i);
     if (!z.allFinite() || !x_next.allFinite()) Refuse(i, "not finite");

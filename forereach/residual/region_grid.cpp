@@ -55,7 +55,6 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
     stride_[a] = stride;
     for (std::size_t cell = 0; cell < num_cells_; ++cell) strips[cell].push_back(cell / stride % (cuts_[a].size() + 1));
   }
-  // Whether a cell lies in a region.
   const auto lies_in = [&](std::size_t cell, const Region& region) {
     return std::ranges::all_of(region.box, [&](const Region::Side& side) {
       const std::size_t a = axis_of(side.variable), strip = strips[cell][a];
@@ -64,6 +63,10 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
       return side.range.lower <= lower && upper <= side.range.upper;
     });
   };
+  std::vector<std::vector<const Region*>> around(num_cells_);
+  for (std::size_t cell = 0; cell < num_cells_; ++cell)
+    for (const Region& region : regions)
+      if (lies_in(cell, region)) around[cell].push_back(&region);
   for (Eigen::Index k = 0; k < declaration.lipschitz.rows(); ++k) {
     const double sigma = declaration.noise_bound.size() == 0 ? 0 : declaration.noise_bound[k];
     std::size_t which = 0;
@@ -72,18 +75,18 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
           std::pair(&Region::bound, kInfinity)}) {
       auto& [by_state, in_cells] = bounds_[which++];
       by_state.push_back(everywhere);
-      for (std::size_t cell = 0; cell < num_cells_ && declaration.AnyRegionHas(of); ++cell) {
+      if (!declaration.AnyRegionHas(of)) continue;
+      for (const std::vector<const Region*>& cell : around) {
         double bound = everywhere;
-        for (const Region& region : regions)
-          if ((region.*of).size() != 0 && lies_in(cell, region)) bound = std::min(bound, (region.*of)[k]);
+        for (const Region* region : cell)
+          if ((region->*of).size() != 0) bound = std::min(bound, (region->*of)[k]);
         in_cells.push_back(bound);
       }
     }
   }
   std::vector<Eigen::MatrixXd> least(num_cells_, declaration.lipschitz);
   for (std::size_t cell = 0; cell < num_cells_; ++cell)
-    for (const Region& region : regions)
-      if (lies_in(cell, region)) least[cell] = least[cell].cwiseMin(region.lipschitz);
+    for (const Region* region : around[cell]) least[cell] = least[cell].cwiseMin(region->lipschitz);
   for (Eigen::Index k = 0; k < declaration.lipschitz.rows(); ++k) {
     const auto is_less = [&](const Eigen::MatrixXd& of) { return of.row(k) != declaration.lipschitz.row(k); };
     if (!std::ranges::any_of(least, is_less)) continue;
