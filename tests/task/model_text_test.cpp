@@ -362,6 +362,21 @@ TEST_F(AnglesTest, AreNotCoordinatesOfObstacles) {
       "14: task.projection: depends on x, which is one of model.angles: how often an angle has turned is not known");
 }
 
+TEST_F(AnglesTest, RegionsBoundMoreThanSlopesOnlyWhereTheDomainHasLessThanATurn) {
+  const auto with = [](const std::string& upper, const std::string& says) {
+    const std::string task = Replaced(Turning("  angles: [theta]\n"), "[1, 1, 1, 1]", "[1, 1, " + upper + ", 1]");
+    return Replaced(task, "}\ntransitions", ", regions: [{in: {theta: [0, 1]}, " + says + "}]}\ntransitions");
+  };
+  for (const std::string key : {"disturbance", "noise_bound", "bound"}) {
+    EXPECT_EQ(Error(with("5.2831853", key + ": {v: 0}")), "");
+    EXPECT_EQ(Error(with("5.2831854", key + ": {v: 0}")),
+              "10: declaration.regions: regions[0]." + key +
+                  " is bounded by theta, an angle, of which the domain has [-1, 5.2831854], must be less than a turn: "
+                  "another number may be the same configuration");
+  }
+  EXPECT_EQ(Error(with("100", "lipschitz: {v: {}}")), "");
+}
+
 TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
   const auto with = [](const std::string& that) {
     return Turning("  angles: [theta]\n") + "  limits: [{name: wall, that: " + that + ", at_most: 2}]\n";
