@@ -127,7 +127,8 @@ TEST_F(ImportWorldTest, MoreThanATaskTakesAreNotWritten) {
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "out.yaml"));
   EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --unknown free --as rectangles --region 0,0,9,9"), Exits(0));
   EXPECT_THAT(ImportWorld(scratch_ / "map.yaml" + " --unknown free --force"), Exits(0, "1 obstacles"));
-  EXPECT_THAT(Read(scratch_ / "out.yaml"), HasSubstr("    - grid:\n        resolution: 1\n"));
+  EXPECT_THAT(Read(scratch_ / "out.yaml"), AllOf(HasSubstr("    - grid:\n        resolution: 1\n"),
+                                                 HasSubstr(fmt::format("size: [{}, 3]\n", 2 * kMostObstacles + 2))));
 }
 
 TEST_F(ImportWorldTest, SaysWhatIsWrongWithItsOptions) {

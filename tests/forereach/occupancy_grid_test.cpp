@@ -179,8 +179,8 @@ TEST(OccupancyGrid, TheFirstBlockThatIsTouchedIsNamedAmongMany) {
   const Certifier certifier(std::make_shared<Problem>(PointMassInHalves()));
   Zonotope start(Eigen::VectorXd::Zero(4), Eigen::MatrixXd::Zero(4, 2));
   for (TracedRandom random(7); random.Again(20);) {
-    Map map{.resolution = 0.25, .origin = {-5, -5}, .width = 40, .height = 40, .outside_is_free = true};
-    for (int cell = 0; cell < 1600; ++cell) map.occupied.push_back(random.Coin());
+    Map map{.resolution = 0.125, .origin = {-5, -5}, .width = 80, .height = 80, .outside_is_free = true};
+    for (int cell = 0; cell < 6400; ++cell) map.occupied.push_back(random.Coin());
     const std::vector<Obstacle> all{GridOf(map)};
     const double across = random.Uniform(1, 2.5), along = random.Uniform(1, 2.5);
     Eigen::MatrixXd generators = Eigen::MatrixXd::Zero(4, 2);
