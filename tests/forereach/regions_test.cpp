@@ -145,6 +145,7 @@ TEST_F(Regions, TakeAnObservationForAsDisturbedAsItsPlaceAllows) {
   };
   EXPECT_NEAR(envelope(-3), 0x1p-6, 1e-12);
   EXPECT_NEAR(envelope(-4), 0.125, 1e-12) << "on the side";
+  EXPECT_NEAR(envelope(4), 0.125, 1e-12);
   EXPECT_NEAR(envelope(NextUp(-4)), 0x1p-6, 1e-12);
   EXPECT_NEAR(envelope(-5), 0.125, 1e-12);
   Problem problem = GustyPointMass();

@@ -3,6 +3,7 @@
 #include "tests/test.h"
 
 #include "forereach/residual/consistency.h"
+#include "identify/calm_regions.h"
 #include "identify/hold_out.h"
 #include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
@@ -289,6 +290,27 @@ TEST_F(HoldOutTest, WindowsAreUnbrokenChainsInsideJudgingBlocks) {
   std::vector<int> begins;
   for (const HoldOutWindow& window : windows) begins.push_back(window.begin);
   EXPECT_THAT(begins, ElementsAre(30, 45, 90, 100, 110));
+}
+
+// The number of a row whose disturbance has an expression, too, cannot stand in a task file.
+TEST(CalmRegions, AreOfRowsWhoseDisturbanceIsANumber) {
+  Problem problem = PaperPointMass();
+  problem.declaration.disturbance = Eigen::Vector4d(0, 0, 0.125, 0.125);
+  Observations seen{Eigen::MatrixXd::Zero(400, 6), Eigen::MatrixXd::Zero(400, 4), {}};
+  for (int i = 0; i < 400; ++i) {
+    seen.z(i, 2) = 0.01 * (i - 200);
+    for (const int k : {2, 3}) seen.lower(i, k) = (i % 2 == 0 ? 1 : -1) * (i < 200 ? 0x1p-7 : 0x1p-4);
+  }
+  seen.upper = seen.lower;
+  const auto calm = FindCalmRegions(problem.declaration, seen, {2});
+  ASSERT_FALSE(calm.empty());
+  EXPECT_LT(calm[0].region.disturbance[2], 0.125);
+  EXPECT_LT(calm[0].region.disturbance[3], 0.125);
+  problem.declaration.growing = Growing(*problem.model, {"0", "0", "vx", "0"});
+  const auto without = FindCalmRegions(problem.declaration, seen, {2});
+  ASSERT_FALSE(without.empty());
+  for (const CalmRegion& found : without) EXPECT_EQ(found.region.disturbance[2], kInfinity);
+  EXPECT_LT(without[0].region.disturbance[3], 0.125);
 }
 
 }  // namespace forereach::estimates_test
