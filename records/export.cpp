@@ -426,6 +426,7 @@ ExportResult ExportPieces(const std::string& robot, std::int64_t number, std::in
     if (i % std::ssize(shards) == 0) {  // past cases without pieces
       std::int64_t next = cases;
       for (ShardPieces& shard : shards) next = std::min(next, shard.Next(number, i));
+      if (next == cases) break;
       i = next - next % std::ssize(shards);
     }
     ShardPieces& shard = shards[static_cast<std::size_t>(i) % shards.size()];
