@@ -22,6 +22,11 @@ class Postgres final {
     return {};
   }
 
+  /** What begins a command that runs as the server does. */
+  [[nodiscard]] static std::string AsUser() {
+    return geteuid() == 0 ? FOREREACH_SOURCE_DIR "/tests/fleet/as_nobody " : "";
+  }
+
   /** Makes the server's files, with the database `fleet` of the user `owner`, and starts it. */
   Postgres() {
     std::filesystem::permissions(scratch_.path(), std::filesystem::perms(0755));
@@ -89,6 +94,7 @@ class PostgresTest : public testing::Test {
  protected:
   void SetUp() override {
     if (Postgres::Programs().empty()) GTEST_SKIP() << "PostgreSQL is not installed";
+    if (Shell(Postgres::AsUser() + "true").code != 0) GTEST_SKIP() << "PostgreSQL refuses root, and only root may enter /";
     server_.emplace();
   }
 
