@@ -81,8 +81,6 @@ class Postgres final {
   }
 
  private:
-  static std::string AsUser() { return geteuid() == 0 ? FOREREACH_SOURCE_DIR "/tests/fleet/as_nobody " : ""; }
-
   const ScratchDirectory scratch_;
   const std::string folder_ = scratch_ / "server";
   std::unique_ptr<ChildProcess> server_;
@@ -94,7 +92,8 @@ class PostgresTest : public testing::Test {
  protected:
   void SetUp() override {
     if (Postgres::Programs().empty()) GTEST_SKIP() << "PostgreSQL is not installed";
-    if (Shell(Postgres::AsUser() + "true").code != 0) GTEST_SKIP() << "PostgreSQL refuses root, and only root may enter /";
+    if (Shell(Postgres::AsUser() + "true").code != 0)
+      GTEST_SKIP() << "PostgreSQL refuses root, and only root may enter /";
     server_.emplace();
   }
 
