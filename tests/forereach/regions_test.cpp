@@ -255,9 +255,8 @@ TEST(RegionsOfAnAngle, BoundSlopesAloneUnlessTheDomainHasLessThanATurn) {
     EXPECT_NO_THROW(Certifier(problem(-half, half, bounds[i], {2})));
     EXPECT_NO_THROW(Certifier(problem(0, turn, bounds[i], {2}))) << "the largest double below a turn";
     EXPECT_NO_THROW(Certifier(problem(-4, 4, bounds[i], {}))) << "no angle";
-    for (const auto& [lower, upper] :
-         {std::pair(-half, NextUp(half)), std::pair(0.0, kTurn.upper), std::pair(-4.0, 4.0)})
-      EXPECT_THAT(Thrown<std::invalid_argument>([&] { Certifier(problem(lower, upper, bounds[i], {2})); }),
+    for (const auto& range : {std::pair(-half, NextUp(half)), std::pair(0.0, kTurn.upper), std::pair(-4.0, 4.0)})
+      EXPECT_THAT(Thrown<std::invalid_argument>([&] { Certifier(problem(range.first, range.second, bounds[i], {2})); }),
                   HasSubstr("regions[0]." + keys[i] + " is bounded by theta, an angle, of which the domain has ["));
   }
   EXPECT_NO_THROW(Certifier(problem(-4, 4, nullptr, {2}))) << "slopes";
