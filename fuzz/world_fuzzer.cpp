@@ -1,7 +1,9 @@
 // Maps, scenarios and drawings of others: any bytes are a world whose numbers are finite and whose text a task's reader
 // would take, or refused with a ConfigError. The first byte chooses the format.
 #include <cmath>
+#include <stdexcept>
 
+#include "forereach/safety/occupancy_grid.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/text_mutator.h"
 #include "task/config_error.h"
@@ -23,14 +25,18 @@ World Read(unsigned choice, const std::string& path, Bytes data) {
     default: {
       const GrayImage image = ReadPgm("map.pgm", {reinterpret_cast<const char*>(data.data()), data.size()});
       Require(std::ssize(image.values) == std::int64_t{image.width} * image.height);
-      std::vector<bool> occupied;
+      OccupancyGrid::Map map{1, {0, 0}, 0, image.width, image.height, {}, true};
       for (const std::uint16_t value : image.values) {
         Require(value <= image.largest);
-        occupied.push_back(2 * value < image.largest);
+        map.occupied.push_back(2 * value < image.largest);
       }
       World world;
-      for (const auto& [column, row, width, height] : Blocks(occupied, image.width, image.height))
-        world.Add("cells", {{1.0 * column, 1.0 * row}, {1.0 * (column + width), 1.0 * (row + height)}});
+      try {
+        const OccupancyGrid grid(map);
+        for (const Obstacle& block : grid.blocks()) world.Add("cells", block);
+      } catch (const std::invalid_argument& error) {
+        throw ConfigError(error.what());
+      }
       return world;
     }
   }
