@@ -157,9 +157,9 @@ nlohmann::json AfterPauses(const Task& task, int rounds, int ports) {
   Config config = MakeConfig(task);
   const std::string cold_url = PortUrl(ports), warm_url = PortUrl(ports + 1);
   const auto make = [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); };
-  const Answerer cold_process(cold_url, make);
+  const Child cold_process(cold_url, false, make);
   config.realtime.keep_warm = true;
-  const Answerer warm_process(warm_url, make);
+  const Child warm_process(warm_url, false, make);
   Asker cold(cold_url, config.bus, decision_t::CERTIFIED), warm(warm_url, config.bus, decision_t::CERTIFIED);
   candidate_plan_t candidate = MakeCandidate(task);
   cold.Reach(candidate);
