@@ -23,7 +23,7 @@
 
 namespace forereach::bench {
 
-/** A bus on a port of this process's own, one of four. */
+/** A bus on a port of this process's own, one of eight. */
 [[nodiscard]] inline std::string PortUrl(int which) {
   return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 8 + which) % 20'000) + "?ttl=0";
 }

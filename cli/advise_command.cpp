@@ -254,13 +254,11 @@ Examples:
                             "The abstentions: a decision (the output of certify --json), or logs, databases and "
                             "directories, as in forereach replay"}),
                   {"--config", &options->config, "FILE", kTaskOfRecords},
-                  {.name = "--advice-seconds",
-                   .variable = &options->seconds,
-                   .type = "S",
-                   .help = "How long to search, the abstentions that missed by least first; the others are said not to "
-                           "be searched. By default all are",
-                   .range = NumberRange{0, 86400},
-                   .excludes = "--shard"},
+                  Excluding("--shard",
+                            {"--advice-seconds", &options->seconds, "S",
+                             "How long to search, the abstentions that missed by least first; the others are said not "
+                             "to be searched. By default all are",
+                             NumberRange{0, 86400}}),
                   {"--inner", &options->inner, "",
                    "Also how wide every sound tube is, and whether a system that agrees with all data touches"},
                   {"--all", &options->all, "", "Show every change, not the first of each kind alone"},

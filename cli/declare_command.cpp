@@ -407,8 +407,7 @@ Examples:
             "Stop after this many boxes for each bound; the bound found by then is valid", NumberRange{1, 100'000'000}},
            {"--regions", &options->regions, "",
             "Also cut the domain into up to so many cells, where that pays, with proven slopes in each; with "
-            "--from-data "
-            "up to 256, with what their transitions need of a disturbance",
+            "--from-data up to 256, with what their transitions need of a disturbance",
             NumberRange{1, 1024}},
            Excluding("--between", {"--cover", &options->cover, "FILE.json",
                                    "The file for the proof: the boxes, and a bound for each"}),

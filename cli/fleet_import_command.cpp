@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "cli/offline.h"
 #include "fleet/transitions.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
@@ -62,9 +61,8 @@ int ImportFromFleet(FleetImportArguments options) {
               << (is_written ? " in " + Printable(options.out) : "");
     if (count > 0)
       std::cout << fmt::format(
-          "\nSteps lasted up to {:g} s longer or shorter: declaration.noise_bound has to include how far states move "
-          "in "
-          "that time",
+          "\nSteps lasted up to {:g} s longer or shorter: declaration.noise_bound has to include how far states "
+          "move in that time",
           found.longer);
     std::cout << std::endl;
   }
@@ -87,10 +85,7 @@ Command FleetImportCommand() {
                       Required({"--database", &options->database, "URL", kDatabaseAddress}),
                       {"--robot", &options->which.robot, "NAME", "Of this robot alone"},
                       {"--day", &options->day, "YYYY-MM-DD", "Of this day alone, UTC"},
-                      {.name = "--by",
-                       .variable = &options->by,
-                       .help = "What the table of residuals compares",
-                       .one_of = {"robot", "day"}},
+                      OneOf({"robot", "day"}, {"--by", &options->by, "", "What the table of residuals compares"}),
                       {"-o,--out", &options->out, "FILE.csv", "The transitions"},
                       JsonFlag(options->json)},
           .run = [options] { return ImportFromFleet(*options); }};

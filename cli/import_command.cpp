@@ -540,8 +540,7 @@ Command ImportCommand() {
            {"--lcm-types", &options->lcm_types, "FILE.lcm",
             "LOG is an LCM event log with messages of these types. Of it, and of an MCAP file (.mcap), columns are "
             "CHANNEL.field; `recorded`, the default of --time, is when a message was recorded. Inputs may be of "
-            "another "
-            "channel. May be repeated"},
+            "another channel. May be repeated"},
            {"--unit", &options->units, "NAME=UNIT",
             "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
            {"--unwrap", &options->unwrapped, "STATE",

@@ -134,9 +134,8 @@ Command ImportWorldCommand() {
       .name = "import-world",
       .footer =
           "FILE is the YAML file of a ROS map, a CommonRoad 2020a or 2018b scenario (.xml), or GeoJSON. OUT has the "
-          "list "
-          "task.obstacles; put it into a task file.\nThe obstacles contain all that the file says is not free. OUT "
-          "begins with what was assumed.\n\n"
+          "list task.obstacles; put it into a task file.\nThe obstacles contain all that the file says is not free. "
+          "OUT begins with what was assumed.\n\n"
           "Examples:\n  forereach import-world map.yaml --task my_robot.yaml --whole-task --out my_robot_in_map.yaml\n"
           "  forereach import-world scenario.xml --region 0,-10,60,10 --steps-per-window 5 --out obstacles.yaml\n"
           "  forereach import-world site.geojson --origin 11.58,48.14 --line-width 0.2 --out obstacles.yaml",

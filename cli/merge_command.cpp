@@ -299,10 +299,7 @@ Command MergeCommand() {
               "  forereach merge part1 part2 --out tables",
           .options = {Required({"files", &options->files, "FILE", "The files of all shards, in any order"}),
                       {"-o,--out", &options->out, "FILE|DIR", "Of an export: what is written, as by its own --out"},
-                      {.name = "--json",
-                       .variable = &options->json,
-                       .help = "One JSON document on standard output",
-                       .excludes = "--out"}},
+                      Excluding("--out", JsonFlag(options->json))},
           .run = [options] { return Merge(*options); }};
 }
 

@@ -8,6 +8,7 @@
 
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "identify/noise_floor.h"
 #include "identify/proposal.h"
 
 namespace forereach {
@@ -16,13 +17,6 @@ namespace {
 constexpr int kMostCompared = 1000, kMostCut = 4000;  // observations that make r^, and that say where to cut
 constexpr int kCuts = 15;                             // that are tried along each variable of a cell
 constexpr double kRoom = 0.05;                        // around the observations
-
-std::vector<int> Evenly(int count, int most) {
-  std::vector<int> rows;
-  for (int i = 0, n = std::min(count, most); i < n; ++i)
-    rows.push_back(static_cast<int>(static_cast<std::int64_t>(i) * count / n));
-  return rows;
-}
 
 double RoundedShort(double x) { return std::strtod(RoundedUp(x, 4).c_str(), nullptr); }
 
@@ -40,10 +34,10 @@ class Search final {
         seen_(observations),
         variables_(variables),
         options_(options),
-        compared_(Evenly(seen_.size(), kMostCompared)) {
+        compared_(EvenRows(seen_.size(), kMostCompared)) {
     for (int k = 0; k < seen_.num_states(); ++k)  // beside an expression, a task file has no number
       if (declaration_.DisturbanceBound(k) > 0 && !declaration_.Grows(k)) rows_.push_back(k);
-    Cell all{{}, Evenly(seen_.size(), kMostCut), {}};
+    Cell all{{}, EvenRows(seen_.size(), kMostCut), {}};
     for (Eigen::Index l = 0; l < seen_.z.cols(); ++l) {
       const double least = seen_.z.col(l).minCoeff(), most = seen_.z.col(l).maxCoeff(), room = kRoom * (most - least);
       all.box.emplace_back(-RoundedShort(room - least), RoundedShort(most + room));

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "command_line/nearest.h"
 #include "forereach/numerics/text.h"
 #include "task/config_error.h"
 
@@ -78,8 +79,7 @@ void ChannelTable::Lose(const std::string& why) {
 
 LogTable ChannelTable::Finish() {
   if (messages_ == 0) {
-    std::string channels;
-    for (const auto& [name, count] : counts_) channels += (channels.empty() ? "" : ", ") + name;
+    const std::string channels = Joined(counts_, [](const auto& channel) { return channel.first; });
     throw ConfigError(fmt::format("{}: has no message on {}; its channels are {}", path_, channel_,
                                   channels.empty() ? "none" : channels));
   }

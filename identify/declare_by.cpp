@@ -97,10 +97,11 @@ std::string DeclarationYaml(const Declaration& declaration, const NominalModel& 
   }
   if (!declaration.regions.empty()) text += "  regions:\n";
   for (const Region& region : declaration.regions) {
-    std::string box, bounds;
-    for (const auto& [variable, range] : region.box)
-      box += fmt::format("{}{}: [{}, {}]", box.empty() ? "" : ", ", variables[ToSize(variable)], ToText(range.lower),
-                         ToText(range.upper));
+    const std::string box = Joined(region.box, [&](const Region::Side& side) {
+      return fmt::format("{}: [{}, {}]", variables[ToSize(side.variable)], ToText(side.range.lower),
+                         ToText(side.range.upper));
+    });
+    std::string bounds;
     for (Eigen::Index k = 0; k < region.disturbance.size(); ++k)
       if (const double w = region.disturbance[k]; w < kInfinity)
         bounds += (bounds.empty() ? "" : ", ") + states[ToSize(k)] + ": " + ToText(w);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include "forereach/numerics/directed.h"
@@ -39,13 +40,14 @@ void FindRepeated(const Observations& observations, int k, const std::vector<int
 }
 
 double GammaTest(const Observations& observations, int k, const std::vector<int>& columns) {
-  const int count = std::min(observations.size(), kMostObservations);
+  const std::vector<int> rows = EvenRows(observations.size(), kMostObservations);
+  const int count = static_cast<int>(rows.size());
   if (count <= kNeighbours || columns.empty()) return 0;
   const Eigen::RowVectorXd scales = ScalesOf(observations);
   Eigen::MatrixXd places(static_cast<Eigen::Index>(columns.size()), count);
   Eigen::VectorXd residuals(count);
   for (int i = 0; i < count; ++i) {
-    const auto row = static_cast<Eigen::Index>(static_cast<std::int64_t>(i) * observations.size() / count);
+    const int row = rows[ToSize(i)];
     for (std::size_t c = 0; c < columns.size(); ++c)
       places(static_cast<Eigen::Index>(c), i) =
           scales[columns[c]] > 0 ? observations.z(row, columns[c]) / scales[columns[c]] : 0;
@@ -78,6 +80,13 @@ Eigen::RowVectorXd ScalesOf(const Observations& observations) {
     scales[l] = constant ? 0 : std::sqrt(about.square().mean());
   }
   return scales;
+}
+
+std::vector<int> EvenRows(int count, int most) {
+  std::vector<int> rows(ToSize(std::min(count, most)));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = static_cast<int>(static_cast<std::int64_t>(i) * count / std::ssize(rows));
+  return rows;
 }
 
 NoiseFloor FindNoiseFloor(const Observations& observations, int coordinate, const std::vector<int>& columns) {

@@ -28,5 +28,7 @@ struct NoiseFloor {
 
 /** The standard deviation of each column of z; 0 for a column that is constant. */
 [[nodiscard]] Eigen::RowVectorXd ScalesOf(const Observations& observations);
+/** Of `count` rows at most `most`, evenly chosen. */
+[[nodiscard]] std::vector<int> EvenRows(int count, int most);
 
 }  // namespace forereach

@@ -16,10 +16,7 @@ constexpr int kMostForEstimators = 1000;
 double Rounded(double x) { return std::strtod(RoundedUp(x, ProposedDeclaration::kDigits).c_str(), nullptr); }
 
 Observations Thinned(const Observations& observations, int most) {
-  const int count = std::min(observations.size(), most);
-  std::vector<int> rows;
-  for (int i = 0; i < count; ++i)
-    rows.push_back(static_cast<int>(static_cast<std::int64_t>(i) * observations.size() / count));
+  const std::vector<int> rows = EvenRows(observations.size(), most);
   return {observations.z(rows, Eigen::all), observations.lower(rows, Eigen::all), observations.upper(rows, Eigen::all)};
 }
 

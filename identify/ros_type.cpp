@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "command_line/nearest.h"
 #include "task/config_error.h"
 #include "task/line_reader.h"
 
@@ -133,8 +134,7 @@ void RosType::RequireNumber(const std::vector<PlaceStep>& place) const {
     const auto member = members ? std::ranges::find(*members, step.name, &Member::name) : Members::const_iterator();
     at += (at.empty() ? "" : ".") + step.name;
     if (!members || member == members->end()) {
-      std::string names;
-      for (const Member& each : members ? *members : Members()) names += (names.empty() ? "" : ", ") + each.name;
+      const std::string names = Joined(members ? *members : Members(), [](const Member& each) { return each.name; });
       throw ConfigError(fmt::format("{} has no {}{}", name_, at, names.empty() ? "" : "; there are " + names));
     }
     type = member->type;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <set>
 #include <utility>
 
@@ -260,11 +259,11 @@ SmallestRow FindSmallestEntry(const Declaration& declaration, const Observations
 std::vector<LoneSlope> FindLoneSlopes(const Declaration& declaration, const Observations& observations, int coordinate,
                                       const std::vector<int>& columns) {
   const Eigen::RowVectorXd scales = ScalesOf(observations);
-  std::vector<int> varied, rows;
+  std::vector<int> varied;
   for (const int l : columns)
     if (scales[l] > 0) varied.push_back(l);
-  const int count = std::min(observations.size(), kMost);
-  for (int i = 0; i < count; ++i) rows.push_back(static_cast<int>(std::int64_t{i} * observations.size() / count));
+  const std::vector<int> rows = EvenRows(observations.size(), kMost);
+  const int count = static_cast<int>(rows.size());
   Eigen::MatrixXd scaled(std::ssize(varied), count);  // an observation a column
   for (Eigen::Index c = 0; c < scaled.rows(); ++c)
     scaled.row(c) = observations.z(rows, varied[ToSize(c)]).transpose() / scales[varied[ToSize(c)]];

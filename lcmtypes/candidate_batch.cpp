@@ -1,10 +1,11 @@
 #include "lcmtypes/candidate_batch.h"
-#include "lcmtypes/seal.h"
 
 #include <algorithm>
 #include <iterator>
 #include <limits>
 #include <optional>
+
+#include "lcmtypes/seal.h"
 
 namespace forereach {
 namespace {

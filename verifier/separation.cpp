@@ -467,7 +467,7 @@ Answer IsClear(std::span<const Sweep> sweeps, const Obstacle& obstacle, double c
 Answer IsWithin(std::span<const Sweep> sweeps, const Rings& rings, Real& margin) {
   margin = 0.0;
   if (sweeps.empty()) return Answer::kUnknown;
-  // By Taylor's theorem a place has its center for the slice's center, so it is what the part sweeps.
+  // Taylor's series starts at the slice's center, which it maps to place.center: the part sweeps that point.
   const Place& place = sweeps[sweeps.size() / 2].places().front();
   if (const Answer inside = IsAround(rings, place.center); inside != Answer::kYes) return inside;
   margin = std::numeric_limits<double>::infinity();

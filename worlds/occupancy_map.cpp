@@ -168,10 +168,9 @@ OccupancyGrid::Map CellsOf(const GrayImage& image, const MapFile& file, const Ma
   for (int value = 0; value <= image.largest; ++value) {
     const double dark = static_cast<double>(file.is_negated ? value : image.largest - value) / image.largest;
     const bool takes_unknown = options.unknown_is_free && file.mode == "trinary";
-    is_occupied[ToSize(value)] = file.mode == "raw"                    ? value != 0
-                                 : takes_unknown                       ? dark > file.occupied
-                                 : IsSaversUnknown(image, file, value) ? true
-                                                                       : !(dark < file.free);
+    is_occupied[ToSize(value)] = file.mode == "raw" ? value != 0
+                                 : takes_unknown    ? dark > file.occupied
+                                                    : IsSaversUnknown(image, file, value) || !(dark < file.free);
   }
   OccupancyGrid::Map map{
       file.resolution,        {file.origin[0], file.origin[1]}, file.origin[2], image.width, image.height, {},

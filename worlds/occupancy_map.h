@@ -16,7 +16,7 @@ struct MapOptions {
   bool unknown_is_free = false;
   /** A block of so many cells by so many is occupied if one of its cells is. */
   int coarsen = 1;
-  bool as_rectangles = false;
+  bool as_rectangles = false;  ///< A world of rectangles that cover the occupied cells, not of one grid.
 };
 
 /** Gray values, the rows from top to bottom. */

@@ -42,8 +42,7 @@ FoundFault DeclarationFalsified(const Violation& violation, const AffineRows& af
   if (const int region = Violation::RegionOf(second); region >= 0)
     why = fmt::format(
         "the executed transition {} contradicts declaration.regions[{}]: residual coordinate {} is at least {} in "
-        "size, "
-        "{} is declared",
+        "size, {} is declared",
         first, region, coordinate, difference, bound);
   else if (second < 0)
     why = fmt::format(

@@ -524,6 +524,7 @@ TEST_F(ErrorTest, AMapThatIsNoneIsAnError) {
   EXPECT_EQ(with(fine, "#.\\n#"), at + ".rows: line 2 of the rows has 1 cells, the first one has 2");
   EXPECT_THAT(with(fine, "#.\\n x"),
               StartsWith(at + ".rows: line 2 of the rows has byte 32 as cell 1, a cell is one of"));
+  EXPECT_EQ(with(fine, ""), at + ".rows: is empty or not text");
   EXPECT_EQ(with(fine, "\\n"), at + ".rows: has 0 by 1 cells, size says 2 by 2; indent all rows as the first one");
   std::string many = "{grid: {size: [1, 1], " + fine + ", rows: x}}";
   many.replace(many.find(": x"), 3, ": \"#\"");
