@@ -119,7 +119,9 @@ Task MakeQuadrotorTask() {
     problem.transitions.x_next.row(i) = Eigen::Map<const Eigen::RowVectorXd>(next.data(), 12);
   }
 
-  Task task{.center = Eigen::VectorXd::Zero(12), .half_width = Eigen::VectorXd::Constant(12, 0.01)};
+  Task task;
+  task.center = Eigen::VectorXd::Zero(12);
+  task.half_width = Eigen::VectorXd::Constant(12, 0.01);
   task.controls = Eigen::MatrixXd::Zero(4, 20);
   for (int t = 0; t < 20; ++t) task.controls.col(t) << kHover, 1e-4 * (t % 2), -1e-4 * (t % 3), 1e-5;
   task.obstacles = {Obstacle::AxisBox(Eigen::Vector3d(4, -1, -1), Eigen::Vector3d(5, 1, 1))};

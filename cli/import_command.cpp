@@ -373,14 +373,16 @@ CommandDelay DelayOf(const std::vector<Source>& sources, const Problem& problem,
   }
 }
 
-std::string Rows(int count) { return fmt::format("{} row{}", count, count == 1 ? "" : "s"); }
+std::string NumberOfRows(int count) { return fmt::format("{} row{}", count, count == 1 ? "" : "s"); }
 
 // What is known of the delay, in a sentence.
 std::string Sentence(const CommandDelay& delay) {
   if (delay.error.empty() || (delay.least == 0 && delay.largest + 1 == std::ssize(delay.error)))
     return "how late commands act cannot be told: the inputs vary too little, or the model is off by more than they do";
-  if (delay.IsKnown()) return delay.best == 0 ? "commands act at once" : "commands act " + Rows(delay.best) + " late";
-  return fmt::format("commands act {} to {} late: which of them cannot be told", delay.least, Rows(delay.largest));
+  if (delay.IsKnown())
+    return delay.best == 0 ? "commands act at once" : "commands act " + NumberOfRows(delay.best) + " late";
+  return fmt::format("commands act {} to {} late: which of them cannot be told", delay.least,
+                     NumberOfRows(delay.largest));
 }
 
 void PrintDelay(const CommandDelay& delay, const NominalModel& model) {
@@ -489,7 +491,8 @@ int RunImport(ImportArguments options) {
     for (const Source& source : sources) PrintForPeople(source, columns, options);
     PrintErrors(sources, options, model);
     if (delay) PrintDelay(*delay, model);
-    if (import.command_delay > 0) std::cout << "Each command counts " << Rows(import.command_delay) << " later.\n";
+    if (import.command_delay > 0)
+      std::cout << "Each command counts " << NumberOfRows(import.command_delay) << " later.\n";
     std::cout << "import: " << all.size() << " transitions of " << ToText(config.period) << " s"
               << (writes ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
     PrintShare(share, config.period);

@@ -72,15 +72,15 @@ int List(const LogArguments& options) {
     const std::string_view type = summary ? summary->type : "unknown", what = summary ? summary->what : "";
     const std::optional<std::int64_t> plan = summary ? summary->plan_id : std::nullopt;
     if (options.json) {
-      using Json = nlohmann::ordered_json;
-      const Json line{{"log", Printable(log)},
-                      {"event_number", event.number},
-                      {"utime", event.utime},
-                      {"channel", Printable(event.channel)},
-                      {"type", summary ? Json(type) : Json(nullptr)},
-                      {"plan_id", plan ? Json(*plan) : Json(nullptr)},
-                      {"what", what.empty() ? Json(nullptr) : Json(what)},
-                      {"bytes", event.data.size()}};
+      using Ordered = nlohmann::ordered_json;
+      const Ordered line{{"log", Printable(log)},
+                         {"event_number", event.number},
+                         {"utime", event.utime},
+                         {"channel", Printable(event.channel)},
+                         {"type", summary ? Ordered(type) : Ordered(nullptr)},
+                         {"plan_id", plan ? Ordered(*plan) : Ordered(nullptr)},
+                         {"what", what.empty() ? Ordered(nullptr) : Ordered(what)},
+                         {"bytes", event.data.size()}};
       std::cout << JsonText(line) << '\n';
       return;
     }

@@ -27,10 +27,13 @@ function(forereach_batches target directory)
   if(length LESS 2 OR folder MATCHES "^(tests/)?(research|bench)")  # the last two are built by few, and seldom
     return()
   endif()
-  set(at_once 12)
+  # As many as a job's memory holds, in parts of one size: each part costs as much again as six files that share one.
+  set(most 24)
   if(folder MATCHES "^tests")
-    set(at_once 8)  # many programs are built by both cores at the end
+    set(most 18)
   endif()
+  math(EXPR parts "(${length} + ${most} - 1) / ${most}")
+  math(EXPR at_once "(${length} + ${parts} - 1) / ${parts}")
   set(alone "")
   set(content "")
   set(count 0)

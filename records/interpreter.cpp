@@ -68,8 +68,8 @@ EventRow MakeRow(const execution_event_t& event, LogReference reference) {
 }
 
 TransitionRow MakeRow(const transition_t& transition, LogReference reference) {
-  const int n = std::clamp<int>(transition.num_states, 0, std::size(transition.state)),
-            m = std::clamp<int>(transition.num_inputs, 0, std::size(transition.input));
+  const int n = std::clamp<int>(transition.num_states, 0, static_cast<int>(std::size(transition.state))),
+            m = std::clamp<int>(transition.num_inputs, 0, static_cast<int>(std::size(transition.input)));
   return {.event = std::move(reference),
           .utime = transition.utime,
           .sequence = transition.sequence,

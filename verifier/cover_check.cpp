@@ -17,7 +17,7 @@ constexpr int kCoverBits = 128;  // the width of a box, not rounding, decides ho
 // A leaf's bound may take finer boxes here than it took there: at most so many halvings.
 constexpr int kMostCuts = 24;
 
-using Box = std::vector<Real>;
+using Ranges = std::vector<Real>;
 
 Real Width(const Real& range) { return range.upper() - range.lower(); }
 
@@ -30,11 +30,11 @@ std::string Text(double x) {
 // One claim's derivative, its domain and its arguments w = (z, theta).
 class ClaimCheck {
  public:
-  ClaimCheck(const Domain& domain, const Slopes& slopes, const SlopeClaim& claim, const Box& whole)
+  ClaimCheck(const Domain& domain, const Slopes& slopes, const SlopeClaim& claim, const Ranges& whole)
       : domain_(domain), slopes_(slopes), claim_(claim), whole_(whole) {}
 
   [[nodiscard]] CoverVerdict Walk(const std::function<void()>& checked) const {
-    std::vector<std::pair<int, Box>> open{{0, whole_}};
+    std::vector<std::pair<int, Ranges>> open{{0, whole_}};
     while (!open.empty()) {
       const auto [index, box] = std::move(open.back());
       open.pop_back();
@@ -55,7 +55,7 @@ class ClaimCheck {
   }
 
  private:
-  [[nodiscard]] std::string FaultOf(const Cover::Node& node, int index, const Box& box) const {
+  [[nodiscard]] std::string FaultOf(const Cover::Node& node, int index, const Ranges& box) const {
     const int size = static_cast<int>(claim_.cover.nodes.size());
     if (node.argument >= static_cast<int>(box.size())) return "a cut across an argument that there is not";
     const auto is_part = [&](int part) { return index < part && part < size; };
@@ -68,7 +68,7 @@ class ClaimCheck {
     return {};
   }
 
-  [[nodiscard]] CoverVerdict Leaf(const Cover::Node& node, const Box& box) const {
+  [[nodiscard]] CoverVerdict Leaf(const Cover::Node& node, const Ranges& box) const {
     if (node.outside) {
       if (LiesOutside(box)) return {};
       return {Answer::kNo, "a box said to lie outside the domain was not shown to"};
@@ -79,17 +79,17 @@ class ClaimCheck {
   }
 
   // Whether |slope| <= bound over the box. If one evaluation does not decide, the box is cut further.
-  [[nodiscard]] CoverVerdict Holds(double bound, const Box& box, int cuts) const {
+  [[nodiscard]] CoverVerdict Holds(double bound, const Ranges& box, int cuts) const {
     if (LiesOutside(box)) return {};
     Trial trial{-1, box};
     const Slope slope = SlopeOver(box, true);
     if (IsAtMostOver(box, slope, bound, 1, trial) && IsAtMostOver(box, slope, bound, -1, trial)) return {};
-    for (const Box& near : {trial.point, box})
+    for (const Ranges& near : {trial.point, box})
       if (const auto witness = CounterExample(bound, near)) return *witness;
     if (cuts == 0 || trial.cut < 0) return {Answer::kUnknown, "a box's bound " + Text(bound) + " could not be shown"};
     const auto argument = ToSize(trial.cut);
     const Real middle = box[argument].middle();
-    Box half = box;
+    Ranges half = box;
     half[argument] = Real::FromTo(box[argument].lower(), middle);
     if (const CoverVerdict verdict = Holds(bound, half, cuts - 1); verdict.answer != Answer::kYes) return verdict;
     half[argument] = Real::FromTo(middle, box[argument].upper());
@@ -100,13 +100,13 @@ class ClaimCheck {
   // large.
   struct Trial {
     int cut;
-    Box point;
+    Ranges point;
   };
 
   // Whether sign * slope <= bound over the box, by its range, or after the arguments in which it is monotone have moved
   // to where it is largest, or expanded around a point of the others. @param slope over the box.
-  [[nodiscard]] bool IsAtMostOver(const Box& box, Slope slope, double bound, double sign, Trial& trial) const {
-    Box rest = box;
+  [[nodiscard]] bool IsAtMostOver(const Ranges& box, Slope slope, double bound, double sign, Trial& trial) const {
+    Ranges rest = box;
     while (true) {
       if (CertainlyAtMost(Real(sign) * slope.value, bound)) return true;
       bool moved = false;
@@ -123,8 +123,8 @@ class ClaimCheck {
     }
   }
 
-  [[nodiscard]] bool ExpandsTo(const Box& rest, const Slope& slope, double bound, double sign, Trial& trial) const {
-    Box& point = trial.point = rest;
+  [[nodiscard]] bool ExpandsTo(const Ranges& rest, const Slope& slope, double bound, double sign, Trial& trial) const {
+    Ranges& point = trial.point = rest;
     Real excess(0.0), most(-1.0);
     bool is_finite = true;
     for (std::size_t i = 0; i < rest.size(); ++i) {
@@ -153,8 +153,8 @@ class ClaimCheck {
   }
 
   // The middle of a box, if it is in the domain and the slope there is above the bound.
-  [[nodiscard]] std::optional<CoverVerdict> CounterExample(double bound, const Box& box) const {
-    Box point = box;
+  [[nodiscard]] std::optional<CoverVerdict> CounterExample(double bound, const Ranges& box) const {
+    Ranges point = box;
     for (Real& w : point) w = w.middle();
     const Real size = abs(SlopeOver(point, false).value);
     if (!CertainlyBelow(bound, size) || !LiesInside(point)) return std::nullopt;
@@ -162,33 +162,33 @@ class ClaimCheck {
                         "a box's bound is " + Text(bound) + ", but the slope is " + Text(size) + " at a point of it"};
   }
 
-  [[nodiscard]] Slope SlopeOver(const Box& w, bool with_gradient) const {
+  [[nodiscard]] Slope SlopeOver(const Ranges& w, bool with_gradient) const {
     return slopes_.At(claim_.row, claim_.column, w, with_gradient);
   }
 
   // ---- The domain's inequalities and balls.
 
-  [[nodiscard]] Real ValueOver(const Domain::Inequality& inequality, const Box& box) const {
+  [[nodiscard]] Real ValueOver(const Domain::Inequality& inequality, const Ranges& box) const {
     Real sum(0.0);
     for (Eigen::Index l = 0; l < inequality.coefficients.size(); ++l)
       sum += Real(inequality.coefficients[l]) * box[ToSize(l)];
     return sum;
   }
-  [[nodiscard]] Real SquaredDistanceOver(const Domain::Ball& ball, const Box& box) const {
+  [[nodiscard]] Real SquaredDistanceOver(const Domain::Ball& ball, const Ranges& box) const {
     Real sum(0.0);
     for (Eigen::Index i = 0; i < ball.center.size(); ++i)
       sum += sqr(box[ToSize(ball.coordinates[ToSize(i)])] - Real(ball.center[i]));
     return sum;
   }
 
-  [[nodiscard]] bool LiesOutside(const Box& box) const {
+  [[nodiscard]] bool LiesOutside(const Ranges& box) const {
     return std::ranges::any_of(domain_.inequalities,
                                [&](const auto& i) { return CertainlyBelow(i.bound, ValueOver(i, box)); }) ||
            std::ranges::any_of(domain_.balls, [&](const auto& ball) {
              return CertainlyBelow(sqr(Real(ball.radius)), SquaredDistanceOver(ball, box));
            });
   }
-  [[nodiscard]] bool LiesInside(const Box& point) const {
+  [[nodiscard]] bool LiesInside(const Ranges& point) const {
     return std::ranges::all_of(domain_.inequalities,
                                [&](const auto& i) { return CertainlyAtMost(ValueOver(i, point), i.bound); }) &&
            std::ranges::all_of(domain_.balls, [&](const auto& ball) {
@@ -199,7 +199,7 @@ class ClaimCheck {
   const Domain& domain_;
   const Slopes& slopes_;
   const SlopeClaim& claim_;
-  const Box& whole_;
+  const Ranges& whole_;
 };
 
 }  // namespace
@@ -214,8 +214,8 @@ CoverVerdict CoverChecker::Check(const SlopeClaim& claim, const std::function<vo
   if (!std::isfinite(claim.bound)) return {Answer::kNo, "the declared bound is not finite"};
   if (claim.cover.nodes.empty()) return {Answer::kNo, "a part of the domain is missing"};
   const Precision precision(kCoverBits);
-  Box whole;
-  for (const forereach::Box* part : {&domain_.state, &domain_.input})
+  Ranges whole;
+  for (const Box* part : {&domain_.state, &domain_.input})
     for (Eigen::Index l = 0; l < part->dim(); ++l) whole.push_back(Real::FromTo(part->lower()[l], part->upper()[l]));
   for (const auto& [name, lower, upper] : residual_.names.parameters) whole.push_back(Real::FromTo(lower, upper));
   return ClaimCheck(domain_, slopes_, claim, whole).Walk(checked);

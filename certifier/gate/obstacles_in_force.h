@@ -73,15 +73,15 @@ class ObstaclesInForce final {
  private:
   struct State {
     SoleSender sender;
-    StreamOrder order;                        // of the messages taken
-    ObstacleSet set;                          // that they have whole or in parts
-    std::vector<Obstacle> heard;              // of the last complete set
-    Digest heard_digest{};                    // of these
-    std::optional<std::int64_t> known_utime;  // of the last message whose set was complete
-    std::optional<Arrival> arrival;           // of that message
-    std::optional<std::int64_t> next;         // the sequence after the last one seen, including refused messages
-    std::string doubt;                        // why the last message was refused
-    int unconfirmed = 0;                      // number of messages in order that are still needed
+    StreamOrder order{};                        // of the messages taken
+    ObstacleSet set{};                          // that they have whole or in parts
+    std::vector<Obstacle> heard{};              // of the last complete set
+    Digest heard_digest{};                      // of these
+    std::optional<std::int64_t> known_utime{};  // of the last message whose set was complete
+    std::optional<Arrival> arrival{};           // of that message
+    std::optional<std::int64_t> next{};         // the sequence after the last one seen, including refused messages
+    std::string doubt{};                        // why the last message was refused
+    int unconfirmed = 0;                        // number of messages in order that are still needed
     std::int64_t lost = 0;
   };
 

@@ -12,16 +12,17 @@
 namespace forereach {
 namespace {
 
-struct Answer {
+struct Response {
   std::int16_t cause, outcome = decision_t::REJECTED;
 };
 
 // Of candidates that come before the need is met.
-constexpr std::array<Answer, Watch::kNeeds> kAnswers{{{decision_t::CAUSE_SECOND_CERTIFIER},
-                                                      {decision_t::CAUSE_LATCH_UNWRITABLE},
-                                                      {decision_t::CAUSE_NOT_ARMED},
-                                                      {decision_t::CAUSE_NOT_ARMED},
-                                                      {decision_t::CAUSE_NO_OBSTACLES, decision_t::ABSTAIN_OBSTACLES}}};
+constexpr std::array<Response, Watch::kNeeds> kResponses{
+    {{decision_t::CAUSE_SECOND_CERTIFIER},
+     {decision_t::CAUSE_LATCH_UNWRITABLE},
+     {decision_t::CAUSE_NOT_ARMED},
+     {decision_t::CAUSE_NOT_ARMED},
+     {decision_t::CAUSE_NO_OBSTACLES, decision_t::ABSTAIN_OBSTACLES}}};
 
 }  // namespace
 
@@ -102,7 +103,7 @@ std::optional<Watch::Refusal> Watch::WhyNot() const {
   for (std::size_t need = 0; need < kNeeds; ++need) {
     if (lacking_[need].empty()) continue;
     if (!refusal)
-      refusal = {kAnswers[need].cause, kAnswers[need].outcome, lacking_[need]};
+      refusal = {kResponses[need].cause, kResponses[need].outcome, lacking_[need]};
     else
       refusal->why += "; " + lacking_[need];
   }

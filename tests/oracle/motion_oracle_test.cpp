@@ -40,7 +40,7 @@ std::string NameOf(const testing::TestParamInfo<Untold>& tested) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OfTheDeclaration, WithoutOnePart,
-                         testing::Values(Untold::kAcceleration, Untold::kTurn, Untold::kBody, Untold::kVelocity,
+                         testing::Values(Untold::kAcceleration, Untold::kTurnRate, Untold::kBody, Untold::kVelocity,
                                          Untold::kGrowth, Untold::kClockError, Untold::kLateness, Untold::kOffsets),
                          NameOf);
 

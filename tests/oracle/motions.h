@@ -30,7 +30,7 @@ namespace forereach {
 
 /** A part of the declaration that the certifier of a trial is not told, which shows that the trial would find its
 absence. */
-enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, kClockError, kLateness, kOffsets };
+enum class Untold { kNothing, kAcceleration, kTurnRate, kBody, kVelocity, kGrowth, kClockError, kLateness, kOffsets };
 
 struct Tally {
   long problems = 0, plans = 0, certified = 0, withdrawn = 0, motions = 0, moments = 0, decided_exactly = 0,
@@ -266,7 +266,7 @@ class MotionTrial {
     if (untold_ == Untold::kOffsets) told->timing = {};
     step_error_us_ = static_cast<std::int64_t>(std::ceil(told->timing.error * 1e6));
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
-    if (untold_ == Untold::kTurn && told->between) {  // a told rate of 0 would be contradicted by the slices
+    if (untold_ == Untold::kTurnRate && told->between) {  // a told rate of 0 would be contradicted by the slices
       problem->between->turn_rate *= 8;
       problem->between->turn_acceleration *= 64;
       told->between->turn_acceleration = 0;
