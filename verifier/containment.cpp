@@ -30,11 +30,19 @@ class ContainmentSearch {
         center_(center),
         generators_(generators),
         rounded_(inner.RoundedColumns()),
+        scaled_(generators),
         taken_(ToSize(generators.cols())),
         pairs_(rounded_.size()) {
     for (Eigen::Index i = 0; i < generators.cols(); ++i) {
       axis_.push_back(AxisOf(generators.col(i), inner.dim(), [](double g) { return g == 0; }));
       taken_[ToSize(i)] = axis_.back() >= 0;  // those make up for the rest
+    }
+    // What is far in one coordinate may be near in another that the set reaches further in.
+    for (Eigen::Index k = 0; k < generators.rows(); ++k) {
+      const double half_width = generators.row(k).cwiseAbs().sum();
+      if (!(half_width > 0 && std::isfinite(1 / half_width))) continue;
+      scaled_.row(k) /= half_width;
+      for (Eigen::VectorXd& column : rounded_) column[k] /= half_width;
     }
   }
 
@@ -59,8 +67,8 @@ class ContainmentSearch {
       if (IsAlongAnAxis(j)) continue;
       while (i < generators_.cols() && axis_[ToSize(i)] >= 0) ++i;
       if (i == generators_.cols()) return false;
-      const double gamma = rounded_[j].dot(generators_.col(i)) < 0 ? -1 : 1;
-      const double rest = (rounded_[j] - gamma * generators_.col(i)).lpNorm<1>();
+      const double gamma = rounded_[j].dot(scaled_.col(i)) < 0 ? -1 : 1;
+      const double rest = (rounded_[j] - gamma * scaled_.col(i)).lpNorm<1>();
       pairs_[j] = Pair{i++, gamma, rest == 0 ? 0 : rest / rounded_[j].lpNorm<1>()};
     }
     return true;
@@ -100,7 +108,7 @@ class ContainmentSearch {
     double least = worst * d.lpNorm<1>();
     for (Eigen::Index i = 0; i < generators_.cols(); ++i) {
       if (taken_[ToSize(i)]) continue;
-      const auto g = generators_.col(i);
+      const auto g = scaled_.col(i);
       const double along = d.dot(g);
       const double gamma = whole ? (along < 0 ? -1 : 1) : std::clamp(along / g.squaredNorm(), -1.0, 1.0);
       const double rest = (d - gamma * g).lpNorm<1>();
@@ -174,7 +182,8 @@ class ContainmentSearch {
   const Slice& inner_;
   const Eigen::VectorXd& center_;
   const Eigen::MatrixXd& generators_;
-  std::vector<Eigen::VectorXd> rounded_;    // inner's columns
+  std::vector<Eigen::VectorXd> rounded_;    // inner's columns, in half-widths of the outer set
+  Eigen::MatrixXd scaled_;                  // the generators in these
   std::vector<int> axis_;                   // of each generator
   std::vector<bool> taken_;                 // each generator
   std::vector<std::optional<Pair>> pairs_;  // of each column of inner

@@ -196,11 +196,13 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
   return std::max(close, tiny);
 }
 
-// As Reduce, by the choice that a record shows: the (order - 1) n columns nearest to its first. False if it has fewer.
-// Any choice gives a set that contains the slice.
-bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
+// As Reduce, by the choice that a record shows: none, if it has more columns that are not along an axis, the offset's
+// apart; else the (order - 1) n columns nearest to its first. False if it has fewer. Any choice gives a set that
+// contains the slice.
+bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded, bool has_offset) {
   const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
-  if (slice.columns.size() <= ToSize(order) * n) return true;
+  const auto mixed = ((recorded.array() != 0).colwise().count() > 1).count() - (has_offset ? 1 : 0);
+  if (slice.columns.size() <= ToSize(order) * n || mixed > static_cast<Eigen::Index>(kept)) return true;
   if (ToSize(recorded.cols()) < kept) return false;
   const std::vector<Eigen::VectorXd> rounded = slice.RoundedColumns();
   std::vector<std::size_t> chosen;
@@ -890,7 +892,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }
-  const bool followed = recorded && ReduceAs(next, problem_.zonotope_order, recorded->generators);
+  const bool followed = recorded && ReduceAs(next, problem_.zonotope_order, recorded->generators, offset.recorded >= 0);
   if (options.reduce && !followed)
     tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
   if (!IsZeroColumn(offset.column)) {

@@ -138,6 +138,16 @@ TEST(Containment, AGeneratorCoversOneColumnThatIsNoLonger) {
   EXPECT_FALSE(is_inside({same, shorter}));
 }
 
+TEST(Containment, WhatIsFarInACoordinateWithRoomIsNear) {
+  const auto is_inside = [](double room) {
+    const Eigen::MatrixXd generators{{1, 2, 0.125, 0}, {1e9, 1e9, 0, room}};
+    const std::vector<std::vector<Real>> columns{{1.0, 1e-3}, {2.0, -3e-3}, {0.125, 1e-3}};
+    return IsInside({{Real(), Real()}, columns}, Eigen::Vector2d::Zero(), generators).answer == Answer::kYes;
+  };
+  EXPECT_TRUE(is_inside(1e15));
+  EXPECT_FALSE(is_inside(1e9)) << "two columns differ by so much there";
+}
+
 TEST(HandMade, APlanThatDoesNotEndStandingIsRefuted) {
   const auto within = [](int coordinate, double tolerance) {
     const auto problem = Halves();
