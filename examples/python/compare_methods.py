@@ -1,15 +1,15 @@
 """The same plan by two methods and three orders: how wide its tube is.   compare_methods.py [PICTURE]"""
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import forereach as fr
+from ready_tasks import CONFIG
 
-file = Path(__file__).parents[2] / "config" / "bicycle.yaml"
+file = CONFIG / "bicycle.yaml"
 text = file.read_text()
-U = np.loadtxt(file.parent / "plans" / "bicycle_certified.csv", delimiter=",", skiprows=1)
+U = np.loadtxt(CONFIG / "plans" / "bicycle_certified.csv", delimiter=",", skiprows=1)
 
 figure, ax = plt.subplots()
 for method in ["centred", "paper"]:

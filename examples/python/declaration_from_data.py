@@ -1,12 +1,12 @@
 """Proposes a declaration from a car's recorded steps, for some factors.   declaration_from_data.py [PICTURE]"""
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 
 import forereach as fr
+from ready_tasks import CONFIG
 
-task = fr.Task.load(str(Path(__file__).parents[2] / "config" / "bicycle.yaml"))
+task = fr.Task.load(str(CONFIG / "bicycle.yaml"))
 columns = ["v", "delta", "steer_rate"]  # on which its residual may depend
 at = [(task.states + task.inputs).index(name) for name in columns]
 theta = task.states.index("theta")

@@ -14,8 +14,12 @@ from pathlib import Path
 import numpy as np
 
 import forereach as fr
+from drawn import colours
 
-BUILD = os.environ["FOREREACH_BUILD"]
+# Of the build, or those that are installed.
+BUILD = os.environ.get("FOREREACH_BUILD")
+FOREREACH = f"{BUILD}/cli/forereach" if BUILD else "forereach"
+CERTIFIER = f"{BUILD}/certifier/process/forereach-certifier" if BUILD else "forereach-certifier"
 TASK = "examples/python/rover.yaml"
 # Below the ports that the kernel hands out by itself, and of this process alone.
 URL = f"udpm://239.255.76.67:{10_000 + os.getpid() % 10_000}?ttl=0"
@@ -43,8 +47,7 @@ class BusTest(unittest.TestCase):
     def setUp(self):
         self.scratch = Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.keys = str(self.scratch / "keys")
-        command = [f"{BUILD}/cli/forereach", "keygen", "--robot", "rover", self.keys]
-        subprocess.run(command, check=True, capture_output=True)
+        subprocess.run([FOREREACH, "keygen", "--robot", "rover", self.keys], check=True, capture_output=True)
 
     def start(self, *command):
         """A process, which ends with the test."""
@@ -58,8 +61,7 @@ class BusTest(unittest.TestCase):
         return process
 
     def start_certifier(self, task=TASK):
-        program = f"{BUILD}/certifier/process/forereach-certifier"
-        certifier = self.start(program, "--config", task, "--lcm-url", URL, "--key", self.keys, "--state",
+        certifier = self.start(CERTIFIER, "--config", task, "--lcm-url", URL, "--key", self.keys, "--state",
                                str(self.scratch / "state"))
         self.assertIn("ready", certifier.stdout.readline())
 
@@ -74,7 +76,7 @@ class Drive(BusTest):
         self.assertEqual(planner.returncode, 0, planner.stderr)
         plans = int(re.search(r"at the goal after (\d+) certified plans", planner.stdout)[1])
         self.assertGreater(plans, 1)
-        self.assertEqual(picture.read_bytes()[:4], b"\x89PNG")
+        self.assertGreater(colours(picture), 0)
         robot.send_signal(signal.SIGINT)
         said = robot.communicate(timeout=60)[0]
         driven, steps, inside = map(int, re.search(r"(\d+) plans, (\d+) steps, (\d+) inside", said).groups())
