@@ -29,11 +29,6 @@ TEST_F(AdviseTest, NamesTheLeastDistanceToTheObstacle) {
                     "with its first 10 steps alone", "1 have a change that turns them, verified by certifying again"));
 }
 
-TEST_F(AdviseTest, PrintsWhatItsDocumentShows) {
-  const std::string text = AdviseOn("bicycle.yaml", "bicycle_safety.csv").text;
-  EXPECT_THAT(Read(FOREREACH_SOURCE_DIR "/docs/advise.md"), HasSubstr("decision.json" + text.substr(text.find('\n'))));
-}
-
 TEST_F(AdviseTest, SaysWhereNoSoundMethodCouldCertify) {
   const std::string text = AdviseOn("bicycle.yaml", "bicycle_safety.csv", " --inner").text;
   EXPECT_THAT(text, ContainsRegex("the inner bound\n *half-width at step 12: [0-9.]+ m; no sound tube is below"));

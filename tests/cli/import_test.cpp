@@ -333,39 +333,4 @@ TEST_F(LateRowsTest, CannotBeToldWhereTheInputDoesNotVary) {
   EXPECT_THAT(Import("--command-delay 1.5 " + log_).text, HasSubstr("'1.5' is no whole number of rows, nor auto"));
 }
 
-// ---- docs/data.md: its commands are run, in a folder of their own.
-
-TEST(DataDocument, CommandsPrintWhatItSays) {
-  const ScratchDirectory scratch;
-  const std::string examples = FOREREACH_SOURCE_DIR "/examples";
-  std::filesystem::copy(examples, scratch / "examples", std::filesystem::copy_options::recursive);
-  std::ifstream document(FOREREACH_SOURCE_DIR "/docs/data.md");
-  std::string command, expected;
-  int commands = 0;
-  const auto check = [&] {
-    if (command.empty()) return;
-    ++commands;
-    const Output output = Shell("cd '" + scratch.path() + "' && '" FOREREACH_PROGRAM "' " +
-                                command.substr(std::string("forereach ").size()));
-    EXPECT_EQ(output.text, expected) << command;
-    command.clear();
-    expected.clear();
-  };
-  bool inside = false;
-  for (std::string line; std::getline(document, line);) {
-    if (line.starts_with("```")) {
-      check();
-      inside = line == "```console";
-    } else if (inside && line.starts_with("$ ")) {
-      check();
-      command = line.substr(2);
-    } else if (inside && command.ends_with("\\")) {
-      command = command.substr(0, command.size() - 1) + line;
-    } else if (inside) {
-      expected += line + "\n";
-    }
-  }
-  EXPECT_GE(commands, 1);
-}
-
 }  // namespace forereach::import_test
