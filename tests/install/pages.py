@@ -15,8 +15,8 @@ BEFORE = {
         printf '%s\n' 'image: map.pgm' 'resolution: 0.5' 'origin: [2, 2, 0]' 'negate: 0' 'occupied_thresh: 0.65' 'free_thresh: 0.196' >map.yaml""",
 }
 
-# Pages that a test of their own follows: it waits for processes.
-ALONE = {"docs/tutorial.md"}
+# Pages that a test of their own follows: it waits for processes, or needs Python.
+ALONE = {"docs/tutorial.md", "examples/python/README.md"}
 
 # The block of a page that has this line, and why it is not run.
 NOT_RUN = {
@@ -30,6 +30,7 @@ NOT_RUN = {
     ("docs/live.md", "forereach live --config config/demo.yaml --key keys/verify.pub"): "a server; tests/live",
     ("docs/logs.md", "forereach tail --config config/demo.yaml"): "runs until it is stopped; tests/process/tail_test.cpp",
     ("examples/mower/README.md", "forereach keygen --robot mower keys"): "four terminals; tests/python/bus_test.py",
+    ("examples/python/README.md", "forereach keygen --robot rover keys"): "four terminals; tests/python/bus_test.py",
     ("research/higher-order-car.md", "research/run drift"): "research",
     ("research/higher-order-car.md", "research/run drift --drive"): "research",
     ("research/real-car.md", "research/run real --data FOLDER --other FOLDER/car_1_Datarecording_09_16_2024_10_12_05.csv"): "research",
