@@ -269,6 +269,7 @@ int Init(const InitArguments& options) {
   RequireOneLine("--out", options.out);
   TaskTemplate task = options.model.empty() ? FromTransitions(options) : FromModel(options);
   task.path = options.out;
+  task.schema = InstalledSchema();
   WriteNewFile(options.out, TaskText(task), options.force);
   std::cout << options.out << ": a task to begin with, " << task.states.size() << " states, " << task.inputs.size()
             << " inputs\n  now: put in what your robot is where a line says PLACEHOLDER";

@@ -42,6 +42,7 @@ install(FILES bus/authentic.h bus/clock.h bus/keys.h DESTINATION ${headers}/bus)
 install(FILES robot/brake.h robot/guard.h robot/report_queue.h robot/supervisor.h DESTINATION ${headers}/robot)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach/ DESTINATION ${headers})
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach/lcmtypes FILES_MATCHING PATTERN "*.lcm")
+install(FILES ${CMAKE_BINARY_DIR}/share/forereach/task.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach)
 install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach)
 
 configure_package_config_file(cmake/ForeReachConfig.cmake.in ForeReachConfig.cmake

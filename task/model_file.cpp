@@ -39,6 +39,14 @@ void AddNeighbours(const fs::path& path, const fs::path& name, std::vector<std::
 
 }  // namespace
 
+std::string InstalledSchema() {
+  std::error_code error;
+  for (const fs::path& directory : InstalledDirectories())
+    if (const fs::path schema = directory.parent_path() / "task.schema.json"; fs::exists(schema, error))
+      return schema.string();
+  return "";
+}
+
 std::string FindModelFile(const std::string& task, const std::string& name, const std::string& named_by) {
   std::vector<fs::path> directories = InstalledDirectories();
   directories.insert(directories.begin(), fs::path(task).parent_path());

@@ -1,4 +1,4 @@
-/** Where the model files are that task files include. */
+/** Where the model files are that task files include, and the task files' schema. */
 #pragma once
 
 #include <string>
@@ -11,6 +11,9 @@ namespace forereach {
 relative to the installed config directory, share/forereach/config of the prefix of the running program.
 @param named_by prefix of the message. @throws ConfigError if there is none in either, with the nearest file name. */
 [[nodiscard]] std::string FindModelFile(const std::string& task, const std::string& name, const std::string& named_by);
+
+/** The path of the installed JSON Schema of task files, share/forereach/task.schema.json; "" if there is none. */
+[[nodiscard]] std::string InstalledSchema();
 
 /** The text of a model file; its name is the file's without the ending. The expressions are not parsed yet.
 @param named_by prefix of the message that it cannot be read. @param bytes receives those of the file.

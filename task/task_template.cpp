@@ -326,7 +326,8 @@ std::string YamlText(const std::string& text) {
 
 std::string TaskText(const TaskTemplate& task) {
   const std::vector<std::string> positions = PositionStates(task.states);
-  return "# The task of a robot, begun by\n"
+  return (task.schema.empty() ? "" : "# yaml-language-server: $schema=" + task.schema + "\n") +
+         "# The task of a robot, begun by\n"
          "#   " +
          task.command +
          "\n"

@@ -27,6 +27,7 @@ struct KnownLaws {
 struct TaskTemplate {
   std::string path;     ///< Where the file will be, for the commands that it suggests.
   std::string command;  ///< What makes this text.
+  std::string schema;   ///< The path of a JSON Schema, by which editors complete and check it; "" for none.
   std::string model;    ///< The lines of the key `model`, each with a line break.
   std::vector<TemplateVariable> states, inputs;
   std::vector<double> center;  ///< Of the initial set, one for each state.

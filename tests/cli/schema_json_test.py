@@ -99,6 +99,13 @@ class Schema(unittest.TestCase):
     def test_is_one(self):
         jsonschema.Draft7Validator.check_schema(SCHEMA)
 
+    def test_is_installed_and_named_by_a_new_task(self):
+        task = self.scratch / "new.yaml"
+        subprocess.run([FOREREACH, "init", "--model", "differential_drive", "--out", task], check=True, capture_output=True)
+        named = re.match(r"# yaml-language-server: \$schema=(/.*)\n", task.read_text())
+        self.assertEqual(json.loads(Path(named[1]).read_text()), SCHEMA)
+        self.assertEqual(list(VALIDATOR.iter_errors(load(task))), [])
+
     def test_takes_every_task_of_ours(self):
         self.assertGreater(len(TASKS), 25)
         for path in TASKS:
