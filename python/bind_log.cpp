@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "forereach/transition_t.hpp"
+#include "lcmtypes/codec.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "records/export_table.h"
@@ -14,13 +16,28 @@
 namespace forereach {
 namespace {
 
-// One kind of records, as the columns of `forereach export`.
+Cells CellsOf(const transition_t& step) {
+  const auto numbers = [](const double* first, int count, std::size_t most) {
+    return std::vector<double>(first, first + std::clamp<std::ptrdiff_t>(count, 0, static_cast<std::ptrdiff_t>(most)));
+  };
+  return {{"utime", step.utime},
+          {"duration_us", step.duration_us},
+          {"state", numbers(step.state, step.num_states, std::size(step.state))},
+          {"input", numbers(step.input, step.num_inputs, std::size(step.input))},
+          {"next_state", numbers(step.next_state, step.num_states, std::size(step.next_state))}};
+}
+
+// One kind of records, as the columns of `forereach export`; of transitions, those of their messages.
 class Table final : public RecordUser {
  public:
-  enum class Of { kDecisions, kWithdrawals, kExecutions, kGaps };
+  enum class Of { kDecisions, kWithdrawals, kExecutions, kGaps, kTransitions };
 
-  Table(Of of, std::string robot) : of_(of), robot_(std::move(robot)) {}
+  Table(Of of, std::string robot, std::string steps) : of_(of), robot_(std::move(robot)), steps_(std::move(steps)) {}
 
+  void OnMessage(const LogEvent& event) override {
+    if (of_ != Of::kTransitions || event.channel != steps_) return;
+    if (const auto step = Decoded<transition_t>(event.message())) rows.push_back(CellsOf(*step));
+  }
   void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
     if (of_ == Of::kDecisions) rows.push_back(CellsOf(robot_, row, candidate));
   }
@@ -38,7 +55,7 @@ class Table final : public RecordUser {
 
  private:
   const Of of_;
-  const std::string robot_;
+  const std::string robot_, steps_;
 };
 
 Cells NamesOf(Table::Of of) {
@@ -46,6 +63,7 @@ Cells NamesOf(Table::Of of) {
     case Table::Of::kDecisions: return CellsOf("", DecisionRow{}, nullptr);
     case Table::Of::kWithdrawals: return CellsOf("", withdrawal_t{}, LogReference{});
     case Table::Of::kExecutions: return CellsOf("", EventRow{});
+    case Table::Of::kTransitions: return CellsOf(transition_t{});
     case Table::Of::kGaps: break;
   }
   return CellsOf("", GapRow{});
@@ -71,8 +89,9 @@ std::vector<Cells> Read(const Log& log, Table::Of of, LogDamage& damage, PassedO
   std::vector<Cells> rows;
   for (const RunLogs& run : log.runs) {
     if (run.logs.empty()) continue;
-    Table table(of, run.robot);
-    RecordReader reader(ChannelsOf(run.logs, log.config, log.key), table);
+    const BusOptions channels = ChannelsOf(run.logs, log.config, log.key);
+    Table table(of, run.robot, channels.transition);
+    RecordReader reader(channels, table);
     reader.Read(run.logs);
     damage += reader.damage();
     passed_over += reader.passed_over();
@@ -140,6 +159,9 @@ unchecked: takes every message for authentic.)");
   table("decisions", Table::Of::kDecisions, "A row a decision, with its candidate. Times in microseconds.");
   table("withdrawals", Table::Of::kWithdrawals, "A row a withdrawal.");
   table("executions", Table::Of::kExecutions, "A row an event of the robot.");
+  table("transitions", Table::Of::kTransitions,
+        "A row an executed step, with lists `state`, `input` and `next_state`: Task(..., data=(z, x_next)) takes them "
+        "stacked.");
   table("gaps", Table::Of::kGaps, "A row a gap in a stream of messages.");
 }
 

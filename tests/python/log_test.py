@@ -63,6 +63,17 @@ class Columns(unittest.TestCase):
         empty = fr.Log(LOG, config=TASK).withdrawals()
         self.assertEqual((empty["message"].dtype.kind, empty["utime"].dtype.kind), ("O", "i"))
 
+    def test_of_executed_steps_are_a_tasks_data(self):
+        steps = fr.Log(LOG, config=TASK).transitions()
+        state, applied, after = (np.stack(steps[name]) for name in ["state", "input", "next_state"])
+        self.assertEqual((state.shape, applied.shape, after.shape), ((74, 6), (74, 2), (74, 6)))
+        one_step = np.abs(steps["duration_us"] - 100_000) < 20_000
+        self.assertGreater(one_step.sum(), 60)
+        text = Path(TASK).read_text()
+        task = fr.Task(text, path=TASK, data=(np.hstack([state, applied])[one_step], after[one_step]))
+        self.assertEqual(task.num_observations, one_step.sum())
+        self.assertEqual(task.declare(by=["v,delta"])["lipschitz"].shape, (6, 8))
+
     def test_warn_of_what_is_damaged_and_have_the_rest(self):
         whole = len(fr.Log(LOG, config=TASK).decisions()["utime"])
         damaged = bytearray(Path(LOG).read_bytes())
