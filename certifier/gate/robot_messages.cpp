@@ -72,9 +72,10 @@ ExecutedTransition FromMessage(const transition_t& message, const Problem& probl
   const double dt = StepOf(model), error = problem.timing.error;
   transition.by_clock = LongerThanDt(message.duration_us, dt);
   if (error > 0) transition.longer = transition.by_clock;
-  if (transition.longer > MostLonger(problem.timing))
-    transition.refusal = fmt::format("the step lasted {} us, further from model.dt, {} s, than two errors of {} s",
-                                     message.duration_us, ToText(dt), ToText(error));
+  if (!(transition.by_clock <= MostLonger(problem.timing)))
+    transition.refusal = fmt::format(
+        "the step lasted {} us, further from model.dt, {} s, than {}", message.duration_us, ToText(dt),
+        error > 0 ? "two errors of " + ToText(error) + " s" : "steps on time do; robot.step_error_ms allows no more");
   return transition;
 }
 

@@ -30,12 +30,11 @@ certificates and its comparison with the slices rest on. Empty if none is. @pre 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
   double longer = 0;            ///< By how much the step lasted longer or shorter than dt, at most, s.
-  double by_clock = 0;          ///< The same by its clock, also where `longer` does not look at it.
+  double by_clock = 0;          ///< The same by its clock, also where `longer` is 0, since steps are on time.
   std::string refusal;          ///< What keeps it from being learned. Empty if nothing does.
 };
 
-/** Refuses sizes other than the model's and, where steps may be off their times, a duration that no step on schedule
-has (StepTiming). Where they are on time, the duration is not looked at. */
+/** Refuses sizes other than the model's, and a duration that no step on schedule has (MostLonger). */
 [[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
 
 /** Also refuses transitions that a certifier would not learn (certify/learned.h). For readers of logs, which have no

@@ -14,9 +14,7 @@ bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned
   return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
 }
 
-double MostLonger(const StepTiming& timing) {
-  return timing.error > 0 ? AddUp(MulUp(2, timing.error), 2e-6) : kInfinity;
-}
+double MostLonger(const StepTiming& timing) { return AddUp(MulUp(2, timing.error), 2e-6); }
 
 Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next, double longer,
                 Observations& observed) {

@@ -24,8 +24,10 @@ enum class Learned {
 then counts. @param is_learned whether it was learned: given ones may be exact (Declaration::given_are_exact). */
 [[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned);
 
-/** By how much the step of a learned transition may have been longer or shorter than dt, at most, s: two errors of its
-boundaries, and two units of a clock of microseconds. Where steps are on time, their duration is not looked at. */
+/** By how much the step of a learned transition may have been longer or shorter than dt by its clock, at most, s: two
+errors of its boundaries, and two units of a clock of microseconds. Where steps are declared to be on time, which is
+also where no clock is looked at, another step is none that the certificates speak of: nothing says what it shows of a
+step of dt. */
 [[nodiscard]] double MostLonger(const StepTiming& timing);
 
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. @param longer by how much the

@@ -4,6 +4,7 @@
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
 #include "lcmtypes/seal.h"
+#include "task/step_time.h"
 #include "tests/certifier/small_task.h"
 #include "tests/oracle/random.h"
 
@@ -125,7 +126,7 @@ TEST_F(GateAnswerTest, ACertifiedPlanSaysWhatItsGuardHasToUphold) {
 
 TEST_F(GateAnswerTest, ACertificateNamesTheTransitionsOfTheTaskWithoutWhatWasLearned) {
   Gate gate(config_);
-  transition_t learned{.utime = kNow, .num_states = 4, .num_inputs = 2};
+  const transition_t learned = AtRest(kNow);
   ASSERT_EQ(gate.Learn(Encode(learned)), "");
   const GateAnswer answer = gate.Decide(Encode(Candidate(7)), kNow);
   ASSERT_TRUE(answer.certified);
@@ -382,7 +383,7 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
   Config config = SmallTask();
   config.gate.learns = true;
   Gate gate(config);
-  transition_t good{.num_states = 4, .num_inputs = 2};
+  const transition_t good = AtRest(kNow);
   const auto expect_refused = [&](auto change, const char* why) {
     transition_t bad = good;
     change(bad);
@@ -399,13 +400,35 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
   EXPECT_NE(gate.grounds().observations, config.grounds.observations);
 }
 
+// A step of another duration shows nothing of a step of dt, 150 ms, unless the task says how it differs.
+TEST(GateTransitionTest, AStepThatNoScheduleAllowsIsNotLearned) {
+  const auto learn = [](std::optional<double> step_error_ms, std::int64_t duration_us) {
+    Config config = SmallTask();
+    config.gate.learns = true;
+    config.gate.step_error_ms = step_error_ms;
+    Own(config.problem).timing.error = StepErrorSeconds(config);
+    transition_t transition = AtRest(kNow);
+    transition.duration_us = duration_us;
+    return Gate(config).Learn(Encode(transition));
+  };
+  for (const std::optional<double> on_time : {std::optional(0.0), std::optional(kAnyTime), std::optional<double>()}) {
+    EXPECT_EQ(learn(on_time, 150'000), "");
+    for (const std::int64_t other : {149'998, 150'002, 100'000, 0, -150'000})
+      EXPECT_THAT(learn(on_time, other), HasSubstr(" us, further from model.dt, 0.15 s, than steps on time do"));
+  }
+  for (const std::int64_t within : {160'000, 140'000}) EXPECT_EQ(learn(5, within), "");
+  for (const std::int64_t beyond : {160'002, 139'998})
+    EXPECT_THAT(learn(5, beyond), HasSubstr(" us, further from model.dt, 0.15 s, than two errors of 0.005 s"));
+  EXPECT_THAT(learn(5, INT64_MAX), HasSubstr("two errors"));
+}
+
 // A robot whose states are recorded with an error of 1/4: at 19.75 m the domain's edge is just reached.
 TEST(GateTransitionTest, ATransitionThatItsErrorsMayTakeOutOfTheDomainIsNotLearned) {
   Config config = SmallTask();
   config.gate.learns = true;
   Own(config.problem).declaration.state_error = Eigen::Vector4d(0.25, 0, 0, 0);
   Gate gate(config);
-  transition_t transition{.num_states = 4, .num_inputs = 2};
+  transition_t transition = AtRest(kNow);
   const auto at = [&](double px) {
     transition.state[0] = transition.next_state[0] = px;
     return gate.Learn(Encode(transition));

@@ -21,7 +21,7 @@ inline constexpr std::int64_t kNow = 1'700'000'000'000'000;
 /** One step of the small task's robot from (x, u), as its model says but for vx, which is off by `error`: that
 contradicts the declaration. */
 inline transition_t Executed(const NominalModel& model, const Eigen::VectorXd& z, double error = 0) {
-  transition_t transition{.num_states = 4, .num_inputs = 2};
+  transition_t transition{.duration_us = 150'000, .num_states = 4, .num_inputs = 2};
   std::copy_n(z.data(), 4, transition.state);
   std::copy_n(z.data() + 4, 2, transition.input);
   model.Evaluate({z.data(), 6}, {transition.next_state, 4});
@@ -86,7 +86,7 @@ inline candidate_plan_t Candidate(std::int64_t plan_id, double acceleration = kA
 
 /** A step at rest in the origin, or one in which it gets up speed by itself: that contradicts the declaration. */
 inline transition_t AtRest(std::int64_t utime, double speed = 0) {
-  return {.utime = utime, .num_states = 4, .num_inputs = 2, .next_state = {0, 0, speed}};
+  return {.utime = utime, .duration_us = 150'000, .num_states = 4, .num_inputs = 2, .next_state = {0, 0, speed}};
 }
 
 }  // namespace forereach

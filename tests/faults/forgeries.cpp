@@ -5,6 +5,7 @@
 
 #include "bus/authentic.h"
 #include "forereach/command_t.hpp"
+#include "task/step_time.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/kind.h"
 #include "tests/keys.h"
@@ -131,6 +132,7 @@ class Forged final : Kind {
               ? Decoded<transition_t>(WithoutSignature(recorded.at(channels.transition))).value_or(transition_t{})
               : transition_t{};
       contradiction.next_state[0] += 1;
+      contradiction.duration_us = StepUs(rig.config());  // or it would not be learned for that
       harmful[channels.transition] = Encode(contradiction);
       for (const Rig::Role role : {Rig::kCertifier, Rig::kRobot}) rig.End(role), rig.Start(role);
       rig.witness().Forget();

@@ -231,9 +231,10 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
 
 // What a transition shows depends on the errors that are declared of what is recorded and of when.
 TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmallerOnes) {
+  Own(config_.problem).timing = {.error = 0.01, .set_at_steps = {2}};
   Begin();
   SayState();
-  Falsify(170'000);  // vx by 0.01, in a step that lasted 0.02 s longer, which was not looked at
+  Falsify(170'000);  // vx by 0.01, in a step that lasted 0.02 s longer, which counts nothing for vx here
   const Problem exact = *config_.problem;
   const auto is_falsified = [&](const std::function<void(Problem&)>& declare) {
     declare(Own(config_.problem) = exact);
@@ -256,13 +257,13 @@ TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmal
   EXPECT_FALSE(with_input_error(0.035));
   const auto with_timing = [&](double error, double rate) {
     return is_falsified([&](Problem& problem) {
-      problem.timing.error = error;
-      problem.timing.rate_bound = Vec({kInfinity, kInfinity, rate, kInfinity});
+      problem.timing = {.error = error, .rate_bound = Vec({kInfinity, kInfinity, rate, kInfinity})};
     });
   };
   EXPECT_TRUE(with_timing(0.02, 0.48));
   EXPECT_FALSE(with_timing(0.02, 0.52)) << "it may have done so in 0.02 s";
   EXPECT_FALSE(with_timing(0.009, 0.48)) << "no step of such a task lasts so long";
+  EXPECT_FALSE(is_falsified([](Problem& problem) { problem.timing.error = 0; })) << "and all of this one last dt";
   EXPECT_TRUE(is_falsified([](Problem&) {})) << "nothing is forgotten";
 }
 

@@ -143,7 +143,8 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "TRANSITION")
     return Certifier([](int number) {
-      return Encode(transition_t{.utime = WallClockUs(), .sequence = number, .num_states = 4, .num_inputs = 2});
+      return Encode(transition_t{
+          .utime = WallClockUs(), .sequence = number, .duration_us = 150'000, .num_states = 4, .num_inputs = 2});
     });
   if (channel == "CERTIFIER_STATUS")
     return Certifier([](int) {

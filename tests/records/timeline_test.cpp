@@ -8,6 +8,7 @@
 #include "lcmtypes/names.h"
 #include "records/replay.h"
 #include "records/report.h"
+#include "task/step_time.h"
 #include "tests/messages.h"
 #include "tests/records/certificates.h"
 #include "tests/records/course.h"
@@ -74,6 +75,7 @@ struct TimelineTest : testing::Test {
     const int n = config_.problem->model->num_states(), m = config_.problem->model->num_inputs();
     transition_t message{.utime = ++now_,
                          .sequence = transitions_++,
+                         .duration_us = StepUs(config_),
                          .num_states = static_cast<std::int16_t>(n),
                          .num_inputs = static_cast<std::int16_t>(m)};
     for (int k = 0; k < n; ++k) message.state[k] = known.z(0, k), message.next_state[k] = known.x_next(0, k);
