@@ -91,6 +91,63 @@ TEST_P(TextCertificates, OfStepsOffTheirTimesAreConfirmed) {
                   random, Eigen::VectorXd::Constant(1, 0.1), 8, 0.02, narrower);
 }
 
+// A cart at 9 m/s drives five steps of 0.1 s at a wall, and each boundary may be 30 ms early or late.
+struct LateStep : testing::Test {
+  static constexpr double kFastest = 9.03, kError = 0.03;
+  // Of the cart that is fastest and ahead, and late in the end. No bound may be below it.
+  static constexpr double kReached = 0.05 + (0.5 + kError) * kFastest;
+  // By hand: the speeds differ by 0.03 m/s from the middle, so E times them counts once in the first step and twice in
+  // each of the others; and within the longest step, 0.13 s, it may be off the chord by 5 m/s^2.
+  static constexpr double kNeeded = 0.05 + 0.5 * kFastest + kError * 9 + 9 * kError * 0.03 + 5 * 0.13 * 0.13 / 8;
+
+  LateStep() {
+    problem_ =
+        std::make_shared<Problem>(WorldOf(MakeTextModel(TextModel({{"x", "v"}, {"y", "0*v"}, {"v", "a"}}, {"a"},
+                                                                  {{"dt", 0.1, 0.1}}, {}, Integrator::kMidpoint)),
+                                          Within({50, 10, 20}), Within({5})));
+    DeclareError(kError);
+  }
+  void DeclareError(double error) {
+    problem_->timing.error = error;
+    problem_->between = Between{Vec({5, 0.1}), 0, 0, AddUp(0.1, error)};
+  }
+  Decision Before(double wall) {
+    obstacles_ = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)};
+    return Certifier(problem_).Certify(plan_, start_, obstacles_, tube_);
+  }
+  Verdict Judge(double wall) {
+    Certificate certificate = CertificateOf(Certifier(problem_), plan_, start_, obstacles_, tube_);
+    certificate.obstacles = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)};
+    for (RecordedSlice& slice : certificate.slices) std::ranges::fill(slice.clearance, 1e-12);
+    return Verifier(problem_, MethodOf(*problem_)).Verify(certificate);
+  }
+
+  std::shared_ptr<Problem> problem_;
+  const std::array<double, 5> controls_{};
+  const Plan plan_{controls_.data(), 1, 5, 1, {}};
+  const Zonotope start_ = Zonotope::FromBox(Vec({0, 0, 9}), Vec({0.05, 0.05, 0.03}));
+  std::vector<Obstacle> obstacles_;
+  forereach::Tube tube_;
+};
+
+TEST_F(LateStep, IsCertifiedIfTheWallIsFartherAwayThanItReaches) {
+  for (const double wall : {4.58, 4.65, kReached, kNeeded - 1e-9})
+    EXPECT_FIELDS(Before(wall), (outcome, Outcome::kSafety), (cause, Cause::kObstacle));
+  for (const double wall : {kNeeded + 1e-9, 4.87}) EXPECT_EQ(Before(wall).outcome, Outcome::kCertified);
+  DeclareError(0);
+  EXPECT_EQ(Before(4.58).outcome, Outcome::kCertified) << "steps on time";
+}
+
+TEST_F(LateStep, IsConfirmedIfTheWallIsFartherAwayThanItReaches) {
+  ASSERT_EQ(Before(kNeeded + 1e-9).outcome, Outcome::kCertified);
+  EXPECT_TRUE(IsConfirmed(Judge(kNeeded + 1e-9)));
+  for (const double wall : {4.58, 4.65, kReached - 1e-9}) EXPECT_EQ(Judge(wall).status, Status::kRefuted) << wall;
+  DeclareError(0.029);
+  ASSERT_EQ(Before(kNeeded + 1e-9).outcome, Outcome::kCertified);
+  DeclareError(kError);
+  EXPECT_EQ(Judge(kNeeded + 1e-9).status, Status::kRefuted) << "a tube of smaller errors";
+}
+
 // A BlueROV2 (von Benzon et al., J. Mar. Sci. Eng. 10(12), 2022) without roll and pitch; `drag` of a speed is its
 // quadratic part.
 ModelText Rov(const std::function<std::string(const std::string&)>& drag, Integrator integrator) {
