@@ -9,6 +9,11 @@
 #include "forereach/residual/growing_disturbance.h"
 
 namespace forereach {
+namespace {
+
+constexpr std::uint64_t kOtherNumbers = std::uint64_t{1} << 32;  // seeds are below it
+
+}  // namespace
 
 Disturbance::Disturbance(const Eigen::VectorXd& bounds, std::shared_ptr<const GrowingDisturbance> growing,
                          const std::string& kind, std::uint64_t seed)
@@ -27,9 +32,13 @@ Disturbance::Disturbance(const Declaration& declaration, const RobotOptions& opt
 }
 
 Disturbance Disturbance::OfMeasurements(const Declaration& declaration, const RobotOptions& options) {
-  constexpr std::uint64_t kOtherNumbers = std::uint64_t{1} << 32;
   return {declaration.state_error, nullptr, options.sensor_error,
           kOtherNumbers + static_cast<std::uint64_t>(options.disturbance_seed)};
+}
+
+Disturbance Disturbance::OfInputs(const Declaration& declaration, const RobotOptions& options) {
+  return {declaration.input_error, nullptr, options.input_error,
+          2 * kOtherNumbers + static_cast<std::uint64_t>(options.disturbance_seed)};
 }
 
 void Disturbance::Add(std::span<double> next, std::span<const double> z) {

@@ -85,6 +85,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out, Pl
       limits_(*config.problem->model, config.problem->limits),
       disturbance_(config.problem->declaration, config.robot),
       sensor_(Disturbance::OfMeasurements(config.problem->declaration, config.robot)),
+      inputs_(Disturbance::OfInputs(config.problem->declaration, config.robot)),
       jitter_(config),
       period_us_(Microseconds(config.robot.step_period_ms)),
       most_late_us_(StepErrorUs(config.gate) ? period_us_ / 2 : 0),
@@ -141,10 +142,11 @@ void RobotSimNode::TakeReload() {
 
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const std::int64_t late_us = std::clamp(now_us - utime, -most_late_us_, most_late_us_);
-  const std::span<const double> control = supervisor_.control();
+  std::vector<double> control(supervisor_.control().begin(), supervisor_.control().end());
   const bool moves = !control.empty() || is_stopping_;
   if (!control.empty()) {
     is_stopping_ = false;
+    inputs_.Add(control);
     const std::vector<double> z = Joined(state_, control);
     plant_(state_, control, state_, static_cast<double>(late_us - late_before_us_) * 1e-6);
     disturbance_.Add(state_, z);

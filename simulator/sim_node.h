@@ -3,9 +3,10 @@
 Step boundaries are due at t_j = t_0 + j * step_period, where t_0 is the first Tick, and come as early or late as
 robot.step_jitter says (step_jitter.h); messages carry the times at which they are due. Where the task has
 robot.step_error_ms, a step lasts as long as the clock says; otherwise step_period. At each boundary, in this order:
- 1. The plant takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
-    turned into [-pi, pi], its state is measured, with an error by robot.sensor_error, and the supervisor finishes the
-    step. All that supervisor and bus see is the measured state.
+ 1. The plant takes the control of the step that has ended, with an error by robot.input_error, is disturbed
+    (disturbance.h), its angles (model.angles) are turned into [-pi, pi], its state is measured, with an error by
+    robot.sensor_error, and the supervisor finishes the step. All that supervisor and bus see is the measured state and
+    the plan's control.
  2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h),
     LIMIT_EXCEEDED for every limit of the task that does not hold at this boundary or, if it uses an input, with the
     control of the step that has ended, and GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
@@ -106,7 +107,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   const Plant plant_;
   const BodyPlaces places_;
   const LimitValues limits_;
-  Disturbance disturbance_, sensor_;
+  Disturbance disturbance_, sensor_, inputs_;
   StepJitter jitter_;
   const std::int64_t period_us_;
   const std::int64_t most_late_us_;  // by which the plant knows of it; 0: the task looks at no clock

@@ -332,8 +332,8 @@ std::vector<Key> RobotKeys() {
                       [](const Field& at, TaskDraft& draft) { draft.config.gate.step_error_ms = at.Number(); }),
                "certificates say that steps are on time"),
       Word("robot.step_error_ms", {"any"},
-           "Steps are taken at any time, and nobody looks at a clock: certificates hold for steps on time. Not with "
-           "gate.max_clock_error_ms.",
+           "Steps are taken at any time, and nobody looks at a clock: certificates hold for steps on time, and those "
+           "of another duration are not learned. Not with gate.max_clock_error_ms.",
            [](const Field&, TaskDraft& draft) { draft.config.gate.step_error_ms = kAnyTime; }),
       Optional(
           robot.Number(
@@ -352,9 +352,13 @@ std::vector<Key> RobotKeys() {
           robot, "sensor_error", &RobotOptions::sensor_error,
           [](const Declaration& declaration) { return !declaration.state_error.isZero(0); }, "state_error",
           "By how much measured states are off the true ones, within declaration.state_error: likewise."),
+      WithinDeclared(
+          robot, "input_error", &RobotOptions::input_error,
+          [](const Declaration& declaration) { return !declaration.input_error.isZero(0); }, "input_error",
+          "By how much the inputs that act are off the plan's, within declaration.input_error: likewise."),
       RobotJitter(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
-                    "Of the random numbers of disturbance, sensor_error and step_jitter."),
+                    "Of the random numbers of disturbance, sensor_error, input_error and step_jitter."),
   };
 }
 

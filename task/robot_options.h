@@ -19,8 +19,9 @@ struct RobotOptions {
   double time_limit_s = 40;           ///< The run ends at this time even without reaching the goal.
   std::string disturbance = "none";   ///< What disturbs each step: none, random or adversarial (disturbance.h).
   std::string sensor_error = "none";  ///< What its measurements are off by, likewise.
+  std::string input_error = "none";   ///< What the inputs that act are off the plan's by, likewise.
   std::string step_jitter = "none";   ///< How its steps are off their times, likewise (step_jitter.h).
-  int disturbance_seed = 1;           ///< Of the random numbers of all three.
+  int disturbance_seed = 1;           ///< Of the random numbers of all four.
 };
 
 }  // namespace forereach

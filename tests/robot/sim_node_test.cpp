@@ -783,6 +783,36 @@ TEST(RobotSim, MeasuresWithItsSensorErrorAndDrivesByTheTruth) {
   }
 }
 
+// The plant is told the inputs that act, all others those of the plan.
+TEST(RobotSim, ActsWithItsInputErrorAndReportsThePlansInputs) {
+  for (const std::string kind : {"none", "random", "adversarial"}) {
+    SCOPED_TRACE(kind);
+    Config config = PointMassTask();
+    Own(config.problem).declaration.input_error = Eigen::Vector2d(0.25, 0);
+    config.robot.input_error = kind;
+    std::vector<std::vector<double>> acted;
+    Rig rig(config, [&](auto x, auto u, auto next, double) {
+      acted.emplace_back(u.begin(), u.end());
+      std::ranges::copy(x, next.begin());
+    });
+    rig.RunTo(40);
+    rig.Send(Plan(config, 1, 42, {0, 0, 0, 0}));
+    rig.RunTo(45);
+    ASSERT_EQ(acted.size(), rig.transitions.size());
+    ASSERT_GE(acted.size(), 1u);
+    double largest = 0;
+    for (std::size_t i = 0; i < acted.size(); ++i) {
+      EXPECT_FIELDS(rig.transitions[i], (input[0], i < 2 ? 1 : -1), (input[1], acted[i][1]));
+      largest = std::max(largest, std::abs(acted[i][0] - rig.transitions[i].input[0]));
+    }
+    EXPECT_LE(largest, 0.25);
+    if (kind == "none")
+      EXPECT_EQ(largest, 0);
+    else
+      EXPECT_GT(largest, kind == "random" ? 0.01 : 0.2499);
+  }
+}
+
 TEST(RobotSim, StopPrintsOneLineOfJson) {
   Rig rig(PointMassTask());
   rig.RunTo(2);

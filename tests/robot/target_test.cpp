@@ -469,6 +469,31 @@ TEST_P(DisturbanceTest, MeasuresWithinTheStateErrorAndReachesIt) {
   EXPECT_EQ(exact, truth);
 }
 
+TEST_P(DisturbanceTest, ActsWithinTheInputErrorAndReachesIt) {
+  Declaration declaration;
+  declaration.state_error = Eigen::Vector2d(9, 9);
+  declaration.input_error = Eigen::Vector3d(0.25, 0, 1e-300);
+  RobotOptions options;
+  options.input_error = GetParam();
+  Disturbance inputs = Disturbance::OfInputs(declaration, options);
+  const std::vector<double> of_plan{0.75, 2, 1e-290};
+  std::vector<double> first;
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<double> acts = of_plan;
+    inputs.Add(acts);
+    for (std::size_t l = 0; l < 3; ++l)
+      EXPECT_LE(abs(mpq_class(acts[l]) - mpq_class(of_plan[l])),
+                mpq_class(declaration.input_error[static_cast<Eigen::Index>(l)]))
+          << l;
+    first.push_back(acts[0] - of_plan[0]);
+  }
+  const auto [least, largest] = std::ranges::minmax(first);
+  EXPECT_LT(least, -0.249);
+  EXPECT_GT(largest, 0.249);
+  if (GetParam() == "adversarial")
+    EXPECT_TRUE(std::ranges::all_of(first, [](double error) { return std::abs(error) > 0.2499; })) << "at a corner";
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, DisturbanceTest, testing::Values("random", "adversarial"));
 
 TEST(MakeTransitionsTest, RefusesWhatIsNotInsideTheDomain) {

@@ -338,6 +338,8 @@ TEST_F(ErrorTest, AMissingKeyIsAnError) {
             "20: robot.disturbance: random, and declaration.disturbance allows for none");
   EXPECT_EQ(After("robot: {sensor_error: adversarial}\n"),
             "20: robot.sensor_error: adversarial, and declaration.state_error allows for none");
+  EXPECT_EQ(After("robot: {input_error: random}\n"),
+            "20: robot.input_error: random, and declaration.input_error allows for none");
   EXPECT_THAT(With(", radius: 0.8", ""), StartsWith("18: task.obstacles[0].circle.radius: missing: "));
   EXPECT_EQ(After("planner: {source: policy}\n"),
             "20: planner.policy: missing: a policy's file, for planner.source: policy");
