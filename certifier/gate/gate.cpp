@@ -21,6 +21,7 @@
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "lcmtypes/why_failed.h"
+#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -450,6 +451,8 @@ std::string Gate::Learn(Bytes bytes) {
   const auto message = Decoded<transition_t>(bytes);
   if (!message) return fmt::format("not a transition_t of {} bytes", EncodedSize<transition_t>());
   const ExecutedTransition transition = FromMessage(*message, certifier_.problem());
+  // Where nobody looks at a clock, a step of another duration is nothing to learn of, and nothing is wrong with it.
+  if (!StepErrorUs(options_) && transition.by_clock > MostLonger(certifier_.problem().timing)) return {};
   if (!transition.refusal.empty()) return transition.refusal;
   if (const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer, transition.by_clock);
       learned != Learned::kAdded)

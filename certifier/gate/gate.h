@@ -112,7 +112,7 @@ class Gate final {
   /** Adds an executed transition to the observations, if the task has gate.learn. grounds().observations becomes the
   BLAKE2b-256 of the digest before and the message's bytes. If a check refuses the transition, nothing changes and the
   result names the check (certify/learned.h); otherwise it is empty. certifier().violation() is set if the transition
-  falsifies the declaration. */
+  falsifies the declaration. Where no clock is looked at, a step that did not last model.dt changes nothing. */
   [[nodiscard]] std::string Learn(Bytes transition);
 
   /** Checks sizes, numbers and stamp of a robot's state. @return the first error, or an empty text. */

@@ -409,12 +409,19 @@ TEST(GateTransitionTest, AStepThatNoScheduleAllowsIsNotLearned) {
     Own(config.problem).timing.error = StepErrorSeconds(config);
     transition_t transition = AtRest(kNow);
     transition.duration_us = duration_us;
-    return Gate(config).Learn(Encode(transition));
+    Gate gate(config);
+    const std::string refusal = gate.Learn(Encode(transition));
+    const bool is_learned = gate.grounds().observations != config.grounds.observations;
+    EXPECT_FALSE(is_learned && !refusal.empty());
+    return refusal.empty() && !is_learned ? "not learned" : refusal;
   };
-  for (const std::optional<double> on_time : {std::optional(0.0), std::optional(kAnyTime), std::optional<double>()}) {
-    EXPECT_EQ(learn(on_time, 150'000), "");
-    for (const std::int64_t other : {149'998, 150'002, 100'000, 0, -150'000})
-      EXPECT_THAT(learn(on_time, other), HasSubstr(" us, further from model.dt, 0.15 s, than steps on time do"));
+  EXPECT_EQ(learn(0, 150'000), "");
+  for (const std::int64_t other : {149'998, 150'002, 100'000, 0, -150'000}) {
+    EXPECT_THAT(learn(0, other), HasSubstr(" us, further from model.dt, 0.15 s, than steps on time do"));
+    for (const std::optional<double> no_clock : {std::optional(kAnyTime), std::optional<double>()}) {
+      EXPECT_EQ(learn(no_clock, 150'000), "");
+      EXPECT_EQ(learn(no_clock, other), "not learned") << "and not refused";
+    }
   }
   for (const std::int64_t within : {160'000, 140'000}) EXPECT_EQ(learn(5, within), "");
   for (const std::int64_t beyond : {160'002, 139'998})
