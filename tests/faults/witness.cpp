@@ -119,8 +119,8 @@ void Witness::OnTransition(const Received& received) {
   if (!std::equal(transition->input, transition->input + transition->num_inputs, certified.plan.control[step]))
     Violate(which + " was driven with another control");
   for (int k = 0; k < transition->num_states; ++k) {
-    const double x = transition->state[k];
-    if (!(certified.slice_lower[step][k] <= x && x <= certified.slice_upper[step][k]))
+    const double x = transition->state[k], error = certified.state_error[k];
+    if (!(certified.slice_lower[step][k] - error <= x && x <= certified.slice_upper[step][k] + error))
       Violate(which + " was driven from outside its slice, in coordinate " + std::to_string(k));
   }
 }
