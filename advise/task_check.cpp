@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/residual/consistency.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
 #include "forereach/residual/recorded_successor.h"
@@ -41,6 +43,8 @@ constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
 constexpr int kSamples = 2000;                 // of the domain, for the length of a step
 constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
 constexpr double kShareBeyond = 0.05;          // of the data's range
+constexpr double kNear = 0.1;                  // standard deviations apart: nearly the same place
+constexpr double kSuspect = 1 - 1e-9;          // of what is declared: worth a rigorous test
 constexpr std::size_t kMostLines = 20;         // that a finding lists
 
 std::string Up(double x) { return RoundedUp(x, 4); }
@@ -246,24 +250,69 @@ class Examination final {
           kWiden);
   }
 
+  // The pairs of transitions that contradict a row of the declaration.
+  struct Contradictions {
+    std::vector<Violation> worst;  // at most kMostLines, the worst first
+    std::int64_t count = 0;
+    std::vector<int> of_each;  // of each transition
+    double excess = 0;         // the largest by which one is more than the declaration allows
+    double near = 0;           // the largest of two transitions at nearly the same place, which no slopes explain
+    double errors = 0;         // what the declaration allows besides slopes
+    double factor = 0;         // on the row's slopes with which none contradicts it; infinite if there is none
+
+    static std::pair<double, double> Rank(const Violation& pair) {
+      return {pair.bound > 0 ? pair.difference / pair.bound : kInfinity, pair.difference};
+    }
+    void Add(const Violation& pair, bool is_near) {
+      ++count, ++of_each[ToSize(pair.first)], ++of_each[ToSize(pair.second)];
+      const double more = SubUp(pair.difference, pair.bound);
+      excess = std::max(excess, more);
+      if (is_near) near = std::max(near, more);
+      const double slopes = SubDown(pair.bound, errors);
+      factor = std::max(factor, slopes > 0 ? DivUp(SubUp(pair.difference, errors), slopes) : kInfinity);
+      worst.insert(std::ranges::upper_bound(worst, Rank(pair), std::greater{}, Rank), pair);
+      if (worst.size() > kMostLines) worst.pop_back();
+    }
+  };
+
+  // For each column on which row k may depend, or all if it is constant: 1 / its standard deviation; 0 for the others.
+  [[nodiscard]] Eigen::VectorXd ScalesOf(const Observations& observations, Eigen::Index k) const {
+    const auto row = problem_.declaration.lipschitz.row(k);
+    Eigen::VectorXd scales = Eigen::VectorXd::Zero(row.size());
+    for (Eigen::Index l = 0; l < row.size(); ++l) {
+      const Eigen::ArrayXd about = observations.z.col(l).array() - observations.z.col(l).mean();
+      const double deviation = std::sqrt(about.square().mean());
+      if ((row[l] > 0 || row.isZero(0)) && deviation > 0) scales[l] = 1 / deviation;
+    }
+    return scales;
+  }
+
   void ExamineDeclaration(const Observations& observations) {
     const Eigen::Index stride = 1 + (observations.size() - 1) / kMostCompared;
     result_.all_pairs = stride == 1;
+    contradictions_.resize(result_.states.size());
     for (std::size_t k = 0; k < result_.states.size(); ++k) {
       const auto c = static_cast<Eigen::Index>(k);
-      const Eigen::VectorXd residual = (observations.lower.col(c) + observations.upper.col(c)) / 2;
-      const Eigen::VectorXd bounds = problem_.declaration.lipschitz.row(c).transpose();
+      const Eigen::VectorXd residual = (observations.lower.col(c) + observations.upper.col(c)) / 2,
+                            hidden = (observations.upper.col(c) - observations.lower.col(c)) / 2,
+                            bounds = problem_.declaration.lipschitz.row(c).transpose(),
+                            scales = ScalesOf(observations, c);
       const double errors = 2 * problem_.declaration.ObservationError(c);
       if (problem_.declaration.affine.Contains(c)) continue;  // the certifier judges them, not pairs
+      Contradictions& found = contradictions_[k];
+      found.of_each.resize(ToSize(observations.size()));
+      found.errors = errors;
       TaskCheck::Row row{result_.states[k], errors > 0 || (bounds.array() > 0).any(), 0, 0, 0};
       for (Eigen::Index i = 0; i < observations.size(); i += stride)
         for (Eigen::Index j = i + stride; j < observations.size(); j += stride) {
-          const double allowed = errors +
-                                 bounds.dot((observations.z.row(i) - observations.z.row(j)).cwiseAbs().transpose()) +
-                                 (observations.upper(i, c) - observations.lower(i, c)) +
-                                 (observations.upper(j, c) - observations.lower(j, c));
-          const double used = std::abs(residual[i] - residual[j]) / allowed;
+          const auto apart = (observations.z.row(i) - observations.z.row(j)).cwiseAbs().transpose();
+          const double used =
+              std::abs(residual[i] - residual[j]) / (errors + bounds.dot(apart) + hidden[i] + hidden[j]);
           if (used > row.used) row = {row.name, row.is_declared, used, FileLine(i), FileLine(j)};
+          if (!(used > kSuspect)) continue;
+          if (const auto pair = TestPair(problem_.declaration, observations, static_cast<int>(i), static_cast<int>(j),
+                                         static_cast<int>(k)))
+            found.Add(*pair, scales.dot(apart) < kNear);
         }
       result_.rows.push_back(row);
     }
@@ -422,11 +471,50 @@ class Examination final {
     if (problem_.projection.rows() == 2) AddTube(*certifier, tube);
   }
 
+  void ExplainPairs(std::size_t k, const Contradictions& found) {
+    const std::string& name = result_.states[k];
+    const Violation& worst = found.worst.front();
+    const auto lines = [&](const Violation& pair) {
+      return fmt::format("lines {} and {}", FileLine(pair.first), FileLine(pair.second));
+    };
+    std::string what = fmt::format(
+        "{}: {} of {} differ in the model's error by {}, and the declaration allows {}: it is false, and nothing can "
+        "be "
+        "certified",
+        name, lines(worst), result_.data, Down(worst.difference), Up(worst.bound));
+    if (found.count > 1) {
+      const auto most = std::ranges::max_element(found.of_each);
+      what += fmt::format(". It is contradicted by {} pairs{}, of which {} have line {}: ", found.count,
+                          result_.all_pairs ? "" : " of a sample", *most, FileLine(most - found.of_each.begin()));
+      for (const Violation& pair : found.worst)
+        what += (&pair == &worst ? "" : ", ") + lines(pair) +
+                (pair.bound > 0 ? fmt::format(" ({} times)", Down(DivDown(pair.difference, pair.bound)))
+                                : ": " + Down(pair.difference));
+      if (found.count > std::ssize(found.worst))
+        what += fmt::format(", and {} more", found.count - std::ssize(found.worst));
+    }
+    const auto c = static_cast<Eigen::Index>(k);
+    const Declaration& declaration = problem_.declaration;
+    const std::string noise =
+        fmt::format("noise_bound of {} at least {}", name, Up(AddUp(declaration.noise_bound[c], found.excess / 2)));
+    std::string advice = "look at these lines, and whether model.dt is the step of the data. If they are right, ";
+    if (found.near > 0) {
+      advice += fmt::format(
+          "the robot does not always do the same at nearly the same place, which no slope explains: declare a "
+          "disturbance of {} of at least {}, or what `forereach declare --from-data` proposes; only if the sensor errs "
+          "by so much, {}",
+          name, Up(AddUp(declaration.DisturbanceBound(c), found.near / 2)), noise);
+    } else {
+      advice += "declare more: " + noise + ", or this row larger" +
+                (found.factor < kInfinity ? " by a factor of " + Up(found.factor) : "");
+    }
+    Add(RowKey(name), what, advice);
+  }
+
   // Of a pair, or of one step in a region, that contradicts the declaration.
   void ExplainViolation(const Violation& violation) {
     const auto k = ToSize(violation.coordinate);
     const std::string& name = result_.states[k];
-    const double sigma = problem_.declaration.noise_bound[violation.coordinate];
     if (const int region = Violation::RegionOf(violation.second); region >= 0)
       return Add(
           fmt::format("declaration.regions[{}].bound.{}", region, name),
@@ -459,15 +547,10 @@ class Examination final {
                       Down(violation.difference), Up(violation.bound)),
           "look at these lines. If they are right, declare more in the regions between them, or make these "
           "smaller: declaration.lipschitz alone allows the difference");
-    Add(RowKey(name),
-        fmt::format("{}: lines {} and {} of {} differ in the model's error by {}, and the declaration allows {}: it is "
-                    "false, and nothing can be certified",
-                    name, FileLine(violation.first), FileLine(violation.second), result_.data,
-                    Down(violation.difference), Up(violation.bound)),
-        "look at these lines, and whether model.dt is the step of the data. If they are right, declare more: "
-        "noise_bound of " +
-            name + " at least " + Up(sigma + (violation.difference - violation.bound) / 2) + ", or this row larger" +
-            (violation.bound > 0 ? " by a factor of " + Up(violation.difference / violation.bound) : std::string()));
+    if (contradictions_[k].count == 0)  // of a pair that is in no sample
+      contradictions_[k].Add(violation, false);
+    for (std::size_t row = 0; row < contradictions_.size(); ++row)
+      if (contradictions_[row].count > 0) ExplainPairs(row, contradictions_[row]);
   }
 
   // A plan of its own has to be certified as a whole; without one, its progress part.
@@ -852,7 +935,8 @@ class Examination final {
   const std::vector<std::string> names_;
   Eigen::MatrixXd controls_;  // a column a step
   Transitions all_;
-  std::vector<Eigen::Index> rows_;  // of all_, those in the domain
+  std::vector<Eigen::Index> rows_;              // of all_, those in the domain
+  std::vector<Contradictions> contradictions_;  // of each state
   TaskCheck result_;
 };
 

@@ -331,6 +331,46 @@ TEST_F(CheckTest, AMatrixThatDataContradictIsNamedAsAMapIs) {
     EXPECT_THAT(check(lipschitz), HasSubstr("x: lines 2 and 3 of")) << lipschitz;
 }
 
+// A state x that stands still; its residual changes by at most 0.1 |x|, and its sensor errs by 0.001.
+struct ContradictionsTest : CheckTest {
+  std::string CheckOf(const std::string& rows, const std::string& more = "") {
+    scratch_.Write("steps.csv", "x,u,x_next\n" + rows);
+    scratch_.Write("task.yaml",
+                   "model: {states: {x: m}, inputs: {u: m/s}, parameters: {dt: 0.1}, next: {x: x + dt*u}}\n"
+                   "domain: {state: {lower: [-10], upper: [10]}, input: {lower: [-1], upper: [1]}}\n"
+                   "declaration: {lipschitz: {x: {x: 0.1}}, noise_bound: [0.001]" +
+                       more +
+                       "}\ntransitions: steps.csv\ngate: {obstacles: task}\n"
+                       "task: {initial_set: {center: [0], half_width: [0.01]}, projection: [x], between: samples, "
+                       "obstacles: []}\n");
+    return Check().text;
+  }
+};
+
+TEST_F(ContradictionsTest, AreAllNamedWorstFirst) {
+  EXPECT_THAT(CheckOf("0,0,0\n1,0,1.2\n2,0,2.5\n"),
+              AllOf(HasSubstr("It is contradicted by 3 pairs, of which 2 have line 2: lines 3 and 4 (2.941 times), "
+                              "lines 2 and 4 (2.475 times), lines 2 and 3 (1.96 times)\n"),
+                    HasSubstr("noise_bound of x at least 0.15"), HasSubstr("larger by a factor of 2.98"),
+                    Not(HasSubstr("disturbance of x"))));
+  EXPECT_THAT(CheckOf("0,0,0\n1,0,1.1021\n2,0,2.05\n"), AllOf(HasSubstr("lines 2 and 3 of"), Not(HasSubstr("pairs"))));
+  EXPECT_THAT(CheckOf("0,0,0\n1,0,1.1019\n2,0,2.05\n"), HasSubstr("the data use 99."));
+}
+
+// 0.1 m/step at the end of what is declared there; the columns' standard deviation is about 0.966 m.
+TEST_F(ContradictionsTest, AtNearlyTheSamePlaceAskForADisturbance) {
+  EXPECT_THAT(CheckOf("-1,0,-1\n1,0,1\n1.09,0,1.19\n"), HasSubstr("declare a disturbance of x of at least 0.0445"));
+  EXPECT_THAT(CheckOf("-1,0,-1\n1,0,1\n1.1,0,1.2\n"),
+              AllOf(Not(HasSubstr("disturbance of x")), HasSubstr("declare more: noise_bound of x at least 0.045")));
+}
+
+// A record that errs by 0.01 hides 0.021 of each residual.
+TEST_F(ContradictionsTest, WhatTheErrorsOfTheRecordHideCountsOnce) {
+  const std::string error = ", state_error: [0.01]";
+  EXPECT_THAT(CheckOf("0,0,0\n1,0,1.1439\n", error), HasSubstr("the data use 99."));
+  EXPECT_THAT(CheckOf("0,0,0\n1,0,1.1441\n", error), HasSubstr("lines 2 and 3 of"));
+}
+
 // The first row is outside the domain, so that rows and lines differ by more than the header.
 TEST_F(CheckTest, TransitionsThatNothingCanBeObservedOfAreNamedByTheirLine) {
   const auto check = [&](const std::string& model, const std::string& rows) {
@@ -365,6 +405,11 @@ TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
                                     "noise_bound of vx at least 0.01005"));
   scratch_.Write("task.yaml", Replaced(Read(task_), "[0.01, 0.01, 0.01, 0.01]", "[0.01, 0.01, 0.01006, 0.01]"));
   EXPECT_THAT(Check(), Exits(0));
+  EXPECT_THAT(with("1.2").text, Not(HasSubstr(" py: lines")));
+  EXPECT_THAT(CheckWith("", "",
+                        "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,1,0,0,0,0.15,0,1,0\n"
+                        "0,0,1,1,0,0,0.15,0.25,1.2,1\n"),
+              Exits(1, " py: lines 2 and 3 of", " vx: lines 2 and 3 of"));
 }
 
 // A bar that turns on the spot in steps of 1 s.
