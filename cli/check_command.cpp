@@ -93,7 +93,7 @@ void PrintHypotheses(const std::vector<Hypothesis>& hypotheses, std::ostream& ou
   for (const Hypothesis& each : hypotheses) out << "  " << each.what << "\n    upheld by: " << each.upheld_by << "\n";
 }
 
-Json ToJson(const TaskCheck& check, const std::vector<Hypothesis>& rests_on) {
+Json ToJson(const TaskCheck& check, const std::vector<Hypothesis>& rests_on, const HeldOutSteps& held_out) {
   Json hypotheses = Json::array();
   for (const Hypothesis& each : rests_on) hypotheses.push_back({{"what", each.what}, {"upheld_by", each.upheld_by}});
   Json findings = Json::array(), coordinates = Json::array(), rows = Json::array();
@@ -113,6 +113,7 @@ Json ToJson(const TaskCheck& check, const std::vector<Hypothesis>& rests_on) {
           {"transitions", check.transitions},
           {"coordinates", coordinates},
           {"declaration", rows},
+          {"held_out", ToJson(held_out)},
           {"states", check.states},
           {"half_widths", check.half_widths},
           {"tube", check.tube},
@@ -123,7 +124,8 @@ Json ToJson(const TaskCheck& check, const std::vector<Hypothesis>& rests_on) {
 int Check(const CheckArguments& options) {
   std::vector<std::string> files = options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
   TaskCheck check = CheckTask(options.check);
-  if (const std::string warning = WarningOfTask(options.check.config); !warning.empty())
+  const HeldOutSteps held_out = JudgeTask(options.check.config);
+  if (const std::string warning = WarningOf(held_out); !warning.empty())
     check.findings.push_back({.place = options.check.config + ": declaration: ",
                               .what = warning,
                               .advice = "declare more: `forereach declare --from-data` proposes a disturbance"});
@@ -132,10 +134,11 @@ int Check(const CheckArguments& options) {
   for (const std::string& file : files) DrawPicture(check.picture, file);
   const std::vector<Hypothesis> rests_on = HypothesesOf(LoadConfig(options.check.config, TransitionsFile::kIgnore));
   if (options.json) {
-    std::cout << JsonText(ToJson(check, rests_on)) << std::endl;
+    std::cout << JsonText(ToJson(check, rests_on, held_out)) << std::endl;
   } else {
     std::ostringstream out;
     PrintData(check, out);
+    if (held_out.slices() > 0) out << "held out, by the other half of the data: " << TextOf(held_out) << "\n";
     PrintTube(check, options, out);
     PrintHypotheses(rests_on, out);
     PrintFindings(check, out);

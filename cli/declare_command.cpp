@@ -450,8 +450,9 @@ Examples:
            Needing("--hold-out", {"--confidence", &options->data.confidence, "",
                                   "With --hold-out: of the bound on the rate of blocks with a contradiction",
                                   NumberRange{0.5, 0.999999}}),
-           Needing("--hold-out", {"--picture", &options->data.picture, "NAME",
-                                  "With --hold-out: the trade-off as NAME.svg and NAME.png, or as one of them"}),
+           Needing("--from-data", {"--picture", &options->data.picture, "NAME",
+                                   "The smallest slopes against the error, or with --hold-out the trade-off, as "
+                                   "NAME.svg and NAME.png, or as one of them"}),
            JobsOption(options->jobs),
            JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
       .run = [options] {

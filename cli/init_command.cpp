@@ -275,7 +275,7 @@ int Init(const InitArguments& options) {
             << " inputs\n  now: put in what your robot is where a line says PLACEHOLDER";
   if (!task.transitions_exist) std::cout << ", record " << task.transitions;
   std::cout << ", and run\n  forereach check " << options.out << std::endl;
-  if (const std::string warning = WarningOfTask(options.out); !warning.empty())
+  if (const std::string warning = WarningOf(JudgeTask(options.out)); !warning.empty())
     std::cerr << "forereach: warning: " << warning << std::endl;
   return 0;
 }

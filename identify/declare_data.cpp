@@ -1,7 +1,9 @@
 #include "identify/declare_data.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iostream>
+#include <limits>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -17,7 +19,9 @@
 #include "forereach/residual/observations.h"
 #include "identify/calm_regions.h"
 #include "identify/declare_by.h"
+#include "identify/noise_floor.h"
 #include "identify/smallest_row.h"
+#include "records/chart.h"
 #include "task/json_text.h"
 #include "task/wrapped_angle.h"
 
@@ -83,41 +87,93 @@ void PrintLoneSlopes(const LoneSlopes& rows, const Config& config, std::ostream&
 }
 
 void PrintErrors(const ProposedDeclaration& proposal, const NominalModel& model, std::ostream& out) {
-  out << "\n" << Line({"row", "noise_bound", "  repeated", "  deviation", "  Strongin", "  Knuth-Chou"});
+  out << "\n" << Line({"row", "noise_bound", "  knee", "  repeated", "  deviation", "  Strongin", "  Knuth-Chou"});
   for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
     const ProposedRow& row = proposal.rows[k];
     std::vector<std::string> cells{model.state_names()[k],
                                    ToText(proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)]),
+                                   "  " + RoundedUp(row.knee, kTableDigits),
                                    "  " + RoundedDown(row.noise.repeated, kTableDigits),
-                                   "  " + RoundedDown(row.noise.deviation, kTableDigits), ""};
+                                   "  " + RoundedDown(row.noise.deviation, kTableDigits),
+                                   ""};
     if (row.strongin > 0)
       cells.back() = fmt::format("  {:<10}  x {}", "x " + RoundedUp(row.strongin, 3), RoundedUp(row.knuth_chou, 3));
     out << Line(cells);
   }
 }
 
-// The smallest slopes of each row with scatter against its disturbance.
-void PrintTrades(const ProposedDeclaration& proposal, const NominalModel& model, std::ostream& out) {
+// As it is if it is short, like one that was declared.
+std::string ErrorText(double error) {
+  constexpr std::size_t kShort = 8;
+  const std::string text = ToText(error);
+  return text.size() <= kShort ? text : RoundedUp(error, kTableDigits);
+}
+
+// Whether the declared error is at the cliff or below it.
+bool IsNearKnee(const ProposedRow& row, double factor) { return row.declared < factor * row.knee; }
+
+// The smallest slopes against the error, of the rows whose declared error may be off the cliff.
+void PrintTrades(const ProposedDeclaration& proposal, const NominalModel& model, double factor, std::ostream& out) {
   const std::vector<std::string> names = model.variable_names();
+  const auto line = [](const auto&... cells) { return fmt::format("  {:<12}{:<12}{}\n", cells...); };
   std::string table;
-  const auto line = [](const auto&... cells) { return fmt::format("  {:<12}{:<14}{:<14}{}\n", cells...); };
   for (std::size_t k = 0; k < proposal.rows.size(); ++k) {
     const ProposedRow& row = proposal.rows[k];
-    for (std::size_t i = 0; i < row.trades.size(); ++i) {
-      const ProposedRow::Trade& trade = row.trades[i];
-      const std::string slopes = !trade.slopes ? "" : Joined(names, [&](const std::string& name) {
-        const double slope = (*trade.slopes)[&name - names.data()];
+    if (!IsNearKnee(row, factor)) continue;
+    std::vector<ProposedRow::Trade> trades = row.trades;
+    trades.push_back({row.proposed, row.smallest.slopes});
+    std::ranges::stable_sort(trades, {}, &ProposedRow::Trade::error);
+    for (std::size_t i = 0; i < trades.size(); ++i) {
+      const double error = trades[i].error;
+      if (i > 0 && trades[i - 1].error == error) continue;
+      const std::string slopes = !trades[i].slopes ? "" : Joined(names, [&](const std::string& name) {
+        const double slope = (*trades[i].slopes)[&name - names.data()];
         return slope > 0 ? name + " " + RoundedUp(slope, kTableDigits) : "";
       });
-      const std::string what = !trade.slopes ? "none are consistent" : slopes.empty() ? "none are needed" : slopes;
-      const char* note = i + 2 == row.trades.size()   ? "  <- the knee"
-                         : i + 1 == row.trades.size() ? "  <- proposed"
-                                                      : "";
-      table += line(names[k], ToText(proposal.declaration.noise_bound[static_cast<Eigen::Index>(k)]),
-                    RoundedUp(trade.disturbance, kTableDigits), what + note);
+      std::string notes;
+      for (const auto& [noted, note] :
+           {std::pair(row.declared, "declared"), std::pair(row.knee, "the knee"), std::pair(row.proposed, "proposed")})
+        if (noted == error) notes += (notes.empty() ? "  <- " : ", ") + std::string(note);
+      table += line(names[k], ErrorText(error),
+                    (!trades[i].slopes ? "none are consistent"
+                     : slopes.empty()  ? "none are needed"
+                                       : slopes) +
+                        notes);
     }
   }
-  if (!table.empty()) out << "\n" << line("row", "noise_bound", "disturbance", "smallest slopes") << table;
+  if (!table.empty()) out << "\n" << line("row", "error", "smallest slopes") << table;
+}
+
+// The rows' slopes against the error, those closest to their knee if there are more than a chart has colours for.
+Chart SlopeChartOf(const ProposedDeclaration& proposal, const NominalModel& model, const Eigen::RowVectorXd& scales) {
+  constexpr std::size_t kMost = 6;
+  std::vector<std::size_t> shown;
+  for (std::size_t k = 0; k < proposal.rows.size(); ++k)
+    if (proposal.rows[k].knee > 0) shown.push_back(k);
+  std::ranges::stable_sort(shown, {}, [&](std::size_t k) { return proposal.rows[k].declared / proposal.rows[k].knee; });
+  shown.resize(std::min(shown.size(), kMost));
+  if (shown.empty())
+    throw PictureError("picture: near places show no error, so there are no slopes to draw against it");
+  Chart chart{.title = "The smallest slopes against the error that is declared",
+              .x_name = "error (noise_bound + disturbance) in multiples of the knee",
+              .y_name = "% of the steepest",
+              .x = {ProposedRow::kShares.begin(), ProposedRow::kShares.end()},
+              .series = {}};
+  for (const std::size_t k : shown) {
+    const ProposedRow& row = proposal.rows[k];
+    Chart::Series& series =
+        chart.series.emplace_back(fmt::format("{}: knee at {}, declared {}", model.state_names()[k],
+                                              RoundedUp(row.knee, kTableDigits), RoundedUp(row.declared, kTableDigits)),
+                                  std::vector<double>());
+    double steepest = 0;
+    for (std::size_t i = 0; i < ProposedRow::kShares.size(); ++i) {
+      const auto& slopes = row.trades[i].slopes;
+      series.y.push_back(slopes ? slopes->dot(scales) : std::numeric_limits<double>::quiet_NaN());
+      steepest = std::fmax(steepest, series.y.back());
+    }
+    for (double& y : series.y) y *= steepest > 0 ? 100 / steepest : 1;
+  }
+  return chart;
 }
 
 // Rows whose declared error is below what the data show of it.
@@ -125,19 +181,18 @@ std::vector<std::string> TooQuiet(const ProposedDeclaration& proposal, const Nom
   std::vector<std::string> names;
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
     if (const auto i = static_cast<Eigen::Index>(k);
-        !proposal.declaration.Grows(i) &&
-        AddUp(proposal.declaration.noise_bound[i], proposal.declaration.DisturbanceBound(i)) <
-            proposal.rows[k].noise.deviation)
+        !proposal.declaration.Grows(i) && proposal.rows[k].proposed < proposal.rows[k].noise.deviation)
       names.push_back(model.state_names()[k]);
   return names;
 }
 
 void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model, const DataCommand& command,
                   std::ostream& out) {
-  std::vector<std::string> constant, scattered;
+  std::vector<std::string> constant, scattered, steep, close;
   for (const int l : proposal.constant) constant.push_back(model.variable_names()[ToSize(l)]);
   for (std::size_t k = 0; k < proposal.rows.size(); ++k)
-    if (proposal.rows[k].scatter > 0) scattered.push_back(model.state_names()[k]);
+    if (const ProposedRow& row = proposal.rows[k]; IsNearKnee(row, command.factor))
+      (!(row.scatter > 0) ? close : command.estimate_disturbance ? scattered : steep).push_back(model.state_names()[k]);
   out << "\nsmallest: the slopes with the least sum, each weighed by its column's standard deviation, that no two "
          "transitions\n  contradict. Every smaller sum is contradicted; the lines are a pair that needs the slope.\n"
          "at least: no smaller slope is possible there, if the row's other slopes are at most the proposed ones.\n"
@@ -147,6 +202,8 @@ void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model
          "proposed: "
       << ToText(command.factor)
       << " times the smallest (--factor). No two transitions contradict it.\n"
+         "knee: the least error, noise_bound + disturbance, with which near places (less than a tenth of the columns' "
+         "standard\n  deviations apart) need no slope. With less, slopes explain what is none, and are steep.\n"
          "repeated: half the largest difference of transitions that agree in all columns; the error is at least that.\n"
          "deviation: an estimate of the error's standard deviation from near neighbours (Gamma test).\n"
          "Strongin, Knuth-Chou: what these estimators say of a row, as factors of the smallest. They ignore "
@@ -158,14 +215,18 @@ void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model
           : scattered.empty()    ? "noise_bound and disturbance are taken from the task, not learned.\n"
                                  : "noise_bound is taken from the task, not learned.\n");
   if (!scattered.empty())
-    out << "Scatter: at nearly the same place (less than a tenth of the columns' standard deviations apart), residuals "
-           "differ by more\n  than noise_bound explains: "
-        << Joined(scattered)
-        << ". The knee is the least disturbance with which such pairs need no slope. Proposed\n  is "
-        << ToText(command.factor)
-        << " times that, as a disturbance: the robot may do so again in every step. If it is the sensor that errs by "
-           "so\n"
-           "  much, declare noise_bound instead; noise that is too large makes tubes too narrow.\n";
+    out << "Scatter: at near places, residuals differ by more than noise_bound explains: " << Joined(scattered)
+        << ". Proposed is " << ToText(command.factor)
+        << " times what the knee\n  has beyond it, as a disturbance: the robot may do so again in every step. If it is "
+           "the sensor that errs by so much,\n  declare noise_bound instead; noise that is too large makes tubes too "
+           "narrow.\n";
+  if (!steep.empty())
+    out << "The declared error is below the knee, and these slopes are a cliff: " << Joined(steep)
+        << ". Propose the knee's: --disturbance estimated.\n";
+  if (!close.empty())
+    out << "The declared error is at the knee or above it, by less than a factor of " << ToText(command.factor) << ": "
+        << Joined(close)
+        << ". It is proposed as it is;\n  less would be a cliff, and the knee of more data lies higher.\n";
   if (!constant.empty())
     out << "Never varied in these transitions, so that nothing is known of their slopes: " << Joined(constant) << ".\n";
   if (const auto names = TooQuiet(proposal, model); !names.empty())
@@ -217,13 +278,8 @@ void Warn(const HeldOutSteps& found) {
 Json TradesJson(const ProposedRow& row) {
   Json trades = Json::array();
   for (const ProposedRow::Trade& trade : row.trades)
-    trades.push_back(
-        {{"disturbance", trade.disturbance}, {"slopes", trade.slopes ? Json(*trade.slopes) : Json(nullptr)}});
+    trades.push_back({{"error", trade.error}, {"slopes", trade.slopes ? Json(*trade.slopes) : Json(nullptr)}});
   return trades;
-}
-
-Json ToJson(const HeldOutSteps& found) {
-  return {{"stretches", found.stretches}, {"steps", found.steps}, {"slices", found.slices}, {"outside", found.outside}};
 }
 
 Json ToJson(const ProposedDeclaration& proposal, const LoneSlopes& lone_slopes, const Config& config,
@@ -247,6 +303,7 @@ Json ToJson(const ProposedDeclaration& proposal, const LoneSlopes& lone_slopes, 
     document["rows"].push_back({{"state", names[k]},
                                 {"noise_bound", proposal.declaration.noise_bound[at]},
                                 {"disturbance", proposal.declaration.DisturbanceBound(at)},
+                                {"knee", row.knee},
                                 {"scatter", row.scatter},
                                 {"trades", TradesJson(row)},
                                 {"repeated", row.noise.repeated},
@@ -280,14 +337,19 @@ Json ToJson(const ProposedDeclaration& proposal, const LoneSlopes& lone_slopes, 
 }  // namespace
 
 int DeclareFromData(const DataCommand& command) {
+  const auto pictures = command.picture.empty() ? std::vector<std::string>() : PictureFiles(command.picture);
   const Config config = LoadConfig(command.config);
   RequireSlopes(config);
   RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
                         config.problem->transitions);
   const Problem& problem = *config.problem;
   std::optional<Progress> progress(std::in_place, "parts of the work", 2 * ToSize(problem.model->num_states()));
-  const ProposalOptions options{command.factor, command.estimate_noise, command.estimate_disturbance,
-                                ColumnsBy(command.by, *problem.model), [&] { progress->Advance(); }};
+  const ProposalOptions options{command.factor,
+                                command.estimate_noise,
+                                command.estimate_disturbance,
+                                ColumnsBy(command.by, *problem.model),
+                                [&] { progress->Advance(); },
+                                true};
   try {
     const Observations observations = ObserveForProposal(problem, problem.transitions);
     ProposedDeclaration proposal = Propose(problem.declaration, observations, options);
@@ -302,25 +364,23 @@ int DeclareFromData(const DataCommand& command) {
       Json document = ToJson(proposal, lone_slopes, config, command);
       document["held_out"] = ToJson(held_out);
       std::cout << JsonText(document) << std::endl;
-      Warn(held_out);
-      return 0;
+    } else {
+      std::ostringstream text;
+      text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
+      PrintSlopes(proposal, config, text);
+      PrintLoneSlopes(lone_slopes, config, text);
+      PrintErrors(proposal, *problem.model, text);
+      PrintTrades(proposal, *problem.model, command.factor, text);
+      PrintMeaning(proposal, *problem.model, command, text);
+      PrintRegions(regions, command, text);
+      if (held_out.slices() > 0)
+        text << "With every other block of time as observations, " << TextOf(held_out) << ".\n";
+      std::cout << text.str() << "\ndeclaration:\n"
+                << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
     }
-    std::ostringstream text;
-    text << "declare: from " << problem.transitions.size() << " transitions, an estimate and no proof\n";
-    PrintSlopes(proposal, config, text);
-    PrintLoneSlopes(lone_slopes, config, text);
-    PrintErrors(proposal, *problem.model, text);
-    PrintTrades(proposal, *problem.model, text);
-    PrintMeaning(proposal, *problem.model, command, text);
-    PrintRegions(regions, command, text);
-    if (held_out.slices > 0)
-      text << fmt::format(
-          "With every other block of time as observations, {} of {} recorded steps of the others lie in their "
-          "slices.\n",
-          held_out.slices - held_out.outside, held_out.slices);
-    std::cout << text.str() << "\ndeclaration:\n"
-              << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
     Warn(held_out);
+    for (const std::string& file : pictures)
+      DrawChart(SlopeChartOf(proposal, *problem.model, ScalesOf(observations)), file);
     return 0;
   } catch (const Unexplained& found) {
     progress.reset();

@@ -120,17 +120,17 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
 }
 
 // "83 of 200 recorded steps"
-std::string OutsideText(int outside, int slices) { return fmt::format("{} of {} recorded steps", outside, slices); }
+std::string LeftText(int left, int slices) { return fmt::format("{} of {} recorded steps", left, slices); }
 
-// Of the factors at which recorded states lie outside their slices.
-void WarnOfOutside(const std::vector<Trial>& trials) {
+// Of the factors at which recorded states have left their slices.
+void WarnOfLeft(const std::vector<Trial>& trials) {
   std::string text;
   for (const Trial& trial : trials)
     if (trial.left() > 0)
       text +=
-          (text.empty() ? "" : ", ") + OutsideText(trial.left(), trial.slices()) + " at factor " + ToText(trial.factor);
+          (text.empty() ? "" : ", ") + LeftText(trial.left(), trial.slices()) + " at factor " + ToText(trial.factor);
   if (!text.empty())
-    std::cerr << "forereach: warning: outside the slices of their certificates lie " << text
+    std::cerr << "forereach: warning: the slices of their certificates were left by " << text
               << ". A declaration whose slices lose the robot is false, whatever it certifies" << std::endl;
 }
 
@@ -266,7 +266,8 @@ int DeclareHoldOut(const DataCommand& command) {
     Declaration declaration = learned.declaration;
     declaration.lipschitz *= factor;
     for (std::size_t k = 0; k < learned.rows.size(); ++k)
-      if (learned.rows[k].scatter > 0) declaration.disturbance[static_cast<Eigen::Index>(k)] *= factor;
+      if (options.estimate_disturbance && learned.rows[k].scatter > 0)
+        declaration.disturbance[static_cast<Eigen::Index>(k)] *= factor;
     Trial& trial = trials.emplace_back();
     trial.factor = factor;
     trial.found = CountContradictions(problem, declaration, split);
@@ -279,7 +280,7 @@ int DeclareHoldOut(const DataCommand& command) {
     std::cout << JsonText(ToJson(trials, command)) << std::endl;
   else
     PrintForPeople(trials, command, split);
-  WarnOfOutside(trials);
+  WarnOfLeft(trials);
   for (const std::string& file : pictures) DrawChart(ChartOf(trials, command), file);
   return 0;
 }
@@ -301,26 +302,38 @@ HeldOutSteps JudgeByHeldOut(const Config& config, const Declaration& declaration
   Trial trial;
   CertifyWindows(config, declaration, split, chosen, jobs, trial);
   found.stretches = trial.windows;
-  found.slices = trial.slices();
-  found.outside = trial.left();
+  found.inside = trial.found_in[0], found.consistent = trial.found_in[1], found.left = trial.left();
   return found;
 }
 
-std::string WarningOf(const HeldOutSteps& found) {
-  if (found.outside == 0) return "";
-  return fmt::format(
-      "{} lie outside the slices that the declaration promises from the other half of the transitions ({} stretches of "
-      "{} steps): it is false, whatever it certifies. What is no function of state and input is a disturbance",
-      OutsideText(found.outside, found.slices), found.stretches, found.steps);
-}
-
-std::string WarningOfTask(const std::string& path) {
+HeldOutSteps JudgeTask(const std::string& path) {
   try {
     const Config config = LoadConfig(path);
-    return WarningOf(JudgeByHeldOut(config, config.problem->declaration, 1));
+    return JudgeByHeldOut(config, config.problem->declaration, 1);
   } catch (const ConfigError&) {
-    return "";
+    return {};
   }
+}
+
+std::string TextOf(const HeldOutSteps& found) {
+  return fmt::format("of {} recorded steps, {} are inside their slices, {} consistent with them, {} have left them",
+                     found.slices(), found.inside, found.consistent, found.left);
+}
+
+Json ToJson(const HeldOutSteps& found) {
+  return {{"stretches", found.stretches},
+          {"steps", found.steps},
+          {"inside", found.inside},
+          {"consistent", found.consistent},
+          {"left", found.left}};
+}
+
+std::string WarningOf(const HeldOutSteps& found) {
+  if (found.left == 0) return "";
+  return fmt::format(
+      "{} have left the slices that the declaration promises from the other half of the transitions ({} stretches of "
+      "{} steps): it is false, whatever it certifies. What is no function of state and input is a disturbance",
+      LeftText(found.left, found.slices()), found.stretches, found.steps);
 }
 
 }  // namespace forereach

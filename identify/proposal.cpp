@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/slopes.h"
@@ -28,31 +29,36 @@ Eigen::RowVectorXd FreeScales(const Eigen::RowVectorXd& scales, const std::vecto
   return free;
 }
 
-// The smallest row for several disturbances from the declared one over the one that takes all scatter to the last.
-std::vector<ProposedRow::Trade> TradesOf(Declaration declaration, const Observations& observations, int k,
-                                         const Eigen::RowVectorXd& scales, double scatter, double last) {
-  const double declared = declaration.disturbance[k];
+// The declaration with this error of row k, as its noise: pairs know sigma_k + w^_k alone.
+Declaration WithError(Declaration declaration, int k, double error) {
+  declaration.noise_bound[k] = error;
+  if (declaration.disturbance.size() > 0) declaration.disturbance[k] = 0;
+  return declaration;
+}
+
+std::vector<ProposedRow::Trade> TradesOf(const Declaration& declaration, const Observations& observations, int k,
+                                         const Eigen::RowVectorXd& scales, const ProposedRow& row) {
   std::vector<ProposedRow::Trade> trades;
-  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0})
-    trades.push_back({.disturbance = declared + share * scatter, .slopes = {}});
-  trades.push_back({.disturbance = last, .slopes = {}});
-  for (ProposedRow::Trade& trade : trades) {
-    declaration.disturbance[k] = trade.disturbance;
-    if (const SmallestRow row = FindSmallestRow(declaration, observations, k, scales); !row.unexplained)
-      trade.slopes = row.slopes;
-  }
+  for (const double share : ProposedRow::kShares) trades.push_back({.error = share * row.knee, .slopes = {}});
+  trades.push_back({.error = row.declared, .slopes = {}});
+  for (ProposedRow::Trade& trade : trades)
+    if (const SmallestRow found = FindSmallestRow(WithError(declaration, k, trade.error), observations, k, scales);
+        !found.unexplained)
+      trade.slopes = found.slopes;
   return trades;
 }
 
-// Raises w^_k to what near places show.
-void EstimateDisturbance(Declaration& proposed, const Observations& observations, int k,
-                         const Eigen::RowVectorXd& scales, double factor, ProposedRow& row) {
-  row.scatter = FindScatter(proposed, observations, k, scales);
-  if (!(row.scatter > 0)) return;
+// Finds what near places show, and raises w^_k to that if it is asked for.
+void ExamineError(Declaration& proposed, const Observations& observations, int k, const Eigen::RowVectorXd& scales,
+                  const ProposalOptions& options, ProposedRow& row) {
+  row.knee = FindScatter(WithError(proposed, k, 0), observations, k, scales);
+  row.declared = row.proposed = proposed.ObservationError(k);
+  row.scatter = std::max(0.0, SubUp(row.knee, row.declared));
+  if (options.find_trades && row.knee > 0) row.trades = TradesOf(proposed, observations, k, scales, row);
+  if (!options.estimate_disturbance || !(row.scatter > 0)) return;
   if (proposed.disturbance.size() == 0) proposed.disturbance = Eigen::VectorXd::Zero(observations.num_states());
-  const double disturbance = Rounded(factor * (proposed.disturbance[k] + row.scatter));
-  row.trades = TradesOf(proposed, observations, k, scales, row.scatter, disturbance);
-  proposed.disturbance[k] = disturbance;
+  proposed.disturbance[k] = Rounded(options.factor * (proposed.disturbance[k] + row.scatter));
+  row.proposed = proposed.ObservationError(k);
 }
 
 }  // namespace
@@ -79,7 +85,7 @@ ProposedDeclaration Propose(const Declaration& declaration, const Observations& 
         options.estimate_noise && shown > proposed.noise_bound[k])
       proposed.noise_bound[k] = Rounded(shown);
     const Eigen::RowVectorXd free = FreeScales(scales, options.columns[ToSize(k)]);
-    if (options.estimate_disturbance) EstimateDisturbance(proposed, observations, k, free, options.factor, row);
+    ExamineError(proposed, observations, k, free, options, row);
     row.smallest = FindSmallestRow(proposed, observations, k, free);
     if (row.smallest.unexplained) throw Unexplained(k, *row.smallest.unexplained);
     if (options.advance) options.advance();

@@ -2,6 +2,7 @@
 declaration and cannot establish one. */
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <stdexcept>
@@ -16,26 +17,31 @@ namespace forereach {
 struct ProposalOptions {
   double factor = 1.5;          ///< Proposed slope over the smallest consistent one, at least 1; likewise for scatter.
   bool estimate_noise = false;  ///< Raise sigma to what the data show: NoiseFloor::repeated and three deviations.
-  /** Raise w^_k to `factor` times w^_k + FindScatter, where that finds any: it acts again in every step, sigma does
-   * not. */
+  /** Raise w^_k to `factor` times w^_k + scatter, where there is any: it acts again in every step, sigma does not. */
   bool estimate_disturbance = false;
   /** For each coordinate k: the columns of z on which its residual may depend. */
   std::vector<std::vector<int>> columns;
   /** Called twice for each coordinate, as the work goes on; may be empty. */
   std::function<void()> advance = {};
+  bool find_trades = false;  ///< ProposedRow::trades
 };
 
 struct ProposedRow {
   SmallestRow smallest;  ///< With the proposed sigma and w^.
   NoiseFloor noise;
-  double scatter = 0;  ///< FindScatter with the proposed sigma and the declared w^; 0 if w^ is not estimated.
-  /** If there is scatter: the smallest slopes for several w^_k in order, the first as declared, the last but one with
-  all of the scatter, the last as proposed. */
+  /** The least error sigma_k + w^_k with which near places need no slope (FindScatter); with less, slopes explain what
+  is none, and are steep. 0: near places show no error. */
+  double knee = 0;
+  double declared = 0;  ///< sigma_k, raised if that is asked for, + w^_k before it is raised.
+  double proposed = 0;  ///< Behind that.
+  double scatter = 0;   ///< By how much `declared` is below the knee.
   struct Trade {
-    double disturbance = 0;
-    std::optional<Eigen::RowVectorXd> slopes;  ///< None: no slopes are consistent.
+    double error = 0;                          ///< sigma_k + w^_k
+    std::optional<Eigen::RowVectorXd> slopes;  ///< The smallest. None: no slopes are consistent.
   };
-  std::vector<Trade> trades;
+  static constexpr std::array kShares{0.5, 0.75, 0.9, 1.0, 1.5};
+  std::vector<Trade>
+      trades;  ///< With these shares of the knee as error, if there is one; and behind them with `declared`.
   Eigen::RowVectorXd least;  ///< FindSmallestEntry of each column with a slope, the others as proposed.
   /** What other estimators (slopes.h) say of the row's size, as factors of `smallest`; 0 for a row without slopes. */
   double strongin = 0, knuth_chou = 0;
@@ -63,7 +69,7 @@ that depends on the slopes, so the proposed ones may be larger than they have to
 
 /** @param declaration its sigma and disturbance are those of the task; its L is not read.
 @throws Unexplained if no row is consistent, which a w^ that is estimated always is. Cost: n (2 + columns) linear
-programs; the other estimators take at most 1000 observations, evenly chosen. */
+programs, and 6 n for the trades; the other estimators take at most 1000 observations, evenly chosen. */
 [[nodiscard]] ProposedDeclaration Propose(const Declaration& declaration, const Observations& observations,
                                           const ProposalOptions& options);
 

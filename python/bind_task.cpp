@@ -215,7 +215,7 @@ py::dict Declare(const JudgingTask& task, const std::vector<std::string>& by, do
   return py::dict("lipschitz"_a = ArrayOf(found.lipschitz), "noise_bound"_a = PerCoordinate(found.noise_bound),
                   "disturbance"_a = PerCoordinate(disturbance_bound),
                   "yaml"_a = "declaration:\n" + DeclarationYaml(found, task.model()),
-                  "held_out_slices"_a = held_out.slices, "held_out_outside"_a = held_out.outside,
+                  "held_out_slices"_a = held_out.slices(), "held_out_outside"_a = held_out.left,
                   "warning"_a = WarningOf(held_out));
 }
 
