@@ -91,6 +91,8 @@ void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
     all.push_back(
         {"steps are on time", error ? "the guard, which ends the plan at one that is not"
                                     : "nobody: robot.step_error_ms is not given, or any, so no clock is looked at"});
+  all.push_back({"recorded steps lasted model.dt, give or take their column dt_error",
+                 "`forereach import`, which writes it by the stamps; otherwise nobody"});
   AddGrowth(*config.problem, all);
   std::string set;
   for (const int k : timing.set_at_steps)

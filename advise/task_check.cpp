@@ -187,7 +187,7 @@ class Examination final {
       return;
     }
     try {
-      const Observations observations = Observe(model_, problem_.declaration, problem_.transitions);
+      const Observations observations = Observe(model_, problem_.declaration, problem_.transitions, problem_.timing);
       ExamineDeclaration(observations);
       ExamineRates();
       ExamineCurvature();
@@ -231,6 +231,7 @@ class Examination final {
               ": within state_error and input_error it may be outside the domain, where nothing is declared",
           "widen the domain, if the declaration holds there", !rows_.empty());
     problem_.transitions = {all_.z(rows_, Eigen::all), all_.x_next(rows_, Eigen::all)};
+    if (all_.longer.size() > 0) problem_.transitions.longer = all_.longer(rows_);
   }
 
   void ExamineRange(std::size_t l) {
@@ -348,7 +349,8 @@ class Examination final {
     std::vector<Eigen::VectorXd> shown;
     for (Eigen::Index i = 0; i < problem_.transitions.size() && !rates.bounds().empty(); ++i) {
       const Eigen::VectorXd z = problem_.transitions.z.row(i), next = problem_.transitions.x_next.row(i);
-      shown.push_back(rates.Shown({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())}, 0, false));
+      shown.push_back(rates.Shown({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())},
+                                  problem_.transitions.Longer(i), false));
     }
     for (const RateBounds::Bound& bound : rates.bounds()) {
       std::vector<std::pair<double, int>> exceeding;
@@ -369,13 +371,14 @@ class Examination final {
   void ExamineCurvature() {
     const std::unique_ptr<Flow> flow = problem_.between ? MakeFlow(model_) : nullptr;
     if (!flow) return;
-    const Interval dt(config_.period);
     Flow::Derivatives derivatives;
     for (Eigen::Index k = 0; k < problem_.projection.rows(); ++k) {
       const double bound = problem_.between->acceleration[k];
       std::vector<std::pair<double, int>> exceeding;
       for (Eigen::Index i = 0; i < problem_.transitions.size(); ++i) {
         const Eigen::VectorXd z = problem_.transitions.z.row(i);
+        const double longer = problem_.transitions.Longer(i);
+        const Interval dt(SubDown(config_.period, longer), AddUp(config_.period, longer));
         const std::vector<Interval> box = TrueBox(z);
         flow->Enclose(box, derivatives);
         Interval off(0.0);  // y(t + dt) - y(t) - dt y'(t)

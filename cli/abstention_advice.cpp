@@ -191,7 +191,8 @@ std::optional<InnerBound> BoundFromWithin(const Case& judged, const Certifier& c
       problem.projection.rows() != 2 || certifier.violation() || tube.length() == 0 ||
       problem.transitions.size() > kMostInnerObservations || std::max(varying, wide) > kMostInnerCoordinates)
     return std::nullopt;
-  const ExtremalResiduals residuals(declaration, Observe(*problem.model, declaration, problem.transitions));
+  const ExtremalResiduals residuals(declaration,
+                                    Observe(*problem.model, declaration, problem.transitions, problem.timing));
   // Slightly inside, so that the rounding of a corner does not lie outside.
   const Eigen::MatrixXd starts = CornersOf(center, (1 - 1e-12) * half_width);
   const std::vector<Eigen::MatrixXd> states = ExtremalRollouts(*problem.model, residuals, judged.plan(), starts);

@@ -60,10 +60,11 @@ int ImportFromFleet(FleetImportArguments options) {
     std::cout << ToText(tables) << "import: " << count << " transitions of " << task.period << " s"
               << (is_written ? " in " + Printable(options.out) : "");
     if (count > 0)
-      std::cout << fmt::format(
-          "\nSteps lasted up to {:g} s longer or shorter: declaration.noise_bound has to include how far states "
-          "move in that time",
-          found.longer);
+      std::cout << fmt::format("\nSteps lasted up to {:g} s longer or shorter: {}", found.longer,
+                               found.transitions.longer.size() > 0
+                                   ? "column dt_error says it of each, so it counts"
+                                   : "declaration.noise_bound has to include how far states move in that "
+                                     "time, or give robot.step_error_ms");
     std::cout << std::endl;
   }
   return count > 0 && found.contradictions.rows.empty() ? 0 : 1;

@@ -201,6 +201,7 @@ ImportOptions ImportOptionsOf(const ImportArguments& options, const Config& conf
   import.input_tolerance = InputTolerances(options, model);
   import.input_mean = options.input_mean;
   import.overlapping = options.overlapping;
+  import.counts_durations = KnowsDurations(*config.problem);
   for (const std::string& name : options.unwrapped) {
     const auto at = std::ranges::find(model.state_names(), name);
     if (at == model.state_names().end())
@@ -298,7 +299,8 @@ std::string Listed(const std::vector<std::string>& names, const Eigen::VectorXd&
 }
 
 // What the transitions cannot know, from the largest of all logs.
-void PrintErrors(const std::vector<Source>& sources, const ImportArguments& options, const NominalModel& model) {
+void PrintErrors(const std::vector<Source>& sources, const ImportArguments& options, const ImportOptions& import,
+                 const NominalModel& model) {
   double offset = 0;
   Eigen::VectorXd rate = Eigen::VectorXd::Zero(model.num_states()), input = Eigen::VectorXd::Zero(model.num_inputs());
   for (const Source& source : sources) {
@@ -309,7 +311,10 @@ void PrintErrors(const std::vector<Source>& sources, const ImportArguments& opti
   if (const std::string moved = Listed(model.state_names(), offset * rate); !moved.empty())
     std::cout << "Stamps are up to " << RoundedUp(offset * 1000, 3)
               << " ms off t + dt. At the largest mean rates seen, the states move in that time by up to\n  " << moved
-              << "\nThat is an error of the successor: declaration.noise_bound has to include it.\n";
+              << (import.counts_durations
+                      ? "\nColumn dt_error says it of each step, so it counts.\n"
+                      : "\nThat is an error of the successor: declaration.noise_bound has to include it, since "
+                        "neither the equations\nnor model.rate_bound say how each state moves with time.\n");
   if (const std::string differs = Listed(model.input_names(), input); !differs.empty())
     std::cout << "The logged inputs differ from the transition's input, "
               << (options.input_mean ? "their mean over the step" : "the one that the step began with")
@@ -472,6 +477,9 @@ int RunImport(ImportArguments options) {
     all.x_next.conservativeResize(before + found.z.rows(), Eigen::NoChange);
     all.z.bottomRows(found.z.rows()) = found.z;
     all.x_next.bottomRows(found.z.rows()) = found.x_next;
+    if (!import.counts_durations) continue;
+    all.longer.conservativeResize(all.z.rows());
+    all.longer.tail(found.z.rows()) = found.longer;
   }
   const Share share = ShareOf(sources);
   const bool writes = all.size() > 0 && (options.keep_few || !share.IsFew());
@@ -489,7 +497,7 @@ int RunImport(ImportArguments options) {
     std::cout << JsonText(document) << std::endl;
   } else {
     for (const Source& source : sources) PrintForPeople(source, columns, options);
-    PrintErrors(sources, options, model);
+    PrintErrors(sources, options, import, model);
     if (delay) PrintDelay(*delay, model);
     if (import.command_delay > 0)
       std::cout << "Each command counts " << NumberOfRows(import.command_delay) << " later.\n";

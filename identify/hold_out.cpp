@@ -64,18 +64,23 @@ Transitions RowsOf(const Transitions& transitions, const std::vector<Split::Bloc
   Eigen::Index rows = 0;
   for (const Split::Block& block : blocks) rows += block.size();
   Transitions part{Eigen::MatrixXd(rows, transitions.z.cols()), Eigen::MatrixXd(rows, transitions.x_next.cols())};
+  if (transitions.longer.size() > 0) part.longer.resize(rows);
   rows = 0;
   for (const Split::Block& block : blocks) {
     part.z.middleRows(rows, block.size()) = transitions.z.middleRows(block.begin, block.size());
     part.x_next.middleRows(rows, block.size()) = transitions.x_next.middleRows(block.begin, block.size());
+    if (part.longer.size() > 0)
+      part.longer.segment(rows, block.size()) = transitions.longer.segment(block.begin, block.size());
     rows += block.size();
   }
   return part;
 }
 
 ContradictionCounts CountContradictions(const Problem& problem, const Declaration& declaration, const Split& split) {
-  const Observations learned = Observe(*problem.model, declaration, RowsOf(problem.transitions, split.learn));
-  const Observations judged = Observe(*problem.model, declaration, RowsOf(problem.transitions, split.judge));
+  const auto observe = [&](const std::vector<Split::Block>& blocks) {
+    return Observe(*problem.model, declaration, RowsOf(problem.transitions, blocks), problem.timing);
+  };
+  const Observations learned = observe(split.learn), judged = observe(split.judge);
   const Observations all = Joined(learned, judged);
   std::vector<bool> contradicts(ToSize(judged.size()), false);
   for (int k = 0; k < all.num_states(); ++k) Mark(declaration, all, learned.size(), k, contradicts);

@@ -5,14 +5,19 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "forereach/certify/learned.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/step_rate.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/reach/domain.h"
+#include "forereach/reach/step_offsets.h"
 #include "task/config_error.h"
 
 namespace forereach {
@@ -60,6 +65,7 @@ class Importer {
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Map<const RowMajor> rows(numbers_.data(), count, 2 * n_ + m_);
     log_.transitions = {rows.leftCols(n_ + m_), rows.rightCols(n_)};
+    if (options_.counts_durations) log_.transitions.longer = Eigen::Map<const Eigen::VectorXd>(longer_.data(), count);
     log_.samples = static_cast<int>(CountStates(0, samples_.size()));
     log_.rows = table_.num_rows() + table_.lost.count - log_.At(Dropped::kRepeatedRow).count -
                 log_.At(Dropped::kOutsideWindow).count;
@@ -254,8 +260,9 @@ class Importer {
     const std::span<double> location(z.data(), ToSize(n_ + m_)), successor(next.data(), ToSize(n_));
     if (!FindStates(i, j, location.first(ToSize(n_)), successor)) return 0;
     if (!FindInput(i, j, location.subspan(ToSize(n_)), deviation)) return 0;
+    const double offset = OffsetOf(i, j), longer = offset > 0 ? NextUp(offset) : 0;
     Observations observed;
-    switch (Observe(problem_, location, successor, 0, observed)) {
+    switch (Observe(problem_, location, successor, options_.counts_durations ? longer : 0, observed)) {
       case Learned::kAdded: break;
       case Learned::kNotFinite: Drop(Dropped::kNoState, samples_[i].row); return 0;
       case Learned::kOutsideDomain: Drop(Dropped::kOutsideDomain, samples_[i].row, ConstraintAt(location)); return 0;
@@ -269,7 +276,8 @@ class Importer {
     log_.lines.push_back(LineOf(samples_[i].row));
     log_.rows_used += CountStates(std::max(i, next_unused_), j + 1);
     next_unused_ = j + 1;
-    Note(i, j, location, successor, deviation);
+    longer_.push_back(longer);
+    Note(offset, location, successor, deviation);
     return j;
   }
 
@@ -279,10 +287,14 @@ class Importer {
     return problem_.model->IsAngle(static_cast<int>(k)) ? std::remainder(change, 2 * std::numbers::pi) : change;
   }
 
-  void Note(std::size_t i, std::size_t j, std::span<const double> z, std::span<const double> next,
-            std::span<const double> deviation) {
+  // |t_j - t_i - dt|; what may be rounding of stamps to doubles counts as 0.
+  [[nodiscard]] double OffsetOf(std::size_t i, std::size_t j) const {
     const long double offset = std::abs(samples_[j].time - TargetOf(i));
-    if (offset > RoundingOf(i, j)) log_.largest_offset = std::max(log_.largest_offset, static_cast<double>(offset));
+    return offset > RoundingOf(i, j) ? static_cast<double>(offset) : 0;
+  }
+
+  void Note(double offset, std::span<const double> z, std::span<const double> next, std::span<const double> deviation) {
+    log_.largest_offset = std::max(log_.largest_offset, offset);
     for (Eigen::Index k = 0; k < n_; ++k)
       log_.largest_rate[k] = std::max(log_.largest_rate[k], std::abs(Change(k, z, next)) / options_.period);
     for (Eigen::Index l = 0; l < m_; ++l)
@@ -305,6 +317,7 @@ class Importer {
   std::vector<Sample> samples_;
   std::size_t next_unused_ = 0;  // the sample behind the last one of a transition
   std::vector<double> numbers_;  // row by row
+  std::vector<double> longer_;   // of each transition
   std::vector<double> gaps_;     // from t + dt to the nearest stamp, of the starts without one near
   ImportedLog log_;
 };
@@ -336,6 +349,15 @@ const DroppedWords& WordsOf(Dropped dropped) {
   };
   static_assert(std::size(kWords) == static_cast<std::size_t>(Dropped::kCount));
   return kWords[static_cast<std::size_t>(dropped)];
+}
+
+bool KnowsDurations(const Problem& problem) try {
+  StepTiming timing = problem.timing;
+  timing.error = StepOf(*problem.model) / 4;
+  static_cast<void>(StepOffsets(*problem.model, timing));
+  return true;
+} catch (const std::invalid_argument&) {
+  return false;
 }
 
 ImportedLog Import(const LogTable& table, const Problem& problem, const ImportOptions& options) {

@@ -42,6 +42,8 @@ struct ImportOptions {
   /** Every sample may start a transition. Otherwise the next one starts where the last one ended, or, behind a sample
   that starts none, at the next sample. */
   bool overlapping = false;
+  /** Transitions::longer is |t_j - t_i - dt|. Otherwise there is none, and that is part of the error. */
+  bool counts_durations = false;
   std::vector<int> unwrapped;  ///< States that are angles: 2 pi is added to x_j or subtracted until it is near x_i.
   /** Only samples at so many seconds after the first stamp of their log. */
   double from = -std::numeric_limits<double>::infinity(), until = std::numeric_limits<double>::infinity();
@@ -92,6 +94,10 @@ struct ImportedLog {
   [[nodiscard]] Finding& At(Dropped cause) { return dropped[static_cast<std::size_t>(cause)]; }
   [[nodiscard]] const Finding& At(Dropped cause) const { return dropped[static_cast<std::size_t>(cause)]; }
 };
+
+/** Whether the duration of a step can count: the model's equations or the declared rates say how each state moves with
+time (StepOffsets). */
+[[nodiscard]] bool KnowsDurations(const Problem& problem);
 
 /** Makes the transitions of one log, in the order of their starts. Cost: linear in the samples and in the rows of all
 steps.

@@ -66,7 +66,7 @@ void ExamineError(Declaration& proposed, const Observations& observations, int k
 Observations ObserveForProposal(const Problem& problem, const Transitions& transitions) {
   Declaration declaration = problem.declaration;
   declaration.lipschitz.setZero();
-  return Observe(*problem.model, declaration, transitions);
+  return Observe(*problem.model, declaration, transitions, problem.timing);
 }
 
 ProposedDeclaration Propose(const Declaration& declaration, const Observations& observations,

@@ -109,6 +109,10 @@ Digest ObservationsDigest(const NominalModel& model, const Transitions& transiti
   CanonicalBytes bytes = Begin("forereach observations", model);
   bytes.Numbers(transitions.z);
   bytes.Numbers(transitions.x_next);
+  if (!transitions.longer.isZero(0)) {
+    bytes.Text("dt_error");
+    bytes.Numbers(transitions.longer);
+  }
   return bytes.digest();
 }
 

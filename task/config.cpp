@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <stdexcept>
 #include <utility>
 
@@ -10,6 +11,7 @@
 
 #include "forereach/certify/learned.h"
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
@@ -31,11 +33,38 @@ std::vector<std::string> TransitionColumns(const NominalModel& model) {
   return columns;
 }
 
+constexpr const char* kDurationColumn = "dt_error";
+
+bool Contains(const std::vector<std::string>& names, const char* name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
 Transitions ReadTransitions(const std::string& path, const NominalModel& model, const std::string& named_by) {
-  const Eigen::MatrixXd rows = ReadCsv(path, TransitionColumns(model), named_by,
-                                       "; `forereach import` makes transitions of a log with other columns");
+  std::vector<std::string> columns = TransitionColumns(model);
+  const bool has_durations =
+      !Contains(columns, kDurationColumn) && std::ifstream(path) && Contains(CsvColumns(path), kDurationColumn);
+  if (has_durations) columns.emplace_back(kDurationColumn);
+  const Eigen::MatrixXd rows =
+      ReadCsv(path, columns, named_by, "; `forereach import` makes transitions of a log with other columns");
   if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
-  return {rows.leftCols(model.num_variables()), rows.rightCols(model.num_states())};
+  Transitions read{rows.leftCols(model.num_variables()), rows.middleCols(model.num_variables(), model.num_states())};
+  if (!has_durations) return read;
+  read.longer = rows.rightCols<1>();
+  const Range allowed{0, StepOf(model) / 2, false, true};
+  for (Eigen::Index i = 0; i < read.longer.size(); ++i)
+    if (const double longer = read.longer[i]; !allowed.Contains(longer))
+      throw ConfigError(fmt::format("{}:{}: {}: {} is outside {}, from 0 up to half of model.dt", path, i + 2,
+                                    kDurationColumn, ToText(longer), allowed.text()));
+  return read;
+}
+
+// The durations of steps, if they are not all dt, say something only where it is known how states move with time.
+void RequireDurations(const std::string& path, const Problem& problem) try {
+  StepTiming timing = problem.timing;
+  timing.error = problem.transitions.longer.isZero(0) ? 0 : problem.transitions.longer.maxCoeff() / 2;
+  static_cast<void>(StepOffsets(*problem.model, timing));
+} catch (const std::invalid_argument& error) {
+  throw ConfigError(fmt::format("{}: {}: {}", path, kDurationColumn, error.what()));
 }
 
 // What a transition violates, in the words of the task file.
@@ -87,15 +116,18 @@ std::vector<int> KeepThoseWithin(const std::string& path, Problem& problem) {
     throw ConfigError(path +
                       ": no transition is inside the domain with all of declaration.state_error and "
                       "declaration.input_error; at least one is needed");
-  if (std::ssize(rows) < all.size())
-    problem.transitions = Transitions{all.z(rows, Eigen::all), all.x_next(rows, Eigen::all)};
+  if (std::ssize(rows) < all.size()) {
+    Transitions kept{all.z(rows, Eigen::all), all.x_next(rows, Eigen::all)};
+    if (all.longer.size() > 0) kept.longer = all.longer(rows);
+    problem.transitions = std::move(kept);
+  }
   return rows;
 }
 
 // Where the nominal model has no value, or the turns of an angle cannot be told, the transition says nothing, and
 // something is wrong with it.
 void RequireObservable(const std::string& path, const std::vector<int>& rows, const Problem& problem) try {
-  static_cast<void>(Observe(*problem.model, problem.declaration, problem.transitions));
+  static_cast<void>(Observe(*problem.model, problem.declaration, problem.transitions, problem.timing));
 } catch (const AmbiguousAngle& error) {
   throw ConfigError(fmt::format("{}:{}: {}", path, rows[ToSize(error.row())] + 2, error.what()));
 } catch (const NoNominalValue& error) {
@@ -161,6 +193,7 @@ Config Load(Document file, TransitionsFile transitions, const NamedFiles& instea
     problem.transitions =
         data ? TransitionsOf(*data, model) : ReadTransitions(transitions_path, model, file.Place("transitions"));
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
+    RequireDurations(transitions_path, problem);
   }
   config.path = file.path();
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
@@ -268,9 +301,18 @@ Transitions LoadTransitions(const std::string& path, const NominalModel& model) 
 }
 
 void SaveTransitions(const std::string& path, const NominalModel& model, const Transitions& transitions) {
-  Eigen::MatrixXd rows(transitions.size(), model.num_variables() + model.num_states());
+  std::vector<std::string> columns = TransitionColumns(model);
+  Eigen::MatrixXd rows(transitions.size(), std::ssize(columns));
   rows << transitions.z, transitions.x_next;
-  WriteCsv(path, TransitionColumns(model), rows);
+  if (!transitions.longer.isZero(0)) {
+    if (Contains(columns, kDurationColumn))
+      throw ConfigError(
+          fmt::format("{}: the model has a variable of the name {}: give it another", path, kDurationColumn));
+    columns.emplace_back(kDurationColumn);
+    rows.conservativeResize(Eigen::NoChange, std::ssize(columns));
+    rows.rightCols<1>() = transitions.longer;
+  }
+  WriteCsv(path, columns, rows);
 }
 
 Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model) {

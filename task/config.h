@@ -88,8 +88,8 @@ void RequireForCertifyingOnBus(const Config& config);
 task does not say it. */
 [[nodiscard]] std::vector<int> HeldStates(const Config& config);
 
-/** Reads transitions from CSV (csv.h): columns for each state, each input and each successor `<state>_next`, in any
-order, in the model's units; one row a transition. @throws ConfigError, also if the file has no transition. */
+/** Reads transitions from CSV (csv.h): columns for each state, input and successor `<state>_next`, in any order, in the
+model's units, and perhaps `dt_error`: Transitions::longer, s. @throws ConfigError, also if there is no transition. */
 [[nodiscard]] Transitions LoadTransitions(const std::string& path, const NominalModel& model);
 
 /** Writes transitions so that LoadTransitions returns the same bits. @throws ConfigError. */

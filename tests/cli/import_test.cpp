@@ -279,7 +279,25 @@ TEST_F(ForeignLogTest, StampsThatJitterAreSaidWithTheToleranceThatTakesThem) {
   for (int i = 0; i < 60; ++i) rows += fmt::format("{:.4f},0,8,1\n", 0.1 * i + (i % 2 == 0 ? 0 : 0.002));
   EXPECT_THAT(Import(header_ + rows),
               Exits(1, "60 of 60 rows (100 %) are in no transition", "--tolerance-ms 2 takes half of these starts"));
-  EXPECT_EQ(Import(header_ + rows, "--tolerance-ms 2").code, 0);
+  const Output taken = Import(header_ + rows, "--tolerance-ms 2");
+  EXPECT_THAT(taken, Exits(0, "Stamps are up to 2 ms off t + dt", "Column dt_error says it of each step"));
+  const Transitions steps = LoadTransitions(
+      scratch_ / "steps.csv", *LoadConfig(scratch_ / "task.yaml", TransitionsFile::kIgnore).problem->model);
+  ASSERT_EQ(steps.longer.size(), steps.size());
+  for (const double longer : steps.longer) {
+    EXPECT_GT(longer, 0.002 - 1e-12);
+    EXPECT_LT(longer, 0.002 + 1e-12);
+  }
+}
+
+// Of equations that do not say how a state moves with time, the duration of a step says nothing.
+TEST_F(ForeignLogTest, WithoutARateTheErrorOfTheStampsIsTheReadersBusiness) {
+  const std::string task = Read(scratch_ / "task.yaml");
+  scratch_.Write("task.yaml", Replaced(Replaced(task, "dt*v", "0.1*v"), "dt*a", "0.1*a"));
+  std::string rows;
+  for (int i = 0; i < 20; ++i) rows += fmt::format("{:.4f},0,8,1\n", 0.1 * i + (i % 2 == 0 ? 0 : 0.002));
+  EXPECT_THAT(Import(header_ + rows, "--tolerance-ms 2"), Exits(0, "declaration.noise_bound has to include it"));
+  EXPECT_THAT(Read(scratch_ / "steps.csv"), Not(HasSubstr("dt_error")));
 }
 
 TEST_F(ForeignLogTest, ARowOfDecimalCommasBetweenCommasIsNamed) {

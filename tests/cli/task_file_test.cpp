@@ -371,6 +371,53 @@ TEST_F(ContradictionsTest, WhatTheErrorsOfTheRecordHideCountsOnce) {
   EXPECT_THAT(CheckOf("0,0,0\n1,0,1.1441\n", error), HasSubstr("lines 2 and 3 of"));
 }
 
+// x' = u. A step of 0.1 s at 1 m/s that lasted 0.01 s longer moves x by 0.01 m more, and little of what the residual
+// grows; two steps hide 0.002 m.
+struct DurationTest : ContradictionsTest {
+  void Steps(const std::string& residual, const std::string& column, const std::string& next = "x + dt*u",
+             const std::string& first = "0") const {
+    scratch_.Write("steps.csv", "x,u,x_next,dt_error\n0,1,0.1," + first + "\n0,1," + residual + "," + column + "\n");
+    scratch_.Write("task.yaml",
+                   "model: {states: {x: m}, inputs: {u: m/s}, parameters: {dt: 0.1}, next: {x: " + next +
+                       "}}\ndomain: {state: {lower: [-10], upper: [10]}, input: {lower: [-1], upper: [1]}}\n"
+                       "declaration: {lipschitz: {}, noise_bound: [0.001]}\ntransitions: steps.csv\n"
+                       "gate: {obstacles: task}\n"
+                       "task: {initial_set: {center: [0], half_width: [0.01]}, projection: [x], between: "
+                       "samples, obstacles: [{box: {lower: [9], upper: [10]}}]}\n");
+  }
+};
+
+TEST_F(DurationTest, OfARecordedStepExplainsHowFarItMoved) {
+  Steps("0.112", "0.01");
+  EXPECT_THAT(Check(), Exits(0, "recorded steps lasted model.dt, give or take their column dt_error"));
+  Steps("0.112", "0");
+  EXPECT_THAT(Check(), Exits(1, "lines 2 and 3 of"));
+  Steps("0.12", "0.01");
+  EXPECT_THAT(Check(), Exits(1, "lines 2 and 3 of"));
+  Steps("0.112", "0.01", "x + 0.1*u");
+  EXPECT_THAT(Check(), Exits(2, "steps.csv: dt_error: ", "which do not use dt", "declare model.rate_bound"));
+  Steps("0.1", "0", "x + 0.1*u");
+  EXPECT_EQ(Check().code, 0);
+}
+
+TEST_F(DurationTest, WidensTheTubeAndIsVerified) {
+  scratch_.Write("plan.csv", "u\n0.5\n0.5\n0\n");
+  const std::string decision = scratch_ / "decision.json";
+  const auto half_width = [&](const std::string& column) {
+    Steps("0.1", column, "x + dt*u", column);
+    const std::string certify = "certify --config " + task_ + " --plan " + scratch_ / "plan.csv";
+    std::ofstream(decision) << Forereach(certify + " --json").text;
+    EXPECT_THAT(Forereach("verify " + decision), Exits(0, "1 confirmed")) << column;
+    return Forereach(certify).text;
+  };
+  const std::string with = half_width("0.02"), without = half_width("0");
+  EXPECT_THAT(with, HasSubstr("half-width of its last slice"));
+  EXPECT_NE(with, without);
+  Steps("0.1", "0.02");
+  EXPECT_THAT(Forereach("verify " + decision + " 2>&1"), testing::Field(&Output::code, testing::Ne(0)))
+      << "the digest of the observations is of the durations, too";
+}
+
 // The first row is outside the domain, so that rows and lines differ by more than the header.
 TEST_F(CheckTest, TransitionsThatNothingCanBeObservedOfAreNamedByTheirLine) {
   const auto check = [&](const std::string& model, const std::string& rows) {

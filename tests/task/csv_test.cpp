@@ -111,6 +111,45 @@ TEST_F(CsvTest, PlansAndTransitionsComeBackToTheLastBit) {
   const Transitions loaded = LoadTransitions(files_ / "steps.csv", *model);
   EXPECT_TRUE(SameBits(loaded.z, transitions.z));
   EXPECT_TRUE(SameBits(loaded.x_next, transitions.x_next));
+  EXPECT_EQ(loaded.longer.size(), 0);
+  Transitions timed = transitions;
+  timed.longer = 0.049 * Eigen::VectorXd::Random(500).cwiseAbs();
+  SaveTransitions(files_ / "steps.csv", *model, timed);
+  EXPECT_TRUE(SameBits(LoadTransitions(files_ / "steps.csv", *model).longer, timed.longer));
+}
+
+TEST_F(CsvTest, AStepLastsLessThanHalfAStepLongerOrShorter) {
+  const auto model = MakePointMass(0.1);
+  const auto longer = [&](const std::string& number) {
+    return LoadTransitions(files_.Write("t.csv", "dt_error,px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n" +
+                                                     number + ",0,0,0,0,0,0,0,0,0,0\n"),
+                           *model)
+        .longer[0];
+  };
+  for (const char* number : {"0", "1e-320", "0.049999"}) EXPECT_EQ(longer(number), std::stod(number));
+  for (const char* number : {"-1e-9", "0.05", "1"})
+    EXPECT_THAT(
+        [&] { longer(number); },
+        ThrowsMessage<ConfigError>(HasSubstr("t.csv:2: dt_error: " + std::string(number) + " is outside [0, 0.05)")));
+}
+
+// The model's own variable of the name is that column, and a duration has no place.
+TEST_F(CsvTest, AVariableOfTheColumnsNameIsNoDuration) {
+  const Config config = LoadConfig(
+      files_.Write(
+          "task.yaml",
+          "model: {states: {dt_error: m}, inputs: {u: m}, parameters: {dt: 0.1}, next: {dt_error: dt_error + dt*u}}\n"
+          "domain: {state: {lower: [-1], upper: [1]}, input: {lower: [-1], upper: [1]}}\n"
+          "declaration: {lipschitz: {}, noise_bound: [0]}\ntransitions: t.csv\n"
+          "task: {initial_set: {center: [0], half_width: [0]}, projection: [dt_error], between: samples, obstacles: "
+          "[]}\n"),
+      TransitionsFile::kIgnore);
+  const NominalModel& model = *config.problem->model;
+  Transitions steps = LoadTransitions(files_.Write("t.csv", "dt_error,u,dt_error_next\n0.5,0,0.5\n"), model);
+  EXPECT_EQ(steps.z(0, 0), 0.5);
+  EXPECT_EQ(steps.longer.size(), 0);
+  steps.longer = Eigen::VectorXd::Constant(1, 0.01);
+  EXPECT_THROW(SaveTransitions(files_ / "t.csv", model, steps), ConfigError);
 }
 
 TEST_F(CsvTest, PlansHaveOneColumnAStepInTheModelsOrder) {

@@ -38,6 +38,14 @@ TEST(ObservationsDigest, ChangesWithEveryNumberAndWithTheOrderOfRows) {
       ++tried;
       entry = kept;
     }
+  transitions.longer = Eigen::VectorXd::Zero(3);
+  EXPECT_TRUE(seen.contains(ObservationsDigest(*model, transitions))) << "all lasted dt";
+  for (double& longer : transitions.longer) {
+    longer = 1e-9;
+    seen.insert(ObservationsDigest(*model, transitions));
+    ++tried;
+    longer = 0;
+  }
   transitions.z.row(0).swap(transitions.z.row(1));
   transitions.x_next.row(0).swap(transitions.x_next.row(1));
   seen.insert(ObservationsDigest(*model, transitions));
