@@ -142,7 +142,7 @@ class Verifying final : public CertificateUser {
 
   verifier::Verifier& VerifierOf(const Basis& basis) {
     Known& known = known_[basis.task->problem.get()];
-    if (known.learned && known.learned != basis.learned && !known.learned->empty()) {
+    if (known.learned && known.learned != basis.learned && known.learned->size() > 0) {
       VerifyWaiting();
       known.verifier.reset();  // it forgets what was learned before
     }
@@ -159,7 +159,7 @@ class Verifying final : public CertificateUser {
   void VerifyWaiting() {
     for (auto& [of, known] : known_)
       if (std::exchange(known.is_waited_for, false))
-        known.verifier->Learn(WithLearned(known.problem, *known.learned)->transitions);
+        known.verifier->Learn(WithLearned(known.problem, *known.learned, known.learned->size())->transitions);
     ForEachInParallel(waiting_.size(), threads_, [&](std::size_t i, std::size_t) {
       auto& [recorded, number, verifier, verdict] = waiting_[i];
       verdict = verifier ? verifier->Verify(recorded.certificate)

@@ -110,7 +110,7 @@ Learned JudgingTask::Observe(std::vector<double> z, std::vector<double> next) {
   require("x_next", next.size(), model().num_states());
   const std::unique_lock lock(mutex_);
   const Learned learned = certifier_.Learn(z, next);
-  if (learned == Learned::kAdded) learned_.push_back({std::move(z), std::move(next), 0, 0, {}});
+  if (learned == Learned::kAdded) learned_.Add(z, next, 0);
   return learned;
 }
 
@@ -121,12 +121,12 @@ std::size_t JudgingTask::num_observations() const {
 
 std::shared_ptr<const Problem> JudgingTask::ProblemWith(std::size_t num_learned) const {
   const std::shared_lock lock(mutex_);
-  return WithLearned(config_.problem, std::span(learned_).first(num_learned));
+  return WithLearned(config_.problem, learned_, num_learned);
 }
 
 std::shared_ptr<const Problem> JudgingTask::problem() const {
   const std::shared_lock lock(mutex_);
-  return WithLearned(config_.problem, learned_);
+  return WithLearned(config_.problem, learned_, learned_.size());
 }
 
 std::vector<Advice> AdviseOn(const Judgement& judgement) {

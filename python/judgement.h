@@ -9,8 +9,8 @@ lock. */
 #include <vector>
 
 #include "advise/advice.h"
-#include "certifier/gate/robot_messages.h"
 #include "forereach/certify/certifier.h"
+#include "records/learned_transitions.h"
 #include "records/picture.h"
 #include "task/config.h"
 
@@ -71,7 +71,7 @@ class JudgingTask final : public std::enable_shared_from_this<JudgingTask> {
  private:
   const Config config_;
   Certifier certifier_;
-  std::vector<ExecutedTransition> learned_;
+  LearnedTransitions learned_{model().num_variables(), model().num_states()};
   mutable std::shared_mutex mutex_;  // the two above: Learn alone, Certify together
 };
 

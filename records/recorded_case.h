@@ -65,7 +65,7 @@ class CaseCertifier final {
       known_ = 0;
     }
     for (; known_ < basis.num_learned; ++known_) {
-      const ExecutedTransition& transition = (*learned_)[known_];
+      const LearnedTransitions::Each transition = (*learned_)[known_];
       static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
     }
     return *certifier_;

@@ -27,18 +27,19 @@ std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& n
 }  // namespace
 
 std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
-                                           std::span<const ExecutedTransition> learned) {
-  if (learned.empty()) return problem;
+                                           const LearnedTransitions& learned, std::size_t count) {
+  if (count == 0) return problem;
   auto known = std::make_shared<Problem>(*problem);
   Transitions& all = known->transitions;
   Eigen::Index row = all.z.rows();
-  all.z.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
-  all.x_next.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
-  all.num_learned += static_cast<int>(learned.size());
+  all.z.conservativeResize(row + static_cast<Eigen::Index>(count), Eigen::NoChange);
+  all.x_next.conservativeResize(all.z.rows(), Eigen::NoChange);
+  all.num_learned += static_cast<int>(count);
   const Eigen::Index before = all.longer.size();
   all.longer.conservativeResize(all.z.rows());
   all.longer.tail(all.z.rows() - before).setZero();
-  for (const ExecutedTransition& each : learned) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const LearnedTransitions::Each each = learned[i];
     all.longer[row] = each.longer;
     all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(each.z.data(), std::ssize(each.z));
     all.x_next.row(row++) = Eigen::Map<const Eigen::RowVectorXd>(each.next.data(), std::ssize(each.next));
@@ -46,9 +47,7 @@ std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>&
   return known;
 }
 
-std::shared_ptr<const Problem> Basis::problem() const {
-  return WithLearned(task->problem, std::span(*learned).first(num_learned));
-}
+std::shared_ptr<const Problem> Basis::problem() const { return WithLearned(task->problem, *learned, num_learned); }
 
 Timeline::Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users)
     : find_(std::move(find)),
@@ -157,7 +156,8 @@ void Timeline::Follow(ObstaclesInForce obstacles) {
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = all_logged_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
-  learned_ = std::make_shared<std::vector<ExecutedTransition>>();
+  const NominalModel& model = *now_->problem->model;
+  learned_ = std::make_shared<LearnedTransitions>(model.num_variables(), model.num_states());
 }
 
 // A decision may tell of a reload before a heartbeat does.
@@ -206,7 +206,7 @@ void Timeline::LearnNext() {
   transitions_ahead_.pop_front();
   observations_digest_ = next.after;
   Tell(&TimelineUser::OnTransition, next.transition, next.bytes);
-  learned_->push_back(std::move(next.transition));
+  learned_->Add(next.transition.z, next.transition.next, next.transition.longer);
 }
 
 // ---- Decisions.

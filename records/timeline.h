@@ -24,7 +24,6 @@ before the candidate; then the digests of the basis differ from those that the d
 #include <map>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +36,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
+#include "records/learned_transitions.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/undecided.h"
@@ -51,7 +51,7 @@ struct Basis {
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
   /** What is learned between the last start or reload and the next, in the order of the log, of which the first
   num_learned were at that time. */
-  std::shared_ptr<const std::vector<ExecutedTransition>> learned;
+  std::shared_ptr<const LearnedTransitions> learned;
   std::size_t num_learned = 0;
 
   /** What was known at that time: the task's problem with these transitions behind its own. */
@@ -112,9 +112,9 @@ class TimelineUser {
   virtual void OnUndecided(const RecordedCandidate&) {}  ///< No decision follows, or one after kMostUndecided others.
 };
 
-/** The problem with these transitions behind its own; the problem itself if there are none. */
+/** The problem with the first `count` of these behind its own transitions; the problem itself if there are none. */
 [[nodiscard]] std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
-                                                         std::span<const ExecutedTransition> learned);
+                                                         const LearnedTransitions& learned, std::size_t count);
 
 class Timeline final {
  public:
@@ -225,7 +225,7 @@ class Timeline final {
   // State at the last decision, and by everything that was logged; what lies between the two.
   std::shared_ptr<const std::vector<Obstacle>> obstacles_;
   Digest obstacles_digest_{}, observations_digest_{};
-  std::shared_ptr<std::vector<ExecutedTransition>> learned_;
+  std::shared_ptr<LearnedTransitions> learned_;
   ObstaclesInForce logged_obstacles_;
   std::shared_ptr<const std::vector<Obstacle>> all_logged_;  // of these
   SoleSender transition_sender_;

@@ -23,7 +23,8 @@ struct CertificateCollector final : CertificateUser {
     file.certificates.push_back(std::move(recorded));
     if (!basis) return;
     file.config = *basis->task;
-    if (basis->learned) file.config.problem = WithLearned(basis->task->problem, *basis->learned);
+    if (basis->learned)
+      file.config.problem = WithLearned(basis->task->problem, *basis->learned, basis->learned->size());
   }
   CertificateFile file;
 };
