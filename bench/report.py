@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the performance report: fills the @names@ of a template from the benchmarks' JSON. No figure is typed by hand.
+"""Writes the performance report: fills the @names@ of a template from the benchmarks' JSON.
 
   bench/report.py --results DIR --build DIR [--load L] [--command TEXT] TEMPLATE OUTPUT
 """

@@ -73,6 +73,11 @@ class Headers(unittest.TestCase):
             self.assertNotIn(hidden, html)
 
 
+class Documents(unittest.TestCase):
+    def test_have_less_than_55000_words_together(self):
+        self.assertLess(sum(len(page.read_text().split()) for page in Path("docs").rglob("*.md")), 55_000)
+
+
 class Links(unittest.TestCase):
     def check(self, **files):
         root = Path(self.enterContext(tempfile.TemporaryDirectory()))
