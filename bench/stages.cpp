@@ -112,7 +112,7 @@ void RunReduction(State& state, const Midway& midway) {
   constexpr std::array<double, kMaxStates> kNone{};
   Zonotope full = midway.slice;
   for (int extra = 0; extra < 2; ++extra)
-    for (int k = 0; k < full.dim(); ++k) full.AppendAxis(k, 0.01);
+    for (int k = 0; k < full.dim(); ++k) ArraysOf(full).AppendAxis(k, 0.01);
   for (auto _ : state) {
     Zonotope set = full;  // the copy is part of the time
     AppendAndReduce(set, kNone.data(), kNone.data(), midway.task.problem->zonotope_order);

@@ -12,16 +12,16 @@ namespace forereach {
 void Extender::Load(const TubeNode& node) {
   const std::size_t t = ToSize(node.depth_), n = ToSize(node.dim_), columns = node.numbers_.size() / n - 3;
   Zonotope& slice = tube_.slices_[t];
-  slice.Reset(node.dim_, static_cast<int>(columns));
-  slice.axes_in_slack() = node.axes_;
+  ArraysOf(slice).Reset(node.dim_, static_cast<int>(columns));
+  ArraysOf(slice).mutable_axes_in_slack() = node.axes_;
   const double* from = node.numbers_.data();
   const auto take = [&](double* to, std::size_t count) { std::copy_n(std::exchange(from, from + count), count, to); };
-  take(slice.mutable_centers(), n);
+  take(ArraysOf(slice).mutable_centers(), n);
   take(tube_.steps_[t].half_width.data(), n);
-  take(slice.mutable_slacks(), n);
+  take(ArraysOf(slice).mutable_slacks(), n);
   for (int k = 0; k < node.dim_; ++k) {
-    take(slice.mutable_row(k), columns);
-    std::fill(slice.mutable_row(k) + columns, slice.mutable_row(k) + slice.padded_size(), 0.0);
+    take(ArraysOf(slice).mutable_row(k), columns);
+    std::fill(ArraysOf(slice).mutable_row(k) + columns, ArraysOf(slice).mutable_row(k) + slice.padded_size(), 0.0);
   }
   if (t > 0) tube_.steps_[t - 1].envelope.found = node.found_;
   tube_.length_ = node.depth_;

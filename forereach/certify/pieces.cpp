@@ -14,12 +14,12 @@ namespace {
 // A box around `sides`, rounded outward.
 void SetBox(std::span<const Interval> sides, Zonotope& set) noexcept {
   const int n = static_cast<int>(sides.size());
-  set.Reset(n, 0);
+  ArraysOf(set).Reset(n, 0);
   for (int k = 0; k < n; ++k) {
-    set.mutable_center(k) = sides[ToSize(k)].Middle();
-    set.mutable_slack(k) = 0;
+    ArraysOf(set).mutable_center(k) = sides[ToSize(k)].Middle();
+    ArraysOf(set).mutable_slack(k) = 0;
   }
-  for (int k = 0; k < n; ++k) set.AppendAxis(k, sides[ToSize(k)].DistanceUpper(set.center(k)));
+  for (int k = 0; k < n; ++k) ArraysOf(set).AppendAxis(k, sides[ToSize(k)].DistanceUpper(set.center(k)));
 }
 
 double Width(const Interval& side) { return side.upper - side.lower; }

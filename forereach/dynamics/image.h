@@ -81,7 +81,7 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
     const Lanes columns[] = {LoadLanes(slice.padded_row(static_cast<int>(K)).data() + j)...};
     const auto row = [&]<std::size_t Row>(std::integral_constant<std::size_t, Row>) __attribute__((always_inline)) {
       const Lanes image = RowImage<kProgram, Row>(columns, factors.data());
-      StoreLanes(image, next.mutable_row(static_cast<int>(Row)) + j);
+      StoreLanes(image, ArraysOf(next).mutable_row(static_cast<int>(Row)) + j);
       row_sums[Row] += Abs(image);
     };
     (row(std::integral_constant<std::size_t, K>()), ...);
@@ -112,9 +112,9 @@ FOREREACH_INLINE double RowSlack(const Expansion& expansion, const StepError& er
 template <const Program& kProgram, std::size_t... K>
 FOREREACH_INLINE void MapAndSum(const Expansion& expansion, const StepError& error, const Zonotope& slice,
                                 Zonotope& next, ImageSums& sums, std::index_sequence<K...> rows) {
-  next.Reset(slice.dim(), slice.num_generators());
+  ArraysOf(next).Reset(slice.dim(), slice.num_generators());
   MapRows<kProgram>(expansion, slice, next, sums, rows);
-  StoreAll({RowSlack<kProgram, K>(expansion, error, slice)...}, next.mutable_slacks());
+  StoreAll({RowSlack<kProgram, K>(expansion, error, slice)...}, ArraysOf(next).mutable_slacks());
 }
 
 /** NominalModel::Map for one program: sets the generators of `next` to fl(J G) and its slack to
@@ -134,7 +134,7 @@ FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, co
 FOREREACH_INLINE void MapByRows(const Program& program, const RowSpan* rows, const Expansion& expansion,
                                 const StepError& error, const Zonotope& slice, Zonotope& next, ImageSums& sums) {
   const auto states = ToSize(program.states);
-  next.Reset(slice.dim(), slice.num_generators());
+  ArraysOf(next).Reset(slice.dim(), slice.num_generators());
   Lanes row_sums[PaddedToLanes(kMaxStates)];
   for (Lanes& sum : row_sums) sum = AllLanes(0);
   const std::size_t size = slice.padded_size();
@@ -150,7 +150,7 @@ FOREREACH_INLINE void MapByRows(const Program& program, const RowSpan* rows, con
         const Lanes product = entry.is_one ? column : AllLanes(expansion.jacobian[e]) * column;
         image = i == 0 ? product : image + product;
       }
-      StoreLanes(image, next.mutable_row(static_cast<int>(k)) + j);
+      StoreLanes(image, ArraysOf(next).mutable_row(static_cast<int>(k)) + j);
       row_sums[k] += Abs(image);
     }
   }
@@ -164,9 +164,9 @@ FOREREACH_INLINE void MapByRows(const Program& program, const RowSpan* rows, con
       const double s = slice.slack(entry.column);
       slack += entry.is_one ? s : std::abs(expansion.jacobian[e]) * s;
     }
-    next.mutable_slacks()[k] = slack;
+    ArraysOf(next).mutable_slacks()[k] = slack;
   }
-  for (std::size_t k = states; k < PaddedToLanes(states); ++k) next.mutable_slacks()[k] = 0;
+  for (std::size_t k = states; k < PaddedToLanes(states); ++k) ArraysOf(next).mutable_slacks()[k] = 0;
 }
 
 }  // namespace forereach::internal

@@ -154,15 +154,15 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
         const Lanes added = Abs(lower) + Abs(upper) + Abs(moved) + disturbed;
         // docs/soundness.md, 3.7. Where nothing is added to f0(c), nothing is rounded.
         const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kSmallest);
-        Lanes slack = LoadLanes(next.mutable_slacks() + k) + (is_axis ? AllLanes(0) : width);
+        Lanes slack = LoadLanes(ArraysOf(next).mutable_slacks() + k) + (is_axis ? AllLanes(0) : width);
         if constexpr (kCountsRounding)
           slack = (slack + (LoadLanes(&error.value[k]) + (added > AllLanes(0) ? rounding : AllLanes(0)))) *
                   AllLanes(1 + kRelative);
         const Lanes hull =
             (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
         StoreLanes(half, box_half_width + k);
-        StoreLanes(center, next.mutable_centers() + k);
-        StoreLanes(slack, next.mutable_slacks() + k);
+        StoreLanes(center, ArraysOf(next).mutable_centers() + k);
+        StoreLanes(slack, ArraysOf(next).mutable_slacks() + k);
         StoreLanes(hull, next_half_width + k);
         return (Abs(center) + hull < AllLanes(kInfinity)) & (lower <= upper);
       });
@@ -175,7 +175,7 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
   const int n = slice.dim();
   for (int k = 0; k < n; ++k) {
     const auto& slope = bounds.slope[ToSize(k)];
-    double* row = next.mutable_row(k);
+    double* row = ArraysOf(next).mutable_row(k);
     double magnitude = 0, slack = next.slack(k), spread = 0;
     for (int j = 0; j < slice.num_generators(); ++j) {
       magnitude = AddUp(magnitude, std::abs(row[j]));
@@ -187,7 +187,7 @@ FOREREACH_INLINE bool Join(std::size_t n, const Expansion& expansion, const Step
       spread += std::abs(row[j]);
     }
     for (int l = 0; l < n; ++l) slack = AddUp(slack, MulUp(std::abs(slope[ToSize(l)]), slice.slack(l)));
-    next.mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
+    ArraysOf(next).mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
     sums.row[ToSize(k)] = spread;
   }
 }
@@ -306,7 +306,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   const double* added = is_punctual ? disturbance : offset.half_width.data();
   if (!Join(n, expansion, error, record, sums, added, negligible_.data(), next, box_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
-  next.axes_in_slack() = slice.axes_in_slack();
+  ArraysOf(next).mutable_axes_in_slack() = slice.axes_in_slack();
   const unsigned lasting = is_punctual && !record.envelope.has_slope ? lasting_ : 0;
   AppendAndReduce(next, record.remainder.half_width.data(), box_half_width.data(), order_, lasting, instructions_);
   if (!is_punctual) StepOffsets::Append(offset, next, next_half_width);

@@ -34,13 +34,14 @@ FOREREACH_INLINE void SubtractFromLast(const double* column, Zonotope& image, Im
   const std::size_t n = ToSize(image.dim()), last = ToSize(image.num_generators()) - 1;
   for (std::size_t k = 0; k < n; k += kLaneCount) {
     const auto at = [&](std::size_t i) __attribute__((always_inline))->double& {
-      return image.mutable_row(static_cast<int>(std::min(k + i, n - 1)))[last];
+      return ArraysOf(image).mutable_row(static_cast<int>(std::min(k + i, n - 1)))[last];
     };
     const Lanes entries{at(0), at(1), at(2), at(3)};
     const Lanes moved = FirstLanes(entries - LoadLanes(column + k), n - k, 0), after = Abs(moved);
     const Lanes sum = LoadLanes(&sums.row[k]);
     StoreLanes(((sum - Abs(entries)) + after) + AllLanes(kSumRelative) * sum, &sums.row[k]);
-    StoreLanes(LoadLanes(image.slacks() + k) + AllLanes(2 * kUnitRoundoff) * after, image.mutable_slacks() + k);
+    StoreLanes(LoadLanes(image.slacks() + k) + AllLanes(2 * kUnitRoundoff) * after,
+               ArraysOf(image).mutable_slacks() + k);
     for (std::size_t i = 0; i < std::min(kLaneCount, n - k); ++i) at(i) = moved[i];
   }
 }
@@ -170,9 +171,9 @@ int StepOffsets::AddInline(const StepSoFar& step, OffsetSpread& spread, Zonotope
 
 void StepOffsets::Append(const OffsetSpread& spread, Zonotope& next, double* half_width) noexcept {
   const auto last = ToSize(next.num_generators());
-  next.Reset(next.dim(), next.num_generators() + 1);
+  ArraysOf(next).Reset(next.dim(), next.num_generators() + 1);
   for (int k = 0, n = next.dim(); k < n; ++k) {
-    double* const row = next.mutable_row(k);
+    double* const row = ArraysOf(next).mutable_row(k);
     if (last % kLaneCount == 0) StoreLanes(AllLanes(0), row + last);  // otherwise it is padding
     row[last] = spread.column[ToSize(k)];
   }

@@ -329,20 +329,20 @@ double Placement::SupportAtExpressions(const Sample& sample, int i, const Eigen:
 
 void Placement::EncloseAtExpressions(const Sample& sample, std::size_t i, Zonotope& place) const noexcept {
   const Zonotope& slice = *sample.slice;
-  place.Reset(dim(), slice.num_generators());
+  ArraysOf(place).Reset(dim(), slice.num_generators());
   for (int k = 0; k < dim(); ++k) {
     const AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear + k)];
     for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
       Lanes sum = AllLanes(0);
       for (int l = 0; l < slice.dim(); ++l)
         sum += AllLanes(linear.slope[ToSize(l)]) * LoadLanes(slice.padded_row(l).data() + j);
-      StoreLanes(sum, place.mutable_row(k) + j);
+      StoreLanes(sum, ArraysOf(place).mutable_row(k) + j);
     }
-    place.mutable_center(k) = sample.points[i].offset[ToSize(k)];
-    place.mutable_slack(k) = 0;
+    ArraysOf(place).mutable_center(k) = sample.points[i].offset[ToSize(k)];
+    ArraysOf(place).mutable_slack(k) = 0;
   }
   for (int k = 0; k < dim(); ++k)
-    place.AppendAxis(k, AddUp(sample.points[i].spread[ToSize(k)], Slack(sample, i, ToSize(k))));
+    ArraysOf(place).AppendAxis(k, AddUp(sample.points[i].spread[ToSize(k)], Slack(sample, i, ToSize(k))));
 }
 
 namespace {
@@ -421,7 +421,7 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
     }
     const Sample::Point& point = sample.points[i];
     Zonotope& place = places[i];
-    place.Reset(dim(), slice.num_generators());
+    ArraysOf(place).Reset(dim(), slice.num_generators());
     for (int k = 0; k < dim(); ++k) {
       const auto row = ToSize(k);
       for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
@@ -429,12 +429,13 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
         for (const MatrixEntry& entry : rows_[row])
           sum += AllLanes(entry.value.lower) * LoadLanes(slice.padded_row(entry.column).data() + j);
         if (point.slope[row] != 0) sum += AllLanes(point.slope[row]) * LoadLanes(slice.padded_row(heading_).data() + j);
-        StoreLanes(sum, place.mutable_row(k) + j);
+        StoreLanes(sum, ArraysOf(place).mutable_row(k) + j);
       }
-      place.mutable_center(k) = sample.center[row] + point.offset[row];
-      place.mutable_slack(k) = 0;
+      ArraysOf(place).mutable_center(k) = sample.center[row] + point.offset[row];
+      ArraysOf(place).mutable_slack(k) = 0;
     }
-    for (int k = 0; k < dim(); ++k) place.AppendAxis(k, AddUp(point.spread[ToSize(k)], Slack(sample, i, ToSize(k))));
+    for (int k = 0; k < dim(); ++k)
+      ArraysOf(place).AppendAxis(k, AddUp(point.spread[ToSize(k)], Slack(sample, i, ToSize(k))));
   }
 }
 

@@ -50,16 +50,17 @@ void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half
 void Projection::Enclose(const Zonotope& slice, std::span<const double> half_width,
                          Zonotope& projected) const noexcept {
   if (copies_) {
-    projected.Reset(dim_, slice.num_generators());
+    ArraysOf(projected).Reset(dim_, slice.num_generators());
     for (const auto& [row, column, one] : entries_) {
-      std::ranges::copy(slice.padded_row(column), projected.mutable_row(row));
-      projected.mutable_center(row) = slice.center(column);
-      projected.mutable_slack(row) = slice.slack(column);
+      std::ranges::copy(slice.padded_row(column), ArraysOf(projected).mutable_row(row));
+      ArraysOf(projected).mutable_center(row) = slice.center(column);
+      ArraysOf(projected).mutable_slack(row) = slice.slack(column);
     }
   } else {
     EncloseLinearImage(entries_, slice, half_width, dim_, projected);
   }
-  for (int k = 0; k < dim_; ++k) projected.AppendAxis(k, std::exchange(projected.mutable_slack(k), 0));
+  for (int k = 0; k < dim_; ++k)
+    ArraysOf(projected).AppendAxis(k, std::exchange(ArraysOf(projected).mutable_slack(k), 0));
 }
 
 }  // namespace forereach

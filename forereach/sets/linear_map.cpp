@@ -14,8 +14,8 @@ namespace {
 void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                    int rows, Zonotope& image, std::span<double> error) noexcept {
   const auto m = ToSize(set.num_generators());
-  image.Reset(rows, set.num_generators());
-  for (int k = 0; k < rows; ++k) std::fill_n(image.mutable_row(k), image.padded_size(), 0.0);
+  ArraysOf(image).Reset(rows, set.num_generators());
+  for (int k = 0; k < rows; ++k) std::fill_n(ArraysOf(image).mutable_row(k), image.padded_size(), 0.0);
 
   std::array<double, kMaxStates> magnitude{};  // sum_l |M_kl| r_l >= sum_j sum_l |M_kl G_lj|
   std::array<int, kMaxStates> terms{};
@@ -25,7 +25,7 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
     const auto k = ToSize(entry.row);
     const double half_width = half_widths[ToSize(entry.column)], weight = entry.value.Middle();
     const std::span<const double> from = set.row(entry.column);
-    double* to = image.mutable_row(entry.row);
+    double* to = ArraysOf(image).mutable_row(entry.row);
     for (std::size_t j = 0; j < m; ++j) to[j] += weight * from[j];
 
     error[k] = AddUp(error[k], MulUp(entry.value.DistanceUpper(weight), half_width));
@@ -52,8 +52,8 @@ void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set
   for (const MatrixEntry& entry : matrix) center[ToSize(entry.row)] += entry.value * Interval(set.center(entry.column));
   for (int k = 0; k < rows; ++k) {
     const Interval& value = center[ToSize(k)];
-    image.mutable_center(k) = value.Middle();
-    image.mutable_slack(k) = AddUp(error[ToSize(k)], value.DistanceUpper(image.center(k)));
+    ArraysOf(image).mutable_center(k) = value.Middle();
+    ArraysOf(image).mutable_slack(k) = AddUp(error[ToSize(k)], value.DistanceUpper(image.center(k)));
   }
 }
 

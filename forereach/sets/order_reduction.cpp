@@ -135,7 +135,7 @@ FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* s
     const Packing packing(bits);
 #pragma GCC unroll 8
     for (std::size_t i = 0; i < kRows; ++i) {
-      double* row = set.mutable_row(static_cast<int>(k + i));
+      double* row = ArraysOf(set).mutable_row(static_cast<int>(k + i));
       const Lanes four = LoadLanes(row + j);
       sums[i] += FromBits(Bits(four) & absolute);
       StoreLanes(packing(four), row + to);
@@ -191,13 +191,13 @@ struct Axes {
   FOREREACH_INLINE int Write(Zonotope& set, unsigned lasting, int column) const {
     for (unsigned rest = which & lasting; rest != 0; rest &= rest - 1) {
       const int k = std::countr_zero(rest);
-      double& slack = set.mutable_slack(k);
+      double& slack = ArraysOf(set).mutable_slack(k);
       slack = (slack + lengths[k]) * (1 + 4 * kUnitRoundoff);
-      set.axes_in_slack().Append(k);
+      ArraysOf(set).mutable_axes_in_slack().Append(k);
     }
     for (unsigned rest = which & ~lasting; rest != 0; rest &= rest - 1) {
       const int k = std::countr_zero(rest);
-      set.mutable_row(k)[column++] = lengths[k];
+      ArraysOf(set).mutable_row(k)[column++] = lengths[k];
     }
     return column;
   }
@@ -220,11 +220,11 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const double* first, c
                                            unsigned lasting) {
   const std::size_t n = ToSize(kDim > 0 ? kDim : set.dim());
   const int count = set.num_generators(), most = order * static_cast<int>(n), keep = most - static_cast<int>(n);
-  AxesInSlack& held = set.axes_in_slack();
+  AxesInSlack& held = ArraysOf(set).mutable_axes_in_slack();
   Axes early = Axes::Nonzero(first, n), late = Axes::Nonzero(second, n);
   const int axes = early.size() + late.size();
   if (count + held.count + axes <= most) {
-    set.Extend<kDim>(count + std::popcount(early.which & ~lasting) + std::popcount(late.which & ~lasting));
+    ArraysOf(set).Extend<kDim>(count + std::popcount(early.which & ~lasting) + std::popcount(late.which & ~lasting));
     late.Write(set, lasting, early.Write(set, lasting, count));
     return;
   }
@@ -253,9 +253,9 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const double* first, c
   Axes box = Axes::Nonzero(boxed.data(), n);
   box.which |= boxed_before;
   const unsigned columns = ~lasting;
-  if (left < count) set.Truncate<kDim>(left);
-  set.Extend<kDim>(left + std::popcount(early.which & columns) + std::popcount(late.which & columns) +
-                   std::popcount(box.which & columns));
+  if (left < count) ArraysOf(set).Truncate<kDim>(left);
+  ArraysOf(set).Extend<kDim>(left + std::popcount(early.which & columns) + std::popcount(late.which & columns) +
+                             std::popcount(box.which & columns));
   box.Write(set, lasting, late.Write(set, lasting, early.Write(set, lasting, left)));
 }
 

@@ -6,7 +6,7 @@ count as generators and do not displace a real generator in the order reduction.
 0.
 
 The type is a value of fixed capacity. It uses no heap and is trivially copyable, so the certify step can work on it in
-place: zonotope_arrays.h is for its kernels, order_reduction.h reduces the number of generators. */
+place: its kernels do by ArraysOf (zonotope_arrays.h). order_reduction.h reduces the number of generators. */
 #pragma once
 
 #include <span>
@@ -21,8 +21,13 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
-class Zonotope final : public ZonotopeArrays {
+class Zonotope final : private ZonotopeArrays {
  public:
+  using ZonotopeArrays::axes_in_slack, ZonotopeArrays::centers, ZonotopeArrays::padded_row, ZonotopeArrays::padded_size,
+      ZonotopeArrays::slacks;
+  /** What a kernel writes in place, unchecked. */
+  [[nodiscard]] friend ZonotopeArrays& ArraysOf(Zonotope& set) { return set; }
+
   /** The point of dimension 0. */
   Zonotope() = default;
 
@@ -36,6 +41,9 @@ class Zonotope final : public ZonotopeArrays {
 
   /** An axis-aligned zonotope that contains the box, rounded outward. */
   [[nodiscard]] static Zonotope Enclose(const Box& box);
+
+  /** Copies only the entries in use of another set: about 2 kB of the 15 kB of the whole value. */
+  void Assign(const Zonotope& other) noexcept { ZonotopeArrays::Assign(other); }
 
   [[nodiscard]] int dim() const { return dim_; }
   [[nodiscard]] int num_generators() const { return num_generators_; }

@@ -42,7 +42,7 @@ class ZonotopeArrays {
   [[nodiscard]] double* mutable_row(int k) { return rows_[ToSize(k)].data(); }
   [[nodiscard]] double& mutable_slack(int k) { return slack_[ToSize(k)]; }
   [[nodiscard]] double& mutable_center(int k) { return center_[ToSize(k)]; }
-  [[nodiscard]] AxesInSlack& axes_in_slack() { return axes_in_slack_; }
+  [[nodiscard]] AxesInSlack& mutable_axes_in_slack() { return axes_in_slack_; }
   [[nodiscard]] const AxesInSlack& axes_in_slack() const { return axes_in_slack_; }
 
   /** Sets the sizes, and that the slack holds no axes. The caller then writes centers, slacks and rows, and keeps the
@@ -70,7 +70,6 @@ class ZonotopeArrays {
     for (; j < padded_size(); j += kLaneCount)
       for (int k = 0; k < (kDim > 0 ? kDim : dim_); ++k) StoreLanes(AllLanes(0), mutable_row(k) + j);
   }
-  /** Copies only the entries in use of another set: about 2 kB of the 15 kB of the whole value. */
   void Assign(const ZonotopeArrays& other) noexcept;
   /** Appends the generator length * e_k unless length is zero. */
   void AppendAxis(int k, double length) noexcept;

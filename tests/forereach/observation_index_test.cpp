@@ -58,7 +58,7 @@ struct Query {
               random.Matrix(kStates, generators, scale / (generators + 1) * random.Uniform(0, 0.9))),
         input(random.Vector(kInputs, scale)) {
     for (int k = 0; k < kStates; ++k) {
-      slice.mutable_slack(k) = random.Coin() ? 0 : 1e-3 * scale * random.Uniform(0, 1);
+      ArraysOf(slice).mutable_slack(k) = random.Coin() ? 0 : 1e-3 * scale * random.Uniform(0, 1);
       half_width.push_back(slice.HalfWidthUpper(k));
     }
   }

@@ -194,10 +194,10 @@ TEST(ReduceOrder, AxesInTheSlackAreTheSameSetAsColumns) {
       for (int k = 0; k < n; ++k)
         if (lasting >> k & 1) map.col(k) = Eigen::VectorXd::Unit(n, k);
       columns = (map * columns).eval();
-      const ZonotopeArrays slice = set;
+      const ZonotopeArrays slice = ArraysOf(set);
       set = Zonotope(set.CenterVector(), map * set.GeneratorMatrix().leftCols(set.num_generators()));
-      set.axes_in_slack() = slice.axes_in_slack();
-      for (int k = 0; k < n; ++k) set.mutable_slack(k) = slice.slacks()[k];
+      ArraysOf(set).mutable_axes_in_slack() = slice.axes_in_slack();
+      for (int k = 0; k < n; ++k) ArraysOf(set).mutable_slack(k) = slice.slacks()[k];
     }
   }
   EXPECT_GT(held, 1000);

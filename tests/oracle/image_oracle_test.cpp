@@ -38,7 +38,7 @@ struct Case {
     const double scale = std::ldexp(1, random.Coin(0.2) ? random.Integer(-1060, -900) : random.Integer(-30, 30));
     slice = Zonotope(random.Vector(program.states), random.Matrix(program.states, random.Integer(0, 30), scale));
     for (int k = 0; k < program.states; ++k)
-      if (random.Coin(0.3)) slice.mutable_slack(k) = random.Uniform(0, scale);
+      if (random.Coin(0.3)) ArraysOf(slice).mutable_slack(k) = random.Uniform(0, scale);
     for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
       const bool is_one = program.jacobian[e].is_one;
       expansion.jacobian[e] = is_one ? 1 : random.Coin(0.1) ? 0 : random.Uniform(-3, 3);

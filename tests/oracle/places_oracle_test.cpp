@@ -35,7 +35,8 @@ TEST(PlacesOracle, ContainTheExactPlacesOfEveryState) {
     Zonotope slice(random.Vector(3, random.Coin(0.1) ? 100 : 2),
                    random.Matrix(3, random.Integer(0, 12), std::ldexp(1, -random.Integer(1, 40))));
     if (random.Coin())
-      for (int k = 0; k < 3; ++k) slice.mutable_slack(k) = std::ldexp(random.Uniform(0, 1), -random.Integer(5, 50));
+      for (int k = 0; k < 3; ++k)
+        ArraysOf(slice).mutable_slack(k) = std::ldexp(random.Uniform(0, 1), -random.Integer(5, 50));
     const std::vector<double> half_width = HalfWidths(slice);
     placement.Observe(slice, half_width, sample);
     placement.Enclose(sample, places.data());

@@ -143,7 +143,7 @@ TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
   for (TracedRandom random(631); random.Again(2000);) {
     Zonotope slice = random.AnyZonotope(kStates, random.Integer(0, 60), std::ldexp(1, random.Integer(-40, 40)));
     for (int k = 0; k < kStates; ++k)
-      if (random.Coin()) slice.mutable_slack(k) = random.Uniform(0, 1);
+      if (random.Coin()) ArraysOf(slice).mutable_slack(k) = random.Uniform(0, 1);
     std::array<double, kMaxStates> half_width{};
     Propagator::HalfWidths(slice, half_width.data());
     for (int k = 0; k < kStates; ++k)

@@ -23,7 +23,7 @@ struct Case {
     if (random.Coin(0.3)) generators.row(random.Below(program.states)).setZero();
     slice = Zonotope(random.Vector(program.states), generators);
     for (int k = 0; k < program.states; ++k)
-      if (random.Coin(0.3)) slice.mutable_slack(k) = random.Uniform(0, scale);
+      if (random.Coin(0.3)) ArraysOf(slice).mutable_slack(k) = random.Uniform(0, scale);
     Propagator::HalfWidths(slice, half_width.data());
     for (int e = 0; e < program.num_second; ++e) {
       const double a = random.Uniform(-2, 2), b = random.Coin() ? a : random.Uniform(-2, 2);

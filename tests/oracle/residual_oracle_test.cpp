@@ -705,7 +705,7 @@ TEST_P(Envelope, IsTheExactEnvelopeRoundedOutward) {
     }
     Zonotope slice = random.AnyZonotope(states, random.Integer(0, active <= 8 ? 20 : 5), random.Coin() ? 0.3 : 0.02);
     if (random.Coin())
-      for (int k = 0; k < states; ++k) slice.mutable_slack(k) = random.Uniform(0, 0.1);
+      for (int k = 0; k < states; ++k) ArraysOf(slice).mutable_slack(k) = random.Uniform(0, 0.1);
     const Eigen::VectorXd input = random.Vector(inputs);
     ExpectEnvelope(s, slice, input, 1e-12);
     EXPECT_EQ(EnvelopeFor(s.declaration, s.observations, slice, View(input)).uses_hull_distance(), active > 12);

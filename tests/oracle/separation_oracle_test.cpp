@@ -148,7 +148,7 @@ TEST(PlanarSeparation, CountsTheSlack) {
   for (TracedRandom random(709); random.Again(2000);) {
     Zonotope slice = AnySlice(random);
     for (int k = 0; k < 2; ++k)
-      if (random.Coin(0.8)) slice.mutable_slack(k) = std::ldexp(random.Uniform(1, 2), -random.Integer(1, 30));
+      if (random.Coin(0.8)) ArraysOf(slice).mutable_slack(k) = std::ldexp(random.Uniform(1, 2), -random.Integer(1, 30));
     const Zonotope same(slice.CenterVector(), slice.GeneratorMatrix());
     const Obstacle obstacle = AnyPlanarObstacle(random);
     const Rational square = SquaredDistance(same, obstacle);
@@ -478,7 +478,7 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
       for (int k = 0; k < p; ++k) matrix.row(k) = Eigen::RowVectorXd::Unit(n, random.Integer(0, n - 1));
     Zonotope slice = random.AnyZonotope(n, random.Integer(0, 12), std::ldexp(1, random.Integer(-300, 300)));
     for (int k = 0; k < n; ++k)
-      slice.mutable_slack(k) = random.Coin() ? 0 : random.Uniform(0, 1) * slice.HalfWidthUpper(k);
+      ArraysOf(slice).mutable_slack(k) = random.Coin() ? 0 : random.Uniform(0, 1) * slice.HalfWidthUpper(k);
     Zonotope projected;
     Projection(matrix, n).Enclose(slice, HalfWidths(slice), projected);
     for (int i = 0; i < 6; ++i) {

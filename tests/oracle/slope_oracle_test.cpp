@@ -74,7 +74,7 @@ TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
     Zonotope slice(random.Vector(4), random.Matrix(4, random.Integer(0, 4 * order)));
     const bool has_slack = random.Coin();
     for (int k = 0; k < 4; ++k)
-      if (has_slack) slice.mutable_slack(k) = random.Uniform(0, 1);
+      if (has_slack) ArraysOf(slice).mutable_slack(k) = random.Uniform(0, 1);
     const std::array<double, 2> input{random.Uniform(-3, 3), random.Uniform(-3, 3)};
     StepRecord record;
     Propagator::HalfWidths(slice, record.half_width.data());

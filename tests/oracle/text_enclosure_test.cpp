@@ -73,7 +73,7 @@ Enclosed AnyEnclosed(Random& random, const TextEnclosure& enclosure) {
   if (random.Coin(0.3)) generators.row(random.Below(3)).setZero();
   Enclosed enclosed{Zonotope(random.Vector(3, 0.8), generators), {}, {random.Uniform(-1, 1)}};
   if (random.Coin(0.5))
-    for (int k = 0; k < 3; ++k) enclosed.slice.mutable_slack(k) = random.Uniform(0, 0.01);
+    for (int k = 0; k < 3; ++k) ArraysOf(enclosed.slice).mutable_slack(k) = random.Uniform(0, 0.01);
   enclosed.half_width = HalfWidths(enclosed.slice);
   enclosure.Enclose(enclosed.slice.center(), enclosed.half_width, enclosed.input, enclosed.values);
   return enclosed;

@@ -38,7 +38,7 @@ TEST(Locate, APointAndASegment) {
 TEST(Locate, SlackCounts) {
   Zonotope set(Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 1));
   EXPECT_EQ(At(set, {1, 0.95}), Membership::kOutside);
-  set.mutable_slack(1) = 0.05;
+  ArraysOf(set).mutable_slack(1) = 0.05;
   EXPECT_EQ(At(set, {1, 0.95}), Membership::kInside);
 }
 
