@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "tests/oracle/problems.h"
@@ -90,6 +93,37 @@ inline bool IsNotOutside(Random& random, const Zonotope& slice, const std::vecto
     if (!(along <= Real(slice.SupportUpper(View(d))))) return false;
   }
   return true;
+}
+
+/** Follows the plan of a query from any point of its initial set under any inputs (drawn from `records`), disturbances
+and offsets (from `winds`) that the problem allows. @param residual r_k(z), as it is called. @return the first t of
+0..steps at which holds(t, x_t) is false; -1 if there is none. */
+template <class Residual, class Holds>
+int FirstFailure(Random& random, Random& winds, Random& records, const Problem& problem, const Query& query, int steps,
+                 const Residual& residual, const Holds& holds) {
+  std::vector<Real> x = PointOf(random, query.initial_set);
+  Real offset;
+  for (int t = 0;; ++t) {
+    if (!holds(t, x)) return t;
+    if (t == steps) return -1;
+    std::vector<Real> z = x;
+    for (int l = 0; l < query.controls.rows(); ++l) z.push_back(ActedInput(records, problem, l, query.controls(l, t)));
+    const Real before = std::exchange(offset, AnyOffset(winds, problem));
+    x = Rolled(winds, problem, residual, z, offset - before);
+  }
+}
+
+/** A certifier that knows the first transitions of a problem and has learned the others. */
+inline std::unique_ptr<Certifier> HasLearned(const Problem& problem, int first) {
+  const Transitions& all = problem.transitions;
+  const auto known = std::make_shared<Problem>(problem);
+  known->transitions = {all.z.topRows(first), all.x_next.topRows(first)};
+  auto certifier = std::make_unique<Certifier>(known);
+  for (int i = first; i < all.size(); ++i) {
+    const Eigen::VectorXd z = all.z.row(i), next = all.x_next.row(i);
+    if (certifier->Learn(View(z), View(next)) != Learned::kAdded) throw std::logic_error("a transition is not added");
+  }
+  return certifier;
 }
 
 }  // namespace forereach

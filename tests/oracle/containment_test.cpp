@@ -130,27 +130,20 @@ TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
       ASSERT_EQ(tube.slice(0).CenterVector(), query.initial_set.CenterVector());
       std::vector<Membership> members;
       for (int t = 0; t <= tube.length(); ++t) members.emplace_back(random, tube.slice(t));
-      for (int r = 0; r < 6; ++r) {
-        const AdmissibleResidual residual(random, *truth);
-        std::vector<Real> x = PointOf(random, query.initial_set);
-        Real offset;
-        ++rollouts;
-        for (int t = 0;; ++t) {
-          // X_0 is the set the state was drawn from, with nothing to spare for the judge's own rounding.
-          ASSERT_TRUE(t == 0 || members[static_cast<std::size_t>(t)].Contains(x)) << "slice " << t;
-          ++slices;
-          for (const Obstacle& obstacle : query.obstacles) {
-            ASSERT_FALSE(decision.outcome == Outcome::kCertified && Collides(obstacle, problem->projection, x))
-                << "step " << t;
-          }
-          if (t == tube.length()) break;
-          std::vector<Real> z = x;
-          for (int l = 0; l < query.controls.rows(); ++l)
-            z.push_back(ActedInput(records, *problem, l, query.controls(l, t)));
-          const Real before = std::exchange(offset, AnyOffset(winds, *problem));
-          x = Rolled(winds, *problem, residual, z, offset - before);
-        }
-      }
+      // X_0 is the set the state was drawn from, with nothing to spare for the judge's own rounding.
+      const auto holds = [&](int t, const std::vector<Real>& x) {
+        ++slices;
+        return (t == 0 || members[static_cast<std::size_t>(t)].Contains(x)) &&
+               (decision.outcome != Outcome::kCertified ||
+                std::ranges::none_of(query.obstacles, [&](const Obstacle& obstacle) {
+                  return Collides(obstacle, problem->projection, x);
+                }));
+      };
+      for (int r = 0; r < 6; ++r, ++rollouts)
+        ASSERT_EQ(FirstFailure(random, winds, records, *problem, query, tube.length(),
+                               AdmissibleResidual(random, *truth), holds),
+                  -1)
+            << "outside that slice, or in an obstacle";
     }
   }
   RecordProperty("rollouts", rollouts);
@@ -201,19 +194,13 @@ TEST_P(Containment, ACertificateHoldsForEveryResidualThatMoreObservationsAdmit) 
     ++plans;
     std::vector<Membership> members;
     for (int t = 0; t <= issued.length(); ++t) members.emplace_back(random, issued.slice(t));
-    for (int r = 0; r < 3; ++r) {
-      const AdmissibleResidual residual(random, *all);
-      std::vector<Real> x = PointOf(random, query.initial_set);
-      Real offset;
-      ++rollouts;
-      for (int t = 0; t < issued.length(); ++t) {
-        std::vector<Real> z = x;
-        for (const double u : query.plan().input(t)) z.emplace_back(u);
-        const Real before = std::exchange(offset, AnyOffset(winds, *all));
-        x = Rolled(winds, *all, residual, z, offset - before);
-        ASSERT_TRUE(members[static_cast<std::size_t>(t) + 1].Contains(x)) << "slice " << t + 1;
-      }
-    }
+    const auto holds = [&](int t, const std::vector<Real>& x) {
+      return t == 0 || members[static_cast<std::size_t>(t)].Contains(x);
+    };
+    for (int r = 0; r < 3; ++r, ++rollouts)
+      ASSERT_EQ(
+          FirstFailure(random, winds, winds, *all, query, issued.length(), AdmissibleResidual(random, *all), holds), -1)
+          << "outside that slice";
     static_cast<void>(certifier.Certify(query.plan(), query.initial_set, {}, again));
     const double excess = Excess(again, issued);
     wider += excess > 1e-9;

@@ -1,4 +1,5 @@
-// Directed rounding against exact rationals: never on the wrong side, and as close as the header says.
+// Directed rounding against exact rationals: never on the wrong side, and within a double
+// of the closest bound, a root of a tiny number within two.
 #include "forereach/numerics/directed.h"
 
 #include "tests/test.h"
