@@ -80,7 +80,7 @@ std::pair<std::int64_t, std::int64_t> WindowOf(const Obstacle& obstacle) {
 }
 constexpr std::int64_t kBegin = -ObstacleMotion::kAlways, kEnd = ObstacleMotion::kAlways;
 
-TEST(ObstaclesV2Test, APieceWithoutMotionStandsAtAllTimes) {
+TEST(ObstaclesTest, APieceWithoutMotionStandsAtAllTimes) {
   for (const std::int64_t from : {kLeast, kBegin, std::int64_t{0}, kNow})
     for (const std::int64_t until : {kNow, kNow + 1, kMost}) {
       const std::vector<Obstacle> taken = Taken({Piece(from, until)});
@@ -91,7 +91,7 @@ TEST(ObstaclesV2Test, APieceWithoutMotionStandsAtAllTimes) {
   EXPECT_FALSE(Taken({Gone(Piece(0, kMost))})[0].motion()) << "it is gone after all times";
 }
 
-TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
+TEST(ObstaclesTest, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
   for (const auto& change : std::vector<std::function<void(obstacle_t&)>>{
            [](auto& piece) { piece.velocity[0] = 1e-300; }, [](auto& piece) { piece.velocity[1] = -1; },
            [](auto& piece) { piece.uncertainty = 0.1; }, [](auto& piece) { piece.growth = 0.2; },
@@ -109,14 +109,14 @@ TEST(ObstaclesV2Test, APieceMovesIfAnyNumberOfItsMotionIsNotZero) {
   EXPECT_FALSE(Taken({third})[0].motion()) << "entries beyond the dimension are not read";
 }
 
-TEST(ObstaclesV2Test, ATrackExtendsBackToTheBeginningOfTime) {
+TEST(ObstaclesTest, ATrackExtendsBackToTheBeginningOfTime) {
   EXPECT_EQ(WindowOf(Taken({Gone(Piece(kNow, kNow + 5))})[0]), std::pair(kBegin, kNow + 5));
   EXPECT_THAT(WhyRefused({Piece(kNow + 1, kMost)}),
               HasSubstr("track 7 begins at 1700000000000001 us, after the message of 1700000000000000 us"));
   EXPECT_NE(WhyRefused({Piece(kMost, kMost)}), "");
 }
 
-TEST(ObstaclesV2Test, ThePiecesOfATrackHaveToJoin) {
+TEST(ObstaclesTest, ThePiecesOfATrackHaveToJoin) {
   const obstacle_t first = Piece(kNow - 10, kNow + 10), second = Piece(kNow + 10, kNow + 20),
                    third = Piece(kNow + 15, kNow + 30);
   const std::vector<Obstacle> taken = Taken({third, first, second});
@@ -134,7 +134,7 @@ TEST(ObstaclesV2Test, ThePiecesOfATrackHaveToJoin) {
       << "the window in the middle lies in the first";
 }
 
-TEST(ObstaclesV2Test, OnlyTheLastPieceOfATrackMayBeGone) {
+TEST(ObstaclesTest, OnlyTheLastPieceOfATrackMayBeGone) {
   const obstacle_t first = Piece(kNow, kNow + 10), last = Piece(kNow + 10, kNow + 20);
   EXPECT_THAT(WhyRefused({Gone(first), last}),
               HasSubstr("track 7 is gone at 1700000000000010 us and goes on until 1700000000000020 us"));
@@ -146,7 +146,7 @@ TEST(ObstaclesV2Test, OnlyTheLastPieceOfATrackMayBeGone) {
       EXPECT_EQ(WindowOf(obstacle).second, kEnd) << "both that end last go on";
 }
 
-TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
+TEST(ObstaclesTest, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
   const auto refused = [](const std::string& why, const std::function<void(obstacle_t&)>& change) {
     obstacles_t message = Of({Piece(0, kMost, 1), Piece(0, kMost, 2)});
@@ -202,7 +202,7 @@ TEST(ObstaclesV2Test, WindowsFlagsAndNumbersOutOfTheirBoundsAreRefused) {
   }
 }
 
-TEST(ObstaclesV2Test, StampsOfAMessageBeyondASchedulesAreRefusedOrTaken) {
+TEST(ObstaclesTest, StampsOfAMessageBeyondASchedulesAreRefusedOrTaken) {
   for (const std::int64_t sign : {1, -1})
     for (const std::int64_t beyond : {0, 1}) {
       obstacle_t piece = Piece(kLeast, kMost);
@@ -219,7 +219,7 @@ TEST(ObstaclesV2Test, StampsOfAMessageBeyondASchedulesAreRefusedOrTaken) {
   }
 }
 
-TEST(ObstaclesV2Test, PredictionsGoThroughTheBus) {
+TEST(ObstaclesTest, PredictionsGoThroughTheBus) {
   ObstacleMotion first, second;
   first.stamp_us = kNow;
   first.velocity = {1, -2, 0};
@@ -242,7 +242,7 @@ TEST(ObstaclesV2Test, PredictionsGoThroughTheBus) {
 }
 
 // Whatever is taken, every track is somewhere at all times from the message on, until it is gone.
-TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
+TEST(ObstaclesTest, RandomWindowsLeaveNoGap) {
   FreshRandom random;
   const auto below = [&](int n) { return static_cast<std::int64_t>(random() % static_cast<unsigned>(n)); };
   int taken = 0, refused = 0;

@@ -1,60 +1,12 @@
-// Certificates of residuals with regions: what the certifier claims, the verifier derives by its own ways.
+// The verifier's ways between places of residuals with regions say what the certifier's grid does.
 #include "tests/test.h"
 
 #include "forereach/residual/region_grid.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/traced_random.h"
-#include "tests/verifier/is_confirmed.h"
-#include "tests/verifier/record.h"
 #include "verifier/ways.h"
 
-namespace forereach::verifier::regions_test {
-
-TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotDeclared) {
-  int certified = 0, need_regions = 0, falsified = 0;
-  for (TracedRandom random(2121); random.Again(80);) {
-    SCOPED_TRACE("trial " + std::to_string(random.trial()));
-    const bool bicycle = random.Coin();
-    auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 8), random.Coin());
-    if (random.Coin(0.3)) problem = Recorded(random, *problem);
-    if (random.Coin(0.3)) Shift(random, *problem);
-    const Certifier certifier(problem);
-    ASSERT_FALSE(certifier.violation());
-    const Verifier judge(problem, MethodOf(*problem));
-    forereach::Tube tube;
-    const Query query = AnyQuery(random, *problem);
-    const Decision decision = certifier.Certify(query.plan(), query.initial_set, query.obstacles, tube);
-    if (decision.outcome != Outcome::kCertified) continue;
-    ++certified;
-    const Certificate certificate = CertificateOf(certifier, query.plan(), query.initial_set, query.obstacles, tube);
-    EXPECT_TRUE(IsConfirmed(judge.Verify(certificate)));
-    Certificate narrower = certificate;
-    RecordedSlice& last = narrower.slices.back();
-    Eigen::Index widest = 0;
-    (last.upper - last.lower).maxCoeff(&widest);
-    last.upper[widest] -= 0.6 * (last.upper - last.lower)[widest];
-    EXPECT_NE(judge.Verify(narrower).status, Status::kConfirmed);
-    // By L alone the tube is wider.
-    const auto plain = std::make_shared<Problem>(*problem);
-    plain->declaration.regions = {};
-    const Certifier wide(plain);
-    forereach::Tube wider;
-    static_cast<void>(wide.Certify(query.plan(), query.initial_set, {}, wider));
-    const bool is_narrower =
-        wider.length() < tube.length() || wider.half_width(tube.length())[0] > 1.01 * tube.half_width(tube.length())[0];
-    if (!is_narrower) continue;
-    ++need_regions;
-    EXPECT_NE(Verifier(plain, MethodOf(*plain)).Verify(certificate).status, Status::kConfirmed);
-    // Data that contradict the regions and not L.
-    const auto false_data = std::make_shared<Problem>(*problem);
-    false_data->declaration.regions = {Region{{{0, {-1e3, 1e3}}}, 0 * problem->declaration.lipschitz}};
-    const Verdict of_false = Verifier(false_data, MethodOf(*false_data)).Verify(certificate);
-    falsified += of_false.failure.what.find("consistent with data") != std::string::npos;
-  }
-  EXPECT_GT(certified, 25);
-  EXPECT_GT(need_regions, 5);
-  EXPECT_GT(falsified, 2);
-}
+namespace forereach::verifier::ways_test {
 
 TEST(Ways, BoundWhatTheGridSays) {
   for (TracedRandom random(2123); random.Again(300);) {
@@ -113,4 +65,4 @@ TEST(Ways, CostWhatTheGridSays) {
   EXPECT_GT(equal, 500);
 }
 
-}  // namespace forereach::verifier::regions_test
+}  // namespace forereach::verifier::ways_test
