@@ -885,8 +885,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     next.center[ToSize(k)] += half * (lower + upper);
     const Real h =
         half * abs(upper - lower) + unexpected[ToSize(k)] + input_spread[ToSize(k)] + offset.spread[ToSize(k)];
-    if (!options.ranks_rounding &&
-        CertainlyAtMost(h, Real(kNegligible) * (Real(domain.upper()[k]) - Real(domain.lower()[k]))))
+    if (CertainlyAtMost(h, Real(kNegligible) * (Real(domain.upper()[k]) - Real(domain.lower()[k]))))
       slack[ToSize(k)] += h;
     else if (!h.IsZero())
       next.columns.push_back(Axis(n, k, h));

@@ -97,7 +97,6 @@ struct RecordedSet {
 /** Variants of the tube. All are sound; the options can make it tighter. */
 struct TubeOptions {
   bool reduce = true;            ///< Reduce the order by the certifier's rule, or never.
-  bool ranks_rounding = false;   ///< Axes of rounding size are columns, too, as in older logs; else they are slack.
   bool split_remainder = false;  ///< Also bound the Hessian over half the box: the integral remainder in two parts.
   KnownRows known = {};
   /** If not null: the record of each slice. Each step then starts from the recorded slice, and reduces as the record

@@ -222,9 +222,9 @@ std::optional<Failure> Verifier::FindContact(const Certificate& claimed, const s
   return failure;
 }
 
-// The certifier's own rules first, then those of older logs. Where these leave a choice, its rounding may have taken it
-// otherwise. What proves the claims as well is a tube that follows the record from slice to slice; and, if they fail by
-// no more than the choice may matter, tubes that need none: never reduced, and with a tighter remainder.
+// The certifier's own rules first. Where these leave a choice, its rounding may have taken it otherwise. What proves
+// the claims as well is a tube that follows the record from slice to slice; and, if they fail by no more than the
+// choice may matter, tubes that need none: never reduced, and with a tighter remainder.
 std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate& certificate) const {
   double ambiguity = 0;
   const auto attempt = [&](const TubeOptions& options) {
@@ -235,7 +235,7 @@ std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate
   const KnownRows& known = certificate.known;
   if (auto too_much = maker.FindTooMuch(known)) return too_much;
   const std::optional<Failure> failure = attempt({.known = known});
-  if (!failure || !attempt({.ranks_rounding = true, .known = known})) return std::nullopt;
+  if (!failure) return std::nullopt;
   std::vector<RecordedSet> recorded;
   for (const RecordedSlice& slice : certificate.slices)
     if (slice.has_generators) recorded.push_back({slice.center, slice.generators});
