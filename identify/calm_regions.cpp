@@ -26,10 +26,10 @@ struct Cell {
   Eigen::VectorXd needed;  // by state: the largest of its members
 };
 
-class Search final {
+class CellSearch final {
  public:
-  Search(const Declaration& declaration, const Observations& observations, const std::vector<int>& variables,
-         const CalmOptions& options)
+  CellSearch(const Declaration& declaration, const Observations& observations, const std::vector<int>& variables,
+             const CalmOptions& options)
       : declaration_(declaration),
         seen_(observations),
         variables_(variables),
@@ -185,7 +185,7 @@ class Search final {
 
 std::vector<CalmRegion> FindCalmRegions(const Declaration& declaration, const Observations& observations,
                                         const std::vector<int>& variables, const CalmOptions& options) {
-  Search search(declaration, observations, variables, options);
+  CellSearch search(declaration, observations, variables, options);
   search.Run();
   return search.Regions();
 }

@@ -276,7 +276,7 @@ class Planner final : public Proposer {
   [[nodiscard]] bool HasRoom(const PlanRequest& request, const Eigen::VectorXd& direction) override;
 
  private:
-  class Search;
+  class ProposalSearch;
 
   // Around obstacles. Where no part of the body is in its frame, P x is no place among them: what counts is where the
   // body is in a state with this P x, at rest.
@@ -313,9 +313,9 @@ class Planner final : public Proposer {
 
 /** One request: what is allowed, what counts as progress, and the work done so far. `more` is added to every distance
 to keep on the way. */
-class Planner::Search {
+class Planner::ProposalSearch {
  public:
-  Search(const Planner& planner, const PlanRequest& request, const NavigationField& field, double more = 0)
+  ProposalSearch(const Planner& planner, const PlanRequest& request, const NavigationField& field, double more = 0)
       : planner_(planner),
         field_(field),
         model_(*planner.problem_->model),
@@ -398,7 +398,7 @@ class Planner::Search {
  private:
   class ProgressGoal final : public ob::Goal {
    public:
-    ProgressGoal(const ob::SpaceInformationPtr& space, const Search& search, const Ambition& ambition)
+    ProgressGoal(const ob::SpaceInformationPtr& space, const ProposalSearch& search, const Ambition& ambition)
         : Goal(space), search_(search), ambition_(ambition) {}
 
     bool isSatisfied(const ob::State* state) const override { return isSatisfied(state, nullptr); }
@@ -414,7 +414,7 @@ class Planner::Search {
     }
 
    private:
-    const Search& search_;
+    const ProposalSearch& search_;
     const Ambition ambition_;
   };
 
@@ -747,10 +747,10 @@ class Planner::Search {
 std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   if (request.state.size() != problem_->model->num_states() || !request.state.allFinite()) return std::nullopt;
   const NavigationField& field = Field(request.clearance, request.schedule.start_us);
-  Search search(*this, request, field);
+  ProposalSearch search(*this, request, field);
   if (!search.StartIsValid()) return std::nullopt;
   if (request.may_follow_hints && motion_.has_hints()) {
-    const Search roomy(*this, request, field, kRoomOfHints * options_.clearance_step);
+    const ProposalSearch roomy(*this, request, field, kRoomOfHints * options_.clearance_step);
     if (std::optional<Proposal> proposal = roomy.FollowHints()) return proposal;
   }
   // OMPL calls a second seed an error because generators that exist keep theirs. None does: each search makes its own.
@@ -765,7 +765,7 @@ std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
 }
 
 bool Planner::HasRoom(const PlanRequest& request, const Eigen::VectorXd& direction) {
-  return Search(*this, request, Field(request.clearance, request.schedule.start_us)).StartHasRoom(direction);
+  return ProposalSearch(*this, request, Field(request.clearance, request.schedule.start_us)).StartHasRoom(direction);
 }
 
 }  // namespace

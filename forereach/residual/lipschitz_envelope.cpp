@@ -61,7 +61,7 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
 using internal::Budget;
 using internal::Sides;
 
-struct LipschitzEnvelope::Search {
+struct LipschitzEnvelope::BoundSearch {
   const Row& row;
   const EnvelopeOptions& options;
   Budget& budget;
@@ -110,7 +110,7 @@ struct LipschitzEnvelope::Search {
   }
   template <template <class> class Metric, class... More>
   [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
-    return Dispatch<&Search::RunWith<Metric<Pack>, More...>, &Search::RunWith<Metric<WidePack>, More...>>(
+    return Dispatch<&BoundSearch::RunWith<Metric<Pack>, More...>, &BoundSearch::RunWith<Metric<WidePack>, More...>>(
         options.instructions, *this, set, more...);
   }
   template <class P>
@@ -158,7 +158,8 @@ void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail
     Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
     Sides best{-kInfinity, -kInfinity};
     if (std::isfinite(row.error))
-      best = Search{row, options_, budget, bounds.found[i], tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(set);
+      best = BoundSearch{row, options_, budget, bounds.found[i], tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(
+          set);
     // Infinite errors leave no bound. A cap on the search leaves a sound one: any subset of the observations gives one.
     bounds.lower[i] = best.floor - row.error;
     bounds.upper[i] = -(best.negated_ceiling - row.error);

@@ -95,7 +95,7 @@ class LipschitzEnvelope final : public ResidualEnclosure {
     double pair_margin = 0;
     std::vector<double> component_errors{};  // of each column: of v_il and of L_kl r_l
   };
-  struct Search;
+  struct BoundSearch;
 
   void EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count, ResidualBounds& bounds) const noexcept;
   void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,

@@ -75,9 +75,10 @@ bool IsSafeLength(double length) { return length > 0x1p-400 && length < kInfinit
 
 // Searches for a direction with a large bound, by plain arithmetic on unit vectors. Its values prove nothing: the bound
 // along the direction that it finds is computed again, so a poor choice costs tightness only.
-class Search {
+class DirectionSearch {
  public:
-  Search(std::span<const Piece> pieces, const Obstacle& obstacle) noexcept : pieces_(pieces), hull_(obstacle.hull()) {
+  DirectionSearch(std::span<const Piece> pieces, const Obstacle& obstacle) noexcept
+      : pieces_(pieces), hull_(obstacle.hull()) {
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       centers_[i].setZero();
       for (int k = 0; k < dim(); ++k) centers_[i][k] = pieces[i].set->center(k) - pieces[i].shift[ToSize(k)].Middle();
@@ -242,7 +243,7 @@ Vector NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
 // Gilbert, Johnson and Keerthi's search for the point of {core - set} next to the origin: from one point found towards
 // it, the lowest point in that direction, and the nearest point of the simplices between it and those kept. A few steps
 // do for one zonotope.
-void DescendInPlane(Search& search, const Effort& effort) noexcept {
+void DescendInPlane(DirectionSearch& search, const Effort& effort) noexcept {
   Vector nearest = search.Offset(), kept[2] = {nearest, nearest};
   for (int step = 0; step < effort.steps; ++step) {
     const double length = nearest.norm();
@@ -257,7 +258,7 @@ void DescendInPlane(Search& search, const Effort& effort) noexcept {
 }
 
 // DescendInPlane in three dimensions: the simplices are triangles.
-void DescendInSpace(Search& search, const Effort& effort) noexcept {
+void DescendInSpace(DirectionSearch& search, const Effort& effort) noexcept {
   Vector nearest = search.Offset(), kept[3] = {nearest, nearest, nearest};
   for (int step = 0; step < effort.steps; ++step) {
     const double length = nearest.norm();
@@ -275,7 +276,7 @@ void DescendInSpace(Search& search, const Effort& effort) noexcept {
 
 // In the plane the distance is attained along the normal of an edge of {core - slice}, or towards a corner next to the
 // best such edge: the dual bound is concave in d, so it rises to its maximum and falls after it.
-[[gnu::noinline]] void TryAllNormals(Search& search, const std::vector<Vector>& hull) noexcept {
+[[gnu::noinline]] void TryAllNormals(DirectionSearch& search, const std::vector<Vector>& hull) noexcept {
   for (int j = 0; j < search.num_generators(); ++j) search.Consider(Turned(search.generator(j)));
   for (std::size_t a = 0; a < hull.size(); ++a)
     for (std::size_t b = 0; b < a; ++b) search.Consider(Turned(hull[a] - hull[b]));
@@ -285,7 +286,7 @@ void DescendInSpace(Search& search, const Effort& effort) noexcept {
 }
 
 Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold, double enough) noexcept {
-  Search search(pieces, obstacle);
+  DirectionSearch search(pieces, obstacle);
   DescendInPlane(search, Effort::For(pieces, threshold, enough));
   if (pieces.size() == 1 && !(search.value() > threshold)) TryAllNormals(search, obstacle.hull());
   return search.best();
@@ -295,7 +296,7 @@ Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, doubl
 // of a box are the axes; the faces of a zonotope lie along pairs of generators.
 [[gnu::noinline]] Vector BestSpatial(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold,
                                      double enough) noexcept {
-  Search search(pieces, obstacle);
+  DirectionSearch search(pieces, obstacle);
   for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
   DescendInSpace(search, {50, 1e-7, threshold, enough});
   if (pieces.size() > 1 || search.value() > threshold) return search.best();
@@ -317,7 +318,7 @@ Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, do
   if (obstacle.hull().empty()) return Vector::Zero();  // of a grid: proves nothing
   switch (obstacle.dim()) {
     case 1: {
-      Search search(pieces, obstacle);
+      DirectionSearch search(pieces, obstacle);
       search.Consider(Vector::UnitX());
       return search.best();
     }

@@ -6,12 +6,12 @@
 
 namespace forereach::usage_test {
 
-struct Program {
+struct Executable {
   const char *name, *path;
-  friend void PrintTo(const Program& program, std::ostream* out) { *out << program.name; }
+  friend void PrintTo(const Executable& program, std::ostream* out) { *out << program.name; }
 };
 
-struct UsageTest : testing::TestWithParam<Program> {
+struct UsageTest : testing::TestWithParam<Executable> {
   std::string program() const { return GetParam().path; }
 
   // The last line on standard error, without its end; LCM itself may have written lines before it.
@@ -25,9 +25,10 @@ struct UsageTest : testing::TestWithParam<Program> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Processes, UsageTest,
-                         testing::Values(Program{"certifier", FOREREACH_CERTIFIER},
-                                         Program{"planner", FOREREACH_PLANNER}, Program{"logger", FOREREACH_LOGGER},
-                                         Program{"robot_sim", FOREREACH_ROBOT_SIM}),
+                         testing::Values(Executable{"certifier", FOREREACH_CERTIFIER},
+                                         Executable{"planner", FOREREACH_PLANNER},
+                                         Executable{"logger", FOREREACH_LOGGER},
+                                         Executable{"robot_sim", FOREREACH_ROBOT_SIM}),
                          [](const auto& instance) { return instance.param.name; });
 
 TEST_P(UsageTest, HelpTeachesWithAnExample) {
