@@ -32,7 +32,6 @@
 #include "records/outlines.h"
 #include "task/config.h"
 #include "task/document.h"
-#include "task/draft.h"
 #include "task/motion.h"
 #include "task/wrapped_angle.h"
 
@@ -51,20 +50,12 @@ std::string Up(double x) { return RoundedUp(x, 4); }
 std::string Down(double x) { return RoundedDown(x, 4); }
 std::string Count(Eigen::Index n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-// Checks the keys, after which the document knows their places. @return the path of the transitions.
-std::string ReadKeys(Document& file) {
-  TaskDraft draft;
-  file.Read(draft);
-  return draft.transitions;
-}
-
 class Examination final {
  public:
   explicit Examination(const TaskCheckOptions& options)
       : options_(options),
         file_(options.config),
-        transitions_(ReadKeys(file_)),
-        config_(LoadConfig(options.config, TransitionsFile::kIgnore)),
+        config_(LoadConfig(file_, TransitionsFile::kIgnore)),
         problem_(*config_.problem),
         model_(*config_.problem->model),
         names_(model_.variable_names()) {
@@ -72,6 +63,7 @@ class Examination final {
     problem_.limits.clear();
     result_.states = model_.state_names();
     result_.period = config_.period;
+    result_.rests_on = HypothesesOf(config_);
   }
 
   TaskCheck Run() {
@@ -156,7 +148,7 @@ class Examination final {
   }
 
   void ReadTransitions() {
-    result_.data = transitions_;
+    result_.data = config_.transitions;
     std::error_code error;
     if (!std::filesystem::exists(result_.data, error)) {
       Add("transitions", result_.data + " does not exist",
@@ -931,7 +923,6 @@ class Examination final {
 
   const TaskCheckOptions options_;
   Document file_;
-  const std::string transitions_;
   const Config config_;
   Problem problem_;
   const NominalModel& model_;

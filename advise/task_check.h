@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "advise/hypotheses.h"
 #include "records/picture.h"
 
 namespace forereach {
@@ -47,6 +48,7 @@ struct TaskCheck {
   std::vector<Row> rows;
   bool all_pairs = true;  ///< False: `rows` is of a sample of the transitions.
 
+  std::vector<Hypothesis> rests_on;  ///< Of a certificate of this task.
   std::vector<std::string> states;
   double period = 0;                             ///< s
   int planned_steps = 0;                         ///< Of the plan.

@@ -7,7 +7,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "advise/hypotheses.h"
 #include "advise/task_check.h"
 #include "cli/commands.h"
 #include "forereach/numerics/limits.h"
@@ -132,7 +131,7 @@ int Check(const CheckArguments& options) {
   const bool lacks_picture = !files.empty() && !check.is_planar;
   if (lacks_picture) files.clear();
   for (const std::string& file : files) DrawPicture(check.picture, file);
-  const std::vector<Hypothesis> rests_on = HypothesesOf(LoadConfig(options.check.config, TransitionsFile::kIgnore));
+  const std::vector<Hypothesis>& rests_on = check.rests_on;
   if (options.json) {
     std::cout << JsonText(ToJson(check, rests_on, held_out)) << std::endl;
   } else {

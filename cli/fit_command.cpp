@@ -111,8 +111,8 @@ int RunFit(const FitArguments& options) {
   if (!text)
     throw ConfigError(config.path + ": model: " + problem.model->name() +
                       " is compiled; only the parameters of a model as text can be fitted");
-  const Transitions transitions = LoadTransitions(FilesNamedBy(options.config).transitions, *problem.model);
-  RequireNoWrappedAngle(config.path, FilesNamedBy(options.config).transitions, *problem.model, transitions);
+  const Transitions transitions = LoadTransitions(config.transitions, *problem.model);
+  RequireNoWrappedAngle(config.path, config.transitions, *problem.model, transitions);
   Fit fit;
   try {
     fit = FitParameters(*text, transitions, NamesOf(options.names, *text));

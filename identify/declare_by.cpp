@@ -8,6 +8,7 @@
 #include "command_line/nearest.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -64,7 +65,8 @@ std::string Explain(const Unexplained& found, const Config& config, const Propos
          "by half of that, raise noise_bound (--noise estimated)";
 }
 
-void RequireSlopes(const Config& config) {
+Config LoadForSlopes(const std::string& path) {
+  Config config = LoadConfig(path);
   if (!config.problem->declaration.affine.rows.empty())
     throw ConfigError(config.path +
                       ": declaration.affine: slopes are proposed for all rows or for none. Take it out, and put it "
@@ -72,6 +74,8 @@ void RequireSlopes(const Config& config) {
   if (!config.problem->declaration.regions.empty())
     throw ConfigError(config.path +
                       ": declaration.regions: slopes are proposed for the whole domain. Take the regions out first");
+  RequireNoWrappedAngle(config.path, config.transitions, *config.problem->model, config.problem->transitions);
+  return config;
 }
 
 std::string DeclarationYaml(const Declaration& declaration, const NominalModel& model) {

@@ -16,8 +16,9 @@ namespace forereach {
 /** Which two lines of the transitions disagree, and what to change. `first_line` of observation 0. */
 [[nodiscard]] std::string Explain(const Unexplained& found, const Config& config, const ProposalOptions& options);
 
-/** @throws ConfigError if rows of the residual are declared affine, or regions: no slopes are proposed beside them. */
-void RequireSlopes(const Config& config);
+/** A task for whose transitions slopes are proposed. @throws ConfigError as LoadConfig does; if rows of the residual
+are declared affine, or regions, beside which no slopes are proposed; or if an angle was wrapped (wrapped_angle.h). */
+[[nodiscard]] Config LoadForSlopes(const std::string& path);
 
 /** "lipschitz: {...}", "noise_bound: [...]" and perhaps "disturbance: [...]", or by names, and the disturbances of
 regions, a line each, indented by two. */

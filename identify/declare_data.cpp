@@ -23,7 +23,6 @@
 #include "identify/smallest_row.h"
 #include "records/chart.h"
 #include "task/json_text.h"
-#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -338,10 +337,7 @@ Json ToJson(const ProposedDeclaration& proposal, const LoneSlopes& lone_slopes, 
 
 int DeclareFromData(const DataCommand& command) {
   const auto pictures = command.picture.empty() ? std::vector<std::string>() : PictureFiles(command.picture);
-  const Config config = LoadConfig(command.config);
-  RequireSlopes(config);
-  RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
-                        config.problem->transitions);
+  const Config config = LoadForSlopes(command.config);
   const Problem& problem = *config.problem;
   std::optional<Progress> progress(std::in_place, "parts of the work", 2 * ToSize(problem.model->num_states()));
   const ProposalOptions options{command.factor,

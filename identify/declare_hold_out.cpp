@@ -20,7 +20,6 @@
 #include "records/decision_json.h"
 #include "task/config.h"
 #include "task/json_text.h"
-#include "task/wrapped_angle.h"
 
 namespace forereach {
 namespace {
@@ -237,10 +236,7 @@ Chart ChartOf(const std::vector<Trial>& trials, const DataCommand& command) {
 
 int DeclareHoldOut(const DataCommand& command) {
   const auto pictures = command.picture.empty() ? std::vector<std::string>() : PictureFiles(command.picture);
-  const Config config = LoadConfig(command.config);
-  RequireSlopes(config);
-  RequireNoWrappedAngle(config.path, FilesNamedBy(command.config).transitions, *config.problem->model,
-                        config.problem->transitions);
+  const Config config = LoadForSlopes(command.config);
   const Problem& problem = *config.problem;
   if (command.blocks > problem.transitions.size())
     throw ConfigError(

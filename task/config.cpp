@@ -171,7 +171,7 @@ Transitions TransitionsOf(const Transitions& data, const NominalModel& model) {
   return data;
 }
 
-Config Load(Document file, TransitionsFile transitions, const NamedFiles& instead, const Transitions* data = nullptr) {
+Config Load(Document& file, TransitionsFile transitions, const NamedFiles& instead, const Transitions* data = nullptr) {
   TaskDraft draft;
   draft.model_file.path = instead.model;
   file.Read(draft);
@@ -196,6 +196,7 @@ Config Load(Document file, TransitionsFile transitions, const NamedFiles& instea
     RequireDurations(transitions_path, problem);
   }
   config.path = file.path();
+  config.transitions = transitions_path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   if (transitions == TransitionsFile::kRead) {
     const int all = problem.transitions.size();
@@ -222,16 +223,21 @@ Config Load(Document file, TransitionsFile transitions, const NamedFiles& instea
 
 }  // namespace
 
+Config LoadConfig(Document& file, TransitionsFile transitions) { return Load(file, transitions, {}); }
+
 Config LoadConfig(const std::string& path, TransitionsFile transitions) {
-  return Load(Document(path), transitions, {});
+  Document file(path);
+  return LoadConfig(file, transitions);
 }
 
 Config LoadConfig(const std::string& path, const NamedFiles& instead) {
-  return Load(Document(path), TransitionsFile::kRead, instead);
+  Document file(path);
+  return Load(file, TransitionsFile::kRead, instead);
 }
 
 Config ConfigOfText(const std::string& path, const std::string& text, const Transitions* data) {
-  return Load(Document::OfText(path, text), TransitionsFile::kRead, {}, data);
+  Document file = Document::OfText(path, text);
+  return Load(file, TransitionsFile::kRead, {}, data);
 }
 
 NamedFiles FilesNamedBy(const std::string& path) {

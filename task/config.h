@@ -22,6 +22,8 @@ meaning, unit, range and default; config/README.md is generated from it. */
 
 namespace forereach {
 
+class Document;
+
 /** A checked task. Everything fits together: sizes, names, and all transitions lie in the domain. */
 struct Config {
   std::string path;
@@ -32,7 +34,8 @@ struct Config {
   /** How many transitions of the file are not the problem's: within the declared errors of states and inputs their z
   may lie outside the domain. The grounds name all. */
   int left_out = 0;
-  double period = 0;  ///< model.dt: from one sample to the next, s.
+  std::string transitions;  ///< The path of that file; "data" if there is none.
+  double period = 0;        ///< model.dt: from one sample to the next, s.
   /** Those of task.obstacles, and behind them what is outside of each area of keep_in. */
   std::vector<Obstacle> obstacles;
   std::size_t num_listed = 0;  ///< So many of them are of task.obstacles.
@@ -59,6 +62,9 @@ enum class TransitionsFile { kRead, kIgnore };
 @throws ConfigError with file, line, key, value and bound: a missing file, an unknown or missing key, a wrong size, a
 number that is not finite or out of range, a transition outside the domain. */
 [[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);
+
+/** The same of a file whose caller asks it for the places of keys afterwards. */
+[[nodiscard]] Config LoadConfig(Document& file, TransitionsFile transitions);
 
 /** The paths of the data files of a task, which belong to the task but not to the bytes of its file. Empty if the task
 file names no such file. A key file is not listed: it is a secret, not data. */
