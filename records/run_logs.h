@@ -44,7 +44,7 @@ Cost: the ends of logs that no database lists (EndsOf), on `jobs` threads, unles
 /** Bytes of its logs, for a progress bar. */
 [[nodiscard]] std::int64_t BytesOf(const RunLogs& run);
 
-/** Why a log of a run is missing, as a sentence's end. */
+/** Why a log of a run is missing: a clause that may follow a colon. */
 [[nodiscard]] std::string WhyMissing(const RunRow& run);
 
 }  // namespace forereach

@@ -38,6 +38,23 @@ struct Deployed {
       PaperCell(system, 100, 0, 0).method.make({*system.model, system.domain, declaration, data, 0});
 };
 
+// Of each system, the answers to the first scenarios of each group. @param judge takes the system, scenario and answer.
+template <class Judge>
+void ForEachAnswer(int scenarios, Judge judge) {
+  for (const System* system : Systems()) {
+    const Deployed deployed{*system};
+    const Evaluator evaluator(*system, *deployed.envelope, 5);
+    Answer answer;
+    for (const Group group : kGroups)
+      for (int i = 0; i < scenarios; ++i) {
+        SCOPED_TRACE(system->name + (NameOf(group) + std::to_string(i)));
+        const Scenario s = MakeScenario(*system, group, 0, i);
+        evaluator.Certify(s, answer);
+        judge(*system, s, answer);
+      }
+  }
+}
+
 TEST(Evaluator, AnswersAsTheCertifierDoes) {
   for (const System* system : Systems()) {
     const Deployed deployed{*system};
@@ -77,17 +94,9 @@ TEST(Evaluator, AnswersAsTheCertifierDoes) {
 }
 
 TEST(Cover, AValidDeclarationCoversEveryTubeAndPrefix) {
-  for (const System* system : Systems()) {
-    const Deployed deployed{*system};
-    const Evaluator evaluator(*system, *deployed.envelope, 5);
-    Answer answer;
-    for (const Group group : kGroups)
-      for (int i = 0; i < 20; ++i) {
-        const Scenario s = MakeScenario(*system, group, 0, i);
-        evaluator.Certify(s, answer);
-        EXPECT_EQ(Cover(answer, Rollouts(*system, s, 80)), Membership::kInside) << system->name << NameOf(group) << i;
-      }
-  }
+  ForEachAnswer(20, [](const System& system, const Scenario& s, const Answer& answer) {
+    EXPECT_EQ(Cover(answer, Rollouts(system, s, 80)), Membership::kInside);
+  });
 }
 
 TEST(Cover, ATubeThatDeniesTheResidualIsNotCovered) {
@@ -130,18 +139,9 @@ int CountOf(Membership wanted, const Answer& answer, const Rollouts& rollouts) {
 }
 
 TEST(LocateRollout, FindsEachRolloutInAValidTubeAndLeavesNoneOpen) {
-  for (const System* system : Systems()) {
-    const Deployed deployed{*system};
-    const Evaluator evaluator(*system, *deployed.envelope, 5);
-    Answer answer;
-    for (const Group group : kGroups)
-      for (int i = 0; i < 3; ++i) {
-        const Scenario s = MakeScenario(*system, group, 0, i);
-        evaluator.Certify(s, answer);
-        EXPECT_EQ(CountOf(Membership::kInside, answer, Rollouts(*system, s, 80)), 80)
-            << system->name << NameOf(group) << i;
-      }
-  }
+  ForEachAnswer(3, [](const System& system, const Scenario& s, const Answer& answer) {
+    EXPECT_EQ(CountOf(Membership::kInside, answer, Rollouts(system, s, 80)), 80);
+  });
 }
 
 TEST(LocateRollout, CatchesANarrowedTubeThatTheEnvelopesDoNotShow) {
