@@ -77,6 +77,7 @@ GuardVerdict CheckInitialSet(const candidate_plan_t& plan, const Angles& angles,
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], center = plan.initial_center[k], half_width = plan.initial_half_width[k];
     const Ends turned = angles[k] ? TurnTowards(x, center - half_width, center + half_width) : Ends{x, x};
+    // Exact sums (SumAtMost): a state that is outside by a rounding error is outside, for the proof begins in X0.
     if (SumAtMost(turned.upper, error[k], center, half_width) &&
         SumAtMost(center, -half_width, turned.lower, -error[k]))
       continue;
@@ -94,6 +95,8 @@ GuardVerdict CheckSlice(const certified_plan_t& certified, const Angles& angles,
   GuardVerdict verdict;
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
+    // Left only if all of the measured state +- its error is outside: a robot must not stop for its sensor's noise. X0
+    // is the other way round, for it is a hypothesis of the certificate.
     const Conformance conformance = Conform(x, error[k], lower, upper, angles[k]);
     const bool has_left = conformance == Conformance::kLeft;
     if (conformance == Conformance::kInside || (!has_left && verdict.coordinate >= 0)) continue;
@@ -143,6 +146,7 @@ GuardVerdict CheckDigestsAreThere(const certified_plan_t& certified) {
            {"obstacles_digest", certified.obstacles_digest},
            {"transitions_digest", certified.transitions_digest},
            {"certificate_digest", certified.certificate_digest}})
+    // A digest that nobody set would be equal to another that nobody set.
     if (GetDigest(digest) == Digest{}) return Refuse(GuardCause::kZeroDigest, Sentence("%s is zero", name));
   return {};
 }
@@ -164,6 +168,7 @@ GuardVerdict CheckSeal(const certified_plan_t& certified) {
 
 std::uint64_t Apart(std::int64_t a, std::int64_t b) {
   const auto x = static_cast<std::uint64_t>(a), y = static_cast<std::uint64_t>(b);
+  // Unsigned: times are a sender's, and no difference of them may overflow.
   return a > b ? x - y : y - x;
 }
 
@@ -274,6 +279,7 @@ void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std:
   const auto known = angles ? std::optional(AnglesOf(*angles, options_.num_states)) : std::nullopt;
   std::erase_if(expected_,
                 [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
+  // Reloads without a plan in between may be many; the newest are those that plans will name.
   if (expected_.size() >= kMostExpected) expected_.erase(expected_.begin());
   expected_.push_back({config_digest, model_digest, std::move(domain), known});
 }
@@ -434,6 +440,7 @@ GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_
   const candidate_plan_t& plan = certified.plan;
   GuardVerdict verdict = ExamineSizes(plan);
   if (verdict.ok()) verdict = CheckDigestsAreThere(certified);
+  // Before its numbers are believed. A seal is no secret: it shows damage, the signature shows who.
   if (verdict.ok()) verdict = CheckSeal(certified);
   if (verdict.ok()) verdict = ExamineNumbers(certified);
   if (verdict.ok()) verdict = ExamineDomain(certified);
@@ -445,6 +452,8 @@ GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_
   if (verdict.ok() && options_.model_digest && !expected)
     verdict = CheckDigest(GuardCause::kModelDigest, "model_digest", GetDigest(certified.model_digest),
                           *options_.model_digest);
+  // A captured certificate that is sent again must not start again. After its expiry none does, so older numbers may be
+  // used then: a planner that began anew counts from the beginning.
   const bool executes = executing_ && plan.plan_id == executing_->plan.plan_id;
   const bool is_older = last_accepted_ && plan.plan_id <= *last_accepted_;
   if (verdict.ok() && (executes || (is_older && now_us <= last_expiry_)))
@@ -474,6 +483,7 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
   for (int t = 0; t <= plan.num_steps; ++t)
     for (int k = 0; k < options_.num_states; ++k) {
       const double lower = certified.slice_lower[t][k], upper = certified.slice_upper[t][k];
+      // An infinite slice would hold every state, so that no departure were ever seen.
       const bool finite = std::isfinite(lower) && std::isfinite(upper);
       if (finite && lower <= upper) continue;
       return RefuseAt(finite ? GuardCause::kEmptySlice : GuardCause::kNonFinite, t, k, lower, upper,
@@ -486,6 +496,8 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
 GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
   const auto task = FindExpected(certified);
   const std::optional<GuardDomain>& domain = task != expected_.end() && task->domain ? task->domain : options_.domain;
+  // The robot's own domain, which no message can change: the last word even against a certifier that has been taken
+  // over.
   if (!domain) return {};
   const candidate_plan_t& plan = certified.plan;
   const auto outside = [](const char* what, int t, int coordinate, double value, double bound) {
@@ -524,8 +536,10 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us, s
   }
   if (!pending_) return verdict;
   verdict.plan_id = pending_->plan.plan_id;
+  // Every other refusal drops the plan: its start has passed, or its hypotheses do not hold.
   if (verdict.cause == GuardCause::kTooEarly) return verdict;
   if (verdict.ok()) {
+    // The plan before ends here: of two plans only one has slices to which the robot is held.
     executing_ = std::move(pending_);
     executing_angles_ = pending_angles_;
     last_step_ = 0;
@@ -570,6 +584,7 @@ GuardVerdict Guard::ExamineMeasured(const certified_plan_t& certified, std::span
 // When a step is due that begins `step` steps after `begin`. A time that no integer holds is the last one.
 std::int64_t Guard::DueAfter(std::int64_t begin, int step) const {
   std::int64_t due = 0;
+  // A plan's start is any number that a message has room for.
   const bool overflows =
       __builtin_mul_overflow(options_.step_us, step, &due) || __builtin_add_overflow(begin, due, &due);
   return overflows ? INT64_MAX : due;
@@ -578,6 +593,7 @@ std::int64_t Guard::DueAfter(std::int64_t begin, int step) const {
 GuardVerdict Guard::ExamineTime(const certified_plan_t& certified, int step, std::int64_t now_us) const {
   if (!LooksAtTime(certified)) return {};
   GuardVerdict verdict = CheckDue(certified, step, DueAfter(certified.plan.start_utime, step), "", now_us);
+  // Two hypotheses of soundness 3.15: a boundary is within E of the plan's schedule, and of the first step plus t dt.
   if (!verdict.ok() || step == 0) return verdict;
   return CheckDue(certified, step, DueAfter(first_step_utime_, step), " by the first step", now_us);
 }
@@ -617,6 +633,7 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
   const int num_steps = executing_->plan.num_steps;
   if (step != last_step_ + 1 || step > num_steps)
     return Refuse(GuardCause::kStepOutOfOrder, Sentence("step %d of %d after step %d", step, num_steps, last_step_));
+  // The control of the step that ends was withdrawn, yet executed: only a stop is left.
   if (standing_steps_ && step > *standing_steps_)
     return Refuse(GuardCause::kWithdrawn,
                   Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
@@ -667,6 +684,8 @@ GuardVerdict Guard::CheckAgain(std::span<const double> measured_state, std::int6
 
 void Guard::EndIfRefused(GuardVerdict& verdict) noexcept {
   if (executing_) verdict.plan_id = executing_->plan.plan_id;
+  // A state that has left its slice refutes an assumption, so every other certificate under it is void: a person
+  // decides.
   if (verdict.cause == GuardCause::kOutsideSlice) Halt();
   if (!verdict.ok()) executing_.reset();
 }

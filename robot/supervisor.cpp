@@ -93,6 +93,7 @@ GuardVerdict Supervisor::Authenticated(const std::string& channel, const Speaker
 
 // Whether a function of the robot calls what it may not: that does nothing, and the call under way ends with a hold.
 bool Supervisor::IsMisuse(bool may_be_sending) noexcept {
+  // A robot's Send that calls back would change the plan in the middle of a decision about it.
   const bool is_misuse = is_deciding_ || (is_sending_ && !may_be_sending);
   is_misused_ = is_misused_ || is_misuse;
   return is_misuse;
@@ -104,6 +105,7 @@ void Supervisor::Run(std::int64_t utime, const Work& work) noexcept {
   is_deciding_ = true;
   try {
     work();
+    // Whatever the work did, no call ends with a robot that moves without a plan.
     if (!IsExecuting()) HoldIfMoving();  // after a fault, or if Hold threw before
     if (is_misused_) throw std::logic_error("a function of Supervisor::Robot called the supervisor");
   } catch (...) {
@@ -123,6 +125,7 @@ void Supervisor::StopAfterException(std::int64_t utime) noexcept {
 }
 
 void Supervisor::Measure() {
+  // Set again at the end: if the robot throws in between, no state is reported that nobody measured.
   is_measured_ = false;
   const std::span<const double> state = robot_.state();
   state_.assign(state.begin(), state.end());
@@ -178,6 +181,7 @@ void Supervisor::TakeFault(Bytes message, std::int64_t now_us) {
   if (guard_.halted()) return;
   const std::int64_t plan_id = PlanId();
   const int step = Step();
+  // First of all: what follows may throw.
   guard_.Halt();
   const auto report = [&] {
     ReportEvent(now_us, execution_event_t::HALTED, plan_id, step, 0,
@@ -212,6 +216,7 @@ std::string Supervisor::Obey(Bytes message, std::int64_t now_us) {
     return why;
   if (command->kind == command_t::RELOAD) robot_.Reload();
   if (command->kind != command_t::RESET) return "";
+  // A reset was meant for the fault that somebody looked at; a later fault needs another one.
   if (guard_.halted() && IsNotAfter(command->utime, halted_utime_, now_us, options_.max_ahead_us))
     return "a reset from before the robot was halted";
   reset_utime_ = std::min(command->utime, now_us);  // a clock that is ahead clears no fault to come
@@ -255,6 +260,7 @@ void Supervisor::CheckStep(std::int64_t utime, std::int64_t now_us) {
   const bool is_new = std::exchange(is_under_way_, false);
   if (is_new) {
     ++step_;
+    // A transition whose time or errors are not within what is declared would teach the certifier something false.
     if (guard_.IsOnSchedule(step_, now_us) && guard_.IsDeclared(step_began_within_) && guard_.IsDeclared(state_error_))
       ReportTransition(utime - options_.guard.step_us, now_us - step_began_us_);
   }
@@ -289,6 +295,7 @@ void Supervisor::StartPending(std::int64_t utime, std::int64_t now_us) {
 
 void Supervisor::ContinuePlan(std::int64_t utime) {
   step_utime_ = utime;
+  // Before the step begins, while a stop still fits into what stands.
   if (MustStop()) return StopInEmergency(utime);
   const candidate_plan_t& plan = guard_.executing()->plan;
   if (step_ == plan.num_steps) {
@@ -315,6 +322,7 @@ bool Supervisor::MustStop() const {
 // Whether the pending plan starts within what stands, at a boundary that the guard takes for its start.
 bool Supervisor::TakesOver(int standing) const {
   const certified_plan_t* const next = guard_.pending();
+  // One whose start has passed will be refused, so it is no way out.
   if (!next || next->plan.start_utime < step_utime_) return false;
   const std::uint64_t ahead =
       static_cast<std::uint64_t>(next->plan.start_utime) - static_cast<std::uint64_t>(step_utime_);
@@ -348,6 +356,7 @@ int Supervisor::Robot::StepsToRest(std::span<const double> /*lower*/, std::span<
 }
 
 void Supervisor::Hold() {
+  // Before the brakes: should they throw, no control of the plan is handed out any more.
   guard_.Finish();
   is_under_way_ = false;
   robot_.Hold();
@@ -422,6 +431,7 @@ void Supervisor::ReportEvent(std::int64_t utime, std::int16_t kind, std::int64_t
 }
 
 void Supervisor::SendReports(std::int64_t utime) noexcept {
+  // A Send that leads to another report adds it; the loop under way sends it.
   if (std::exchange(is_sending_, true)) return;
   reports_.Send([this](const std::string& channel, Bytes message) { robot_.Send(channel, message); });
   is_sending_ = false;

@@ -193,7 +193,9 @@ class SeparationSearch {
     }
     const Real bound = (gap / length - kept_).lower();
     best_ = best_ ? max(*best_, bound) : bound;
+    // Times the length instead of divided by it: no quotient has to be decided.
     const Real needed = Needed() * length;
+    // A clearance that is claimed may be met exactly; without one, touching is not being clear.
     const Answer answer = clearance_ > 0 ? IsAtMost(needed, gap) : IsBelow(needed, gap);
     undecided_ |= answer == Answer::kUnknown;
     return answer == Answer::kYes;
@@ -285,6 +287,7 @@ class SeparationSearch {
       for (std::size_t i = 0; i < corners.size(); ++i)
         for (std::size_t k = 0; k < point.size(); ++k) point[k] += weights[i] * corners[i][k];
       point = Middle(point);
+      // By middles, which prove nothing: the search may go wrong, only Try says yes.
       if (!CertainlyBelow(Dot(point, point).middle(), square)) break;
       nearest = std::move(point);
     }
@@ -355,6 +358,7 @@ Answer IsAround(const Rings& rings, const RealVector& p) {
 
 Answer IsClearOf(const Core& core, const Sweep& sweep, double clearance, Real& best, const Passage& passage) {
   best = DistanceAlongAnAxis(sweep, core, passage);
+  // Most obstacles are far away; this needs no search, and proves as much.
   if (CertainlyBelow(clearance, best)) return Answer::kYes;
   SeparationSearch search(sweep, core, clearance, passage);
   const bool proven = search.Run();
@@ -445,6 +449,7 @@ class GridSearch {
     Real found;
     const Answer answer = IsClearOf(core, sweeps_, clearance_, found, {});
     best_ = min(best_, found);
+    // No outweighs unknown, and unknown yes.
     if (answer == Answer::kNo || answer_ == Answer::kYes) answer_ = answer;
   }
 
@@ -469,6 +474,7 @@ Answer IsWithin(std::span<const Sweep> sweeps, const Rings& rings, Real& margin)
   if (sweeps.empty()) return Answer::kUnknown;
   // Taylor's series starts at the slice's center, which it maps to place.center: the part sweeps that point.
   const Place& place = sweeps[sweeps.size() / 2].places().front();
+  // One point inside, and no contact with a side: what is connected cannot be on both sides of a closed ring.
   if (const Answer inside = IsAround(rings, place.center); inside != Answer::kYes) return inside;
   margin = std::numeric_limits<double>::infinity();
   for (const auto& ring : rings)

@@ -125,6 +125,8 @@ Score ScoreOf(const std::vector<Real>& column, std::size_t index) {
   Real sum;
   for (std::size_t k = 0; k < column.size(); ++k)
     if (k != largest && !column[k].IsZero()) sum += abs(column[k]);
+  // Above what a double's sum of 16 entries may be off: where two scores are closer, the certifier may have chosen the
+  // other column, and neither choice is wrong.
   const double rounded = sum.ToDouble(), error = 0x1p-44 * (sum + abs(column[largest])).ToDouble();
   return {index, rounded == 0 ? Real() : sum, rounded, rounded == 0 ? 0 : error};
 }
@@ -290,6 +292,7 @@ Bounds CentredRange(const RemainderTerm& term, const Slice& slice, const std::ve
   const Real& curve = term.diagonal->value;
   const Bounds square = DiagonalRange(curve, r[ToSize(shared)]);
   const Real slope = entry.value.magnitude() * r[ToSize(other)];
+  // Both bound the same sum, so the tighter holds (soundness 3.4).
   return {max(range.lower + square.lower, -Peak(-curve.lower(), slope, r[ToSize(shared)])),
           min(range.upper + square.upper, Peak(curve.upper(), slope, r[ToSize(shared)]))};
 }
@@ -359,6 +362,7 @@ std::shared_ptr<const Functions> GrowthOf(const Problem& problem) {
 // The least double that is not below any number of a range.
 double UpperDouble(const Real& range) {
   double bound = range.upper().ToDouble();
+  // ToDouble rounds to nearest, which may be inward.
   while (!CertainlyAtMost(range.upper(), Real(bound))) bound = std::nextafter(bound, kNone);
   return bound;
 }
@@ -505,6 +509,7 @@ void TubeMaker::Learn() {
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
     const std::vector<Real> nominal = equations_.Value(z);
     std::vector<Real> errors(ToSize(problem_.model->num_states()));
+    // Only transitions of the file may be declared exact: a robot's own are measured (soundness 3.16).
     const bool is_exact = problem_.declaration.given_are_exact && !data.IsLearned(i);
     if (!is_exact) errors = RecordErrors(z);
     const std::vector<Real> around = is_exact ? z : BoxAround(problem_.declaration, z);

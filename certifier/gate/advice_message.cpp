@@ -56,6 +56,7 @@ std::vector<advice_change_t> ChangesForObstacles(const Abstained& abstained, Tub
   if (!effort.goes_on()) return {};
   const std::vector<Obstacle> farther = Shifted(abstained.obstacles.all(), *ways);
   const Decision again = abstained.certifier.Certify(abstained.plan, abstained.initial_set, farther, tube);
+  // Each obstacle was moved by itself; whether all together certify the plan is certified, not concluded.
   for (advice_change_t& change : changes) change.verified = again.outcome == Outcome::kCertified ? 1 : 0;
   return changes;
 }

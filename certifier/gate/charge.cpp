@@ -11,6 +11,7 @@ void Charge::Hear(const Identity& other, State its_state) {
   if (other.instance == self_.instance) return;
   other_ = other;
   other_silent_us_ = 0;
+  // A shadow gives no certificates, so it must not keep one from giving them.
   if (other.is_shadow && !self_.is_shadow) return;
   const bool is_earlier = other.IsEarlierThan(self_), decides = its_state == State::kInCharge,
              will_decide = its_state == State::kListening && is_earlier;
@@ -23,6 +24,7 @@ void Charge::Hear(const Identity& other, State its_state) {
 }
 
 void Charge::Advance(std::int64_t steady_us) {
+  // A pause is not silence of the other: while this process did not run, it could not have heard it.
   const std::int64_t passed = steady_us - last_us_.value_or(steady_us),
                      counted = std::clamp<std::int64_t>(passed, 0, kStepUs);
   last_us_ = steady_us;
@@ -38,6 +40,7 @@ void Charge::Advance(std::int64_t steady_us) {
       if (leaderless_us_ < kSilenceUs) return;
       break;
     case State::kInCharge:
+      // After such a pause another may have taken over: it listens before it certifies again.
       if (listen_us_ == 0 || passed <= kLapseUs) return;
       break;
   }

@@ -86,6 +86,8 @@ GateAnswer Gate::Answer(Bytes message, const TimeSource& clock, std::optional<Re
   try {
     const auto batch = IsBatch(message) ? Decoded<candidate_batch_t>(message) : std::nullopt;
     if (batch && WhyNoBatch(*batch).empty()) {
+      // A batch that is refused anyway is answered by its first candidate: nobody may have the gate certify hundreds of
+      // plans that it will not pass on.
       const Choice chosen = from_outside ? Choice{} : Choose(*batch, now_us, clock);
       GateAnswer answer = AnswerOne(Encode(CandidateOf(*batch, chosen.candidate)), now_us, clock, from_outside);
       SetText(answer.decision.message, chosen.how + GetText(answer.decision.message));
@@ -106,6 +108,7 @@ Gate::Choice Gate::Choose(const candidate_batch_t& batch, std::int64_t now_us, c
   std::vector<Plan> plans;
   for (int k = 0; k < count; ++k) {
     candidate = CandidateOf(batch, k);
+    // The refusal names the candidate that is wrong.
     if (CheckContent(candidate, initial_set) || sources_.IsUsed(candidate, now_us)) return {k, at(k)};
     plans.push_back(PlanOf(batch, k, ScheduleOf(candidate, options_)));
   }
@@ -135,6 +138,7 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
   decision_t& decision = answer.decision;
   decision.utime = now_us;
   decision.sequence = decisions_++;
+  // Fails closed: whatever ends this early, as memory does, has refused.
   decision.outcome = decision_t::REJECTED;
   decision.cause = decision_t::CAUSE_INTERNAL_ERROR;
   decision.step = decision.coordinate = decision.obstacle = -1;
@@ -145,6 +149,7 @@ GateAnswer Gate::AnswerOne(Bytes bytes, std::int64_t now_us, const TimeSource& c
     candidate_plan_t candidate{};
     Zonotope initial_set;
     std::optional<Rejection> rejection = Admit(bytes, candidate, initial_set, now_us);
+    // The candidate's own defects take precedence: its sender can do something about them.
     if (!rejection) rejection = std::move(from_outside);
     if (!rejection) rejection = CheckDeadline(candidate, now_us);
     decision.candidate_utime = candidate.utime;
@@ -196,11 +201,13 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
     return Rejection{decision_t::CAUSE_WRONG_DIMENSION, "batch: " + WhyNoBatch(batch)};
   }
   if (auto rejection = CheckBytes(bytes, candidate)) return rejection;
+  // Counted before it is judged: a gap is a loss also if what came is refused.
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
   if (std::string why = WhyNoSchedule(candidate, options_); !why.empty())
     return Rejection{decision_t::CAUSE_WRONG_DIMENSION, std::move(why)};
+  // Last, because it uses up the plan_id: a candidate with a defect may be sent again under its number.
   return CheckSource(candidate, now_us);
 }
 
@@ -237,6 +244,7 @@ std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidat
     case Freshness::kStale:
       return Rejection{decision_t::CAUSE_TOO_LATE,
                        "its start was " + Milliseconds(now_us, candidate.start_utime) + " ago"};
+    // Its certificate would have expired before its start.
     case Freshness::kFuture:
       return Rejection{decision_t::CAUSE_FUTURE, "starts in " + Milliseconds(candidate.start_utime, now_us) +
                                                      ", a certificate lives " +
@@ -261,6 +269,7 @@ std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candida
 
 std::int64_t Gate::EarliestStart(std::int64_t now_us) const {
   const std::int64_t budget_us = Microseconds(options_.decision_budget_ms);
+  // A clock may show any number, and no sum may overflow.
   return now_us > INT64_MAX - budget_us ? INT64_MAX : now_us + budget_us;
 }
 
@@ -306,6 +315,7 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   const std::string sentence = Explain(verdict, certifier_.problem(), obstacles_.all(), plan, tube_) + how;
   SetText(decision.message, sentence);
   if (verdict.outcome != Outcome::kCertified) return;
+  // In shadow mode no certificate is made, so none can be taken for one (docs/decisions.md).
   if (!options_.shadow) return Attest(candidate, decision, answer.certified.emplace());
   decision.outcome = decision_t::REJECTED;
   decision.cause = decision_t::CAUSE_SHADOW;
@@ -331,6 +341,7 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, const Upheld& uphel
         [&] { return std::chrono::steady_clock::now() < end; }, tube_, first_step);
     return in_pieces.outcome == Outcome::kCertified ? Standing{plan.num_steps, in_pieces} : whole;
   } catch (const std::exception&) {
+    // Nothing stands: a withdrawal that is not needed costs a stop, one that is missing more.
     return {};
   }
 }
@@ -349,6 +360,7 @@ void Gate::KeepWarm() noexcept {
 }
 
 std::optional<Gate::Again> Gate::CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {
+  // Advice on another world than the decision's would mislead.
   if (GroundsOf(decision) != grounds()) return std::nullopt;
   Again again{PlanOf(candidate, ScheduleOf(candidate, options_)), InitialSetOf(candidate), {}};
   certifier_.Require(again.plan, again.initial_set, obstacles_.indexed());
@@ -423,6 +435,8 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
   certified.plan = candidate;
   for (int t = 0; t <= candidate.num_steps; ++t) {
     for (int k = 0; k < candidate.num_states; ++k) {
+      // Outward-rounded: the robot compares its state with these, and a state in X_t must not look like one that has
+      // left.
       const Interval hull = tube_.hull(t, k);
       certified.slice_lower[t][k] = hull.lower;
       certified.slice_upper[t][k] = hull.upper;
@@ -432,6 +446,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
   SetUpheld(certified, UpheldUnder(certifier_.problem(), options_));
   SetGrounds(certified, grounds());
   SetDigest(certified.transitions_digest, transitions_);
+  // Last: the seal covers everything above, so a guard notices what was changed afterwards.
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 

@@ -62,6 +62,7 @@ class Track final {
       Refuse("begins at " + At(begin) + ", after the message of " + At(stamp));
     std::int64_t covered = pieces_.front()->until_utime;
     for (const obstacle_t* piece : pieces_) {
+      // Silence about a time must not mean that the obstacle is elsewhere (docs/decisions.md).
       if (piece->from_utime > covered) Refuse("is nowhere between " + At(covered) + " and " + At(piece->from_utime));
       covered = std::max(covered, piece->until_utime);
       if (ends_ && piece->until_utime == end_ && piece->gone == 0)
@@ -105,6 +106,7 @@ ObstacleMotion MotionOf(const obstacle_t& piece, const Track& track) {
   motion.uncertainty = piece.uncertainty;
   motion.growth = piece.growth;
   motion.growth_rate = piece.growth_rate;
+  // A track has no beginning and, unless it is gone, no end: what is not said of a time is not free.
   motion.from_us =
       track.BeginsWith(piece) ? -ObstacleMotion::kAlways : std::max(piece.from_utime, -ObstacleMotion::kAlways);
   motion.until_us = track.GoesOnAfter(piece) ? ObstacleMotion::kAlways : piece.until_utime;

@@ -23,6 +23,7 @@ void RequireRoom(std::size_t count) {
 }  // namespace
 
 std::int64_t ObstacleSender::PeriodUs(const GateOptions& options) {
+  // Three messages in a row may be lost before the obstacles are unknown.
   return std::max<std::int64_t>(Microseconds(options.obstacles_timeout_ms) / 4, 1);
 }
 
@@ -78,6 +79,7 @@ std::int64_t ObstacleSender::Interval() const {
 }
 
 std::optional<obstacles_t> ObstacleSender::Due(std::int64_t now_us) {
+  // A clock that was set back must not silence the sender: then it is due at once.
   if (!content_ || (last_us_ && *last_us_ <= now_us && now_us < *last_us_ + Interval())) return std::nullopt;
   last_us_ = now_us;
   obstacles_t due{};

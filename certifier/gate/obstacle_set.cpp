@@ -19,6 +19,7 @@ void RequireWithin(const char* what, int value, int least, int most) {
 }
 
 void RequirePart(const obstacles_t& message) {
+  // Sizes first: the parts are allocated by what a message claims.
   RequireWithin("set_size", message.set_size, kMaxObstacles + 1, kMostObstacles);
   RequireWithin("first", message.first, 0, message.set_size - 1);
   if (message.first % kMaxObstacles != 0)
@@ -55,6 +56,7 @@ ObstacleSet::Known ObstacleSet::Take(const obstacles_t& message) {
 
 ObstacleSet::Known ObstacleSet::TakePart(const obstacles_t& message) {
   RequirePart(message);
+  // Parts of another size are of another set. No mixture of both is ever complete, for the digest is of all parts.
   if (message.set_size != std::exchange(size_, message.set_size)) {
     const int count = (size_ + kMaxObstacles - 1) / kMaxObstacles;
     parts_.assign(ToSize(count), nullptr);

@@ -27,6 +27,7 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId 
   if (options_.obstacles != ObstaclesSource::kBus)
     return "gate.obstacles is task: those of the task file are all there are";
   switch (state_.sender.Hear(sender, now_us)) {
+    // Each of two may see only a part of the obstacles, and neither is known to be the right one.
     case SoleSender::Place::kOther: return state_.sender.WhyTwo(now_us);
     case SoleSender::Place::kTakesOver:
       state_.order = {};
@@ -43,6 +44,7 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us, SenderId 
 
 std::string ObstaclesInForce::Take(const obstacles_t& message, std::int64_t now_us) {
   const StreamPosition position{message.sequence, message.utime};
+  // What cannot be read, or is not believed, is doubted: the obstacles before it are not known to be there still.
   if (position.sequence < 0) return Doubt(fmt::format("sequence {} is negative", position.sequence));
   const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(options_.max_ahead_ms));
   if (!IsNews(state_.order.Compare(position, horizon)))
@@ -55,6 +57,7 @@ std::string ObstaclesInForce::Take(const obstacles_t& message, std::int64_t now_
   } catch (const std::invalid_argument& error) {
     return Doubt(error.what());
   }
+  // Only now: a message that is refused must not make the next good one look old.
   state_.order.Take(position, horizon);
   if (is_partial()) return {};
   state_.known_utime = position.utime;
@@ -99,6 +102,7 @@ void ObstaclesInForce::NoteOrder(std::int64_t sequence, std::int64_t now_us) {
   } else if (sequence == next || follows_the_last_taken) {
     state_.unconfirmed = std::max(state_.unconfirmed - 1, 0);
   } else {
+    // A message backwards may be the other of two senders, so it takes one more in order to be believed.
     state_.unconfirmed = std::max(state_.unconfirmed, sequence > next ? 1 : 2);
     if (sequence > next) state_.lost = SumOfLost(state_.lost, sequence - next);
   }

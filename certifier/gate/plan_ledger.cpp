@@ -120,7 +120,9 @@ void PlanLedger::ForgetEnded(std::int64_t steady_us) {
 
 void PlanLedger::ForgetOldest() {
   const auto oldest = std::ranges::find_if_not(records_, kIsInForce);
+  // What may be executed is never forgotten for want of room: the ledger is full, and says so (IsFull).
   if (oldest == records_.end()) return;
+  // What is forgotten may still run, and nothing tells it from a plan that nobody certified.
   tolerates_until_us_ = std::max(tolerates_until_us_, oldest->ends_us);
   records_.erase(oldest);
 }
@@ -145,6 +147,7 @@ void PlanLedger::KeepSlices(Slices added) {
     return;
   }
   if (slices.size() == kSlices) {
+    // A flood of certificates must not end the test of the plan that the robot drives.
     if (executing >= 0 && slices.front().certified->plan.plan_id == executing)
       std::rotate(slices.begin(), slices.begin() + 1, slices.end());
     slices.pop_front();
@@ -168,6 +171,7 @@ std::optional<PlanLedger::Departure> PlanLedger::FindDeparture(const robot_state
                        state.sequence - 1 == order.newest()->sequence && last.sender == sender;
   std::optional<Departure> departure;
   const std::span<const double> error(state.state_error, ToSize(state.num_state_errors));
+  // Where another plan takes over, this is also the state at the end of the old plan's step.
   if (executing && follows && last.plan_id >= 0) departure = Compare(last.plan_id, last.step + 1, measured, error);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured, error);
   // A late state does not tell where the robot is now.
@@ -270,6 +274,7 @@ void PlanLedger::SeeRobot(const robot_state_t& state, std::int64_t steady_us) {
   const bool executes = state.mode == robot_state_t::EXECUTING;
   std::optional<std::int64_t> expires;  // the earliest expiry among the plans that may be the executing one
   for (Record& record : records_) {
+    // By the number alone: of two sources' plans with one number each may be the one.
     if (!executes || !record.force || record.plan_id != state.executing_plan_id) continue;
     Begin(record, state, steady_us);
     expires = std::min(expires.value_or(record.expires_utime), record.expires_utime);
@@ -279,6 +284,7 @@ void PlanLedger::SeeRobot(const robot_state_t& state, std::int64_t steady_us) {
     if (state.mode == robot_state_t::FINISHED) return !record.force->is_shared;
     if (record.force->may_run_until_us < steady_us) return true;
     if (record.force->is_shared) return false;
+    // A guard takes an older plan_id only after the newer one has expired.
     const bool is_superseded = expires && record.plan_id < state.executing_plan_id && record.expires_utime <= *expires;
     return is_superseded || record.force->has_begun;
   };

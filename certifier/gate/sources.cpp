@@ -27,6 +27,7 @@ void Sources::Source::ForgetAllBut(std::int64_t plan_id) {
 }
 
 bool Sources::Source::Uses(std::int64_t plan_id) const {
+  // Below the window nothing is remembered, so it counts as used: a guard must not get one number for two plans.
   const std::uint64_t below = Apart(highest, plan_id);
   return plan_id <= highest && (below >= kWindow || used.test(below));
 }
@@ -51,6 +52,7 @@ Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_
   const std::string name = NameOf(candidate);
   auto known = sources_.find(name);
   if (known == sources_.end()) {
+    // Names are free: a flood of them must neither grow the memory nor push out a planner that is heard.
     if (sources_.size() >= kMaxSources && !MakeRoom(now_us)) return Admission::kTooManySources;
     known = sources_.emplace(name, Source{}).first;
     known->second.StartCounting(PositionOf(candidate), Horizon(now_us));
@@ -70,6 +72,7 @@ bool Sources::IsUsed(const candidate_plan_t& candidate, std::int64_t now_us) con
 }
 
 bool Sources::IsSilent(const Source& source, std::int64_t now_us) const {
+  // Either way: a clock that was set back must not keep a source forever.
   return std::abs(now_us - source.heard_us) > forget_after_us_;
 }
 
@@ -95,6 +98,7 @@ void Sources::Hear(const candidate_plan_t& candidate, std::int64_t now_us) {
   Source& source = known->second;
   const StreamPosition position = PositionOf(candidate);
   const Succession succession = source.order.Compare(position, Horizon(now_us));
+  // A leap that no loss explains is a restart or nonsense; counted as loss it would spoil the count for good.
   if (succession == Succession::kRestarted || position.sequence < source.first_sequence - kBehind ||
       position.sequence - source.last_sequence() > kLeap) {
     lost_before_ += source.lost();

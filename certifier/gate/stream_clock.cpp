@@ -26,6 +26,7 @@ std::optional<ClockBounds> ClockBoundsOf(const Config& config) {
 }
 
 std::string WhyOff(const Arrival& arrival, const ClockBounds& bounds) {
+  // A message is never early by more than the clocks differ, but late by the network, too.
   const std::int64_t late = bounds.error_us + bounds.delay_us;
   switch (FreshnessOf(arrival.utime, arrival.at_us, late, bounds.error_us)) {
     case Freshness::kStale:

@@ -9,6 +9,8 @@
 namespace forereach {
 
 bool Upheld::Suffices(const Upheld& other) const {
+  // The guard that has this plan holds steps to the seal's step error, and the start to X0 less the seal's state error.
+  // So a smaller step error and larger state errors uphold what the other task rests on, too.
   const bool is_on_time = other.step_error_us < 0 || (0 <= step_error_us && step_error_us <= other.step_error_us);
   return is_on_time && std::ranges::equal(state_error, other.state_error, std::greater_equal());
 }

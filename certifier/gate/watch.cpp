@@ -61,6 +61,7 @@ void Watch::RobotHasFinished() {
 }
 
 std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t steady_us) {
+  // Between two calls only the wall clock can be set: what this differs by is a jump, however long the pause was.
   const std::int64_t offset = now_us - steady_us, moved = offset - offset_us_.value_or(offset);
   offset_us_ = offset;
   Run(now_us, steady_us);
@@ -80,6 +81,7 @@ std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t ste
 }
 
 bool Watch::Latch(Fault fault) {
+  // The first fault is the one that a person has to understand, unless it is one that lets the robot drive on.
   if (fault_ && (StopsTheRobot(fault_->cause) || !StopsTheRobot(fault.cause))) return false;
   fault_ = std::move(fault);
   return true;
@@ -87,6 +89,7 @@ bool Watch::Latch(Fault fault) {
 
 bool Watch::Reset() {
   if (!fault_) return false;
+  // What was heard of the robot before the reset says nothing of it now.
   fault_.reset();
   RobotHasFinished();
   return true;

@@ -147,6 +147,7 @@ int Certifier::Observed::Add(std::span<const double> z, const Observations& obse
     return store.Insert(z, entries(one.lower), entries(one.upper)).id;
   };
   const int id = insert(affine ? WithoutAffineRows(affine->declaration(), observation) : observation);
+  // What the store refuses is outside the domain, where nothing is declared: no other enclosure may know it either.
   if (id >= 0 && regional) regional->Add(id, z, entries(observation.lower), entries(observation.upper));
   if (id >= 0 && affine) affine->Add(id, z, entries(observation.lower), entries(observation.upper));
   return id;
@@ -243,6 +244,7 @@ std::string Certifier::Unexcited() const {
 
 // The store drops observations for want of room, but none with a contradiction among them. Affine rows keep all.
 void Certifier::ForgetDropped() {
+  // A contradiction is kept on disk with all of its rows (`Contradiction`), so none of them may go.
   if (violation_ || observed_->affine || learned_.size() <= 2 * observed_->known.size()) return;
   const std::vector<int> kept = observed_->known.ids();
   std::erase_if(learned_, [&](const Record& record) {
@@ -286,6 +288,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions, problem_->timing, {},
                   problem_->declaration.growing, safety_.placement().SeparableStates()) {
+  // Soundness 3.18 bounds what an input's error does to the residual by L, and nobody says that this residual keeps L.
   forereach::Require(problem_->declaration.input_error.isZero(0),
                      "declaration: input_error counts by lipschitz, which does not bound a residual of another kind");
 }
@@ -293,6 +296,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclo
 Learned Certifier::Learn(std::span<const double> z, std::span<const double> next, double longer,
                          std::optional<double> by_clock) {
   Observations observed;
+  // What is learned is for good, so what may say nothing true (no value, no turns, near the edge) is refused here.
   if (const Learned learned = Observe(*problem_, z, next, longer, observed); learned != Learned::kAdded) return learned;
   const int id = observed_->Add(z, observed);
   if (id < 0) return Learned::kOutsideDomain;
@@ -321,6 +325,7 @@ std::optional<Certifier::Misfit> Certifier::FindMisfit(const Plan& plan) const {
   if (start < -kLatest || start > kLatest || step < 0 || step > kLongest || error < 0 || error > kLongest)
     return size("its schedule starts at " + number(start) + " us with steps of " + number(step) +
                 " us and a clock error of " + number(error) + " us, must be within 2^60, [0, 2^40] and [0, 2^40]");
+  // NaN would pass no comparison of the step, but a caller has to hear which number it was.
   for (int t = 0; t < plan.num_steps; ++t)
     for (std::size_t k = 0; k < plan.input(t).size(); ++k)
       if (!std::isfinite(plan.input(t)[k]))
@@ -358,6 +363,7 @@ void Certifier::Require(const Zonotope& initial_set, const ObstacleView& obstacl
 
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, const ObstacleView& obstacles, Tube& tube,
                             int known) const noexcept {
+  // The first slices may be those of another plan with the same first controls (batch.h): a prefix, never more.
   tube.length_ = std::clamp(known, 0, tube.length_);
   Decision decision = Begin(initial_set, tube);
   if (decision.outcome != Outcome::kNone) return decision;
@@ -380,6 +386,8 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   for (int t = tube.length(); t < plan.num_steps; ++t) {
     const auto i = ToSize(t);
     StepRecord& record = tube.steps_[i];
+    // Where the step before found its bounds the search begins. It may change which sound bound is found, never whether
+    // it is one: any subset of the observations bounds the residual (soundness 3.5).
     record.envelope.found = t > 0 ? tube.steps_[i - 1].envelope.found : decltype(record.envelope.found){};
     const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1],
                                                tube.steps_[i + 1].half_width.data(), t == 0);
@@ -408,6 +416,8 @@ Decision Certifier::JudgeBetween(const Tube& tube, int first) const noexcept {
     for (const RateBounds::Bound& bound : rates_.bounds()) {
       const int k = bound.state;
       const double least = LeastChange(tube.hull(t, k), tube.hull(t + 1, k), bound.is_angle);
+      // D, though the data may be right: no motion within the declared rate joins the two slices, so the theorem at all
+      // times would say nothing (soundness 3.17).
       if (!(least > bound.change)) continue;
       decision.outcome = Outcome::kDomain;
       decision.cause = Cause::kBetween;
@@ -424,6 +434,8 @@ Decision Certifier::JudgeRest(const Tube& tube) const noexcept {
   Decision decision;
   for (const RestBound& bound : problem_->rest) {
     const Interval reached = tube.hull(tube.length(), bound.coordinate);
+    // All of the last slice has to be at rest: where the robot stops within it is not known. NaN fails both
+    // comparisons.
     const bool is_below = reached.upper <= bound.tolerance;
     if (is_below && -bound.tolerance <= reached.lower) continue;
     decision.outcome = Outcome::kDomain;

@@ -21,6 +21,7 @@ void Extender::Load(const TubeNode& node) {
   take(ArraysOf(slice).mutable_slacks(), n);
   for (int k = 0; k < node.dim_; ++k) {
     take(ArraysOf(slice).mutable_row(k), columns);
+    // Sums over a row read its padding.
     std::fill(ArraysOf(slice).mutable_row(k) + columns, ArraysOf(slice).mutable_row(k) + slice.padded_size(), 0.0);
   }
   if (t > 0) tube_.steps_[t - 1].envelope.found = node.found_;

@@ -10,6 +10,7 @@ ExtremalResiduals::ExtremalResiduals(const Declaration& declaration, const Obser
     : declaration_(declaration), observations_(observations), constant_(observations.num_states()) {
   for (int k = 0; k < observations.num_states(); ++k) {
     const double sigma = declaration.noise_bound[k];
+    // A row without slopes is one number: the middle of what all observations leave of it.
     constant_[k] =
         ((observations.lower.col(k).maxCoeff() - sigma) + (observations.upper.col(k).minCoeff() + sigma)) / 2;
     if (declaration.lipschitz.row(k).maxCoeff() > 0) varying_.push_back(k);
@@ -29,6 +30,8 @@ void ExtremalResiduals::Evaluate(int choice, const Eigen::VectorXd& z, std::vect
     const bool upper = choice >> j & 1;
     long double best = std::numeric_limits<long double>::infinity();  // of the upper, or of the lower negated
     for (Eigen::Index i = 0; i < observations_.z.rows(); ++i) {
+      // McShane's extensions: the least and the largest admissible residual, of which rollouts are inner bounds
+      // (soundness 3.22).
       long double value = upper ? observations_.upper(i, k) : -observations_.lower(i, k);
       value += declaration_.noise_bound[k];
       for (Eigen::Index l = 0; l < z.size(); ++l)

@@ -41,6 +41,7 @@ std::optional<TextEnclosure> FunctionsOf(const Problem& problem) {
   const NominalModel& model = *problem.model;
   TextEnclosure functions(NamesOf(model), expressions);
   for (std::size_t i = 0; i < problem.limits.size(); ++i)
+    // A state in the slice stands for all that differ by whole turns (soundness 3.14), so the function has to, too.
     RequireSameAfterTurns(functions.program(), static_cast<int>(i), expressions[i], "limits: " + problem.limits[i].name,
                           model.angles(), model.state_names());
   return functions;
@@ -60,6 +61,7 @@ template <class Visit>
 void LimitTest::ForEach(const Plan& plan, const Tube& tube, int t, Visit visit) const noexcept {
   const Zonotope& slice = tube.slice(t);
   const bool is_last = t == tube.length();
+  // Zero is any input: no value that depends on it is visited.
   constexpr std::array<double, kMaxInputs> kNoInput{};
   std::array<AffineEnclosure, kMaxLimits> values;
   functions_->Enclose(slice.center(), tube.half_width(t),
@@ -75,6 +77,7 @@ Decision LimitTest::Judge(const Plan& plan, const Tube& tube, int first) const n
   for (int t = first; t <= tube.length() && decision.outcome == Outcome::kNone; ++t)
     ForEach(plan, tube, t, [&](std::size_t i, const Interval& reached) {
       const auto& [name, that, at_least, at_most] = limits_[i];
+      // The whole range has to keep the limit (soundness 3.12). An enclosure that is not finite keeps none.
       const bool is_below = reached.upper <= at_most;
       if (is_below && at_least <= reached.lower) return false;
       decision.outcome = Outcome::kSafety;

@@ -38,10 +38,12 @@ double Clearance(const Decision& decision) { return decision.margin - decision.t
 }  // namespace
 
 Decision Pieces::Try(const Call& call, const Part& part) noexcept {
+  // Out of time is no certificate.
   if (!call.goes_on()) return {};
   ++trials_;
   SetBox({part.box.data(), ToSize(dim_)}, set_);
   const Decision decision = call.certifier.Certify(call.plan, set_, call.obstacles, tube_);
+  // A plan that is judged again while it is driven has passed the steps before `first`: what touches there is past.
   if (decision.outcome != Outcome::kSafety || decision.step >= call.first) return decision;
   return call.certifier.JudgeSafety(call.plan, call.obstacles, tube_, call.first);
 }
@@ -87,6 +89,7 @@ void Pieces::Widen(int steps) noexcept {
   for (int t = 1; t <= steps; ++t)
     for (int k = 0; k < dim_; ++k) {
       Interval& hull = hulls_[ToSize(t)][ToSize(k)];
+      // What is attested is the hull of the pieces' slices: x_t lies in one of them (soundness 3.21).
       hull = is_first ? tube_.hull(t, k) : Join(hull, tube_.hull(t, k));
     }
 }
@@ -122,6 +125,7 @@ Decision Pieces::Certify(const Certifier& certifier, const Plan& plan, const Zon
     for (std::size_t k = 1; k < ToSize(dim_); ++k)
       if (gain(k) > gain(best)) best = k;
     const double at = part.box[best].Middle();
+    // Neighbouring doubles have no double between them: cutting on would not end.
     const bool can_halve = part.box[best].lower < at && at < part.box[best].upper;
     if (decision.outcome != Outcome::kSafety || ++count > ToSize(most) || !can_halve) return {};
     if (IsHopeless(call, part)) return {};

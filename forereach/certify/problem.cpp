@@ -18,6 +18,8 @@ std::string FindCoupledRegion(const Problem& problem) {
   };
   const RegionGrid grid(problem.declaration);
   for (const int l : grid.variables()) {
+    // Moved along this variable alone, a point might leave the domain, outside of which no slope is declared (soundness
+    // 3.20).
     for (std::size_t i = 0; i < domain.inequalities.size(); ++i)
       if (domain.inequalities[i].coefficients[l] != 0) return name("inequalities", i, l);
     for (std::size_t i = 0; i < domain.balls.size(); ++i)

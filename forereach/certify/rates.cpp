@@ -25,6 +25,7 @@ RateBounds::RateBounds(const Problem& problem) : problem_(&problem), period_(Ste
   const auto add = [&](int state, double rate, double longest, const std::string& key) {
     if (rate < kInfinity) bounds_.push_back({state, rate, MulUp(rate, longest), key, problem.model->IsAngle(state)});
   };
+  // A step may begin early and end late. Rounded up: what is refuted has to be refuted for the longest step.
   const double longest = AddUp(period_, MulUp(2, problem.timing.error));
   for (int k = 0; period_ > 0 && k < problem.timing.rate_bound.size(); ++k)
     add(k, problem.timing.rate_bound[k], longest, "model.rate_bound." + problem.model->state_names()[ToSize(k)]);
@@ -44,6 +45,7 @@ Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const dou
     const Interval before(SubDown(z[k], error), AddUp(z[k], error));
     const double change = LeastChange(
         before, EncloseSuccessor(declaration, bound.state, next[k], bound.is_angle, is_exact), bound.is_angle);
+    // Downward in all: a violation is a claim in real arithmetic (soundness 3.17), and it stops the robot's work.
     shown[bound.state] = DivDown(change, AddUp(period_, longer));
   }
   return shown;

@@ -31,6 +31,7 @@ class WayClearSearch final {
   [[nodiscard]] bool GoesOn() { return goes_on_ = goes_on_ && effort_.goes_on(); }
 
   std::optional<Eigen::VectorXd> LeastShift(const Obstacle& obstacle, const Decision& touch) {
+    // Where it begins and how far it goes proves nothing: a shift counts only once Touch has judged it.
     const double depth = std::max(touch.threshold - touch.margin, kLeastDepth);
     const double farthest = FarthestOf(obstacle, depth);
     std::optional<double> least;
@@ -66,6 +67,7 @@ class WayClearSearch final {
     std::vector<Eigen::VectorXd> directions;
     const Eigen::VectorXd outward = (obstacle.lower() + obstacle.upper()).head(p) / 2 - place.CenterVector();
     if (outward.norm() > 0) directions.push_back(outward.normalized());
+    // Some direction has to be left when the place lies around the obstacle's middle.
     for (int k = 0; k < p; ++k)
       for (const double sign : {-1.0, 1.0}) directions.push_back(sign * Eigen::VectorXd::Unit(p, k));
     return directions;

@@ -105,6 +105,7 @@ AffineSet::AffineSet(std::vector<int> columns, std::span<const double> domain_lo
 }
 
 void AffineSet::Add(int id, std::span<const double> z, double lower, double upper) {
+  // An observation that says nothing, or NaN, bounds nothing: without it A is only larger.
   if (!(-kInfinity < lower && lower <= upper && upper < kInfinity)) return;
   for (const int l : columns_) phi_.push_back(z[ToSize(l)]);
   phi_.push_back(1);
@@ -136,6 +137,7 @@ std::size_t AffineSet::ChooseBasis(Basis& basis) {
       least = std::min(least, phi_[i * q + l]), most = std::max(most, phi_[i * q + l]);
     middle[l] = least / 2 + most / 2;
     spread[l] = most / 2 - least / 2;
+    // Spread of rounding size would make a matrix that is regular by its rounding alone.
     if (!(spread[l] > kFlat * std::abs(middle[l]))) spread[l] = kInfinity;
   }
   for (std::size_t i = 0; i < count; ++i) {
@@ -193,6 +195,8 @@ bool AffineSet::BoundParameters(const Basis& basis) {
     unit[j] = 1;
     inverse[j] = factors.Solve(unit);
   }
+  // R is any matrix: what it lacks of the inverse is bounded here outward, and the proof needs no more (soundness
+  // 3.19).
   std::array<Vector, kMostUnknowns> error;  // |I - R Phi|
   Vector most{};                            // |R| |y|
   for (std::size_t l = 0; l < q; ++l) {
@@ -215,11 +219,13 @@ bool AffineSet::BoundParameters(const Basis& basis) {
   Vector v = most;
   for (int round = 0; round < 4; ++round) {
     Vector grown{};
+    // A guess at a fixed point, with room for the rounding of the test below, which alone proves it.
     for (std::size_t l = 0; l < q; ++l) grown[l] = 1.25 * next(v, l);
     v = grown;
   }
   limit_ = v;
   for (std::size_t l = 0; l < q; ++l)
+    // |R| |y| + |I - R Phi| v <= v: the spectral radius is below 1, so |theta| <= v for every theta of A.
     if (!(next(v, l) <= v[l] && v[l] < kInfinity)) return false;
   return true;
 }
@@ -243,6 +249,8 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
   for (int step = 0;; ++step) {
     const Factors factors(*this, found.basis);
     if (!factors.is_regular()) break;
+    // Weights of zero let the simplex walk in circles; the perturbed direction has none. Its weights only choose the
+    // way.
     if (step == 0) Perturb(factors.Combine({direction.data(), q}), start, perturbed);
     found.weights = factors.Combine({direction.data(), q});
     const Vector weights = factors.Combine({perturbed.data(), q});
@@ -258,6 +266,7 @@ AffineSet::Climb AffineSet::Search(const Vector& direction, std::span<const int>
     for (const int row : rows) {
       const auto i = ToSize(row);
       const double value = Dot(phi(row), found.theta.data());
+      // A violation of rounding size is none: the climb would not end.
       const double allowed = kOfWidth * (upper_[i] - lower_[i]) + kOfValue * size_of_values_;
       const double above = value - upper_[i] - allowed, below = lower_[i] - value - allowed;
       if (!(std::max(above, below) > worst)) continue;
@@ -294,6 +303,7 @@ double AffineSet::SupportUpper(const Vector& direction, const Climb& found) cons
   for (std::size_t j = 0; j < size_; ++j) {
     const auto i = ToSize(found.basis[j]);
     const double weight = found.weights[j];
+    // The rule that proves: true for any weights that are numbers, so nothing above has to be.
     if (!(std::abs(weight) < kInfinity)) return kInfinity;
     sum = AddUp(sum, MulUp(weight, weight < 0 ? lower_[i] : upper_[i]));
     for (std::size_t l = 0; l < size_; ++l) rest[l] = rest[l] - Interval(weight) * Interval(phi(found.basis[j])[l]);
@@ -349,6 +359,7 @@ bool AffineSet::Prove(const Climb& found) {
   for (std::size_t l = 0; l < size_; ++l) down.weights[l] = -up.weights[l], against[l] = -along[l];
   const double gap =
       std::max(SubDown(lower_[i], SupportUpper(along, up)), SubDown(-SupportUpper(against, down), upper_[i]));
+  // Both sides outward: what the others say of phi . theta misses what this one shows, so A is empty (F).
   if (!(gap > 0)) return false;
   std::vector<std::size_t> order(size_);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -368,6 +379,7 @@ void AffineSet::SetHull() {
     hull_[l] = {-SupportUpper(opposite, least), SupportUpper(axis, most)};
     if (l + 1 < size_) TestSlope(l, least, most);
     const double size = hull_[l].Magnitude();
+    // Coarse on purpose: whoever derives the hull again, with other rounding, takes the same slope. Any slope is sound.
     const double unit = std::ldexp(1.0, std::max(std::ilogb(size), -900) - 16);
     slope_[l] = hull_[l].IsFinite() && size > 0 ? std::nearbyint(hull_[l].Middle() / unit) * unit : 0;
     reach_[l] = hull_[l].DistanceUpper(slope_[l]);
@@ -377,6 +389,7 @@ void AffineSet::SetHull() {
 
 void AffineSet::TestSlope(std::size_t l, const Climb& least, const Climb& most) {
   const double size = std::max(hull_[l].lower, -hull_[l].upper);
+  // The whole hull lies beyond what is declared of the slope (soundness 3.19): data refute it.
   if (contradiction_ || most_[l] == 0 || !(size > most_[l])) return;
   contradiction_ = AffineContradiction{-1, {}, size, most_[l]};
   const Basis& basis = (hull_[l].lower > most_[l] ? least : most).basis;
@@ -428,6 +441,7 @@ void AffineSet::Learn(int id, std::span<const double> z, double lower, double up
   const std::size_t before = ids_.size();
   Add(id, z, lower, upper);
   if (ids_.size() == before) return;
+  // One that agrees with every known vertex cuts none off. If it cuts elsewhere, A is only taken for larger.
   if (LatestMayNarrow()) return Derive();
   Forget();
 }

@@ -50,6 +50,8 @@ void ValidateAffine(const Declaration& declaration) {
     for (Eigen::Index l = 0; l < declaration.lipschitz.cols(); ++l) {
       const std::string entry = "row " + std::to_string(k) + ", variable " + std::to_string(l) + ": ";
       const bool is_column = std::ranges::binary_search(columns, static_cast<int>(l));
+      // It would say |M_kl| <= L_kl of a slope that is zero by declaration, and errors would count by it (soundness
+      // 3.19).
       RequireAffine(is_column || declaration.lipschitz(k, l) == 0, entry + "bounded by lipschitz, and no column");
       RequireAffine(!is_column || declaration.lipschitz(k, l) > 0 || declaration.VariableError(l) == 0,
                     entry + "recorded with an error, which counts by lipschitz: declare a bound on |M| there");
@@ -84,6 +86,7 @@ void ValidateRegions(const Declaration& declaration) {
           std::pair(&regions[i].bound, "bound")})
       RequireRegion(bounds->size() == 0 || (bounds->size() == L.rows() && (bounds->array() >= 0).all()), i,
                     std::string("its ") + name + " has not an entry for each state, or one that is negative or NaN");
+    // An affine row holds in the whole domain; nothing uses a bound of a part of it.
     for (const int k : declaration.affine.rows)
       RequireRegion(regions[i].bound.size() == 0 || regions[i].bound[k] == kInfinity, i,
                     "bounds row " + std::to_string(k) + ", which is affine");
@@ -132,6 +135,8 @@ bool Declaration::AnyRegionHas(Eigen::VectorXd Region::*bound) const {
 }
 
 double Declaration::ObservationError(Eigen::Index k) const {
+  // The least anywhere counts for every observation. What one may be off by more, where it lies, widens its own
+  // enclosure (observations.cpp), so that one number is enough here.
   return AddUp(LeastOf(&Region::noise_bound, k, noise_bound[k]), LeastOf(&Region::disturbance, k, DisturbanceBound(k)));
 }
 

@@ -19,6 +19,7 @@ bool EnvelopeTail::Covers(std::span<const double> lower, std::span<const double>
   for (int k = 0; k < envelope_.num_states(); ++k) {
     const auto i = ToSize(k);
     const double magnitude = AddUp(std::max(std::abs(lower[i]), std::abs(upper[i])), rows_[i].observation_error);
+    // The error of an answer was computed for values up to this limit (soundness 3.5); NaN is beyond it.
     if (!envelope_.row(k).is_constant() && !(magnitude <= envelope_.value_limit(k))) return false;
   }
   return true;
@@ -38,6 +39,7 @@ void EnvelopeTail::Append(std::span<const double> z, std::span<const double> low
     for (std::size_t c = 0; c < columns; ++c) block[c].set(lane, coordinates[c]);
     block[columns].set(lane, floor);
     block[columns + 1].set(lane, negated_ceiling);
+    // Running extremes: a reader with an older size finds those of its own entries.
     row.floors[entry] = entry == 0 ? floor : std::max(floor, row.floors[entry - 1]);
     row.negated_ceilings[entry] =
         entry == 0 ? negated_ceiling : std::max(negated_ceiling, row.negated_ceilings[entry - 1]);

@@ -35,6 +35,7 @@ void GrowingDisturbance::Enclose(std::span<const Interval> box, std::span<Interv
   Evaluate<Interval>(program, needed_, std::span<const Interval>(parameters_), box, all);
   for (std::size_t k = 0; k < bounds_.size(); ++k) {
     const Interval& value = all[ToSize(program.value[k])];
+    // Where the expression may have no value nothing is bounded, and the step has no finite enclosure: D.
     sizes[k] = value.IsFinite() ? abs(value) : Interval(0, kInfinity);
   }
 }
@@ -55,6 +56,7 @@ std::optional<std::pair<int, std::vector<Interval>>> GrowingDisturbance::FindUnb
       bool matters = false;
       for (int i = 0; i < kHalvings; ++i) {
         const Interval whole = range, low(whole.lower, whole.Middle()), high(whole.Middle(), whole.upper);
+        // Halving finds a place to name in the error; that the whole box is bounded is not concluded from its parts.
         range = low;
         const bool in_low = is_unbounded(k);
         range = high;

@@ -54,6 +54,7 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
   row.value_limit = MulUp(options_.value_headroom, LargestValue(entries));
   const double magnitude = AddUp(AddUp(row.value_limit, MulUp(2, locations)), MulUp(3, widths));
   row.error = PlainErrorUpper(magnitude, a + 24, a * (kMaxGenerators + 4));
+  // Where a sum may overflow, no rounding bound holds: the row then has no finite bound, and the answer is D.
   if (!(magnitude < kHuge)) row.error = kInfinity;
   row.pair_margin = PairMarginUpper(row.value_limit, locations, row.distance.columns().size());
 }

@@ -87,6 +87,7 @@ class ObservationIndex::Builder {
       const std::uint32_t id = used ? places_[i].id : kNone;
       index_.ids_[i] = id;
       for (std::size_t c = 0; c < k; ++c) block[c].set(lane, used ? Coordinate(id, c) : 0);
+      // An entry that is not there bounds nothing, on either side.
       block[k].set(lane, used ? entries_.floors[id] : kMinusInfinity);
       block[k + 1].set(lane, used ? -entries_.ceilings[id] : kMinusInfinity);
     }
@@ -187,6 +188,7 @@ ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& 
   for (int i = 0; i < observations.size(); ++i) {
     row.Map([&](int l) { return observations.z(i, l); },
             entries.coordinates.data() + ToSize(i) * row.num_coordinates());
+    // Outward, once for all queries: what follows may search as it likes.
     entries.floors.push_back(SubDown(observations.lower(i, coordinate), error));
     entries.ceilings.push_back(AddUp(observations.upper(i, coordinate), error));
   }

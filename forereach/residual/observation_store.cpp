@@ -281,6 +281,7 @@ class ObservationStore::PartnerSearch {
 ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, std::span<const double> lower,
                                                      std::span<const double> upper) {
   for (std::size_t l = 0; l < domain_lower_.size(); ++l)
+    // The declaration speaks of the domain, and the error of an answer is computed for it. NaN is outside.
     if (!(domain_lower_[l] <= z[l] && z[l] <= domain_upper_[l])) return {};
   for (std::size_t k = 0; k < lower.size(); ++k)
     if (!(-kInfinity < lower[k] && lower[k] <= upper[k] && upper[k] < kInfinity)) return {};
@@ -314,6 +315,7 @@ ObservationStore::Insertion ObservationStore::Enlist(const Entry& entry) {
   Insertion insertion{id, PartnerSearch(*this, entry, id).FindPartner()};
   if (insertion.violation) {
     const std::lock_guard lock(current_lock_);
+    // The first contradiction stays: it is a proof, and nothing that comes later takes it back.
     if (!violation_) violation_ = insertion.violation;
   }
   return insertion;

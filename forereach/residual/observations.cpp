@@ -110,6 +110,7 @@ class Observer final {
       double& error = error_[ToSize(k)] = declaration_.VariableError(k);
       for (int l = 0; l < model_.num_variables(); ++l)
         error = AddUp(error, MulUp(declaration_.lipschitz(k, l), declaration_.VariableError(l)));
+      // f0 might jump within the box, and no slope bounds a jump (soundness 3.16).
       if (!linear_.value[ToSize(k)].IsFinite()) error = kInfinity;
     }
     for (const auto& [k, l, slope] : linear_.jacobian())

@@ -78,6 +78,8 @@ struct PairSearch::Kernel {
         continue;
       }
       const std::size_t child = at.child++, last_leaf = ((child + 1) << (3 * (level - 1))) - 1;
+      // -margin instead of 0: plain arithmetic may be off by so much, and no provable contradiction may be missed
+      // (soundness, section 4). Suspects cost time, no more: TestPair decides.
       if (last_leaf < first || !(at.excess.at(child % kPackSize) > -margin)) continue;
       if (level > 1)
         enter(--level, child);
@@ -180,6 +182,7 @@ struct PairSearch::Kernel {
     if (!(MaxLane(values) > best.value)) return;
     for (std::size_t lane = 0; lane < kPackSize; ++lane) {
       const std::uint32_t id = index.ids(b)[lane];
+      // Of equals at one place the first stays: each would else be the reason for which the other may go.
       const bool same = values.at(lane) == own && block[k + side].at(lane) == own && id > self;
       if (id != self && !same && values.at(lane) > best.value) best = {values.at(lane), id};
     }

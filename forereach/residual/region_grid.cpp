@@ -35,6 +35,7 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
     for (const auto& [variable, range] : region.box) {
       const std::size_t a = axis_of(variable);
       for (const double cut : {range.lower, range.upper})
+        // Sides beyond the domain divide nothing: there no slope is asked for.
         if (ends_of(a).lower < cut && cut < ends_of(a).upper) cuts[a].push_back(cut);
     }
   std::string product;
@@ -60,6 +61,7 @@ RegionGrid::RegionGrid(const Declaration& declaration, std::span<const double> d
       const std::size_t a = axis_of(side.variable), strip = strips[cell][a];
       const double lower = strip == 0 ? ends_of(a).lower : cuts_[a][strip - 1],
                    upper = strip == cuts_[a].size() ? ends_of(a).upper : cuts_[a][strip];
+      // All of the cell: a region's slopes hold between two points of its box only (soundness 3.20).
       return side.range.lower <= lower && upper <= side.range.upper;
     });
   };
@@ -125,6 +127,8 @@ double RegionGrid::LargestBound(RegionBound which, std::size_t k, const Box& box
   for (std::size_t a = 0; a < num_axes_; ++a) {
     const auto l = ToSize(variables_[a]);
     const Slopes& cuts = cuts_[a];
+    // A side counts for both cells, the other way round than in Find: a bound on what is at z may be of either, and the
+    // larger is the safe one. NaN gets all cells.
     first[a] = ToSize(std::lower_bound(cuts.begin(), cuts.end(), box.lower[l]) - cuts.begin());
     last[a] = ToSize(std::upper_bound(cuts.begin(), cuts.end(), box.upper[l]) - cuts.begin());
   }
@@ -173,6 +177,7 @@ double RegionGrid::Ascent(const Row& row, std::size_t a, Place at, std::size_t s
     is_last = up ? strip == cuts.size() || to <= cuts[strip] : strip == 0 || cuts[strip - 1] <= to;
     const double end = is_last ? to : cuts[up ? strip : strip - 1];
     at.first[a] = at.last[a] = static_cast<std::uint16_t>(strip);
+    // A longer way is sound, a shorter one is not: upward throughout.
     cost = AddUp(cost, MulUp(LargestSlope(row.axes[a].slopes, at), up ? SubUp(end, from) : SubUp(from, end)));
     from = end;
   }
@@ -207,6 +212,7 @@ double RegionGrid::CostUpper(std::size_t index, const Box& from, const Box& to, 
   least.fill(kInfinity);
   least[0] = 0;
   for (std::size_t moved = 0; moved + 1 < all; ++moved) {
+    // A cost that is not below `enough` narrows nothing, so what it leads to need not be known.
     if (!(least[moved] < enough)) continue;
     Place at = from.place;
     for (std::size_t a = 0; a < num_axes_; ++a)

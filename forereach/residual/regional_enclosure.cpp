@@ -35,6 +35,7 @@ RegionalEnclosure::RegionalEnclosure(const Declaration& declaration, const Obser
   };
   for (int i = 0; i < observations.size() && declaration.AnyRegionHas(&Region::bound); ++i)
     with_row(i, [&](auto z, auto lower, auto upper) { TestBounds(i, PlaceOf(z, grid_), lower, upper); });
+  // Any subset of the observations bounds the residual. All of them are held against each other by L (consistency.h).
   const int tried = std::min(observations.size(), kMostTried);
   for (int t = 0; t < tried; ++t) {
     const auto i = static_cast<int>(static_cast<std::int64_t>(t) * observations.size() / tried);
@@ -58,6 +59,7 @@ void RegionalEnclosure::Add(int id, std::span<const double> z, std::span<const d
     narrows = one.floor[i] > known.lower || one.ceiling[i] < known.upper;
   }
   if (!narrows) return;
+  // The oldest goes: a query has a bounded cost, whatever the robot reports.
   if (kept_.size() == kMostKept) kept_.erase(kept_.begin());
   kept_.push_back(std::move(one));
 }
@@ -69,6 +71,7 @@ void RegionalEnclosure::Test(const Kept& one) {
       const double apart = std::max(SubDown(one.floor[i], other.ceiling[i]), SubDown(other.floor[i], one.ceiling[i]));
       if (!(apart > 0)) continue;
       const double cost = grid_.CostUpper(i, other.at, one.at);
+      // Said as the pairwise test says it, of r~; both roundings are against a violation.
       const double errors = MulUp(2, error_[ToSize(grid_.rows()[i])]), difference = AddDown(apart, errors),
                    bound = AddUp(cost, errors);
       if (!(difference > bound)) continue;
@@ -127,6 +130,7 @@ void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) c
   }
   for (std::size_t k = 0; k < n; ++k) {
     const double bound = grid_.LargestBound(RegionBound::kResidual, k, hull);
+    // After the observations, so that a declared bound cuts them, too (soundness 3.20).
     bounds.lower[k] = std::max(bounds.lower[k], -bound);
     bounds.upper[k] = std::min(bounds.upper[k], bound);
   }

@@ -134,6 +134,7 @@ Observations Select(const Observations& o, const std::vector<int>& indices) {
 std::vector<int> MostUseful(const Declaration& declaration, const Observations& observations, std::size_t most) {
   std::vector<int> kept(ToSize(observations.size()));
   std::iota(kept.begin(), kept.end(), 0);
+  // Any choice is sound, since any subset of the observations bounds the residual (soundness 3.5); this one is tight.
   while (kept.size() > most) {
     std::vector<int> again = OneRound(GainsOf(declaration, Select(observations, kept)), most);
     for (int& i : again) i = kept[ToSize(i)];

@@ -31,6 +31,8 @@ int HullTree::Build(std::span<const Hull> hulls, int dim, int first, int count) 
     StoreLanes(center + half_width, node.upper.data());
     return number;
   }
+  // Slices follow each other, so halves of the list are near each other without a sort, which a certify step has no
+  // time for.
   Build(hulls, dim, first, count / 2);
   node.second = Build(hulls, dim, first + count / 2, count - count / 2);
   const Node &a = nodes_[ToSize(number + 1)], &b = nodes_[ToSize(node.second)];
@@ -80,6 +82,7 @@ void BoxTree::Build(std::span<const Bounds> boxes, std::int32_t first, std::int3
   const std::int32_t half = count / 2;
   const auto begin = order_.begin() + first;
   std::nth_element(begin, begin + half, begin + count, [&](std::int32_t a, std::int32_t b) {
+    // Equal middles by their numbers: the tree, and so the first obstacle that is named, is the same on every machine.
     return std::pair(middle(a, axis), a) < std::pair(middle(b, axis), b);
   });
   Build(boxes, first, half);

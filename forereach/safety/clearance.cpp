@@ -32,6 +32,7 @@ bool NearestInside(const Simplex& simplex, int members, Simplex& face, Vector& n
   for (int i = 1; i < face.count; ++i) edges.col(i - 1) = face.points[ToSize(i)] - base;
   const int count = face.count - 1;
   gram.topLeftCorner(count, count) = (edges.transpose() * edges).topLeftCorner(count, count);
+  // NaN is flat, too.
   if (!(gram.determinant() > 1e-14 * gram.diagonal().prod())) return false;
   const Vector weights = gram.inverse() * -(edges.transpose() * base);  // of the edges; 0 of those that are not there
   nearest = base + edges * weights;
@@ -65,6 +66,7 @@ double HullDistance(const std::vector<Vector>& core, std::span<const Vector> poi
     const auto along = [&](const Vector& a, const Vector& b) { return nearest.dot(a) < nearest.dot(b); };
     const Vector lowest = *std::ranges::min_element(core, along) - *std::ranges::max_element(points, along);
     const double square = nearest.squaredNorm();
+    // No corner is lower than the point by more than rounding: the point is the nearest one.
     if (square - nearest.dot(lowest) <= kTolerance * std::max(square, lowest.squaredNorm())) break;
     simplex.points[ToSize(simplex.count++)] = lowest;
     nearest = Reduce(simplex);
@@ -152,6 +154,7 @@ double ApproximateDistance(const Obstacle& obstacle, const BodyPart& part) {
 double ApproximateDistance(const Obstacle& obstacle, const BodyPart& part, std::int64_t time_us) {
   if (!obstacle.motion()) return ApproximateDistance(obstacle, part);
   const ObstacleMotion& motion = *obstacle.motion();
+  // Outside its window another piece of its track says where it is.
   if (time_us < motion.from_us || motion.until_us < time_us) return kInfinity;
   const double tau = static_cast<double>(time_us - motion.stamp_us) * 1e-6;
   BodyPart seen = part;  // from the obstacle

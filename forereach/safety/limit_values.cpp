@@ -29,6 +29,7 @@ void LimitValues::Room(std::span<const double> x, std::span<const double> u, std
   for (std::size_t i = 0; i < size(); ++i) {
     const auto value = static_cast<double>(values[i]);
     const double above = limits_[i].at_most - value, below = value - limits_[i].at_least;
+    // NaN goes on into `room`, and Keep refuses it.
     room[i] = u.empty() && UsesInput(i) ? kInfinity : below < above ? below : above;
   }
 }

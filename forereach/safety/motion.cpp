@@ -22,6 +22,7 @@ Encounter Meet(const ObstacleMotion& motion, const Schedule& schedule, int first
   encounter.moves = true;
   const std::int64_t error = schedule.clock_error_us;
   const std::array at{schedule.start_us + first * schedule.step_us, schedule.start_us + last * schedule.step_us};
+  // Windows are widened by the clock's error: an obstacle that may be there counts.
   encounter.is_there = at[0] - error <= motion.until_us && motion.from_us <= at[1] + error;
   if (!encounter.is_there) return encounter;
   Interval speed_square(0);

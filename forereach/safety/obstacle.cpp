@@ -55,6 +55,7 @@ bool IsInNames(char c) {
 std::string WhyNoName(std::string_view text) {
   if (text.empty() || text.size() > kMaxObstacleName)
     return "has " + std::to_string(text.size()) + " characters, must have 1 to " + std::to_string(kMaxObstacleName);
+  // Names reach terminals, pages and logs: no character of theirs means anything there.
   if (IsLetter(text.front()) && std::ranges::all_of(text, IsInNames)) return {};
   return "must begin with a letter and have only letters, digits and _-.:/";
 }
@@ -147,6 +148,7 @@ Obstacle Obstacle::Moving(const ObstacleMotion& motion) const {
   require_size("uncertainty", motion.uncertainty);
   require_size("growth", motion.growth);
   require_size("growth_rate", motion.growth_rate);
+  // So that no difference of two times overflows.
   Require(-Schedule::kLatest <= motion.stamp_us && motion.stamp_us <= Schedule::kLatest,
           "motion: stamp " + std::to_string(motion.stamp_us) + " is not within 2^60 us of the epoch");
   Require(motion.from_us <= motion.until_us, "motion: the window [" + std::to_string(motion.from_us) + ", " +

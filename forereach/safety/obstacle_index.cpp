@@ -47,6 +47,7 @@ ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obs
       continue;
     }
     const bool is_bounded = obstacle.kind() != Obstacle::Kind::kHalfSpace && !obstacle.grid();
+    // What has no box at all times is asked about always: an index may only leave out what is provably away.
     if (!is_bounded || obstacle.motion()) {
       everywhere_.push_back(number++);
       continue;
@@ -54,6 +55,7 @@ ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obs
     standing_.push_back(number++);
     Bounds& box = boxes.emplace_back();
     for (int k = 0; k < obstacle.dim(); ++k) {
+      // Outward: a box that is too small would leave an obstacle out.
       box.lower[ToSize(k)] = SubDown(obstacle.lower()[k], obstacle.radius());
       box.upper[ToSize(k)] = AddUp(obstacle.upper()[k], obstacle.radius());
     }

@@ -91,6 +91,7 @@ struct Placement::Rotation {
     const double theta = slice.center(heading);
     cosine = std::cos(theta);
     sine = std::sin(theta);
+    // The library's sine and cosine are within kPlaceMargin up to there; beyond, nothing is proven.
     half_width = std::abs(theta) <= kLargestHeading ? half_widths[ToSize(heading)] : kInfinity;
   }
 };
@@ -161,6 +162,7 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
 
 void Placement::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
   projection_.EncloseHull(slice, half_width, hull);
+  // Between two samples a point leaves the chord by at most this (soundness 3.9).
   for (std::size_t k = 0; sweeps_ && k < ToSize(dim()); ++k) hull.half_width[k] = AddUp(hull.half_width[k], bulge_[k]);
 }
 
@@ -273,6 +275,7 @@ void Placement::Observe(const Zonotope& slice, std::span<const double> half_widt
 }
 
 unsigned Placement::SeparableStates() const {
+  // An expression may use any state, and twice.
   if (expressions_) return 0;
   unsigned seen = heading_ >= 0 ? 1u << heading_ : 0, twice = seen;
   for (const MatrixEntry& entry : projection_.entries()) {
@@ -384,6 +387,7 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
   for (int i = part.first; i < part.first + part.count; ++i) {
     if (points_[ToSize(i)].linear >= 0) {
       const double support = SupportAtExpressions(sample, i, d);
+      // Written so that NaN becomes the largest, and stays: it proves no separation.
       if (!(support <= largest)) largest = support;
       if (std::isnan(support)) break;
       continue;

@@ -59,6 +59,7 @@ void Projection::Enclose(const Zonotope& slice, std::span<const double> half_wid
   } else {
     EncloseLinearImage(entries_, slice, half_width, dim_, projected);
   }
+  // Separation sums over generators and knows no slack.
   for (int k = 0; k < dim_; ++k)
     ArraysOf(projected).AppendAxis(k, std::exchange(ArraysOf(projected).mutable_slack(k), 0));
 }

@@ -39,6 +39,8 @@ void StandingCores::BoundEach(std::span<const Hull> hulls, double* bounds) const
       }
       const Lanes root{std::sqrt(square[0]), std::sqrt(square[1]), std::sqrt(square[2]), std::sqrt(square[3])};
       const Lanes distance = root * AllLanes(1 - kMargin), threshold = LoadLanes(&threshold_[o]);
+      // Every comparison is false for NaN, and below 2^-400 the squares may have lost digits: unproven, so it is asked
+      // again by directions.
       const LaneMask proven =
           (distance > AllLanes(0x1p-400)) & (distance < AllLanes(kInfinity)) & (distance > threshold);
       const Lanes clearance = distance - threshold - AllLanes(4 * kUnitRoundoff) * distance;
