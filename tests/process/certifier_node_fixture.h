@@ -1,11 +1,6 @@
 /** The certifier's node on an in-memory bus with a simulated clock. */
 #pragma once
 
-#include <algorithm>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "certifier/process/certifier_node.h"
 #include "tests/certifier/small_task.h"
 #include "tests/test.h"
