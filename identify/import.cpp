@@ -260,7 +260,7 @@ class Importer {
     const std::span<double> location(z.data(), ToSize(n_ + m_)), successor(next.data(), ToSize(n_));
     if (!FindStates(i, j, location.first(ToSize(n_)), successor)) return 0;
     if (!FindInput(i, j, location.subspan(ToSize(n_)), deviation)) return 0;
-    const double offset = OffsetOf(i, j), longer = offset > 0 ? NextUp(offset) : 0;
+    const double offset = OffsetOf(i, j), longer = offset > 0 ? LongerOf(offset, i, j) : 0;
     Observations observed;
     switch (Observe(problem_, location, successor, options_.counts_durations ? longer : 0, observed)) {
       case Learned::kAdded: break;
@@ -291,6 +291,11 @@ class Importer {
   [[nodiscard]] double OffsetOf(std::size_t i, std::size_t j) const {
     const long double offset = std::abs(samples_[j].time - TargetOf(i));
     return offset > RoundingOf(i, j) ? static_cast<double>(offset) : 0;
+  }
+
+  // What stamps in doubles may hide counts, too.
+  [[nodiscard]] double LongerOf(double offset, std::size_t i, std::size_t j) const {
+    return NextUp(static_cast<double>(offset + RoundingOf(i, j)));
   }
 
   void Note(double offset, std::span<const double> z, std::span<const double> next, std::span<const double> deviation) {

@@ -51,8 +51,10 @@ TaskPointer MakeTask(const py::object& task, const std::string& path, const py::
   py::object whole = task.is_none() ? keys : task;
   std::optional<Transitions> transitions;
   if (!data.is_none()) {
-    const auto [z, next] = PairOf(data, "data");
+    const bool has_durations = py::isinstance<py::tuple>(data) && py::len(data) == 3;
+    const auto [z, next] = PairOf(has_durations ? data[py::slice(0, 2, 1)] : data, "data");
     transitions = Transitions{RowsOf(z, "data: z"), RowsOf(next, "data: x_next")};
+    if (has_durations) transitions->longer = VectorOf(data[py::int_(2)], "data: dt_error");
     if (py::isinstance<py::dict>(whole)) {
       whole = whole.attr("copy")();
       whole.attr("setdefault")("transitions", "data");
@@ -312,7 +314,8 @@ Any number of threads may use one. n states, m inputs, T steps; the units are th
           R"(Of a dict with the keys of a task file, the text of one, or the keys by name: Task(model={...}, domain={...}, ...).
 
 `path` names it in messages, and the files that it names are relative to the directory of `path`.
-data: (z, x_next) of observed steps, (N, n + m) and (N, n), instead of the file `transitions`.)")
+data: (z, x_next) of observed steps, (N, n + m) and (N, n), instead of the file `transitions`, or (z, x_next, dt_error):
+step i lasted at most dt_error[i] seconds longer or shorter than dt.)")
       .def_static("load", &LoadTaskFile, py::arg("path"), WithoutGil(), "Reads a task file.")
       .def_property_readonly("path", [](const JudgingTask& task) { return task.config().path; })
       .def_property_readonly(

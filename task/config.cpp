@@ -60,9 +60,7 @@ Transitions ReadTransitions(const std::string& path, const NominalModel& model, 
 
 // The durations of steps, if they are not all dt, say something only where it is known how states move with time.
 void RequireDurations(const std::string& path, const Problem& problem) try {
-  StepTiming timing = problem.timing;
-  timing.error = problem.transitions.longer.isZero(0) ? 0 : problem.transitions.longer.maxCoeff() / 2;
-  static_cast<void>(StepOffsets(*problem.model, timing));
+  ValidateDurations(problem);
 } catch (const std::invalid_argument& error) {
   throw ConfigError(fmt::format("{}: {}: {}", path, kDurationColumn, error.what()));
 }

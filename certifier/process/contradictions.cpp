@@ -21,10 +21,12 @@ bool IsSame(const Contradictions::Evidence& a, const Contradictions::Evidence& b
 
 std::span<const double> Values(const Eigen::VectorXd& row) { return {row.data(), ToSize(row.size())}; }
 
-// Whether every row is an observation under this task. One that is not says nothing.
+// Whether every row is an observation under this task. One that is not says nothing. What a file says of a step's
+// duration counts under any task; a learned one has to be of a step on schedule.
 bool AllCount(const Transitions& rows, const Problem& problem) {
   for (int i = 0; i < rows.size(); ++i)
-    if (!IsWithin(problem, Values(rows.z.row(i)), rows.IsLearned(i)) || rows.longer[i] > MostLonger(problem.timing))
+    if (!IsWithin(problem, Values(rows.z.row(i)), rows.IsLearned(i)) ||
+        (rows.IsLearned(i) && !(rows.longer[i] <= MostLonger(problem.timing))))
       return false;
   return true;
 }
@@ -45,7 +47,7 @@ bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const
   if (one.model != model || rows.x_next.cols() != declaration.lipschitz.rows() ||
       rows.z.cols() != declaration.lipschitz.cols() || !AllCount(rows, problem))
     return false;
-  if (!(problem.timing.error > 0)) rows.longer.setZero();  // steps are on time
+  if (!(problem.timing.error > 0)) rows.longer.tail(rows.num_learned).setZero();  // steps are on time
   const Observations observed = Observe(*problem.model, declaration, rows, problem.timing);
   const auto [lower, upper] = problem.domain.Corners();
   return FindViolation(declaration, observed) || FindRegionalViolation(declaration, observed, lower, upper) ||

@@ -57,6 +57,7 @@ void ValidateObservations(const Problem& problem) {
             "transition " + std::to_string(i) + ": lies outside the certification domain" +
                 (problem.declaration.HasErrorInZ() ? ", or may within the declared errors" : ""));
   }
+  ValidateDurations(problem);
   const std::string coupled = FindCoupledRegion(problem);
   Require(coupled.empty(),
           "declaration: " + coupled + ", by which a region is bounded: paths have to stay in the domain");

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
+#include "forereach/numerics/directed.h"
+#include "forereach/numerics/text.h"
+#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/no_nominal_value.h"
 
 namespace forereach {
@@ -12,6 +16,21 @@ bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned
   const Declaration& declaration = problem.declaration;
   if (!declaration.HasErrorInZ() || (declaration.given_are_exact && !is_learned)) return problem.domain.Contains(z);
   return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
+}
+
+void ValidateDurations(const Problem& problem) {
+  const Eigen::VectorXd& longer = problem.transitions.longer;
+  if (longer.size() == 0) return;
+  if (longer.size() != problem.transitions.size())
+    throw std::invalid_argument("transitions: " + std::to_string(longer.size()) + " durations, must be " +
+                                std::to_string(problem.transitions.size()) + " or none");
+  for (Eigen::Index i = 0; i < longer.size(); ++i)
+    if (!(longer[i] >= 0 && longer[i] < kInfinity))
+      throw std::invalid_argument("transition " + std::to_string(i) + ": a duration is off by " + ToText(longer[i]) +
+                                  " s, which is negative or not finite");
+  StepTiming timing = problem.timing;
+  timing.error = std::max(timing.error, DivUp(longer.maxCoeff(), 2));
+  static_cast<void>(StepOffsets(*problem.model, timing));
 }
 
 double MostLonger(const StepTiming& timing) { return AddUp(MulUp(2, timing.error), 2e-6); }

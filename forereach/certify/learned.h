@@ -30,6 +30,10 @@ also where no clock is looked at, another step is none that the certificates spe
 step of dt. */
 [[nodiscard]] double MostLonger(const StepTiming& timing);
 
+/** @throws std::invalid_argument unless Transitions::longer is none, or finite and not negative for each transition,
+and, where one is positive, equations or declared rates say how each state moves with time (StepOffsets). */
+void ValidateDurations(const Problem& problem);
+
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. @param longer by how much the
 step lasted longer or shorter than dt, at most, s. Without a fault `observed` gets
 the enclosure of its residual, one row. Cost: one evaluation of the model. */

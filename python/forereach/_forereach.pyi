@@ -46,7 +46,7 @@ class Task:
         task: dict[str, Any] | str | None = ...,
         /,
         path: str = ...,
-        data: tuple[ArrayLike, ArrayLike] | None = ...,
+        data: tuple[ArrayLike, ArrayLike] | tuple[ArrayLike, ArrayLike, ArrayLike] | None = ...,
         **keys: Any,
     ) -> None: ...
     @staticmethod

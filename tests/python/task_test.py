@@ -243,6 +243,9 @@ class Tasks(unittest.TestCase):
             file = fr.Task(self.SMALL, path=f"{directory}/task")
         for same in [fr.Task(keys, data=(z, x_next)), fr.Task(self.SMALL, data=(np.asfortranarray(z), x_next.tolist())), file]:
             np.testing.assert_array_equal(same.certify([[0.5]] * 9).tube.hull, task.certify([[0.5]] * 9).tube.hull)
+        known, less_known = (np.ptp(fr.Task(keys, data=(z, x_next, late)).certify([[0.5]]).tube.hull[1], axis=1)
+                             for late in ([0, 0], [0.01, 0.01]))
+        self.assertTrue((less_known > known).all(), "of steps that may have been longer or shorter")
         self.assertNotIn("transitions", keys)
         for words, data in [
             ("must be a pair .z, x_next.", z[:1]),
@@ -251,6 +254,10 @@ class Tasks(unittest.TestCase):
             ("data: x_next has 1 rows and 2 columns, has to have 2 rows", (z, x_next[:1])),
             ("data: z has 0 rows", (z[:0], x_next[:0])),
             ("data: x_next has a number that is not finite", (z, x_next * np.nan)),
+            ("dt_error: transitions: 1 durations, must be 2 or none", (z, x_next, [0])),
+            ("dt_error: transition 1: a duration is off by -0.1 s", (z, x_next, [0, -0.1])),
+            ("dt_error: transition 1: a duration is off by (nan|NaN|inf)", (z, x_next, [0, np.inf])),
+            ("dt_error: step error: 0.05 s is not below half", (z, x_next, [0, 0.1])),
             (r"data:3: v: -5 is outside \[-3, 3\] of domain.state", (z * [1, 5, 1] * [[0.2], [1]], x_next)),
         ]:
             self.assertRaisesRegex(fr.Error, words, fr.Task, keys, data=data)
