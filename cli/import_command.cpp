@@ -15,6 +15,7 @@
 #include "cli/commands.h"
 #include "command_line/nearest.h"
 #include "command_line/progress.h"
+#include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "identify/channel_table.h"
 #include "identify/command_delay.h"
@@ -36,7 +37,7 @@ using Json = nlohmann::json;
 struct ImportArguments {
   std::string config, out, inputs_from, inputs_time, time, time_unit = "s", delimiter = "auto", comment = "#", header,
                                                            decimal = "point";
-  std::vector<std::string> logs, lcm_types, states, inputs, units, input_tolerances, unwrapped;
+  std::vector<std::string> logs, lcm_types, states, inputs, held, units, input_tolerances, unwrapped;
   std::string command_delay = "none";
   std::optional<double> rate, from, until;
   double tolerance_ms = 0.001;
@@ -86,6 +87,18 @@ LogFormat FormatOf(const ImportArguments& options) {
   return format;
 }
 
+// The states of --held, each with the input that it holds.
+std::vector<std::pair<int, int>> HeldOf(const ImportArguments& options, const NominalModel& model) {
+  std::vector<std::pair<int, int>> held;
+  const auto &states = model.state_names(), &inputs = model.input_names();
+  for (const auto& [state, input] : Assignments("held", options.held, states)) {
+    const auto at = std::ranges::find(inputs, input);
+    if (at == inputs.end()) Refuse("held", "the model has no input '" + input + "'; " + Suggestion(input, inputs));
+    held.emplace_back(std::ranges::find(states, state) - states.begin(), at - inputs.begin());
+  }
+  return held;
+}
+
 // The columns of a log: of states, and of inputs, each after its stamp. A variable without an option has the column of
 // its name.
 struct Columns {
@@ -115,6 +128,9 @@ Columns ColumnsOf(const ImportArguments& options, const NominalModel& model) {
   }
   take("state", options.states, model.state_names(), columns.states);
   take("input", options.inputs, model.input_names(), columns.inputs);
+  const std::size_t first = options.rate ? 0 : 1;
+  for (const auto& [state, input] : HeldOf(options, model))
+    columns.states[first + ToSize(state)] = columns.inputs[first + ToSize(input)];
   return columns;
 }
 
@@ -148,6 +164,8 @@ LogTable TableOf(const std::string& path, const Columns& columns, const ImportAr
 
 // Rows of two logs are joined by their stamps, and a delay in rows of both is none.
 void CheckJoin(const ImportArguments& options) {
+  if (!options.held.empty() && (IsRecording(options) || !options.inputs_from.empty()))
+    Refuse("held", "the log has to be one table with its inputs");
   if (IsRecording(options) || (options.inputs_from.empty() && options.inputs_time.empty())) return;
   if (options.inputs_from.empty()) Refuse("inputs-time", "needs --inputs-from");
   if (options.rate) Refuse("inputs-from", "needs stamps, and --rate says that there are none");
@@ -201,6 +219,7 @@ ImportOptions ImportOptionsOf(const ImportArguments& options, const Config& conf
   import.input_tolerance = InputTolerances(options, model);
   import.input_mean = options.input_mean;
   import.overlapping = options.overlapping;
+  import.held = HeldOf(options, model);
   import.counts_durations = KnowsDurations(*config.problem);
   for (const std::string& name : options.unwrapped) {
     const auto at = std::ranges::find(model.state_names(), name);
@@ -399,7 +418,7 @@ void PrintDelay(const CommandDelay& delay, const NominalModel& model) {
     std::cout << "Shift them with --command-delay " << delay.best
               << ": a certificate then is about inputs as they act, and whoever sends plans has to send each command "
                  "so much earlier.\nOr model it: for a delay of one dt, a state `held` with `held: u` in model.next, "
-                 "and `held` for u in the other equations.\n";
+                 "`held` for u in the other equations, and --held held=u.\n";
 }
 
 Json ToJson(const CommandDelay& delay) {
@@ -565,6 +584,9 @@ Command ImportCommand() {
                                            "Take the mean of each input over the step, however it changes"}),
            {"--command-delay", &options->command_delay, "auto|N",
             "Commands act so many rows after theirs; auto: as many as the model's error says"},
+           {"--held", &options->held, "STATE=INPUT",
+            "This state has no column: it holds the input of the step before, for a robot that obeys one step late. "
+            "May be repeated"},
            {"--overlapping", &options->overlapping, "",
             "Start a transition at each sample; by default where the one before it ended"},
            {"--keep-few", &options->keep_few, "",

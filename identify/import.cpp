@@ -235,8 +235,34 @@ class Importer {
     return true;
   }
 
+  // The sample one step before sample i in its piece; i if there is none.
+  [[nodiscard]] std::size_t BeginBefore(std::size_t i) const {
+    const long double target = samples_[i].time - options_.period;
+    for (std::size_t begin = i; begin > 0 && !samples_[begin].begins_piece;) {
+      const long double offset = samples_[--begin].time - target;
+      if (offset > options_.tolerance + RoundingOf(begin, i)) continue;
+      return -offset > options_.tolerance + RoundingOf(begin, i) ? i : begin;
+    }
+    return i;
+  }
+
+  // Sets the states that hold inputs of the step before. False with the cause counted if it has none.
+  bool FindHeld(std::size_t i, std::span<const double> input, std::span<double> state, std::span<double> next) {
+    if (options_.held.empty()) return true;
+    const std::size_t begin = BeginBefore(i);
+    if (begin == i) {
+      Drop(Dropped::kNoState, samples_[i].row, problem_.model->state_names()[ToSize(options_.held.front().first)]);
+      return false;
+    }
+    std::array<double, kMaxInputs> before{}, deviation{};
+    if (!FindInput(begin, i, before, deviation)) return false;
+    for (const auto& [k, l] : options_.held) state[ToSize(k)] = before[ToSize(l)], next[ToSize(k)] = input[ToSize(l)];
+    return true;
+  }
+
   bool FindStates(std::size_t i, std::size_t j, std::span<double> state, std::span<double> next) {
     for (Eigen::Index k = 0; k < n_; ++k) {
+      if (std::ranges::find(options_.held, k, &std::pair<int, int>::first) != options_.held.end()) continue;
       state[ToSize(k)] = Value(i, k);
       next[ToSize(k)] = Value(j, k);
       if (std::isfinite(state[ToSize(k)]) && std::isfinite(next[ToSize(k)])) continue;
@@ -260,6 +286,7 @@ class Importer {
     const std::span<double> location(z.data(), ToSize(n_ + m_)), successor(next.data(), ToSize(n_));
     if (!FindStates(i, j, location.first(ToSize(n_)), successor)) return 0;
     if (!FindInput(i, j, location.subspan(ToSize(n_)), deviation)) return 0;
+    if (!FindHeld(i, location.subspan(ToSize(n_)), location.first(ToSize(n_)), successor)) return 0;
     const double offset = OffsetOf(i, j), longer = offset > 0 ? LongerOf(offset, i, j) : 0;
     Observations observed;
     switch (Observe(problem_, location, successor, options_.counts_durations ? longer : 0, observed)) {

@@ -44,6 +44,9 @@ struct ImportOptions {
   bool overlapping = false;
   /** Transitions::longer is |t_j - t_i - dt|. Otherwise there is none, and that is part of the error. */
   bool counts_durations = false;
+  /** States, each with an input: its column is not read, and it holds the input of the step before. For a robot that
+  obeys one step late. */
+  std::vector<std::pair<int, int>> held;
   std::vector<int> unwrapped;  ///< States that are angles: 2 pi is added to x_j or subtracted until it is near x_i.
   /** Only samples at so many seconds after the first stamp of their log. */
   double from = -std::numeric_limits<double>::infinity(), until = std::numeric_limits<double>::infinity();
