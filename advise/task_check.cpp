@@ -21,6 +21,7 @@
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
+#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
@@ -42,7 +43,7 @@ constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
 constexpr int kSamples = 2000;                 // of the domain, for the length of a step
 constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
 constexpr double kShareBeyond = 0.05;          // of the data's range
-constexpr double kNear = 0.1;                  // standard deviations apart: nearly the same place
+constexpr double kNear = 0.1;                  // standard deviations apart, as in identify/smallest_row.h
 constexpr double kSuspect = 1 - 1e-9;          // of what is declared: worth a rigorous test
 constexpr std::size_t kMostLines = 20;         // that a finding lists
 
@@ -157,7 +158,17 @@ class Examination final {
       return;
     }
     all_ = LoadTransitions(result_.data, model_);
+    RequireDurations();
     result_.transitions = all_.size();
+  }
+
+  // As LoadConfig does.
+  void RequireDurations() const try {
+    StepTiming timing = problem_.timing;
+    timing.error = all_.longer.isZero(0) ? 0 : all_.longer.maxCoeff() / 2;
+    static_cast<void>(StepOffsets(model_, timing));
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(result_.data + ": dt_error: " + error.what());
   }
 
   // ---- Data against the domain and the declaration.
@@ -479,8 +490,12 @@ class Examination final {
         name, lines(worst), result_.data, Down(worst.difference), Up(worst.bound));
     if (found.count > 1) {
       const auto most = std::ranges::max_element(found.of_each);
-      what += fmt::format(". It is contradicted by {} pairs{}, of which {} have line {}: ", found.count,
-                          result_.all_pairs ? "" : " of a sample", *most, FileLine(most - found.of_each.begin()));
+      const auto involved = std::ssize(found.of_each) - std::ranges::count(found.of_each, 0);
+      what +=
+          fmt::format(". It is contradicted by {} pairs{}{}: ", found.count, result_.all_pairs ? "" : " of a sample",
+                      *most * involved < 4 * found.count  // twice the mean
+                          ? ""
+                          : fmt::format(", {} of them with line {}", *most, FileLine(most - found.of_each.begin())));
       for (const Violation& pair : found.worst)
         what += (&pair == &worst ? "" : ", ") + lines(pair) +
                 (pair.bound > 0 ? fmt::format(" ({} times)", Down(DivDown(pair.difference, pair.bound)))

@@ -162,7 +162,7 @@ Chart SlopeChartOf(const ProposedDeclaration& proposal, const NominalModel& mode
     const ProposedRow& row = proposal.rows[k];
     Chart::Series& series =
         chart.series.emplace_back(fmt::format("{}: knee at {}, declared {}", model.state_names()[k],
-                                              RoundedUp(row.knee, kTableDigits), RoundedUp(row.declared, kTableDigits)),
+                                              RoundedUp(row.knee, kTableDigits), ErrorText(row.declared)),
                                   std::vector<double>());
     double steepest = 0;
     for (std::size_t i = 0; i < ProposedRow::kShares.size(); ++i) {
@@ -195,14 +195,13 @@ void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model
   out << "\nsmallest: the slopes with the least sum, each weighed by its column's standard deviation, that no two "
          "transitions\n  contradict. Every smaller sum is contradicted; the lines are a pair that needs the slope.\n"
          "at least: no smaller slope is possible there, if the row's other slopes are at most the proposed ones.\n"
-         "alone: the largest slope of two transitions that differ in this column and by at most a fifth of that, in "
-         "standard\n  deviations, in each other one, after taking off noise_bound and disturbance. No bound: other "
-         "columns have a part in it.\n"
+         "alone: the largest slope of two transitions that hardly differ in another column. No bound: the others have "
+         "a part in it.\n"
          "proposed: "
       << ToText(command.factor)
       << " times the smallest (--factor). No two transitions contradict it.\n"
-         "knee: the least error, noise_bound + disturbance, with which near places (less than a tenth of the columns' "
-         "standard\n  deviations apart) need no slope. With less, slopes explain what is none, and are steep.\n"
+         "knee: the least error, noise_bound + disturbance, with which near places (a tenth of the columns' standard "
+         "deviations\n  apart) need no slope. With less, slopes are steep.\n"
          "repeated: half the largest difference of transitions that agree in all columns; the error is at least that.\n"
          "deviation: an estimate of the error's standard deviation from near neighbours (Gamma test).\n"
          "Strongin, Knuth-Chou: what these estimators say of a row, as factors of the smallest. They ignore "
@@ -221,7 +220,7 @@ void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model
            "narrow.\n";
   if (!steep.empty())
     out << "The declared error is below the knee, and these slopes are a cliff: " << Joined(steep)
-        << ". Propose the knee's: --disturbance estimated.\n";
+        << ". --disturbance estimated proposes the knee's.\n";
   if (!close.empty())
     out << "The declared error is at the knee or above it, by less than a factor of " << ToText(command.factor) << ": "
         << Joined(close)
@@ -370,7 +369,7 @@ int DeclareFromData(const DataCommand& command) {
       PrintMeaning(proposal, *problem.model, command, text);
       PrintRegions(regions, command, text);
       if (held_out.slices() > 0)
-        text << "With every other block of time as observations, " << TextOf(held_out) << ".\n";
+        text << "With every other block of time as observations: " << TextOf(held_out) << ".\n";
       std::cout << text.str() << "\ndeclaration:\n"
                 << DeclarationYaml(proposal.declaration, *problem.model) << std::flush;
     }

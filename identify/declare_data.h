@@ -44,7 +44,7 @@ struct HeldOutSteps {
   [[nodiscard]] int slices() const { return inside + consistent + left; }
 };
 
-/** "of 40 recorded steps, 38 are inside their slices, 2 consistent with them, 0 have left them". */
+/** "of 40 recorded steps, 38 inside their slices, 2 consistent, 0 left". */
 [[nodiscard]] std::string TextOf(const HeldOutSteps& found);
 [[nodiscard]] nlohmann::json ToJson(const HeldOutSteps& found);
 

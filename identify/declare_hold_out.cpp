@@ -312,8 +312,8 @@ HeldOutSteps JudgeTask(const std::string& path) {
 }
 
 std::string TextOf(const HeldOutSteps& found) {
-  return fmt::format("of {} recorded steps, {} are inside their slices, {} consistent with them, {} have left them",
-                     found.slices(), found.inside, found.consistent, found.left);
+  return fmt::format("of {} recorded steps, {} inside their slices, {} consistent, {} left", found.slices(),
+                     found.inside, found.consistent, found.left);
 }
 
 Json ToJson(const HeldOutSteps& found) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <stdexcept>
 #include <utility>
 
@@ -35,20 +34,13 @@ std::vector<std::string> TransitionColumns(const NominalModel& model) {
 
 constexpr const char* kDurationColumn = "dt_error";
 
-bool Contains(const std::vector<std::string>& names, const char* name) {
-  return std::ranges::find(names, name) != names.end();
-}
-
 Transitions ReadTransitions(const std::string& path, const NominalModel& model, const std::string& named_by) {
-  std::vector<std::string> columns = TransitionColumns(model);
-  const bool has_durations =
-      !Contains(columns, kDurationColumn) && std::ifstream(path) && Contains(CsvColumns(path), kDurationColumn);
-  if (has_durations) columns.emplace_back(kDurationColumn);
-  const Eigen::MatrixXd rows =
-      ReadCsv(path, columns, named_by, "; `forereach import` makes transitions of a log with other columns");
+  const std::vector<std::string> columns = TransitionColumns(model);
+  const Eigen::MatrixXd rows = ReadCsv(
+      path, columns, named_by, "; `forereach import` makes transitions of a log with other columns", kDurationColumn);
   if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
   Transitions read{rows.leftCols(model.num_variables()), rows.middleCols(model.num_variables(), model.num_states())};
-  if (!has_durations) return read;
+  if (rows.cols() == std::ssize(columns)) return read;
   read.longer = rows.rightCols<1>();
   const Range allowed{0, StepOf(model) / 2, false, true};
   for (Eigen::Index i = 0; i < read.longer.size(); ++i)
@@ -309,7 +301,7 @@ void SaveTransitions(const std::string& path, const NominalModel& model, const T
   Eigen::MatrixXd rows(transitions.size(), std::ssize(columns));
   rows << transitions.z, transitions.x_next;
   if (!transitions.longer.isZero(0)) {
-    if (Contains(columns, kDurationColumn))
+    if (std::ranges::count(columns, kDurationColumn) > 0)
       throw ConfigError(
           fmt::format("{}: the model has a variable of the name {}: give it another", path, kDurationColumn));
     columns.emplace_back(kDurationColumn);

@@ -62,8 +62,9 @@ std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<
 
 class Reader {
  public:
-  Reader(const std::string& path, const std::vector<std::string>& columns, const std::string& advice)
-      : path_(path), columns_(columns), advice_(advice) {}
+  Reader(const std::string& path, const std::vector<std::string>& columns, const std::string& advice,
+         const std::string& optional)
+      : path_(path), columns_(columns), advice_(advice), optional_(optional) {}
 
   Eigen::MatrixXd Read(LineReader in) {
     std::vector<Eigen::Index> order;
@@ -80,6 +81,7 @@ class Reader {
       ++rows;
       Split(text, fields);
       if (line == 1) {
+        if (!optional_.empty() && Has(fields, optional_) && !Has(columns_, optional_)) columns_.push_back(optional_);
         order = ReadHeader(path_, fields, columns_, advice_);
       } else {
         AddRow(line, fields, order);
@@ -92,6 +94,7 @@ class Reader {
   }
 
  private:
+  static bool Has(const auto& names, const std::string& name) { return std::ranges::find(names, name) != names.end(); }
   void AddRow(int line, const std::vector<std::string_view>& fields, const std::vector<Eigen::Index>& order) {
     if (fields.size() != order.size())
       FailAt(path_, line,
@@ -110,8 +113,8 @@ class Reader {
   }
 
   const std::string& path_;
-  const std::vector<std::string>& columns_;
-  const std::string& advice_;
+  std::vector<std::string> columns_;
+  const std::string &advice_, &optional_;
   std::vector<double> numbers_;  // row by row
 };
 
@@ -132,8 +135,8 @@ std::vector<std::string> CsvColumns(const std::string& path) {
 }
 
 Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns, const std::string& named_by,
-                        const std::string& advice) {
-  return Reader(path, columns, advice).Read(LineReader(path, named_by));
+                        const std::string& advice, const std::string& optional) {
+  return Reader(path, columns, advice, optional).Read(LineReader(path, named_by));
 }
 
 void WriteCsv(const std::string& path, const std::vector<std::string>& columns, const Eigen::MatrixXd& rows) {

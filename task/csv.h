@@ -16,10 +16,12 @@ namespace forereach {
 
 /** @return one row a line, columns in the order of `columns`. Row i is line i + 2 of the file.
 @param named_by prefix of the message if the file cannot be opened: the place that names it. @param advice end of the
-message if the header has other columns or separators.
+message if the header has other columns or separators. @param optional a column that the file may have beside these; it
+is the last one then.
 @throws ConfigError with file, line and column. */
 [[nodiscard]] Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns,
-                                      const std::string& named_by = "", const std::string& advice = "");
+                                      const std::string& named_by = "", const std::string& advice = "",
+                                      const std::string& optional = "");
 
 /** Writes the shortest decimals from which ReadCsv returns the same doubles. @throws ConfigError if the file cannot be
 written. */

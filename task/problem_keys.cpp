@@ -335,8 +335,8 @@ std::vector<Key> DeclarationKeys() {
       Number("declaration.regions[].bound.<state>", "of the state", kNotNegative, "Of this state."),
       Required(Text("transitions",
                     "CSV of observed steps, relative to this file: a column for each state, input and `<state>_next`, "
-                    "inside the domain, at least one row; `dt_error`: a step lasted at most so many seconds longer or "
-                    "shorter. Those whose declared errors may take them out are left out.",
+                    "inside the domain; `dt_error`: by how many s steps were off dt. Those whose declared errors may "
+                    "take them out are left out.",
                     [](const Field& at, TaskDraft& draft) { draft.transitions = PathIn(at); })),
       Optional(Word("declaration.transitions_are", {"measured", "exact"},
                     "measured: state_error and input_error are those of the file's transitions, too. exact: the file's "

@@ -158,7 +158,7 @@ TEST_F(DeclareDataTest, SaysSoIfNoSlopesAreConsistent) {
 
 TEST_F(DeclareDataTest, WhatSlopesAndNoiseExplainIsNoScatter) {
   EXPECT_THAT(Declare("--by vx").text, AllOf(Not(HasSubstr("disturbance:")), Not(HasSubstr("<- the knee")),
-                                             HasSubstr("of 100 recorded steps, "), HasSubstr(" 0 have left them")));
+                                             HasSubstr("of 100 recorded steps, "), HasSubstr(" 0 left")));
   EXPECT_EQ(Json::parse(Declare("--by vx --json").text)["rows"][2]["scatter"], 0);
 }
 
@@ -314,7 +314,7 @@ TEST_F(LateCommandTest, CheckNamesTheDisturbanceFirstAndEveryPair) {
   const std::size_t noise = text.find("noise_bound of x at least");
   EXPECT_LT(text.find("declare a disturbance of x of at least 0."), noise);
   EXPECT_NE(noise, std::string::npos);
-  EXPECT_THAT(text, testing::ContainsRegex("contradicted by [0-9]+ pairs, of which [0-9]+ have line [0-9]+: lines"));
+  EXPECT_THAT(text, testing::ContainsRegex("contradicted by [0-9]+ pairs"));
   EXPECT_THAT(text, testing::ContainsRegex("times\\), and [0-9]+ more\n"));
 }
 
@@ -323,8 +323,7 @@ TEST_F(LateCommandTest, CheckSaysHowManyStepsLeaveTheirSlices) {
   Declared("lipschitz: {x: {u: 0.1}}\n  noise_bound: [0.13]");
   EXPECT_THAT(check(), HasSubstr("recorded steps have left the slices"));
   Declared("lipschitz: {x: {u: 0.001}}\n  noise_bound: [0.001]\n  disturbance: [0.2]");
-  EXPECT_THAT(check(),
-              AllOf(Not(HasSubstr("left the slices")), HasSubstr(" consistent with them, 0 have left them\n")));
+  EXPECT_THAT(check(), AllOf(Not(HasSubstr("left the slices")), HasSubstr(" consistent, 0 left\n")));
   const Json held_out = Json::parse(Forereach("check --json " + scratch_ / "task.yaml").text)["held_out"];
   EXPECT_GT(held_out["inside"], 0);
   EXPECT_EQ(held_out["left"], 0);
