@@ -31,7 +31,7 @@ struct Options {
   int seeds = 20, first_seed = 1;
   bool advice = false, repair = false, certifies = false;
   double scatter = 0;
-  double errors = 0;
+  double errors = 0, input_errors = 0;
 };
 
 std::string TextOf(const DriveCounts& all) {
@@ -50,8 +50,8 @@ struct Drive {
   std::vector<double> ends_at;  // the measured state
 };
 
-// Even seeds have an adversary, odd ones disturbances, errors of measurement and steps off their times at random, all
-// within what the task declares.
+// Even seeds have an adversary, odd ones disturbances, errors of measurement and of inputs, and steps off their times
+// at random, all within what the task declares.
 Drive DriveOnce(Config config, const Config& world, int seed) {
   constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
   config.planner.seed = seed;
@@ -59,6 +59,7 @@ Drive DriveOnce(Config config, const Config& world, int seed) {
   const char* const kind = seed % 2 == 0 ? "adversarial" : "random";
   if (config.problem->declaration.IsDisturbed()) config.robot.disturbance = kind;
   if (!config.problem->declaration.state_error.isZero(0)) config.robot.sensor_error = kind;
+  if (!config.problem->declaration.input_error.isZero(0)) config.robot.input_error = kind;
   if (StepErrorUs(config.gate).value_or(0) > 0) config.robot.step_jitter = kind;
   Lockstep lockstep(config, world, kStartUs);
   Drive drive;
@@ -73,13 +74,15 @@ Drive DriveOnce(Config config, const Config& world, int seed) {
 }
 
 // The task of a robot that measures with errors, a share of what its planner allows a start, and takes its steps off
-// their times by the same share of a tenth of a step. A task that declares errors keeps its own.
-Config WithErrors(Config config, double share) {
+// their times by the same share of a tenth of a step; its inputs act beside the plan's by a share of their range. A
+// task that declares errors keeps its own.
+Config WithErrors(Config config, double share, double of_inputs) {
   if (share == 0 || config.problem->declaration.HasErrorInZ()) return config;
   Problem& problem = Own(config.problem);
   std::vector<double>& half_width = config.planner.initial_half_width;
   problem.declaration.state_error =
       share * Eigen::Map<const Eigen::VectorXd>(half_width.data(), std::ssize(half_width));
+  problem.declaration.input_error = of_inputs * (problem.domain.input.upper() - problem.domain.input.lower());
   problem.declaration.given_are_exact = true;
   for (double& width : half_width) width *= 1 + share;  // what is measured at the start is off, too
   config.gate.step_error_ms = share / 10 * config.period * 1e3;
@@ -136,7 +139,7 @@ int Run(const Options& options) {
                            "goals", "to goal", "contacts", "limits", "steps outside", "stops", "emergency",
                            "plans certified", "searches", "rounds lost", "time");
   for (const std::string& task : options.tasks) {
-    Config config = WithErrors(LoadConfig(task), options.errors);
+    Config config = WithErrors(LoadConfig(task), options.errors, options.input_errors);
     const std::string name = std::filesystem::path(task).stem().string();
     all_good = DriveAll(name, config, options) && all_good;
     if (options.advice) {
@@ -179,6 +182,10 @@ int main(int argc, char** argv) {
            .variable = &options.errors,
            .help = "Tasks without errors of measurement get this share of planner.initial_half_width, and steps "
                    "off their times by as much of a tenth of model.dt",
+           .range = NumberRange{0, 1}},
+          {.name = "--input-errors",
+           .variable = &options.input_errors,
+           .help = "With --errors, inputs act beside the plan's by up to this share of their range",
            .range = NumberRange{0, 1}},
           {.name = "--scatter",
            .variable = &options.scatter,
