@@ -138,7 +138,7 @@ std::optional<Eigen::MatrixXd> PolicyProposer::Progress(const Eigen::VectorXd& s
   const Reference reference = MakeReference(*problem_->model, ReferenceStart(state, aim), policy_.num_steps());
   Eigen::MatrixXd progress = policy_.Act(Features(state, reference)).leftCols(options_.progress_steps);
   if (!progress.allFinite()) return std::nullopt;  // weights are finite, their sums need not be
-  const Box& inputs = problem_->domain.input;
+  const Box& inputs = motion_.controls();
   for (auto column : progress.colwise()) column = column.cwiseMax(inputs.lower()).cwiseMin(inputs.upper());
   return progress;
 }

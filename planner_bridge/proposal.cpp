@@ -673,7 +673,7 @@ class Planner::ProposalSearch {
         std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
 
     auto controls = std::make_shared<oc::RealVectorControlSpace>(states, static_cast<unsigned>(m_));
-    const Box& input = planner_.problem_->domain.input;
+    const Box& input = planner_.motion_.controls();
     ob::RealVectorBounds control_bounds(static_cast<unsigned>(m_));
     control_bounds.low.assign(input.lower().begin(), input.lower().end());
     control_bounds.high.assign(input.upper().begin(), input.upper().end());

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
 
 namespace forereach {
@@ -23,10 +24,23 @@ const Config& WithLaws(const Config& config) {
   return config;
 }
 
+Box ControlsOf(const Problem& problem) {
+  Eigen::VectorXd lower = problem.domain.input.lower(), upper = problem.domain.input.upper();
+  const Eigen::VectorXd& error = problem.declaration.input_error;
+  for (Eigen::Index i = 0; i < error.size(); ++i) {
+    if (!(error[i] > 0)) continue;
+    lower[i] = AddUp(lower[i], error[i]);
+    upper[i] = SubDown(upper[i], error[i]);
+    if (lower[i] > upper[i]) lower[i] = upper[i] = lower[i] / 2 + upper[i] / 2;
+  }
+  return {lower, upper};
+}
+
 }  // namespace
 
 RobotMotion::RobotMotion(const Config& config, Braking braking)
     : problem_(WithLaws(config).problem),
+      controls_(ControlsOf(*problem_)),
       dt_(StepOf(*problem_->model)),
       held_(HeldStates(config)),
       at_rest_(*config.laws.at_rest) {
@@ -130,9 +144,8 @@ bool RobotMotion::Rests(std::span<const double> x) const {
 }
 
 double RobotMotion::Clipped(std::size_t k, double value) const {
-  const Box& box = problem_->domain.input;
   const auto i = static_cast<Eigen::Index>(k);
-  return std::clamp(value, box.lower()[i], box.upper()[i]);
+  return std::clamp(value, controls_.lower()[i], controls_.upper()[i]);
 }
 
 void RobotMotion::Control(const TextFunction& law, std::span<const double> z, std::span<double> u) const {

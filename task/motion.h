@@ -30,6 +30,9 @@ class RobotMotion final {
 
   /** Duration of one step, s. */
   [[nodiscard]] double dt() const { return dt_; }
+  /** Where the controls of plans lie: domain.input, from each side nearer by declaration.input_error, since what acts
+  has to lie in the domain, too. Where nothing is left, the middle. */
+  [[nodiscard]] const Box& controls() const { return controls_; }
 
   /** Speed in state x, m/s: planner.speed, or else along the way of one step. It may be negative in reverse, which
   plans then do not use. */
@@ -43,11 +46,11 @@ class RobotMotion final {
   /** Whether there is a Pursue. */
   [[nodiscard]] bool has_hints() const { return hints_.has_value(); }
 
-  /** Sets u to a control for one step that steers x towards this motion, within the input domain. It is a hint for the
+  /** Sets u to a control for one step that steers x towards this motion, within controls(). It is a hint for the
   search. @pre has_hints(). */
   void Pursue(std::span<const double> x, const DesiredMotion& desired, std::span<double> u) const;
 
-  /** Changes u, a control drawn at random from the input domain, into one that the search may try in x. With hints it
+  /** Changes u, a control drawn at random from controls(), into one that the search may try in x. With hints it
   stays as it is: the search tries it for what no hint says. @param share drawn from [0, 1]. */
   void Explore(std::span<const double> x, double share, std::span<double> u) const;
 
@@ -64,7 +67,7 @@ class RobotMotion final {
   /** The number of ways to brake. Way 0 is the first of the task; try it first. */
   [[nodiscard]] int num_tails() const { return static_cast<int>(stops_.size()); }
 
-  /** Computes controls that bring the nominal model from x to rest. They lie within the input domain; the caller checks
+  /** Computes controls that bring the nominal model from x to rest. They lie within controls(); the caller checks
   the states.
   @param tail 0 .. num_tails() - 1. @param controls is set, one column for each step.
   @return false, with `controls` unspecified, if this takes more than max_steps. */
@@ -78,6 +81,7 @@ class RobotMotion final {
   void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const;
 
   std::shared_ptr<const Problem> problem_;
+  Box controls_;
   double dt_;
   std::vector<int> held_;
   std::vector<RestBound> at_rest_;

@@ -1,4 +1,4 @@
-// The log of a drive with errors of steps and sensors, which learns of it: replayed and verified.
+// The log of a drive with errors of steps, sensors and inputs, which learns of it: replayed and verified.
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/seal.h"
 #include "logger/logger_node.h"
@@ -16,15 +16,17 @@ namespace forereach::errors_log_test {
 
 using verifier::Status;
 
-// The course with errors of steps and states, driven by a robot that has them.
+// The course with errors of steps, states and inputs, driven by a robot that has them.
 std::string Task(const ScratchDirectory& scratch, const std::string& step_error_ms = "5") {
   std::filesystem::copy_file(FOREREACH_SOURCE_DIR "/tests/data/course_transitions.csv",
                              scratch / "course_transitions.csv", std::filesystem::copy_options::overwrite_existing);
   std::string text = Read(kCourseTask);
   text = Replaced(text, "state_error: {}", R"(state_error: {x: 0.02, y: 0.02, theta: 0.003, v: 0.02}
+  input_error: {jerk: 0.01, steer_rate: 0.001}
   transitions_are: exact)");
   text = Replaced(text, "step_error_ms: any", "step_error_ms: " + step_error_ms + R"(
   step_jitter: random
+  input_error: random
   sensor_error: adversarial)");
   text = Replaced(text, "time_limit_s: 4", "time_limit_s: 2");
   return scratch.Write("task" + step_error_ms + ".yaml", text);
