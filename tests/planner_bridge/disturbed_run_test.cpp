@@ -21,7 +21,8 @@ Config Task(const std::string& disturbance, int seed, bool grows = false) {
   }
   config.robot.disturbance = disturbance;
   config.robot.disturbance_seed = seed;
-  config.robot.time_limit_s = 40;
+  config.robot.step_period_ms = 100;  // model.dt: other steps are not learned
+  config.robot.time_limit_s = 100;
   config.planner.initial_half_width = {0.06, 0.06, 0.012, 0.04, 0.01, 0.002};
   config.planner.candidates = 8;
   config.gate.obstacles = ObstaclesSource::kTask;
@@ -48,7 +49,7 @@ Ending Drive(const Config& config) {
   CertifierNode certifier(config, *bus, {clock, clock});
   PlannerNode planner(config, *bus, out);
   RobotSimNode robot(config, *bus, out);
-  for (const std::int64_t end = now + 42'000'000; now < end && !robot.done(); now += 1000)
+  for (const std::int64_t end = now + 102'000'000; now < end && !robot.done(); now += 1000)
     for (Node* node : std::initializer_list<Node*>{&robot, &planner, &certifier}) {
       node->Tick(now);
       while (bus->Dispatch(0) > 0) {
@@ -117,7 +118,8 @@ Config DeadEnd() {
   config.planner.goal = {30, 0};
   config.gate.obstacles = ObstaclesSource::kTask;
   config.planner.candidates = 4;
-  config.robot.time_limit_s = 40;
+  config.robot.step_period_ms = 100;
+  config.robot.time_limit_s = 100;
   config.grounds = GroundsOf(DigestOf(std::string_view("dead end")), *config.problem, config.obstacles);
   return config;
 }
@@ -134,7 +136,7 @@ TEST(DeadEnd, ACarThatMayBackOffLeavesItAndReachesItsGoal) {
 
 TEST(DeadEnd, ACarThatMayNotStaysInIt) {
   Config config = DeadEnd();
-  config.robot.time_limit_s = 4;
+  config.robot.time_limit_s = 10;
   const Ending run = Drive(config);
   SCOPED_TRACE(run.robot.dump() + run.planner.dump());
   EXPECT_FIELDS(run, (robot["goal_reached"], false), (robot["contacts"], 0), (planner["back_off_rounds"], 0));

@@ -66,6 +66,24 @@ TEST(Motion, ARobotThatStandsNeedsNoTail) {
   EXPECT_EQ(controls.cols(), 0);
 }
 
+// What acts has to lie in the domain, however far it is off a plan's control.
+TEST(Motion, ControlsStayInTheDomainWithTheirErrors) {
+  Config config = PointMass();
+  const Box exact = RobotMotion(config, Braking::kPlanned).controls(), domain = config.problem->domain.input;
+  EXPECT_EQ(exact.upper(), domain.upper());
+  const double error = 0.6;
+  Own(config.problem).declaration.input_error = Vec({error, 9});
+  const RobotMotion motion(config, Braking::kPlanned);
+  const Box& controls = motion.controls();
+  EXPECT_LE(AddUp(controls.upper()[0], error), domain.upper()[0]);
+  EXPECT_GE(SubDown(controls.lower()[0], error), domain.lower()[0]);
+  EXPECT_GT(controls.upper()[0], domain.upper()[0] - 1.001 * error);
+  EXPECT_FIELDS(controls, (lower()[1], 0), (upper()[1], 0));  // nothing is left
+  Eigen::MatrixXd braking;
+  ASSERT_TRUE(motion.Brake(Span(Vec({0, 0, 2.5, 0})), 0, 100, braking));
+  EXPECT_EQ(braking.row(0).minCoeff(), controls.lower()[0]) << "it brakes as hard as it may";
+}
+
 TEST(Motion, HasTheStepOfItsModel) {
   EXPECT_DOUBLE_EQ(RobotMotion(Bicycle(), Braking::kPlanned).dt(), 0.1);
   EXPECT_DOUBLE_EQ(RobotMotion(PointMass(), Braking::kPlanned).dt(), 0.15);
