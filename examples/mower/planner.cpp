@@ -12,8 +12,8 @@ constexpr int kDrive = 12, kStop = 20, kMost = 24;  // steps; plans in one messa
 // How far a plan leaves the mower from the goal, by the task's model: metres, and what it has to turn there.
 static double Left(const forereach::NominalModel& model, VectorXd x, const MatrixXd& plan, const Vector2d& goal) {
   for (const auto& u : plan.colwise()) {
-    const VectorXd z = (VectorXd(x.size() + u.size()) << x, u).finished();
-    model.Evaluate({z.data(), static_cast<std::size_t>(z.size())}, {x.data(), static_cast<std::size_t>(x.size())});
+    const Eigen::Vector<double, 7> z = (Eigen::Vector<double, 7>() << x, u).finished();
+    model.Evaluate({z.data(), 7}, {x.data(), static_cast<std::size_t>(x.size())});
   }
   const Vector2d way = goal - x.head<2>();
   return way.norm() + 0.3 * std::abs(std::remainder(std::atan2(way.y(), way.x()) - x[2], 2 * M_PI));
