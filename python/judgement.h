@@ -71,7 +71,7 @@ class JudgingTask final : public std::enable_shared_from_this<JudgingTask> {
  private:
   const Config config_;
   Certifier certifier_;
-  LearnedTransitions learned_{model().num_variables(), model().num_states()};
+  LearnedTransitions learned_;
   mutable std::shared_mutex mutex_;  // the two above: Learn alone, Certify together
 };
 

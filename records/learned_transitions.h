@@ -7,8 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "forereach/numerics/size.h"
-
 namespace forereach {
 
 /** Executed transitions in the order in which they were learned. They only become more, and none moves: the first so
@@ -20,17 +18,15 @@ class LearnedTransitions final {
     double longer;                    ///< ExecutedTransition::longer
   };
 
-  LearnedTransitions(int num_variables, int num_states)
-      : num_variables_(ToSize(num_variables)), width_(num_variables_ + ToSize(num_states) + 1) {}
-
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] Each operator[](std::size_t i) const {
     const std::span<const double> row(blocks_[i / kBlock].get() + i % kBlock * width_, width_);
     return {row.first(num_variables_), row.subspan(num_variables_, width_ - num_variables_ - 1), row.back()};
   }
 
-  /** @pre as many numbers as the constructor says. */
+  /** @pre as many numbers as the first. */
   void Add(std::span<const double> z, std::span<const double> next, double longer) {
+    if (size_ == 0) num_variables_ = z.size(), width_ = z.size() + next.size() + 1;
     if (size_ % kBlock == 0) blocks_.push_back(std::make_unique_for_overwrite<double[]>(kBlock * width_));
     double* const row = blocks_.back().get() + size_++ % kBlock * width_;
     *std::ranges::copy(next, std::ranges::copy(z, row).out).out = longer;
@@ -39,7 +35,7 @@ class LearnedTransitions final {
  private:
   static constexpr std::size_t kBlock = 256;
 
-  std::size_t num_variables_, width_, size_ = 0;
+  std::size_t num_variables_ = 0, width_ = 0, size_ = 0;
   std::vector<std::unique_ptr<double[]>> blocks_;
 };
 

@@ -156,8 +156,7 @@ void Timeline::Follow(ObstaclesInForce obstacles) {
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = all_logged_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
-  const NominalModel& model = *now_->problem->model;
-  learned_ = std::make_shared<LearnedTransitions>(model.num_variables(), model.num_states());
+  learned_ = std::make_shared<LearnedTransitions>();
 }
 
 // A decision may tell of a reload before a heartbeat does.
