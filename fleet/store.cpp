@@ -344,15 +344,14 @@ class Store::Connection final {
     pqxx::work work(server);
     if (!HasTables(work)) {
       work.exec(kLock);
-      if (!HasTables(work)) Migrate(work, 0);
+      if (!HasTables(work)) MakeTables(work);
     }
     const auto version = work.exec1("SELECT max(version) FROM forereach_schema")[0].as<int>();
-    if (version < kMigrations[0].version || version > Database::kSchemaVersion)
+    if (version != Database::kSchemaVersion)
       throw StoreError(
           fmt::format("the store: schema version {}, this program knows version {}: use the program that made it, or "
                       "another database",
                       version, Database::kSchemaVersion));
-    if (version < Database::kSchemaVersion) Migrate(work, version);
     work.commit();
   }
 
@@ -364,9 +363,9 @@ class Store::Connection final {
         .as<bool>();
   }
 
-  static void Migrate(pqxx::work& work, int version) {
-    work.exec(MigrationSql(version, kDialect));
-    if (version == 0) work.exec(kAroundTables);
+  static void MakeTables(pqxx::work& work) {
+    work.exec(TablesSql(kDialect));
+    work.exec(kAroundTables);
     work.exec(fmt::format("INSERT INTO forereach_schema VALUES ({})", Database::kSchemaVersion));
   }
 };

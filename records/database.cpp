@@ -200,14 +200,13 @@ void Database::MakeOrCheck() {
     Execute(fmt::format("PRAGMA application_id = {}", kApplicationId).c_str());
   else if (number("PRAGMA application_id") != kApplicationId)
     throw DatabaseError("not a decision database: move it away or use another directory");
-  const std::int64_t version = is_new ? 0 : number("PRAGMA user_version");
-  if (!is_new && (version < kMigrations[0].version || version > kSchemaVersion))
+  if (const std::int64_t version = number("PRAGMA user_version"); !is_new && version != kSchemaVersion)
     throw DatabaseError(
         fmt::format("schema version {}, this program knows version {}: use the program that made it, or "
                     "another directory",
                     version, kSchemaVersion));
-  if (version < kSchemaVersion) {
-    Execute(MigrationSql(static_cast<int>(version), kDialect).c_str());
+  if (is_new) {
+    Execute(TablesSql(kDialect).c_str());
     Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion).c_str());
   }
   Execute("COMMIT");

@@ -15,14 +15,8 @@
 
 namespace forereach {
 
-/** What brings the tables from the version before to this one. */
-struct Migration {
-  int version;
-  const char* sql;  ///< With the names of Dialect in braces.
-};
-
 /** Both engines take these types: eight bytes each, in SQLite by the words INT and DOUB in them. */
-inline constexpr Migration kMigrations[] = {{Database::kSchemaVersion, R"sql(
+inline constexpr const char* kTables = R"sql(
   CREATE TABLE {runs} (
     log_file TEXT NOT NULL, start_utime BIGINT NOT NULL, end_utime BIGINT,
     events BIGINT NOT NULL DEFAULT 0, recovered TEXT NOT NULL DEFAULT '', continues TEXT NOT NULL DEFAULT '',
@@ -52,7 +46,7 @@ inline constexpr Migration kMigrations[] = {{Database::kSchemaVersion, R"sql(
     utime BIGINT NOT NULL, sequence BIGINT NOT NULL, duration_us BIGINT NOT NULL,
     state TEXT NOT NULL, input TEXT NOT NULL, next_state TEXT NOT NULL,
     event_digest TEXT NOT NULL, {unique} ({key})){partitioned};
-)sql"}};
+)sql";
 
 /** In what the engines differ. SQLite's database is one robot's, and its rows change with it; in PostgreSQL several
 robots add rows, and none changes. */
@@ -66,16 +60,13 @@ struct Dialect {
   const char* partitioned;
 };
 
-/** The statements that bring tables of `version` to the newest, which 0 has none of. Empty if they are that. */
-inline std::string MigrationSql(int version, const Dialect& dialect) {
-  std::string sql;
-  for (const Migration& each : kMigrations)
-    if (each.version > version)
-      sql += fmt::format(fmt::runtime(each.sql), fmt::arg("runs", dialect.runs), fmt::arg("run_key", dialect.run_key),
-                         fmt::arg("robot", dialect.robot), fmt::arg("key", dialect.key),
-                         fmt::arg("gap_key", dialect.gap_key), fmt::arg("unique", dialect.unique),
-                         fmt::arg("partitioned", dialect.partitioned));
-  return sql;
+/** The statements that make them, of version Database::kSchemaVersion. Tables of another version are refused: logs make
+them anew (ingest, and the logger where its database is gone). */
+inline std::string TablesSql(const Dialect& dialect) {
+  return fmt::format(fmt::runtime(kTables), fmt::arg("runs", dialect.runs), fmt::arg("run_key", dialect.run_key),
+                     fmt::arg("robot", dialect.robot), fmt::arg("key", dialect.key),
+                     fmt::arg("gap_key", dialect.gap_key), fmt::arg("unique", dialect.unique),
+                     fmt::arg("partitioned", dialect.partitioned));
 }
 
 /** A column that is NULL where the number is -1. */
