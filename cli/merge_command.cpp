@@ -63,7 +63,8 @@ std::string DigestOfRest(const std::string& path) {
 
 std::string DigestOfProgram() { return DigestOfFile(fs::read_symlink("/proc/self/exe").string()); }
 
-// Names, sizes and times of the kept tasks: the content of each is checked against its name when it is read.
+// Names and sizes of the kept tasks, which are digests: the content of each is checked against its name when it is
+// read. A copy on another machine has other times.
 std::string DescribeTasks(const fs::path& directory) {
   std::vector<std::string> files;
   std::error_code error;
@@ -71,8 +72,7 @@ std::string DescribeTasks(const fs::path& directory) {
        file.increment(error)) {
     std::error_code none;
     const auto bytes = file->is_regular_file(none) ? file->file_size(none) : 0;
-    files.push_back(fmt::format("{} {} {}\n", file->path().string(), bytes,
-                                file->last_write_time(none).time_since_epoch().count()));
+    files.push_back(fmt::format("{} {}\n", file->path().string(), bytes));
   }
   std::ranges::sort(files);
   std::string text;

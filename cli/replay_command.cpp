@@ -2,6 +2,7 @@
 #include <iostream>
 #include <map>
 #include <optional>
+#include <span>
 
 #include <nlohmann/json.hpp>
 
@@ -141,14 +142,23 @@ std::string GainsAndLosses(const Comparison& compared) {
          " certificates lost";
 }
 
+// The JSON has all.
+void PrintFirst(const std::vector<std::string>& plans) {
+  constexpr std::size_t kMost = 20;
+  for (const std::string& plan : std::span(plans).first(std::min(kMost, plans.size())))
+    std::cout << "    " << Printable(plan) << "\n";
+  if (plans.size() > kMost) std::cout << "    and " << plans.size() - kMost << " more\n";
+}
+
 void PrintForPeople(const Comparison& compared, const ByRobot& robots, const NamedRuns& named,
                     const std::string& config) {
   PrintMissing(named);
   if (!compared.gained.empty()) std::cout << "abstentions that would have been certificates, by what was recorded\n";
   for (const auto& [why, count] : ByCount(compared.gained)) std::cout << "  " << count << ": " << Describe(why) << "\n";
+  PrintFirst(compared.gained_plans);
   if (!compared.lost.empty()) std::cout << "certificates that would have been lost, by why\n";
   for (const auto& [why, count] : ByCount(compared.lost)) std::cout << "  " << count << ": " << Describe(why) << "\n";
-  for (const std::string& plan : compared.lost_plans) std::cout << "    " << Printable(plan) << "\n";
+  PrintFirst(compared.lost_plans);
   if (!compared.otherwise.empty()) std::cout << "refused in both, for another reason\n";
   for (const auto& [whys, count] : ByCount(compared.otherwise))
     std::cout << "  " << count << ": " << Describe(whys.first) << "; then " << Describe(whys.second) << "\n";
@@ -203,6 +213,7 @@ void PrintJson(const Comparison& compared, const ByRobot& robots, const NamedRun
                                     {"lost", compared.num_lost()},
                                     {"gained_by", ToJson(compared.gained)},
                                     {"lost_by", ToJson(compared.lost)},
+                                    {"gained_plans", compared.gained_plans},
                                     {"lost_plans", compared.lost_plans},
                                     {"refused_alike", compared.refused_alike},
                                     {"refused_otherwise", otherwise},
@@ -223,7 +234,7 @@ int PrintComparison(ResultsOfRuns<Comparison> results, const NamedRuns& named, c
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (!results[i]) continue;
     Comparison of_run = std::move(*results[i]).Sum();
-    NameRobot(named, named.runs[i], of_run.lost_plans);
+    for (auto* const plans : {&of_run.lost_plans, &of_run.gained_plans}) NameRobot(named, named.runs[i], *plans);
     robots[named.runs[i].robot] += of_run;
     sum += of_run;
   }

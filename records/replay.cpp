@@ -257,7 +257,7 @@ class Comparer final : public GateFollower {
     const bool was = before.outcome == decision_t::CERTIFIED, is = after.outcome == decision_t::CERTIFIED;
     ++counts.candidates;
     counts.certificates += was;
-    if (!was && is) ++counts.gained[WhyNotOf(before)];
+    if (!was && is) Gain(recorded);
     if (was && !is) Lose(recorded, after);
     if (!was && !is) Refuse(before, after);
   }
@@ -271,11 +271,17 @@ class Comparer final : public GateFollower {
   }
 
  private:
+  static std::string NameOfPlan(const RecordedDecision& recorded) {
+    return fmt::format("{}, plan {} of {}", recorded.event, recorded.decision.plan_id,
+                       GetText(recorded.decision.source));
+  }
+  void Gain(const RecordedDecision& recorded) {
+    ++cases_.counts.gained[WhyNotOf(recorded.decision)];
+    cases_.Tell().gained_plans.push_back(NameOfPlan(recorded));
+  }
   void Lose(const RecordedDecision& recorded, const decision_t& after) {
     ++cases_.counts.lost[WhyNotOf(after)];
-    if (cases_.told.size() < Comparison::kLostPlans)
-      cases_.Tell().lost_plans.push_back(fmt::format("{}, plan {} of {}: {}", recorded.event, after.plan_id,
-                                                     GetText(after.source), GetText(after.message)));
+    cases_.Tell().lost_plans.push_back(NameOfPlan(recorded) + ": " + GetText(after.message));
   }
   void Refuse(const decision_t& before, const decision_t& after) {
     WhyNot then = WhyNotOf(before), now = WhyNotOf(after);
@@ -359,8 +365,8 @@ Comparison& operator+=(Comparison& sum, const Comparison& other) {
   for (const auto& [why, count] : other.lost) sum.lost[why] += count;
   for (const auto& [whys, count] : other.otherwise) sum.otherwise[whys] += count;
   sum.refused_alike += other.refused_alike;
-  for (const std::string& plan : other.lost_plans)
-    if (sum.lost_plans.size() < Comparison::kLostPlans) sum.lost_plans.push_back(plan);
+  std::ranges::copy(other.lost_plans, std::back_inserter(sum.lost_plans));
+  std::ranges::copy(other.gained_plans, std::back_inserter(sum.gained_plans));
   sum.corruptions += other.corruptions;
   sum.passed_over += other.passed_over;
   return sum;

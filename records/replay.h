@@ -79,12 +79,10 @@ struct Comparison {
   std::map<WhyNot, std::int64_t> lost;
   /** Refused in both, for other reasons: recorded, and under the other task. Without steps. */
   std::map<std::pair<WhyNot, WhyNot>, std::int64_t> otherwise;
-  std::int64_t refused_alike = 0;       ///< For the same outcome, cause and obstacle.
-  std::vector<std::string> lost_plans;  ///< The first kLostPlans of them, for people.
+  std::int64_t refused_alike = 0;                     ///< For the same outcome, cause and obstacle.
+  std::vector<std::string> lost_plans, gained_plans;  ///< All of them, in the order of the log, for people.
   std::int64_t corruptions = 0;
   PassedOver passed_over;
-
-  static constexpr std::size_t kLostPlans = 20;
 
   [[nodiscard]] std::int64_t num_gained() const;
   [[nodiscard]] std::int64_t num_lost() const;

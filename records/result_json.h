@@ -19,7 +19,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReplayResult, candidates, agreed, withdrawals
                                    passed_over, differences, shown)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WhyNot, outcome, cause, obstacle, step)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Comparison, candidates, certificates, circumstances, without_candidate, undecided,
-                                   gained, lost, otherwise, refused_alike, lost_plans, corruptions, passed_over)
+                                   gained, lost, otherwise, refused_alike, lost_plans, gained_plans, corruptions,
+                                   passed_over)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ExportResult, decisions, without_candidate, executions, withdrawals, gaps, tubes,
                                    messages, left_out, damage, passed_over, has_messages)
 
