@@ -44,8 +44,8 @@ Command FleetReportCommand() {
       .options = {Required({"--database", &options->database, "URL", kDatabaseAddress}),
                   {"-o,--out", &options->out, "FILE.html", "Write a page for a browser, a new file"},
                   Needing("--out", {"--runs", &options->runs, "URL",
-                                    "Where the pages of runs are: logs lead to URL/ROBOT/LOG.html, as forereach report "
-                                    "LOG --out writes them"}),
+                                    "Where the pages of runs are: numbers lead to URL/ROBOT/LOG.html, as forereach "
+                                    "report LOG --out writes them, or to a list of these"}),
                   Excluding("--out", {"--json", &options->json, "", "One JSON document on standard output"})},
       .run = [options] { return ReportFleet(*options); }};
 }

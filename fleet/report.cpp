@@ -1,10 +1,14 @@
 #include "fleet/report.h"
 
 #include <algorithm>
+#include <array>
+#include <sstream>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forereach/numerics/size.h"
 #include "lcmtypes/printable.h"
 #include "task/json_text.h"
 
@@ -30,10 +34,22 @@ constexpr const char* kGroups = R"sql(
     SELECT robot, declaration_digest, sum(n) AS n, coalesce(sum(n) FILTER (WHERE outcome = 'certified'), 0) AS certified,
            coalesce(sum(n) FILTER (WHERE outcome = 'abstain_falsified'), 0) AS contradictions, max(last) AS last,
            max(last) = max(max(last)) OVER (PARTITION BY robot) AS in_force
-    FROM groups GROUP BY 1, 2)
+    FROM groups GROUP BY 1, 2),
+  days_of AS (
+    SELECT robot, day, round(100 * coalesce(sum(n) FILTER (WHERE outcome = 'certified'), 0) / sum(n), 1) AS share,
+           row_number() OVER (PARTITION BY robot ORDER BY day DESC) AS back
+    FROM groups WHERE day BETWEEN 0 AND 100000 GROUP BY 1, 2),
+  trends AS (
+    SELECT robot, string_agg(share::TEXT, ' ' ORDER BY day) AS trend FROM days_of WHERE back <= 30 GROUP BY 1)
 )sql";
 
-// Each gives rows of values in the order of its columns.
+constexpr const char* kTrend = "certified % by day";
+
+// Whose numbers lead to runs.
+constexpr std::array<std::string_view, 8> kNumbers = {"decisions", "certified %", "contradictions", "withdrawals",
+                                                      "runs",      "%",           "robots",         "in force on"};
+
+// Each gives rows of values in the order of its columns, and all runs of a row, or null.
 struct TableQuery {
   const char* title;
   std::vector<std::string> columns;
@@ -43,38 +59,44 @@ struct TableQuery {
 const std::vector<TableQuery>& Queries() {
   static const std::vector<TableQuery> queries{
       {"Robots",
-       {"robot", "decisions", "certified %", "contradictions", "withdrawals", "runs", "log"},
+       {"robot", "decisions", "certified %", "contradictions", "withdrawals", "runs", kTrend, "log"},
        R"sql(SELECT r.robot, sum(r.n), round(100 * sum(certified) / sum(r.n), 1), sum(contradictions),
-             coalesce(sum(w.n), 0), count(*), (array_agg(r.log_file ORDER BY certified / r.n))[1]
-             FROM runs_of r LEFT JOIN withdrawn w USING (robot, log_file) GROUP BY 1 ORDER BY 3, 1)sql"},
+             coalesce(sum(w.n), 0), count(*), min(trend), (array_agg(r.log_file ORDER BY certified / r.n))[1],
+             jsonb_agg(DISTINCT jsonb_build_array(r.robot, r.log_file))
+             FROM runs_of r LEFT JOIN withdrawn w USING (robot, log_file) LEFT JOIN trends USING (robot)
+             GROUP BY 1 ORDER BY 3, 1)sql"},
       {"Causes",
        {"outcome", "cause", "decisions", "%", "robots", "robot", "log", "event"},
        R"sql(SELECT outcome, cause, sum(n), round(100 * sum(n) / sum(sum(n)) OVER (), 1), count(DISTINCT robot),
              (array_agg(robot ORDER BY n DESC, robot, log_file))[1],
              (array_agg(log_file ORDER BY n DESC, robot, log_file))[1],
-             (array_agg(event ORDER BY n DESC, robot, log_file))[1] FROM groups GROUP BY 1, 2 ORDER BY 3 DESC, 1, 2)sql"},
+             (array_agg(event ORDER BY n DESC, robot, log_file))[1],
+             jsonb_agg(DISTINCT jsonb_build_array(robot, log_file)) FROM groups GROUP BY 1, 2 ORDER BY 3 DESC, 1, 2)sql"},
       {"Contradictions",
        {"declaration", "decisions", "robot", "log", "event"},
-       R"sql(SELECT left(declaration_digest, 12), sum(n), robot, log_file, min(event) FROM groups
+       R"sql(SELECT left(declaration_digest, 12), sum(n), robot, log_file, min(event), NULL::JSONB FROM groups
              WHERE outcome = 'abstain_falsified' GROUP BY declaration_digest, robot, log_file ORDER BY 2 DESC, 3, 4)sql"},
       {"Withdrawals",
        {"withdrawals", "robot", "log", "event"},
-       R"sql(SELECT n, robot, log_file, event FROM withdrawn ORDER BY 1 DESC, 2, 3)sql"},
+       R"sql(SELECT n, robot, log_file, event, NULL::JSONB FROM withdrawn ORDER BY 1 DESC, 2, 3)sql"},
       {"Declarations",
        {"declaration", "in force on", "robots", "decisions", "certified %", "contradictions", "until", "robot"},
        R"sql(SELECT left(declaration_digest, 12), count(*) FILTER (WHERE in_force), count(*), sum(n),
              round(100 * sum(certified) / sum(n), 1), sum(contradictions),
-             to_char(to_timestamp(max(last) / 1000000) AT TIME ZONE 'UTC', 'YYYY-MM-DD HH24:MI'), min(robot)
+             to_char(to_timestamp(max(last) / 1000000) AT TIME ZONE 'UTC', 'YYYY-MM-DD HH24:MI'), min(robot),
+             (SELECT jsonb_agg(DISTINCT jsonb_build_array(g.robot, g.log_file)) FROM groups g
+              WHERE g.declaration_digest = declared.declaration_digest)
              FROM declared GROUP BY declaration_digest ORDER BY 2 DESC, 4 DESC, 1)sql"},
       {"Days",
        {"day", "robots", "decisions", "certified %", "contradictions"},
        R"sql(SELECT to_char(to_timestamp(day * 86400) AT TIME ZONE 'UTC', 'YYYY-MM-DD'), count(DISTINCT robot), sum(n),
              round(100 * coalesce(sum(n) FILTER (WHERE outcome = 'certified'), 0) / sum(n), 1),
-             coalesce(sum(n) FILTER (WHERE outcome = 'abstain_falsified'), 0)
+             coalesce(sum(n) FILTER (WHERE outcome = 'abstain_falsified'), 0),
+             jsonb_agg(DISTINCT jsonb_build_array(robot, log_file))
              FROM groups WHERE day BETWEEN 0 AND 100000 GROUP BY day ORDER BY day DESC)sql"},
       {"Runs",
        {"robot", "log", "decisions", "certified %", "contradictions"},
-       R"sql(SELECT robot, log_file, n, round(100 * certified / n, 1), contradictions FROM runs_of
+       R"sql(SELECT robot, log_file, n, round(100 * certified / n, 1), contradictions, NULL::JSONB FROM runs_of
              ORDER BY contradictions DESC, 4, 1, 2)sql"}};
   return queries;
 }
@@ -111,18 +133,23 @@ std::vector<FleetTable> ReadFleet(Store& store) {
   std::string sql = kGroups;
   for (const TableQuery& query : Queries()) {
     std::vector<std::string> names, texts;
+    const std::string first_runs = fmt::format("jsonb_path_query_array(runs, '$[0 to {}]')", FleetTable::kMostRuns - 1);
     for (std::size_t i = 0; i < query.columns.size(); ++i) {
       names.push_back(fmt::format("c{}", i));
       texts.push_back(fmt::format("coalesce(c{}::TEXT, '')", i));
     }
-    sql += fmt::format("{} (SELECT {}, json_build_array({})::TEXT FROM ({}) AS t({}) LIMIT {})",
-                       tables.empty() ? "" : " UNION ALL", tables.size(), fmt::join(texts, ", "), query.sql,
+    sql += fmt::format("{} (SELECT {}, json_build_array({})::TEXT, {}::TEXT FROM ({}) AS t({}, runs) LIMIT {})",
+                       tables.empty() ? "" : " UNION ALL", tables.size(), fmt::join(texts, ", "), first_runs, query.sql,
                        fmt::join(names, ", "), kMostRows);
-    tables.push_back({query.title, query.columns, {}});
+    tables.push_back({query.title, query.columns, {}, {}});
   }
   for (const Store::Values& row : store.Query(sql)) {
-    std::vector<std::string>& cells = tables.at(std::stoul(row.at(0).value())).rows.emplace_back();
+    FleetTable& table = tables.at(std::stoul(row.at(0).value()));
+    std::vector<std::string>& cells = table.rows.emplace_back();
     for (const auto& cell : ParseJson(row.at(1).value())) cells.push_back(FromStoredText(cell.get<std::string>()));
+    auto& runs = table.runs.emplace_back();
+    for (const auto& run : ParseJson(row.at(2).value_or("[]")))
+      runs.emplace_back(FromStoredText(run.at(0).get<std::string>()), FromStoredText(run.at(1).get<std::string>()));
   }
   return tables;
 }
@@ -152,28 +179,81 @@ nlohmann::json ToJson(const std::vector<FleetTable>& tables) {
   return json;
 }
 
+namespace {
+
+std::string PageOf(const std::string& runs, const std::string& robot, const std::string& log) {
+  return fmt::format("{}/{}/{}.html", Escaped(runs), InAddress(robot), InAddress(log));
+}
+
+// Shares by day, as a line.
+std::string Sparkline(const std::string& shares) {
+  std::istringstream words(shares);
+  std::string points;
+  int days = 0;
+  for (double share = 0; words >> share; ++days) points += fmt::format("{},{:.0f} ", 4 * days, 16 - 0.15 * share);
+  return fmt::format(
+      "<svg width=\"{}\" height=\"17\"><title>{}</title><polyline points=\"{}\" fill=\"none\" "
+      "stroke=\"#0072B2\"/></svg>",
+      4 * days, Escaped(shares), points);
+}
+
+// One row, and the list of its runs where they are several.
+void AddRow(const FleetTable& table, std::size_t number, const std::string& runs, std::string& rows,
+            std::string& lists) {
+  const std::vector<std::string>& row = table.rows[number];
+  const std::size_t robot = Find(table.columns, "robot"), log = Find(table.columns, "log");
+  const auto& counted = table.runs[number];
+  std::string numbers;  // where they lead to
+  if (runs.empty()) {
+  } else if (counted.size() > 1) {
+    const std::string name = fmt::format("{}-{}", table.title, number);
+    numbers = "#" + name;
+    lists += fmt::format("<p class=\"runs\" id=\"{}\">{}:", name, Escaped(Printable(row[0])));
+    for (const auto& [of, file] : counted)
+      lists += fmt::format(" <a href=\"{}\">{} {}</a>", PageOf(runs, of, file), Escaped(Printable(of)),
+                           Escaped(Printable(file)));
+    lists += ToSize(FleetTable::kMostRuns) == counted.size() ? " and perhaps more</p>\n" : "</p>\n";
+  } else if (counted.size() == 1) {
+    numbers = PageOf(runs, counted[0].first, counted[0].second);
+  } else if (log < row.size()) {
+    numbers = PageOf(runs, row[robot], row[log]);
+  }
+  rows += "<tr>";
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    const std::string& column = table.columns[i];
+    const std::string text = column == kTrend ? Sparkline(row[i]) : Escaped(Printable(row[i]));
+    const std::string address = runs.empty() ? ""
+                                : i == log   ? PageOf(runs, row[robot], row[log])
+                                : std::ranges::find(kNumbers, column) != std::end(kNumbers) ? numbers
+                                                                                            : "";
+    rows += address.empty() ? fmt::format("<td>{}</td>", text)
+                            : fmt::format("<td><a href=\"{}\">{}</a></td>", address, text);
+  }
+  rows += "</tr>\n";
+}
+
+}  // namespace
+
 std::string FleetHtml(const std::vector<FleetTable>& tables, const std::string& runs) {
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>ForeReach: the fleet</title>\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
       "<style>body{font:15px sans-serif;margin:2em}table{border-collapse:collapse}td,th{padding:.2em "
-      ".8em;text-align:left;border-bottom:1px solid #ccc}</style></head><body>\n<h1>The fleet</h1>\n";
+      ".8em;text-align:left;border-bottom:1px solid #ccc}"
+      ".runs{display:none}.runs:target{display:block}</style></head><body>\n<h1>The fleet</h1>\n";
+  html += runs.empty() ? "<p>With <code>--runs</code>, numbers lead to the pages of runs.</p>\n"
+                       : fmt::format(
+                             "<p>Numbers lead to the pages of the runs that they count. The page of a run is made by "
+                             "<code>forereach report LOG --out {}/ROBOT/LOG.html</code>, with the log's name.</p>\n",
+                             Escaped(runs));
+  html += "<p>Decisions in shadow mode count as the others: whether a run was one says its page.</p>\n";
   for (const FleetTable& table : tables) {
-    const std::size_t robot = Find(table.columns, "robot"), log = Find(table.columns, "log");
     html += fmt::format("<h2>{}</h2>\n<table><tr>", table.title);
     for (const std::string& column : table.columns) html += fmt::format("<th>{}</th>", column);
     html += "</tr>\n";
-    for (const auto& row : table.rows) {
-      html += "<tr>";
-      for (std::size_t i = 0; i < row.size(); ++i)
-        if (i == log && !runs.empty())
-          html += fmt::format("<td><a href=\"{}/{}/{}.html\">{}</a></td>", Escaped(runs), InAddress(row[robot]),
-                              InAddress(row[log]), Escaped(Printable(row[i])));
-        else
-          html += fmt::format("<td>{}</td>", Escaped(Printable(row[i])));
-      html += "</tr>\n";
-    }
-    html += "</table>\n";
+    std::string lists;
+    for (std::size_t i = 0; i < table.rows.size(); ++i) AddRow(table, i, runs, html, lists);
+    html += "</table>\n" + lists;
     if (table.rows.size() == kMostRows) html += fmt::format("<p>The first {} rows.</p>\n", kMostRows);
   }
   return html + "</body></html>\n";

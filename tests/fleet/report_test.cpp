@@ -2,6 +2,7 @@
 
 #include "tests/cli/program.h"
 #include "tests/fleet/postgres.h"
+#include "tests/records/course.h"
 
 namespace forereach::report_test {
 
@@ -45,9 +46,9 @@ using Row = std::vector<std::string>;
 TEST_F(FleetReportTest, CountsEachRobotCauseDeclarationAndDay) {
   AddFleet();
   const auto tables = Tables();
-  EXPECT_THAT(tables.at("Robots"), ElementsAre(Row{"<b>r3</b>", "4", "25.0", "0", "1", "1", "x\"&.lcmlog"},
-                                               Row{"r1", "20", "70.0", "2", "2", "2", "b.lcmlog"},
-                                               Row{"r2", "20", "100.0", "0", "1", "1", "a.lcmlog"}));
+  EXPECT_THAT(tables.at("Robots"), ElementsAre(Row{"<b>r3</b>", "4", "25.0", "0", "1", "1", "25.0", "x\"&.lcmlog"},
+                                               Row{"r1", "20", "70.0", "2", "2", "2", "90.0 50.0", "b.lcmlog"},
+                                               Row{"r2", "20", "100.0", "0", "1", "1", "100.0", "a.lcmlog"}));
   EXPECT_THAT(tables.at("Causes"),
               ElementsAre(Row{"certified", "none", "35", "79.5", "3", "r2", "a.lcmlog", "0"},
                           Row{"abstain_safety", "obstacle", "7", "15.9", "2", "<b>r3</b>", "x\"&.lcmlog", "1"},
@@ -89,7 +90,50 @@ TEST_F(FleetReportTest, IsATextADocumentOrAPage) {
   EXPECT_THAT(Read(page), AllOf(HasSubstr("<td><a href=\"../pages/r1/b.lcmlog.html\">b.lcmlog</a></td>"),
                                 HasSubstr("&lt;b&gt;r3&lt;/b&gt;"), Not(HasSubstr("<b>r3")),
                                 HasSubstr("pages/%3Cb%3Er3%3C%2Fb%3E/x%22%26.lcmlog.html")));
+  EXPECT_THAT(Read(page),
+              AllOf(HasSubstr("<a href=\"#Robots-1\">2</a>"), HasSubstr("points=\"0,2 4,8 \""),
+                    HasSubstr("<td><a href=\"../pages/r2/a.lcmlog.html\">100.0</a></td>"), HasSubstr("shadow mode"),
+                    HasSubstr("<code>forereach report LOG --out ../pages/ROBOT")));
   EXPECT_THAT(Forereach(database + " --out " + page + " 2>&1"), Exits(2, page));
+}
+
+// From every number to the page of a run, which is there.
+TEST_F(FleetReportTest, ItsNumbersLeadToThePagesOfRuns) {
+  const ScratchDirectory scratch;
+  for (const std::string robot : {"r1", "r2"}) {
+    std::filesystem::create_directories(scratch / ("pages/" + robot));
+    for (const std::string log : {"a.lcmlog", "b.lcmlog"}) {
+      std::filesystem::copy_file(kCourseLog, scratch / log, std::filesystem::copy_options::overwrite_existing);
+      const std::string of = " '" + scratch / log + "' --config " + kCourseTask;
+      EXPECT_EQ(Forereach("ingest" + of + " --robot " + robot + " --database '" + server_->Address() + "' 2>&1").code,
+                0);
+      EXPECT_EQ(Forereach("report" + of + " --advice-seconds 0 --out " + (scratch / ("pages/" + robot + "/" + log)) +
+                          ".html 2>&1")
+                    .code,
+                0);
+    }
+  }
+  const std::string page = scratch / "fleet.html";
+  EXPECT_THAT(Forereach("report --database '" + server_->Address() + "' --out " + page + " --runs pages 2>&1"),
+              Exits(0, "2 robots"));
+  const std::string html = Read(page), address = "<a href=\"";
+  std::set<std::string> pages;
+  int lists = 0;
+  for (std::size_t at = 0; (at = html.find(address, at)) != std::string::npos;) {
+    at += address.size();
+    const std::string to = html.substr(at, html.find('"', at) - at);
+    if (to.starts_with("#")) {
+      ++lists;
+      EXPECT_THAT(html, HasSubstr("id=\"" + to.substr(1) + "\">"));
+    } else {
+      pages.insert(to);
+      EXPECT_THAT(Read(scratch / to), HasSubstr("<html")) << to;
+    }
+  }
+  EXPECT_EQ(pages.size(), 4u);
+  EXPECT_GE(lists, 2 * 5) << "of robots, causes, declarations and days";
+  const std::size_t robots = html.find("<h2>Robots"), row = html.find("<td>r1</td>", robots);
+  EXPECT_EQ(html.find("<td><a", row), row + 11) << "each number leads somewhere";
 }
 
 }  // namespace forereach::report_test

@@ -72,6 +72,30 @@ TEST_F(FleetImportTest, WritesWhatEachRobotHasExecuted) {
               Exits(0, "from " + std::to_string(2 * of_course.size()) + " transitions"));
 }
 
+// Of each robot alone, and of all together.
+TEST_F(FleetImportTest, WritesWhatFitReads) {
+  std::string text = Replaced(Read(kCourseTask), "transitions: course_transitions.csv", "transitions: fleet.csv");
+  text = Replaced(text, "{name: kinematic_bicycle, dt: 0.1, wheelbase: 2.5, set_at_steps: [a, delta]}",
+                  "{file: " FOREREACH_SOURCE_DIR
+                  "/config/models/kinematic_bicycle.yaml, parameters: {dt: 0.1, wheelbase: 2.5}, angles: []}");
+  const std::string task = scratch_.Write("task.yaml", text.substr(0, text.find("\ncertifier:") + 1));
+  Add("r1");
+  Add("r2", [](int, transition_t& transition) {  // It turns less, as a longer car does.
+    transition.next_state[2] = transition.state[2] + 0.8 * (transition.next_state[2] - transition.state[2]);
+  });
+  const auto wheelbase = [&](const std::string& robots) {
+    EXPECT_THAT(Import("--out " + out_ + robots).text, HasSubstr("transitions of 0.1 s in "));
+    const Output output = Forereach("fit --json --parameters wheelbase --config " + task);
+    EXPECT_EQ(output.code, 0) << robots;
+    std::filesystem::remove(out_);
+    return nlohmann::json::parse(output.text)["parameters"][0]["after"].get<double>();
+  };
+  const double first = wheelbase(" --robot r1"), second = wheelbase(" --robot r2"), pooled = wheelbase("");
+  EXPECT_NEAR(second, first / 0.8, 1e-6 * second);
+  EXPECT_LT(first + 0.05, pooled);
+  EXPECT_LT(pooled, second - 0.05);
+}
+
 TEST_F(FleetImportTest, TakesOneRobotOrDay) {
   const std::string count = std::to_string(OfCourse().size());
   Add("r1");
