@@ -186,9 +186,10 @@ const figuresOf = (run) => {
   const abstained = [...outcomes].filter(([name]) => name.startsWith('abstain')).reduce((sum, [, n]) => sum + n, 0);
   const latency = sortedOf(run, 'latency'), gate = sortedOf(run, 'elapsed');
   const kinds = countKinds(run.events, 'kind'), reasons = new Map();
-  const first = [];
+  const first = [], stepped = [];
   for (let k = 0; k < run.size; ++k) {
-    const i = run.rows[k];
+    const i = run.rows[k], latency = run.decisions.latency.values[i];
+    if (latency < 0 || latency >= 3.6e9) stepped.push(run.time[i]);
     if (run.decisions.step.values[i] >= 0 && nameAt(run.decisions.outcome, i).startsWith('abstain'))
       first.push(run.decisions.step.values[i]);
   }
@@ -211,7 +212,8 @@ const figuresOf = (run) => {
     ['Rejected', percent(of('rejected'), run.size), counted(of('rejected'))],
     ['First step that fails', first.length ? `${quantile(first, .5)}` : '\u2013',
       first.length ? `median; from ${first[0]} to ${first.at(-1)}` : 'no abstention names a step'],
-    ['Latency', duration(quantile(latency, .5)), `median; ${times(latency)}`],
+    ['Latency', duration(quantile(latency, .5)), `median; ${times(latency)}${
+      stepped.length ? `; ${counted(stepped.length)} left out, since the log's clock stepped at ${timeText(stepped[0])}` : ''}`],
     ['Gate', duration(quantile(gate, .5)), `median; ${times(gate)}`],
     ['Steps in their slice', steps > 0 ? percent(inside, steps) : '\u2013',
       `${counted(inside)} of ${counted(steps)}${consistent ? `; ${counted(consistent)} consistent (within the state error)` : ''}`],

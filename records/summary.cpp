@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <numeric>
 #include <utility>
 
+#include <fmt/chrono.h>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
@@ -19,6 +21,13 @@ namespace {
 
 constexpr std::int64_t kBackUs = 1'000'000, kAheadUs = 3'600'000'000;  // a step of the clock, and no passing of time
 constexpr std::size_t kRepeated = 256;  // answers to withdrawals that may be repeated at one time
+
+// UTC; a log's time may be any number.
+std::string DayAndTime(std::int64_t utime) {
+  constexpr std::int64_t kMost = 253'402'300'800'000'000;  // the year 10000
+  return 0 <= utime && utime < kMost ? fmt::format("{:%F %T}", fmt::gmtime(static_cast<std::time_t>(utime / 1'000'000)))
+                                     : fmt::format("at {} us", utime);
+}
 
 double NearestRank(std::vector<double>& values, double fraction) {
   if (values.empty()) return kNoNumber;
@@ -99,9 +108,9 @@ std::string ToText(const Summary& summary) {
   if (const std::string refused = DescribeRefusals(summary.passed_over.not_authentic); !refused.empty())
     line("not authentic", refused + ", passed over");
   if (summary.clock_steps > 0)
-    line("clock stepped",
-         fmt::format("{} times, first at event {} by {:+.3f} s; times across it are left out", summary.clock_steps,
-                     summary.first_step_event, static_cast<double>(summary.first_step_us) * 1e-6));
+    line("clock stepped", fmt::format("{} times, first {} at event {} by {:+.3f} s; times across it are left out",
+                                      summary.clock_steps, DayAndTime(summary.first_step_utime),
+                                      summary.first_step_event, static_cast<double>(summary.first_step_us) * 1e-6));
   line("duration", fmt::format("{:.1f} s", summary.duration_s));
   return text;
 }
@@ -138,6 +147,7 @@ nlohmann::json ToJson(const Summary& summary) {
   json["duration_s"] = summary.duration_s;
   json["clock_steps"] = {{"count", summary.clock_steps},
                          {"first_event", summary.clock_steps > 0 ? nlohmann::json(summary.first_step_event) : nullptr},
+                         {"first_utime", summary.first_step_utime},
                          {"first_us", summary.first_step_us}};
   return json;
 }
@@ -189,14 +199,15 @@ void SummaryBuilder::Add(const LogEvent& event) {
 
 // Where the clock was set back or ahead, or a log of before follows, no time passes.
 void SummaryBuilder::TakeTime(const LogEvent& event) {
-  const std::int64_t passed = last_utime_ ? event.utime - *last_utime_ : 0;
-  last_utime_ = event.utime;
+  const std::int64_t before = std::exchange(last_utime_, event.utime).value_or(event.utime);
+  const std::int64_t passed = event.utime - before;
   if (-kBackUs < passed && passed < kAheadUs) {
     elapsed_us_ += std::max<std::int64_t>(passed, 0);
     return;
   }
   if (summary_.clock_steps++ > 0) return;
   summary_.first_step_event = event.number;
+  summary_.first_step_utime = before;
   summary_.first_step_us = passed;
 }
 

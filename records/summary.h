@@ -37,8 +37,8 @@ struct Summary {
   std::map<std::string, std::int64_t> messages;
   double duration_s = 0;  ///< From the first message to the last, without the steps of the logger's clock.
   /** Messages that came a second before the last one by the logger's clock, or an hour behind it; the first of them,
-  and by how much. Latencies across one are left out. Of logs alone. */
-  std::int64_t clock_steps = 0, first_step_event = -1, first_step_us = 0;
+  the time before it, and by how much. Latencies across one are left out. Of logs alone. */
+  std::int64_t clock_steps = 0, first_step_event = -1, first_step_utime = 0, first_step_us = 0;
   std::int64_t proposed = 0;  ///< Candidates; from a database, decisions.
   std::int64_t decided = 0, certified = 0;
   std::string holds;  ///< When certificates of the task hold, as HoldsName; empty if the task is not known.

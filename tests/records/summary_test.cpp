@@ -182,9 +182,11 @@ TEST(Summary, LeavesOutWhatLiesAcrossAStepOfTheClock) {
   EXPECT_EQ(summary.latency_us.p99, 400);
   EXPECT_EQ(summary.duration_s, 2);
   EXPECT_EQ(summary.clock_steps, 2);
-  EXPECT_THAT(ToText(summary),
-              testing::HasSubstr("2 times, first at event 3 by -6.000 s; times across it are left out"));
+  EXPECT_THAT(
+      ToText(summary),
+      testing::HasSubstr("2 times, first 1970-01-01 00:00:11 at event 3 by -6.000 s; times across it are left out"));
   EXPECT_EQ(ToJson(summary)["clock_steps"]["first_us"], -6'000'000);
+  EXPECT_EQ(ToJson(summary)["clock_steps"]["first_utime"], 11'000'000);
 }
 
 TEST(Summary, InventedChannelsAreCountedTogether) {
