@@ -41,10 +41,10 @@ struct PassesTest : testing::TestWithParam<const char*> {
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     std::string chosen;
-    const Command program{
-        .name = "forereach",
-        .commands = {ReplayCommand(), VerifyCommand(), AdviseCommand(), ReportCommand(), ExportCommand(), LogCommand()},
-        .chosen = &chosen};
+    const Command program{.name = "forereach",
+                          .commands = {ReplayCommand(), VerifyCommand(), AdviseCommand(), ReportCommand(),
+                                       ExportCommand(), LogCommand(), CheckLogCommand(), MergeCommand()},
+                          .chosen = &chosen};
     testing::internal::CaptureStdout();
     const bool is_parsed = !ParseCommandLine(program, static_cast<int>(argv.size()), argv.data());
     const int code = is_parsed ? std::ranges::find(program.commands, chosen, &Command::name)->run() : kExitBadInput;
@@ -70,14 +70,34 @@ TEST_P(PassesTest, ALogIsReadOnce) {
   EXPECT_LT(passes, 1.4) << "the log, and the task with its transitions";
 }
 
+// Which plans have the outcome is known when their decisions are read, and candidates come first.
+TEST_F(PassesTest, ByOutcomeALogIsReadTwice) {
+  EXPECT_LT(Passes("log cut LOG --out OUT.lcmlog --outcome certified"), 2.1);
+}
+
+// A shard also reads the log for its digest, which no case has, and the program for its own.
+TEST_F(PassesTest, AShardReadsALogTwice) {
+  const double program =
+      static_cast<double>(fs::file_size(fs::read_symlink("/proc/self/exe"))) / static_cast<double>(fs::file_size(log_));
+  const auto passes = [&](const std::string& line, int programs) { return Passes(line) - programs * program; };
+  EXPECT_LT(passes("replay LOG --config TASK --shard 1/2 --out OUT1", 1), 2.4);
+  EXPECT_LT(passes("replay LOG --config TASK --shard 2/2 --out OUT2", 1), 2.4);
+  EXPECT_LT(passes("merge OUT1 OUT2", 2), 0.4) << "without the log";
+}
+
 INSTANTIATE_TEST_SUITE_P(Commands, PassesTest,
                          testing::Values("replay LOG --config TASK", "replay DIRECTORY --config TASK",
                                          "replay LOG --compare --config TASK", "verify LOG --config TASK",
                                          "advise LOG --config TASK", "report LOG --config TASK",
                                          "report DIRECTORY --config TASK", "report LOG --picture OUT.svg --config TASK",
+                                         "verify DIRECTORY --config TASK", "advise DIRECTORY --config TASK",
                                          "log list LOG", "report LOG --out OUT.html --config TASK",
                                          "report DIRECTORY --out OUT.html --config TASK",
-                                         "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT"));
+                                         "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT",
+                                         "export LOG --format jsonl --out OUT", "export LOG --format npz --out OUT",
+                                         "export DIRECTORY --format csv --out OUT", "check-log DIRECTORY --config TASK",
+                                         "log filter LOG --out OUT.lcmlog --channel ROBOT_STATE",
+                                         "log merge LOG --out OUT.lcmlog", "log cut LOG --out OUT.lcmlog --from 1"));
 
 struct ThreadsTest : PassesTest {
   // Slices shrunken so that every certificate is refuted, and every other one sealed anew: there is much to say.
