@@ -72,7 +72,7 @@ void AddGrowth(const Problem& problem, std::vector<Hypothesis>& all) {
   for (int k = 0; k < problem.model->num_states(); ++k)
     follows_equations = follows_equations || (std::ranges::count(timing.set_at_steps, k) == 0 &&
                                               !(timing.rate_bound.size() > 0 && timing.rate_bound[k] < kInfinity));
-  if (timing.error == 0 || !follows_equations) return;
+  if ((timing.error == 0 && problem.transitions.longer.isZero(0)) || !follows_equations) return;
   all.push_back(
       {fmt::format("in a step of duration h what the model does not know differs from that of dt by at most "
                    "((1 + |h - dt|/dt)^{} - 1) of its bounds",

@@ -28,7 +28,8 @@ class NoNominalValue final : public std::invalid_argument {
  private:
   static std::string Text(const std::string& state, At at) {
     return state + ": the nominal model has no finite " +
-           (at == At::kLocation ? "value there" : "derivative within the declared errors of states and inputs there");
+           (at == At::kLocation ? "value there"
+                                : "derivative within the declared errors of states, inputs and durations there");
   }
 
   int row_;

@@ -267,6 +267,17 @@ TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmal
   EXPECT_TRUE(is_falsified([](Problem&) {})) << "nothing is forgotten";
 }
 
+// Steps are on time, and a file's step took 2 ms longer: its column dt_error says so under any task.
+TEST_F(LatchTest, WhatAFileSaysOfADurationIsNoReasonToForgetWhatItContradicts) {
+  Problem& problem = Own(config_.problem);
+  problem.timing = {.set_at_steps = {0, 1, 2, 3}};
+  problem.transitions.longer.setConstant(problem.transitions.size(), 0.002);
+  Begin();
+  SayState();
+  Falsify();
+  EXPECT_TRUE(IsFalsifiedAfterARestart());
+}
+
 TEST_F(LatchTest, ATransitionOutsideTheDomainSaysNothing) {
   FalsifyAndEnd();
   Own(config_.problem).domain.state = Within({9, 9, 9, 9});
