@@ -14,6 +14,7 @@ Config Task() {
   config.gate.obstacles = ObstaclesSource::kBus;
   config.gate.obstacles_lost_ms = kNeverLost;
   config.grounds = GroundsOf(DigestOf(std::string_view("withdrawal run")), *config.problem, config.obstacles);
+  config.robot.step_period_ms = 100;  // model.dt: other steps are not learned
   config.robot.time_limit_s = 60;
   return config;
 }
@@ -63,13 +64,13 @@ struct WithdrawalRunTest : testing::Test {
 };
 
 TEST_F(WithdrawalRunTest, ACertifiedStopTakesOverBeforeAWallThatAppears) {
-  RunFor(1'500'000);
+  RunFor(3'750'000);
   for (const int started = events_[execution_event_t::STARTED]; events_[execution_event_t::STARTED] == started;)
     RunFor(1'000);
-  ASSERT_GT(Speed(), 3) << "it drives";
+  ASSERT_GT(Speed(), 3.5) << "it drives";
   const double braking = 0.95 * 3;
   const double wall = SeeWall(Speed() * Speed() / (2 * braking) + 4);
-  RunFor(1'800'000);
+  RunFor(4'500'000);
   ASSERT_FALSE(withdrawn_.empty());
   EXPECT_GE(Planner()["stopping_rounds"], 1);
   EXPECT_EQ(events_[execution_event_t::EMERGENCY_STOP], 0);
@@ -79,10 +80,10 @@ TEST_F(WithdrawalRunTest, ACertifiedStopTakesOverBeforeAWallThatAppears) {
 }
 
 TEST_F(WithdrawalRunTest, AWallTooNearToStopBeforeItIsAnEmergency) {
-  RunFor(1'500'000);
+  RunFor(3'750'000);
   ASSERT_GT(Speed(), 3.5);
   const double wall = SeeWall(1.5);
-  RunFor(1'800'000);
+  RunFor(4'500'000);
   ASSERT_FALSE(withdrawn_.empty());
   EXPECT_EQ(events_[execution_event_t::EMERGENCY_STOP], 1);
   EXPECT_LT(robot_.state()[0], wall) << "the simulated robot's emergency stop takes no way";
