@@ -151,6 +151,9 @@ MotionProposal FromPositions(const Config& config) {
       "Largest second differences in {} triples of logged samples. This proves nothing: the true motion curves "
       "at\nleast as much. Errors of the measurement are included. Add a margin, and what was not driven.",
       measured.triples);
+  if (const Eigen::VectorXd& longer = problem.transitions.longer; !longer.isZero(0))
+    proposal.remark += fmt::format(
+        "\nSteps that lasted up to {:g} s longer or shorter count as if they had lasted model.dt.", longer.maxCoeff());
   return proposal;
 }
 

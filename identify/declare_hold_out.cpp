@@ -47,9 +47,10 @@ struct Trial {
 struct Commands {
   Eigen::MatrixXd controls;  // a column a step
   Eigen::MatrixXd states;    // a column a sample, one more than steps
+  Eigen::MatrixXd moved;     // how far each may be off since the steps before it were longer or shorter than dt
 };
 
-std::vector<Commands> CommandsOf(const Transitions& transitions, const Split& split, int steps) {
+std::vector<Commands> CommandsOf(const Transitions& transitions, double dt, const Split& split, int steps) {
   const Eigen::Index n = transitions.x_next.cols(), m = transitions.z.cols() - n;
   std::vector<Commands> all;
   for (const HoldOutWindow& window : WindowsOf(transitions, split, steps)) {
@@ -58,6 +59,13 @@ std::vector<Commands> CommandsOf(const Transitions& transitions, const Split& sp
     commands.states.resize(n, steps + 1);
     commands.states.leftCols(steps) = transitions.z.block(window.begin, 0, steps, n).transpose();
     commands.states.col(steps) = transitions.x_next.row(window.begin + steps - 1);
+    commands.moved.setZero(n, steps + 1);
+    for (int t = 0; t < steps; ++t) {
+      const double longer = transitions.Longer(window.begin + t);  // below dt / 2
+      commands.moved.col(t + 1) =
+          commands.moved.col(t) +
+          longer / (dt - longer) * (commands.states.col(t + 1) - commands.states.col(t)).cwiseAbs();
+    }
   }
   return all;
 }
@@ -100,7 +108,8 @@ void CertifyWindows(const Config& config, const Declaration& declaration, const 
           for (int k = 0; k < problem->model->num_states(); ++k) {
             const Interval hull = tube.hull(t, k);
             // How far what is recorded may be from the true state.
-            const double error = AddUp(declaration.noise_bound[k], declaration.VariableError(k));
+            const double error =
+                AddUp(AddUp(declaration.noise_bound[k], declaration.VariableError(k)), commands[i].moved(k, t));
             worst = std::max(
                 worst, Conform(commands[i].states(k, t), error, hull.lower, hull.upper, problem->model->IsAngle(k)));
           }
@@ -256,7 +265,7 @@ int DeclareHoldOut(const DataCommand& command) {
               << std::endl;
     return 1;
   }
-  const std::vector<Commands> commands = CommandsOf(problem.transitions, split, command.steps);
+  const std::vector<Commands> commands = CommandsOf(problem.transitions, config.period, split, command.steps);
   std::vector<Trial> trials;
   for (const double factor : kFactors) {
     Declaration declaration = learned.declaration;
@@ -290,7 +299,7 @@ HeldOutSteps JudgeByHeldOut(const Config& config, const Declaration& declaration
   const Split split = SplitByTime(transitions.size(), std::min(kBlocks, transitions.size()));
   std::vector<Commands> commands;
   for (found.steps = 10; commands.empty() && found.steps > 0; --found.steps)
-    commands = CommandsOf(transitions, split, found.steps);
+    commands = CommandsOf(transitions, config.period, split, found.steps);
   ++found.steps;
   const std::size_t count = std::min(commands.size(), kMostStretches);
   std::vector<Commands> chosen;

@@ -1,5 +1,7 @@
 // `forereach init` and `forereach check`: a task to begin with, and what keeps one from certifying plans.
 
+#include <fmt/format.h>
+
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/size.h"
 #include "task/task_template.h"
@@ -394,12 +396,28 @@ TEST_F(DurationTest, OfARecordedStepExplainsHowFarItMoved) {
   EXPECT_THAT(Check(), Exits(0, "recorded steps lasted model.dt, give or take their column dt_error"));
   Steps("0.112", "0");
   EXPECT_THAT(Check(), Exits(1, "lines 2 and 3 of"));
-  Steps("0.12", "0.01");
-  EXPECT_THAT(Check(), Exits(1, "lines 2 and 3 of"));
+  Steps("0.1202", "0.01");
+  EXPECT_EQ(Check().code, 0);
+  Steps("0.1204", "0.01");
+  EXPECT_THAT(Check(), Exits(1, "lines 2 and 3 of", "it is false"));
   Steps("0.112", "0.01", "x + 0.1*u");
   EXPECT_THAT(Check(), Exits(2, "steps.csv: dt_error: ", "which do not use dt", "declare model.rate_bound"));
   Steps("0.1", "0", "x + 0.1*u");
   EXPECT_EQ(Check().code, 0);
+}
+
+// Steps are 1 ms longer and shorter in turn at 1 m/s, so every other state is 1 mm off what a step of dt gives.
+TEST_F(DurationTest, LeavesNoSliceByTheTimeThatItSays) {
+  Steps("0.1", "0");
+  scratch_.Write("task.yaml",
+                 Replaced(Replaced(Read(task_), "noise_bound: [0.001]", "noise_bound: [0]"), "[0.01]", "[0]"));
+  std::string rows = "x,u,x_next,dt_error\n";
+  for (int i = 0; i < 40; ++i) {
+    const double begin = -2 + 0.1 * i;
+    rows += fmt::format("{},1,{},0.0011\n", begin + 0.001 * (i % 2), begin + 0.1 + 0.001 * (1 - i % 2));
+  }
+  scratch_.Write("steps.csv", rows);
+  EXPECT_THAT(Check(), Exits(0, " consistent, 0 left\n"));
 }
 
 TEST_F(DurationTest, WidensTheTubeAndIsVerified) {
