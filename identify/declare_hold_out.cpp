@@ -193,7 +193,8 @@ void PrintForPeople(const std::vector<Trial>& trials, const DataCommand& command
             << command.steps
             << " steps (inf: the tube leaves the domain before).\n"
                "inside, consistent, left: recorded states whose slice contains all, a part or nothing of state +- "
-               "declaration.state_error\n  (not declared: exact). One that has left its slice halts a robot.\n"
+               "declaration.state_error\n  (not declared: exact), and of what dt_error may have moved it. One that has "
+               "left its slice halts a robot.\n"
             << (first.windows == 0 ? "There is no stretch of so many transitions that follow one another: use fewer "
                                      "--steps or fewer --blocks.\n"
                                    : "")

@@ -346,8 +346,8 @@ TEST(Observe, RefusesARecordWhoseErrorsReachAnUnboundedSlope) {
     } catch (const NoNominalValue& refused) {
       EXPECT_EQ(refused.at(), NoNominalValue::At::kAround);
       EXPECT_STREQ(refused.what(),
-                   "transition 0: x: the nominal model has no finite derivative within the declared errors of states "
-                   "and inputs there");
+                   "transition 0: x: the nominal model has no finite derivative within the declared errors of states, "
+                   "inputs and durations there");
     }
   }
   try {

@@ -85,19 +85,17 @@ TEST_F(PassesTest, AShardReadsALogTwice) {
   EXPECT_LT(passes("merge OUT1 OUT2", 2), 0.4) << "without the log";
 }
 
-INSTANTIATE_TEST_SUITE_P(Commands, PassesTest,
-                         testing::Values("replay LOG --config TASK", "replay DIRECTORY --config TASK",
-                                         "replay LOG --compare --config TASK", "verify LOG --config TASK",
-                                         "advise LOG --config TASK", "report LOG --config TASK",
-                                         "report DIRECTORY --config TASK", "report LOG --picture OUT.svg --config TASK",
-                                         "verify DIRECTORY --config TASK", "advise DIRECTORY --config TASK",
-                                         "log list LOG", "report LOG --out OUT.html --config TASK",
-                                         "report DIRECTORY --out OUT.html --config TASK",
-                                         "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT",
-                                         "export LOG --format jsonl --out OUT", "export LOG --format npz --out OUT",
-                                         "export DIRECTORY --format csv --out OUT", "check-log DIRECTORY --config TASK",
-                                         "log filter LOG --out OUT.lcmlog --channel ROBOT_STATE",
-                                         "log merge LOG --out OUT.lcmlog", "log cut LOG --out OUT.lcmlog --from 1"));
+INSTANTIATE_TEST_SUITE_P(
+    Commands, PassesTest,
+    testing::Values("replay LOG --config TASK", "replay DIRECTORY --config TASK", "replay LOG --compare --config TASK",
+                    "verify LOG --config TASK", "advise LOG --config TASK", "report LOG --config TASK",
+                    "report DIRECTORY --config TASK", "report LOG --picture OUT.svg --config TASK",
+                    "verify DIRECTORY --config TASK", "advise DIRECTORY --config TASK", "log list LOG",
+                    "report LOG --out OUT.html --config TASK", "report DIRECTORY --out OUT.html --config TASK",
+                    "export LOG --format csv --out OUT", "export LOG --format mcap --out OUT",
+                    "export LOG --format jsonl --out OUT", "export LOG --format npz --out OUT",
+                    "export DIRECTORY --format csv --out OUT", "log filter LOG --out OUT.lcmlog --channel ROBOT_STATE",
+                    "log merge LOG --out OUT.lcmlog", "log cut LOG --out OUT.lcmlog --from 1"));
 
 struct ThreadsTest : PassesTest {
   // Slices shrunken so that every certificate is refuted, and every other one sealed anew: there is much to say.
