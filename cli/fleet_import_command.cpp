@@ -9,6 +9,7 @@
 
 #include "cli/commands.h"
 #include "fleet/transitions.h"
+#include "identify/import.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
 #include "task/json_text.h"
@@ -40,7 +41,11 @@ void SetDay(const std::string& text, Store::WhichTransitions& which) {
 
 FleetTransitions Read(const FleetImportArguments& options, const Config& task) try {
   Store store(options.database);
-  return ReadTransitions(store, *task.problem, options.which,
+  Problem problem = *task.problem;
+  // Where no clock is looked at, a step of another duration still says what it says, if it is known how states move
+  // with time.
+  if (problem.timing.error == 0 && KnowsDurations(problem)) problem.timing.error = task.period / 5;
+  return ReadTransitions(store, problem, options.which,
                          options.by == "day" ? TransitionsBy::kDay : TransitionsBy::kRobot);
 } catch (const std::invalid_argument& error) {  // a task that no certifier accepts
   throw ConfigError(task.path + ": " + error.what());

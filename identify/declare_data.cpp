@@ -160,10 +160,9 @@ Chart SlopeChartOf(const ProposedDeclaration& proposal, const NominalModel& mode
               .series = {}};
   for (const std::size_t k : shown) {
     const ProposedRow& row = proposal.rows[k];
-    Chart::Series& series =
-        chart.series.emplace_back(fmt::format("{}: knee at {}, declared {}", model.state_names()[k],
-                                              RoundedUp(row.knee, kTableDigits), ErrorText(row.declared)),
-                                  std::vector<double>());
+    Chart::Series& series = chart.series.emplace_back();
+    series.name = fmt::format("{}: knee at {}, declared {}", model.state_names()[k], RoundedUp(row.knee, kTableDigits),
+                              ErrorText(row.declared));
     double steepest = 0;
     for (std::size_t i = 0; i < ProposedRow::kShares.size(); ++i) {
       const auto& slopes = row.trades[i].slopes;

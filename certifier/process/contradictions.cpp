@@ -14,9 +14,13 @@
 namespace forereach {
 namespace {
 
+bool IsSame(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a.rows() == b.rows() && a.cols() == b.cols() && a == b;
+}
+
 bool IsSame(const Contradictions::Evidence& a, const Contradictions::Evidence& b) {
-  return a.model == b.model && a.rows.z == b.rows.z && a.rows.x_next == b.rows.x_next &&
-         a.rows.longer == b.rows.longer && a.rows.num_learned == b.rows.num_learned;
+  return a.model == b.model && IsSame(a.rows.z, b.rows.z) && IsSame(a.rows.x_next, b.rows.x_next) &&
+         IsSame(a.rows.longer, b.rows.longer) && a.rows.num_learned == b.rows.num_learned;
 }
 
 std::span<const double> Values(const Eigen::VectorXd& row) { return {row.data(), ToSize(row.size())}; }

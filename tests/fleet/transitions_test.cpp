@@ -96,6 +96,19 @@ TEST_F(FleetImportTest, WritesWhatFitReads) {
   EXPECT_LT(pooled, second - 0.05);
 }
 
+// The task looks at no clock.
+TEST_F(FleetImportTest, TakesStepsOfOtherDurationsWithThese) {
+  Add("r1", [](int number, transition_t& transition) {
+    if (number == 0) transition.duration_us += 2000;
+    if (number == 1) transition.duration_us = 200'000;
+  });
+  EXPECT_THAT(Import("--out " + out_), Exits(0, "import: " + std::to_string(OfCourse().size() - 1) + " transitions",
+                                             "column dt_error says it of each"));
+  const Transitions all = LoadTransitions(out_, *LoadConfig(kCourseTask).problem->model);
+  EXPECT_NEAR(all.Longer(0), 0.002, 2e-6);
+  EXPECT_LT(all.Longer(1), 2e-6);
+}
+
 TEST_F(FleetImportTest, TakesOneRobotOrDay) {
   const std::string count = std::to_string(OfCourse().size());
   Add("r1");
