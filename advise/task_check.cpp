@@ -15,13 +15,13 @@
 
 #include "forereach/certify/certifier.h"
 #include "forereach/certify/explain.h"
+#include "forereach/certify/learned.h"
 #include "forereach/certify/rates.h"
 #include "forereach/declare/flow.h"
 #include "forereach/dynamics/unbounded.h"
 #include "forereach/numerics/limits.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
-#include "forereach/reach/step_offsets.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/no_nominal_value.h"
 #include "forereach/residual/observations.h"
@@ -158,17 +158,13 @@ class Examination final {
       return;
     }
     all_ = LoadTransitions(result_.data, model_);
-    RequireDurations();
     result_.transitions = all_.size();
-  }
-
-  // As LoadConfig does.
-  void RequireDurations() const try {
-    StepTiming timing = problem_.timing;
-    timing.error = all_.longer.isZero(0) ? 0 : all_.longer.maxCoeff() / 2;
-    static_cast<void>(StepOffsets(model_, timing));
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(result_.data + ": dt_error: " + error.what());
+    problem_.transitions = all_;
+    try {
+      ValidateDurations(problem_);
+    } catch (const std::invalid_argument& error) {
+      throw ConfigError(result_.data + ": dt_error: " + error.what());
+    }
   }
 
   // ---- Data against the domain and the declaration.
@@ -485,8 +481,7 @@ class Examination final {
     };
     std::string what = fmt::format(
         "{}: {} of {} differ in the model's error by {}, and the declaration allows {}: it is false, and nothing can "
-        "be "
-        "certified",
+        "be certified",
         name, lines(worst), result_.data, Down(worst.difference), Up(worst.bound));
     if (found.count > 1) {
       const auto most = std::ranges::max_element(found.of_each);

@@ -160,8 +160,8 @@ unchecked: takes every message for authentic.)");
   table("withdrawals", Table::Of::kWithdrawals, "A row a withdrawal.");
   table("executions", Table::Of::kExecutions, "A row an event of the robot.");
   table("transitions", Table::Of::kTransitions,
-        "A row an executed step, with lists `state`, `input` and `next_state`: Task(..., data=(z, x_next, "
-        "dt_error)) takes them stacked, with by how many seconds `duration_us` is off the model's dt, and 1e-6 more.");
+        "A row an executed step, with lists `state`, `input` and `next_state`. Task(..., data=(z, x_next, dt_error)) "
+        "takes them stacked; dt_error is |duration_us / 1e6 - dt| + 1e-6.");
   table("gaps", Table::Of::kGaps, "A row a gap in a stream of messages.");
 }
 
