@@ -46,22 +46,47 @@ as_root() {
   if [[ $(id -u) == 0 ]]; then "$@"; elif command -v sudo >/dev/null; then sudo "$@"; else return 126; fi
 }
 
-# install_packages [NAME...]: those of scripts/packages.txt and of scripts/packages-NAME.txt.
-install_packages() {
-  local wanted present missing=() files=("${@/#/scripts/packages-}")
-  files=("${files[@]/%/.txt}")
-  mapfile -t wanted < <(sed -s '/^#/d' scripts/packages.txt "${files[@]}" | sort -u)
+# missing_packages [NAME...]: those of scripts/packages.txt and of scripts/packages-NAME.txt that this machine lacks, a line each.
+missing_packages() {
+  local package present files=("${@/#/scripts/packages-}")
   # Installed, or provided by one that is, as npm by other packagers' nodejs.
   present=" $(dpkg-query -W -f '${db:Status-Status} ${Package} ${Provides}\n' | sed -n 's/ ([^)]*)//g; s/,//g; s/^installed //p' | tr '\n' ' ') "
-  for package in "${wanted[@]}"; do
-    [[ $present == *" $package "* ]] || missing+=("$package")
+  for package in $(sed -s '/^#/d' scripts/packages.txt "${files[@]/%/.txt}" | sort -u); do
+    [[ $present == *" $package "* ]] || echo "$package"
   done
+}
+install=(apt-get install -y --no-install-recommends) listed=''
+# install_packages [NAME...]: these.
+install_packages() {
+  local missing begin=$SECONDS
+  mapfile -t missing < <(missing_packages "$@")
   ((${#missing[@]} == 0)) && return
   say "Installing ${#missing[@]} Debian packages"
-  local list="apt-get install -y --no-install-recommends ${missing[*]}" begin=$SECONDS
-  as_root true || { echo "This needs root. As root, run:  $list" >&2; exit 1; }
+  as_root true || { echo "This needs root. As root, run:  ${install[*]} ${missing[*]}" >&2; exit 1; }
   progress "fetching the list of packages" build/apt.log as_root apt-get update -q
-  progress "installing" build/apt.log as_root env DEBIAN_FRONTEND=noninteractive $list
+  listed=yes
+  progress "installing" build/apt.log as_root env DEBIAN_FRONTEND=noninteractive "${install[@]}" "${missing[@]}"
+  spend packages $((SECONDS - begin))
+}
+
+# install_meanwhile [NAME...]: the same, while other work goes on. await_packages waits for them.
+meanwhile=''
+install_meanwhile() {
+  local missing
+  mapfile -t missing < <(missing_packages "$@")
+  ((${#missing[@]} == 0)) && return
+  say "Installing ${#missing[@]} more meanwhile"
+  as_root true || { install_packages "$@"; return; }
+  mkdir -p build
+  { [[ $listed ]] || as_root apt-get update -q
+    as_root env DEBIAN_FRONTEND=noninteractive "${install[@]}" "${missing[@]}"; } >build/apt-meanwhile.log 2>&1 & meanwhile=$!
+}
+await_packages() {
+  local begin=$SECONDS
+  [[ $meanwhile ]] || return 0
+  progress "installing" /dev/null tail --pid "$meanwhile" -n +1 -f build/apt-meanwhile.log
+  wait "$meanwhile" || { tail -n 50 build/apt-meanwhile.log >&2; exit 1; }
+  meanwhile=''
   spend packages $((SECONDS - begin))
 }
 
