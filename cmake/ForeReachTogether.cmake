@@ -18,7 +18,10 @@ function(forereach_compile_together)
   endforeach()
 endfunction()
 
-# Files with compile options or definitions of their own, and generated ones, stay alone.
+# Files with compile options or definitions of their own, generated ones, and those that differ from the last commit stay
+# alone: who works on a file waits for it, and not for those beside it.
+execute_process(COMMAND git diff --name-only HEAD WORKING_DIRECTORY ${CMAKE_SOURCE_DIR} OUTPUT_VARIABLE changed ERROR_QUIET)
+string(REPLACE "\n" ";" forereach_changed "${changed}")
 function(forereach_batches target directory)
   get_target_property(sources ${target} SOURCES)
   get_target_property(binary ${target} BINARY_DIR)
@@ -54,7 +57,7 @@ function(forereach_batches target directory)
     if(source STREQUAL "end")
       continue()
     endif()
-    if(IS_ABSOLUTE ${source} OR options OR definitions OR NOT source MATCHES "\\.cpp$")
+    if(IS_ABSOLUTE ${source} OR "${folder}/${source}" IN_LIST forereach_changed OR options OR definitions OR NOT source MATCHES "\\.cpp$")
       list(APPEND alone ${source})
     else()
       string(APPEND content "#include \"${folder}/${source}\"\n")
