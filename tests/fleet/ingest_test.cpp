@@ -1,5 +1,8 @@
 #include "fleet/ingest.h"
 
+#include <atomic>
+#include <thread>
+
 #include <sys/wait.h>
 
 #include "logger/recorder.h"
@@ -30,6 +33,14 @@ class IngestTest : public PostgresTest {
   // As the start of a logger does: makes the rows of the logs in the directory.
   void Recover() { Recorder(config_, FreeBytes); }
   Rows RowsOfDirectory() const { return Database(path_).Read(); }
+  std::size_t DecisionsInLogs() const {
+    std::size_t decisions = 0;
+    for (const auto& file : fs::directory_iterator(directory_))
+      if (file.path().extension() == ".lcmlog")
+        for (const LogEvent& event : ReadLog(file.path().string()).events)
+          decisions += event.channel == "PLAN_DECISION";
+    return decisions;
+  }
   Rows RowsOfStore(const std::string& robot) {
     Rows rows;
     Store store(server_->Address());
@@ -182,11 +193,7 @@ TEST_F(IngestTest, LosesAndDoublesNoRowWhereLoggerAndSenderAreKilled) {
   const Rows rows = RowsOfDirectory();
   EXPECT_GT(rows.decisions.size(), 100u);
   EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), rows), "");
-  std::size_t decisions = 0;  // in the logs themselves
-  for (const auto& file : fs::directory_iterator(directory_))
-    if (file.path().extension() == ".lcmlog")
-      for (const LogEvent& event : ReadLog(file.path().string()).events) decisions += event.channel == "PLAN_DECISION";
-  EXPECT_EQ(rows.decisions.size(), decisions);
+  EXPECT_EQ(rows.decisions.size(), DecisionsInLogs());
 }
 
 TEST_F(IngestTest, BesideTheLoggerSendsItsRowsToTheLast) {
@@ -209,6 +216,61 @@ TEST_F(IngestTest, BesideTheLoggerSendsItsRowsToTheLast) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_TRUE(has_ended());
   EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), RowsOfDirectory()), "");
+}
+
+// Server and logger are killed at once while decisions come: in the middle of a transaction that waits for a lock, or
+// whenever it happens. The logger starts again behind the server or before it.
+TEST_F(IngestTest, LosesAndDoublesNoRowWhereServerAndLoggerAreKilledAtOnce) {
+  const std::string url = PrivateBusUrl(), address = server_->Address();
+  const std::string task = scratch_.Write("task.yaml", PatientTask() + "logger: {flush_ms: 10}\n");
+  const auto start = [&] {
+    return std::make_unique<ChildProcess>(std::vector<std::string>{FOREREACH_LOGGER, "--config", task, "--lcm-url", url,
+                                                                   "--directory", directory_, "--database", address,
+                                                                   "--robot", "r1"});
+  };
+  const auto wait_for = [&](const std::string& query, const std::string& wanted) {
+    Store store(address);
+    std::string got;
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         got != wanted && std::chrono::steady_clock::now() < deadline;) {
+      got = store.Query(query).at(0).at(0).value_or("");
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(got, wanted) << query;
+  };
+  std::atomic<bool> is_over = false;
+  std::thread gate([&] {
+    BusProbe probe(url, {});
+    for (int i = 0; !is_over; ++i) {
+      probe.bus().Publish("PLAN_DECISION", MakeDecision(MakeCandidate(i, i), i, decision_t::CERTIFIED, 0));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  std::unique_ptr<ChildProcess> logger = start(), blocker;
+  for (int round = 0; round < 4; ++round) {
+    wait_for("SELECT count(DISTINCT log_file) FROM decisions", std::to_string(round + 1));
+    if (round % 2 == 0) {
+      blocker = std::make_unique<ChildProcess>(std::vector<std::string>{
+          Postgres::Programs() + "psql", "-X", address, "-c", "BEGIN; LOCK TABLE decisions; SELECT pg_sleep(60)"});
+      wait_for("SELECT count(*) FROM pg_locks WHERE NOT granted AND relation = 'decisions'::regclass", "1");
+    }
+    std::thread killer([&] { logger->Signal(SIGKILL); });
+    server_->Kill();
+    killer.join();
+    EXPECT_TRUE(logger->WaitForEnd(kPatience));
+    if (round < 2) logger = start();
+    server_->Start();
+    if (round >= 2) logger = start();
+  }
+  wait_for("SELECT count(DISTINCT log_file) FROM decisions", "5");
+  EXPECT_EQ(logger->Terminate(), 0) << logger->error();
+  is_over = true;
+  gate.join();
+  wait_for("SELECT count(*) FROM runs WHERE end_utime IS NOT NULL", "5");
+  const Rows rows = RowsOfDirectory();
+  EXPECT_GT(rows.decisions.size(), 100u);
+  EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), rows), "");
+  EXPECT_EQ(rows.decisions.size(), DecisionsInLogs());
 }
 
 TEST_F(IngestTest, KeepsTheRowsInTheDirectoryWhileTheServerIsAway) {
