@@ -1,10 +1,13 @@
 // forereach-research: the paper's experiments, one subcommand each, and `all`.
 #include <algorithm>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "command_line/command_line.h"
@@ -33,12 +36,23 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-research real --data ../dart    declarations from a real car's logs, judged by others: research/real-car.md
   forereach-research drift                  a published car of nine states: research/higher-order-car.md
   forereach-research drift --drive          the same car driven to goals, certified
+  FOREREACH=forereach-research scripts/fleet --hosts one,two run/job all --quick
+                                               cells of experiments on several machines: --shard and merge
 
 Exit: 0 done, 2 bad usage or a file that cannot be used.)";
 
 // The smallest that still shows what a method does.
 constexpr int kQuickSeeds = 2;
 constexpr Effort kQuickEffort{30, 24};
+
+// I/N, I from 1.
+std::pair<int, int> ShardOf(const std::string& text) {
+  int number = 0, count = 0;
+  char more = 0;
+  if (std::sscanf(text.c_str(), "%d/%d%c", &number, &count, &more) != 2 || number < 1 || number > count)
+    throw std::invalid_argument("--shard: " + text + " is not I/N with 1 <= I <= N");
+  return {number - 1, count};
+}
 
 void Train(const std::string& file, unsigned threads) {
   TrainingOptions options;
@@ -58,7 +72,8 @@ int main(int argc, char** argv) {
   bool quick = false, drives = false;
   std::optional<int> seeds;
   options.threads = std::max(1u, std::thread::hardware_concurrency());
-  std::string directory, report;
+  std::string directory, report, shard;
+  std::vector<std::string> shards;
 
   std::string name, policy = "config/policies/bicycle.json", data;
   std::vector<std::string> others;
@@ -74,11 +89,16 @@ int main(int argc, char** argv) {
                    NumberRange{1, 1024}},
                   {"--out", &directory, "",
                    "directory of results; default run/research, with --quick run/research-quick"},
+                  {"--shard", &shard, "I/N",
+                   "of experiments, only the I-th of N shards of the cells; --out is the file, for `merge`"},
                   {"--report", &report, "", "where the report goes; default report.md in --out"}},
       .chosen = &name};
   for (const Experiment& experiment : Experiments())
     program.commands.push_back({.name = experiment.name, .purpose = experiment.about});
   program.commands.push_back({.name = "all", .purpose = "all of them, in this order"});
+  program.commands.push_back({.name = "merge",
+                              .purpose = "what a run of the shards' cells prints and keeps in --out",
+                              .options = {Required({"shards", &shards, "FILE", "every shard of one run"})}});
   program.commands.push_back({.name = "train",
                               .purpose = "make the policy that `chunks` asks for its plans",
                               .options = {{"--policy", &policy, "", "where it goes"}}});
@@ -108,12 +128,15 @@ int main(int argc, char** argv) {
   options.scope.quick = quick;
   if (quick) options.scope.seeds = kQuickSeeds, options.effort = kQuickEffort;
   if (seeds) options.scope.seeds = *seeds;
-  options.directory = !directory.empty() ? directory : quick ? "run/research-quick" : "run/research";
+  options.directory = directory;
+  if (directory.empty() && name != "merge") options.directory = DefaultDirectory(quick);
   options.report = report;
   const std::string command =
       "research/run " + name + (quick ? " --quick" : "") + (seeds ? " --seeds " + std::to_string(*seeds) : "");
   options.origin = OriginOf(command, options.threads);
   try {
+    if (!shard.empty() && (options.names.empty() || directory.empty()))
+      throw std::invalid_argument("--shard: of experiments alone, with --out FILE");
     if (name == "train") return Train(policy, options.threads), 0;
     if (name == "real") {
       RunReal({data, others, options.directory, quick, command + " --data " + data}, std::cout);
@@ -129,6 +152,11 @@ int main(int argc, char** argv) {
                        std::cout);
       else
         RunDrift({options.directory, quick, command}, std::cout);
+    } else if (name == "merge") {
+      return MergeShards(shards, options, std::cout), 0;
+    } else if (!shard.empty()) {
+      const auto [index, count] = ShardOf(shard);
+      RunShard(options, index, count, directory);
     } else {
       RunExperiments(options, std::cout);
     }

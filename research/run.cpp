@@ -5,10 +5,17 @@
 #include <set>
 #include <stdexcept>
 
+#include <nlohmann/json.hpp>
+
 #include "research/run_directory.h"
+#include "task/files.h"
+#include "task/json_text.h"
 
 namespace forereach::research {
 namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
 
 const Experiment& ExperimentNamed(const std::string& name) {
   const auto found = std::ranges::find(Experiments(), name, &Experiment::name);
@@ -21,11 +28,11 @@ std::vector<Cell> CellsOf(const Experiment& experiment, const Scope& scope) {
 }
 
 // Each once, in the order in which they are first asked for.
-std::vector<Cell> CellsOf(const std::vector<const Experiment*>& experiments, const Scope& scope) {
+std::vector<Cell> CellsOf(const RunOptions& options) {
   std::vector<Cell> all;
   std::set<std::string> keys;
-  for (const Experiment* experiment : experiments)
-    for (Cell& cell : CellsOf(*experiment, scope))
+  for (const std::string& name : options.names)
+    for (Cell& cell : CellsOf(ExperimentNamed(name), options.scope))
       if (keys.insert(cell.key()).second) all.push_back(std::move(cell));
   return all;
 }
@@ -92,13 +99,82 @@ experiment Wilson's of recall and coverage over the plans of each cell.
 )";
 }
 
+// What a shard is of.
+Json JsonOf(const RunOptions& options, int count) {
+  return {{"names", options.names},
+          {"seeds", options.scope.seeds},
+          {"quick", options.scope.quick},
+          {"scenarios", options.effort.scenarios},
+          {"rollouts", options.effort.rollouts},
+          {"command", options.origin.command},
+          {"shards", count}};
+}
+
+Json ReadJson(const fs::path& file) {
+  try {
+    return ParseJson<Json>(ReadWhole(file.string(), kLargestJsonFile));
+  } catch (const Json::exception& error) {
+    throw std::runtime_error(file.string() + ": " + DescribeJsonError(error));
+  }
+}
+
+fs::path FileOf(const Cell& cell) { return fs::path("cells") / (cell.key() + ".json"); }
+
 }  // namespace
+
+fs::path DefaultDirectory(bool quick) { return quick ? "run/research-quick" : "run/research"; }
+
+void RunShard(const RunOptions& options, int index, int count, const fs::path& file) {
+  std::vector<Cell> own = CellsOf(options);
+  std::erase_if(own, [&, number = 0](const Cell&) mutable { return number++ % count != index; });
+  const RunDirectory directory(file.string() + ".cells", options.effort);
+  static_cast<void>(RunAll(own, directory, options.threads));
+  Json shard{{"run", JsonOf(options, count)}, {"shard", index}, {"cells", Json::object()}};
+  for (const Cell& cell : own) shard["cells"][cell.key()] = ReadJson(directory.path() / FileOf(cell));
+  WriteFile(file, JsonText(shard, 1) + "\n");
+}
+
+void MergeShards(const std::vector<std::string>& files, RunOptions options, std::ostream& out) {
+  Json run, cells;
+  std::set<int> shards;
+  for (const std::string& file : files) try {
+      Json shard = ReadJson(file);
+      if (run.is_null()) run = shard.at("run");
+      if (shard.at("run") != run) throw std::runtime_error(file + ": is of another run than " + files.front());
+      if (!shards.insert(shard.at("shard").get<int>()).second)
+        throw std::runtime_error(file + ": its shard is there twice");
+      cells.update(shard.at("cells"));
+    } catch (const Json::exception&) {
+      throw std::runtime_error(file + ": is no shard of a run");
+    }
+  if (run.is_null()) throw std::runtime_error("merge: no shard is named");
+  try {
+    if (std::ssize(shards) != run.at("shards").get<int>())
+      throw std::runtime_error(files.front() + ": there are " + run.at("shards").dump() + " shards, of which " +
+                               std::to_string(shards.size()) + " are named");
+    run.at("names").get_to(options.names);
+    run.at("seeds").get_to(options.scope.seeds);
+    run.at("quick").get_to(options.scope.quick);
+    run.at("scenarios").get_to(options.effort.scenarios);
+    run.at("rollouts").get_to(options.effort.rollouts);
+    run.at("command").get_to(options.origin.command);
+  } catch (const Json::exception&) {
+    throw std::runtime_error(files.front() + ": is no shard of a run");
+  }
+  if (options.directory.empty()) options.directory = DefaultDirectory(options.scope.quick);
+  const RunDirectory directory(options.directory, options.effort);
+  for (const Cell& cell : CellsOf(options)) {
+    if (!cells.contains(cell.key())) throw std::runtime_error("merge: no shard has " + cell.key());
+    WriteFile(directory.path() / FileOf(cell), JsonText(cells[cell.key()], 1) + "\n");
+  }
+  RunExperiments(options, out);
+}
 
 void RunExperiments(const RunOptions& options, std::ostream& out) {
   std::vector<const Experiment*> experiments;
   for (const std::string& name : options.names) experiments.push_back(&ExperimentNamed(name));
   const RunDirectory directory(options.directory, options.effort);
-  const std::vector<Cell> cells = CellsOf(experiments, options.scope);
+  const std::vector<Cell> cells = CellsOf(options);
   const Results results(options.scope, cells, RunAll(cells, directory, options.threads));
 
   const std::filesystem::path report_file = options.report.empty() ? directory.path() / "report.md" : options.report;

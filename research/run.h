@@ -30,4 +30,18 @@ For any number of threads the files are the same, but for the lines about the or
 @throws std::invalid_argument for an unknown name, std::runtime_error as RunDirectory does. */
 void RunExperiments(const RunOptions& options, std::ostream& out);
 
+/** @name A run on several machines, by scripts/fleet: each shard is a file, and merged they print what the run prints.
+ */
+///@{
+/** Runs the cells whose number in the run is `index` modulo `count`; FILE.cells has the finished ones. */
+void RunShard(const RunOptions& options, int index, int count, const std::filesystem::path& file);
+/** RunExperiments of the shards' run, with their cells in `directory`; empty: that of such a run.
+@param options of which the names, scope, effort and command are the shards'. @throws std::runtime_error naming the file
+that is no shard of the first one's run, or what of the run is missing. */
+void MergeShards(const std::vector<std::string>& files, RunOptions options, std::ostream& out);
+///@}
+
+/** Where a run keeps its results if nothing else is said. */
+[[nodiscard]] std::filesystem::path DefaultDirectory(bool quick);
+
 }  // namespace forereach::research
