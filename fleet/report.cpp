@@ -27,8 +27,8 @@ constexpr const char* kGroups = R"sql(
     GROUP BY 1, 2),
   runs_of AS (
     SELECT robot, log_file, sum(n) AS n, coalesce(sum(n) FILTER (WHERE outcome = 'certified'), 0) AS certified,
-           coalesce(sum(n) FILTER (WHERE outcome = 'abstain_falsified'), 0) AS contradictions,
-           min(first) AS first, max(last) AS last
+           coalesce(sum(n) FILTER (WHERE cause = 'shadow'), 0) AS shadow,
+           coalesce(sum(n) FILTER (WHERE outcome = 'abstain_falsified'), 0) AS contradictions
     FROM groups GROUP BY 1, 2),
   declared AS (
     SELECT robot, declaration_digest, sum(n) AS n, coalesce(sum(n) FILTER (WHERE outcome = 'certified'), 0) AS certified,
@@ -44,10 +44,11 @@ constexpr const char* kGroups = R"sql(
 )sql";
 
 constexpr const char* kTrend = "certified % by day";
+constexpr const char* kShadow = "shadow";  // that a gate in shadow mode would have certified
 
 // Whose numbers lead to runs.
-constexpr std::array<std::string_view, 8> kNumbers = {"decisions", "certified %", "contradictions", "withdrawals",
-                                                      "runs",      "%",           "robots",         "in force on"};
+constexpr std::array<std::string_view, 9> kNumbers = {
+    "decisions", "certified %", kShadow, "contradictions", "withdrawals", "runs", "%", "robots", "in force on"};
 
 // Each gives rows of values in the order of its columns, and all runs of a row, or null.
 struct TableQuery {
@@ -59,8 +60,8 @@ struct TableQuery {
 const std::vector<TableQuery>& Queries() {
   static const std::vector<TableQuery> queries{
       {"Robots",
-       {"robot", "decisions", "certified %", "contradictions", "withdrawals", "runs", kTrend, "log"},
-       R"sql(SELECT r.robot, sum(r.n), round(100 * sum(certified) / sum(r.n), 1), sum(contradictions),
+       {"robot", "decisions", "certified %", kShadow, "contradictions", "withdrawals", "runs", kTrend, "log"},
+       R"sql(SELECT r.robot, sum(r.n), round(100 * sum(certified) / sum(r.n), 1), sum(shadow), sum(contradictions),
              coalesce(sum(w.n), 0), count(*), min(trend), (array_agg(r.log_file ORDER BY certified / r.n))[1],
              jsonb_agg(DISTINCT jsonb_build_array(r.robot, r.log_file))
              FROM runs_of r LEFT JOIN withdrawn w USING (robot, log_file) LEFT JOIN trends USING (robot)
@@ -95,8 +96,8 @@ const std::vector<TableQuery>& Queries() {
              jsonb_agg(DISTINCT jsonb_build_array(robot, log_file))
              FROM groups WHERE day BETWEEN 0 AND 100000 GROUP BY day ORDER BY day DESC)sql"},
       {"Runs",
-       {"robot", "log", "decisions", "certified %", "contradictions"},
-       R"sql(SELECT robot, log_file, n, round(100 * certified / n, 1), contradictions, NULL::JSONB FROM runs_of
+       {"robot", "log", "decisions", "certified %", kShadow, "contradictions"},
+       R"sql(SELECT robot, log_file, n, round(100 * certified / n, 1), shadow, contradictions, NULL::JSONB FROM runs_of
              ORDER BY contradictions DESC, 4, 1, 2)sql"}};
   return queries;
 }
@@ -232,6 +233,22 @@ void AddRow(const FleetTable& table, std::size_t number, const std::string& runs
   rows += "</tr>\n";
 }
 
+// Which robots were in shadow mode.
+std::string ShadowsIn(const std::vector<FleetTable>& tables) {
+  std::string names;
+  for (const FleetTable& table : tables) {
+    if (table.title != "Robots") continue;
+    const std::size_t shadow = Find(table.columns, kShadow);
+    for (const auto& row : table.rows)
+      if (row.at(shadow) != "0") names.append(1, ' ').append(Escaped(Printable(row[0])));
+  }
+  if (names.empty()) return "<p>No gate in shadow mode would have certified a plan.</p>\n";
+  return fmt::format(
+      "<p><b>In shadow mode:{}.</b> Their gates certified nothing there. Column <i>{}</i> counts plans that they would "
+      "have certified.</p>\n",
+      names, kShadow);
+}
+
 }  // namespace
 
 std::string FleetHtml(const std::vector<FleetTable>& tables, const std::string& runs) {
@@ -246,7 +263,7 @@ std::string FleetHtml(const std::vector<FleetTable>& tables, const std::string& 
                              "<p>Numbers lead to the pages of the runs that they count. The page of a run is made by "
                              "<code>forereach report LOG --out {}/ROBOT/LOG.html</code>, with the log's name.</p>\n",
                              Escaped(runs));
-  html += "<p>Decisions in shadow mode count as the others: whether a run was one says its page.</p>\n";
+  html += ShadowsIn(tables);
   for (const FleetTable& table : tables) {
     html += fmt::format("<h2>{}</h2>\n<table><tr>", table.title);
     for (const std::string& column : table.columns) html += fmt::format("<th>{}</th>", column);

@@ -46,9 +46,9 @@ using Row = std::vector<std::string>;
 TEST_F(FleetReportTest, CountsEachRobotCauseDeclarationAndDay) {
   AddFleet();
   const auto tables = Tables();
-  EXPECT_THAT(tables.at("Robots"), ElementsAre(Row{"<b>r3</b>", "4", "25.0", "0", "1", "1", "25.0", "x\"&.lcmlog"},
-                                               Row{"r1", "20", "70.0", "2", "2", "2", "90.0 50.0", "b.lcmlog"},
-                                               Row{"r2", "20", "100.0", "0", "1", "1", "100.0", "a.lcmlog"}));
+  EXPECT_THAT(tables.at("Robots"), ElementsAre(Row{"<b>r3</b>", "4", "25.0", "0", "0", "1", "1", "25.0", "x\"&.lcmlog"},
+                                               Row{"r1", "20", "70.0", "0", "2", "2", "2", "90.0 50.0", "b.lcmlog"},
+                                               Row{"r2", "20", "100.0", "0", "0", "1", "1", "100.0", "a.lcmlog"}));
   EXPECT_THAT(tables.at("Causes"),
               ElementsAre(Row{"certified", "none", "35", "79.5", "3", "r2", "a.lcmlog", "0"},
                           Row{"abstain_safety", "obstacle", "7", "15.9", "2", "<b>r3</b>", "x\"&.lcmlog", "1"},
@@ -60,7 +60,7 @@ TEST_F(FleetReportTest, CountsEachRobotCauseDeclarationAndDay) {
                           Row{"aaaaaaaaaaaa", "1", "2", "30", "96.7", "0", "2026-01-02 00:00", "r1"}));
   EXPECT_THAT(tables.at("Days"),
               ElementsAre(Row{"2026-01-02", "3", "34", "76.5", "2"}, Row{"2026-01-01", "1", "10", "90.0", "0"}));
-  EXPECT_THAT(tables.at("Runs").front(), (Row{"r1", "b.lcmlog", "10", "50.0", "2"}));
+  EXPECT_THAT(tables.at("Runs").front(), (Row{"r1", "b.lcmlog", "10", "50.0", "0", "2"}));
 }
 
 // The query of docs/fleet.md.
@@ -92,9 +92,28 @@ TEST_F(FleetReportTest, IsATextADocumentOrAPage) {
                                 HasSubstr("pages/%3Cb%3Er3%3C%2Fb%3E/x%22%26.lcmlog.html")));
   EXPECT_THAT(Read(page),
               AllOf(HasSubstr("<a href=\"#Robots-1\">2</a>"), HasSubstr("points=\"0,2 4,8 \""),
-                    HasSubstr("<td><a href=\"../pages/r2/a.lcmlog.html\">100.0</a></td>"), HasSubstr("shadow mode"),
-                    HasSubstr("<code>forereach report LOG --out ../pages/ROBOT")));
+                    HasSubstr("<td><a href=\"../pages/r2/a.lcmlog.html\">100.0</a></td>"),
+                    HasSubstr("No gate in shadow mode"), HasSubstr("<code>forereach report LOG --out ../pages/ROBOT")));
   EXPECT_THAT(Forereach(database + " --out " + page + " 2>&1"), Exits(2, page));
+}
+
+TEST_F(FleetReportTest, NamesTheRobotsInShadowMode) {
+  AddFleet();
+  Rows rows;
+  for (const std::string cause : {"shadow", "shadow", "fault"}) {
+    DecisionRow& row = rows.decisions.emplace_back();
+    row.event = {"s.lcmlog", std::ssize(rows.decisions), cause + std::to_string(rows.decisions.size()), kFirst};
+    row.outcome = "rejected";
+    row.cause = cause;
+  }
+  Store store(server_->Address());
+  for (const std::string robot : {"r2", "r5<i>"}) static_cast<void>(store.Write(robot, rows));
+  const std::vector<FleetTable> tables = ReadFleet(store);
+  EXPECT_THAT(tables.front().rows.front(), (Row{"r5<i>", "3", "0.0", "2", "0", "0", "1", "0.0", "s.lcmlog"}));
+  EXPECT_THAT(tables.back().rows, Contains(Row{"r2", "s.lcmlog", "3", "0.0", "2", "0"}));
+  const std::string html = FleetHtml(tables, "pages");
+  EXPECT_THAT(html, AllOf(HasSubstr("<b>In shadow mode: r5&lt;i&gt; r2.</b>"),
+                          HasSubstr("<td><a href=\"pages/r5%3Ci%3E/s.lcmlog.html\">2</a></td>")));
 }
 
 // From every number to the page of a run, which is there.
