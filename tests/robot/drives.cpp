@@ -2,8 +2,11 @@
 #include <chrono>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <random>
+#include <span>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -17,6 +20,7 @@
 #include "forereach/certify/way_clear.h"
 #include "forereach/fault_t.hpp"
 #include "lcmtypes/codec.h"
+#include "logger/logger_node.h"
 #include "simulator/drive_counts.h"
 #include "simulator/lockstep.h"
 #include "task/step_time.h"
@@ -32,6 +36,8 @@ struct Options {
   bool advice = false, repair = false, certifies = false;
   double scatter = 0;
   double errors = 0, input_errors = 0;
+  double wear = 0;
+  std::string log;
 };
 
 std::string TextOf(const DriveCounts& all) {
@@ -50,10 +56,21 @@ struct Drive {
   std::vector<double> ends_at;  // the measured state
 };
 
+// A robot that moves less than its task's target by a share.
+Plant Worn(const Config& config, double share) {
+  return [target = std::shared_ptr<const Target>(MakeTarget(config)), share](
+             std::span<const double> x, std::span<const double> u, std::span<double> next, double longer) {
+    const std::vector<double> before(x.begin(), x.end());
+    target->Step(x, u, next, longer);
+    for (std::size_t i = 0; i < next.size(); ++i) next[i] -= share * (next[i] - before[i]);
+  };
+}
+
 // Even seeds have an adversary, odd ones disturbances, errors of measurement and of inputs, and steps off their times
 // at random, all within what the task declares.
-Drive DriveOnce(Config config, const Config& world, int seed) {
-  constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
+Drive DriveOnce(Config config, const Config& world, int seed, const Options& options) {
+  constexpr std::int64_t kStartUs = 1'700'000'000'000'000, kApartUs = 8LL * 3600 * 1'000'000;  // three a day
+  const int number = seed - options.first_seed;
   config.planner.seed = seed;
   config.robot.disturbance_seed = seed;
   const char* const kind = seed % 2 == 0 ? "adversarial" : "random";
@@ -61,13 +78,21 @@ Drive DriveOnce(Config config, const Config& world, int seed) {
   if (!config.problem->declaration.state_error.isZero(0)) config.robot.sensor_error = kind;
   if (!config.problem->declaration.input_error.isZero(0)) config.robot.input_error = kind;
   if (StepErrorUs(config.gate).value_or(0) > 0) config.robot.step_jitter = kind;
-  Lockstep lockstep(config, world, kStartUs);
+  config.logger.directory = options.log;
+  config.logger.flush_ms = 60'000;  // of simulated time
+  Plant plant;
+  if (options.wear > 0) plant = Worn(config, options.wear * (number + 1) / options.seeds);
+  Lockstep lockstep(config, world, kStartUs + number * kApartUs, std::move(plant));
+  std::ostringstream summary;
+  std::optional<LoggerNode> logger;
+  if (!options.log.empty()) logger.emplace(lockstep.config(), lockstep.bus(), summary);
   Drive drive;
   lockstep.bus().Subscribe(config.bus.fault, [&drive](const Received& received) {
     const auto fault = Decoded<fault_t>(received.bytes);
     if (fault && drive.fault.empty()) drive.fault = GetText(fault->message);
   });
-  lockstep.Run();
+  lockstep.Run(logger ? &*logger : nullptr);
+  if (logger) logger->Stop();
   drive.counts = CountsOf(lockstep);
   drive.ends_at.assign(lockstep.robot().state().begin(), lockstep.robot().state().end());
   return drive;
@@ -117,7 +142,7 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
     for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
       Config scattered = config;
       if (options.scatter > 0) scattered.obstacles = Scattered(config.obstacles, options.scatter, seed);
-      const Drive drive = DriveOnce(scattered, world, seed);
+      const Drive drive = DriveOnce(scattered, world, seed, options);
       const bool is_good = drive.fault.empty() && drive.counts.good();
       if (!is_good)
         bad += fmt::format("{:>26} {}, abstained {}, {}, ends at {:.2f}\n", fmt::format("seed {}", seed),
@@ -191,6 +216,11 @@ int main(int argc, char** argv) {
            .variable = &options.scatter,
            .help = "Moves each obstacle of the task by up to so many metres in each coordinate, by the seed",
            .range = NumberRange{0, 1000}},
+          {.name = "--wear",
+           .variable = &options.wear,
+           .help = "The robot moves less than its task says: in the last drive by this share, before by less",
+           .range = NumberRange{0, 1}},
+          {"--log", &options.log, "DIR", "Records the drives as a logger does; they begin eight hours apart"},
           {"--advice", &options.advice, "Drives each task once more with gate.advice: send"},
           {"--certifies", &options.certifies, "Drives each task once more with planner.certifies: true"},
           {"--repair", &options.repair, "Drives each task once more with planner.repair: true"}}};
