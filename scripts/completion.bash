@@ -1,13 +1,14 @@
-# What bash completes after `forereach`: commands and options as its help has them, and files.
+# What bash completes after the programs: commands and options as their help has them, and files.
 _forereach() {
-  local cur prev words cword
-  _init_completion || return
-  if ((cword == 1)); then
-    COMPREPLY=($(compgen -W "$(forereach --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z-]*\) .*/\1/p') --help --version" -- "$cur"))
-  elif [[ $cur == -* ]]; then
-    COMPREPLY=($(compgen -W "$(forereach "${words[1]}" --help | grep -o -- '--[a-z-]*' | sort -u)" -- "$cur"))
+  local program=$1 current=$2 words
+  words=$("$program" --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z-]*\) .*/\1/p')
+  if [[ -n $words ]] && ((COMP_CWORD == 1)); then
+    words+=' --help --version'
+  elif [[ $current == -* ]]; then
+    words=$("$program" ${words:+"${COMP_WORDS[1]}"} --help | sed -nE 's/^  (-[a-zA-Z],)?(--[a-z-]+).*/\2/p')
   else
-    _filedir
+    words=''
   fi
+  COMPREPLY=($(compgen -W "$words" -- "$current"))
 }
-complete -F _forereach forereach
+complete -o default -F _forereach forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim
