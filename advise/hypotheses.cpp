@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "forereach/certify/learned.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/dynamics/step_rate.h"
 #include "forereach/numerics/size.h"
@@ -66,13 +67,16 @@ void AddRatesAndTurns(const Config& config, std::vector<Hypothesis>& all) {
 }
 
 // What is assumed of a residual in a step that is off its time, where some state's rate is that of the equations.
-void AddGrowth(const Problem& problem, std::vector<Hypothesis>& all) {
+void AddGrowth(const Config& config, std::vector<Hypothesis>& all) {
+  const Problem& problem = *config.problem;
   const StepTiming& timing = problem.timing;
   bool follows_equations = false;
   for (int k = 0; k < problem.model->num_states(); ++k)
     follows_equations = follows_equations || (std::ranges::count(timing.set_at_steps, k) == 0 &&
                                               !(timing.rate_bound.size() > 0 && timing.rate_bound[k] < kInfinity));
-  if ((timing.error == 0 && problem.transitions.longer.isZero(0)) || !follows_equations) return;
+  const bool is_off = timing.error > 0 || !problem.transitions.longer.isZero(0) ||
+                      (config.gate.learns && !StepErrorUs(config.gate) && KnowsDurations(problem));
+  if (!is_off || !follows_equations) return;
   all.push_back(
       {fmt::format("in a step of duration h what the model does not know differs from that of dt by at most "
                    "((1 + |h - dt|/dt)^{} - 1) of its bounds",
@@ -93,7 +97,7 @@ void AddTimes(const Config& config, std::vector<Hypothesis>& all) {
                                     : "nobody: robot.step_error_ms is not given, or any, so no clock is looked at"});
   all.push_back({"recorded steps lasted model.dt, give or take their column dt_error",
                  "`forereach import`, which writes it by the stamps; otherwise nobody"});
-  AddGrowth(*config.problem, all);
+  AddGrowth(config, all);
   std::string set;
   for (const int k : timing.set_at_steps)
     set += (set.empty() ? "" : ", ") + config.problem->model->state_names()[ToSize(k)];

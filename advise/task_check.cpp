@@ -43,7 +43,6 @@ constexpr Eigen::Index kMostCompared = 1500;   // transitions: a million pairs
 constexpr int kSamples = 2000;                 // of the domain, for the length of a step
 constexpr double kTight = 0.8, kLoose = 0.02;  // shares of the declaration that are worth a remark
 constexpr double kShareBeyond = 0.05;          // of the data's range
-constexpr double kNear = 0.1;                  // standard deviations apart, as in identify/smallest_row.h
 constexpr double kSuspect = 1 - 1e-9;          // of what is declared: worth a rigorous test
 constexpr std::size_t kMostLines = 20;         // that a finding lists
 
@@ -312,7 +311,7 @@ class Examination final {
           if (!(used > kSuspect)) continue;
           if (const auto pair = TestPair(problem_.declaration, observations, static_cast<int>(i), static_cast<int>(j),
                                          static_cast<int>(k)))
-            found.Add(*pair, scales.dot(apart) < kNear);
+            found.Add(*pair, scales.dot(apart) < kNearby);
         }
       result_.rows.push_back(row);
     }

@@ -9,7 +9,6 @@
 
 #include "cli/commands.h"
 #include "fleet/transitions.h"
-#include "identify/import.h"
 #include "lcmtypes/printable.h"
 #include "task/config.h"
 #include "task/json_text.h"
@@ -41,12 +40,7 @@ void SetDay(const std::string& text, Store::WhichTransitions& which) {
 
 FleetTransitions Read(const FleetImportArguments& options, const Config& task) try {
   Store store(options.database);
-  Problem problem = *task.problem;
-  // Where no clock is looked at, a step of another duration still says what it says, if it is known how states move
-  // with time.
-  if (problem.timing.error == 0 && KnowsDurations(problem)) problem.timing.error = task.period / 5;
-  return ReadTransitions(store, problem, options.which,
-                         options.by == "day" ? TransitionsBy::kDay : TransitionsBy::kRobot);
+  return ReadTransitions(store, task, options.which, options.by == "day" ? TransitionsBy::kDay : TransitionsBy::kRobot);
 } catch (const std::invalid_argument& error) {  // a task that no certifier accepts
   throw ConfigError(task.path + ": " + error.what());
 }
@@ -66,7 +60,7 @@ int ImportFromFleet(FleetImportArguments options) {
               << (is_written ? " in " + Printable(options.out) : "");
     if (count > 0)
       std::cout << fmt::format("\nSteps lasted up to {:g} s longer or shorter: {}", found.longer,
-                               found.transitions.longer.size() > 0
+                               !found.transitions.longer.isZero(0)
                                    ? "column dt_error says it of each, so it counts"
                                    : "declaration.noise_bound has to include how far states move in that "
                                      "time, or give robot.step_error_ms");

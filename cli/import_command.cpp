@@ -112,7 +112,7 @@ struct Columns {
   }
 };
 
-Columns ColumnsOf(const ImportArguments& options, const NominalModel& model) {
+Columns ColumnsOf(const ImportArguments& options, const ImportOptions& import, const NominalModel& model) {
   Columns columns;
   const auto take = [&](const char* option, const auto& texts, const std::vector<std::string>& names,
                         std::vector<std::string>& into) {
@@ -129,7 +129,7 @@ Columns ColumnsOf(const ImportArguments& options, const NominalModel& model) {
   take("state", options.states, model.state_names(), columns.states);
   take("input", options.inputs, model.input_names(), columns.inputs);
   const std::size_t first = options.rate ? 0 : 1;
-  for (const auto& [state, input] : HeldOf(options, model))
+  for (const auto& [state, input] : import.held)
     columns.states[first + ToSize(state)] = columns.inputs[first + ToSize(input)];
   return columns;
 }
@@ -468,9 +468,9 @@ int RunImport(ImportArguments options) {
   const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   const NominalModel& model = *config.problem->model;
   CheckJoin(options);
-  const Columns wanted = ColumnsOf(options, model);
-  const std::vector<std::string> columns = wanted.All(!options.rate);
   ImportOptions import = ImportOptionsOf(options, config);
+  const Columns wanted = ColumnsOf(options, import, model);
+  const std::vector<std::string> columns = wanted.All(!options.rate);
   std::vector<Source> sources;
   Transitions all{Eigen::MatrixXd(0, model.num_variables()), Eigen::MatrixXd(0, model.num_states())};
   std::optional<Progress> progress(std::in_place, "logs read", options.logs.size());

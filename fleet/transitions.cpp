@@ -66,7 +66,7 @@ std::string KindOf(const std::string& refusal) {
 
 class Reading final {
  public:
-  Reading(const Problem& problem, TransitionsBy by) : problem_(problem), by_(by) {}
+  Reading(const Config& task, TransitionsBy by) : problem_(*task.problem), options_(task.gate), by_(by) {}
 
   void Take(const Store::OfRobot& of_robot) {
     const auto& [robot, row] = of_robot;
@@ -76,7 +76,7 @@ class Reading final {
     const std::optional<transition_t> message = MessageOf(row);
     ExecutedTransition executed;
     if (message)
-      executed = Examine(*message, problem_);
+      executed = Examine(*message, problem_, options_);
     else
       executed.refusal = "the row has other sizes than a message of a step";
     if (!executed.refusal.empty()) {
@@ -124,7 +124,7 @@ class Reading final {
     const Eigen::Map<const RowMajor> z(z_.data(), count, d), next(next_.data(), count, n);
     Transitions some{z(kept_, Eigen::all), next(kept_, Eigen::all)};
     some.num_learned = some.size();
-    if (problem_.timing.error > 0) some.longer = Eigen::Map<const Eigen::VectorXd>(longer_.data(), count)(kept_);
+    some.longer = Eigen::Map<const Eigen::VectorXd>(longer_.data(), count)(kept_);
     return some;
   }
 
@@ -191,6 +191,7 @@ class Reading final {
   }
 
   const Problem& problem_;
+  const GateOptions& options_;
   const TransitionsBy by_;
   std::set<std::string> names_;
   std::vector<Place> places_;
@@ -203,9 +204,9 @@ class Reading final {
 
 }  // namespace
 
-FleetTransitions ReadTransitions(Store& store, const Problem& problem, const Store::WhichTransitions& which,
+FleetTransitions ReadTransitions(Store& store, const Config& task, const Store::WhichTransitions& which,
                                  TransitionsBy by) {
-  Reading reading(problem, by);
+  Reading reading(task, by);
   std::vector<Store::OfRobot> rows;
   std::optional<Store::OfRobot> last;
   do {

@@ -6,7 +6,7 @@ between robots, and which of them contradict the task's declaration. */
 
 #include "fleet/report.h"
 #include "fleet/store.h"
-#include "forereach/certify/problem.h"
+#include "task/config.h"
 
 namespace forereach {
 
@@ -22,9 +22,9 @@ struct FleetTransitions {
   FleetTable residuals, refused, contradictions;
 };
 
-/** @param problem its own transitions do not count. Cost: a pass over the rows, whose numbers are kept in memory; then
+/** @param task its own transitions do not count. Cost: a pass over the rows, whose numbers are kept in memory; then
 a Certifier of each robot's, and one of the others' for each contradiction between robots. @throws StoreError. */
-[[nodiscard]] FleetTransitions ReadTransitions(Store& store, const Problem& problem,
-                                               const Store::WhichTransitions& which, TransitionsBy by);
+[[nodiscard]] FleetTransitions ReadTransitions(Store& store, const Config& task, const Store::WhichTransitions& which,
+                                               TransitionsBy by);
 
 }  // namespace forereach

@@ -17,7 +17,6 @@
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/reach/domain.h"
-#include "forereach/reach/step_offsets.h"
 #include "task/config_error.h"
 
 namespace forereach {
@@ -381,15 +380,6 @@ const DroppedWords& WordsOf(Dropped dropped) {
   };
   static_assert(std::size(kWords) == static_cast<std::size_t>(Dropped::kCount));
   return kWords[static_cast<std::size_t>(dropped)];
-}
-
-bool KnowsDurations(const Problem& problem) try {
-  StepTiming timing = problem.timing;
-  timing.error = StepOf(*problem.model) / 4;
-  static_cast<void>(StepOffsets(*problem.model, timing));
-  return true;
-} catch (const std::invalid_argument&) {
-  return false;
 }
 
 ImportedLog Import(const LogTable& table, const Problem& problem, const ImportOptions& options) {

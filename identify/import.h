@@ -98,10 +98,6 @@ struct ImportedLog {
   [[nodiscard]] const Finding& At(Dropped cause) const { return dropped[static_cast<std::size_t>(cause)]; }
 };
 
-/** Whether the duration of a step can count: the model's equations or the declared rates say how each state moves with
-time (StepOffsets). */
-[[nodiscard]] bool KnowsDurations(const Problem& problem);
-
 /** Makes the transitions of one log, in the order of their starts. Cost: linear in the samples and in the rows of all
 steps.
 @param table columns: the stamp, unless there is none, the states, the inputs. @param problem its model and domain.

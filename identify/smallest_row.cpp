@@ -88,7 +88,7 @@ class SmallestRowSearch {
     if (declaration_.disturbance.size() == 0)
       declaration_.disturbance = Eigen::VectorXd::Zero(declaration_.noise_bound.size());
     std::vector<double> prices(free_.size(), 1);
-    prices.push_back(2 / kNear);
+    prices.push_back(2 / kNearby);
     LinearProgram program(prices);
     SmallestRow found;
     Solve(program, found);

@@ -42,14 +42,10 @@ Cost: some tens of rounds, each about N descents of a search tree and a small li
 [[nodiscard]] SmallestRow FindSmallestRow(const Declaration& declaration, const Observations& observations,
                                           int coordinate, const Eigen::RowVectorXd& scales);
 
-/** Places z, z' with sum_l |z_l - z'_l| / s_l below this are near each other: a tenth of a standard deviation if the
-s_l are those. */
-inline constexpr double kNear = 0.1;
-
 /** The scatter of coordinate k: the error e beyond the declaration's eps that residuals of near places show. It
-minimises sum_l s_l L_kl + (2 / kNear) e over e >= 0 and the rows that are consistent with the error eps + e. A pair at
-a distance d, as above, asks for slopes of its difference over d, or for half its difference: so e explains near pairs,
-and slopes the others. No pair contradicts the row that FindSmallestRow finds with the error eps + e.
+minimises sum_l s_l L_kl + (2 / kNearby) e over e >= 0 and the rows that are consistent with the error eps + e. A pair
+at a distance d, as above, asks for slopes of its difference over d, or for half its difference: so e explains near
+pairs, and slopes the others. No pair contradicts the row that FindSmallestRow finds with the error eps + e.
 @return e, zero if slopes explain near pairs as well. Arguments and cost as for FindSmallestRow. */
 [[nodiscard]] double FindScatter(const Declaration& declaration, const Observations& observations, int coordinate,
                                  const Eigen::RowVectorXd& scales);

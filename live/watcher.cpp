@@ -258,7 +258,7 @@ bool Watcher::TakeTransition(const LogEvent& event) {
   const auto message = Decoded<transition_t>(event.message());
   if (!message) return false;
   if (!task_.gate.learns || certifier_->num_observations() >= kMostLearned) return true;
-  const ExecutedTransition transition = Examine(*message, *task_.problem);
+  const ExecutedTransition transition = Examine(*message, *task_.problem, task_.gate);
   if (transition.refusal.empty())
     static_cast<void>(certifier_->Learn(transition.z, transition.next, transition.longer));
   return true;

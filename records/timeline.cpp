@@ -185,7 +185,7 @@ void Timeline::TakeTransition(const LogEvent& event) {
   if (!transition_sender_.WhyTwo(event.utime).empty()) return;
   const auto message = Decoded<transition_t>(event.message());
   if (!now_->gate.learns || !message) return;
-  ExecutedTransition transition = Examine(*message, *now_->problem);
+  ExecutedTransition transition = Examine(*message, *now_->problem, now_->gate);
   if (!transition.refusal.empty()) return;
   logged_observations_ = ChainedDigest(logged_observations_, event.message());
   transitions_ahead_.push_back(

@@ -41,7 +41,7 @@ Transitions ReadTransitions(const std::string& path, const NominalModel& model, 
   Transitions read{rows.leftCols(model.num_variables()), rows.middleCols(model.num_variables(), model.num_states())};
   if (rows.cols() == std::ssize(columns)) return read;
   read.longer = rows.rightCols<1>();
-  const Range allowed{0, StepOf(model) / 2, false, true};
+  const Range allowed{0, TooFarOff(model), false, true};
   for (Eigen::Index i = 0; i < read.longer.size(); ++i)
     if (const double longer = read.longer[i]; !allowed.Contains(longer))
       throw ConfigError(fmt::format("{}:{}: {}: {} is outside {}, from 0 up to half of model.dt", path, i + 2,

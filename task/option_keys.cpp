@@ -333,7 +333,8 @@ std::vector<Key> RobotKeys() {
                "certificates say that steps are on time"),
       Word("robot.step_error_ms", {"any"},
            "Steps are taken at any time, and nobody looks at a clock: certificates hold for steps on time, and those "
-           "of another duration are not learned. Not with gate.max_clock_error_ms.",
+           "of another duration are learned where the model's equations or rates explain it. Not with "
+           "gate.max_clock_error_ms.",
            [](const Field&, TaskDraft& draft) { draft.config.gate.step_error_ms = kAnyTime; }),
       Optional(
           robot.Number(

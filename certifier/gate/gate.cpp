@@ -465,9 +465,10 @@ std::string Gate::Learn(Bytes bytes) {
   if (!options_.learns) return "the task has gate.learn: none";
   const auto message = Decoded<transition_t>(bytes);
   if (!message) return fmt::format("not a transition_t of {} bytes", EncodedSize<transition_t>());
-  const ExecutedTransition transition = FromMessage(*message, certifier_.problem());
-  // Where nobody looks at a clock, a step of another duration is nothing to learn of, and nothing is wrong with it.
-  if (!StepErrorUs(options_) && transition.by_clock > MostLonger(certifier_.problem().timing)) return {};
+  const Problem& problem = certifier_.problem();
+  const ExecutedTransition transition = FromMessage(*message, problem, options_);
+  // Where nobody looks at a clock, a step that is nothing to learn of by its duration has nothing wrong with it.
+  if (!StepErrorUs(options_) && !CountedDuration(problem, transition.by_clock, true)) return {};
   if (!transition.refusal.empty()) return transition.refusal;
   if (const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer, transition.by_clock);
       learned != Learned::kAdded)

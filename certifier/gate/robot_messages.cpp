@@ -9,6 +9,7 @@
 #include "forereach/certify/learned.h"
 #include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/text.h"
+#include "task/step_time.h"
 
 namespace forereach {
 
@@ -57,7 +58,7 @@ double LongerThanDt(std::int64_t duration_us, double dt) {
 
 }  // namespace
 
-ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
+ExecutedTransition FromMessage(const transition_t& message, const Problem& problem, const GateOptions& options) {
   const NominalModel& model = *problem.model;
   const int n = model.num_states(), m = model.num_inputs();
   ExecutedTransition transition;
@@ -71,16 +72,17 @@ ExecutedTransition FromMessage(const transition_t& message, const Problem& probl
   transition.next.assign(message.next_state, message.next_state + n);
   const double dt = StepOf(model), error = problem.timing.error;
   transition.by_clock = LongerThanDt(message.duration_us, dt);
-  if (error > 0) transition.longer = transition.by_clock;
-  if (!(transition.by_clock <= MostLonger(problem.timing)))
+  if (const auto counted = CountedDuration(problem, transition.by_clock, !StepErrorUs(options)))
+    transition.longer = *counted;
+  else
     transition.refusal = fmt::format(
         "the step lasted {} us, further from model.dt, {} s, than {}", message.duration_us, ToText(dt),
         error > 0 ? "two errors of " + ToText(error) + " s" : "steps on time do; robot.step_error_ms allows no more");
   return transition;
 }
 
-ExecutedTransition Examine(const transition_t& message, const Problem& problem) {
-  ExecutedTransition transition = FromMessage(message, problem);
+ExecutedTransition Examine(const transition_t& message, const Problem& problem, const GateOptions& options) {
+  ExecutedTransition transition = FromMessage(message, problem, options);
   Observations observed;
   if (transition.refusal.empty())
     transition.refusal = Explain(Observe(problem, transition.z, transition.next, transition.longer, observed));

@@ -34,11 +34,13 @@ struct ExecutedTransition {
   std::string refusal;          ///< What keeps it from being learned. Empty if nothing does.
 };
 
-/** Refuses sizes other than the model's, and a duration that no step on schedule has (MostLonger). */
-[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
+/** Refuses sizes other than the model's, and a duration that does not count (CountedDuration). */
+[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem,
+                                             const GateOptions& options);
 
 /** Also refuses transitions that a certifier would not learn (certify/learned.h). For readers of logs, which have no
 certifier. */
-[[nodiscard]] ExecutedTransition Examine(const transition_t& message, const Problem& problem);
+[[nodiscard]] ExecutedTransition Examine(const transition_t& message, const Problem& problem,
+                                         const GateOptions& options);
 
 }  // namespace forereach

@@ -1,6 +1,7 @@
 #include "certifier/process/contradictions.h"
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <stdexcept>
 
@@ -10,6 +11,7 @@
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/regional_enclosure.h"
+#include "task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -25,13 +27,14 @@ bool IsSame(const Contradictions::Evidence& a, const Contradictions::Evidence& b
 
 std::span<const double> Values(const Eigen::VectorXd& row) { return {row.data(), ToSize(row.size())}; }
 
-// Whether every row is an observation under this task. One that is not says nothing. What a file says of a step's
-// duration counts under any task; a learned one has to be of a step on schedule.
-bool AllCount(const Transitions& rows, const Problem& problem) {
-  for (int i = 0; i < rows.size(); ++i)
-    if (!IsWithin(problem, Values(rows.z.row(i)), rows.IsLearned(i)) ||
-        (rows.IsLearned(i) && !(rows.longer[i] <= MostLonger(problem.timing))))
-      return false;
+// Whether every row is an observation under this task, with what then counts of its duration. One that is not says
+// nothing. What a file says of a duration counts under any task.
+bool AllCount(Transitions& rows, const Problem& problem, bool is_any) {
+  for (int i = 0; i < rows.size(); ++i) {
+    const auto longer = rows.IsLearned(i) ? CountedDuration(problem, rows.longer[i], is_any) : rows.longer[i];
+    if (!longer || !IsWithin(problem, Values(rows.z.row(i)), rows.IsLearned(i))) return false;
+    rows.longer[i] = *longer;
+  }
   return true;
 }
 
@@ -45,13 +48,12 @@ bool ExceedsARate(const Transitions& rows, const Problem& problem) {
   return false;
 }
 
-bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const Problem& problem) try {
+bool Contradicts(const Contradictions::Evidence& one, const Digest& model, const Problem& problem, bool is_any) try {
   const Declaration& declaration = problem.declaration;
   Transitions rows = one.rows;
   if (one.model != model || rows.x_next.cols() != declaration.lipschitz.rows() ||
-      rows.z.cols() != declaration.lipschitz.cols() || !AllCount(rows, problem))
+      rows.z.cols() != declaration.lipschitz.cols() || !AllCount(rows, problem, is_any))
     return false;
-  if (!(problem.timing.error > 0)) rows.longer.tail(rows.num_learned).setZero();  // steps are on time
   const Observations observed = Observe(*problem.model, declaration, rows, problem.timing);
   const auto [lower, upper] = problem.domain.Corners();
   return FindViolation(declaration, observed) || FindRegionalViolation(declaration, observed, lower, upper) ||
@@ -66,12 +68,13 @@ void Contradictions::Follow(const Config& config) {
   model_ = config.grounds.model;
   declaration_digest_ = config.grounds.declaration;
   problem_ = config.problem;
+  is_any_ = !StepErrorUs(config.gate);
   contradict_in_force_ = Contradict(config);
 }
 
 void Contradictions::Add(Evidence one) {
   if (std::ranges::any_of(evidence_, [&](const Evidence& known) { return IsSame(known, one); })) return;
-  contradict_in_force_ = contradict_in_force_ || Contradicts(one, model_, *problem_);
+  contradict_in_force_ = contradict_in_force_ || Contradicts(one, model_, *problem_, is_any_);
   evidence_.push_back(std::move(one));
 }
 
@@ -85,7 +88,7 @@ void Contradictions::AddReported(const Digest& model, const Digest& declaration)
 
 bool Contradictions::Contradict(const Config& config) const {
   return WasReported(config) || std::ranges::any_of(evidence_, [&](const Evidence& one) {
-           return Contradicts(one, config.grounds.model, *config.problem);
+           return Contradicts(one, config.grounds.model, *config.problem, !StepErrorUs(config.gate));
          });
 }
 

@@ -50,6 +50,7 @@ class Contradictions final {
   std::vector<std::pair<Digest, Digest>> reported_;  // model, declaration
   Digest model_{}, declaration_digest_{};            // in force
   std::shared_ptr<const Problem> problem_;           // in force
+  bool is_any_ = false;                              // as for CountedDuration, in force
   bool contradict_in_force_ = false;
 };
 

@@ -5,17 +5,37 @@
 #include <stdexcept>
 #include <string>
 
+#include "forereach/dynamics/models/named_models.h"
 #include "forereach/numerics/directed.h"
 #include "forereach/numerics/text.h"
 #include "forereach/reach/step_offsets.h"
 #include "forereach/residual/no_nominal_value.h"
 
 namespace forereach {
+namespace {
+
+// @throws std::invalid_argument if it is not known how a state moves in a step that is off dt by so many seconds.
+void RequireRates(const Problem& problem, double longer) {
+  StepTiming timing = problem.timing;
+  timing.error = std::max(timing.error, DivUp(longer, 2));
+  static_cast<void>(StepOffsets(*problem.model, timing));
+}
+
+}  // namespace
 
 bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned) {
   const Declaration& declaration = problem.declaration;
   if (!declaration.HasErrorInZ() || (declaration.given_are_exact && !is_learned)) return problem.domain.Contains(z);
   return FindExit(problem.domain, problem.declaration.BoxAround(z)).kind == DomainExit::Kind::kNone;
+}
+
+double TooFarOff(const NominalModel& model) { return StepOf(model) / 2; }
+
+bool KnowsDurations(const Problem& problem) try {
+  RequireRates(problem, TooFarOff(*problem.model));
+  return true;
+} catch (const std::invalid_argument&) {
+  return false;
 }
 
 void ValidateDurations(const Problem& problem) {
@@ -24,22 +44,28 @@ void ValidateDurations(const Problem& problem) {
   if (longer.size() != problem.transitions.size())
     throw std::invalid_argument("transitions: " + std::to_string(longer.size()) + " durations, must be " +
                                 std::to_string(problem.transitions.size()) + " or none");
+  if (longer.isZero(0)) return;
+  const double most = TooFarOff(*problem.model);
   for (Eigen::Index i = 0; i < longer.size(); ++i)
-    if (!(longer[i] >= 0 && longer[i] < kInfinity))
+    if (!(longer[i] >= 0 && longer[i] < most))
       throw std::invalid_argument("transition " + std::to_string(i) + ": a duration is off by " + ToText(longer[i]) +
-                                  " s, which is negative or not finite");
-  StepTiming timing = problem.timing;
-  timing.error = std::max(timing.error, DivUp(longer.maxCoeff(), 2));
-  static_cast<void>(StepOffsets(*problem.model, timing));
+                                  " s, outside [0, " + ToText(most) + "), from 0 up to half of dt");
+  RequireRates(problem, longer.maxCoeff());
 }
 
-double MostLonger(const StepTiming& timing) { return AddUp(MulUp(2, timing.error), 2e-6); }
+std::optional<double> CountedDuration(const Problem& problem, double by_clock, bool is_any) {
+  const double error = problem.timing.error;
+  if (by_clock <= AddUp(MulUp(2, error), 2e-6)) return error > 0 ? by_clock : 0;
+  if (is_any && by_clock < TooFarOff(*problem.model) && KnowsDurations(problem)) return by_clock;
+  return std::nullopt;
+}
 
 Learned Observe(const Problem& problem, std::span<const double> z, std::span<const double> next, double longer,
                 Observations& observed) {
   const auto finite = [](double value) { return std::isfinite(value); };
   if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
   if (!IsWithin(problem, z, true)) return problem.domain.Contains(z) ? Learned::kNearTheEdge : Learned::kOutsideDomain;
+  if (longer > 0 && !(longer < TooFarOff(*problem.model))) return Learned::kNoNominalSlope;
   const auto row = [](std::span<const double> values) {
     return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
   };

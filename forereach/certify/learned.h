@@ -1,6 +1,7 @@
 /** Which executed transitions (z, x+) are observations of a problem's residual. */
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 
@@ -24,15 +25,22 @@ enum class Learned {
 then counts. @param is_learned whether it was learned: given ones may be exact (Declaration::given_are_exact). */
 [[nodiscard]] bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned);
 
-/** By how much the step of a learned transition may have been longer or shorter than dt by its clock, at most, s: two
-errors of its boundaries, and two units of a clock of microseconds. Where steps are declared to be on time, which is
-also where no clock is looked at, another step is none that the certificates speak of: nothing says what it shows of a
-step of dt. */
-[[nodiscard]] double MostLonger(const StepTiming& timing);
+/** A step that was longer or shorter than dt by so much or more, half of dt, s, says nothing. */
+[[nodiscard]] double TooFarOff(const NominalModel& model);
 
-/** @throws std::invalid_argument unless Transitions::longer is none, or finite and not negative for each transition,
-and, where one is positive, equations or declared rates say how each state moves with time (StepOffsets). */
+/** Whether the duration of a step can count: the model's equations or declared rates say how each state moves with time
+(StepOffsets). */
+[[nodiscard]] bool KnowsDurations(const Problem& problem);
+
+/** @throws std::invalid_argument unless Transitions::longer is none, or in [0, TooFarOff) for each transition, and,
+where one is positive, as KnowsDurations asks; the message says why not. */
 void ValidateDurations(const Problem& problem);
+
+/** What counts of the duration of a learned step that was, by its clock, up to `by_clock` s longer or shorter than dt.
+On time is a step within two errors of its boundaries and two units of a clock of microseconds: it counts as it is, or
+as one of dt if steps have no errors. Nothing for another one: it is not learned. @param is_any nobody looks at a clock:
+another one counts as it is, too, below TooFarOff and with KnowsDurations. */
+[[nodiscard]] std::optional<double> CountedDuration(const Problem& problem, double by_clock, bool is_any);
 
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. @param longer by how much the
 step lasted longer or shorter than dt, at most, s. Without a fault `observed` gets

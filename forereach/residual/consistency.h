@@ -24,6 +24,10 @@ struct Violation {
   [[nodiscard]] static constexpr int RegionOf(int second) { return -2 - second; }
 };
 
+/** Places z, z' with sum_l |z_l - z'_l| / s_l below this are near each other, where the s_l are the standard
+deviations: residuals that differ there scatter. */
+inline constexpr double kNearby = 0.1;
+
 /** Tests one pair in one coordinate. Rounding favours the declaration, so a returned violation holds in real
 arithmetic. Cost O(d_z). */
 [[nodiscard]] std::optional<Violation> TestPair(const Declaration& declaration, const Observations& observations,

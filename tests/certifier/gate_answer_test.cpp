@@ -7,6 +7,7 @@
 #include "task/step_time.h"
 #include "tests/certifier/small_task.h"
 #include "tests/oracle/random.h"
+#include "tests/text_models.h"
 
 namespace forereach::gate_answer_test {
 
@@ -401,9 +402,18 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
 }
 
 // A step of another duration shows nothing of a step of dt, 150 ms, unless the task says how it differs.
+// The small task's model in numbers of a step of its dt, which do not say what others do.
+Config TaskOfNumbers() {
+  Config config = SmallTask();
+  Own(config.problem).model = MakeTextModel(
+      TextModel({{"px", "px + 0.15*vx"}, {"py", "py + 0.15*vy"}, {"vx", "vx + 0.15*ax"}, {"vy", "vy + 0.15*ay"}},
+                {"ax", "ay"}, {{"dt", 0.15, 0.15}}));
+  return config;
+}
+
 TEST(GateTransitionTest, AStepThatNoScheduleAllowsIsNotLearned) {
-  const auto learn = [](std::optional<double> step_error_ms, std::int64_t duration_us) {
-    Config config = SmallTask();
+  const auto learn = [](std::optional<double> step_error_ms, std::int64_t duration_us, bool has_equations = true) {
+    Config config = has_equations ? SmallTask() : TaskOfNumbers();
     config.gate.learns = true;
     config.gate.step_error_ms = step_error_ms;
     Own(config.problem).timing.error = StepErrorSeconds(config);
@@ -419,10 +429,16 @@ TEST(GateTransitionTest, AStepThatNoScheduleAllowsIsNotLearned) {
   for (const std::int64_t other : {149'998, 150'002, 100'000, 0, -150'000}) {
     EXPECT_THAT(learn(0, other), HasSubstr(" us, further from model.dt, 0.15 s, than steps on time do"));
     for (const std::optional<double> no_clock : {std::optional(kAnyTime), std::optional<double>()}) {
-      EXPECT_EQ(learn(no_clock, 150'000), "");
-      EXPECT_EQ(learn(no_clock, other), "not learned") << "and not refused";
+      EXPECT_EQ(learn(no_clock, 150'000, false), "");
+      EXPECT_EQ(learn(no_clock, other, false), "not learned") << "and not refused";
+      EXPECT_EQ(learn(no_clock, other), other > 75'000 ? "" : "not learned") << "the equations know time";
     }
   }
+  // (1 + x / dt)^2 < 2, else the residual may have doubled.
+  for (const std::int64_t within : {212'130, 87'870}) EXPECT_EQ(learn(kAnyTime, within), "");
+  for (const std::int64_t beyond : {212'132, 87'868, 224'998, 75'002})
+    EXPECT_THAT(learn(kAnyTime, beyond), HasSubstr("nothing bounds the residual"));
+  for (const std::int64_t half : {225'000, 75'000}) EXPECT_EQ(learn(kAnyTime, half), "not learned");
   for (const std::int64_t within : {160'000, 140'000}) EXPECT_EQ(learn(5, within), "");
   for (const std::int64_t beyond : {160'002, 139'998})
     EXPECT_THAT(learn(5, beyond), HasSubstr(" us, further from model.dt, 0.15 s, than two errors of 0.005 s"));

@@ -109,6 +109,23 @@ TEST_F(FleetImportTest, TakesStepsOfOtherDurationsWithThese) {
   EXPECT_LT(all.Longer(1), 2e-6);
 }
 
+// Steps may be up to 60 ms off, and a file's up to half of dt, 50 ms: what is written is read again.
+TEST_F(FleetImportTest, TakesNoStepThatATaskRefusesByItsDuration) {
+  std::string text = Replaced(Read(kCourseTask), "transitions: course_transitions.csv", "transitions: fleet.csv");
+  text = Replaced(text, "step_error_ms: any", "step_error_ms: 30");
+  const std::string task =
+      scratch_.Write("task.yaml", Replaced(text, "set_at_steps: [a, delta]",
+                                           "set_at_steps: [a, delta], rate_bound: {x: 20, y: 20, theta: 3, v: 9}"));
+  Add("r1", [](int number, transition_t& transition) {
+    if (number < 2) transition.duration_us += number == 0 ? 49'998 : 49'999;
+  });
+  EXPECT_THAT(Forereach("import --config " + task + " --database '" + server_->Address() + "' --out " + out_ + " 2>&1"),
+              Exits(0, "import: " + std::to_string(OfCourse().size() - 1) + " transitions"));
+  const Config config = LoadConfig(task);
+  EXPECT_NEAR(config.problem->transitions.Longer(0), 0.049999, 1e-9);
+  EXPECT_LT(config.problem->transitions.Longer(1), 3e-6);
+}
+
 TEST_F(FleetImportTest, TakesOneRobotOrDay) {
   const std::string count = std::to_string(OfCourse().size());
   Add("r1");

@@ -142,8 +142,8 @@ double ScatterAt(double distance, double noise) {
 
 TEST(Scatter, IsTheErrorThatNearPlacesShow) {
   EXPECT_NEAR(ScatterAt(0, 0), 0.5, 1e-6);
-  EXPECT_NEAR(ScatterAt(kNear - 0.001, 0), 0.5, 0.01) << "a slope of 1 / 8 remains";
-  EXPECT_EQ(ScatterAt(kNear + 0.001, 0), 0) << "a slope explains it";
+  EXPECT_NEAR(ScatterAt(kNearby - 0.001, 0), 0.5, 0.01) << "a slope of 1 / 8 remains";
+  EXPECT_EQ(ScatterAt(kNearby + 0.001, 0), 0) << "a slope explains it";
   EXPECT_NEAR(ScatterAt(0, 0.3), 0.2, 1e-6) << "beyond the noise";
   EXPECT_EQ(ScatterAt(0, 0.5), 0);
 }

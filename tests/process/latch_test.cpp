@@ -232,6 +232,7 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
 // What a transition shows depends on the errors that are declared of what is recorded and of when.
 TEST_F(LatchTest, ADeclarationOfLargerErrorsIsNotHeldAgainstWhatWasSeenUnderSmallerOnes) {
   Own(config_.problem).timing = {.error = 0.01, .set_at_steps = {2}};
+  config_.gate.step_error_ms = 10;
   Begin();
   SayState();
   Falsify(170'000);  // vx by 0.01, in a step that lasted 0.02 s longer, which counts nothing for vx here
@@ -276,6 +277,16 @@ TEST_F(LatchTest, WhatAFileSaysOfADurationIsNoReasonToForgetWhatItContradicts) {
   SayState();
   Falsify();
   EXPECT_TRUE(IsFalsifiedAfterARestart());
+}
+
+// Nobody looks at a clock, and the equations say what another duration does.
+TEST_F(LatchTest, AStepOfAnyDurationContradictsWhereItCounts) {
+  Begin();
+  SayState();
+  Falsify(170'000);
+  EXPECT_TRUE(IsFalsifiedAfterARestart());
+  config_.gate.step_error_ms = 0;
+  EXPECT_FALSE(IsFalsifiedAfterARestart()) << "all steps last dt";
 }
 
 TEST_F(LatchTest, ATransitionOutsideTheDomainSaysNothing) {

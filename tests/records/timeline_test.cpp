@@ -75,7 +75,7 @@ struct TimelineTest : testing::Test {
     const int n = config_.problem->model->num_states(), m = config_.problem->model->num_inputs();
     transition_t message{.utime = ++now_,
                          .sequence = transitions_++,
-                         .duration_us = StepUs(config_),
+                         .duration_us = StepUs(config_) + off_us_,
                          .num_states = static_cast<std::int16_t>(n),
                          .num_inputs = static_cast<std::int16_t>(m)};
     for (int k = 0; k < n; ++k) message.state[k] = known.z(0, k), message.next_state[k] = known.x_next(0, k);
@@ -174,7 +174,7 @@ struct TimelineTest : testing::Test {
   std::vector<std::string> logs_;
   std::unique_ptr<EventLogWriter> writer_;
   candidate_plan_t candidate_{};
-  std::int64_t now_ = kStart, obstacles_ = 0, transitions_ = 0;
+  std::int64_t now_ = kStart, obstacles_ = 0, transitions_ = 0, off_us_ = 0;
   int certified_ = 0;
 };
 
@@ -285,6 +285,22 @@ TEST_F(TimelineTest, OfTwoObstacleSendersTheSecondIsNotTakenUntilTheFirstIsSilen
   ObstaclesBy(1, 90, true);
   Certify();
   ExpectAllAgree();
+}
+
+// The task looks at no clock: a step counts with its duration, and one of half a step more not at all.
+TEST_F(TimelineTest, StepsOfOtherDurationsAreLearnedWithThese) {
+  Restart();
+  for (const std::int64_t off_us : {0, 2'000, -3'000, 50'000}) {
+    off_us_ = off_us;
+    Transition();
+    Certify();
+  }
+  ExpectAllAgree();
+  const Transitions known = ReadLogs(logs_, kCourseTask).config.problem->transitions;
+  ASSERT_EQ(known.num_learned, 3);
+  EXPECT_EQ(known.longer.tail(3)[0], 0);
+  EXPECT_NEAR(known.longer.tail(3)[1], 0.002001, 1e-9);
+  EXPECT_NEAR(known.longer.tail(3)[2], 0.003001, 1e-9);
 }
 
 TEST_F(TimelineTest, TransitionsOfTwoSendersAreNotLearned) {
