@@ -31,7 +31,7 @@ using Json = nlohmann::json;
 struct DeclareArguments {
   std::string config, cover, check;
   std::string from = "equations";
-  bool json = false, between = false, from_data = false;
+  bool json = false, between = false, from_data = false, rates = false;
   double seconds = BetweenCommand{}.seconds;
   std::string noise = "declared", disturbance = "estimated";
   DataCommand data;
@@ -423,6 +423,9 @@ Examples:
            Needing("--between", {"--seconds", &options->seconds, "",
                                  "With --between: the bounds found by then, or by Ctrl-C, are printed; they are valid",
                                  NumberRange{0.1, 1e6}}),
+           Needing("--between", {"--rates", &options->rates, "",
+                                 "With --between: also how fast each state moves, for model.rate_bound, proven from "
+                                 "the equations and confirmed by the verifier"}),
            Excluding("--between", {"--from-data", &options->from_data, "",
                                    "Propose a declaration from the task's transitions instead"}),
            Needing("--from-data", {"--by", &options->data.by, "[STATE=]NAMES",
@@ -457,8 +460,8 @@ Examples:
            JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
       .run = [options] {
         if (options->between)
-          return DeclareBetween(
-              {options->config, options->from == "positions", options->json, options->search, options->seconds});
+          return DeclareBetween({options->config, options->from == "positions", options->json, options->rates,
+                                 options->search, options->seconds});
         if (options->from_data) {
           DataCommand& data = options->data;
           data.config = options->config;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <csignal>
 #include <iostream>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -18,7 +19,9 @@
 #include "forereach/safety/clearance.h"
 #include "task/config.h"
 #include "task/json_text.h"
+#include "task/number.h"
 #include "task/step_time.h"
+#include "verifier/rate_check.h"
 
 namespace forereach {
 namespace {
@@ -42,6 +45,7 @@ struct MotionProposal {
   std::vector<MotionRow> rows;
   std::string source, remark;
   double seconds = 0;
+  std::string rates, unconfirmed;  // for the key model.rate_bound, if asked for; the state that is not confirmed
 };
 
 // The map to the robot's frame; zero if no part of the body stands there, so that nothing has to be said of it.
@@ -105,23 +109,47 @@ class SearchTime final {
   int told_ = 0;
 };
 
+// Adds a row for each state, and what the verifier says of them.
+void AddRates(const Config& config, std::span<const int> states, const MotionBounds& bounds, MotionProposal& proposal) {
+  const NominalModel& model = *config.problem->model;
+  std::vector<verifier::RateClaim> claims;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const std::string& name = model.state_names()[ToSize(states[i])];
+    const std::string most = RoundedUp(bounds.rates[i].upper, kMotionDigits);
+    proposal.rows.push_back({"rate_bound", name + "'", "1/s", bounds.rates[i]});
+    proposal.rates += (proposal.rates.empty() ? "" : ", ") + name + ": " + most;
+    claims.push_back({states[i], ParseNumber(most).value});
+  }
+  const verifier::RateVerdict verdict =
+      verifier::CheckRates(model, config.problem->domain, LongestPeriod(config), bounds.reachable, claims);
+  proposal.rates = "rate_bound: {" + proposal.rates + "}";
+  if (verdict.answer != verifier::Answer::kYes) proposal.unconfirmed = model.state_names()[ToSize(verdict.state)];
+}
+
 MotionProposal FromEquations(const Config& config, const BetweenCommand& command) {
   const Problem& problem = *config.problem;
   const std::vector<ExpressionText> places = problem.body.Coordinates();
   const auto flow = MakeFlow(*problem.model, places);
   if (!flow)
     throw ConfigError(config.path + ": model: the equations of " + problem.model->name() +
-                      " in continuous time are not known; use --from positions");
+                      " in continuous time are not known" +
+                      (command.rates ? ", so none of its rates is proven: `rate` says them, `next` does not"
+                                     : "; use --from positions"));
   Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
   const Eigen::MatrixXd frame = FrameOf(problem);
+  std::vector<int> moving;  // the states whose rates are asked for
+  for (int k = 0; command.rates && k < problem.model->num_states(); ++k)
+    if (std::ranges::count(problem.timing.set_at_steps, k) == 0) moving.push_back(k);
   SearchTime time(command.seconds);
-  const MotionBounds bounds = BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading,
-                                           rest, [&](double done, double next) { return time.IsOver(done, next); }},
-                                          command.search);
+  const MotionBounds bounds =
+      BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading, rest,
+                   [&](double done, double next) { return time.IsOver(done, next); }, moving},
+                  command.search);
   MotionProposal proposal;
   proposal.seconds = time.passed();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
+  if (command.rates) AddRates(config, moving, bounds, proposal);
   proposal.source = "equations";
   proposal.remark = "Proven for the equations of " + problem.model->name() +
                     ", for each motion with constant controls between two\nsamples that are in the domain" +
@@ -163,7 +191,7 @@ std::string Yaml(const std::vector<MotionRow>& rows) {
     const std::string value = RoundedUp(row.bound.upper, kMotionDigits);
     if (row.key == "acceleration")
       acceleration += (acceleration.empty() ? "" : ", ") + value;
-    else
+    else if (row.key != "rate_bound")
       others += ", " + row.key + ": " + value;
   }
   return "between: {acceleration: [" + acceleration + "]" + others + "}";
@@ -181,6 +209,7 @@ Json ToJson(const MotionProposal& proposal, const Config& config) {
                 {"seconds", proposal.seconds},
                 {"entries", Json::array()},
                 {"digests", {{"config", ToHex(config.grounds.config)}, {"model", ToHex(config.grounds.model)}}}};
+  if (!proposal.rates.empty()) document["rates"] = {{"yaml", proposal.rates}, {"unconfirmed", proposal.unconfirmed}};
   for (const MotionRow& row : proposal.rows)
     document["entries"].push_back({{"key", row.key},
                                    {"name", row.name},
@@ -209,12 +238,20 @@ void PrintForPeople(const MotionProposal& proposal, const Config& config) {
     text += "\n";
   }
   std::cout << text << proposal.remark << (config.problem->declaration.IsDisturbed() ? kDisturbed : "")
-            << "\n\ntask:\n  " << Yaml(proposal.rows) << std::endl;
+            << "\n\ntask:\n  " << Yaml(proposal.rows);
+  if (!proposal.rates.empty())
+    std::cout << "\nmodel:\n  " << proposal.rates
+              << (proposal.unconfirmed.empty()
+                      ? "\nThe verifier confirms these rates."
+                      : "\nThe verifier does not confirm that of " + proposal.unconfirmed + ".");
+  std::cout << std::endl;
 }
 
 }  // namespace
 
 int DeclareBetween(const BetweenCommand& command) try {
+  if (command.rates && command.from_positions)
+    throw ConfigError("--rates: positions show no bound on a rate; --from equations proves it");
   const Config config =
       LoadConfig(command.config, command.from_positions ? TransitionsFile::kRead : TransitionsFile::kIgnore);
   const MotionProposal proposal = command.from_positions ? FromPositions(config) : FromEquations(config, command);
@@ -222,7 +259,7 @@ int DeclareBetween(const BetweenCommand& command) try {
     std::cout << JsonText(ToJson(proposal, config)) << std::endl;
   else
     PrintForPeople(proposal, config);
-  return AllReached(proposal.rows) ? 0 : 1;
+  return AllReached(proposal.rows) && proposal.unconfirmed.empty() ? 0 : 1;
 } catch (const std::runtime_error& error) {
   if (dynamic_cast<const BadInput*>(&error)) throw;
   throw std::runtime_error(command.config + ": model: " + error.what());

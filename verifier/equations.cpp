@@ -180,6 +180,11 @@ class TextEquations final : public Equations {
     return AlongArithmetic::Slopes(sum);
   }
 
+  std::vector<Real> Flow(std::span<const Real> z) const override {
+    return stages_.empty() ? Rate(z, 0.0)
+                           : Evaluate(formulas_.tape, formulas_.results, RealArithmetic(z, Parameters()));
+  }
+
   // Of an integrator only Euler's x + dt x', if the rate x' does not use dt.
   bool IsProportional(int k) const override {
     if (scaling_.empty() || stages_.size() > 1) return false;

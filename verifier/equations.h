@@ -41,6 +41,8 @@ class Equations {
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
   /** For each state the derivative of x+ by the step's duration, where that is in `duration` instead of dt. */
   [[nodiscard]] virtual std::vector<Real> Rate(std::span<const Real> z, const Real& duration) const = 0;
+  /** The rates x' = f(x, u) of a model with an integrator; of another one what Rate is for a step of no duration. */
+  [[nodiscard]] virtual std::vector<Real> Flow(std::span<const Real> z) const = 0;
   /** Whether x+_k - x_k is the step's duration times what does not depend on it, so that the derivative is
   (x+_k - x_k) / dt: true where docs/soundness.md, 3.15, says so, and only there. */
   [[nodiscard]] virtual bool IsProportional(int k) const = 0;

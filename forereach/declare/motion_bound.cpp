@@ -458,12 +458,19 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   MotionBounds bounds;
   const auto p = ToSize(motion.projection.rows());
   const std::size_t quantities_of_all = p + motion.flow.num_places() + (motion.heading < 0 ? 0 : 2);
-  Searches searches{0, static_cast<double>(2 * quantities_of_all * std::max<std::size_t>(regions.size(), 1))};
+  const std::size_t in_regions = quantities_of_all * std::max<std::size_t>(regions.size(), 1);
+  Searches searches{0, static_cast<double>(2 * (in_regions + motion.rates_of.size()))};
   for (std::size_t k = 0; k < p; ++k) {
     std::vector<Quantity> quantities{AccelerationAlong(motion.projection.row(static_cast<Eigen::Index>(k)))};
     for (std::size_t i = k; i < motion.flow.num_places(); i += p) quantities.push_back(AccelerationOfPlace(i));
     bounds.acceleration.push_back(BoundMagnitude(motion, quantities, regions, options, searches));
   }
+  for (const int k : motion.rates_of)
+    bounds.rates.push_back(BoundMagnitude(motion, {First(ToSize(k))}, {reachable}, options, searches));
+  Eigen::VectorXd lower(std::ssize(reachable)), upper(lower.size());
+  for (Eigen::Index i = 0; i < lower.size(); ++i)
+    lower[i] = reachable[ToSize(i)].lower, upper[i] = reachable[ToSize(i)].upper;
+  bounds.reachable = Box(lower, upper);
   if (motion.heading < 0) return bounds;
   const auto heading = ToSize(motion.heading);
   bounds.turn_rate = BoundMagnitude(motion, {First(heading)}, regions, options, searches);

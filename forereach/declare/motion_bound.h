@@ -29,6 +29,8 @@ struct MotionBound {
 struct MotionBounds {
   std::vector<MotionBound> acceleration;     ///< Of each (P x)_k'' and of coordinate k of each place.
   MotionBound turn_rate, turn_acceleration;  ///< Of the heading's first and second derivative; 0 without a heading.
+  std::vector<MotionBound> rates;            ///< Of |x_k'| for each of SampledMotion::rates_of, over `reachable`.
+  Box reachable;                             ///< B of z, which no motion leaves.
 };
 
 /** Is asked again and again whether the search at hand ends now, with the bound that it has by then.
@@ -44,7 +46,8 @@ struct SampledMotion {
   int heading;                        ///< The state that is the heading; -1: none.
   /** A plan ends with |x_k| <= rest_k; infinite where nothing is known. n entries. */
   Eigen::VectorXd rest;
-  MotionWatch watch = {};  ///< None: every search runs to its end.
+  MotionWatch watch = {};          ///< None: every search runs to its end.
+  std::vector<int> rates_of = {};  ///< States.
 };
 
 /** Bounds for every motion that is in the domain at its samples. A plan's last sample is not tested against the domain;

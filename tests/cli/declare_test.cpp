@@ -153,6 +153,35 @@ TEST_F(DeclareTest, BetweensLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
   }
 }
 
+TEST_F(DeclareTest, BetweenProvesRatesIfAskedAndTheVerifierConfirmsThem) {
+  const std::string field = Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml");
+  std::ofstream(task_) << field;
+  EXPECT_THAT(Declare("--between"), Exits(0, Not(HasSubstr("rate"))));
+  EXPECT_THAT(Declare("--between --rates"), Exits(0, "x'", "\nmodel:\n  rate_bound: {x: 12.", "verifier confirms"));
+  const Json document = Json::parse(Declare("--between --rates --json").text);
+  ASSERT_EQ(document["entries"].size(), 6u) << "a and delta are set at steps";
+  const std::string said = document["rates"]["yaml"];
+  std::ofstream(task_) << Replaced(field, "set_at_steps: [a, delta]", "set_at_steps: [a, delta], " + said);
+  const Eigen::VectorXd bound = LoadConfig(task_, TransitionsFile::kIgnore).problem->timing.rate_bound;
+  for (int k = 0; k < 4; ++k) {
+    const double proven = document["entries"][ToSize(2 + k)]["upper"];
+    EXPECT_GE(bound[k], proven);
+    EXPECT_LE(bound[k], proven * (1 + 1e-5));
+  }
+  EXPECT_EQ(bound[4], std::numeric_limits<double>::infinity());
+}
+
+TEST_F(DeclareTest, NoRateIsProvenWithoutEquations) {
+  std::ofstream(task_) << Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml");
+  EXPECT_THAT(Declare("--between --rates --from positions"),
+              Exits(2, "--rates: positions show no bound on a rate; --from equations proves it"));
+  std::ofstream(task_) << TaskFor(
+      "model: {states: {x: m, v: m/s}, inputs: {u: m/s^2}, parameters: {dt: 0.1}, next: {x: x + dt*v, v: v + dt*u}}\n",
+      2, 1, "x, v");
+  EXPECT_THAT(Declare("--between --rates"),
+              Exits(2, "in continuous time are not known, so none of its rates is proven: `rate` says them, `next`"));
+}
+
 TEST_F(DeclareTest, BetweenTakesLoggedPositionsIfAsked) {
   const std::string point_mass = Read(FOREREACH_SOURCE_DIR "/config/point_mass.yaml");
   std::ofstream(task_) << Replaced(point_mass, "transitions: data/point_mass_100.csv", "transitions: steps.csv");

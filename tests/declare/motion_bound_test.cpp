@@ -44,6 +44,21 @@ TEST(MotionBound, OfAPointMassIsItsLargestControl) {
   EXPECT_EQ(bounds.turn_rate.upper, 0);
 }
 
+// Of a state and of its rate, which a motion reaches at the end of a step.
+TEST(MotionBound, OfARateIsItsLargestBetweenTwoSamples) {
+  const auto model = MakePointMass(0.125);
+  const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3), Eigen::Vector2d(2, 0.5));
+  const auto flow = MakeFlow(*model);
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(0, 4);
+  const MotionBounds bounds = BoundMotion({*flow, domain, 0.125, none, -1, NoRest(4), {}, {0, 2, 3}}, {.gap = kGap});
+  ASSERT_EQ(bounds.rates.size(), 3u);
+  EXPECT_GE(bounds.rates[0].upper, 3.25) << "from 3 m/s on for 1/8 s with 2 m/s^2";
+  EXPECT_LE(bounds.rates[0].upper, 3.27);
+  EXPECT_FIELDS(bounds.rates[1], (upper, 2), (lower, 2));
+  EXPECT_FIELDS(bounds.rates[2], (upper, 0.5), (lower, 0.5));
+  EXPECT_GE(bounds.reachable.upper()[2], 3.25);
+}
+
 // Then no place moves at first, only after the speed has.
 // A watch that ends every search at once, and one that ends those of the second half: what is there by then is valid.
 TEST(MotionBound, HoldsWhenItsWatchEndsTheSearch) {

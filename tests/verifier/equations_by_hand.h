@@ -32,6 +32,7 @@ class PointMassEquations final : public Equations {
   std::vector<Real> Rate(std::span<const Real> z, const Real& h) const override {
     return {z[2] + h * z[4], z[3] + h * z[5], z[4], z[5]};
   }
+  std::vector<Real> Flow(std::span<const Real> z) const override { return Rate(z, 0.0); }
   bool IsProportional(int k) const override { return k >= 2; }
 
  private:
@@ -85,6 +86,7 @@ class BicycleEquations final : public Equations {
   std::vector<Real> Rate(std::span<const Real> z, const Real&) const override {
     return {z[3] * cos(z[2]), z[3] * sin(z[2]), z[3] * tan(z[5]) / Real(wheelbase_), z[4], z[6], z[7]};
   }
+  std::vector<Real> Flow(std::span<const Real> z) const override { return Rate(z, 0.0); }
   bool IsProportional(int) const override { return true; }
 
  private:

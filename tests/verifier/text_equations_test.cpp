@@ -70,6 +70,9 @@ void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int
     // Over a box the texts' order of operations may cost some width.
     for (std::size_t k = 0; k < rate.size(); ++k)
       EXPECT_TRUE(random.trial() % 2 == 0 ? AreEqual(rate[k], rate_by_hand[k]) : Inside(rate_by_hand[k], rate[k])) << k;
+    const auto flow = text.Flow(box), flow_by_hand = by_hand.Flow(box);
+    ASSERT_EQ(flow.size(), flow_by_hand.size());
+    for (std::size_t k = 0; k < flow.size(); ++k) EXPECT_TRUE(Inside(flow_by_hand[k], flow[k])) << k;
     for (int k = 0; k < static_cast<int>(rate.size()); ++k)
       EXPECT_EQ(text.IsProportional(k), by_hand.IsProportional(k)) << k;
   }
