@@ -151,6 +151,11 @@ bool DriveAll(const std::string& name, const Config& config, const Options& opti
       all_good = all_good && is_good;
       all += drive.counts;
       progress.Advance();
+      // It has stood for its whole time and searched, as with any other seed.
+      if (drive.counts.certified == 0) {
+        bad += "no plan of this drive is certified: no further seed is driven\n";
+        break;
+      }
     }
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
