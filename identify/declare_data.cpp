@@ -108,6 +108,8 @@ std::string ErrorText(double error) {
   return text.size() <= kShort ? text : RoundedUp(error, kTableDigits);
 }
 
+std::string NameOfError(const ProposedRow& row) { return row.is_raised ? "with the noise raised" : "declared"; }
+
 // Whether the declared error is at the cliff or below it.
 bool IsNearKnee(const ProposedRow& row, double factor) { return row.declared < factor * row.knee; }
 
@@ -131,8 +133,8 @@ void PrintTrades(const ProposedDeclaration& proposal, const NominalModel& model,
       });
       std::string notes;
       for (const auto& [noted, note] :
-           {std::pair(row.declared, "declared"), std::pair(row.knee, "the knee"), std::pair(row.proposed, "proposed")})
-        if (noted == error) notes += (notes.empty() ? "  <- " : ", ") + std::string(note);
+           {std::pair(row.declared, NameOfError(row)), {row.knee, "the knee"}, {row.proposed, "proposed"}})
+        if (noted == error) notes += (notes.empty() ? "  <- " : ", ") + note;
       table += line(names[k], ErrorText(error),
                     (!trades[i].slopes ? "none are consistent"
                      : slopes.empty()  ? "none are needed"
@@ -161,8 +163,8 @@ Chart SlopeChartOf(const ProposedDeclaration& proposal, const NominalModel& mode
   for (const std::size_t k : shown) {
     const ProposedRow& row = proposal.rows[k];
     Chart::Series& series = chart.series.emplace_back();
-    series.name = fmt::format("{}: knee at {}, declared {}", model.state_names()[k], RoundedUp(row.knee, kTableDigits),
-                              ErrorText(row.declared));
+    series.name = fmt::format("{}: knee at {}, {} {}", model.state_names()[k], RoundedUp(row.knee, kTableDigits),
+                              NameOfError(row), ErrorText(row.declared));
     double steepest = 0;
     for (std::size_t i = 0; i < ProposedRow::kShares.size(); ++i) {
       const auto& slopes = row.trades[i].slopes;
@@ -218,10 +220,10 @@ void PrintMeaning(const ProposedDeclaration& proposal, const NominalModel& model
            "the sensor that errs by so much,\n  declare noise_bound instead; noise that is too large makes tubes too "
            "narrow.\n";
   if (!steep.empty())
-    out << "The declared error is below the knee, and these slopes are a cliff: " << Joined(steep)
+    out << "The error is below the knee, and these slopes are a cliff: " << Joined(steep)
         << ". --disturbance estimated proposes the knee's.\n";
   if (!close.empty())
-    out << "The declared error is at the knee or above it, by less than a factor of " << ToText(command.factor) << ": "
+    out << "The error is at the knee or above it, by less than a factor of " << ToText(command.factor) << ": "
         << Joined(close)
         << ". It is proposed as it is;\n  less would be a cliff, and the knee of more data lies higher.\n";
   if (!constant.empty())

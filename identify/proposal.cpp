@@ -82,8 +82,10 @@ ProposedDeclaration Propose(const Declaration& declaration, const Observations& 
     ProposedRow& row = proposal.rows[ToSize(k)];
     row.noise = FindNoiseFloor(observations, k, options.columns[ToSize(k)]);
     if (const double shown = std::max(row.noise.repeated, 3 * row.noise.deviation);
-        options.estimate_noise && shown > proposed.noise_bound[k])
+        options.estimate_noise && shown > proposed.noise_bound[k]) {
       proposed.noise_bound[k] = Rounded(shown);
+      row.is_raised = true;
+    }
     const Eigen::RowVectorXd free = FreeScales(scales, options.columns[ToSize(k)]);
     ExamineError(proposed, observations, k, free, options, row);
     row.smallest = FindSmallestRow(proposed, observations, k, free);

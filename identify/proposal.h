@@ -32,9 +32,10 @@ struct ProposedRow {
   /** The least error sigma_k + w^_k with which near places need no slope (FindScatter); with less, slopes explain what
   is none, and are steep. 0: near places show no error. */
   double knee = 0;
-  double declared = 0;  ///< sigma_k, raised if that is asked for, + w^_k before it is raised.
-  double proposed = 0;  ///< Behind that.
-  double scatter = 0;   ///< By how much `declared` is below the knee.
+  double declared = 0;     ///< sigma_k, raised if that is asked for, + w^_k before it is raised.
+  bool is_raised = false;  ///< sigma_k was raised, so `declared` is not what the task declares.
+  double proposed = 0;     ///< Behind that.
+  double scatter = 0;      ///< By how much `declared` is below the knee.
   struct Trade {
     double error = 0;                          ///< sigma_k + w^_k
     std::optional<Eigen::RowVectorXd> slopes;  ///< The smallest. None: no slopes are consistent.

@@ -159,9 +159,11 @@ unchecked: takes every message for authentic.)");
   table("decisions", Table::Of::kDecisions, "A row a decision, with its candidate. Times in microseconds.");
   table("withdrawals", Table::Of::kWithdrawals, "A row a withdrawal.");
   table("executions", Table::Of::kExecutions, "A row an event of the robot.");
-  table("transitions", Table::Of::kTransitions,
-        "A row an executed step, with lists `state`, `input` and `next_state`. Task(..., data=(z, x_next, dt_error)) "
-        "takes them stacked; dt_error is |duration_us / 1e6 - dt| + 1e-6.");
+  table(
+      "transitions", Table::Of::kTransitions,
+      "A row an executed step, also one that the certifier refused to learn, with lists `state`, `input` and "
+      "`next_state`. Task(..., data=(z, x_next, dt_error)) takes them stacked; dt_error is |duration_us / 1e6 - dt| + "
+      "1e-6, and has to be below dt / 2.");
   table("gaps", Table::Of::kGaps, "A row a gap in a stream of messages.");
 }
 

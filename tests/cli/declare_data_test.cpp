@@ -282,6 +282,7 @@ TEST_F(LateCommandTest, ScatterTakenForNoiseLosesTheRobotAndIsSaid) {
   EXPECT_EQ(Declare("--disturbance declared").code, 1);
   const Output output = Declare("--noise estimated --disturbance declared");
   EXPECT_THAT(output.text, HasSubstr("recorded steps have left the slices"));
+  EXPECT_THAT(output.text, AllOf(HasSubstr("<- with the noise raised"), Not(HasSubstr("<- declared"))));
   EXPECT_THAT(output.text, HasSubstr("stretches of 10 steps"));
   EXPECT_THAT(Declare("--noise estimated --disturbance declared --hold-out").text,
               HasSubstr("warning: the slices of their certificates were left by "));
