@@ -31,6 +31,12 @@ Hull Shifted(Hull hull, const std::array<Interval, kMaxSafetyDim>& shift, int di
   return hull;
 }
 
+// The hulls at both samples of a unit, which are one object if it has one sample, seen from an obstacle that moves.
+Hull Seen(const Hull& first, const Hull& last, const Encounter& meeting, int dim) noexcept {
+  const Hull at_first = Shifted(first, meeting.shift[0], dim);
+  return &first == &last ? at_first : Join(at_first, Shifted(last, meeting.shift[1], dim), dim);
+}
+
 // The closest approach found so far.
 struct Closest {
   double clearance = kInfinity;
@@ -191,12 +197,13 @@ class SafetyTest::Unit {
 
   // Of the frame, at all samples of the unit. @pre EncloseHulls.
   [[nodiscard]] const Hull& hull() const noexcept { return hull_; }
-  // Likewise, at its first one.
+  // Likewise, at its first one and at its last one.
   [[nodiscard]] const Hull& first_hull() const noexcept { return first_ == last_ ? hull_ : hulls_[0]; }
+  [[nodiscard]] const Hull& last_hull() const noexcept { return first_ == last_ ? hull_ : hulls_[1]; }
 
   // By the interval hulls of the frame and a ball around the body: sound, not tight. @pre EncloseHulls.
   [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
-    const Hull& seen = meeting.moves ? Seen(meeting) : hull_;
+    const Hull& seen = meeting.moves ? Seen(first_hull(), last_hull(), meeting, placement().dim()) : hull_;
     return SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach()));
   }
 
@@ -290,13 +297,6 @@ class SafetyTest::Unit {
   void EncloseHull(int t, Hull& hull) noexcept {
     if (placement().has_expressions()) return placement().EncloseHull(SampleAt(t), hull);
     placement().EncloseHull(tube_.slice(t), tube_.half_width(t), hull);
-  }
-
-  // The hull of both samples, seen from the obstacle.
-  [[nodiscard]] Hull Seen(const Encounter& meeting) const noexcept {
-    const int p = placement().dim();
-    if (first_ == last_) return Shifted(hull_, meeting.shift[0], p);
-    return Join(Shifted(hulls_[0], meeting.shift[0], p), Shifted(hulls_[1], meeting.shift[1], p), p);
   }
 
   [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
@@ -497,17 +497,69 @@ class SafetyTest::Judgement {
       hulls_[ToSize(t - first_)] = unit_.hull();
       poses_[ToSize(t - first_)].frame = unit_.first_hull();
     }
+    poses_[ToSize(units_ - 1 + span() - first_)].frame = unit_.last_hull();
   }
 
-  // What moves or has no end in each unit; what stands where the index finds it near.
+  // What has no end in each unit; the others where the index finds them near.
   void SeeNear(const ObstacleIndex& index) noexcept {
     EncloseHulls();
     if (has_boxes()) EncloseBodies();
     SeeNear(index, first_, units_);
+    if (index.has_moving()) SeeMoving(index);
     if (!index.everywhere().empty()) SeeEverywhere(index);
   }
 
-  // What moves or has no end: first what is nearest to the whole tube, then what is nearer than that turns out to be.
+  // First what is nearest by its hull, then what is not further than that turns out to be.
+  void SeeMoving(const ObstacleIndex& index) noexcept {
+    struct {
+      int t = -1, o = -1;
+      Separation by_hulls;
+      double clearance = kInfinity;
+    } nearest;
+    const auto find_nearest = [&](int t, int o) {
+      const Encounter& meeting = MeetIn(t, o);
+      if (!meeting.is_there) return;
+      const Separation found = ByHulls(t, o, meeting);
+      if (const double clearance = found.clearance(); !(clearance >= nearest.clearance))
+        nearest = {t, o, found, clearance};
+    };
+    if (touched_ == units_)
+      ForEachNearMoving(
+          index, [&] { return std::min(nearest.clearance, closest_.clearance); }, find_nearest);
+    if (nearest.o >= 0) {
+      See(nearest.t, nearest.o, nearest.by_hulls);
+      ConsiderLeast();
+    }
+    ForEachNearMoving(
+        index, [&] { return touched_ < units_ ? 0 : closest_.clearance; },
+        [&](int t, int o) {
+          if (t != nearest.t || o != nearest.o) SeeByHulls(t, o);
+        });
+  }
+  template <class Within, class Visit>
+  void ForEachNearMoving(const ObstacleIndex& index, const Within& within, const Visit& visit) noexcept {
+    const int units = std::min(touched_ + 1, units_) - first_;  // what comes after a touch does not count
+    tree_.Build(std::span(hulls_).first(ToSize(units)), test_.placement_.dim());
+    index.ForEachNearMoving(tree_, {schedule_, first_, span()}, test_.placement_.reach(), within,
+                            [&](int i, int o) { visit(first_ + i, o); });
+  }
+  const Encounter& MeetIn(int t, int o) noexcept {
+    unit_.Enter(t);
+    return unit_.MeetIn(obstacle(o));
+  }
+  // As Unit::ByHulls, of the hulls that are kept.
+  [[nodiscard]] Separation ByHulls(int t, int o, const Encounter& meeting) const noexcept {
+    if (!meeting.moves) return ByHulls(t, o);
+    const std::size_t i = ToSize(t - first_);
+    const Placement& placement = test_.placement_;
+    const Hull seen = Seen(poses_[i].frame, poses_[i + ToSize(span())].frame, meeting, placement.dim());
+    return SeparateHulls(seen, obstacle(o), AddUp(meeting.growth, placement.reach()));
+  }
+  void SeeByHulls(int t, int o) noexcept {
+    if (const Encounter& meeting = MeetIn(t, o); meeting.is_there) See(t, o, ByHulls(t, o, meeting));
+  }
+
+  // What has no end: first what is nearest to the whole tube, then what is nearer than that turns out to be.
   void SeeEverywhere(const ObstacleIndex& index) noexcept {
     const auto all = index.everywhere();
     Hull tube = hulls_[0];
@@ -515,12 +567,9 @@ class SafetyTest::Judgement {
     const std::size_t count = std::min(all.size(), bounds_.size());
     for (std::size_t i = 0; i < count; ++i) bounds_[i] = ClearanceOfAll(tube, obstacle(all[i]));
     const auto see = [&](const auto& is_near) {
-      for (int t = first_; t <= std::min(touched_, units_ - 1); ++t) {
-        unit_.Enter(t);
-        unit_.EncloseHulls();
+      for (int t = first_; t <= std::min(touched_, units_ - 1); ++t)
         for (std::size_t i = 0; i < all.size(); ++i)
-          if (is_near(i)) See(t, all[i]);
-      }
+          if (is_near(i)) SeeByHulls(t, all[i]);
     };
     const auto known = std::span(bounds_).first(count);
     const std::size_t nearest = ToSize(std::ranges::min_element(known) - known.begin());
@@ -530,7 +579,7 @@ class SafetyTest::Judgement {
     const double far = WithTolerance(index, closest_.clearance);
     see([&](std::size_t i) { return i != nearest && !IsFurther(i, far); });
   }
-  // Of those that move or have no end, the i-th: in every unit.
+  // Of those that have no end, the i-th: in every unit.
   [[nodiscard]] bool IsFurther(std::size_t i, double distance) const noexcept {
     return i < bounds_.size() && bounds_[i] > distance;
   }
@@ -707,8 +756,9 @@ class SafetyTest::Judgement {
   // @pre unit t is entered, with its hulls.
   void See(int t, int o) noexcept {
     const Encounter& meeting = unit_.MeetIn(obstacle(o));
-    if (!meeting.is_there) return;
-    const Separation by_hulls = unit_.ByHulls(obstacle(o), meeting);
+    if (meeting.is_there) See(t, o, unit_.ByHulls(obstacle(o), meeting));
+  }
+  void See(int t, int o, const Separation& by_hulls) noexcept {
     if (by_hulls.IsProven())
       nearest_.Add(by_hulls, -1, t, o, is_at_frame());
     else
@@ -937,7 +987,7 @@ class SafetyTest::Judgement {
     const ObstacleIndex* const index = obstacles_.index();
     if (nearest_.left_out() > closest_.clearance)
       for (Pair& pair : nearest_.InOrder(closest_.clearance, least)) ConsiderIfCloser(pair);
-    else if (index == nullptr || !index->everywhere().empty())
+    else if (index == nullptr || index->has_moving() || !index->everywhere().empty())
       LookAgain();
     if (index != nullptr && test_.placement_.has_expressions())
       ForEachNear(
@@ -950,6 +1000,14 @@ class SafetyTest::Judgement {
 
   // At those for which there was no room.
   void LookAgain() noexcept {
+    if (const ObstacleIndex* const index = obstacles_.index(); index != nullptr && index->has_moving())
+      ForEachNearMoving(
+          *index, [&] { return closest_.clearance; },
+          [&](int t, int o) {
+            unit_.Enter(t);
+            unit_.EncloseHulls();
+            Look(t, o);
+          });
     for (int t = first_; t < units_; ++t) {
       unit_.Enter(t);
       unit_.EncloseHulls();
@@ -983,8 +1041,8 @@ class SafetyTest::Judgement {
   std::array<Hull, HullTree::kMost> tight_bodies_;  // likewise, where has_body_
   std::array<bool, HullTree::kMost> has_body_{};
   std::array<Placement::Pose, HullTree::kMost> poses_;  // at the samples; without boxes only the frame's hulls
-  // With an index ClearanceOfAll, of the first that move or have no end; others are seen always. Without, of each core
-  // in each unit.
+  // With an index bounds on the clearances of the first that have no end, in all units; others are seen always.
+  // Without, of each core in each unit.
   std::array<double, 4096> bounds_;
   StandingCores cores_;
   Outline outline_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace forereach {
 
@@ -41,53 +40,27 @@ int HullTree::Build(std::span<const Hull> hulls, int dim, int first, int count) 
   return number;
 }
 
-BoxTree::BoxTree(std::span<const Bounds> boxes, int dim) : dim_(dim), order_(boxes.size()) {
-  std::iota(order_.begin(), order_.end(), 0);
-  for (const Bounds& box : boxes)
-    for (std::size_t k = 0; k < ToSize(dim); ++k)
+BoxTree::BoxTree(std::span<const Bounds> boxes, int dim) {
+  std::vector<std::array<double, kMaxSafetyDim>> middles;
+  for (const Bounds& box : boxes) {
+    auto& middle = middles.emplace_back();
+    for (std::size_t k = 0; k < ToSize(dim); ++k) {
       size_ = std::max(size_, static_cast<double>(dim) * (std::abs(box.lower[k]) + std::abs(box.upper[k])));
-  nodes_.reserve(boxes.size());
-  if (!boxes.empty()) Build(boxes, 0, static_cast<std::int32_t>(boxes.size()));
-}
-
-// The halves of the boxes along the axis on which their middles are spread the widest.
-void BoxTree::Build(std::span<const Bounds> boxes, std::int32_t first, std::int32_t count) {
-  const auto place = nodes_.size();
-  nodes_.emplace_back();
-  Bounds all = boxes[ToSize(order_[ToSize(first)])], middles;
-  middles.lower.fill(kInfinity);
-  middles.upper.fill(-kInfinity);
-  const auto middle = [&](std::int32_t box, std::size_t k) {
-    return boxes[ToSize(box)].lower[k] / 2 + boxes[ToSize(box)].upper[k] / 2;
-  };
-  for (std::int32_t i = first; i < first + count; ++i) {
-    const std::int32_t box = order_[ToSize(i)];
-    for (std::size_t k = 0; k < ToSize(dim_); ++k) {
-      all.lower[k] = std::min(all.lower[k], boxes[ToSize(box)].lower[k]);
-      all.upper[k] = std::max(all.upper[k], boxes[ToSize(box)].upper[k]);
-      middles.lower[k] = std::min(middles.lower[k], middle(box, k));
-      middles.upper[k] = std::max(middles.upper[k], middle(box, k));
+      middle[k] = box.lower[k] / 2 + box.upper[k] / 2;
     }
   }
-  std::ranges::copy(all.lower, nodes_[place].lower.begin());
-  std::ranges::copy(all.upper, nodes_[place].upper.begin());
-  if (count <= kLeaf) {
-    nodes_[place].first = first;
-    nodes_[place].count = count;
-    return;
-  }
-  std::size_t axis = 0;
-  for (std::size_t k = 1; k < ToSize(dim_); ++k)
-    if (middles.upper[k] - middles.lower[k] > middles.upper[axis] - middles.lower[axis]) axis = k;
-  const std::int32_t half = count / 2;
-  const auto begin = order_.begin() + first;
-  std::nth_element(begin, begin + half, begin + count, [&](std::int32_t a, std::int32_t b) {
-    // Equal middles by their numbers: the tree, and so the first obstacle that is named, is the same on every machine.
-    return std::pair(middle(a, axis), a) < std::pair(middle(b, axis), b);
-  });
-  Build(boxes, first, half);
-  nodes_[place].first = static_cast<std::int32_t>(nodes_.size());
-  Build(boxes, first + half, count - half);
+  halves_ = {middles, [&](std::span<const std::int32_t> some) {
+               Node node;
+               for (std::size_t k = 0; k < ToSize(dim); ++k) {
+                 node.lower[k] = boxes[ToSize(some[0])].lower[k];
+                 node.upper[k] = boxes[ToSize(some[0])].upper[k];
+                 for (const std::int32_t i : some.subspan(1)) {
+                   node.lower[k] = std::min(node.lower[k], boxes[ToSize(i)].lower[k]);
+                   node.upper[k] = std::max(node.upper[k], boxes[ToSize(i)].upper[k]);
+                 }
+               }
+               return node;
+             }};
 }
 
 }  // namespace forereach

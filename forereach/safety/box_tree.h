@@ -1,8 +1,11 @@
-/** A hierarchy over boxes in R^p: it finds those near the hulls of a tube without a look at the others. */
+/** A hierarchy over boxes in R^p: it finds those near the hulls of a tube without a look at the others. Its parts serve
+motion_tree.h, too. */
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -44,27 +47,34 @@ class HullTree final {
   double size_ = 0;
 };
 
-class BoxTree final {
+/** Things in nested halves, and around each half a node: {lower, upper, first, count}, where `first` is a place in the
+order of a leaf's `count` things, and of another node, whose count is 0, its second child; the first one follows it. */
+template <class Node>
+class Halves final {
  public:
-  BoxTree() = default;
-  /** @pre lower <= upper, and 1 <= dim <= kMaxSafetyDim. Cost O(n log^2 n). */
-  BoxTree(std::span<const Bounds> boxes, int dim);
+  Halves() = default;
+  /** @param places of the things, each half is cut where they are spread the widest. @param enclose makes the node
+  around the things of a list. Cost O(n log n) and, for each of them, a node on each of log2 n levels. */
+  template <std::size_t kAxes, class Enclose>
+  Halves(const std::vector<std::array<double, kAxes>>& places, const Enclose& enclose) : order_(places.size()) {
+    std::iota(order_.begin(), order_.end(), 0);
+    nodes_.reserve(places.size());
+    if (!places.empty()) Cut(places, enclose, 0, static_cast<std::int32_t>(places.size()));
+  }
 
-  /** Calls visit(t, i) for hulls t and boxes i, each pair at most once and about from near to far. A pair that is left
-  out is further apart than `reach` + `within()`, by more than what SeparateHulls may lose by rounding. `within()` is
-  asked on the way and may fall; what is below 0 counts as 0. It allocates nothing. Cost about O(log n + pairs
-  visited). */
-  template <class Within, class Visit>
-  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
+  /** Calls visit(t, i) for hulls t and things i, each pair at most once and about from near to far. Left out are those
+  whose nodes have a `square_of(hulls, node)` of their distance that is negative, never, or above that of `far()`, which
+  may fall on the way. It allocates nothing. */
+  template <class Square, class Far, class Visit>
+  void Search(const HullTree& hulls, const Square& square_of, const Far& far, const Visit& visit) const {
     if (nodes_.empty()) return;
     struct Entry {
-      std::int32_t hulls, boxes;
-      double square;  // of the distance
+      std::int32_t hulls, things;
+      double square;
     };
     const auto entry = [&](std::int32_t t, std::int32_t i) {
-      return Entry{t, i, SquareOfDistance(hulls.node(t), nodes_[ToSize(i)])};
+      return Entry{t, i, square_of(hulls.node(t), nodes_[ToSize(i)])};
     };
-    const double hair = kHair * (size_ + hulls.size() + reach);
     std::array<Entry, 2 * kMostLevels> stack;
     std::size_t count = 0;
     const auto push = [&](Entry first, Entry second) {
@@ -75,8 +85,8 @@ class BoxTree final {
     stack[count++] = entry(0, 0);
     while (count > 0) {
       const auto [t, i, square] = stack[--count];
-      const double least = within(), far = (reach + (least > 0 ? least : 0) + hair) * (1 + kHair);
-      if (square > far * far) continue;
+      const double most = far();
+      if (square < 0 || square > most * most) continue;
       const HullTree::Node& some = hulls.node(t);
       const Node& node = nodes_[ToSize(i)];
       const bool is_unit = some.count == 1, is_leaf = node.count > 0;
@@ -89,41 +99,102 @@ class BoxTree final {
     }
   }
 
-  /** An upper bound on the absolute values of the coordinates. */
-  [[nodiscard]] double size() const { return size_; }
-
  private:
-  static constexpr int kLeaf = 2;  // boxes in a leaf, at most
+  static constexpr std::int32_t kLeaf = 2;  // things in a leaf, at most
   static constexpr std::size_t kMostLevels =
-      48;  // of both hierarchies together: halves of 2^31 boxes and of kMost hulls
-  // Far above all rounding here and in SeparateHulls, relative to their operands.
-  static constexpr double kHair = 0x1p-40;
+      48;  // of both hierarchies together: halves of 2^31 things and of kMost hulls
 
-  struct Node {
-    std::array<double, kLaneCount> lower{}, upper{};  // unused coordinates are 0
-    std::int32_t first = 0;  // of a leaf its first place in order_; otherwise its second child; the first follows it
-    std::int32_t count = 0;  // boxes of a leaf; otherwise 0
-  };
-
-  // What is not a number is no distance, nor is what is too small or too large for its square.
-  [[nodiscard]] FOREREACH_INLINE static double SquareOfDistance(const HullTree::Node& a, const Node& b) noexcept {
-    const Lanes below = LoadLanes(b.lower.data()) - LoadLanes(a.upper.data()),
-                above = LoadLanes(a.lower.data()) - LoadLanes(b.upper.data());
-    const Lanes gap = Max(Max(below, above), AllLanes(0));
-    const double square = Sum(gap * gap);
-    return square > 0x1p-800 && square < kInfinity ? square : 0;
-  }
   template <class Box>
   [[nodiscard]] static double Extent(const Box& box) noexcept {
     return box.upper[0] - box.lower[0] + (box.upper[1] - box.lower[1]) + (box.upper[2] - box.lower[2]);
   }
 
-  void Build(std::span<const Bounds> boxes, std::int32_t first, std::int32_t count);
+  template <std::size_t kAxes, class Enclose>
+  void Cut(const std::vector<std::array<double, kAxes>>& places, const Enclose& enclose, std::int32_t first,
+           std::int32_t count) {
+    const auto begin = order_.begin() + first, end = begin + count;
+    const auto number = nodes_.size();
+    nodes_.push_back(enclose(std::span<const std::int32_t>(&*begin, ToSize(count))));
+    if (count <= kLeaf) {
+      nodes_[number].first = first;
+      nodes_[number].count = count;
+      return;
+    }
+    std::size_t widest = 0;
+    double most = -kInfinity;
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      const auto by = [&](std::int32_t i) { return places[ToSize(i)][k]; };
+      const auto [least, largest] = std::ranges::minmax_element(begin, end, {}, by);
+      if (const double spread = by(*largest) - by(*least); spread > most) {
+        most = spread;
+        widest = k;
+      }
+    }
+    const std::int32_t half = count / 2;
+    // Equal places by their numbers: the tree, and so the first obstacle that is named, is the same on every machine.
+    std::ranges::nth_element(begin, begin + half, end, {},
+                             [&](std::int32_t i) { return std::pair(places[ToSize(i)][widest], i); });
+    Cut(places, enclose, first, half);
+    nodes_[number].first = static_cast<std::int32_t>(nodes_.size());
+    Cut(places, enclose, first + half, count - half);
+  }
 
-  int dim_ = 1;
-  double size_ = 0;  // of the coordinates
   std::vector<Node> nodes_;
-  std::vector<std::int32_t> order_;  // the boxes, leaf by leaf
+  std::vector<std::int32_t> order_;  // the things, leaf by leaf
+};
+
+/** How far two boxes are from each other, squared. What is not a number is no distance, nor is what is too small or too
+large for its square. */
+[[nodiscard]] FOREREACH_INLINE double SquareOfDistance(const HullTree::Node& a, const Lanes& lower,
+                                                       const Lanes& upper) noexcept {
+  const Lanes below = lower - LoadLanes(a.upper.data()), above = LoadLanes(a.lower.data()) - upper;
+  const Lanes gap = Max(Max(below, above), AllLanes(0));
+  const double square = Sum(gap * gap);
+  return square > 0x1p-800 && square < kInfinity ? square : 0;
+}
+
+class BoxTree final {
+ public:
+  // Far above all rounding here and in SeparateHulls, relative to their operands.
+  static constexpr double kHair = 0x1p-40;
+
+  BoxTree() = default;
+  /** @pre lower <= upper, and 1 <= dim <= kMaxSafetyDim. Cost O(n log n). */
+  BoxTree(std::span<const Bounds> boxes, int dim);
+
+  /** Calls visit(t, i) for hulls t and boxes i, each pair at most once and about from near to far. A pair that is left
+  out is further apart than `reach` + `within()`, by more than what SeparateHulls may lose by rounding. `within()` is
+  asked on the way and may fall; what is below 0 counts as 0. It allocates nothing. Cost about O(log n + pairs
+  visited). */
+  template <class Within, class Visit>
+  void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
+    halves_.Search(
+        hulls,
+        [](const HullTree::Node& some, const Node& node) {
+          return SquareOfDistance(some, LoadLanes(node.lower.data()), LoadLanes(node.upper.data()));
+        },
+        FarBy(kHair * (size_ + hulls.size() + reach), reach, within), visit);
+  }
+  /** How far nodes have to be from each other to be left out. */
+  template <class Within>
+  [[nodiscard]] static auto FarBy(double hair, double reach, const Within& within) {
+    return [=, &within] {
+      const double least = within();
+      return (reach + (least > 0 ? least : 0) + hair) * (1 + kHair);
+    };
+  }
+
+  /** An upper bound on the absolute values of the coordinates. */
+  [[nodiscard]] double size() const { return size_; }
+
+ private:
+  struct Node {
+    std::array<double, kLaneCount> lower{}, upper{};  // unused coordinates are 0
+    std::int32_t first = 0, count = 0;
+  };
+
+  double size_ = 0;
+  Halves<Node> halves_;
 };
 
 }  // namespace forereach

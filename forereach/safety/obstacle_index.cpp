@@ -36,6 +36,7 @@ const BoxTree& ObstacleIndex::tree_of(const OccupancyGrid& grid) { return grid.i
 
 ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obstacles) {
   std::vector<Bounds> boxes;
+  std::vector<const Obstacle*> moving;
   int number = 0;
   for (const Obstacle& obstacle : obstacles) {
     if (obstacle.grid() && grids_.size() < ConvexNumbers::kMostGrids) {
@@ -46,10 +47,14 @@ ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obs
       number += own.numbers().size();
       continue;
     }
-    const bool is_bounded = obstacle.kind() != Obstacle::Kind::kHalfSpace && !obstacle.grid();
-    // What has no box at all times is asked about always: an index may only leave out what is provably away.
-    if (!is_bounded || obstacle.motion()) {
+    // What has no box is asked about always: an index may only leave out what is provably away.
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace || obstacle.grid()) {
       everywhere_.push_back(number++);
+      continue;
+    }
+    if (obstacle.motion()) {
+      moving_.push_back(number++);
+      moving.push_back(&obstacle);
       continue;
     }
     standing_.push_back(number++);
@@ -62,6 +67,7 @@ ObstacleIndex::ObstacleIndex(std::span<const Obstacle> obstacles) : numbers_(obs
   }
   if (!boxes.empty()) tree_ = BoxTree(boxes, obstacles.front().dim());
   size_ = std::max(size_, tree_.size());
+  moving_tree_ = MotionTree(moving);
 }
 
 }  // namespace forereach

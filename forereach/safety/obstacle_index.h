@@ -6,6 +6,7 @@ within its reach. */
 #include <vector>
 
 #include "forereach/safety/box_tree.h"
+#include "forereach/safety/motion_tree.h"
 #include "forereach/safety/obstacle_view.h"
 
 namespace forereach {
@@ -13,23 +14,32 @@ namespace forereach {
 class ObstacleIndex final {
  public:
   ObstacleIndex() = default;
-  /** Those that stand and have a size are in a tree of the boxes around them, and a grid has a tree of its own. Those
-  that move, and half-spaces, are near everything. Obstacles are known by ConvexNumbers. @pre all have one dimension.
+  /** Those that stand and have a size are in a tree of the boxes around them, those that move and have a size in one of
+  their own, and so is a grid. Half-spaces are near everything. Obstacles are known by ConvexNumbers. @pre all have one
+  dimension.
   Cost O(n log^2 n) for n obstacles that are no grids. */
   explicit ObstacleIndex(std::span<const Obstacle> obstacles);
 
   [[nodiscard]] const ConvexNumbers& numbers() const { return numbers_; }
   /** Those that are near everything. */
   [[nodiscard]] std::span<const int> everywhere() const { return everywhere_; }
-  /** An upper bound on the absolute values of the coordinates of the others, and on their radii. */
+  /** An upper bound on the absolute values of the coordinates of those that stand, and on their radii. */
   [[nodiscard]] double size() const { return size_; }
-  /** BoxTree::ForEachNear of the others: visit(t, o). One that is left out is proven apart by SeparateHulls, with
+  /** BoxTree::ForEachNear of those that stand: visit(t, o). One that is left out is proven apart by SeparateHulls, with
   `reach` added, and its clearance there exceeds `within()`. */
   template <class Within, class Visit>
   void ForEachNear(const HullTree& hulls, double reach, const Within& within, const Visit& visit) const {
     tree_.ForEachNear(hulls, reach, within, [&](int t, int i) { visit(t, standing_[ToSize(i)]); });
     for (const auto& [first, grid] : grids_)
       tree_of(*grid).ForEachNear(hulls, reach, within, [&, from = first](int t, int i) { visit(t, from + i); });
+  }
+
+  [[nodiscard]] bool has_moving() const { return !moving_.empty(); }
+  /** MotionTree::ForEachNear of those that move: visit(t, o). */
+  template <class Within, class Visit>
+  void ForEachNearMoving(const HullTree& hulls, const MotionTree::Times& times, double reach, const Within& within,
+                         const Visit& visit) const {
+    moving_tree_.ForEachNear(hulls, times, reach, within, [&](int t, int i) { visit(t, moving_[ToSize(i)]); });
   }
 
  private:
@@ -41,9 +51,10 @@ class ObstacleIndex final {
   [[nodiscard]] static const BoxTree& tree_of(const OccupancyGrid& grid);
 
   ConvexNumbers numbers_;
-  std::vector<int> everywhere_, standing_;
+  std::vector<int> everywhere_, standing_, moving_;
   std::vector<Grid> grids_;
   BoxTree tree_;  // of those that stand
+  MotionTree moving_tree_;
   double size_ = 0;
 };
 

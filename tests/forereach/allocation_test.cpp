@@ -69,7 +69,8 @@ struct Allocation : testing::Test {
     const Eigen::VectorXd center = (Eigen::VectorXd(6) << 0, 0, 0, v, 0, delta).finished();
     const Zonotope start = Zonotope::FromBox(center, Eigen::VectorXd::Constant(6, 0.01));
     const long before = allocations;
-    const Decision decision = certifier_->Certify({controls_.data(), 2, 12, 2}, start, obstacles, tube_);
+    const Decision decision =
+        certifier_->Certify({controls_.data(), 2, 12, 2, {0, 100'000, 0}}, start, obstacles, tube_);
     const long counted = allocations - before;
     EXPECT_EQ(decision.outcome, expected);
     return counted;
@@ -130,6 +131,7 @@ TEST_F(Allocation, CertifyAllocatesNothingAmongThousands) {
   for (int i = 0; i < 2000; ++i) {
     const Eigen::Vector2d corner(i % 50 - 20, 5 + i / 50.0);
     cells.push_back(Obstacle::AxisBox(corner, corner + Eigen::Vector2d(0.5, 0.5)));
+    if (i % 2 == 1) cells.back() = cells.back().Moving({.velocity = {0.1, 0, 0}});
   }
   const ObstacleIndex index(cells);
   EXPECT_EQ(Count(10, 0, {cells, index}, Outcome::kCertified), 0);

@@ -100,6 +100,160 @@ TEST(BoxTree, LooksAtFewOfMany) {
   EXPECT_LE(visits, 80);
 }
 
+// The square of the distance between the boxes around a unit's hulls and around an obstacle that moves, as seen from it
+// at both samples, and what has to be kept: exact but for the length of the velocity, which is rounded up.
+struct Apart {
+  Rational square, kept;
+};
+Apart ApartAt(std::span<const Hull> samples, int t, int span, const Obstacle& obstacle, const Schedule& schedule) {
+  const ObstacleMotion& motion = *obstacle.motion();
+  const auto seconds = [](std::int64_t us) -> Rational { return Rational(us) / 1'000'000; };
+  Apart apart{0, Rational(obstacle.radius()) + Rational(motion.uncertainty)};
+  std::int64_t longest = 0;
+  for (int k = 0; k < obstacle.dim(); ++k) {
+    std::optional<Rational> lower, upper;
+    for (const int sample : {t, t + span}) {
+      const std::int64_t at = schedule.start_us + sample * schedule.step_us;
+      longest = std::max(
+          {longest, motion.stamp_us - at + schedule.clock_error_us, at + schedule.clock_error_us - motion.stamp_us});
+      const Hull& hull = samples[ToSize(sample)];
+      const Rational middle =
+          Rational(hull.center[ToSize(k)]) - Rational(motion.velocity[k]) * seconds(at - motion.stamp_us);
+      const Rational low = middle - Rational(hull.half_width[ToSize(k)]),
+                     high = middle + Rational(hull.half_width[ToSize(k)]);
+      lower = lower ? std::min(*lower, low) : low;
+      upper = upper ? std::max(*upper, high) : high;
+    }
+    const Rational gap =
+        std::max(Rational(Rational(obstacle.lower()[k]) - *upper), Rational(*lower - Rational(obstacle.upper()[k])));
+    if (gap > 0) apart.square += gap * gap;
+  }
+  const Rational tau = seconds(longest);
+  apart.kept += Rational(motion.growth) * tau + Rational(motion.growth_rate) * tau * tau / 2 +
+                Rational(motion.velocity.norm() * (1 + 1e-14)) * seconds(schedule.clock_error_us);
+  return apart;
+}
+
+TEST(MotionTree, LeavesOutOnlyWhatIsNowhereOrFurtherThanAsked) {
+  long nowhere = 0, far = 0;
+  for (TracedRandom random(4); random.Again(400);) {
+    const int p = random.Integer(1, 3), units = random.Integer(1, 12), span = random.Integer(0, 1);
+    const Schedule schedule = AnySchedule(random);
+    const double scale = random.Coin(0.9) ? 20 : std::ldexp(1, random.Integer(-40, 200));
+    std::vector<Hull> samples(ToSize(units + span)), hulls;
+    for (Hull& hull : samples)
+      for (std::size_t k = 0; k < ToSize(p); ++k) {
+        hull.center[k] = scale * random.Uniform(-1.5, 1.5);
+        hull.half_width[k] = random.Coin(0.3) ? 0 : scale * random.Uniform(0, 0.1);
+      }
+    for (std::size_t t = 0; t < ToSize(units); ++t) hulls.push_back(Join(samples[t], samples[t + ToSize(span)], p));
+    std::vector<Obstacle> obstacles;
+    for (int count = random.Integer(1, 60); count > 0; --count) {
+      const Obstacle shape = AnyShape(random, p)(random.Vector(p, scale));
+      if (shape.kind() == Obstacle::Kind::kHalfSpace) continue;
+      ObstacleMotion motion = AnyMotion(random, p, schedule, units);
+      if (random.Coin(0.1)) motion.velocity *= scale;
+      if (random.Coin(0.02)) motion.stamp_us = random.Coin() ? Schedule::kLatest : -Schedule::kLatest;
+      if (random.Coin(0.02)) motion.from_us = -ObstacleMotion::kAlways + random.Below(9);
+      if (random.Coin(0.02)) motion.until_us = ObstacleMotion::kAlways - random.Below(9);
+      obstacles.push_back(shape.Moving(motion));
+    }
+    std::vector<const Obstacle*> moving;
+    for (const Obstacle& obstacle : obstacles) moving.push_back(&obstacle);
+    const double reach = random.Coin() ? 0 : scale * random.Uniform(0, 0.2), within = scale * random.Uniform(-0.1, 0.5);
+    const int first = random.Integer(0, 3);
+    Schedule shifted = schedule;
+    shifted.start_us -= first * schedule.step_us;
+    std::map<std::pair<int, int>, int> visits;
+    MotionTree(moving).ForEachNear(
+        TreeOf(hulls, p), {shifted, first, span}, reach, [&] { return within; },
+        [&](int t, int i) {
+          ++visits[{t, i}];
+        });
+    const Rational most = Rational(reach) + Rational(std::max(within, 0.0));
+    for (int t = 0; t < units; ++t)
+      for (int i = 0; i < std::ssize(obstacles); ++i) {
+        EXPECT_LE((visits[{t, i}]), 1);
+        if (visits[{t, i}] > 0) continue;
+        if (!Meet(*obstacles[ToSize(i)].motion(), schedule, t, t + span).is_there) {
+          ++nowhere;
+          continue;
+        }
+        ++far;
+        const auto [square, kept] = ApartAt(samples, t, span, obstacles[ToSize(i)], schedule);
+        EXPECT_GT(square, (kept + most) * (kept + most)) << "hull " << t << ", obstacle " << i;
+      }
+  }
+  EXPECT_GT(nowhere, 1000);
+  EXPECT_GT(far, 1000) << "a tree that visits all shows nothing";
+}
+
+// A window is closed, and wider by the clock's error: one microsecond beyond it the obstacle is nowhere.
+TEST(MotionTree, FindsWhatIsThereAtTheEndOfAWindowToTheMicrosecond) {
+  ObstacleMotion motion;
+  motion.stamp_us = motion.from_us = 1'000'000;
+  motion.until_us = 2'000'000;
+  const Obstacle obstacle = Obstacle::Circle(Vec({0, 0}), 1).Moving(motion);
+  const std::vector<const Obstacle*> moving{&obstacle};
+  const MotionTree tree(moving);
+  const std::vector<Hull> hulls(2);  // sample 0 to 1, and 1 to 2
+  const auto visited = [&](std::int64_t start_us, std::int64_t error_us) {
+    std::vector<int> found;
+    const Schedule schedule{start_us, 100'000, error_us};
+    tree.ForEachNear(
+        TreeOf(hulls, 2), {schedule, 0, 1}, 0, [] { return 0.0; }, [&](int t, int) { found.push_back(t); });
+    std::ranges::sort(found);
+    return found;
+  };
+  using testing::ElementsAre;
+  EXPECT_THAT(visited(2'000'000, 0), ElementsAre(0));
+  EXPECT_THAT(visited(2'000'001, 0), ElementsAre());
+  EXPECT_THAT(visited(2'000'050, 50), ElementsAre(0));
+  EXPECT_THAT(visited(2'000'051, 50), ElementsAre());
+  EXPECT_THAT(visited(800'000, 0), ElementsAre(1));
+  EXPECT_THAT(visited(799'999, 0), ElementsAre());
+  EXPECT_THAT(visited(1'500'000, 0), ElementsAre(0, 1));
+}
+
+TEST(MotionTree, VisitsAllIfNumbersAreTooLarge) {
+  ObstacleMotion motion;
+  motion.velocity = {1e308, -1e308, 0};
+  motion.growth = 1e308;
+  std::vector<Obstacle> obstacles;
+  for (int i = 0; i < 20; ++i) {
+    motion.stamp_us = i % 3 * 10'000'000;
+    obstacles.push_back(Obstacle::Circle(Vec({100.0 * i, 5}), 1).Moving(i % 2 ? motion : ObstacleMotion{}));
+  }
+  std::vector<const Obstacle*> moving;
+  for (const Obstacle& obstacle : obstacles) moving.push_back(&obstacle);
+  const std::vector<Hull> hulls(3);
+  int visits = 0;
+  MotionTree(moving).ForEachNear(
+      TreeOf(hulls, 2), {{5'000'000, 100'000, 0}, 0, 0}, 0, [] { return 0.0; }, [&](int, int) { ++visits; });
+  EXPECT_EQ(visits, 60);
+}
+
+// A crossing of many in short windows, as predictions are: at most a few are near the plan when it is there.
+TEST(MotionTree, LooksAtFewOfMany) {
+  TracedRandom random(5);
+  std::vector<Obstacle> obstacles;
+  for (int i = 0; i < 4000; ++i) {
+    ObstacleMotion motion;
+    motion.stamp_us = motion.from_us = random.Integer(0, 39) * 100'000;
+    motion.until_us = motion.from_us + 100'000;
+    motion.velocity.head(2) = random.Vector(2, 15);
+    obstacles.push_back(Obstacle::Circle(random.Vector(2, 100), 0.5).Moving(motion));
+  }
+  std::vector<const Obstacle*> moving;
+  for (const Obstacle& obstacle : obstacles) moving.push_back(&obstacle);
+  std::vector<Hull> hulls;
+  for (int t = 0; t < 20; ++t) hulls.push_back({{t - 10.0, 0, 0}, {0.5, 0.5, 0}});
+  int visits = 0;
+  MotionTree(moving).ForEachNear(
+      TreeOf(hulls, 2), {{0, 100'000, 0}, 0, 1}, 1, [] { return 0.0; }, [&](int, int) { ++visits; });
+  EXPECT_LE(visits, 100);  // of 80,000 pairs
+}
+
 TEST(ObstacleIndex, ChangesNoDecisionInRandomWorlds) {
   TracedRandom random(2);
   int certified = 0, touched = 0, drives = 0;
