@@ -32,8 +32,9 @@ bool IsWithin(const Problem& problem, std::span<const double> z, bool is_learned
 double TooFarOff(const NominalModel& model) { return StepOf(model) / 2; }
 
 bool KnowsDurations(const Problem& problem) try {
-  RequireRates(problem, TooFarOff(*problem.model));
-  return true;
+  const double most = TooFarOff(*problem.model);
+  RequireRates(problem, most);
+  return most > 0;  // without dt nothing is off it
 } catch (const std::invalid_argument&) {
   return false;
 }

@@ -257,7 +257,7 @@ class Tasks(unittest.TestCase):
             ("dt_error: transitions: 1 durations, must be 2 or none", (z, x_next, [0])),
             ("dt_error: transition 1: a duration is off by -0.1 s", (z, x_next, [0, -0.1])),
             ("dt_error: transition 1: a duration is off by (nan|NaN|inf)", (z, x_next, [0, np.inf])),
-            ("dt_error: step error: 0.05 s is not below half", (z, x_next, [0, 0.1])),
+            ("dt_error: transition 1: a duration is off by 0.05 s, outside", (z, x_next, [0, 0.05])),
             (r"data:3: v: -5 is outside \[-3, 3\] of domain.state", (z * [1, 5, 1] * [[0.2], [1]], x_next)),
         ]:
             self.assertRaisesRegex(fr.Error, words, fr.Task, keys, data=data)
