@@ -108,6 +108,33 @@ TEST_F(LearnTest, AnswersAsACertifierThatHadAllDataFromTheStart) {
   }
 }
 
+// One bound for a learned step and for a given one. Software sets all states, so that a duration hides nothing.
+TEST_F(LearnTest, AStepThatIsOffByHalfOfDtSaysNothing) {
+  problem_.timing.set_at_steps = {0, 1, 2, 3, 4, 5};
+  const Eigen::VectorXd z = Draw(), next = Next(z);
+  Add(problem_, z, next);
+  Certifier certifier(std::make_shared<Problem>(problem_));
+  EXPECT_EQ(certifier.Learn({z.data(), 8}, {next.data(), 6}, std::nextafter(0.05, 0)), Learned::kAdded);
+  EXPECT_EQ(certifier.Learn({z.data(), 8}, {next.data(), 6}, 0.05), Learned::kNoNominalSlope);
+  problem_.transitions.longer = Vec({std::nextafter(0.05, 0)});
+  EXPECT_NO_THROW(ValidateDurations(problem_));
+  problem_.transitions.longer = Vec({0.05});
+  EXPECT_THAT([&] { ValidateDurations(problem_); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("a duration is off by 0.05 s, outside [0, 0.05)")));
+}
+
+TEST_F(LearnTest, DurationsAreKnownWhereEquationsOrRatesSayHowStatesMove) {
+  EXPECT_TRUE(KnowsDurations(problem_));
+  const auto with = [&](const std::string& next) {
+    problem_.model = MakeTextModel(TextModel({{"x", next}}, {"u"}, {{"dt", 0.1, 0.1}}));
+    return KnowsDurations(problem_);
+  };
+  EXPECT_TRUE(with("x + dt*u"));
+  EXPECT_FALSE(with("x + 0.1*u"));
+  problem_.timing.rate_bound = Vec({5});
+  EXPECT_TRUE(with("x + 0.1*u"));
+}
+
 TEST_F(LearnTest, RefusesATransitionInsideTheBoxAndOutsideTheDomain) {
   Add(problem_, Draw(), Next(Draw()));
   problem_.transitions.x_next.row(0) = Next(problem_.transitions.z.row(0).transpose()).transpose();
