@@ -40,7 +40,7 @@ inline transition_t Transition(FuzzedDataProvider& input, std::int64_t now) {
 
 inline obstacle_shape_t AnyShape(FuzzedDataProvider& input) {
   obstacle_shape_t shape{};
-  shape.kind = input.ConsumeIntegralInRange<std::int16_t>(0, 5);
+  shape.kind = input.ConsumeIntegralInRange<std::int16_t>(0, 7);
   shape.dimension = input.ConsumeIntegralInRange<std::int16_t>(1, 3);
   shape.num_points = input.ConsumeIntegralInRange<std::int16_t>(0, 16);
   shape.value = AnyNumber(input);

@@ -1,6 +1,8 @@
 #include "certifier/gate/obstacle_message.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -8,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "forereach/numerics/size.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/freshness.h"
 
@@ -113,15 +116,141 @@ ObstacleMotion MotionOf(const obstacle_t& piece, const Track& track) {
   return motion;
 }
 
+ObstacleMotion StandsSince(std::int64_t stamp_us) {
+  ObstacleMotion standing;
+  standing.stamp_us = stamp_us;
+  return standing;
+}
+
+// ---- Grids
+
+// Of a CELLS piece: its numbers are whole and below 2^48, so each has 48 cells as bits, and none of them is NaN.
+constexpr int kBitsOfNumber = 48, kNumbersOfPiece = kMaxObstaclePoints * kMaxSafetyDim,
+              kCellsOfPiece = kBitsOfNumber * kNumbersOfPiece;
+
+std::int64_t Whole(const char* what, double value, std::int64_t most) {
+  if (!(0 <= value && value <= static_cast<double>(most)) || value != std::floor(value))
+    throw std::invalid_argument(fmt::format("{} {}, must be a whole number up to {}", what, value, most));
+  return static_cast<std::int64_t>(value);
+}
+
+void SetPoint(obstacle_shape_t& shape, int index, double x, double y) {
+  shape.point[index][0] = x;
+  shape.point[index][1] = y;
+}
+
+// All that a grid has but its cells.
+obstacle_shape_t ShapeOf(const GridMap& map) {
+  obstacle_shape_t shape{};
+  shape.kind = obstacle_shape_t::GRID;
+  shape.dimension = 2;
+  shape.num_points = 3;
+  shape.value = map.resolution;
+  SetPoint(shape, 0, map.origin[0], map.origin[1]);
+  SetPoint(shape, 1, map.width, map.height);
+  SetPoint(shape, 2, map.yaw, map.outside_is_free ? 1 : 0);
+  return shape;
+}
+
+GridMap GridOf(const obstacle_shape_t& shape) {
+  RequirePoints(shape, 3);
+  if (shape.dimension != 2) throw std::invalid_argument(fmt::format("dimension {}, a grid has 2", shape.dimension));
+  const auto size = [&](int k) { return static_cast<int>(Whole("a grid's size", shape.point[1][k], kMostSentCells)); };
+  return {.resolution = shape.value,
+          .origin = {shape.point[0][0], shape.point[0][1]},
+          .yaw = shape.point[2][0],
+          .width = size(0),
+          .height = size(1),
+          .outside_is_free = Whole("outside", shape.point[2][1], 1) == 1};
+}
+
+obstacle_shape_t CellsOf(const GridMap& map, std::size_t first) {
+  obstacle_shape_t shape{};
+  shape.kind = obstacle_shape_t::CELLS;
+  shape.dimension = kMaxSafetyDim;
+  shape.num_points = kMaxObstaclePoints;
+  for (std::size_t i = first; i < std::min(first + kCellsOfPiece, map.occupied.size()); ++i)
+    if (map.occupied[i]) {
+      const auto place = static_cast<int>(i - first), number = place / kBitsOfNumber;
+      shape.point[number / kMaxSafetyDim][number % kMaxSafetyDim] += std::ldexp(1, place % kBitsOfNumber);
+    }
+  return shape;
+}
+
+// Puts grids together, piece by piece.
+class GridReader final {
+ public:
+  explicit GridReader(std::span<const Obstacle> known) : known_(known) {}
+
+  // Whether the piece is of a grid. @throws std::invalid_argument if it is not of the grid that is under way.
+  [[nodiscard]] bool Takes(const obstacle_shape_t& shape) {
+    if (is_open() != (shape.kind == obstacle_shape_t::CELLS))
+      throw std::invalid_argument(is_open() ? WhyOpen() : "cells without a grid before them");
+    if (is_open())
+      TakeCells(shape);
+    else if (shape.kind == obstacle_shape_t::GRID)
+      Begin(GridOf(shape));
+    else
+      return false;
+    return true;
+  }
+
+  [[nodiscard]] bool is_open() const { return next_ < size_; }
+  [[nodiscard]] std::string WhyOpen() const {
+    return fmt::format("a grid of {} by {} cells has only {} of them", map_.width, map_.height, next_);
+  }
+  [[nodiscard]] Obstacle TakeGrid() {
+    for (const Obstacle& obstacle : known_)
+      if (obstacle.grid() && obstacle.grid()->map() == map_) return Obstacle::Grid(obstacle.grid());
+    return Obstacle::Grid(std::make_shared<const OccupancyGrid>(std::move(map_)));
+  }
+
+ private:
+  void Begin(GridMap map) {
+    map_ = std::move(map);
+    const std::int64_t cells = std::int64_t{map_.width} * map_.height;
+    if (cells < 1 || cells > kMostSentCells - total_)
+      throw std::invalid_argument(fmt::format("a grid of {} by {} cells; the grids of a set have 1 to {} in all",
+                                              map_.width, map_.height, kMostSentCells));
+    total_ += cells;
+    next_ = 0;
+    size_ = static_cast<std::size_t>(cells);
+    map_.occupied.assign(size_, false);
+  }
+
+  void TakeCells(const obstacle_shape_t& shape) {
+    if (shape.dimension != kMaxSafetyDim || shape.num_points != kMaxObstaclePoints)
+      throw std::invalid_argument(fmt::format("cells in {} points of dimension {}, must be {} of {}", shape.num_points,
+                                              shape.dimension, kMaxObstaclePoints, kMaxSafetyDim));
+    for (int number = 0; number < kNumbersOfPiece; ++number) {
+      const double value = shape.point[number / kMaxSafetyDim][number % kMaxSafetyDim];
+      for (auto bits = Whole("cells", value, (std::int64_t{1} << kBitsOfNumber) - 1); bits != 0; bits &= bits - 1) {
+        const std::size_t cell = next_ + ToSize(number * kBitsOfNumber + std::countr_zero(ToSize(bits)));
+        if (cell >= size_) throw std::invalid_argument(fmt::format("cell {} of {}", cell, size_));
+        map_.occupied[cell] = true;
+      }
+    }
+    next_ = std::min(next_ + kCellsOfPiece, size_);
+  }
+
+  std::span<const Obstacle> known_;
+  GridMap map_;
+  std::size_t next_ = 0, size_ = 0;  // cells
+  std::int64_t total_ = 0;           // of all grids
+};
+
 Obstacle FromMessage(const obstacle_t& piece, std::int64_t stamp, const std::map<std::int64_t, Track>& tracks) {
   const Obstacle shape = FromMessage(piece.shape).Named(GetText(piece.name));
   const ObstacleMotion motion = MotionOf(piece, tracks.at(piece.track));
   const bool stands = motion.velocity.isZero(0) && motion.growth == 0 && motion.growth_rate == 0;
   const std::string why = stands ? "" : WhyNotFresh(piece.utime, stamp, kFarthestStampUs, kFarthestStampUs);
   if (!why.empty()) throw std::invalid_argument(why + ", from its message");
-  ObstacleMotion standing;
-  standing.stamp_us = motion.stamp_us;
-  return motion == standing ? shape : shape.Moving(motion);
+  return motion == StandsSince(motion.stamp_us) ? shape : shape.Moving(motion);
+}
+
+void RequireStanding(const obstacle_t& piece, const Track& track) {
+  if (MotionOf(piece, track) != StandsSince(piece.utime))
+    throw std::invalid_argument("a grid has no window, no velocity and no growth");
 }
 
 // A piece without a window of time. The rules of a track compare windows, so this is checked before them.
@@ -168,12 +297,20 @@ obstacle_shape_t ShapeOf(const Obstacle& from) {
 
 }  // namespace
 
-std::vector<Obstacle> FromMessage(std::span<const obstacle_t> pieces, std::int64_t stamp, int dim) {
+std::vector<Obstacle> FromMessage(std::span<const obstacle_t> pieces, std::int64_t stamp, int dim,
+                                  std::span<const Obstacle> known) {
   ForEach(pieces, RequireWindow);
   const std::map<std::int64_t, Track> tracks = TracksOf(pieces, stamp);
   std::vector<Obstacle> obstacles;
-  ForEach(pieces,
-          [&](const obstacle_t& piece) { obstacles.push_back(OfDimension(dim, FromMessage(piece, stamp, tracks))); });
+  GridReader grids(known);
+  std::string name;
+  ForEach(pieces, [&](const obstacle_t& piece) {
+    if (!grids.Takes(piece.shape)) return obstacles.push_back(OfDimension(dim, FromMessage(piece, stamp, tracks)));
+    RequireStanding(piece, tracks.at(piece.track));
+    if (piece.shape.kind == obstacle_shape_t::GRID) name = GetText(piece.name);
+    if (!grids.is_open()) obstacles.push_back(OfDimension(dim, grids.TakeGrid().Named(name)));
+  });
+  if (grids.is_open()) throw std::invalid_argument("the last obstacle: " + grids.WhyOpen());
   return obstacles;
 }
 
@@ -187,18 +324,18 @@ bool Continues(const Obstacle& obstacle, const Obstacle& before) {
          obstacle.motion()->from_us == before.motion()->until_us;
 }
 
+bool HasRoom(const Obstacle& grid, int cells) { return std::ssize(MapOf(grid).occupied) <= kMostSentCells - cells; }
+
 std::vector<obstacle_t> ToPieces(const std::vector<Obstacle>& obstacles, std::int64_t utime,
                                  std::span<const std::int64_t> tracks) {
-  std::vector<obstacle_t> pieces(obstacles.size());
+  std::vector<obstacle_t> pieces;
   std::map<std::int64_t, std::int64_t> ends;  // of the tracks
   std::int64_t track = -1;
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
-    ObstacleMotion motion;
-    motion.stamp_us = utime;
-    motion = obstacles[i].motion().value_or(motion);
+    const ObstacleMotion motion = obstacles[i].motion().value_or(StandsSince(utime));
     if (i == 0 || !Continues(obstacles[i], obstacles[i - 1])) track = static_cast<std::int64_t>(i);
-    obstacle_t& to = pieces[i];
-    to.shape = ShapeOf(obstacles[i]);
+    obstacle_t to{};
+    to.shape = obstacles[i].grid() ? ShapeOf(MapOf(obstacles[i])) : ShapeOf(obstacles[i]);
     to.track = tracks.empty() ? track : tracks[i];
     to.utime = motion.stamp_us;
     to.from_utime = motion.from_us;
@@ -210,6 +347,13 @@ std::vector<obstacle_t> ToPieces(const std::vector<Obstacle>& obstacles, std::in
     SetText(to.name, obstacles[i].name());
     std::int64_t& end = ends.try_emplace(to.track, to.until_utime).first->second;
     end = std::max(end, to.until_utime);
+    pieces.push_back(to);
+    if (!obstacles[i].grid()) continue;
+    const GridMap& map = MapOf(obstacles[i]);
+    for (std::size_t first = 0; first < map.occupied.size(); first += kCellsOfPiece) {
+      to.shape = CellsOf(map, first);
+      pieces.push_back(to);
+    }
   }
   for (obstacle_t& piece : pieces)
     piece.gone = piece.until_utime == ends.at(piece.track) && piece.until_utime != ObstacleMotion::kAlways;
@@ -220,8 +364,9 @@ obstacles_t ToMessage(const std::vector<Obstacle>& obstacles, std::int64_t utime
                       std::span<const std::int64_t> tracks) {
   obstacles_t message{};
   message.utime = utime;
-  message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
-  std::ranges::copy(ToPieces(obstacles, utime, tracks), message.obstacle);
+  const std::vector<obstacle_t> pieces = ToPieces(obstacles, utime, tracks);
+  message.num_obstacles = static_cast<std::int16_t>(pieces.size());
+  std::ranges::copy(pieces, message.obstacle);
   return message;
 }
 

@@ -9,6 +9,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/limits.h"
+#include "forereach/safety/grid_map.h"
 #include "task/canonical.h"
 #include "task/most_obstacles.h"
 
@@ -32,16 +33,16 @@ ObstacleSender::ObstacleSender(std::int64_t period_us) : period_us_(period_us) {
 }
 
 void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks) {
-  RequireRoom(obstacles.size());
   if (!tracks.empty() && tracks.size() != obstacles.size())
     throw std::invalid_argument(fmt::format("{} tracks of {} obstacles", tracks.size(), obstacles.size()));
   const Digest digest = ObstaclesDigest(obstacles);
   if (content_ && digest == content_->digest && tracks == content_->tracks) return;
+  const std::vector<obstacle_t> all = ToPieces(obstacles, 0, tracks);  // no stamp, so what stands stays the same
+  RequireRoom(all.size());
   std::vector<ObstaclePart> before;
-  if (content_ && content_->obstacles.size() == obstacles.size()) before = std::move(content_->parts);
-  content_ = {obstacles, tracks, digest, {}};
-  if (obstacles.size() > kMaxObstacles) {
-    const std::vector<obstacle_t> all = ToPieces(obstacles, 0, tracks);  // no stamp, so what stands stays the same
+  if (content_ && content_->num_pieces == all.size()) before = std::move(content_->parts);
+  content_ = {obstacles, tracks, digest, all.size(), {}};
+  if (all.size() > kMaxObstacles) {
     std::vector<Digest> digests;
     for (std::size_t i = 0; i < all.size(); i += kMaxObstacles)
       digests.push_back(
@@ -89,7 +90,7 @@ std::optional<obstacles_t> ObstacleSender::Due(std::int64_t now_us) {
     const std::size_t i = NextPart();
     const std::vector<obstacle_t>& part = content_->parts[i].obstacles;
     due.utime = now_us;
-    due.set_size = static_cast<std::int16_t>(content_->obstacles.size());
+    due.set_size = static_cast<std::int16_t>(content_->num_pieces);
     due.first = static_cast<std::int16_t>(i * kMaxObstacles);
     due.num_obstacles = static_cast<std::int16_t>(part.size());
     SetDigest(due.set_digest, content_->set_digest);
@@ -118,7 +119,13 @@ std::optional<obstacles_t> ObstaclesOfFile::Due(std::int64_t now_us) {
 
 std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles) {
   std::vector<Obstacle> begun;
+  int cells = 0;  // of grids
   for (const Obstacle& obstacle : obstacles) {
+    if (obstacle.grid() && HasRoom(obstacle, cells)) {
+      cells += static_cast<int>(MapOf(obstacle).occupied.size());
+      begun.push_back(obstacle);
+      continue;
+    }
     if (!obstacle.motion()) {
       for (const Obstacle& convex : obstacle.convex()) begun.push_back(convex.Named(obstacle.name()));
       continue;
@@ -149,9 +156,9 @@ void RequireSendable(const Config& config) try {
     if (obstacle.motion()) changes.insert(std::max<std::int64_t>(obstacle.motion()->from_us, 0));
   for (const std::int64_t time_us : changes) {
     const std::vector<Obstacle> seen = SeenBy(time_us, BegunAt(0, config.obstacles));
-    RequireRoom(seen.size());
-    static_cast<void>(
-        FromMessage(ToPieces(seen, time_us), time_us, static_cast<int>(config.problem->projection.rows())));
+    const std::vector<obstacle_t> pieces = ToPieces(seen, time_us);
+    RequireRoom(pieces.size());
+    static_cast<void>(FromMessage(pieces, time_us, static_cast<int>(config.problem->projection.rows()), seen));
   }
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": task.obstacles: " + error.what());

@@ -41,7 +41,7 @@ class ObstacleSender final {
   /** Sets all obstacles. If they differ from the last ones, the next message is due at once. Motions have the times of
   the clock that Due is called with.
   @param tracks as of ToMessage, which also has the rules for tracks that receivers check.
-  @throws std::invalid_argument for more than kMostObstacles, or tracks of another number. */
+  @throws std::invalid_argument for more than kMostObstacles pieces, or tracks of another number. */
   void Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks = {});
 
   /** The next message, if it is due, with the stamp `now_us` in microseconds since the Unix epoch. Nothing before the
@@ -53,6 +53,7 @@ class ObstacleSender final {
     std::vector<Obstacle> obstacles;
     std::vector<std::int64_t> tracks;
     Digest digest;                    // of the obstacles
+    std::size_t num_pieces;           // of ToPieces
     std::vector<ObstaclePart> parts;  // none: they are sent whole
     Digest set_digest{};
   };
@@ -69,7 +70,8 @@ class ObstacleSender final {
   std::optional<std::int64_t> last_us_;      // nothing: due at once
 };
 
-/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on; of a grid its blocks.
+/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on; of a grid that
+has no room on the bus its blocks.
 @pre |begin_us| and the obstacles' finite times are at most Schedule::kLatest. */
 [[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
 

@@ -70,7 +70,7 @@ std::string ObstaclesInForce::Take(const obstacles_t& message, std::int64_t now_
 void ObstaclesInForce::TakeSet(const obstacles_t& message) {
   if (state_.set.Take(message) != ObstacleSet::Known::kNew) return;
   try {
-    std::vector<Obstacle> heard = FromMessage(state_.set.obstacles(), message.utime, dim_);
+    std::vector<Obstacle> heard = FromMessage(state_.set.obstacles(), message.utime, dim_, state_.heard);
     RequireClock(heard);
     state_.heard = std::move(heard);
   } catch (const std::invalid_argument&) {

@@ -347,7 +347,7 @@ TEST_F(GateObstaclesTest, WrongContentNamesTheObstacle) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   for (const std::int16_t count : Shorts{-1, 65, 32767})
     ExpectRefused(std::to_string(count) + ", must be 0 to 64", [count](auto& m) { m.num_obstacles = count; });
-  for (const std::int16_t kind : Shorts{-1, 0, 5, 32767})
+  for (const std::int16_t kind : Shorts{-1, 0, 7, 32767})
     ExpectRefused("obstacle 1: unknown kind", [kind](auto& m) { m.obstacle[1].shape.kind = kind; });
   for (const std::int16_t dimension : Shorts{-1, 0, 4, 32767})
     ExpectRefused("obstacle 1: ", [dimension](auto& m) { m.obstacle[1].shape.dimension = dimension; });

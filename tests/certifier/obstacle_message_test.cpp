@@ -3,8 +3,10 @@
 
 #include "tests/test.h"
 
+#include "forereach/safety/occupancy_grid.h"
 #include "task/canonical.h"
 #include "tests/certifier/small_task.h"
+#include "tests/oracle/traced_random.h"
 
 namespace forereach::obstacle_message_test {
 
@@ -41,6 +43,127 @@ TEST(ObstacleMessageTest, BoxesAndHalfSpacesExistInOneAndThreeDimensions) {
     EXPECT_EQ(ObstaclesDigest(FromMessage(ToMessage(obstacles, kNow), dim)), ObstaclesDigest(obstacles));
     EXPECT_THROW((void)FromMessage(ToMessage(obstacles, kNow), 2), std::invalid_argument);
   }
+}
+
+// ---- Grids: a piece, and then pieces of its cells.
+
+Obstacle GridOf(GridMap map) { return Obstacle::Grid(std::make_shared<const OccupancyGrid>(std::move(map))); }
+Obstacle GridOf(int width, int height, const std::function<bool(std::size_t)>& is_occupied) {
+  GridMap map{0.05, {-3, 7.25}, 0, width, height, std::vector<bool>(ToSize(width) * ToSize(height)), true};
+  for (std::size_t i = 0; i < map.occupied.size(); ++i) map.occupied[i] = is_occupied(i);
+  return GridOf(std::move(map));
+}
+const Obstacle kOneByTwo = GridOf(1, 2, [](std::size_t i) { return i == 1; });
+
+TEST(GridMessageTest, GridsGoThroughTheBusAmongOthers) {
+  for (TracedRandom random(1); random.Again(60);) {
+    std::vector<Obstacle> obstacles;
+    for (int count = random.Integer(1, 4); count > 0; --count) {
+      const double share = random.Coin(0.2) ? 1 : random.Uniform(0, 0.6);
+      GridMap map =
+          MapOf(GridOf(random.Integer(1, 90), random.Integer(1, 90), [&](std::size_t) { return random.Coin(share); }));
+      map.origin = {random.Uniform(-50, 50), random.Uniform(-50, 50)};
+      map.yaw = random.Coin() ? 0 : random.Uniform(-4, 4);
+      map.resolution = random.Uniform(0.02, 2);
+      map.outside_is_free = random.Coin();
+      obstacles.push_back(GridOf(map));
+      if (random.Coin()) obstacles.back() = obstacles.back().Named("map_1");
+      if (random.Coin()) obstacles.push_back(kCircle);
+    }
+    if (ToPieces(obstacles, kNow).size() > kMaxObstacles) continue;
+    const auto taken = FromMessage(Decoded<obstacles_t>(Encode(ToMessage(obstacles, kNow))).value(), 2);
+    ASSERT_EQ(taken.size(), obstacles.size());
+    for (std::size_t i = 0; i < taken.size(); ++i) {
+      EXPECT_EQ(taken[i].name(), obstacles[i].name());
+      if (obstacles[i].grid()) EXPECT_TRUE(MapOf(taken[i]) == MapOf(obstacles[i]));
+    }
+    EXPECT_EQ(ObstaclesDigest(taken), ObstaclesDigest(obstacles));
+  }
+}
+
+TEST(GridMessageTest, ACellsPieceHas2304AndTheNextOneTheRest) {
+  for (const auto& [width, pieces] : {std::pair(2303, 2u), {2304, 2u}, {2305, 3u}}) {
+    const Obstacle grid = GridOf(width, 1, [width = width](std::size_t i) { return i + 1 == ToSize(width); });
+    const std::vector<obstacle_t> all = ToPieces({grid}, kNow);
+    EXPECT_EQ(all.size(), pieces);
+    EXPECT_TRUE(MapOf(FromMessage(all, kNow, 2).at(0)) == MapOf(grid));
+  }
+}
+
+TEST(GridMessageTest, AsManyCellsAsTheBusTakesAndNoMore) {
+  const Obstacle most = GridOf(512, 512, [](std::size_t i) { return i % 512 == 0; });
+  EXPECT_TRUE(HasRoom(most, 0));
+  EXPECT_FALSE(HasRoom(most, 1));
+  std::vector<obstacle_t> pieces = ToPieces({most}, kNow);
+  EXPECT_EQ(FromMessage(pieces, kNow, 2).at(0).convex().size(), 1u);
+  std::ranges::copy(ToPieces({kOneByTwo}, kNow), std::back_inserter(pieces));
+  EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(pieces, kNow, 2); }),
+              HasSubstr("obstacle 115: a grid of 1 by 2 cells; the grids of a set have 1 to 262144 in all"));
+}
+
+TEST(GridMessageTest, AGridThatIsKnownIsNotMadeAgain) {
+  const std::vector<obstacle_t> pieces = ToPieces({kCircle, kOneByTwo}, kNow);
+  const std::vector<Obstacle> first = FromMessage(pieces, kNow, 2);
+  EXPECT_EQ(FromMessage(pieces, kNow, 2, first)[1].grid(), first[1].grid());
+  EXPECT_NE(FromMessage(pieces, kNow, 2)[1].grid(), first[1].grid());
+}
+
+TEST(GridMessageTest, WhatIsNoGridIsRefused) {
+  using Pieces = std::vector<obstacle_t>;
+  const auto why = [](const std::function<void(Pieces&)>& change) {
+    Pieces pieces = ToPieces({kOneByTwo, kCircle}, kNow);
+    change(pieces);
+    return Thrown<std::invalid_argument>([&] { (void)FromMessage(pieces, kNow, 2); });
+  };
+  const auto grid = [&](const std::function<void(obstacle_shape_t&)>& change) {
+    return why([&](Pieces& pieces) { change(pieces[0].shape); });
+  };
+  const auto cells = [&](const std::function<void(obstacle_shape_t&)>& change) {
+    return why([&](Pieces& pieces) { change(pieces[1].shape); });
+  };
+  EXPECT_EQ(why([](Pieces&) {}), "");
+  EXPECT_EQ(why([](Pieces& pieces) { pieces.erase(pieces.begin()); }), "obstacle 0: cells without a grid before them");
+  EXPECT_EQ(why([](Pieces& pieces) { pieces.erase(pieces.begin() + 1); }),
+            "obstacle 1: a grid of 1 by 2 cells has only 0 of them");
+  EXPECT_EQ(why([](Pieces& pieces) { pieces.resize(1); }),
+            "the last obstacle: a grid of 1 by 2 cells has only 0 of them");
+  EXPECT_EQ(why([](Pieces& pieces) { std::swap(pieces[1], pieces[2]); }),
+            "obstacle 1: a grid of 1 by 2 cells has only 0 of them");
+  EXPECT_EQ(why([](Pieces& pieces) { pieces.insert(pieces.begin() + 1, pieces[1]); }),
+            "obstacle 2: cells without a grid before them");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double bad : {nan, kInfinity, -1.0, 0.5, 0.0, 262'145.0}) {
+    EXPECT_THAT(grid([&](auto& shape) { shape.point[1][0] = bad; }), HasSubstr("obstacle 0: a grid")) << bad;
+    EXPECT_THAT(grid([&](auto& shape) { shape.point[1][1] = bad; }), HasSubstr("obstacle 0: a grid")) << bad;
+  }
+  EXPECT_THAT(grid([](auto& shape) { shape.point[1][0] = shape.point[1][1] = 262'144; }),
+              HasSubstr("a grid of 262144 by 262144 cells; the grids of a set have 1 to 262144"));
+  for (const double bad : {nan, 0.5, 2.0, -1.0})
+    EXPECT_THAT(grid([&](auto& shape) { shape.point[2][1] = bad; }), HasSubstr("outside ")) << bad;
+  for (const double bad : {nan, 0.0, -1.0, kInfinity}) {
+    EXPECT_THAT(grid([&](auto& shape) { shape.value = bad; }), HasSubstr("obstacle 1: grid: resolution")) << bad;
+    if (bad == 0 || bad == -1) continue;
+    EXPECT_THAT(grid([&](auto& shape) { shape.point[0][1] = bad; }), HasSubstr("grid: origin")) << bad;
+    EXPECT_THAT(grid([&](auto& shape) { shape.point[2][0] = bad; }), HasSubstr("grid: yaw")) << bad;
+  }
+  for (const int count : {0, 2, 4, 16})
+    EXPECT_THAT(grid([&](auto& shape) { shape.num_points = static_cast<std::int16_t>(count); }),
+                HasSubstr("must be 3"));
+  EXPECT_THAT(grid([](auto& shape) { shape.dimension = 3; }), HasSubstr("a grid has 2"));
+  EXPECT_THAT(cells([](auto& shape) { shape.num_points = 15; }), HasSubstr("must be 16 of 3"));
+  EXPECT_THAT(cells([](auto& shape) { shape.dimension = 2; }), HasSubstr("must be 16 of 3"));
+  for (const double bad : {nan, -1.0, 0.5, 0x1p48, kInfinity})
+    EXPECT_THAT(cells([&](auto& shape) { shape.point[15][2] = bad; }), HasSubstr("obstacle 1: cells")) << bad;
+  EXPECT_EQ(cells([](auto& shape) { shape.point[0][0] = 4; }), "obstacle 1: cell 2 of 2") << "behind the last one";
+  EXPECT_EQ(cells([](auto& shape) { shape.point[0][0] = 3; }), "");
+  for (const std::size_t i : {0u, 1u}) {
+    EXPECT_THAT(why([&](Pieces& pieces) { pieces[i].velocity[0] = 1; }), HasSubstr("no velocity"));
+    EXPECT_THAT(why([&](Pieces& pieces) { pieces[i].uncertainty = 1; }), HasSubstr("no growth"));
+    EXPECT_THAT(why([&](Pieces& pieces) { pieces[i].track = 99, pieces[i].until_utime = kNow, pieces[i].gone = 1; }),
+                HasSubstr("no window"));
+  }
+  EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(ToPieces({kOneByTwo}, kNow), kNow, 3); }),
+              HasSubstr("dimension 2, must be 3"));
 }
 
 // ---- Predictions.

@@ -3,6 +3,7 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "task/most_obstacles.h"
 #include "tests/certifier/small_task.h"
 
@@ -81,6 +82,25 @@ TEST(ObstacleSenderTest, MotionsOfAFileBeginWithTheSender) {
   EXPECT_FIELDS(*begun[1].motion(), (stamp_us, kNow), (from_us, kNow - 20), (until_us, kNow + 30));
   EXPECT_FIELDS(*begun[2].motion(), (stamp_us, kNow), (from_us, -ObstacleMotion::kAlways),
                 (until_us, ObstacleMotion::kAlways));
+}
+
+TEST(ObstacleSenderTest, AGridOfAFileIsSentAsOneOrIfItHasNoRoomAsItsBlocks) {
+  const auto grid = [](int width, int height) {
+    GridMap map{0.05, {3, 4}, 0, width, height, std::vector<bool>(ToSize(width) * ToSize(height)), true};
+    map.occupied.front() = map.occupied.back() = true;
+    return Obstacle::Grid(std::make_shared<const OccupancyGrid>(map)).Named("map");
+  };
+  const std::vector<Obstacle> begun = BegunAt(kNow, {grid(512, 400), grid(1000, 300), grid(512, 112), grid(2, 1)});
+  std::vector<std::string> kinds;
+  for (const Obstacle& obstacle : begun) {
+    kinds.emplace_back(obstacle.grid() ? "grid" : "block");
+    EXPECT_EQ(obstacle.name(), "map");
+  }
+  EXPECT_THAT(kinds, testing::ElementsAre("grid", "block", "block", "grid", "block"));
+  ObstacleSender sender(1000);
+  sender.Set(begun);
+  const obstacles_t first = sender.Due(0).value();
+  EXPECT_FIELDS(first, (set_size, 1 + 89 + 2 + 1 + 25 + 1), (num_obstacles, 64));
 }
 
 // Two pieces of one track that begins at 100, one that began before, and one that stands.

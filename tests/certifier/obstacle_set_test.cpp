@@ -7,6 +7,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_sender.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "task/canonical.h"
 #include "task/most_obstacles.h"
 #include "tests/certifier/small_task.h"
@@ -291,6 +292,28 @@ TEST(ObstacleSenderPartsTest, WhatStandsIsTheSamePartWheneverItIsSet) {
   one.Set(Cells(100));
   later.Set(Cells(100));
   EXPECT_EQ(GetDigest(one.Due(0)->set_digest), GetDigest(later.Due(86'400'000'000 * 3)->set_digest));
+}
+
+// A grid of 10^5 cells and a circle, in one part and in two, of which some are lost: known whole or not at all.
+TEST_F(ObstacleSetTest, AGridIsKnownWithAllItsCellsOrNotAtAll) {
+  std::mt19937 random(1);
+  for (const auto& [width, height] : {std::pair(400, 250), {512, 256}}) {
+    Begin();
+    GridMap map{0.05, {-10, 50}, 0, width, height, {}, true};
+    map.occupied.resize(ToSize(width) * ToSize(height));
+    for (std::size_t i = 0; i < map.occupied.size(); ++i) map.occupied[i] = random() % 50 == 0;
+    std::vector<Obstacle> before;
+    for (int change = 0; change < 4; ++change) {
+      map.occupied[random() % map.occupied.size()].flip();
+      const std::vector<Obstacle> all{Obstacle::Grid(std::make_shared<const OccupancyGrid>(map)), Cells(1)[0]};
+      sender_->Set(all);
+      Run(20 * kMs, [&](obstacles_t&) { return random() % 2 == 0; });
+      ExpectInForce(Why().empty() && NumHeard() == 2 && MapOf(gate_->obstacles()[of_task_]) == map ? all : before);
+      Run(1000 * kMs);
+      EXPECT_EQ(Why(), "");
+      ExpectInForce(before = all);
+    }
+  }
 }
 
 }  // namespace forereach::obstacle_set_test
