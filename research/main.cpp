@@ -16,6 +16,7 @@
 #include "research/drift/drive.h"
 #include "research/plans.h"
 #include "research/real/real.h"
+#include "research/regional.h"
 #include "research/run.h"
 
 using namespace forereach::research;
@@ -36,6 +37,7 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-research real --data ../dart    declarations from a real car's logs, judged by others: research/real-car.md
   forereach-research drift                  a published car of nine states: research/higher-order-car.md
   forereach-research drift --drive          the same car driven to goals, certified
+  forereach-research regional               a bound for each region of the domain: research/regions.md
   FOREREACH=forereach-research scripts/fleet --hosts one,two run/job all --quick
                                                cells of experiments on several machines: --shard and merge
 
@@ -121,6 +123,7 @@ int main(int argc, char** argv) {
        .purpose = "what has to be declared for CommonRoad's single-track drift model, and its worth",
        .options = {{"--drive", &drives, "",
                     "instead, drive it to goals: planner, certifier, guard and simulated robot; 20 seeds"}}});
+  program.commands.push_back({.name = "regional", .purpose = "a bound on the residual for each region of the domain"});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())
@@ -146,6 +149,8 @@ int main(int argc, char** argv) {
       plans.threads = options.threads;
       plans.directory = options.directory;
       RunPlans(plans, std::cout);
+    } else if (name == "regional") {
+      RunRegional({options.directory, quick, command}, std::cout);
     } else if (name == "drift") {
       if (drives)
         RunDriftDrives({options.directory, seeds.value_or(quick ? kQuickSeeds : 20), quick, command + " --drive"},

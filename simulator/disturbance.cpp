@@ -51,9 +51,7 @@ void Disturbance::Add(std::span<double> next, std::span<const double> z) {
   }
   std::vector<double> bounds(bounds_.begin(), bounds_.end());
   for (const Region& region : regions_)
-    if (region.disturbance.size() != 0 && std::ranges::all_of(region.box, [&](const Region::Side& side) {
-          return side.range.Contains(z[ToSize(side.variable)]);
-        }))
+    if (region.disturbance.size() != 0 && region.Contains(z))
       for (std::size_t k = 0; k < bounds.size(); ++k)
         bounds[k] = std::min(bounds[k], region.disturbance[static_cast<Eigen::Index>(k)]);
   for (std::size_t k = 0; k < next.size(); ++k) {

@@ -1236,6 +1236,58 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
   return {bounds, contradicts(bounds) && contradicts(intersect(true))};
 }
 
+// Bounds the size of what goes into an observation and its ways.
+Real TubeMaker::ScaleAt(int k, int i) const {
+  const Problem& problem = problem_;
+  const auto [lower, upper] = problem.domain.Corners();
+  Real size = sizes_[ToSize(i)][ToSize(k)];
+  for (std::size_t l = 0; l < lower.size(); ++l)
+    size += Real(problem.declaration.lipschitz(k, static_cast<Eigen::Index>(l))) *
+            Real(std::max(std::abs(lower[l]), std::abs(upper[l])));
+  return size;
+}
+
+// What some transitions say at the nodes of a plane (ways.h), and the largest of their sizes.
+struct TubeMaker::Plane {
+  Nodes nodes;
+  std::vector<bool> seen = {};
+  std::ptrdiff_t count = 0;
+  Real size = {};
+};
+
+// Made of the largest one there is of a part of these transitions: those of a log become ever more.
+std::shared_ptr<const TubeMaker::Plane> TubeMaker::PlaneOf(int k, const KnownRows& known) const {
+  constexpr std::size_t kKept = 4;
+  const Transitions& data = problem_.transitions;
+  std::vector<bool> wanted;
+  for (int i = 0; i < data.size(); ++i) wanted.push_back(known.Contains(i));
+  const std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<const Plane>>& planes = planes_[k];
+  std::shared_ptr<const Plane> best;
+  for (const auto& plane : planes) {
+    bool is_part = !best || plane->count > best->count;
+    for (std::size_t i = 0; i < plane->seen.size() && is_part; ++i) is_part = !plane->seen[i] || wanted[i];
+    if (is_part) best = plane;
+  }
+  if (best && best->count == std::ranges::count(wanted, true)) return best;
+  const auto plane = best ? std::make_shared<Plane>(*best) : std::make_shared<Plane>(Nodes(ways_, k));
+  plane->seen.resize(wanted.size());
+  for (int i = 0; i < data.size(); ++i) {
+    if (!wanted[ToSize(i)] || plane->seen[ToSize(i)]) continue;
+    const auto& [lower, upper] = residuals_[ToSize(i)][ToSize(k)];
+    if (lower.IsFinite() && upper.IsFinite()) {
+      plane->size = max(plane->size, ScaleAt(k, i));
+      plane->nodes.Add(data.z.row(i), lower, upper);
+    }
+    plane->seen[ToSize(i)] = true;
+    ++plane->count;
+  }
+  plane->nodes.Spread();
+  planes.push_back(plane);
+  if (planes.size() > kKept) planes.erase(planes.begin());
+  return plane;
+}
+
 // `bounds` narrowed by what regions say of the residual, and by ways through them. Doubles choose those that may narrow
 // them.
 void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const {
@@ -1244,6 +1296,13 @@ void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bo
     if (most < kNone) bounds = {max(bounds.lower, Real(-most)), min(bounds.upper, Real(most))};
   }
   if (!ways_.Narrow(k)) return;
+  if (!ways_.Plane(k).empty()) {
+    const auto plane = PlaneOf(k, known);
+    const auto [lower, upper] = plane->nodes.Over(query.hull);
+    const Real doubt = in_doubt ? Real(kSeenInDoubles) * plane->size : Real();
+    bounds = {max(bounds.lower, lower - doubt), min(bounds.upper, upper + doubt)};
+    return;
+  }
   const Row row(problem_.declaration, query, k);
   const Transitions& data = problem_.transitions;
   Ways::Box hull = DoublesAround(query.hull);

@@ -9,7 +9,9 @@ input, it is the largest over the box of what is known of them. */
 #pragma once
 
 #include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
@@ -149,6 +151,9 @@ class TubeMaker final {
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
   void AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const;
+  [[nodiscard]] Real ScaleAt(int k, int i) const;
+  struct Plane;
+  [[nodiscard]] std::shared_ptr<const Plane> PlaneOf(int k, const KnownRows& known) const;
   [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
   void AddDuration(int i, const std::vector<Real>& z, const std::vector<Real>& nominal,
                    const std::vector<Real>& disturbance, const std::vector<Real>& noise,
@@ -182,6 +187,9 @@ class TubeMaker final {
   std::vector<RoughResiduals> rough_residuals_;  // of each state
   /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
+  /** The latest planes of each row, of different known transitions. */
+  mutable std::mutex mutex_;
+  mutable std::map<int, std::vector<std::shared_ptr<const Plane>>> planes_;
   std::vector<std::pair<int, Failure>> too_much_;  ///< The transitions of FindTooMuch, in their order.
   /** The rounding error that the remainder may have added to the certifier's columns. */
   double remainder_rounding_;

@@ -129,4 +129,178 @@ double Ways::LargestOf(const BoundOf& bound_of, double everywhere, Box box) cons
   return everywhere;
 }
 
+std::vector<int> Ways::Plane(int k) const {
+  const auto [lower, upper] = problem_.domain.Corners();
+  Box domain;
+  for (std::size_t l = 0; l < lower.size(); ++l) domain.emplace_back(lower[l], upper[l]);
+  std::vector<int> plane;
+  for (int l = 0; l < std::ssize(sides_); ++l)
+    if (!sides_[ToSize(l)].empty())
+      plane.push_back(l);
+    else if (LargestSlope(k, l, domain) > 0)
+      return {};
+  return plane.size() > 2 ? std::vector<int>() : plane;
+}
+
+namespace {
+
+// How far roundings may move what is computed in doubles, relative to the larger of the numbers.
+constexpr double kRoughly = 0x1p-40;
+constexpr std::size_t kMostCells = 32768, kMostStrips = 1024;
+
+// Even parts between neighbours of `ends`, each at most the `parts`-th of the whole.
+std::vector<double> Divided(const std::vector<double>& ends, std::size_t parts) {
+  const double whole = ends.back() / 2 - ends.front() / 2;
+  std::vector<double> ticks;
+  for (std::size_t i = 1; i < ends.size(); ++i) {
+    const double share = (ends[i] / 2 - ends[i - 1] / 2) / whole * static_cast<double>(parts);
+    const int count = share > 1 ? static_cast<int>(std::ceil(share)) : 1;
+    for (int p = 0; p < count; ++p)
+      ticks.push_back(p == 0 ? ends[i - 1]
+                             : std::clamp(ends[i - 1] * (1 - p * (1.0 / count)) + ends[i] * (p * (1.0 / count)),
+                                          ends[i - 1], ends[i]));
+  }
+  ticks.push_back(ends.back());
+  return ticks;
+}
+
+// The most that min(p + slope (t - a), q + slope (b - t)) is for t in [x, y].
+Real Most(const Real& p, const Real& q, const Real& slope, const Real& a, const Real& b, const Real& x, const Real& y) {
+  return min(min(p + slope * (y - a), q + slope * (b - x)), Real(0.5) * (p + q + slope * (b - a)));
+}
+
+}  // namespace
+
+Nodes::Nodes(const Ways& ways, int k) : ways_(ways), k_(k) {
+  const std::vector<int> plane = ways.Plane(k);
+  const auto [lower, upper] = ways.problem_.domain.Corners();
+  const auto count = [&] { return (axes_[0].ticks.size() - 1) * (axes_[1].ticks.size() - 1); };
+  for (std::size_t parts = kMostStrips;; parts -= parts / 32 + 1) {
+    for (std::size_t a = 0; a < plane.size(); ++a) {
+      const auto l = ToSize(plane[a]);
+      std::vector<double> ends{lower[l]};
+      for (const double side : ways.sides_[l])
+        if (lower[l] < side && side < upper[l] && side != ends.back()) ends.push_back(side);
+      ends.push_back(upper[l]);
+      axes_[a] = {plane[a], Divided(ends, parts)};
+    }
+    if (count() <= kMostCells || parts == 1) break;
+  }
+  const std::size_t nodes = axes_[0].ticks.size() * axes_[1].ticks.size();
+  constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+  sides_.fill({std::vector<Real>(nodes, Real(kUnbounded)), std::vector<double>(nodes, kUnbounded)});
+  for (std::size_t i = 0; i < axes_[0].ticks.size(); ++i)
+    for (std::size_t j = 0; j < axes_[1].ticks.size(); ++j) {
+      const std::size_t next_i = std::min(i + 1, axes_[0].ticks.size() - 1),
+                        next_j = std::min(j + 1, axes_[1].ticks.size() - 1);
+      slopes_[0].push_back(Slope(0, {std::pair(i, next_i), std::pair(j, j)}));
+      slopes_[1].push_back(Slope(1, {std::pair(i, i), std::pair(j, next_j)}));
+    }
+}
+
+// Over the box between these ticks, which may be an edge.
+double Nodes::Slope(std::size_t axis, std::array<std::pair<std::size_t, std::size_t>, 2> ticks) const {
+  if (axes_[axis].variable < 0) return 0;
+  Ways::Box box(ways_.sides_.size());
+  for (std::size_t a = 0; a < 2; ++a)
+    if (axes_[a].variable >= 0)
+      box[ToSize(axes_[a].variable)] = {axes_[a].ticks[ticks[a].first], axes_[a].ticks[ticks[a].second]};
+  return ways_.LargestSlope(k_, axes_[axis].variable, box);
+}
+
+// The last strip that begins at or below.
+std::size_t Nodes::StripOf(const Axis& axis, double at) const {
+  return ToSize(std::upper_bound(axis.ticks.begin(), axis.ticks.end() - 1, at) - axis.ticks.begin()) - 1;
+}
+
+void Nodes::Reach(Side& side, std::size_t node, const Real& value) const {
+  if (!CertainlyBelow(value, side.values[node])) return;
+  side.values[node] = value;
+  side.roughly[node] = value.ToDouble();
+  side.waiting.emplace_back(-side.roughly[node], node);
+  std::ranges::push_heap(side.waiting);
+}
+
+void Nodes::Add(const Eigen::VectorXd& z, const Real& lower, const Real& upper) {
+  std::array<double, 2> at{};
+  std::array<std::pair<std::size_t, std::size_t>, 2> strips;
+  for (std::size_t a = 0; a < 2; ++a) {
+    if (axes_[a].variable >= 0) at[a] = z[axes_[a].variable];
+    if (!(axes_[a].ticks.front() <= at[a] && at[a] <= axes_[a].ticks.back())) return;
+    const std::size_t strip = StripOf(axes_[a], at[a]);
+    strips[a] = {strip, strip + 1};
+  }
+  const Real first(Slope(0, strips)), second(Slope(1, strips));
+  for (const std::size_t i : {strips[0].first, strips[0].second})
+    for (const std::size_t j : {strips[1].first, strips[1].second}) {
+      const Real way =
+          first * abs(Real(axes_[0].ticks[i]) - Real(at[0])) + second * abs(Real(axes_[1].ticks[j]) - Real(at[1]));
+      const std::size_t node = i * axes_[1].ticks.size() + j;
+      Reach(sides_[0], node, upper + way);
+      Reach(sides_[1], node, way - lower);
+    }
+}
+
+// The least first, as far as doubles tell: in another order the same is found.
+void Nodes::Spread(Side& side) const {
+  const std::array<std::size_t, 2> sizes{axes_[0].ticks.size(), axes_[1].ticks.size()};
+  while (!side.waiting.empty()) {
+    std::ranges::pop_heap(side.waiting);
+    const auto [rank, node] = side.waiting.back();
+    side.waiting.pop_back();
+    if (-rank != side.roughly[node]) continue;
+    const std::array<std::size_t, 2> at{node / sizes[1], node % sizes[1]};
+    for (std::size_t a = 0; a < 2; ++a)
+      for (const bool up : {false, true}) {
+        if (up ? at[a] + 1 == sizes[a] : at[a] == 0) continue;
+        const std::size_t stride = a == 0 ? sizes[1] : 1, next = up ? node + stride : node - stride,
+                          first = up ? at[a] : at[a] - 1;
+        const double begin = axes_[a].ticks[first], end = axes_[a].ticks[first + 1];
+        const double slope = slopes_[a][std::min(node, next)], roughly = side.roughly[node] + slope * (end - begin);
+        // Also where numbers are too large or too small for doubles to tell.
+        if (const double known = side.roughly[next]; std::abs(roughly) > 1e-250 && known < 1e250 &&
+                                                     roughly - known > kRoughly * (std::abs(roughly) + std::abs(known)))
+          continue;
+        Reach(side, next, side.values[node] + Real(slope) * (Real(end) - Real(begin)));
+      }
+  }
+}
+
+void Nodes::Spread() {
+  for (Side& side : sides_) Spread(side);
+}
+
+std::pair<Real, Real> Nodes::Over(std::span<const Real> box) const {
+  std::array<Real, 2> lower, upper;
+  std::array<std::pair<std::size_t, std::size_t>, 2> strips{};
+  for (std::size_t a = 0; a < 2; ++a) {
+    const auto& [variable, ticks] = axes_[a];
+    if (variable < 0) continue;
+    lower[a] = max(Real(ticks.front()), box[ToSize(variable)].lower());
+    upper[a] = min(Real(ticks.back()), box[ToSize(variable)].upper());
+    for (std::size_t i = 0; i + 1 < ticks.size(); ++i) {
+      if (CertainlyAtMost(Real(ticks[i]), lower[a])) strips[a].first = i;
+      if (!CertainlyAtMost(upper[a], Real(ticks[i]))) strips[a].second = i;
+    }
+    strips[a].second = std::max(strips[a].first, strips[a].second);
+  }
+  std::array<std::optional<Real>, 2> most;
+  const std::size_t stride = axes_[1].ticks.size();
+  for (std::size_t i = strips[0].first; i <= strips[0].second; ++i)
+    for (std::size_t j = strips[1].first; j <= strips[1].second; ++j) {
+      const std::array<std::pair<std::size_t, std::size_t>, 2> cell{std::pair(i, i + 1), std::pair(j, j + 1)};
+      const Real first(Slope(0, cell)), second(Slope(1, cell));
+      const Real a(axes_[0].ticks[i]), b(axes_[0].ticks[i + 1]), c(axes_[1].ticks[j]), d(axes_[1].ticks[j + 1]);
+      for (std::size_t s = 0; s < 2; ++s) {
+        const auto along = [&](std::size_t end) {
+          return Most(sides_[s].values[i * stride + j + end], sides_[s].values[(i + 1) * stride + j + end], first, a, b,
+                      max(lower[0], a), min(upper[0], b));
+        };
+        const Real here = Most(along(0), along(1), second, c, d, max(lower[1], c), min(upper[1], d));
+        most[s] = most[s] ? max(*most[s], here) : here;
+      }
+    }
+  return {-*most[1], *most[0]};
+}
+
 }  // namespace forereach::verifier

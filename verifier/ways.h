@@ -1,14 +1,20 @@
-/** What it costs a residual to change from an observation to a box, by declared regions (Declaration::regions), with no
-table: each order of the moves is tried, each way is cut at the sides of regions that it meets, and the slope of a piece
+/** What it costs a residual to change from an observation to a box, by declared regions (Declaration::regions): each
+order of the moves is tried, each way is cut at the sides of regions that it meets, and the slope of a piece
 is looked up among the regions themselves. So is what else they bound, in each piece into which their sides cut a box.
-The certifier's grid (residual/region_grid.h) shares nothing with this. */
+The certifier's grid (residual/region_grid.h) shares nothing with this.
+
+Where one or two variables decide, ways along edges of a grid are tried, too: its ticks are those of the certifier
+(soundness 3.20), a choice that claims nothing. What is found at its nodes is spread from all observations at once,
+again with slopes from the regions themselves. */
 #pragma once
 
+#include <array>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "forereach/certify/problem.h"
+#include "verifier/real.h"
 
 namespace forereach::verifier {
 
@@ -34,7 +40,12 @@ class Ways final {
   /** Without what lies outside the domain's box. */
   void Cut(Box& box) const;
 
+  /** The variables on which r_k depends, those by which regions are bounded: none if these are more than two, or others
+  have slopes, too. */
+  [[nodiscard]] std::vector<int> Plane(int k) const;
+
  private:
+  friend class Nodes;
   template <class Number>
   [[nodiscard]] Number Move(int k, const std::vector<int>& move, const Box& at, const Box& to) const;
   template <class Number>
@@ -46,6 +57,44 @@ class Ways final {
   const Problem& problem_;
   std::vector<std::vector<double>> sides_;  // by variable, ascending
   std::vector<std::vector<int>> moves_;     // the variables that move together
+};
+
+/** Bounds on r_k at the nodes of a grid in the plane of its variables, and from these over a box. */
+class Nodes final {
+ public:
+  /** @param ways must outlive this object. @pre ways.Plane(k) is not empty. */
+  Nodes(const Ways& ways, int k);
+
+  /** An observation: lower <= r_k(z) <= upper. It counts from the next Spread on. */
+  void Add(const Eigen::VectorXd& z, const Real& lower, const Real& upper);
+  void Spread();
+
+  /** The least and the largest that r_k can be over a box of ranges of all variables. */
+  [[nodiscard]] std::pair<Real, Real> Over(std::span<const Real> box) const;
+
+ private:
+  struct Axis {
+    int variable = -1;  // -1: none, and a strip without width
+    std::vector<double> ticks = {0, 0};
+  };
+  // Upper bounds on sign * r_k. Doubles near them tell what may be less; those that wait have not told their
+  // neighbours.
+  struct Side {
+    std::vector<Real> values;
+    std::vector<double> roughly;
+    std::vector<std::pair<double, std::size_t>> waiting = {};
+  };
+
+  void Reach(Side& side, std::size_t node, const Real& value) const;
+  void Spread(Side& side) const;
+  [[nodiscard]] double Slope(std::size_t axis, std::array<std::pair<std::size_t, std::size_t>, 2> ticks) const;
+  [[nodiscard]] std::size_t StripOf(const Axis& axis, double at) const;
+
+  const Ways& ways_;
+  int k_;
+  std::array<Axis, 2> axes_;
+  std::array<std::vector<double>, 2> slopes_;  // by axis and node: along the edge to the next node
+  std::array<Side, 2> sides_;
 };
 
 }  // namespace forereach::verifier

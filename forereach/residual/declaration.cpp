@@ -100,6 +100,10 @@ void ValidateRegions(const Declaration& declaration) {
 
 }  // namespace
 
+bool Region::Contains(std::span<const double> z) const {
+  return std::ranges::all_of(box, [&](const Side& side) { return side.range.Contains(z[ToSize(side.variable)]); });
+}
+
 double Declaration::VariableError(Eigen::Index l) const {
   const Eigen::Index n = noise_bound.size();
   const Eigen::VectorXd& errors = l < n ? state_error : input_error;

@@ -42,6 +42,9 @@ struct Region {
   Eigen::MatrixXd lipschitz;  ///< L', as L.
   /** n entries, not negative, infinite where nothing is said of a state; or none. No bound of an affine row. */
   Eigen::VectorXd disturbance = {}, noise_bound = {}, bound = {};
+
+  /** Whether z, of all variables, lies in the box. */
+  [[nodiscard]] bool Contains(std::span<const double> z) const;
 };
 
 struct Declaration {

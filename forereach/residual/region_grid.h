@@ -46,6 +46,8 @@ class RegionGrid final {
   [[nodiscard]] std::string SizeText() const;
   /** The rows whose slopes some cell has below L, ascending. */
   [[nodiscard]] const std::vector<int>& rows() const { return rows_; }
+  /** Whether a row of rows(), by its index, has a slope by a variable that no region bounds. */
+  [[nodiscard]] bool HasOtherSlopes(std::size_t row) const { return !slopes_[row].others.empty(); }
 
   /** Along each axis the first and the last strip that a box meets. What has no width and lies on a cut is in one
   strip, and in the next one as well. */
@@ -59,6 +61,11 @@ class RegionGrid final {
   };
   /** Sets box.place. A box outside the domain counts as if the outer strips went on. */
   void Find(Box& box) const noexcept;
+
+  /** The largest slope of a row by variables()[a] in the cells that a box meets. @pre it has its place. */
+  [[nodiscard]] double LargestSlope(std::size_t row, std::size_t a, const Box& box) const noexcept {
+    return LargestSlope(slopes_[row].axes[a].slopes, box.place);
+  }
 
   /** At least |r_k(z) - r_k(from)| for every z in `to`, for all residuals within L and the regions, rounded up.
   @param row of rows(), by its index. @param enough a cost from here on may be returned as infinity, which saves time.

@@ -35,23 +35,34 @@ RegionalEnclosure::RegionalEnclosure(const Declaration& declaration, const Obser
   };
   for (int i = 0; i < observations.size() && declaration.AnyRegionHas(&Region::bound); ++i)
     with_row(i, [&](auto z, auto lower, auto upper) { TestBounds(i, PlaceOf(z, grid_), lower, upper); });
+  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
+    tables_.emplace_back();
+    if (RegionTable::Fits(grid_, i)) tables_.back().emplace(grid_, i, domain_lower, domain_upper);
+  }
   // Any subset of the observations bounds the residual. All of them are held against each other by L (consistency.h).
   const int tried = std::min(observations.size(), kMostTried);
   for (int t = 0; t < tried; ++t) {
     const auto i = static_cast<int>(static_cast<std::int64_t>(t) * observations.size() / tried);
-    with_row(i, [&](auto z, auto lower, auto upper) { Add(i, z, lower, upper); });
+    with_row(i, [&](auto z, auto lower, auto upper) { AddTested({i, PlaceOf(z, grid_)}, z, lower, upper); });
   }
 }
 
 void RegionalEnclosure::Add(int id, std::span<const double> z, std::span<const double> lower,
                             std::span<const double> upper) {
-  Kept one{id, PlaceOf(z, grid_), {}, {}};
-  for (const int row : grid_.rows()) {
-    const auto k = ToSize(row);
+  const RegionGrid::Box at = PlaceOf(z, grid_);
+  TestBounds(id, at, lower, upper);
+  AddTested({id, at}, z, lower, upper);
+}
+
+// What TestBounds has seen.
+void RegionalEnclosure::AddTested(Kept one, std::span<const double> z, std::span<const double> lower,
+                                  std::span<const double> upper) {
+  for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
+    const auto k = ToSize(grid_.rows()[i]);
     one.floor.push_back(SubDown(lower[k], error_[k]));
     one.ceiling.push_back(AddUp(upper[k], error_[k]));
+    if (tables_[i]) tables_[i]->Add(z, one.floor[i], one.ceiling[i]);
   }
-  TestBounds(id, one.at, lower, upper);
   if (!violation_) Test(one);
   bool narrows = false;
   for (std::size_t i = 0; i < grid_.rows().size() && !narrows; ++i) {
@@ -89,9 +100,7 @@ void RegionalEnclosure::TestBounds(int id, const RegionGrid::Box& at, std::span<
     if (!(least > bound)) continue;
     const auto says = std::ranges::find_if(regions_, [&](const Region& region) {
       return region.bound.size() != 0 && region.bound[static_cast<Eigen::Index>(k)] == bound &&
-             std::ranges::all_of(region.box, [&](const Region::Side& side) {
-               return side.range.Contains(at.lower[ToSize(side.variable)]);
-             });
+             region.Contains(at.lower);
     });
     const int region = static_cast<int>(says - regions_.begin());
     violation_ = Violation{id, Violation::OfRegion(region), static_cast<int>(k), least, bound};
@@ -124,9 +133,10 @@ void RegionalEnclosure::Enclose(const QuerySet& query, ResidualBounds& bounds) c
   grid_.Find(hull);
   for (std::size_t i = 0; i < grid_.rows().size(); ++i) {
     const auto k = ToSize(grid_.rows()[i]);
-    const Interval narrower = Bound(i, hull, {bounds.lower[k], bounds.upper[k]});
-    bounds.lower[k] = narrower.lower;
-    bounds.upper[k] = narrower.upper;
+    const Interval known{bounds.lower[k], bounds.upper[k]};
+    const Interval narrower = tables_[i] ? tables_[i]->Enclose(hull) : Bound(i, hull, known);
+    bounds.lower[k] = std::max(known.lower, narrower.lower);
+    bounds.upper[k] = std::min(known.upper, narrower.upper);
   }
   for (std::size_t k = 0; k < n; ++k) {
     const double bound = grid_.LargestBound(RegionBound::kResidual, k, hull);

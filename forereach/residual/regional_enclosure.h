@@ -1,11 +1,13 @@
 /** The enclosure of a residual that changes less in some regions of the domain (Declaration::regions):
-    max_i [r~_ik - eps_k - D_ik(Z)] <= r_k <= min_i [r~_ik + eps_k + D_ik(Z)],
-with D_ik(Z) the cost of a path from observation i to the hull of Z (RegionGrid::CostUpper), intersected with the bounds
-on |r_k| of the regions that the hull meets, and with those of another enclosure, which knows L alone: that sees the
-zonotope, this one its hull.
+    max_i [r~_ik - eps_k - D_i(z)] <= r_k(z) <= min_i [r~_ik + eps_k + D_i(z)]   for every z in the hull of Z,
+with D_i(z) the cost of a path from observation i. A row that a table fits (region_table.h) looks up the largest of
+these bounds over the hull; another takes for D_i the largest cost over it (RegionGrid::CostUpper). They are intersected
+with the bounds on |r_k| of the regions that the hull meets, and with those of another enclosure, which knows L alone:
+that sees the zonotope, this one its hull.
 
-Work. Any subset of the observations gives sound bounds. Kept are those that narrow a bound at their own location when
-they are added, and of these the last kMostKept; of more than kMostTried given at once, so many are tried, evenly. */
+Work. Any subset of the observations gives sound bounds. Tables know each that is added. Kept for the rest, and for
+contradictions, are those that narrow a bound at their own location when they are added, and of these the last
+kMostKept; of more than kMostTried given at once, so many are added, evenly. */
 #pragma once
 
 #include <optional>
@@ -17,6 +19,7 @@ they are added, and of these the last kMostKept; of more than kMostTried given a
 #include "forereach/residual/enclosure.h"
 #include "forereach/residual/observations.h"
 #include "forereach/residual/region_grid.h"
+#include "forereach/residual/region_table.h"
 
 namespace forereach {
 
@@ -32,8 +35,8 @@ class RegionalEnclosure final : public ResidualEnclosure {
                     std::span<const double> domain_lower, std::span<const double> domain_upper,
                     const ResidualEnclosure& others);
 
-  /** Cost: RegionGrid::CostUpper for each observation that is kept and may narrow a bound, in each row of
-  RegionGrid::rows(). */
+  /** Cost, in each row of RegionGrid::rows(): RegionTable::Enclose, or RegionGrid::CostUpper for each observation that
+  is kept and may narrow a bound. */
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
   /** Adds an observation, and tests it against those that are kept; the rest is not to be called meanwhile.
@@ -51,9 +54,10 @@ class RegionalEnclosure final : public ResidualEnclosure {
   struct Kept {
     int id;
     RegionGrid::Box at;
-    std::vector<double> floor, ceiling;  // r~ -+ eps rounded outward, of grid_.rows()
+    std::vector<double> floor = {}, ceiling = {};  // r~ -+ eps rounded outward, of grid_.rows()
   };
 
+  void AddTested(Kept one, std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
   [[nodiscard]] Interval Bound(std::size_t row, const RegionGrid::Box& to, Interval bounds) const noexcept;
   void Test(const Kept& one);
   void TestBounds(int id, const RegionGrid::Box& at, std::span<const double> lower, std::span<const double> upper);
@@ -62,6 +66,7 @@ class RegionalEnclosure final : public ResidualEnclosure {
   std::vector<Region> regions_;
   std::vector<double> error_;  // eps, of each state
   const ResidualEnclosure& others_;
+  std::vector<std::optional<RegionTable>> tables_;  // of grid_.rows()
   std::vector<Kept> kept_;
   std::optional<Violation> violation_;
 };

@@ -14,17 +14,6 @@ ConvexNumbers::ConvexNumbers(std::span<const Obstacle> all) noexcept {
   }
 }
 
-ConvexNumbers::Place ConvexNumbers::PlaceOf(int number) const {
-  int obstacle = number;
-  for (int g = 0; g < num_grids_ && grids_[ToSize(g)].first <= number; ++g) {
-    const auto& [first, blocks] = grids_[ToSize(g)];
-    const int count = static_cast<int>(blocks.size());
-    if (number - first < count) return {obstacle - (number - first), number - first};
-    obstacle -= count - 1;
-  }
-  return {obstacle, -1};
-}
-
 int ConvexNumbers::NumberOf(const Place& place) const {
   int number = place.obstacle;
   for (int g = 0; g < num_grids_ && grids_[ToSize(g)].first < number; ++g)

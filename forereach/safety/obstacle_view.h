@@ -24,18 +24,23 @@ class ConvexNumbers final {
   [[nodiscard]] int size() const { return size_; }
   /** @param all the obstacles. */
   [[nodiscard]] const Obstacle& Find(std::span<const Obstacle> all, int number) const {
-    int obstacle = number;
-    for (int g = 0; g < num_grids_ && grids_[g].first <= number; ++g) {
-      const auto& [first, blocks] = grids_[g];
-      if (number - first < std::ssize(blocks)) return blocks[static_cast<std::size_t>(number - first)];
-      obstacle -= static_cast<int>(blocks.size()) - 1;
-    }
-    return all[static_cast<std::size_t>(obstacle)];
+    const auto [obstacle, block] = PlaceOf(number);
+    const Obstacle& found = all[static_cast<std::size_t>(obstacle)];
+    return block < 0 ? found : found.convex()[static_cast<std::size_t>(block)];
   }
   struct Place {
     int obstacle, block;  ///< -1: the obstacle is no grid.
   };
-  [[nodiscard]] Place PlaceOf(int number) const;
+  [[nodiscard]] Place PlaceOf(int number) const {
+    int obstacle = number;
+    for (int g = 0; g < num_grids_ && grids_[g].first <= number; ++g) {
+      const auto& [first, blocks] = grids_[g];
+      const int count = static_cast<int>(blocks.size());
+      if (number - first < count) return {obstacle - (number - first), number - first};
+      obstacle -= count - 1;
+    }
+    return {obstacle, -1};
+  }
   /** @pre the obstacle is there, and so is the block of one that is a grid. */
   [[nodiscard]] int NumberOf(const Place& place) const;
 

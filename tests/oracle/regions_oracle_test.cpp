@@ -221,6 +221,101 @@ TEST(RegionsOracle, TheCostIsThatOfTheCheapestOrderRoundedUp) {
   EXPECT_GT(compared, 500);
 }
 
+// A table of the first row, in a domain of that reach.
+struct Tabled {
+  Tabled(const Declaration& declaration, double reach)
+      : lower(static_cast<std::size_t>(declaration.lipschitz.cols()), -reach),
+        upper(lower.size(), reach),
+        grid(declaration, lower, upper),
+        table(grid, 0, lower, upper) {}
+
+  Interval Over(const std::vector<double>& from, const std::vector<double>& to) const {
+    RegionGrid::Box box;
+    std::ranges::copy(from, box.lower.begin());
+    std::ranges::copy(to, box.upper.begin());
+    return table.Enclose(box);
+  }
+
+  const std::vector<double> lower, upper;
+  const RegionGrid grid;
+  RegionTable table;
+};
+
+// By L it is far along x, and near along y to where x costs nothing.
+Declaration SteepAboveCalm(double scale) {
+  Declaration declaration{Eigen::Matrix2d{{1, 0.25}, {0, 0}} / scale, Eigen::Vector2d::Zero()};
+  declaration.regions = {{{{0, {-2 * scale, 2 * scale}}, {1, {-2 * scale, -scale}}}, Eigen::Matrix2d::Zero()}};
+  return declaration;
+}
+
+TEST(RegionTable, KnowsWaysAroundCorners) {
+  Tabled tabled(SteepAboveCalm(1), 2);
+  ASSERT_TRUE(RegionTable::Fits(tabled.grid, 0));
+  EXPECT_EQ(tabled.Over({1, 1}, {1, 1}).upper, kInfinity) << "nothing is known";
+  tabled.table.Add(std::vector<double>{-1, 1}, 0.5, 0.5);
+  const Interval across = tabled.Over({1, 1}, {1, 1}), calm = tabled.Over({-2, -2}, {2, -1});
+  EXPECT_GE(across.upper, 1.5) << "down, across and up";
+  EXPECT_LT(across.upper, 1.55) << "2.5 by moves along the axes";
+  EXPECT_NEAR(across.upper + across.lower, 1, 1e-13) << "as far below as above";
+  EXPECT_GE(calm.upper, 1) << "down to the side of the calm region";
+  EXPECT_LT(calm.upper, 1.03);
+  EXPECT_LT(tabled.Over({1, -1}, {1, -1}).upper, 1.03) << "on the side";
+  EXPECT_LE(tabled.Over({1, 1}, {1, 1}).upper, tabled.Over({0.5, 0.5}, {1, 1.5}).upper) << "a larger box";
+  tabled.table.Add(std::vector<double>{1, 1.5}, 0.75, 0.75);
+  EXPECT_NEAR(tabled.Over({1, 1}, {1, 1}).upper, 0.875, 0.03) << "another one is nearer";
+}
+
+TEST(RegionTable, HasNoBoundOutsideTheDomain) {
+  Tabled tabled(SteepAboveCalm(1), 2);
+  tabled.table.Add(std::vector<double>{0, NextUp(2)}, 0, 0);
+  tabled.table.Add(std::vector<double>{std::nan(""), 0}, 0, 0);
+  EXPECT_EQ(tabled.Over({0, 0}, {0, 0}).lower, -kInfinity) << "an observation outside says nothing";
+  tabled.table.Add(std::vector<double>{-2, 2}, 0, 0);
+  EXPECT_TRUE(tabled.Over({-2, -2}, {2, 2}).IsFinite());
+  EXPECT_LT(tabled.Over({-2, 2}, {-2, 2}).upper, 1e-14) << "in a corner";
+  EXPECT_TRUE(tabled.Over({-3, -3}, {3, 3}).IsFinite()) << "the part of it in the domain";
+  EXPECT_EQ(tabled.Over({0, NextUp(2)}, {0, 3}).upper, kInfinity);
+  EXPECT_EQ(tabled.Over({std::nan(""), 0}, {0, 0}).upper, kInfinity);
+  EXPECT_EQ(tabled.Over({0, 0}, {0, std::nan("")}).lower, -kInfinity);
+}
+
+TEST(RegionTable, IsTheSameInEveryOrderOfObservations) {
+  for (TracedRandom random(2105); random.Again(20);) {
+    const Scene scene = AnyScene(random);
+    const RegionGrid grid(scene.declaration, scene.lower, scene.upper);
+    if (grid.rows().empty() || !RegionTable::Fits(grid, 0)) continue;
+    std::vector<std::pair<std::vector<double>, double>> seen(5);
+    for (auto& [z, value] : seen) {
+      for (int l = 0; l < scene.variables; ++l) z.push_back(AnyPlace(random));
+      value = random.Uniform(-1, 1);
+    }
+    Tabled forward(scene.declaration, kReach), backward(scene.declaration, kReach);
+    for (const auto& [z, value] : seen) forward.table.Add(z, value, value + 0.5);
+    for (auto at = seen.rbegin(); at != seen.rend(); ++at) backward.table.Add(at->first, at->second, at->second + 0.5);
+    for (int query = 0; query < 10; ++query) {
+      std::vector<double> from, to;
+      for (int l = 0; l < scene.variables; ++l) {
+        from.push_back(AnyPlace(random));
+        to.push_back(random.Coin(0.3) ? from.back() : random.Uniform(from.back(), kReach));
+      }
+      const Interval one = forward.Over(from, to), other = backward.Over(from, to);
+      EXPECT_NEAR(one.lower, other.lower, 1e-14);
+      EXPECT_NEAR(one.upper, other.upper, 1e-14);
+    }
+  }
+}
+
+// A bound, or none: never one that numbers out of range have made.
+TEST(RegionTable, HoldsInDomainsOfEveryScale) {
+  for (const double scale : {0x1p-1000, 0x1p-500, 0x1p500, 0x1p1020}) {
+    Tabled tabled(SteepAboveCalm(scale), 2 * scale);
+    tabled.table.Add(std::vector<double>{-scale, scale}, 0.5, 0.5);
+    const Interval bounds = tabled.Over({scale, scale}, {scale, scale});
+    EXPECT_GE(bounds.upper, 1.5) << scale;
+    EXPECT_LE(bounds.lower, -0.5) << scale;
+  }
+}
+
 // Against the definition at points: one in each cell that the box meets or touches, and on all sides between them.
 TEST(RegionsOracle, TheLargestBoundIsThatOfTheCellsThatABoxTouches) {
   int less = 0;

@@ -1,7 +1,7 @@
 // The verifier's ways between places of residuals with regions say what the certifier's grid does.
 #include "tests/test.h"
 
-#include "forereach/residual/region_grid.h"
+#include "forereach/residual/region_table.h"
 #include "tests/oracle/region_problems.h"
 #include "tests/oracle/traced_random.h"
 #include "verifier/ways.h"
@@ -63,6 +63,56 @@ TEST(Ways, CostWhatTheGridSays) {
     }
   }
   EXPECT_GT(equal, 500);
+}
+
+// The table's bounds are never tighter than those at the nodes, and no looser than rounding makes them.
+TEST(Nodes, BoundWhatTheTableSays) {
+  int compared = 0;
+  for (TracedRandom random(2124); random.Again(20);) {
+    SCOPED_TRACE("trial " + std::to_string(random.trial()));
+    const auto problem = AnyRegionalProblem(random, random.Coin(), 3, false);
+    const auto [lower, upper] = problem->domain.Corners();
+    const RegionGrid grid(problem->declaration, lower, upper);
+    const Ways ways(*problem);
+    // Where a region begins at the domain's end, its slopes hold along that; the table has no cell there.
+    const bool touches = std::ranges::any_of(problem->declaration.regions, [&](const Region& region) {
+      return std::ranges::any_of(region.box, [&](const Region::Side& side) {
+        const auto l = static_cast<std::size_t>(side.variable);
+        return side.range.lower == upper[l] || side.range.upper == lower[l];
+      });
+    });
+    for (std::size_t i = 0; i < grid.rows().size(); ++i) {
+      ASSERT_EQ(RegionTable::Fits(grid, i), !ways.Plane(grid.rows()[i]).empty());
+      if (!RegionTable::Fits(grid, i)) continue;
+      RegionTable table(grid, i, lower, upper);
+      Nodes nodes(ways, grid.rows()[i]);
+      for (int one = 0; one < 3; ++one) {
+        const Eigen::VectorXd z = problem->transitions.z.row(one);
+        const double value = random.Uniform(-0.1, 0.1);
+        table.Add({z.data(), lower.size()}, value, value);
+        nodes.Add(z, value, value);
+      }
+      nodes.Spread();
+      for (int query = 0; query < 5; ++query) {
+        RegionGrid::Box box;
+        std::vector<Real> ranges;
+        for (std::size_t l = 0; l < lower.size(); ++l) {
+          box.lower[l] = random.Coin(0.3) ? random.Integer(-2, 2) * upper[l] / 2 : random.Uniform(lower[l], upper[l]);
+          box.upper[l] = random.Coin(0.3) ? box.lower[l] : random.Uniform(box.lower[l], upper[l]);
+          ranges.push_back(Real::FromTo(box.lower[l], box.upper[l]));
+        }
+        const Interval bounds = table.Enclose(box);
+        const auto [least, most] = nodes.Over(ranges);
+        EXPECT_TRUE(CertainlyAtMost(Real(bounds.lower), least));
+        EXPECT_TRUE(CertainlyAtMost(most, Real(bounds.upper)));
+        if (touches) continue;
+        EXPECT_NEAR(bounds.lower, least.ToDouble(), 1e-13);
+        EXPECT_NEAR(bounds.upper, most.ToDouble(), 1e-13);
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 30);
 }
 
 }  // namespace forereach::verifier::ways_test

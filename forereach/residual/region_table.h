@@ -1,0 +1,75 @@
+/** What observations say of one row of the residual, where that depends on one or two variables by which regions are
+bounded: bounds at the nodes of a grid, whose ticks are all sides of regions in the domain and even cuts between them.
+
+    r_k(node) <= min_i [ceiling_i + cost of the cheapest way from z_i to the node],   -r_k likewise with floor_i.
+
+A way goes from z_i to a corner of its cell of the grid, then along edges, which cost their length times the lesser
+slope of the cells on both sides. It may go around a corner of a steep region, which the moves of RegionGrid::CostUpper
+do not, and over a box the tightest observation may be another one at each of its points.
+
+Rounding (docs/soundness.md, 3.20). Bounds at nodes are rounded up. A query runs in plain arithmetic, with the error of
+its expressions added at the end. */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "forereach/residual/region_grid.h"
+
+namespace forereach {
+
+class RegionTable final {
+ public:
+  /** Of the grid, unless regions have more, and along an axis. */
+  static constexpr std::size_t kMostCells = std::size_t{1} << 15, kMostStrips = std::size_t{1} << 10;
+
+  /** Whether there is a table for a row of RegionGrid::rows(), given by its index. */
+  [[nodiscard]] static bool Fits(const RegionGrid& grid, std::size_t row) {
+    return grid.variables().size() <= 2 && !grid.HasOtherSlopes(row);
+  }
+
+  /** @pre Fits; `grid` has these ends of the domain. Cost: some 10 ns a cell. */
+  RegionTable(const RegionGrid& grid, std::size_t row, std::span<const double> domain_lower,
+              std::span<const double> domain_upper);
+
+  /** Adds an observation: floor <= r_k(z) <= ceiling. One outside the domain says nothing. Cost: about 100 ns for each
+  node whose bound it narrows. */
+  void Add(std::span<const double> z, double floor, double ceiling);
+
+  /** Bounds on r_k at every z in the box and the domain. No heap, lock or exception. Cost: some 20 ns for each cell
+  that the box meets. */
+  [[nodiscard]] Interval Enclose(const RegionGrid::Box& box) const noexcept;
+
+ private:
+  struct Axis {
+    int variable = -1;  // -1: none, and a single strip without width
+    std::vector<double> ticks = {0, 0};
+    std::vector<double> slopes{};  // by cell
+  };
+  // The part of a box that lies between the ticks, and the strips that cover it.
+  struct Part {
+    double lower, upper;
+    std::size_t first, last;
+  };
+
+  static bool Cover(const Axis& axis, const RegionGrid::Box& box, Part& part) noexcept;
+  [[nodiscard]] std::size_t CellAt(std::size_t i, std::size_t j) const { return i * (axes_[1].ticks.size() - 1) + j; }
+  [[nodiscard]] std::size_t NodeAt(std::size_t i, std::size_t j) const { return i * axes_[1].ticks.size() + j; }
+  [[nodiscard]] double Cost(std::size_t a, std::size_t i, std::size_t j) const;
+  [[nodiscard]] double LargestIn(const std::vector<double>& values, std::size_t i, std::size_t j, const Part& first,
+                                 const Part& second) const noexcept;
+  struct Reached {
+    double value;
+    std::uint32_t node;
+  };
+  void Spread(std::vector<double>& values, std::vector<Reached> reached);
+
+  std::array<Axis, 2> axes_;
+  std::array<std::vector<double>, 2> values_;   // of the nodes: upper bounds on r_k, and on -r_k
+  double largest_way_ = 0, largest_value_ = 0;  // along a side of a cell; of the bounds, in size
+  double error_ = 0;
+};
+
+}  // namespace forereach

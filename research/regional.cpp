@@ -1,0 +1,198 @@
+#include "research/regional.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <ostream>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "forereach/declare/region_search.h"
+#include "forereach/dynamics/models/residuals.h"
+#include "forereach/residual/lipschitz_envelope.h"
+#include "forereach/residual/regional_enclosure.h"
+#include "research/cell.h"
+#include "research/equations_slopes.h"
+#include "research/evaluate.h"
+#include "research/markdown.h"
+#include "research/run_directory.h"
+
+namespace forereach::research {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double MicrosecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - begin).count();
+}
+
+// L and regions for all parameters of the road within a share of the paper's.
+struct DeclaredByRegion {
+  Eigen::MatrixXd lipschitz;
+  std::vector<Region> regions;
+  double seconds = 0;
+};
+
+template <class Residual>
+DeclaredByRegion Declare(const System& system, const Residual& residual, std::size_t first_of_road, double share,
+                         const std::vector<int>& variables) {
+  const auto begin = Clock::now();
+  const EquationsSlopes<Residual> slopes;
+  std::vector<Interval> parameters;
+  for (const double p : residual.parameters()) {
+    const double away = parameters.size() < first_of_road ? 0 : share * p;
+    parameters.push_back({p - away, p + away});
+  }
+  DeclaredByRegion declared{Eigen::MatrixXd::Zero(system.deployed.rows(), system.deployed.cols())};
+  for (int k = 0; k < slopes.num_states(); ++k)
+    for (int l = 0; l < slopes.num_variables(); ++l)
+      if (slopes.Occurs(k, l))
+        declared.lipschitz(k, l) = BoundSlope(slopes, system.domain, parameters, k, l, {.gap = 1e-3}).upper;
+  declared.regions = FindRegions(slopes, system.domain, parameters, declared.lipschitz, variables);
+  declared.seconds = MicrosecondsSince(begin) * 1e-6;
+  return declared;
+}
+
+// The point mass without the ball around its speeds: no region may be bounded by what a ball names.
+const System& PointMassInABox() {
+  static const System system = [] {
+    System in_a_box = PointMassSystem();
+    in_a_box.domain.balls.clear();
+    return in_a_box;
+  }();
+  return system;
+}
+
+class RegionalByCells final : public ResidualEnclosure {
+ public:
+  RegionalByCells(const Setting& setting, Declaration declaration)
+      : corners_(setting.domain.Corners()),
+        observations_(Observe(setting.model, setting.data)),
+        by_l_(declaration, observations_, corners_.first, corners_.second),
+        regional_(declaration, observations_, corners_.first, corners_.second, by_l_) {}
+  void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override {
+    regional_.Enclose(query, bounds);
+  }
+
+ private:
+  std::pair<std::vector<double>, std::vector<double>> corners_;
+  Observations observations_;
+  LipschitzEnvelope by_l_;
+  RegionalEnclosure regional_;
+};
+
+Method WithRegions(const DeclaredByRegion& declared) {
+  return {"Regional", [&declared](const Setting& setting) {
+            Declaration declaration = setting.declaration;
+            declaration.regions = declared.regions;
+            return std::make_unique<RegionalByCells>(setting, std::move(declaration));
+          }};
+}
+
+// Of one method over the seeds.
+struct RegionalSum {
+  std::array<int, 3> safe{}, certified{}, complete{};  // by group
+  std::array<double, 3> side{};                        // half of that of a square as large as P X_T, m
+  int false_certificates = 0, outside = 0;
+  double build_us = 0, call_us = 0;
+
+  [[nodiscard]] std::string Recall(std::size_t g) const {
+    return safe[g] == 0 ? "none" : fmt::format("{:.3f}", static_cast<double>(certified[g]) / safe[g]);
+  }
+  [[nodiscard]] std::string HalfWidth(std::size_t g) const {
+    return complete[g] == 0 ? "none" : fmt::format("{:.3f}", side[g] / complete[g]);
+  }
+};
+
+void CountInto(const CellResult& result, RegionalSum& sum) {
+  for (std::size_t g = 0; g < result.size(); ++g) {
+    const Tally& tally = result[g];
+    sum.safe[g] += tally.safe;
+    sum.certified[g] += tally.certified_safe;
+    sum.false_certificates += tally.false_certificates();
+    sum.outside += tally.complete() - tally.covered;
+    for (const double area : tally.areas)
+      if (area >= 0) ++sum.complete[g], sum.side[g] += std::sqrt(area) / 2;
+  }
+}
+
+// The median time of a call, over the plans of C.
+double CallTime(const System& system, const ResidualEnclosure& residual, int seed, int plans) {
+  const Evaluator evaluator(system, residual, 5);
+  std::vector<double> times;
+  Answer answer;
+  for (int i = 0; i < plans; ++i) {
+    const Scenario scenario = MakeScenario(system, Group::kC, seed, i);
+    const auto begin = Clock::now();
+    evaluator.Certify(scenario, answer);
+    times.push_back(MicrosecondsSince(begin));
+  }
+  std::ranges::nth_element(times, times.begin() + std::ssize(times) / 2);
+  return times[times.size() / 2];
+}
+
+RegionalSum RunSeeds(const System& system, const Method& method, const DeclaredByRegion& declared, int observations,
+                     int seeds, const Effort& effort) {
+  RegionalSum sum;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Cell cell{&system, method, {"certified", declared.lipschitz}, observations, 0, seed};
+    CountInto(RunCell(cell, effort), sum);
+    const Transitions data = MakeData(system, cell.layout, seed, observations, 0);
+    const Declaration declaration{declared.lipschitz, Eigen::VectorXd::Zero(system.num_states())};
+    const auto begin = Clock::now();
+    const auto residual = method.make({*system.model, system.domain, declaration, data, 0});
+    sum.build_us += MicrosecondsSince(begin) / seeds;
+    sum.call_us += CallTime(system, *residual, seed, effort.scenarios) / seeds;
+  }
+  return sum;
+}
+
+}  // namespace
+
+void RunRegional(const RegionalStudyOptions& options, std::ostream& out) {
+  const Effort effort = options.quick ? Effort{20, 24} : Effort{100, 70};
+  const int seeds = options.quick ? 1 : 3;
+  const std::vector<int> percents = options.quick ? std::vector{0} : std::vector{0, 5, 10, 20},
+                         sizes = options.quick ? std::vector{25, 400} : std::vector{25, 50, 100, 400};
+  std::vector<Cells> rows;
+  std::string cells;
+  for (const System* system : {&BicycleSystem(), &PointMassInABox()})
+    for (const int percent : percents) {
+      const bool is_bicycle = system->name == "bicycle";
+      const double share = percent / 100.0;
+      const DeclaredByRegion declared = is_bicycle ? Declare(*system, HeadingSaturation{0.1, 2.5}, 2, share, {3, 5})
+                                                   : Declare(*system, VelocityKnee{0.15}, 1, share, {2, 3});
+      cells += fmt::format("{}{}, {} %: {} regions in {:.1f} s", cells.empty() ? "" : "; ", system->name, percent,
+                           declared.regions.size(), declared.seconds);
+      for (const int observations : sizes) {
+        const RegionalSum flat = RunSeeds(*system, Methods().front(), declared, observations, seeds, effort),
+                          regional = RunSeeds(*system, WithRegions(declared), declared, observations, seeds, effort);
+        Cells row{system->name, std::to_string(percent), std::to_string(observations)};
+        for (const std::size_t g : {2, 1, 0}) row.push_back(flat.Recall(g) + " → " + regional.Recall(g));
+        for (const std::size_t g : {2, 1, 0}) row.push_back(flat.HalfWidth(g) + " → " + regional.HalfWidth(g));
+        row.push_back(fmt::format("{} + {}", flat.false_certificates + regional.false_certificates,
+                                  flat.outside + regional.outside));
+        row.push_back(fmt::format("{:.1f}", regional.build_us / 1e3));
+        row.push_back(fmt::format("{:.1f} → {:.1f}", flat.call_us, regional.call_us));
+        rows.push_back(std::move(row));
+      }
+    }
+  const std::string report =
+      "# A bound for each region\n\n`" + options.command + "`. " +
+      fmt::format("{} seeds, {} plans a group, {} rollouts a plan, noiseless. ", seeds, effort.scenarios,
+                  effort.rollouts) +
+      "One certified L → up to 64 regions with certified slopes. Parameters of the road within so many per cent. "
+      "Half-width: half the side of a square as large as the last slice, m, mean of the complete tubes. False: false "
+      "certificates, and tubes that a rollout leaves, of both. Build: of the regions' enclosure. Call: median of the "
+      "plans of C, of 12 steps. " +
+      cells + ".\n\n" +
+      Markdown({"system", "±%", "N", "recall C", "B", "A", "half-width C", "B", "A", "false", "build, ms", "call, µs"},
+               rows);
+  std::filesystem::create_directories(options.directory);
+  WriteFile(options.directory / "regional.md", report);
+  out << report << std::flush;
+}
+
+}  // namespace forereach::research
