@@ -165,8 +165,11 @@ Interval RegionTable::Enclose(const RegionGrid::Box& box) const noexcept {
   std::array<double, 2> largest{-kInfinity, -kInfinity};
   for (std::size_t i = part[0].first; i <= part[0].last; ++i)
     for (std::size_t j = part[1].first; j <= part[1].last; ++j)
-      for (std::size_t side = 0; side < 2; ++side)
-        largest[side] = std::max(largest[side], LargestIn(values_[side], i, j, part[0], part[1]));
+      for (std::size_t side = 0; side < 2; ++side) {
+        const double here = LargestIn(values_[side], i, j, part[0], part[1]);
+        largest[side] =
+            std::max(largest[side], here < kInfinity ? here : kInfinity);  // what is no number bounds nothing
+      }
   return {-AddUp(largest[1], error_), AddUp(largest[0], error_)};
 }
 
