@@ -13,7 +13,10 @@
 #include <nlohmann/json.hpp>
 
 #include "command_line/progress.h"
+#include "forereach/certify/learned.h"
 #include "forereach/declare/motion_bound.h"
+#include "forereach/dynamics/models/named_models.h"
+#include "forereach/numerics/directed.h"
 #include "forereach/numerics/size.h"
 #include "forereach/numerics/text.h"
 #include "forereach/safety/clearance.h"
@@ -109,6 +112,11 @@ class SearchTime final {
   int told_ = 0;
 };
 
+// The longest step of which a rate has to say how far a state moves: of a plan, or one that is recorded.
+double LongestStep(const Problem& problem) {
+  return AddUp(StepOf(*problem.model), std::max(MulUp(2, problem.timing.error), TooFarOff(*problem.model)));
+}
+
 // Adds a row for each state, and what the verifier says of them.
 void AddRates(const Config& config, std::span<const int> states, const MotionBounds& bounds, MotionProposal& proposal) {
   const NominalModel& model = *config.problem->model;
@@ -121,7 +129,7 @@ void AddRates(const Config& config, std::span<const int> states, const MotionBou
     claims.push_back({states[i], ParseNumber(most).value});
   }
   const verifier::RateVerdict verdict =
-      verifier::CheckRates(model, config.problem->domain, LongestPeriod(config), bounds.reachable, claims);
+      verifier::CheckRates(model, config.problem->domain, LongestStep(*config.problem), bounds.reachable, claims);
   proposal.rates = "rate_bound: {" + proposal.rates + "}";
   if (verdict.answer != verifier::Answer::kYes) proposal.unconfirmed = model.state_names()[ToSize(verdict.state)];
 }
@@ -144,7 +152,7 @@ MotionProposal FromEquations(const Config& config, const BetweenCommand& command
   SearchTime time(command.seconds);
   const MotionBounds bounds =
       BoundMotion({*flow, problem.domain, LongestPeriod(config), frame, problem.body.heading, rest,
-                   [&](double done, double next) { return time.IsOver(done, next); }, moving},
+                   [&](double done, double next) { return time.IsOver(done, next); }, moving, LongestStep(problem)},
                   command.search);
   MotionProposal proposal;
   proposal.seconds = time.passed();
@@ -242,8 +250,9 @@ void PrintForPeople(const MotionProposal& proposal, const Config& config) {
   if (!proposal.rates.empty())
     std::cout << "\nmodel:\n  " << proposal.rates
               << (proposal.unconfirmed.empty()
-                      ? "\nThe verifier confirms these rates."
-                      : "\nThe verifier does not confirm that of " + proposal.unconfirmed + ".");
+                      ? "\nThe verifier confirms these rates, for steps of up to "
+                      : "\nThe verifier does not confirm that of " + proposal.unconfirmed + ", for steps of up to ")
+              << RoundedUp(LongestStep(*config.problem), kMotionDigits) << " s.";
   std::cout << std::endl;
 }
 

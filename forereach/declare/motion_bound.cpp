@@ -465,12 +465,17 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
     for (std::size_t i = k; i < motion.flow.num_places(); i += p) quantities.push_back(AccelerationOfPlace(i));
     bounds.acceleration.push_back(BoundMagnitude(motion, quantities, regions, options, searches));
   }
-  for (const int k : motion.rates_of)
-    bounds.rates.push_back(BoundMagnitude(motion, {First(ToSize(k))}, {reachable}, options, searches));
-  Eigen::VectorXd lower(std::ssize(reachable)), upper(lower.size());
-  for (Eigen::Index i = 0; i < lower.size(); ++i)
-    lower[i] = reachable[ToSize(i)].lower, upper[i] = reachable[ToSize(i)].upper;
-  bounds.reachable = Box(lower, upper);
+  if (!motion.rates_of.empty()) {
+    SampledMotion longer = motion;
+    longer.period = motion.rates_period;
+    const Arguments within = Reachable(longer, start);
+    for (const int k : motion.rates_of)
+      bounds.rates.push_back(BoundMagnitude(motion, {First(ToSize(k))}, {within}, options, searches));
+    Eigen::VectorXd lower(std::ssize(within)), upper(lower.size());
+    for (Eigen::Index i = 0; i < lower.size(); ++i)
+      lower[i] = within[ToSize(i)].lower, upper[i] = within[ToSize(i)].upper;
+    bounds.reachable = Box(lower, upper);
+  }
   if (motion.heading < 0) return bounds;
   const auto heading = ToSize(motion.heading);
   bounds.turn_rate = BoundMagnitude(motion, {First(heading)}, regions, options, searches);

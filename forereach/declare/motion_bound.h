@@ -30,7 +30,7 @@ struct MotionBounds {
   std::vector<MotionBound> acceleration;     ///< Of each (P x)_k'' and of coordinate k of each place.
   MotionBound turn_rate, turn_acceleration;  ///< Of the heading's first and second derivative; 0 without a heading.
   std::vector<MotionBound> rates;            ///< Of |x_k'| for each of SampledMotion::rates_of, over `reachable`.
-  Box reachable;                             ///< B of z, which no motion leaves.
+  Box reachable;                             ///< B of z, which no motion leaves within rates_period.
 };
 
 /** Is asked again and again whether the search at hand ends now, with the bound that it has by then.
@@ -48,6 +48,7 @@ struct SampledMotion {
   Eigen::VectorXd rest;
   MotionWatch watch = {};          ///< None: every search runs to its end.
   std::vector<int> rates_of = {};  ///< States.
+  double rates_period = 0;         ///< From a sample on, s: their rates are bounded for so long.
 };
 
 /** Bounds for every motion that is in the domain at its samples. A plan's last sample is not tested against the domain;

@@ -157,7 +157,8 @@ TEST_F(DeclareTest, BetweenProvesRatesIfAskedAndTheVerifierConfirmsThem) {
   const std::string field = Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml");
   std::ofstream(task_) << field;
   EXPECT_THAT(Declare("--between"), Exits(0, Not(HasSubstr("rate"))));
-  EXPECT_THAT(Declare("--between --rates"), Exits(0, "x'", "\nmodel:\n  rate_bound: {x: 12.", "verifier confirms"));
+  EXPECT_THAT(Declare("--between --rates"), Exits(0, "x'", "\nmodel:\n  rate_bound: {x: 12.",
+                                                  "The verifier confirms these rates, for steps of up to 0.15"));
   const Json document = Json::parse(Declare("--between --rates --json").text);
   ASSERT_EQ(document["entries"].size(), 6u) << "a and delta are set at steps";
   const std::string said = document["rates"]["yaml"];

@@ -50,13 +50,14 @@ TEST(MotionBound, OfARateIsItsLargestBetweenTwoSamples) {
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3), Eigen::Vector2d(2, 0.5));
   const auto flow = MakeFlow(*model);
   const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(0, 4);
-  const MotionBounds bounds = BoundMotion({*flow, domain, 0.125, none, -1, NoRest(4), {}, {0, 2, 3}}, {.gap = kGap});
+  const MotionBounds bounds =
+      BoundMotion({*flow, domain, 0.125, none, -1, NoRest(4), {}, {0, 2, 3}, 0.25}, {.gap = kGap});
   ASSERT_EQ(bounds.rates.size(), 3u);
-  EXPECT_GE(bounds.rates[0].upper, 3.25) << "from 3 m/s on for 1/8 s with 2 m/s^2";
-  EXPECT_LE(bounds.rates[0].upper, 3.27);
+  EXPECT_GE(bounds.rates[0].upper, 3.5) << "from 3 m/s on for 1/4 s with 2 m/s^2, though samples are half as far apart";
+  EXPECT_LE(bounds.rates[0].upper, 3.53);
   EXPECT_FIELDS(bounds.rates[1], (upper, 2), (lower, 2));
   EXPECT_FIELDS(bounds.rates[2], (upper, 0.5), (lower, 0.5));
-  EXPECT_GE(bounds.reachable.upper()[2], 3.25);
+  EXPECT_GE(bounds.reachable.upper()[2], 3.5);
 }
 
 // Then no place moves at first, only after the speed has.
