@@ -159,7 +159,7 @@ class Verifying final : public CertificateUser {
   void VerifyWaiting() {
     for (auto& [of, known] : known_)
       if (std::exchange(known.is_waited_for, false))
-        known.verifier->Learn(WithLearned(known.problem, *known.learned, known.learned->size())->transitions);
+        known.verifier->Learn(WithLearned(known.problem->transitions, *known.learned, known.learned->size()));
     ForEachInParallel(waiting_.size(), threads_, [&](std::size_t i, std::size_t) {
       auto& [recorded, number, verifier, verdict] = waiting_[i];
       verdict = verifier ? verifier->Verify(recorded.certificate)

@@ -10,7 +10,7 @@ lock. */
 
 #include "advise/advice.h"
 #include "forereach/certify/certifier.h"
-#include "records/learned_transitions.h"
+#include "forereach/residual/learned_transitions.h"
 #include "records/picture.h"
 #include "task/config.h"
 

@@ -25,6 +25,7 @@ namespace {
 // A gate that knows what the recorded one knew.
 class GateFollower : public TimelineUser {
  public:
+  [[nodiscard]] bool AsksForLearned() const override { return false; }
   void OnStart(const Config& task) override { gate_ = std::make_unique<Gate>(task); }
   void OnReload(const Config& task) override {
     const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));
@@ -68,7 +69,15 @@ class Replayer final : public GateFollower {
   void OnStart(const Config& task) override {
     GateFollower::OnStart(task);
     plans_.clear();
+    not_learned_.clear();
     advice_ = task.bus.advice;
+  }
+  void OnReload(const Config& task) override {
+    GateFollower::OnReload(task);
+    not_learned_.clear();
+  }
+  void OnRefusedTransition(const std::string& event, const std::string& why) override {
+    if (not_learned_.empty()) not_learned_ = event + ": " + why;
   }
 
   // Which plan a search proposes depends on the time that it had; that it is certified does not.
@@ -109,7 +118,11 @@ class Replayer final : public GateFollower {
     const decision_t again = DecideAgain(bytes, decision);
     std::string difference = Difference(decision, again);
     if (!difference.empty() && recorded.basis.grounds.observations != GroundsOf(decision).observations)
-      difference += "; transitions that had been learned are not in the log, which begins later or lacks messages";
+      difference +=
+          not_learned_.empty()
+              ? "; transitions that had been learned are not in the log, which begins later or lacks messages"
+              : "; it rests on transitions that this release does not learn, or the log lacks some: " + not_learned_ +
+                    "; the release that recorded the log can replay it";
     Show(recorded.event, "recorded", decision);
     Show(recorded.event, "replayed", again);
     if (difference.empty())
@@ -220,8 +233,9 @@ class Replayer final : public GateFollower {
 
   const std::string plan_digest_;
   const Shard shard_;
-  std::string advice_;      // the channel
-  std::deque<Plan> plans_;  // the last ones
+  std::string advice_;       // the channel
+  std::string not_learned_;  // the first transition that was refused since the last start or reload, and why
+  std::deque<Plan> plans_;   // the last ones
   CaseResults<ReplayResult> result_;
 };
 

@@ -26,24 +26,28 @@ std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& n
 
 }  // namespace
 
+Transitions WithLearned(const Transitions& given, const LearnedTransitions& learned, std::size_t count) {
+  const Eigen::Index before = given.z.rows(), size = before + static_cast<Eigen::Index>(count);
+  Transitions all{Eigen::MatrixXd(size, given.z.cols()), Eigen::MatrixXd(size, given.x_next.cols())};
+  all.num_learned = given.num_learned + static_cast<int>(count);
+  all.z.topRows(before) = given.z, all.x_next.topRows(before) = given.x_next;
+  all.longer = Eigen::VectorXd::Zero(size);
+  all.longer.head(given.longer.size()) = given.longer;
+  for (std::size_t i = 0; i < count; ++i) {
+    const LearnedTransitions::Each each = learned[i];
+    const Eigen::Index row = before + static_cast<Eigen::Index>(i);
+    all.longer[row] = each.longer;
+    all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(each.z.data(), std::ssize(each.z));
+    all.x_next.row(row) = Eigen::Map<const Eigen::RowVectorXd>(each.next.data(), std::ssize(each.next));
+  }
+  return all;
+}
+
 std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
                                            const LearnedTransitions& learned, std::size_t count) {
   if (count == 0) return problem;
   auto known = std::make_shared<Problem>(*problem);
-  Transitions& all = known->transitions;
-  Eigen::Index row = all.z.rows();
-  all.z.conservativeResize(row + static_cast<Eigen::Index>(count), Eigen::NoChange);
-  all.x_next.conservativeResize(all.z.rows(), Eigen::NoChange);
-  all.num_learned += static_cast<int>(count);
-  const Eigen::Index before = all.longer.size();
-  all.longer.conservativeResize(all.z.rows());
-  all.longer.tail(all.z.rows() - before).setZero();
-  for (std::size_t i = 0; i < count; ++i) {
-    const LearnedTransitions::Each each = learned[i];
-    all.longer[row] = each.longer;
-    all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(each.z.data(), std::ssize(each.z));
-    all.x_next.row(row++) = Eigen::Map<const Eigen::RowVectorXd>(each.next.data(), std::ssize(each.next));
-  }
+  known->transitions = WithLearned(problem->transitions, learned, count);
   return known;
 }
 
@@ -52,6 +56,7 @@ std::shared_ptr<const Problem> Basis::problem() const { return WithLearned(task-
 Timeline::Timeline(const Config& first, TaskFinder find, std::vector<TimelineUser*> users)
     : find_(std::move(find)),
       users_(std::move(users)),
+      keeps_learned_(std::ranges::any_of(users_, &TimelineUser::AsksForLearned)),
       channels_(first.bus),
       authenticator_(channels_, PublicKeysOf(channels_)),
       now_(&first),
@@ -90,7 +95,7 @@ void Timeline::Take(const LogEvent& event, const std::string& name) {
   } else if (event.channel == channels_.obstacles) {
     TakeObstacles(event);
   } else if (event.channel == channels_.transition) {
-    TakeTransition(event);
+    TakeTransition(event, name);
   }
 }
 
@@ -180,13 +185,13 @@ void Timeline::TakeObstacles(const LogEvent& event) {
       {place_, event.utime, event.sender(), {event.message().begin(), event.message().end()}, after, all_logged_});
 }
 
-void Timeline::TakeTransition(const LogEvent& event) {
+void Timeline::TakeTransition(const LogEvent& event, const std::string& name) {
   transition_sender_.Hear(event.sender(), event.utime);
   if (!transition_sender_.WhyTwo(event.utime).empty()) return;
   const auto message = Decoded<transition_t>(event.message());
   if (!now_->gate.learns || !message) return;
   ExecutedTransition transition = Examine(*message, *now_->problem, now_->gate);
-  if (!transition.refusal.empty()) return;
+  if (!transition.refusal.empty()) return Tell(&TimelineUser::OnRefusedTransition, name, transition.refusal);
   logged_observations_ = ChainedDigest(logged_observations_, event.message());
   transitions_ahead_.push_back(
       {place_, std::move(transition), {event.message().begin(), event.message().end()}, logged_observations_});
@@ -205,7 +210,7 @@ void Timeline::LearnNext() {
   transitions_ahead_.pop_front();
   observations_digest_ = next.after;
   Tell(&TimelineUser::OnTransition, next.transition, next.bytes);
-  learned_->Add(next.transition.z, next.transition.next, next.transition.longer);
+  if (keeps_learned_) learned_->Add(next.transition.z, next.transition.next, next.transition.longer);
 }
 
 // ---- Decisions.

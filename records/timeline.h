@@ -32,11 +32,11 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "certifier/gate/robot_messages.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/residual/learned_transitions.h"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
-#include "records/learned_transitions.h"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
 #include "records/undecided.h"
@@ -50,7 +50,7 @@ struct Basis {
   Grounds grounds;  ///< The digests of these inputs. The decision's message has the digests that it names.
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
   /** What is learned between the last start or reload and the next, in the order of the log, of which the first
-  num_learned were at that time. */
+  num_learned were at that time. Empty if no user asks for it. */
   std::shared_ptr<const LearnedTransitions> learned;
   std::size_t num_learned = 0;
 
@@ -100,18 +100,25 @@ class TimelineUser {
   TimelineUser(const TimelineUser&) = delete;
   TimelineUser& operator=(const TimelineUser&) = delete;
 
+  /** Whether it looks at Basis::learned, which a long run has much of. */
+  [[nodiscard]] virtual bool AsksForLearned() const { return true; }
+
   virtual void OnEvent(const LogEvent&) {}  ///< Every authentic message, before the calls that it causes.
   virtual void OnStart(const Config&) {}    ///< The process starts under this task.
   virtual void OnReload(const Config&) {}   ///< The process continues under this task.
   /** A message after which a different set is in force, or a part of a set that is not complete. */
   virtual void OnObstacles(Bytes /*message*/, std::int64_t /*utime*/, SenderId) {}
   virtual void OnTransition(const ExecutedTransition&, Bytes /*message*/) {}  ///< A transition is learned.
+  /** A transition of this event is not, and why. */
+  virtual void OnRefusedTransition(const std::string& /*event*/, const std::string& /*why*/) {}
   virtual void OnDecision(const RecordedDecision&) {}
   virtual void OnCertified(const RecordedPlan&) {}
   virtual void OnWithdrawn(const RecordedWithdrawal&) {}
   virtual void OnUndecided(const RecordedCandidate&) {}  ///< No decision follows, or one after kMostUndecided others.
 };
 
+/** These transitions and behind them the first `count` that were learned. */
+[[nodiscard]] Transitions WithLearned(const Transitions& given, const LearnedTransitions& learned, std::size_t count);
 /** The problem with the first `count` of these behind its own transitions; the problem itself if there are none. */
 [[nodiscard]] std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
                                                          const LearnedTransitions& learned, std::size_t count);
@@ -177,7 +184,7 @@ class Timeline final {
 
   void Take(const LogEvent& event, const std::string& name);
   void TakeObstacles(const LogEvent& event);
-  void TakeTransition(const LogEvent& event);
+  void TakeTransition(const LogEvent& event, const std::string& name);
   void TakeStatus(const LogEvent& event);
   void TakeDecision(const LogEvent& event, const std::string& name);
   void TakeCertified(const LogEvent& event, const std::string& name);
@@ -202,6 +209,7 @@ class Timeline final {
 
   const TaskFinder find_;
   const std::vector<TimelineUser*> users_;
+  const bool keeps_learned_;
   const BusOptions channels_;
   LogAuthenticator authenticator_;
 

@@ -14,6 +14,15 @@
 namespace forereach::verifier {
 namespace {
 
+// An order of what is recorded of steps.
+int CompareSteps(const Transitions& data, int i, int j) {
+  for (const Eigen::MatrixXd* part : {&data.z, &data.x_next})
+    for (Eigen::Index l = 0; l < part->cols(); ++l)
+      if (const double a = (*part)(i, l), b = (*part)(j, l); a != b) return a < b ? -1 : 1;
+  if (data.Longer(i) != data.Longer(j)) return data.Longer(i) < data.Longer(j) ? -1 : 1;
+  return data.IsLearned(i) - data.IsLearned(j);
+}
+
 constexpr double kNone = std::numeric_limits<double>::infinity();
 // Rows of L with more nonzero columns than this are bounded over the hull: that is part of the method.
 constexpr std::size_t kMaxExactColumns = 12;
@@ -503,55 +512,62 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
 
 void TubeMaker::Learn() {
   const Transitions& data = problem_.transitions;
-  for (int i = static_cast<int>(residuals_.size()); i < data.size(); ++i) {
+  for (int i = static_cast<int>(rough_residuals_[0].lower.size()); i < data.size(); ++i) {
     if (const auto failure = WhyTooFast(i)) too_much_.emplace_back(i, *failure);
-    std::vector<Real> z;
-    for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
-    const std::vector<Real> nominal = equations_.Value(z);
-    std::vector<Real> errors(ToSize(problem_.model->num_states()));
-    // Only transitions of the file may be declared exact: a robot's own are measured (soundness 3.16).
-    const bool is_exact = problem_.declaration.given_are_exact && !data.IsLearned(i);
-    if (!is_exact) errors = RecordErrors(z);
-    const std::vector<Real> around = is_exact ? z : BoxAround(problem_.declaration, z);
-    const std::vector<Real> disturbance = DisturbanceOver(around), noise = NoiseOver(around);
-    AddDuration(i, z, nominal, disturbance, noise, errors);
-    std::vector<Bounds>& row = residuals_.emplace_back();
+    auto seen = std::make_shared<const Seen>(Look(i));
+    if (const auto failure = WhyTooLarge(i, *seen)) too_much_.emplace_back(i, *failure);
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
-      const double x_next = data.x_next(i, k);
-      const bool is_angle = std::ranges::count(problem_.model->angles(), k) > 0;
-      const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
-      const Real& error = errors[ToSize(k)];
-      const Real& w = disturbance[ToSize(k)];
-      const Real allowed = Real(unit) + noise[ToSize(k)] + w + error;
-      const Real difference = Real(x_next) - nominal[ToSize(k)];
-      const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
-      const Bounds bounds{observed - allowed, observed + allowed};
-      // A transition for which the model has no value says nothing.
-      row.push_back(!observed.IsFinite() || !error.IsFinite() || !w.IsFinite() ? Bounds{-kNone, kNone}
-                    : equations_.IsExact()                                     ? bounds
-                                                                               : Outermost(bounds));
       RoughResiduals& rough = rough_residuals_[ToSize(k)];
-      rough.lower.push_back(row.back().lower.ToDouble());
-      rough.upper.push_back(row.back().upper.ToDouble());
+      rough.lower.push_back(seen->residual[ToSize(k)].lower.ToDouble());
+      rough.upper.push_back(seen->residual[ToSize(k)].upper.ToDouble());
       rough.scale.push_back(problem_.declaration.lipschitz.row(k).dot(data.z.row(i).cwiseAbs()));
     }
-    std::vector<Real>& sizes = sizes_.emplace_back();
-    for (Eigen::Index k = 0; k < data.x_next.cols(); ++k)
-      sizes.push_back(abs(Real(data.x_next(i, k))) + errors[ToSize(k)]);
-    for (const auto& [output, variable, value] : equations_.First(z))
-      sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
-    if (const auto failure = WhyTooLarge(i)) too_much_.emplace_back(i, *failure);
+    if (i < kMostKeptBits / Precision::bits()) seen_.push_back(std::move(seen));
   }
 }
 
+TubeMaker::Seen TubeMaker::Look(int i) const {
+  const Transitions& data = problem_.transitions;
+  std::vector<Real> z;
+  for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
+  const std::vector<Real> nominal = equations_.Value(z);
+  std::vector<Real> errors(ToSize(problem_.model->num_states()));
+  // Only transitions of the file may be declared exact: a robot's own are measured (soundness 3.16).
+  const bool is_exact = problem_.declaration.given_are_exact && !data.IsLearned(i);
+  if (!is_exact) errors = RecordErrors(z);
+  const std::vector<Real> around = is_exact ? z : BoxAround(problem_.declaration, z);
+  const std::vector<Real> disturbance = DisturbanceOver(around), noise = NoiseOver(around);
+  AddDuration(i, z, nominal, disturbance, noise, errors);
+  Seen seen;
+  for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
+    const double x_next = data.x_next(i, k);
+    const bool is_angle = std::ranges::count(problem_.model->angles(), k) > 0;
+    const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
+    const Real& error = errors[ToSize(k)];
+    const Real& w = disturbance[ToSize(k)];
+    const Real allowed = Real(unit) + noise[ToSize(k)] + w + error;
+    const Real difference = Real(x_next) - nominal[ToSize(k)];
+    const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference, error) : difference;
+    const Bounds bounds{observed - allowed, observed + allowed};
+    // A transition for which the model has no value says nothing.
+    seen.residual.push_back(!observed.IsFinite() || !error.IsFinite() || !w.IsFinite() ? Bounds{-kNone, kNone}
+                            : equations_.IsExact()                                     ? bounds
+                                                                                       : Outermost(bounds));
+    seen.size.push_back(abs(Real(x_next)) + error);
+  }
+  for (const auto& [output, variable, value] : equations_.First(z))
+    seen.size[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
+  return seen;
+}
+
 // What an observation shows of the residual, against what the regions around it say.
-std::optional<Failure> TubeMaker::WhyTooLarge(int i) const {
+std::optional<Failure> TubeMaker::WhyTooLarge(int i, const Seen& seen) const {
   Ways::Box at;
   for (const double value : problem_.transitions.z.row(i)) at.emplace_back(value, value);
-  for (std::size_t k = 0; k < residuals_[ToSize(i)].size(); ++k) {
+  for (std::size_t k = 0; k < seen.residual.size(); ++k) {
     const double most = ways_.Largest(&Region::bound, static_cast<int>(k), kNone, at);
-    const auto& [lower, upper] = residuals_[ToSize(i)][k];
-    if (most == kNone || !CertainlyBelow(Real(most) + Real(kSeenInDoubles) * sizes_[ToSize(i)][k], max(lower, -upper)))
+    const auto& [lower, upper] = seen.residual[k];
+    if (most == kNone || !CertainlyBelow(Real(most) + Real(kSeenInDoubles) * seen.size[k], max(lower, -upper)))
       continue;
     return Failure{-1,
                    "no known transition has a residual of " + problem_.model->state_names()[k] +
@@ -758,10 +774,10 @@ bool TubeMaker::CanExtend(const std::vector<int>& rows) const {
         for (Eigen::Index l = 0; l < L.cols(); ++l)
           if (L(k, l) > 0) reach += L(k, l) * std::abs(z(i, l) - z(j, l));
         if (rough.lower[a] <= reach) continue;
-        Real exact = residuals_[b][ToSize(k)].upper;
+        Real exact = See(j)->residual[ToSize(k)].upper;
         for (Eigen::Index l = 0; l < L.cols(); ++l)
           if (L(k, l) > 0) exact += Real(L(k, l)) * abs(Real(z(i, l)) - Real(z(j, l)));
-        if (!CertainlyAtMost(residuals_[a][ToSize(k)].lower, exact)) return false;
+        if (!CertainlyAtMost(See(i)->residual[ToSize(k)].lower, exact)) return false;
       }
   }
   return true;
@@ -774,7 +790,8 @@ Real TubeMaker::Extension(const std::vector<int>& rows, int k, bool upper, const
     Real away;
     for (Eigen::Index l = 0; l < L.cols(); ++l)
       if (L(k, l) > 0) away += Real(L(k, l)) * abs(z[ToSize(l)] - Real(problem_.transitions.z(i, l)));
-    const auto& [below, above] = residuals_[ToSize(i)][ToSize(k)];
+    const auto seen = See(i);
+    const auto& [below, above] = seen->residual[ToSize(k)];
     const Real value = upper ? above + away : below - away;
     best = !best ? value : upper ? min(*best, value) : max(*best, value);
   }
@@ -822,9 +839,10 @@ std::optional<Failure> TubeMaker::MakeAffine(const KnownRows& known, Affine& aff
     const std::string& name = problem_.model->state_names()[ToSize(k)];
     std::vector<Real> lower, upper, sizes;
     for (const int i : kept) {
-      lower.push_back(residuals_[ToSize(i)][ToSize(k)].lower);
-      upper.push_back(residuals_[ToSize(i)][ToSize(k)].upper);
-      sizes.push_back(sizes_[ToSize(i)][ToSize(k)]);
+      const auto seen = See(i);
+      lower.push_back(seen->residual[ToSize(k)].lower);
+      upper.push_back(seen->residual[ToSize(k)].upper);
+      sizes.push_back(seen->size[ToSize(k)]);
     }
     auto row = std::make_unique<AffineRow>(z, std::move(lower), std::move(upper), std::move(sizes));
     if (row->IsEmpty())
@@ -1218,12 +1236,17 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
   for_each([&](int i) {
     if (!trusted || !(lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest)) tight.push_back(i);
   });
+  // A robot that stands records one step again and again.
+  const auto less = [&](int i, int j) { return CompareSteps(problem_.transitions, i, j) < 0; };
+  std::ranges::sort(tight, less);
+  tight.erase(std::unique(tight.begin(), tight.end(), [&](int i, int j) { return !less(i, j); }), tight.end());
   const auto intersect = [&](bool in_doubt) {
     std::optional<Bounds> tightest;
     for (const int i : tight) {
       Real away = row.Distance(z, i);
-      if (in_doubt) away += Real(kSeenInDoubles) * (sizes_[ToSize(i)][ToSize(k)] + Real(row.ScaleAt(z, i)));
-      const auto& [below, above] = residuals_[ToSize(i)][ToSize(k)];
+      const auto seen = See(i);
+      if (in_doubt) away += Real(kSeenInDoubles) * (seen->size[ToSize(k)] + Real(row.ScaleAt(z, i)));
+      const auto& [below, above] = seen->residual[ToSize(k)];
       tightest = tightest ? Bounds{max(tightest->lower, below - away), min(tightest->upper, above + away)}
                           : Bounds{below - away, above + away};
     }
@@ -1237,10 +1260,10 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
 }
 
 // Bounds the size of what goes into an observation and its ways.
-Real TubeMaker::ScaleAt(int k, int i) const {
+Real TubeMaker::ScaleAt(int k, const Seen& seen) const {
   const Problem& problem = problem_;
   const auto [lower, upper] = problem.domain.Corners();
-  Real size = sizes_[ToSize(i)][ToSize(k)];
+  Real size = seen.size[ToSize(k)];
   for (std::size_t l = 0; l < lower.size(); ++l)
     size += Real(problem.declaration.lipschitz(k, static_cast<Eigen::Index>(l))) *
             Real(std::max(std::abs(lower[l]), std::abs(upper[l])));
@@ -1274,9 +1297,10 @@ std::shared_ptr<const TubeMaker::Plane> TubeMaker::PlaneOf(int k, const KnownRow
   plane->seen.resize(wanted.size());
   for (int i = 0; i < data.size(); ++i) {
     if (!wanted[ToSize(i)] || plane->seen[ToSize(i)]) continue;
-    const auto& [lower, upper] = residuals_[ToSize(i)][ToSize(k)];
+    const auto seen = See(i);
+    const auto& [lower, upper] = seen->residual[ToSize(k)];
     if (lower.IsFinite() && upper.IsFinite()) {
-      plane->size = max(plane->size, ScaleAt(k, i));
+      plane->size = max(plane->size, ScaleAt(k, *seen));
       plane->nodes.Add(data.z.row(i), lower, upper);
     }
     plane->seen[ToSize(i)] = true;
@@ -1307,18 +1331,25 @@ void TubeMaker::AddRegions(const Query& query, int k, const KnownRows& known, bo
   const Transitions& data = problem_.transitions;
   Ways::Box hull = DoublesAround(query.hull);
   ways_.Cut(hull);
+  const RoughResiduals& rough = rough_residuals_[ToSize(k)];
+  const double floor = bounds.lower.ToDouble(), ceiling = bounds.upper.ToDouble();
   for (int i = 0; i < data.size(); ++i) {
     if (!known.Contains(i)) continue;
+    // Doubles, good to 2^-50, tell of most that they do not narrow, however near they were.
+    const double below = rough.lower[ToSize(i)], above = rough.upper[ToSize(i)],
+                 slack = 0x1p-50 * (std::abs(below) + std::abs(above) + std::abs(floor) + std::abs(ceiling));
+    if (below + slack < floor && above - slack > ceiling) continue;
     const Eigen::VectorXd z = data.z.row(i);
-    const Real &lower = residuals_[ToSize(i)][ToSize(k)].lower, &upper = residuals_[ToSize(i)][ToSize(k)].upper;
-    const auto narrows = [&](const Real& away) {
-      return !CertainlyAtMost(lower - away, bounds.lower) || !CertainlyAtMost(bounds.upper, upper + away);
+    const auto seen = See(i);
+    const auto& [lower, upper] = seen->residual[ToSize(k)];
+    const auto narrows = [&, &low = lower, &high = upper](const Real& away) {
+      return !CertainlyAtMost(low - away, bounds.lower) || !CertainlyAtMost(bounds.upper, high + away);
     };
     if (!narrows(Real())) continue;
     if (const double scale = row.ScaleAt(data.z, i); scale > 1e-250 && scale < 1e250)
       if (!narrows(max(Real(), Real(ways_.Cheapest<double>(k, z, hull)) - Real(0x1p-36 * scale)))) continue;
     Real away = ways_.Cheapest<Real>(k, z, hull);
-    if (in_doubt) away += Real(kSeenInDoubles) * (sizes_[ToSize(i)][ToSize(k)] + Real(row.ScaleAt(data.z, i)));
+    if (in_doubt) away += Real(kSeenInDoubles) * (seen->size[ToSize(k)] + Real(row.ScaleAt(data.z, i)));
     bounds = {max(bounds.lower, lower - away), min(bounds.upper, upper + away)};
   }
 }

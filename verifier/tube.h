@@ -135,10 +135,26 @@ class TubeMaker final {
   struct Row;
   struct Affine;
 
+  /** What an observation shows, an entry for each state. */
+  struct Seen {
+    /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
+    included; e_ik is what the declared errors of the record may add. */
+    std::vector<Bounds> residual;
+    /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual. */
+    std::vector<Real> size;
+  };
+  /** Memory for so many bits of precision in all: it takes 3 kB an observation to keep it. Doubles tell of the others
+  whether they matter, and those that do are derived again. */
+  static constexpr int kMostKeptBits = 1 << 22;
+  [[nodiscard]] Seen Look(int i) const;
+  [[nodiscard]] std::shared_ptr<const Seen> See(int i) const {
+    return ToSize(i) < seen_.size() ? seen_[ToSize(i)] : std::make_shared<const Seen>(Look(i));
+  }
+
   [[nodiscard]] bool CanExtend(const std::vector<int>& rows) const;
   [[nodiscard]] Real Extension(const std::vector<int>& rows, int k, bool upper, const std::vector<Real>& z) const;
   [[nodiscard]] std::optional<Failure> WhyTooFast(int i) const;
-  [[nodiscard]] std::optional<Failure> WhyTooLarge(int i) const;
+  [[nodiscard]] std::optional<Failure> WhyTooLarge(int i, const Seen& seen) const;
   [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(int t, const std::vector<Real>& centers,
                                                     const std::vector<Real>& half_width) const;
@@ -151,7 +167,7 @@ class TubeMaker final {
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
   void AddRegions(const Query& query, int k, const KnownRows& known, bool in_doubt, Bounds& bounds) const;
-  [[nodiscard]] Real ScaleAt(int k, int i) const;
+  [[nodiscard]] Real ScaleAt(int k, const Seen& seen) const;
   struct Plane;
   [[nodiscard]] std::shared_ptr<const Plane> PlaneOf(int k, const KnownRows& known) const;
   [[nodiscard]] std::optional<Failure> MakeAffine(const KnownRows& known, Affine& affine) const;
@@ -177,16 +193,12 @@ class TubeMaker final {
   std::vector<Real> input_error_, of_inputs_;
   /** By this power of a step's duration grows what the model does not know. */
   int power_;
-  /** r~_ik - sigma_k - w_k - e_ik and r~_ik + sigma_k + w_k + e_ik, one unit in the last place of the successor
-  included; e_ik is what the declared errors of the record may add. [observation][state]. */
-  std::vector<std::vector<Bounds>> residuals_;
-  /** The same in doubles, to the nearest, and sum_l L_kl |z_l|; an entry for each observation. */
+  std::vector<std::shared_ptr<const Seen>> seen_;  // of the first observations
+  /** Seen::residual in doubles, to the nearest, and sum_l L_kl |z_l|; an entry for each observation. */
   struct RoughResiduals {
     std::vector<double> lower, upper, scale;
   };
   std::vector<RoughResiduals> rough_residuals_;  // of each state
-  /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
-  std::vector<std::vector<Real>> sizes_;
   /** The latest planes of each row, of different known transitions. */
   mutable std::mutex mutex_;
   mutable std::map<int, std::vector<std::shared_ptr<const Plane>>> planes_;

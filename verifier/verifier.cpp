@@ -167,8 +167,8 @@ const TubeMaker& Verifier::MakerOf(int bits) const {
   return *maker;
 }
 
-void Verifier::Learn(const Transitions& transitions) {
-  problem_->transitions = transitions;
+void Verifier::Learn(Transitions transitions) {
+  problem_->transitions = std::move(transitions);
   for (const auto& [bits, maker] : makers_) {
     const Precision precision(bits);
     maker->Learn();

@@ -219,12 +219,13 @@ Transitions Certifier::Contradiction() const {
     if (id < 0) continue;
     if (id < given.size()) {
       add(given.z.row(id), given.x_next.row(id), given.Longer(id), given.IsLearned(id));
-    } else if (const auto record = std::ranges::lower_bound(learned_, id, {}, &Record::id);
-               record != learned_.end() && record->id == id) {
-      const auto row = [](const std::vector<double>& values) {
+    } else if (const auto found_id = std::ranges::lower_bound(learned_ids_, id);
+               found_id != learned_ids_.end() && *found_id == id) {
+      const auto row = [](std::span<const double> values) {
         return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
       };
-      add(row(record->z), row(record->next), record->longer, true);
+      const auto [z, next, longer] = learned_[ToSize(found_id - learned_ids_.begin())];
+      add(row(z), row(next), longer, true);
     }
   }
   return rows;
@@ -248,10 +249,16 @@ void Certifier::ForgetDropped() {
   // A contradiction is kept on disk with all of its rows (`Contradiction`), so none of them may go.
   if (violation_ || observed_->affine || learned_.size() <= 2 * observed_->known.size()) return;
   const std::vector<int> kept = observed_->known.ids();
-  std::erase_if(learned_, [&](const Record& record) {
-    return !std::ranges::binary_search(kept, record.id) &&
-           !(observed_->regional && observed_->regional->Keeps(record.id));
-  });
+  LearnedTransitions left;
+  std::vector<int> ids;
+  for (std::size_t i = 0; i < learned_ids_.size(); ++i) {
+    const int id = learned_ids_[i];
+    if (!std::ranges::binary_search(kept, id) && !(observed_->regional && observed_->regional->Keeps(id))) continue;
+    left.Add(learned_[i].z, learned_[i].next, learned_[i].longer);
+    ids.push_back(id);
+  }
+  learned_ = std::move(left);
+  learned_ids_ = std::move(ids);
 }
 
 namespace {
@@ -301,7 +308,8 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   if (const Learned learned = Observe(*problem_, z, next, longer, observed); learned != Learned::kAdded) return learned;
   const int id = observed_->Add(z, observed);
   if (id < 0) return Learned::kOutsideDomain;
-  learned_.push_back({id, {z.begin(), z.end()}, {next.begin(), next.end()}, by_clock.value_or(longer)});
+  learned_.Add(z, next, by_clock.value_or(longer));
+  learned_ids_.push_back(id);
   observed_->known = observed_->store.snapshot();
   if (!too_fast_ && !rates_.bounds().empty()) too_fast_ = rates_.FindViolation(rates_.Shown(z, next, longer, true), id);
   violation_ = observed_->violation();

@@ -20,6 +20,7 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 #include "forereach/reach/propagator.h"
 #include "forereach/residual/affine_rows_enclosure.h"
 #include "forereach/residual/enclosure.h"
+#include "forereach/residual/learned_transitions.h"
 #include "forereach/residual/observation_store.h"
 #include "forereach/residual/regional_enclosure.h"
 #include "forereach/safety/projection.h"
@@ -144,12 +145,6 @@ class Certifier final {
   void TestRates();
   void ForgetDropped();
 
-  // A learned transition as it was recorded, by the id of its observation.
-  struct Record {
-    int id;
-    std::vector<double> z, next;
-    double longer;
-  };
   struct Observed {
     explicit Observed(const Problem& problem);
     Observed(const Problem& problem, const Observations& observations);
@@ -182,8 +177,11 @@ class Certifier final {
   LimitTest limits_;
   RateBounds rates_;
   std::optional<Violation> too_fast_;  // a transition that contradicts a bound on a rate
-  std::vector<Record> learned_;        // those whose observations are kept, and some more; in the order of their ids
-  std::optional<Observed> observed_;   // none where an enclosure was given; propagator_ refers to it
+  // Learned transitions as they were recorded: those whose observations are kept, and some more. Of each the id of its
+  // observation, ascending.
+  LearnedTransitions learned_;
+  std::vector<int> learned_ids_;
+  std::optional<Observed> observed_;  // none where an enclosure was given; propagator_ refers to it
   std::optional<Violation> violation_;
   Propagator propagator_;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "forereach/residual/envelope_tail.h"
+#include "forereach/residual/observation_rows.h"
 #include "forereach/residual/pairs.h"
 #include "forereach/residual/search.h"
 
@@ -15,7 +16,8 @@ constexpr double kHuge = 0x1p960;  // far from overflow, and nothing next to the
 
 }  // namespace
 
-LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Observations& observations,
+template <class Rows>
+LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Rows& observations,
                                      std::span<const double> domain_lower, std::span<const double> domain_upper,
                                      const EnvelopeOptions& options)
     : options_(options) {
@@ -34,16 +36,22 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
   }
 }
 
+template LipschitzEnvelope::LipschitzEnvelope(const Declaration&, const Observations&, std::span<const double>,
+                                              std::span<const double>, const EnvelopeOptions&);
+template LipschitzEnvelope::LipschitzEnvelope(const Declaration&, const ObservationRows&, std::span<const double>,
+                                              std::span<const double>, const EnvelopeOptions&);
+
 // Sets row.error, E_k of the header. It bounds the rounding of every answer before there is a query, since a query's
 // hull lies in the domain; docs/soundness.md, 3.5, counts the a + 24 roundings and the products that may underflow.
-void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries,
-                                    const Observations& observations, std::span<const double> domain_lower,
-                                    std::span<const double> domain_upper) const {
+template <class Rows>
+void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Rows& observations,
+                                    std::span<const double> domain_lower, std::span<const double> domain_upper) const {
   double locations = 0, widths = 0;  // S, W
   for (const LipschitzRow::Column& column : row.distance.columns()) {
     const auto l = ToSize(column.variable);
-    const double farthest = std::max({observations.z.col(column.variable).cwiseAbs().maxCoeff(),
-                                      std::abs(domain_lower[l]), std::abs(domain_upper[l])});
+    double farthest = std::max(std::abs(domain_lower[l]), std::abs(domain_upper[l]));
+    for (int i = 0; i < observations.size(); ++i)
+      farthest = std::max(farthest, std::abs(observations.z(i, column.variable)));
     const double width = Interval(domain_lower[l], domain_upper[l]).HalfWidthUpper();
     locations = AddUp(locations, MulUp(column.slope, farthest));
     if (column.variable < observations.num_states()) widths = AddUp(widths, MulUp(column.slope, width));

@@ -53,10 +53,11 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   static constexpr int kMaxExactColumns = 12;
 
   /** @param domain_lower, domain_upper d_z entries each: a box that contains the hull of every query.
+  @tparam Rows Observations or ObservationRows, which are read by number.
   @pre declaration.Validate passed and observations is not empty. Cost: ObservationIndex, for each row with columns. */
-  LipschitzEnvelope(const Declaration& declaration, const Observations& observations,
-                    std::span<const double> domain_lower, std::span<const double> domain_upper,
-                    const EnvelopeOptions& options = {});
+  template <class Rows>
+  LipschitzEnvelope(const Declaration& declaration, const Rows& observations, std::span<const double> domain_lower,
+                    std::span<const double> domain_upper, const EnvelopeOptions& options = {});
 
   /** As ResidualEnclosure; never sets a slope. No heap, lock or exception. Cost for a row of L with a nonzero columns
   and m generators:
@@ -98,7 +99,8 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   struct BoundSearch;
 
   void EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count, ResidualBounds& bounds) const noexcept;
-  void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
+  template <class Rows>
+  void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Rows& observations,
                    std::span<const double> domain_lower, std::span<const double> domain_upper) const;
 
   EnvelopeOptions options_;

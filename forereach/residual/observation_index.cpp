@@ -1,8 +1,11 @@
 #include "forereach/residual/observation_index.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <numeric>
+
+#include "forereach/residual/observation_rows.h"
 
 namespace forereach {
 
@@ -12,12 +15,21 @@ constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
 constexpr double kNothing = -std::numeric_limits<double>::max();  // what a lane without a child holds
 constexpr std::size_t kFanout = kPackSize;
 
+// Room for so many and some more: of an index that is built again for some more entries the arrays then are as large,
+// and take the places of the former ones' instead of leaving them empty.
+std::size_t Roomy(std::size_t count) {
+  const std::size_t unit = std::bit_floor(count) / 8 + 1;
+  return (count / unit + 1) * unit;
+}
+
 }  // namespace
 
 class ObservationIndex::Builder {
  public:
   Builder(const Entries& entries, ObservationIndex& index)
-      : entries_(entries), index_(index), count_(entries.floors.size()), places_(count_) {
+      : entries_(entries), index_(index), count_(entries.floors.size()) {
+    places_.reserve(Roomy(count_));
+    places_.resize(count_);
     for (std::size_t i = 0; i < count_; ++i) places_[i].id = static_cast<std::uint32_t>(i);
     Arrange(0, count_);
     StoreBlocks();
@@ -78,6 +90,9 @@ class ObservationIndex::Builder {
 
   void StoreBlocks() {
     const std::size_t blocks = index_.num_leaves() * kLeafBlocks, k = entries_.num_coordinates;
+    index_.blocks_.reserve(Roomy(blocks) * index_.block_packs());
+    index_.ids_.reserve(Roomy(blocks) * kPackSize);
+    index_.nodes_.reserve(Roomy(index_.num_leaves() / (kFanout - 1) + kMaxHeight) * index_.node_packs());
     index_.blocks_.assign(blocks * index_.block_packs(), Pack{});
     index_.ids_.assign(blocks * kPackSize, kNone);
     for (std::size_t i = 0; i < blocks * kPackSize; ++i) {
@@ -175,16 +190,17 @@ double LargestValue(const ObservationIndex::Entries& entries) {
   return largest;
 }
 
-ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
-                                    const Observations& observations, int coordinate) {
+template <class Rows>
+ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration, const Rows& observations,
+                                    int coordinate) {
   const auto count = ToSize(observations.size());
   const double error = declaration.ObservationError(coordinate);
   using Shape = ObservationIndex::Shape;
-  ObservationIndex::Entries entries{row.has_patterns() ? Shape::kLifted : Shape::kBoxed,
-                                    row.num_coordinates(),
-                                    std::vector<double>(count * row.num_coordinates()),
-                                    {},
-                                    {}};
+  ObservationIndex::Entries entries{
+      row.has_patterns() ? Shape::kLifted : Shape::kBoxed, row.num_coordinates(), {}, {}, {}};
+  entries.coordinates.reserve(Roomy(count) * row.num_coordinates());
+  entries.coordinates.resize(count * row.num_coordinates());
+  entries.floors.reserve(Roomy(count)), entries.ceilings.reserve(Roomy(count));
   for (int i = 0; i < observations.size(); ++i) {
     row.Map([&](int l) { return observations.z(i, l); },
             entries.coordinates.data() + ToSize(i) * row.num_coordinates());
@@ -194,5 +210,8 @@ ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& 
   }
   return entries;
 }
+
+template ObservationIndex::Entries EntriesOf(const LipschitzRow&, const Declaration&, const Observations&, int);
+template ObservationIndex::Entries EntriesOf(const LipschitzRow&, const Declaration&, const ObservationRows&, int);
 
 }  // namespace forereach

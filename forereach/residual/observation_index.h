@@ -96,8 +96,10 @@ class ObservationIndex final {
 [[nodiscard]] double LargestValue(const ObservationIndex::Entries& entries);
 
 /** The entries of coordinate k = `coordinate`: floors r~_ik - eps_k and ceilings r~_ik + eps_k, rounded outward, with
-eps_k = Declaration::ObservationError, and their coordinates in plain arithmetic. */
+eps_k = Declaration::ObservationError, and their coordinates in plain arithmetic.
+@tparam Rows Observations or ObservationRows. */
+template <class Rows>
 [[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
-                                                  const Observations& observations, int coordinate);
+                                                  const Rows& observations, int coordinate);
 
 }  // namespace forereach

@@ -1,6 +1,7 @@
 #include "forereach/residual/observation_store.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -10,77 +11,32 @@
 #include "forereach/residual/retention.h"
 
 namespace forereach {
-namespace {
-
-std::span<const double> View(const Eigen::VectorXd& x) { return {x.data(), ToSize(x.size())}; }
-
-}  // namespace
 
 // One observation: d_z and n entries.
 struct ObservationStore::Entry {
   std::span<const double> z, lower, upper;
-
-  void WriteTo(Observations& observations, int row) const {
-    const auto write = [row](Eigen::MatrixXd& matrix, std::span<const double> values) {
-      matrix.row(row) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
-    };
-    write(observations.z, z);
-    write(observations.lower, lower);
-    write(observations.upper, upper);
-  }
-};
-
-// Observations and their ids, row by row.
-struct ObservationStore::Known {
-  Observations observations;
-  std::vector<int> ids;
-
-  // Room for so many rows of the sizes of others.
-  static Known WithRows(int rows, const Observations& like) {
-    const int n = like.num_states();
-    return {{Eigen::MatrixXd(rows, like.z.cols()), Eigen::MatrixXd(rows, n), Eigen::MatrixXd(rows, n)},
-            std::vector<int>(ToSize(rows))};
-  }
-
-  void Set(int row, int id, const Entry& entry) {
-    entry.WriteTo(observations, row);
-    ids[ToSize(row)] = id;
-  }
 };
 
 // An index and its tail. Entries of the tail below its size do not change any more, and neither does the index.
 struct ObservationStore::Generation {
-  Known indexed;
+  ObservationRows rows;  // those of the index, and behind them those of the tail
+  int indexed;
   LipschitzEnvelope envelope;
   EnvelopeTail tail;
-  Known in_tail;  // as many rows as the tail may hold
 
-  Generation(const Declaration& declaration, Known known, std::span<const double> lower, std::span<const double> upper,
-             const StoreOptions& options)
-      : indexed(std::move(known)),
-        envelope(declaration, indexed.observations, lower, upper, options.envelope),
-        tail(declaration, envelope, options.tail_capacity),
-        in_tail(Known::WithRows(options.tail_capacity, indexed.observations)) {}
-
-  // The index's observations, the first `tail_size` of the tail, and room for `more`.
-  [[nodiscard]] Known All(int tail_size, int more = 0) const {
-    const Observations &early = indexed.observations, &late = in_tail.observations;
-    Known all = Known::WithRows(early.size() + tail_size + more, early);
-    const auto join = [&](Eigen::MatrixXd Observations::*part) {
-      (all.observations.*part).topRows(early.size()) = early.*part;
-      (all.observations.*part).middleRows(early.size(), tail_size) = (late.*part).topRows(tail_size);
-    };
-    join(&Observations::z);
-    join(&Observations::lower);
-    join(&Observations::upper);
-    std::copy_n(in_tail.ids.begin(), tail_size, std::ranges::copy(indexed.ids, all.ids.begin()).out);
-    return all;
+  Generation(const Declaration& declaration, ObservationRows known, std::span<const double> lower,
+             std::span<const double> upper, const StoreOptions& options)
+      : rows(std::move(known)),
+        indexed(rows.size()),
+        envelope(declaration, rows, lower, upper, options.envelope),
+        tail(declaration, envelope, options.tail_capacity) {
+    rows.Reserve(options.tail_capacity);
   }
 
   [[nodiscard]] bool HasRoom() const { return tail.size() < tail.capacity(); }
 
   void Append(int id, const Entry& entry) {
-    in_tail.Set(tail.size(), id, entry);
+    rows.Append(id, entry.z, entry.lower, entry.upper);
     tail.Append(entry.z, entry.lower, entry.upper);
   }
 };
@@ -89,11 +45,11 @@ void ObservationStore::Snapshot::Enclose(const QuerySet& query, ResidualBounds& 
   generation_->envelope.Enclose(query, generation_->tail, tail_size_, bounds);
 }
 
-std::size_t ObservationStore::Snapshot::size() const { return generation_->indexed.ids.size() + ToSize(tail_size_); }
+std::size_t ObservationStore::Snapshot::size() const { return ToSize(generation_->indexed + tail_size_); }
 
 std::vector<int> ObservationStore::Snapshot::ids() const {
-  std::vector<int> ids = generation_->indexed.ids;
-  ids.insert(ids.end(), generation_->in_tail.ids.begin(), generation_->in_tail.ids.begin() + tail_size_);
+  std::vector<int> ids(size());
+  for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = generation_->rows.id(static_cast<int>(i));
   std::ranges::sort(ids);
   return ids;
 }
@@ -116,13 +72,16 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
     throw std::invalid_argument("observation store: max_observations must be at least 1");
   options_.envelope.value_headroom = kValueHeadroom;
   next_id_ = observations.size();
-  std::vector<int> ids(ToSize(next_id_));
-  std::iota(ids.begin(), ids.end(), 0);
+  ObservationRows rows(static_cast<int>(observations.z.cols()), observations.num_states());
+  const auto entries = [](const Eigen::RowVectorXd& row) { return std::vector<double>(row.begin(), row.end()); };
+  for (int i = 0; i < next_id_; ++i)
+    rows.Append(i, entries(observations.z.row(i)), entries(observations.lower.row(i)),
+                entries(observations.upper.row(i)));
   // Where not all are kept, the contradiction has to be known before: Build then keeps all.
-  const bool keeps_all = ids.size() <= options_.max_observations;
+  const bool keeps_all = ToSize(next_id_) <= options_.max_observations;
   if (!keeps_all) violation_ = FindViolation(declaration_, observations);
-  current_ = Build({observations, std::move(ids)});
-  if (keeps_all) violation_ = FindViolation(declaration_, current_->indexed.observations, &current_->envelope);
+  current_ = Build(std::move(rows));
+  if (keeps_all) violation_ = FindViolation(declaration_, observations, &current_->envelope);
 }
 
 ObservationStore::~ObservationStore() = default;
@@ -151,15 +110,16 @@ void ObservationStore::Swap(std::shared_ptr<Generation> generation) {
   current_.swap(generation);  // the old one is destroyed after the lock is released, unless a snapshot holds it
 }
 
-std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Known known) const {
+std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(ObservationRows rows) const {
   // A contradiction must not be forgotten for want of room.
-  if (known.ids.size() > options_.max_observations && !Violated()) {
-    const std::vector<int> kept = MostUseful(declaration_, known.observations, options_.max_observations);
-    known.observations = Select(known.observations, kept);
-    for (std::size_t i = 0; i < kept.size(); ++i) known.ids[i] = known.ids[ToSize(kept[i])];
-    known.ids.resize(kept.size());
+  if (ToSize(rows.size()) > options_.max_observations && !Violated()) {
+    std::vector<int> all(ToSize(rows.size()));
+    std::iota(all.begin(), all.end(), 0);
+    ObservationRows kept = rows.First(0);
+    for (const int i : MostUseful(declaration_, rows.Select(all), options_.max_observations)) kept.Append(rows, i);
+    rows = std::move(kept);
   }
-  return std::make_shared<Generation>(declaration_, std::move(known), domain_lower_, domain_upper_, options_);
+  return std::make_shared<Generation>(declaration_, std::move(rows), domain_lower_, domain_upper_, options_);
 }
 
 void ObservationStore::Compact() {
@@ -173,18 +133,18 @@ void ObservationStore::Compact() {
   }
   // Built without the lock, so that others may insert. Generations are swapped under compacting_ alone, so `old` stays
   // the one that they append to.
-  std::shared_ptr<Generation> fresh = Build(old->All(merged));
+  const ObservationRows& rows = old->rows;
+  std::shared_ptr<Generation> fresh = Build(rows.First(old->indexed + merged));
   const std::lock_guard writing(writing_);
   // Entries that were inserted during Build.
   const int size = old->tail.size();
-  const Observations& tail = old->in_tail.observations;
   for (int i = merged; i < size; ++i) {
-    const Eigen::VectorXd z = tail.z.row(i), lower = tail.lower.row(i), upper = tail.upper.row(i);
-    if (!fresh->tail.Covers(View(lower), View(upper))) {  // rare enough to wait for
-      fresh = Build(old->All(size));
+    const int row = old->indexed + i;
+    if (!fresh->tail.Covers(rows.lower(row), rows.upper(row))) {  // rare enough to wait for
+      fresh = Build(rows.First(rows.size()));
       break;
     }
-    fresh->Append(old->in_tail.ids[ToSize(i)], {View(z), View(lower), View(upper)});
+    fresh->Append(rows.id(row), {rows.z(row), rows.lower(row), rows.upper(row)});
   }
   Swap(std::move(fresh));
 }
@@ -221,7 +181,7 @@ class ObservationStore::PartnerSearch {
     if (!std::isfinite(margin) || !generation_.tail.Covers(entry_.lower, entry_.upper)) return TestAll(k);
     const Point point = PointIn(k);
     const PairSearch search(generation_.envelope.index(k), margin, store_.options_.envelope.instructions);
-    if (search.AnyPartner(point, [&](std::uint32_t j) { return TestIndexed(static_cast<int>(j), k); })) return true;
+    if (search.AnyPartner(point, [&](std::uint32_t j) { return Test(static_cast<int>(j), k); })) return true;
     std::vector<std::uint32_t> partners;
     PairSearch::Suspects(point, generation_.envelope.row(k), generation_.tail.blocks(k),
                          ToSize(generation_.tail.size()), margin, partners);
@@ -229,30 +189,29 @@ class ObservationStore::PartnerSearch {
   }
 
   bool TestAll(int k) {
-    for (int j = 0; j < generation_.indexed.observations.size(); ++j)
-      if (TestIndexed(j, k)) return true;
-    for (int j = 0; j < generation_.tail.size(); ++j)
-      if (TestInTail(j, k)) return true;
+    for (int row = 0; row < generation_.rows.size(); ++row)
+      if (Test(row, k)) return true;
     return false;
   }
 
-  bool TestIndexed(int j, int k) { return Test(generation_.indexed, j, k); }
-  bool TestInTail(int j, int k) { return Test(generation_.in_tail, j, k); }
+  bool TestInTail(int j, int k) { return Test(generation_.indexed + j, k); }
 
-  bool Test(const Known& others, int j, int k) {
-    if (is_consistent_ && IsWithin(others.observations, j, k)) return true;
-    Observations two = Select(others.observations, {j, j});
-    entry_.WriteTo(two, 1);
-    found_ = TestPair(store_.declaration_, two, 0, 1, k);
+  bool Test(int row, int k) {
+    const ObservationRows& rows = generation_.rows;
+    if (is_consistent_ && IsWithin(rows, row, k)) return true;
+    ObservationRows two = rows.First(0);
+    two.Append(rows, row);
+    two.Append(id_, entry_.z, entry_.lower, entry_.upper);
+    found_ = TestPair(store_.declaration_, two.Select(std::array{0, 1}), 0, 1, k);
     if (!found_) return false;
-    found_->first = others.ids[ToSize(j)];
+    found_->first = rows.id(row);
     found_->second = id_;
     return true;
   }
 
   // Whether this entry contradicts only what observation j contradicts: it has the same location in the columns of the
   // row, and a residual that contains j's.
-  [[nodiscard]] bool IsWithin(const Observations& o, int j, int k) const {
+  [[nodiscard]] bool IsWithin(const ObservationRows& o, int j, int k) const {
     return entry_.lower[ToSize(k)] <= o.lower(j, k) && o.upper(j, k) <= entry_.upper[ToSize(k)] &&
            std::ranges::all_of(generation_.envelope.row(k).columns(), [&](const LipschitzRow::Column& column) {
              return entry_.z[ToSize(column.variable)] == o.z(j, column.variable);
@@ -300,8 +259,8 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
     const std::lock_guard again(writing_);
     // Too large for the error bound of the index: into a new one at once.
     const Insertion insertion = Enlist(entry);
-    Known all = current_->All(current_->tail.size(), 1);
-    all.Set(all.observations.size() - 1, insertion.id, entry);
+    ObservationRows all = current_->rows.First(current_->rows.size());
+    all.Append(insertion.id, z, lower, upper);
     Swap(Build(std::move(all)));
     return insertion;
   }

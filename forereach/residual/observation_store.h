@@ -18,14 +18,15 @@ budget, not a removal. */
 #include "forereach/residual/consistency.h"
 #include "forereach/residual/envelope_tail.h"
 #include "forereach/residual/lipschitz_envelope.h"
+#include "forereach/residual/observation_rows.h"
 
 namespace forereach {
 
 struct StoreOptions {
   /** Observations in the tail until an index has to be built, 1 to EnvelopeTail::kMaxCapacity. A query looks at all. */
   int tail_capacity = 256;
-  /** Observations an index may hold, at least 1: memory is about 16 (d_z + n) bytes for each and what ObservationIndex
-  states. When Compact finds more, it keeps those that attain the envelope, MostUseful. */
+  /** Observations an index may hold, at least 1: memory is 8 (d_z + 2 n + 1) bytes for each, and what ObservationIndex
+  states, twice while one is built. When Compact finds more, it keeps those that attain the envelope, MostUseful. */
   std::size_t max_observations = 10'000'000;
   EnvelopeOptions envelope;  ///< value_headroom is set by the store.
 };
@@ -33,7 +34,6 @@ struct StoreOptions {
 class ObservationStore final {
  private:
   struct Entry;
-  struct Known;
   struct Generation;
   class PartnerSearch;
 
@@ -84,7 +84,7 @@ class ObservationStore final {
   [[nodiscard]] int tail_size() const;
 
  private:
-  std::shared_ptr<Generation> Build(Known known) const;
+  std::shared_ptr<Generation> Build(ObservationRows rows) const;
   Insertion Enlist(const Entry& entry);
   bool Violated() const;
   void Swap(std::shared_ptr<Generation> generation);

@@ -355,6 +355,28 @@ TEST(ObservationStore, CompactKeepsAContradictionThatArrivesWhileItBuilds) {
   }
 }
 
+TEST(GrowingRows, ASnapshotStaysAndSharesWhatIsFull) {
+  GrowingRows rows(2);
+  const auto append = [](GrowingRows& to, double value) { std::ranges::fill(to.Append(), value); };
+  for (int i = 0; i < 600; ++i) append(rows, i);
+  for (const std::size_t count : {0, 1, 255, 256, 257, 512, 600}) {
+    GrowingRows first = rows.First(count);
+    append(first, -1);
+    append(rows, -2);
+    EXPECT_FIELDS(first, (size(), count + 1), (operator[](count)[1], -1));
+    for (std::size_t i = 0; i < 600; ++i) ASSERT_EQ(rows[i][0], i) << count;
+    for (std::size_t i = 0; i < count; ++i)
+      ASSERT_EQ(&first[i][0] == &rows[i][0], i < count / 256 * 256) << i << " of " << count;
+    EXPECT_EQ(rows[rows.size() - 1][0], -2);
+  }
+  GrowingRows reserved(2);
+  reserved.Reserve(257);
+  append(reserved, 0);
+  const double* const begin = &reserved[0][0];
+  for (int i = 1; i < 1000; ++i) append(reserved, i);
+  EXPECT_EQ(&reserved[0][0], begin) << "rows do not move";
+}
+
 // With a contradiction among them nothing is dropped for want of room, however often the index is built anew.
 TEST(ObservationStore, AContradictionOutlivesAnyNumberOfCompactions) {
   for (TracedRandom random(813); random.Again(20);) {

@@ -344,6 +344,21 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
               Contains(HasSubstr("transitions that had been learned are not in the log")));
 }
 
+// As in logs of before, when a task without a clock learned steps of any duration.
+TEST_F(ReplayTest, SaysWhichTransitionsAreNotLearnedAnyMore) {
+  const std::string log = Edited([](LogEvent& event) {
+    if (auto transition = Decoded<transition_t>(event.data)) {
+      transition->duration_us += 30'000;
+      event.data = Encode(*transition);
+    }
+    return true;
+  });
+  EXPECT_THAT(Replay({log}, {LoadConfig(kCourseTask)}).differences,
+              Contains(AllOf(HasSubstr("it rests on transitions that this release does not learn"),
+                             HasSubstr(": the step lasted 130000 us, further from model.dt, 0.1 s"),
+                             HasSubstr("the release that recorded the log can replay it"))));
+}
+
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
 // the certifier itself began after them.
 TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {

@@ -183,6 +183,24 @@ TEST(HandMade, ASliceWithoutItsLastBitIsRefuted) {
   }
 }
 
+// Of so many transitions not all are kept in 256 bits. The last one alone says that the residual is known to kTiny.
+TEST(HandMade, TheLastOfManyTransitionsCountsToItsLastBit) {
+  const auto problem = Halves();
+  const Eigen::Index count = 17'000;
+  Transitions& data = problem->transitions;
+  const Eigen::RowVectorXd z = data.z.row(0), next = data.x_next.row(0);
+  data.z = Eigen::RowVectorXd::Ones(6).replicate(count, 1);
+  data.x_next = Eigen::RowVector4d(1.625, 1.625, 1.5, 1.5).replicate(count, 1);
+  data.z.row(count - 1) = z, data.x_next.row(count - 1) = next;
+  ExpectConfirmed(Judge(problem, OneStep()));
+  Certificate certificate = OneStep();
+  certificate.slices[1].upper[0] = Down(certificate.slices[1].upper[0]);
+  ExpectRefuted(Judge(problem, certificate), 1, "hull");
+  certificate = OneStep();
+  certificate.known = {.base = static_cast<int>(count) - 1};
+  ExpectRefuted(Judge(problem, certificate), 1, "hull");
+}
+
 TEST(HandMade, DomainIsClosed) {
   const auto problem = Halves();
   problem->domain.state = Box(Eigen::Vector4d::Constant(-1), Eigen::Vector4d::Constant(1));

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <memory>
+#include <optional>
 #include <span>
-#include <vector>
+
+#include "forereach/residual/growing_rows.h"
 
 namespace forereach {
 
@@ -18,25 +19,21 @@ class LearnedTransitions final {
     double longer;                    ///< ExecutedTransition::longer
   };
 
-  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] std::size_t size() const { return rows_ ? rows_->size() : 0; }
   [[nodiscard]] Each operator[](std::size_t i) const {
-    const std::span<const double> row(blocks_[i / kBlock].get() + i % kBlock * width_, width_);
-    return {row.first(num_variables_), row.subspan(num_variables_, width_ - num_variables_ - 1), row.back()};
+    const std::span<const double> row = (*rows_)[i];
+    return {row.first(num_variables_), row.subspan(num_variables_, row.size() - num_variables_ - 1), row.back()};
   }
 
   /** @pre as many numbers as the first. */
   void Add(std::span<const double> z, std::span<const double> next, double longer) {
-    if (size_ == 0) num_variables_ = z.size(), width_ = z.size() + next.size() + 1;
-    if (size_ % kBlock == 0) blocks_.push_back(std::make_unique_for_overwrite<double[]>(kBlock * width_));
-    double* const row = blocks_.back().get() + size_++ % kBlock * width_;
-    *std::ranges::copy(next, std::ranges::copy(z, row).out).out = longer;
+    if (!rows_) num_variables_ = z.size(), rows_.emplace(z.size() + next.size() + 1);
+    *std::ranges::copy(next, std::ranges::copy(z, rows_->Append().begin()).out).out = longer;
   }
 
  private:
-  static constexpr std::size_t kBlock = 256;
-
-  std::size_t num_variables_ = 0, width_ = 0, size_ = 0;
-  std::vector<std::unique_ptr<double[]>> blocks_;
+  std::size_t num_variables_ = 0;
+  std::optional<GrowingRows> rows_;
 };
 
 }  // namespace forereach
