@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <deque>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -17,6 +18,7 @@ namespace forereach {
 namespace {
 
 constexpr double kLongestSeconds = 1e9;
+constexpr std::int64_t kMostHeldBytes = 64 << 20;
 
 // A whole text as a number.
 template <class Number>
@@ -97,18 +99,14 @@ std::int64_t FirstUtime(const std::vector<std::string>& logs) {
   return 0;
 }
 
+bool IsDecision(const MessageSummary& summary) { return summary.type == "decision_t"; }
+
 class Selector final {
  public:
   Selector(const LogSelection& selection, const std::vector<std::string>& logs) : selection_(selection) {
     const std::int64_t first = selection.from.empty() && selection.to.empty() ? 0 : FirstUtime(logs);
     if (!selection.from.empty()) from_ = ParseLogTime(selection.from, first);
     if (!selection.to.empty()) to_ = ParseLogTime(selection.to, first);
-    if (selection.outcome.empty()) return;
-    LogEditResult ignored;
-    ForEachInOrder(logs, {}, ignored, [this](const Source& source) {
-      const auto summary = Summarize(source.event().message());
-      if (summary && summary->type == "decision_t" && summary->what == selection_.outcome) plans_.insert(summary->plan);
-    });
   }
 
   [[nodiscard]] bool Takes(const LogEvent& event, const std::optional<MessageSummary>& summary) const {
@@ -119,14 +117,70 @@ class Selector final {
     if (selection_.outcome.empty()) return true;
     if (!summary || !summary->is_of_plan) return !selection_.drops_others;
     // Of a candidate that came twice, each decision has an outcome of its own.
-    if (summary->type == "decision_t" && summary->what != selection_.outcome) return false;
-    return plans_.contains(summary->plan);
+    return !IsDecision(*summary) || summary->what == selection_.outcome;
   }
 
  private:
   const LogSelection& selection_;
   std::optional<std::int64_t> from_, to_;
-  std::set<Digest> plans_;
+};
+
+// Passes chosen events on in their order. With an outcome, what is about a plan waits for the decision on it.
+class Queue final {
+ public:
+  Queue(const LogSelection& selection, const LogUser& user, std::int64_t& passed)
+      : outcome_(selection.outcome), user_(user), passed_(passed) {}
+
+  // Also of an event that was not chosen.
+  void Heed(const MessageSummary& summary) {
+    if (outcome_.empty() || !IsDecision(summary)) return;
+    const bool has_outcome = summary.what == outcome_;
+    if (has_outcome) plans_.insert(summary.plan);
+    for (Held& held : held_)
+      if (held.waits && held.summary->plan == summary.plan) held.waits = false, held.goes = has_outcome;
+    PassOn();
+  }
+  void Add(const LogEvent& event, const std::optional<MessageSummary>& summary, const std::string& log) {
+    const bool is_in_question = !outcome_.empty() && summary && summary->is_of_plan && !plans_.contains(summary->plan);
+    const bool waits = is_in_question && summary->type != "advice_t";  // which is given after the decision
+    if (is_in_question && !waits) return;
+    if (held_.empty() && !waits) return Pass(event, summary, log);
+    held_.push_back({event, summary, log, waits, !waits});
+    bytes_ += RecordBytes(event);
+    while (bytes_ > kMostHeldBytes) PassFirst(), PassOn();
+  }
+  void End() {
+    while (!held_.empty()) PassFirst();
+  }
+
+ private:
+  struct Held {
+    LogEvent event;
+    std::optional<MessageSummary> summary;
+    std::string log;
+    bool waits, goes;
+  };
+
+  void PassOn() {
+    while (!held_.empty() && !held_.front().waits) PassFirst();
+  }
+  void PassFirst() {
+    const Held first = std::move(held_.front());
+    held_.pop_front();
+    bytes_ -= RecordBytes(first.event);
+    if (first.goes) Pass(first.event, first.summary, first.log);
+  }
+  void Pass(const LogEvent& event, const std::optional<MessageSummary>& summary, const std::string& log) {
+    ++passed_;
+    user_.on_event(event, summary, log);
+  }
+
+  const std::string& outcome_;
+  const LogUser& user_;
+  std::int64_t& passed_;
+  std::set<Digest> plans_;  // with the outcome
+  std::deque<Held> held_;   // the first of them waits
+  std::int64_t bytes_ = 0;
 };
 
 }  // namespace
@@ -151,14 +205,15 @@ LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection&
   RequireLogs(logs);
   const Selector selector(selection, logs);
   LogEditResult result;
+  Queue queue(selection, user, result.chosen);
   const auto visit = [&](const Source& source) {
     if (result.channels.size() < LogEditResult::kMostChannels) result.channels.insert(source.event().channel);
     const auto summary = Summarize(source.event().message());
-    if (!selector.Takes(source.event(), summary)) return;
-    ++result.chosen;
-    user.on_event(source.event(), summary, source.path());
+    if (summary) queue.Heed(*summary);
+    if (selector.Takes(source.event(), summary)) queue.Add(source.event(), summary, source.path());
   };
   (sequence == LogSequence::kByTime ? ForEachByTime : ForEachInOrder)(logs, user.on_damage, result, visit);
+  queue.End();
   RequireChannels(selection, result.channels);
   return result;
 }

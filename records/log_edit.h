@@ -22,8 +22,8 @@ without a final Z), or "+12.5", seconds after the first event of the logs.
 struct LogSelection {
   std::string from, to;                 ///< As for ParseLogTime; from <= event < to. Empty: no bound.
   std::vector<std::string> channels{};  ///< Empty: all.
-  /** The name of an outcome: candidates, decisions and certified plans only of plans that were decided so. Empty: all.
-   */
+  /** The name of an outcome: candidates, decisions and certified plans only of plans that were decided so, by the next
+  decision on the plan within 64 MiB or by one before. Empty: all. */
   std::string outcome;
   bool drops_others = false;  ///< With an outcome: messages that are not about a plan, too.
 };
@@ -54,7 +54,8 @@ struct LogEditResult {
 enum class LogSequence { kAsNamed, kByTime };
 
 /** Reads logs, one behind the other or merged by time. Merged events of one log keep their order, also where its clock
-went back. Memory: one event of each log that is open, and 32 bytes for each plan with the outcome.
+went back. Memory: one event of each log that is open; with an outcome 32 bytes for each plan with it, and the events
+from the first whose plan is not decided.
 @throws LogError if a log cannot be read, is named twice or is of another kind; if a time cannot be read; at the end, if
 no event has a channel that was chosen. */
 [[nodiscard]] LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection& selection,

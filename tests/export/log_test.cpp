@@ -83,6 +83,68 @@ TEST_F(LogTest, ACutByOutcomeKeepsTheRest) {
             std::ranges::count_if(ReadLog(kCourseLog).events, is_other));
 }
 
+// A plan's messages are chosen by its decision, wherever that is, and stay in their order.
+TEST_F(LogTest, AnOutcomeIsThatOfADecisionBeforeOrBehind) {
+  const auto kept = [&](const auto& order) {
+    std::vector<LogEvent> events = ReadLog(kCourseLog).events;
+    std::ranges::stable_sort(events, {},
+                             [&](const LogEvent& event) { return order(event.channel == "PLAN_DECISION"); });
+    const std::string log = scratch_ / "reordered.lcmlog", out = scratch_ / "out.lcmlog";
+    std::filesystem::remove(log);
+    EventLogWriter writer(log);
+    for (const LogEvent& event : events) writer.Append(event.utime, event.channel, event.data);
+    EXPECT_TRUE(writer.Flush());
+    EXPECT_EQ(Log("filter '" + log + "' --outcome abstain_safety -o '" + out + "'").code, 0);
+    std::multiset<std::vector<std::uint8_t>> messages;
+    std::int64_t number = -1;
+    for (const LogEvent& event : ReadLog(out).events) {
+      EXPECT_LT(std::exchange(number, event.number), event.number);
+      messages.insert(event.data);
+    }
+    std::filesystem::remove(out);
+    return messages;
+  };
+  const auto as_recorded = kept([](bool) { return 0; });
+  EXPECT_GT(as_recorded.size(), 20u);
+  EXPECT_EQ(kept([](bool is_decision) { return is_decision ? 1 : 0; }), as_recorded) << "decisions last";
+  EXPECT_EQ(kept([](bool is_decision) { return is_decision ? 0 : 1; }), as_recorded) << "decisions first";
+}
+
+// Without a decision a candidate has no outcome, and with two that of the first behind it or of any before it.
+TEST_F(LogTest, AnOutcomeOfACandidateThatComesTwice) {
+  const std::vector<LogEvent> course = ReadLog(kCourseLog).events;
+  const auto certified = std::ranges::find_if(course, [](const LogEvent& event) {
+    const auto decision = Decoded<decision_t>(event.data);
+    return decision && decision->outcome == decision_t::CERTIFIED;
+  });
+  decision_t decision = *Decoded<decision_t>(certified->data);
+  const auto candidate = std::ranges::find_if(course, [&](const LogEvent& event) {
+    return event.channel == "PLAN_CANDIDATE" && PlanDigest(Bytes(event.data)) == GetDigest(decision.plan_digest);
+  });
+  const std::string log = scratch_ / "twice.lcmlog";
+  EventLogWriter writer(log);
+  const auto append = [&](const LogEvent& event, const std::vector<std::uint8_t>& data) {
+    writer.Append(event.utime, event.channel, data);
+  };
+  append(*candidate, candidate->data);  // 0
+  append(*certified, certified->data);
+  append(*candidate, candidate->data);  // 2
+  decision.outcome = decision_t::REJECTED;
+  append(*certified, Encode(decision));
+  append(*candidate, candidate->data);  // 4, without a decision
+  EXPECT_TRUE(writer.Flush());
+  const auto numbers = [&](const std::string& outcome) {
+    std::istringstream lines(Log("list '" + log + "' --json --outcome " + outcome + " 2>/dev/null").text);
+    std::vector<int> found;
+    for (std::string line; std::getline(lines, line);)
+      found.push_back(nlohmann::json::parse(line)["event_number"].get<int>());
+    return found;
+  };
+  EXPECT_THAT(numbers("certified"), ElementsAre(0, 1, 2, 4));
+  EXPECT_THAT(numbers("rejected"), ElementsAre(2, 3, 4));
+  EXPECT_THAT(numbers("abstain_domain"), IsEmpty());
+}
+
 TEST_F(LogTest, AFilterKeepsTheChosenAlone) {
   const std::string out = scratch_ / "out.lcmlog";
   EXPECT_EQ(Log("filter '" + kCourseLog + "' --outcome certified -o '" + out + "'").code, 0);
