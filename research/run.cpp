@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "forereach/numerics/size.h"
 #include "research/run_directory.h"
 #include "task/files.h"
 #include "task/json_text.h"
@@ -125,8 +126,9 @@ fs::path FileOf(const Cell& cell) { return fs::path("cells") / (cell.key() + ".j
 fs::path DefaultDirectory(bool quick) { return quick ? "run/research-quick" : "run/research"; }
 
 void RunShard(const RunOptions& options, int index, int count, const fs::path& file) {
-  std::vector<Cell> own = CellsOf(options);
-  std::erase_if(own, [&, number = 0](const Cell&) mutable { return number++ % count != index; });
+  const std::vector<Cell> all = CellsOf(options);
+  std::vector<Cell> own;
+  for (std::size_t i = ToSize(index); i < all.size(); i += ToSize(count)) own.push_back(all[i]);
   const RunDirectory directory(file.string() + ".cells", options.effort);
   static_cast<void>(RunAll(own, directory, options.threads));
   Json shard{{"run", JsonOf(options, count)}, {"shard", index}, {"cells", Json::object()}};

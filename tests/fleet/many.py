@@ -103,7 +103,9 @@ try:
     server = start(*as_nobody, programs[-1] / 'postgres', '-D', server_of / 'data', '-k', server_of, '-c', 'listen_addresses=', out=open(directory / 'server.log', 'w'))
     store = f'postgresql:///postgres?host={server_of}&user=owner'
     ask = lambda query: run(programs[-1] / 'psql', '-X', '-q', '-At', '-v', 'ON_ERROR_STOP=1', store, '-c', query)[0].strip()
-    while subprocess.run([programs[-1] / 'pg_isready', '-q', '-h', server_of]).returncode:
+    for _ in range(300):
+        if subprocess.run([programs[-1] / 'pg_isready', '-q', '-h', server_of]).returncode == 0:
+            break
         time.sleep(0.1)
 
     def ingest(robot):
