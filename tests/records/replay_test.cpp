@@ -3,6 +3,7 @@
 #include "records/replay.h"
 #include "certifier/gate/gate.h"
 #include "certifier/gate/plan_ledger.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/seal.h"
 #include "records/record_reader.h"
@@ -363,21 +364,24 @@ TEST_F(ReplayTest, SaysWhichTransitionsAreNotLearnedAnyMore) {
 // the certifier itself began after them.
 TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
   const Config config = SmallTaskOnTheBus();
-  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}, kNow);
-  for (const std::int64_t heartbeat : {0, 7}) {
-    certifier_status_t status{};
-    status.sequence = heartbeat;
-    const std::string path = Written([&](EventLogWriter& writer) {
-      LoggedGate gate{config, writer};
-      if (heartbeat > 0)
-        gate.Hear(Encode(on_the_way));
-      else  // before this certifier's start
-        writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
-      gate.Say(status);
-      gate.Decide(Candidate(1), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
-    });
-    ExpectAgreed(path, config, 1);
-  }
+  const GridMap map{0.5, {1, 0}, 0, 2, 1, {true, false}, true};
+  for (const Obstacle& there :
+       {Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3), Obstacle::Grid(std::make_shared<const OccupancyGrid>(map))})
+    for (const std::int64_t heartbeat : {0, 7}) {
+      const obstacles_t on_the_way = ToMessage({there}, kNow);
+      certifier_status_t status{};
+      status.sequence = heartbeat;
+      const std::string path = Written([&](EventLogWriter& writer) {
+        LoggedGate gate{config, writer};
+        if (heartbeat > 0)
+          gate.Hear(Encode(on_the_way));
+        else  // before this certifier's start
+          writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
+        gate.Say(status);
+        gate.Decide(Candidate(1), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
+      });
+      ExpectAgreed(path, config, 1);
+    }
 }
 
 // What was heard before a reload counts after it, beside the task's own.
