@@ -33,6 +33,7 @@ struct Span {
   [[nodiscard]] double middle() const { return lower + (upper - lower) / 2; }
   // Of both sides of the middle, the larger one.
   [[nodiscard]] double half() const { return std::max(SubUp(upper, middle()), SubUp(middle(), lower)); }
+  friend bool operator==(const Span&, const Span&) = default;
 };
 
 // ---- Elements with their places
@@ -195,7 +196,7 @@ class ObstacleReader {
     const XmlElement* const shape = at.Find("shape");
     if (const XmlElement* state = at.Find("initialState"); state && shape)
       motion.push_back(AtState(shapes_.Read(*shape), *state));
-    const std::size_t known = motion.size();
+    std::size_t known = motion.size();
     if (const XmlElement* trajectory = at.Find("trajectory")) {
       const std::vector<Convex> parts = shapes_.Read(in_.Require(at, "shape"));
       for (const XmlElement* state : trajectory->All("state")) motion.push_back(AtState(parts, *state));
@@ -204,6 +205,13 @@ class ObstacleReader {
       for (const XmlElement* each : set->All("occupancy"))
         motion.push_back({in_.Interval(in_.Require(*each, "time"), -kLastStep, kLastStep),
                           shapes_.Read(in_.Require(*each, "shape"))});
+    // A set that begins with the state covers what both do then.
+    if (known == 1 && motion.size() > 1 && motion[0].time == motion[1].time) {
+      std::ranges::copy(motion[0].parts, std::back_inserter(motion[1].parts));
+      motion[1].yaw = motion[0].yaw;
+      motion.erase(motion.begin());
+      known = 0;
+    }
     if (motion.empty()) in_.Fail(at, "has no state and no occupancy");
     if (motion.size() == known) {
       world_.notes.push_back("No prediction of " + name + ": it is taken to stand where it is.");
@@ -214,25 +222,33 @@ class ObstacleReader {
 
   // The last step of the first prediction that ends.
   [[nodiscard]] const std::optional<double>& first_end() const { return first_end_; }
+  // How many states do not say which way the obstacle looks.
+  [[nodiscard]] int headless() const { return headless_; }
 
  private:
-  [[nodiscard]] Occupancy AtState(const std::vector<Convex>& shape, const XmlElement& state) const {
+  [[nodiscard]] Occupancy AtState(const std::vector<Convex>& shape, const XmlElement& state) {
     Occupancy at;
     if (const XmlElement* time = state.Find("time")) at.time = in_.Interval(*time, -kLastStep, kLastStep);
     const XmlElement& position = in_.Require(state, "position");
     const XmlElement* const orientation = state.Find("orientation");
-    const Span yaw = orientation ? in_.Interval(*orientation, -kMostTurned, kMostTurned) : Span{};
-    if (!orientation && std::ranges::any_of(shape, [](const Convex& part) { return part.points.size() > 1; }))
-      in_.Fail(state, "has no orientation");
+    const Span yaw =
+        orientation ? in_.Interval(*orientation, -kMostTurned, kMostTurned) : Span{-std::numbers::pi, std::numbers::pi};
     PlanePoint middle;
     const double uncertain = PositionOf(position, middle);
     at.yaw = yaw;
+    bool turns = false;
     for (const Convex& part : shape) {
+      turns |= part.points.size() > 1 || part.points.front() != PlanePoint{};
+      if (!orientation) {  // around the position, whichever way it looks
+        at.parts.push_back({{middle}, AddUp(part.Reach(), uncertain)});
+        continue;
+      }
       Convex placed = PlacedConvex(part, {middle.x, middle.y, yaw.middle()});
       placed.own_reach = part.Reach();
       placed.radius = AddUp(placed.radius, AddUp(uncertain, MulUp(part.Reach(), yaw.half())));
       at.parts.push_back(std::move(placed));
     }
+    headless_ += !orientation && turns ? 1 : 0;
     return at;
   }
 
@@ -320,6 +336,7 @@ class ObstacleReader {
   const int steps_per_window_;
   World& world_;
   std::optional<double> first_end_;
+  int headless_ = 0;
 };
 
 // ---- The road
@@ -469,6 +486,10 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
       "The boundary: bounds of lanelets without a neighbour there; {} segments inside another lanelet are left out. "
       "Lanelets have open ends, and a change to a neighbour's lane in the other direction is allowed.",
       road.inside()));
+  if (obstacles.headless() > 0)
+    world.notes.push_back(
+        fmt::format("{} states have no orientation: there an obstacle covers what it does whichever way it looks.",
+                    obstacles.headless()));
   if (obstacles.first_end())
     world.notes.push_back(fmt::format(
         "Windows are seconds from time step 0, of {} s. From one state to the next, an obstacle is taken to move on a "

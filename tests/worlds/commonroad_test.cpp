@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "task/config_error.h"
+#include "tests/oracle/traced_random.h"
 #include "tests/test.h"
 #include "tests/worlds/in_pieces.h"
 
@@ -105,6 +106,50 @@ TEST_F(CommonRoadTest, WhatStandsIsItsShapeAtItsState) {
   EXPECT_EQ(world.pieces[0].name, "staticObstacle 3");
   EXPECT_EQ(world.pieces[0].obstacle.name(), "staticObstacle_3");
   EXPECT_THAT(ObstaclesText(world, "any"), HasSubstr("  # staticObstacle 3\n      name: staticObstacle_3\n"));
+}
+
+// As of a point mass: on each of these ways, looking anywhere, a corner may be anywhere around the position.
+TEST_F(CommonRoadTest, AStateWithoutOrientationIsCoveredWhicheverWayItLooks) {
+  const auto state = [](const char* name, double x, int step) {
+    return fmt::format("<{0}><position><point><x>{1}</x><y>0</y></point></position>{2}</{0}>", name, x,
+                       Exact("time", step));
+  };
+  const std::string car = std::string("<dynamicObstacle id=\"1\">") + kCar;
+  const World world = Scenario(car + State("initialState", 0, 0, 0, 0) + "<trajectory>" + state("state", 10, 1) +
+                               state("state", 20, 2) + "</trajectory></dynamicObstacle>");
+  EXPECT_THAT(world.notes, Contains(HasSubstr("2 states have no orientation")));
+  for (TracedRandom random(1); random.Again(500);) {
+    const double along = random.Uniform(0, 2), yaw = random.Uniform(-4, 4);
+    // From the first state on it turns evenly.
+    const double turned = along < 1 ? along * std::remainder(yaw, 2 * std::numbers::pi) : yaw;
+    for (const double u : {-2.0, 2.0})
+      for (const double v : {-1.0, 1.0}) {
+        const double x = 10 * along + std::cos(turned) * u - std::sin(turned) * v,
+                     y = std::sin(turned) * u + std::cos(turned) * v;
+        EXPECT_TRUE(Contains(world, At(x, y), 0.1 * along)) << along << " " << turned;
+      }
+  }
+  EXPECT_FALSE(Contains(world, At(20, 2.3), 0.2)) << "the disc's radius is sqrt(5)";
+  EXPECT_TRUE(Contains(Scenario("<staticObstacle id=\"1\"><shape><circle><radius>1</radius><center><x>3</x><y>0</y>"
+                                "</center></circle></shape>" +
+                                state("initialState", 0, 0) + "</staticObstacle>"),
+                       At(0, -3.99)))
+      << "a circle beside its origin turns, too";
+}
+
+TEST_F(CommonRoadTest, ASetThatBeginsWithTheInitialStateIsTakenWithIt) {
+  const auto occupancy = [](double x, int step) {
+    return fmt::format(
+        "<occupancy><shape><circle><radius>1</radius><center><x>{}</x><y>0</y></center></circle></shape>"
+        "{}</occupancy>",
+        x, Exact("time", step));
+  };
+  const std::string car = std::string("<dynamicObstacle id=\"1\">") + kCar + State("initialState", 0, 0, 0, 0);
+  const World world =
+      Scenario(car + "<occupancySet>" + occupancy(5, 0) + occupancy(9, 1) + "</occupancySet></dynamicObstacle>");
+  EXPECT_TRUE(Contains(world, At(-2, 1), 0) && Contains(world, At(5.9, 0), 0) && Contains(world, At(9.9, 0), 0.1));
+  EXPECT_THAT(WhyNot(car + "<occupancySet>" + occupancy(5, -1) + "</occupancySet></dynamicObstacle>"),
+              HasSubstr("not in the order of time"));
 }
 
 TEST_F(CommonRoadTest, IntervalsOfAStateAreCovered) {

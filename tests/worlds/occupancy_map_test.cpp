@@ -39,6 +39,8 @@ TEST(Pgm, RefusesWhatIsNoneAndAllocatesNothingForIt) {
   EXPECT_THAT(Refusal("P5 1 1 10 z"), HasSubstr("pixel 0 is 122, above the largest value 10"));
   EXPECT_THAT(Refusal("P2 2 1 10 3 -4"), HasSubstr("no number"));
   EXPECT_THAT(Refusal("P5 1 1 255"), HasSubstr("white space"));
+  EXPECT_THAT(Refusal("P5 2 1 255\n# late\nab"), HasSubstr("at byte 13: 7 bytes behind the last pixel"));
+  EXPECT_EQ(Pgm("P5 2 1 255 ab\r\n").values, (std::vector<std::uint16_t>{'a', 'b'}));
 }
 
 constexpr const char* kGrayPng =
