@@ -361,6 +361,9 @@ Share ShareOf(const std::vector<Source>& sources) {
     for (std::size_t cause = 0; cause < counts.size(); ++cause)
       if (*WordsOf(static_cast<Dropped>(cause)).remedy != '\0') counts[cause] += source.log.dropped[cause].count;
   }
+  // Of rows whose stamps go backwards, each is a piece that ends at once.
+  const auto of = [&](Dropped cause) -> std::int64_t& { return counts[static_cast<std::size_t>(cause)]; };
+  if (2 * of(Dropped::kBackwards) > of(Dropped::kEnd)) of(Dropped::kEnd) = 0;
   share.main_cause = static_cast<Dropped>(std::ranges::max_element(counts) - counts.begin());
   return share;
 }

@@ -25,7 +25,9 @@ std::string ChannelOf(const std::vector<std::string>& wanted) {
       if (name == kRecorded) continue;
       const std::string own = name.substr(0, name.find('.'));
       if (own == name || own.empty())
-        throw ConfigError("'" + name + "' has to be CHANNEL.field, of a message in the log");
+        throw ConfigError("'" + name +
+                          "' has to be CHANNEL.field, of a message in the log, as in --state x=ODOMETRY.x; if the "
+                          "log has no such channel, its channels are named");
       if (!channel.empty() && own != channel)
         throw ConfigError("columns of two channels, " + channel + " and " + own +
                           ": one has the states, and one may have the inputs");

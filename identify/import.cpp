@@ -166,7 +166,7 @@ class Importer {
     throw ConfigError(
         fmt::format("{}: its rows are typically {:.6g} s apart, and a step of the task is {} s; states are not "
                     "interpolated: record faster, or let model.dt be a multiple of the log's spacing; if the stamps "
-                    "are not in s, give their unit",
+                    "are not in s, give their unit with --time-unit",
                     table_.path, log_.typical_spacing, ToText(options_.period)));
   }
 
@@ -359,7 +359,7 @@ const DroppedWords& WordsOf(Dropped dropped) {
   static constexpr DroppedWords kWords[] = {
       {"row_lost", "rows with other fields than the header",
        "mend these lines, or say with --delimiter what separates their fields"},
-      {"no_stamp", "rows without a stamp", "write the stamps as decimal numbers"},
+      {"no_stamp", "rows without a stamp", "write the stamps as decimal numbers or dates of ISO 8601"},
       {"repeated_row", "rows that repeat the one before", ""},
       {"repeated_stamp", "rows with another row's stamp and other values", "leave one row for each stamp"},
       {"backwards", "stamps that go backwards: a new piece begins",
@@ -369,7 +369,8 @@ const DroppedWords& WordsOf(Dropped dropped) {
       {"gap", "starts without a stamp near t + dt",
        "raise --tolerance-ms, or let model.dt be a multiple of the log's spacing"},
       {"no_state", "starts with a state that is no number", "write these fields as decimal numbers"},
-      {"no_input", "starts with an input that is no number", "write these fields as decimal numbers"},
+      {"no_input", "starts with an input that is no number",
+       "write these fields as decimal numbers; inputs in rows of their own can be given with --inputs-from"},
       {"input_changes", "starts whose input is not constant over the step", "give --input-mean or --input-tolerance"},
       {"outside_domain", "starts outside the task's domain",
        "widen the task's domain, or give the columns' units with --unit"},

@@ -41,6 +41,25 @@ Parsed<double> ParseLogged(std::string_view field) {
 
 bool IsNumber(std::string_view field) { return ParseLogged(field).problem.empty(); }
 
+// What begins so is no text, with what can be done; empty if it may be one.
+std::string WhyNoText(std::string_view begin) {
+  using namespace std::string_view_literals;
+  constexpr std::pair<std::string_view, const char*> kKinds[] = {
+      {"#ROSBAG"sv, "is a bag of ROS 1; `rosbags-convert` makes an MCAP file of it"},
+      {"SQLite format 3"sv, "is a database, as bags of ROS 2 may be; `ros2 bag convert` makes an MCAP file of it"},
+      {"\x89MCAP"sv, "is an MCAP file; its name has to end in .mcap"},
+      {"\xed\xa1\xda\x01"sv, "is an LCM log; give the types of its messages with --lcm-types"},
+      {"\x1f\x8b"sv, "is compressed; `gunzip` unpacks it"},
+      {"\x28\xb5\x2f\xfd"sv, "is compressed; `unzstd` unpacks it"},
+      {"PK\3\4"sv, "is a zip archive, as spreadsheets are; save the table as CSV"},
+      {"PAR1"sv, "is a Parquet file; save the table as CSV"},
+      {"\xff\xfe"sv, "is in UTF-16; `iconv -f UTF-16 -t UTF-8` makes UTF-8 of it"},
+      {"\xfe\xff"sv, "is in UTF-16; `iconv -f UTF-16 -t UTF-8` makes UTF-8 of it"}};
+  for (const auto& [magic, why] : kKinds)
+    if (begin.starts_with(magic)) return why;
+  return begin.find('\0') == std::string_view::npos ? "" : "is no text: it has a zero byte in its first line";
+}
+
 bool HasDecimalComma(std::string field) {
   const std::size_t at = field.find(',');
   return at != std::string::npos && IsNumber(field.replace(at, 1, "."));
@@ -141,11 +160,13 @@ class Reader {
   template <class Condition>
   void ReadLines(const Condition& goes_on) {
     for (std::string line; goes_on() && lines_.Next(line);) {
+      if (const std::string why = lines_.line() == 1 ? WhyNoText(line) : ""; !why.empty())
+        throw ConfigError(table_.path + ": " + why);
       if (IsRow(line)) Take(line);
     }
     if (parser_ && !parser_->is_complete()) Fail(first_line_, "a quoted field begins in this row and does not end");
     if (num_fields_ == 0)
-      throw ConfigError(table_.path + ":1: no line that names the columns; give their names if the file has none");
+      throw ConfigError(table_.path + ":1: no line that names the columns; give their names with --header");
   }
 
   [[noreturn]] void Fail(int line, const std::string& what) const {
@@ -169,7 +190,9 @@ class Reader {
   void Take(const std::string& line) {
     if (!parser_) parser_ = std::make_unique<RowParser>(DelimiterOf(line));
     if (const std::string problem = parser_->Feed(line); !problem.empty()) {
-      if (num_fields_ == 0) Fail(first_line_, "the names of the columns: " + problem);
+      if (num_fields_ == 0)
+        Fail(first_line_, "the names of the columns: " + problem +
+                              (line.find('\r') == std::string::npos ? "" : "; `tr '\\r' '\\n'` makes lines of it"));
       Lose(problem);
     } else if (parser_->is_complete()) {
       if (num_fields_ == 0)
@@ -266,7 +289,7 @@ class Reader {
           return std::string("the fields seem to be separated by ") + name;
     }
     if (!std::ranges::all_of(fields, IsNumber)) return "";
-    return "this line has numbers only, so no column has a name; give the names of the columns";
+    return "this line has numbers only, so no column has a name; give the names with --header";
   }
 
   // The names in a comment; empty if one of its fields is empty or a number.
@@ -299,9 +322,11 @@ class Reader {
 
   void TakeRow(const std::vector<std::string>& fields) {
     if (fields.size() != num_fields_) {
-      Lose(fmt::format(
-          "{} fields, the header has {}{}", fields.size(), num_fields_,
-          fields.size() == 2 * num_fields_ ? ": twice as many, as if each number had a decimal comma" : ""));
+      Lose(fmt::format("{} fields, the header has {}{}", fields.size(), num_fields_,
+                       fields.size() == 2 * num_fields_ ? ": twice as many, as if each number had a decimal comma"
+                       : fields.size() == num_fields_ + 1 && fields.back().empty()
+                           ? ": the last is empty, as if a separator ended the row; end the header so, too"
+                           : ""));
       return;
     }
     for (std::size_t j = 0; j < places_.size(); ++j) {

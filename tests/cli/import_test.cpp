@@ -239,6 +239,12 @@ TEST_F(ForeignLogTest, StampsThatGoBackAreNamed) {
               Exits(2, "stamps go back, 6 times, first in line 8", Not(HasSubstr("record faster"))));
 }
 
+TEST_F(ForeignLogTest, RowsInReverseHaveToBeSorted) {
+  std::string rows;
+  for (int i = 20; i > 0; --i) rows += Row(i);
+  EXPECT_THAT(Import(header_ + rows), Exits(1, "the most frequent reason: stamps that go backwards", "sort the rows"));
+}
+
 TEST_F(ForeignLogTest, FewerThanHalfOfTheRowsAreKeptOnlyIfAskedFor) {
   const auto log = [&](int lost) { return header_ + Rows(0, 20) + Rows(20, 20 + lost, "{:.1f},{:.4f},-,1\n"); };
   const Output half = Import(log(20)), fewer = Import(log(21));

@@ -58,6 +58,9 @@ TEST_F(LogTableTest, ARowWithOtherFieldsThanTheHeaderIsLostAndSaid) {
   EXPECT_THAT(table.lines, ElementsAre(2, 4, 7, 8));
   EXPECT_FIELDS(table.lost, (count, 3), (first_line, 3), (first, "1 fields, the header has 2"));
   EXPECT_THAT(table.after_loss, ElementsAre(false, true, true, false));
+  EXPECT_THAT(Table("t,pos x\n1,2,\n").lost.first, EndsWith("the last is empty, as if a separator ended the row; end "
+                                                            "the header so, too"));
+  EXPECT_EQ(Table("t,pos x,\n1,2,\n").values.rows(), 1);
 }
 
 // A row that was cut off and the next one, whose line ends are others, are not one row.
@@ -65,14 +68,15 @@ TEST_F(LogTableTest, ACarriageReturnInsideARowEndsIt) {
   const LogTable table = Table("t,pos x\r\n1\r2\n3,4\r\n\r\n5\r,6\r\n\"7\r\",8\n9,10\r");
   EXPECT_THAT(table.lines, ElementsAre(3, 6, 7));
   EXPECT_FIELDS(table.lost, (count, 2), (first_line, 2), (first, "a carriage return inside a row"));
-  EXPECT_EQ(Error("t,pos x\r1,2\r3,4\r"), "log.csv:1: the names of the columns: a carriage return inside a row");
+  EXPECT_EQ(Error("t,pos x\r1,2\r3,4\r"),
+            "log.csv:1: the names of the columns: a carriage return inside a row; `tr '\\r' '\\n'` makes lines of it");
   EXPECT_EQ(Error("t,\"pos\"x\n1,2\n"), "log.csv:1: the names of the columns: quotes inside a field");
 }
 
 TEST_F(LogTableTest, RefusesALogWhoseColumnsAreNotClear) {
   EXPECT_EQ(Error("t,pos y\n1,2\n"), "log.csv:1: no column 'pos x'; did you mean pos y?");
   EXPECT_EQ(Error("\n1,2\n3,4\n"),
-            "log.csv:2: this line has numbers only, so no column has a name; give the names of the columns");
+            "log.csv:2: this line has numbers only, so no column has a name; give the names with --header");
   EXPECT_EQ(Error("t,t,pos x\n"), "log.csv:1: 2 columns are named 't'");
   EXPECT_EQ(Error("t;pos x,y\n"), "log.csv:1: the fields may be separated by ; or by ,; say which it is");
   EXPECT_EQ(Error("t,pos x\n1,\"2\n3,4\n"), "log.csv:2: a quoted field begins in this row and does not end");
@@ -81,6 +85,22 @@ TEST_F(LogTableTest, RefusesALogWhoseColumnsAreNotClear) {
   std::string text = "t,pos x\n";
   text.append(2 << 20, '1');
   EXPECT_THAT(Error(text), HasSubstr("log.csv:2: longer than 1048576 bytes"));
+}
+
+TEST_F(LogTableTest, WhatIsNoTextIsNamedWithWhatMakesOneOfIt) {
+  using namespace std::string_literals;
+  for (const auto& [bytes, why] : {std::pair("#ROSBAG V2.0\n\x45\0"s, "is a bag of ROS 1; `rosbags-convert`"),
+                                   {"SQLite format 3\0"s, "ros2 bag"},
+                                   {"\x89MCAP0\r\n"s, "end in .mcap"},
+                                   {"\xed\xa1\xda\x01\0"s, "--lcm-types"},
+                                   {"\x1f\x8b\x08"s, "gunzip"},
+                                   {"\x28\xb5\x2f\xfd"s, "unzstd"},
+                                   {"PK\3\4"s, "zip"},
+                                   {"PAR1"s, "Parquet"},
+                                   {"\xff\xfet\0,\0x\0\n\0"s, "UTF-16"},
+                                   {"\xfe\xff\0t"s, "UTF-16"},
+                                   {"t,x\0\n1,2\n"s, "a zero byte"}})
+    EXPECT_THAT(Error(bytes), AllOf(StartsWith("log.csv: is "), HasSubstr(why)));
 }
 
 TEST_F(LogTableTest, TakesAGivenFormat) {
