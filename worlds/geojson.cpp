@@ -84,8 +84,9 @@ class Drawing {
   }
 
   World Read(const Json& document) {
+    const bool are_degrees = TakeReferenceSystem(document);
     TakeObject(JsonField(path_, document), nullptr, 0);
-    if (!options_.origin && !options_.are_metres && any_ && LooksLikeDegrees())
+    if (!options_.origin && !options_.are_metres && any_ && (are_degrees || LooksLikeDegrees()))
       throw ConfigError(path_ +
                         ": the coordinates look like degrees; give --origin LON,LAT, where x = y = 0, or --metres if "
                         "they are metres");
@@ -104,6 +105,25 @@ class Drawing {
     bool keep_in = false;
     std::optional<double> width, radius;
   };
+
+  // What GeoJSON before RFC 7946 says its coordinates are. Whether they are degrees.
+  [[nodiscard]] bool TakeReferenceSystem(const Json& document) {
+    const Json* at = &document;
+    for (const char* key : {"crs", "properties", "name"}) {
+      if (!at->is_object() || !at->contains(key)) return false;
+      at = &(*at)[key];
+    }
+    if (!at->is_string()) return false;
+    const std::string system = at->get<std::string>();
+    const auto is = [&](std::string_view code) { return system.ends_with(code); };
+    if (is(":3857") || is(":900913") || is(":3785"))
+      throw ConfigError(path_ + ": crs: " + system.substr(0, 80) +
+                        " is Web Mercator, whose metres are not those of the ground; `ogr2ogr -t_srs EPSG:4326` makes "
+                        "degrees of them, for --origin");
+    if (is("CRS84") || is(":4326")) return true;
+    world_.notes.push_back("Coordinates are taken as metres of a plane, with the crs " + system.substr(0, 80) + ".");
+    return false;
+  }
 
   // ---- Objects
 

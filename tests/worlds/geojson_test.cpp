@@ -113,6 +113,24 @@ TEST_F(GeoJsonTest, WhatLooksLikeDegreesNeedsAWord) {
   EXPECT_EQ(Drawing(place).pieces.size(), 1u);
 }
 
+// Metres of Web Mercator are larger than those of the ground: obstacles would stand too far away.
+TEST_F(GeoJsonTest, WhatTheCoordinatesAreIsReadWhereTheFileSaysIt) {
+  const auto with_crs = [](const std::string& crs) {
+    return R"({"type": "Polygon", "coordinates": [[[0,0],[8,0],[8,8]]], "crs": )" + crs + "}";
+  };
+  const auto named = [&](const std::string& name) {
+    return with_crs(R"({"type": "name", "properties": {"name": ")" + name + "\"}}");
+  };
+  EXPECT_THAT(WhyNot(named("urn:ogc:def:crs:EPSG::3857")), HasSubstr("is Web Mercator"));
+  EXPECT_THAT(WhyNot(named("EPSG:900913"), {.origin = PlanePoint{0, 0}}), HasSubstr("ogr2ogr"));
+  for (const char* degrees : {"urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4326"})
+    EXPECT_THAT(WhyNot(named(degrees), {}), HasSubstr("look like degrees")) << "eight of them are no metres";
+  EXPECT_THAT(Drawing(named("EPSG:32632"), {}).notes, Contains(HasSubstr("with the crs EPSG:32632")));
+  EXPECT_THAT(ObstaclesText(Drawing(named("a\\ntask: 1"), {}), "any"), Not(HasSubstr("\ntask: 1")));
+  for (const char* none : {"null", "[1]", "\"EPSG:3857\"", R"({"properties": 3})"})
+    EXPECT_TRUE(Drawing(with_crs(none), {}).notes.empty());
+}
+
 TEST_F(GeoJsonTest, RefusesWhatIsNoneWithThePlace) {
   EXPECT_THAT(WhyNot("{"), HasSubstr("site.geojson: is no JSON"));
   EXPECT_THAT(WhyNot("{}"), HasSubstr("has no type"));
