@@ -243,6 +243,27 @@ TEST_F(CertifierObstaclesTest, AsManyObstaclesAsATaskTakesAreHeardAndStayKnown) 
   EXPECT_EQ(certifier->Terminate(), 0) << certifier->error();
 }
 
+// 10^5 cells in 45 pieces of one message, by the programs.
+TEST_F(CertifierObstaclesTest, AGridIsHeardAndItsCellsAreNamed) {
+  std::string grid =
+      "    - name: hall\n      grid:\n        resolution: 0.01\n        origin: [-0.5, 1.5]\n        unknown: free\n"
+      "        size: [400, 250]\n        rows: |\n";
+  for (int row = 0; row < 250; ++row) grid += "          " + std::string(400, row < 100 ? '.' : '#') + "\n";
+  scratch_.Write("world.yaml", Replaced(Read(world_), "    - circle: {center: [0, 2], radius: 0.8}\n", grid));
+  const auto perception = StartPerception();
+  auto certifier = StartCertifier();
+  certifier_status_t last{};
+  ASSERT_TRUE(probe_.WaitUntil([&] {
+    const auto all = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
+    if (!all.empty()) last = all.back();
+    return last.obstacles_known == 1;
+  }));
+  EXPECT_EQ(last.obstacles_in_force, 1);
+  EXPECT_THAT(GetText(Ask().message), testing::HasSubstr(" may touch cells (0, 0) to (399, 149) of hall (by "));
+  EXPECT_EQ(perception->Terminate(), 0) << perception->error();
+  EXPECT_EQ(certifier->Terminate(), 0) << certifier->error();
+}
+
 TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
   const auto perception = StartPerception();
   auto first = StartCertifier();
