@@ -145,7 +145,7 @@ TEST(NamesTest, EveryConstantHasItsRecordedNumber) {
                    "LATCH_WRITTEN 1, LATCH_UNWRITABLE 2, OBSTACLES_TASK 1, OBSTACLES_BUS 2"));
   EXPECT_EQ(ConstantsOf("command_t"), Listed("RESET 1, RELOAD 2"));
   EXPECT_EQ(ConstantsOf("robot_state_t"), Listed("STANDING 1, EXECUTING 2, FINISHED 3"));
-  EXPECT_EQ(ConstantsOf("obstacle_shape_t"), Listed("CIRCLE 1, BOX 2, POLYGON 3, HALF_SPACE 4"));
+  EXPECT_EQ(ConstantsOf("obstacle_shape_t"), Listed("CIRCLE 1, BOX 2, POLYGON 3, HALF_SPACE 4, GRID 5, CELLS 6"));
 }
 
 }  // namespace forereach::names_test
