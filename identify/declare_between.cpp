@@ -165,7 +165,8 @@ MotionProposal FromEquations(const Config& config, const BetweenCommand& command
                                           : ", and for the last step of a plan, which ends at rest.\n") +
                     "The residual is not included: it is a difference at the samples, and bounds no curvature between "
                     "them. Add what\n"
-                    "the true robot does beyond the equations.";
+                    "the true robot does beyond the equations" +
+                    (command.rates ? ", and to a rate what residual and disturbance add in a second." : ".");
   return proposal;
 }
 

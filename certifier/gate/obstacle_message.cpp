@@ -155,7 +155,9 @@ obstacle_shape_t ShapeOf(const GridMap& map) {
 GridMap GridOf(const obstacle_shape_t& shape) {
   RequirePoints(shape, 3);
   if (shape.dimension != 2) throw std::invalid_argument(fmt::format("dimension {}, a grid has 2", shape.dimension));
-  const auto size = [&](int k) { return static_cast<int>(Whole("a grid's size", shape.point[1][k], kMostSentCells)); };
+  const auto size = [&](int k) {
+    return static_cast<int>(Whole("a grid's size", shape.point[1][k], GridRoom::kMostCells));
+  };
   return {.resolution = shape.value,
           .origin = {shape.point[0][0], shape.point[0][1]},
           .yaw = shape.point[2][0],
@@ -200,19 +202,22 @@ class GridReader final {
     return fmt::format("a grid of {} by {} cells has only {} of them", map_.width, map_.height, next_);
   }
   [[nodiscard]] Obstacle TakeGrid() {
-    for (const Obstacle& obstacle : known_)
-      if (obstacle.grid() && obstacle.grid()->map() == map_) return Obstacle::Grid(obstacle.grid());
-    return Obstacle::Grid(std::make_shared<const OccupancyGrid>(std::move(map_)));
+    const auto same = std::ranges::find_if(
+        known_, [&](const Obstacle& obstacle) { return obstacle.grid() && obstacle.grid()->map() == map_; });
+    Obstacle grid =
+        Obstacle::Grid(same != known_.end() ? same->grid() : std::make_shared<const OccupancyGrid>(std::move(map_)));
+    if (!room_.Take(grid))
+      throw std::invalid_argument(fmt::format("the grids of a set make {} rectangles at most", GridRoom::kMostBlocks));
+    return grid;
   }
 
  private:
   void Begin(GridMap map) {
     map_ = std::move(map);
     const std::int64_t cells = std::int64_t{map_.width} * map_.height;
-    if (cells < 1 || cells > kMostSentCells - total_)
-      throw std::invalid_argument(fmt::format("a grid of {} by {} cells; the grids of a set have 1 to {} in all",
-                                              map_.width, map_.height, kMostSentCells));
-    total_ += cells;
+    if (cells < 1 || !room_.HasCells(cells))
+      throw std::invalid_argument(fmt::format("a grid of {} by {} cells; a set has up to {} grids of 1 to {} in all",
+                                              map_.width, map_.height, GridRoom::kMostGrids, GridRoom::kMostCells));
     next_ = 0;
     size_ = static_cast<std::size_t>(cells);
     map_.occupied.assign(size_, false);
@@ -236,7 +241,7 @@ class GridReader final {
   std::span<const Obstacle> known_;
   GridMap map_;
   std::size_t next_ = 0, size_ = 0;  // cells
-  std::int64_t total_ = 0;           // of all grids
+  GridRoom room_;
 };
 
 Obstacle FromMessage(const obstacle_t& piece, std::int64_t stamp, const std::map<std::int64_t, Track>& tracks) {
@@ -324,7 +329,14 @@ bool Continues(const Obstacle& obstacle, const Obstacle& before) {
          obstacle.motion()->from_us == before.motion()->until_us;
 }
 
-bool HasRoom(const Obstacle& grid, int cells) { return std::ssize(MapOf(grid).occupied) <= kMostSentCells - cells; }
+bool GridRoom::Take(const Obstacle& grid) {
+  const std::int64_t cells = std::ssize(MapOf(grid).occupied), blocks = std::ssize(grid.grid()->blocks());
+  if (!HasCells(cells) || blocks > kMostBlocks - blocks_) return false;
+  ++grids_;
+  cells_ += cells;
+  blocks_ += blocks;
+  return true;
+}
 
 std::vector<obstacle_t> ToPieces(const std::vector<Obstacle>& obstacles, std::int64_t utime,
                                  std::span<const std::int64_t> tracks) {

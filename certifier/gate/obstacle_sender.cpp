@@ -21,6 +21,15 @@ void RequireRoom(std::size_t count) {
     throw std::invalid_argument(fmt::format("{} obstacles, at most {} can be sent", count, kMostObstacles));
 }
 
+void RequireRoomForGrids(const std::vector<Obstacle>& obstacles) {
+  GridRoom room;
+  for (std::size_t i = 0; i < obstacles.size(); ++i)
+    if (obstacles[i].grid() && !room.Take(obstacles[i]))
+      throw std::invalid_argument(
+          fmt::format("obstacle {}: up to {} grids with {} cells and {} rectangles in all can be sent", i,
+                      GridRoom::kMostGrids, GridRoom::kMostCells, GridRoom::kMostBlocks));
+}
+
 }  // namespace
 
 std::int64_t ObstacleSender::PeriodUs(const GateOptions& options) {
@@ -37,6 +46,7 @@ void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vect
     throw std::invalid_argument(fmt::format("{} tracks of {} obstacles", tracks.size(), obstacles.size()));
   const Digest digest = ObstaclesDigest(obstacles);
   if (content_ && digest == content_->digest && tracks == content_->tracks) return;
+  RequireRoomForGrids(obstacles);
   const std::vector<obstacle_t> all = ToPieces(obstacles, 0, tracks);  // no stamp, so what stands stays the same
   RequireRoom(all.size());
   std::vector<ObstaclePart> before;
@@ -119,10 +129,9 @@ std::optional<obstacles_t> ObstaclesOfFile::Due(std::int64_t now_us) {
 
 std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles) {
   std::vector<Obstacle> begun;
-  int cells = 0;  // of grids
+  GridRoom room;
   for (const Obstacle& obstacle : obstacles) {
-    if (obstacle.grid() && HasRoom(obstacle, cells)) {
-      cells += static_cast<int>(MapOf(obstacle).occupied.size());
+    if (obstacle.grid() && room.Take(obstacle)) {
       begun.push_back(obstacle);
       continue;
     }

@@ -41,7 +41,8 @@ class ObstacleSender final {
   /** Sets all obstacles. If they differ from the last ones, the next message is due at once. Motions have the times of
   the clock that Due is called with.
   @param tracks as of ToMessage, which also has the rules for tracks that receivers check.
-  @throws std::invalid_argument for more than kMostObstacles pieces, or tracks of another number. */
+  @throws std::invalid_argument for more than kMostObstacles pieces, grids without GridRoom, or tracks of another
+  number. */
   void Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks = {});
 
   /** The next message, if it is due, with the stamp `now_us` in microseconds since the Unix epoch. Nothing before the

@@ -1,6 +1,7 @@
 #include "certifier/gate/obstacles_in_force.h"
 
 #include <algorithm>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/text.h"
+#include "forereach/safety/obstacle_view.h"
 #include "task/canonical.h"
 
 namespace forereach {
@@ -72,6 +74,7 @@ void ObstaclesInForce::TakeSet(const obstacles_t& message) {
   try {
     std::vector<Obstacle> heard = FromMessage(state_.set.obstacles(), message.utime, dim_, state_.heard);
     RequireClock(heard);
+    RequireGrids(heard);
     state_.heard = std::move(heard);
   } catch (const std::invalid_argument&) {
     state_.set.Refuse();
@@ -88,6 +91,16 @@ void ObstaclesInForce::RequireClock(const std::vector<Obstacle>& obstacles) cons
   if (moving != obstacles.end())
     throw std::invalid_argument(
         fmt::format("obstacle {} moves, and the task has no gate.max_clock_error_ms", moving - obstacles.begin()));
+}
+
+// A certifier takes so many, and a candidate is not to blame for one too many.
+void ObstaclesInForce::RequireGrids(const std::vector<Obstacle>& heard) const {
+  const auto of_task = std::span(all_).first(num_of_task_);
+  const auto is_grid = [](const Obstacle& each) { return each.grid() != nullptr; };
+  const auto own = std::ranges::count_if(of_task, is_grid), more = std::ranges::count_if(heard, is_grid);
+  if (own + more > ConvexNumbers::kMostGrids)
+    throw std::invalid_argument(
+        fmt::format("{} grids and {} of the task file, at most {} in all", more, own, ConvexNumbers::kMostGrids));
 }
 
 // Of a message that is newer than the last one taken.

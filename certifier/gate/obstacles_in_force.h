@@ -88,6 +88,7 @@ class ObstaclesInForce final {
   [[nodiscard]] std::string Doubt(const std::string& why);
   [[nodiscard]] std::string Take(const obstacles_t& message, std::int64_t now_us);
   void RequireClock(const std::vector<Obstacle>& obstacles) const;
+  void RequireGrids(const std::vector<Obstacle>& heard) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
   void TakeSet(const obstacles_t& message);
   [[nodiscard]] Freshness FreshnessAt(std::int64_t utime, std::int64_t now_us) const;

@@ -30,7 +30,7 @@ std::vector<double> TicksOf(double lower, double upper, const std::vector<double
 
 // The largest value on [x, y] of min(p + slope (t - a), q + slope (b - t)), p and q at the ends of a cell's side.
 double Tent(double p, double q, double slope, double a, double b, double x, double y) noexcept {
-  return std::min({p + slope * (y - a), q + slope * (b - x), (p + q + slope * (b - a)) * 0.5});
+  return std::min({p + slope * (y - a), q + slope * (b - x), p * 0.5 + q * 0.5 + slope * (b - a) * 0.5});
 }
 
 }  // namespace

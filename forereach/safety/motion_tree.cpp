@@ -83,7 +83,7 @@ MotionTree::MotionTree(std::span<const Obstacle* const> obstacles) : empty_(obst
                  motion.velocity[row] * PlainSeconds(time - motion.stamp_us);
       place[kMaxSafetyDim + k] = motion.velocity[row];
     }
-    place.back() = speed_ * PlainSeconds(time - reference);
+    place.back() = std::min(speed_, 1e100) * PlainSeconds(time - reference);  // a number, whatever is sent
   }
   halves_ = Halves<Node>(places, [&](std::span<const std::int32_t> some) {
     const Node node = Around(obstacles, some, reference);

@@ -4,6 +4,8 @@
 #include "tests/test.h"
 
 #include "certifier/gate/gate.h"
+#include "forereach/safety/obstacle_view.h"
+#include "forereach/safety/occupancy_grid.h"
 #include "tests/certifier/small_task.h"
 
 namespace forereach::gate_obstacles_test {
@@ -438,6 +440,21 @@ TEST(GateMovingTest, RefusesMovingObstaclesWithoutABoundOnTheClockError) {
   EXPECT_THAT(gate.UpdateObstacles(MovingMessage(1), kNow),
               HasSubstr("obstacle 0 moves, and the task has no gate.max_clock_error_ms"));
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
+}
+
+TEST(GateObstaclesTest, RefusesMoreGridsThanACertifierTakesWithThoseOfItsTask) {
+  const auto grids = [](std::size_t count) {
+    return std::vector(count, Obstacle::Grid(std::make_shared<const OccupancyGrid>(
+                                  GridMap{0.05, {-90, 90}, 0, 1, 1, std::vector<bool>(1, true), true})));
+  };
+  Config config = SmallTaskOnTheBus();
+  for (const Obstacle& grid : grids(ConvexNumbers::kMostGrids - 1)) config.obstacles.push_back(grid);
+  Gate gate(config);
+  EXPECT_THAT(gate.UpdateObstacles(MovingMessage(0, kNow, grids(2)), kNow),
+              HasSubstr("2 grids and 7 of the task file, at most 8 in all"));
+  EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(1, kNow, grids(1)), kNow), "");
+  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
 }
 
 // The candidate starts in half a second and reaches the wall with its sample 5, 0.75 s later; its sample 6 is past it.

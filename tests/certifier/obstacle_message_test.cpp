@@ -92,13 +92,28 @@ TEST(GridMessageTest, ACellsPieceHas2304AndTheNextOneTheRest) {
 
 TEST(GridMessageTest, AsManyCellsAsTheBusTakesAndNoMore) {
   const Obstacle most = GridOf(512, 512, [](std::size_t i) { return i % 512 == 0; });
-  EXPECT_TRUE(HasRoom(most, 0));
-  EXPECT_FALSE(HasRoom(most, 1));
+  GridRoom room;
+  EXPECT_TRUE(room.Take(most));
+  EXPECT_FALSE(room.Take(kOneByTwo));
   std::vector<obstacle_t> pieces = ToPieces({most}, kNow);
   EXPECT_EQ(FromMessage(pieces, kNow, 2).at(0).convex().size(), 1u);
   std::ranges::copy(ToPieces({kOneByTwo}, kNow), std::back_inserter(pieces));
   EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(pieces, kNow, 2); }),
-              HasSubstr("obstacle 115: a grid of 1 by 2 cells; the grids of a set have 1 to 262144 in all"));
+              HasSubstr("obstacle 115: a grid of 1 by 2 cells; a set has up to 4 grids of 1 to 262144 in all"));
+}
+
+TEST(GridMessageTest, AsManyGridsAndBlocksAsTheBusTakesAndNoMore) {
+  const std::vector<Obstacle> grids(GridRoom::kMostGrids + 1, kOneByTwo);
+  EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(ToPieces(grids, kNow), kNow, 2); }),
+              HasSubstr("a set has up to 4 grids"));
+  EXPECT_EQ(FromMessage(ToPieces({grids.begin() + 1, grids.end()}, kNow), kNow, 2).size(), 4u);
+  // Every second cell of every second row is a block of its own.
+  const auto scattered = [](int height) {
+    return GridOf(256, height, [](std::size_t i) { return i % 2 == 0 && i / 256 % 2 == 0; });
+  };
+  EXPECT_EQ(FromMessage(ToPieces({scattered(128)}, kNow), kNow, 2).at(0).grid()->blocks().size(), 8192u);
+  EXPECT_THAT(Thrown<std::invalid_argument>([&] { (void)FromMessage(ToPieces({scattered(129)}, kNow), kNow, 2); }),
+              HasSubstr("the grids of a set make 8192 rectangles at most"));
 }
 
 TEST(GridMessageTest, AGridThatIsKnownIsNotMadeAgain) {
@@ -137,7 +152,7 @@ TEST(GridMessageTest, WhatIsNoGridIsRefused) {
     EXPECT_THAT(grid([&](auto& shape) { shape.point[1][1] = bad; }), HasSubstr("obstacle 0: a grid")) << bad;
   }
   EXPECT_THAT(grid([](auto& shape) { shape.point[1][0] = shape.point[1][1] = 262'144; }),
-              HasSubstr("a grid of 262144 by 262144 cells; the grids of a set have 1 to 262144"));
+              HasSubstr("a grid of 262144 by 262144 cells; a set has up to 4 grids of 1 to 262144"));
   for (const double bad : {nan, 0.5, 2.0, -1.0})
     EXPECT_THAT(grid([&](auto& shape) { shape.point[2][1] = bad; }), HasSubstr("outside ")) << bad;
   for (const double bad : {nan, 0.0, -1.0, kInfinity}) {
