@@ -468,11 +468,13 @@ std::string Gate::Learn(Bytes bytes) {
   const Problem& problem = certifier_.problem();
   const ExecutedTransition transition = FromMessage(*message, problem, options_);
   // Where nobody looks at a clock, a step that is nothing to learn of by its duration has nothing wrong with it.
-  if (!StepErrorUs(options_) && !CountedDuration(problem, transition.by_clock, true)) return {};
+  const bool is_any = !StepErrorUs(options_);
+  if (is_any && !CountedDuration(problem, transition.by_clock, true)) return {};
   if (!transition.refusal.empty()) return transition.refusal;
-  if (const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer, transition.by_clock);
-      learned != Learned::kAdded)
-    return Explain(learned);
+  const Learned learned = certifier_.Learn(transition.z, transition.next, transition.longer, transition.by_clock);
+  if (is_any && transition.longer > 0 && (learned == Learned::kNoNominalSlope || learned == Learned::kAmbiguousAngle))
+    return {};
+  if (learned != Learned::kAdded) return Explain(learned);
   grounds_.observations = ChainedDigest(grounds_.observations, bytes);
   ++counts_.learned;
   return {};

@@ -3,6 +3,7 @@
 
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
+#include "forereach/dynamics/text_model.h"
 #include "lcmtypes/seal.h"
 #include "task/step_time.h"
 #include "tests/certifier/small_task.h"
@@ -436,9 +437,8 @@ TEST(GateTransitionTest, AStepThatNoScheduleAllowsIsNotLearned) {
   }
   // (1 + x / dt)^2 < 2, else the residual may have doubled.
   for (const std::int64_t within : {212'130, 87'870}) EXPECT_EQ(learn(kAnyTime, within), "");
-  for (const std::int64_t beyond : {212'132, 87'868, 224'998, 75'002})
-    EXPECT_THAT(learn(kAnyTime, beyond), HasSubstr("nothing bounds the residual"));
-  for (const std::int64_t half : {225'000, 75'000}) EXPECT_EQ(learn(kAnyTime, half), "not learned");
+  for (const std::int64_t beyond : {212'132, 87'868, 225'000, 75'000})
+    EXPECT_EQ(learn(kAnyTime, beyond), "not learned");
   for (const std::int64_t within : {160'000, 140'000}) EXPECT_EQ(learn(5, within), "");
   for (const std::int64_t beyond : {160'002, 139'998})
     EXPECT_THAT(learn(5, beyond), HasSubstr(" us, further from model.dt, 0.15 s, than two errors of 0.005 s"));
