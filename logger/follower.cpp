@@ -26,10 +26,15 @@ std::string FleetProgram() {
   return program;
 }
 
-// Between fork and exec: only calls that are safe there. The parent may have ended already.
+// Between fork and exec: only calls that are safe there. The parent may have ended already, or ends before the program
+// waits for the signal: so it stays pending until then.
 [[noreturn]] void Become(char* const* arguments, pid_t parent) {
+  sigset_t end;
+  sigemptyset(&end);
+  sigaddset(&end, SIGTERM);
+  sigprocmask(SIG_BLOCK, &end, nullptr);
   prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (getppid() != parent) _exit(0);
+  if (getppid() != parent) raise(SIGTERM);
   close_range(STDERR_FILENO + 1, ~0U, 0);  // the bus and the log's lock
   dup2(STDERR_FILENO, STDOUT_FILENO);
   execv(arguments[0], arguments);

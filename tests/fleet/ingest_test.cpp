@@ -41,6 +41,17 @@ class IngestTest : public PostgresTest {
           decisions += event.channel == "PLAN_DECISION";
     return decisions;
   }
+  // Until a query gives this.
+  void WaitFor(const std::string& query, const std::string& wanted) {
+    Store store(server_->Address());
+    std::string got;
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         got != wanted && std::chrono::steady_clock::now() < deadline;) {
+      got = store.Query(query).at(0).at(0).value_or("");
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(got, wanted) << query;
+  }
   Rows RowsOfStore(const std::string& robot) {
     Rows rows;
     Store store(server_->Address());
@@ -176,12 +187,7 @@ TEST_F(IngestTest, LosesAndDoublesNoRowWhereLoggerAndSenderAreKilled) {
       _exit(0);
     }
     // Until the log is there and some rows of it are in the store, so that both are at work.
-    Store store(server_->Address());
-    const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    const auto sent = [&] { return store.Query("SELECT count(DISTINCT log_file) FROM decisions")[0][0].value_or(""); };
-    while (sent() != std::to_string(round + 1) && std::chrono::steady_clock::now() < deadline)
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    EXPECT_EQ(sent(), std::to_string(round + 1));
+    WaitFor("SELECT count(DISTINCT log_file) FROM decisions", std::to_string(round + 1));
     if (round % 2 == 0) sender->Signal(SIGKILL);
     kill(logger, SIGKILL);
     waitpid(logger, nullptr, 0);
@@ -206,15 +212,7 @@ TEST_F(IngestTest, BesideTheLoggerSendsItsRowsToTheLast) {
     probe.bus().Publish("PLAN_DECISION", MakeDecision(MakeCandidate(i, i), i, decision_t::CERTIFIED, 0));
   EXPECT_TRUE(probe.WaitUntil([&] { return RowsOfDirectory().decisions.size() == 20; }));
   EXPECT_EQ(logger.Terminate(), 0) << logger.error();
-  Store store(server_->Address());
-  const auto has_ended = [&] {
-    const std::vector<RunRow> runs = store.Runs("r1");
-    return !runs.empty() && runs[0].end_utime.has_value();
-  };
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (!has_ended() && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_TRUE(has_ended());
+  WaitFor("SELECT count(*) FROM runs WHERE end_utime IS NOT NULL", "1");
   EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), RowsOfDirectory()), "");
 }
 
@@ -228,16 +226,6 @@ TEST_F(IngestTest, LosesAndDoublesNoRowWhereServerAndLoggerAreKilledAtOnce) {
                                                                    "--directory", directory_, "--database", address,
                                                                    "--robot", "r1"});
   };
-  const auto wait_for = [&](const std::string& query, const std::string& wanted) {
-    Store store(address);
-    std::string got;
-    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
-         got != wanted && std::chrono::steady_clock::now() < deadline;) {
-      got = store.Query(query).at(0).at(0).value_or("");
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    EXPECT_EQ(got, wanted) << query;
-  };
   std::atomic<bool> is_over = false;
   std::thread gate([&] {
     BusProbe probe(url, {});
@@ -248,11 +236,11 @@ TEST_F(IngestTest, LosesAndDoublesNoRowWhereServerAndLoggerAreKilledAtOnce) {
   });
   std::unique_ptr<ChildProcess> logger = start(), blocker;
   for (int round = 0; round < 4; ++round) {
-    wait_for("SELECT count(DISTINCT log_file) FROM decisions", std::to_string(round + 1));
+    WaitFor("SELECT count(DISTINCT log_file) FROM decisions", std::to_string(round + 1));
     if (round % 2 == 0) {
       blocker = std::make_unique<ChildProcess>(std::vector<std::string>{
           Postgres::Programs() + "psql", "-X", address, "-c", "BEGIN; LOCK TABLE decisions; SELECT pg_sleep(60)"});
-      wait_for("SELECT count(*) FROM pg_locks WHERE NOT granted AND relation = 'decisions'::regclass", "1");
+      WaitFor("SELECT count(*) FROM pg_locks WHERE NOT granted AND relation = 'decisions'::regclass", "1");
     }
     std::thread killer([&] { logger->Signal(SIGKILL); });
     server_->Kill();
@@ -262,15 +250,26 @@ TEST_F(IngestTest, LosesAndDoublesNoRowWhereServerAndLoggerAreKilledAtOnce) {
     server_->Start();
     if (round >= 2) logger = start();
   }
-  wait_for("SELECT count(DISTINCT log_file) FROM decisions", "5");
+  WaitFor("SELECT count(DISTINCT log_file) FROM decisions", "5");
   EXPECT_EQ(logger->Terminate(), 0) << logger->error();
   is_over = true;
   gate.join();
-  wait_for("SELECT count(*) FROM runs WHERE end_utime IS NOT NULL", "5");
+  WaitFor("SELECT count(*) FROM runs WHERE end_utime IS NOT NULL", "5");
   const Rows rows = RowsOfDirectory();
   EXPECT_GT(rows.decisions.size(), 100u);
   EXPECT_EQ(DifferenceOf(RowsOfStore("r1"), rows), "");
   EXPECT_EQ(rows.decisions.size(), DecisionsInLogs());
+}
+
+// It has hardly begun when it is told to end.
+TEST_F(IngestTest, BesideALoggerThatEndsAtOnceSendsWhatTheDirectoryHas) {
+  std::int64_t now = kStart;
+  Record(20, now);
+  ChildProcess logger({FOREREACH_LOGGER, "--config", scratch_.Write("task.yaml", PatientTask()), "--lcm-url",
+                       PrivateBusUrl(), "--directory", directory_, "--database", server_->Address(), "--robot", "r1"});
+  ASSERT_TRUE(logger.WaitForLog("recording to")) << logger.error();
+  logger.Signal(SIGKILL);
+  WaitFor("SELECT count(*) FROM decisions", "20");
 }
 
 TEST_F(IngestTest, KeepsTheRowsInTheDirectoryWhileTheServerIsAway) {
