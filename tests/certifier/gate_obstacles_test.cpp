@@ -442,7 +442,7 @@ TEST(GateMovingTest, RefusesMovingObstaclesWithoutABoundOnTheClockError) {
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
 }
 
-TEST(GateObstaclesTest, RefusesMoreGridsThanACertifierTakesWithThoseOfItsTask) {
+TEST(GateGridsTest, RefusesMoreThanACertifierTakesWithThoseOfItsTask) {
   const auto grids = [](std::size_t count) {
     return std::vector(count, Obstacle::Grid(std::make_shared<const OccupancyGrid>(
                                   GridMap{0.05, {-90, 90}, 0, 1, 1, std::vector<bool>(1, true), true})));
