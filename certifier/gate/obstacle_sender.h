@@ -71,8 +71,8 @@ class ObstacleSender final {
   std::optional<std::int64_t> last_us_;      // nothing: due at once
 };
 
-/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on; of a grid that
-has no room on the bus its blocks.
+/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on; of a grid that has
+no room on the bus its blocks.
 @pre |begin_us| and the obstacles' finite times are at most Schedule::kLatest. */
 [[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
 

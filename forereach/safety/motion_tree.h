@@ -21,8 +21,6 @@ class MotionTree final {
   /** @pre all move, have a size and one dimension. It keeps none of them. Cost O(n log n). */
   explicit MotionTree(std::span<const Obstacle* const> obstacles);
 
-  [[nodiscard]] bool empty() const { return empty_; }
-
   /** The times of hulls: that of hull t are samples first + t to first + t + span of the schedule. */
   struct Times {
     Schedule schedule;

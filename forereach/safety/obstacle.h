@@ -30,7 +30,7 @@ class OccupancyGrid;
 
 class Obstacle final {
  public:
-  // As in lcmtypes/obstacle_shape_t.lcm, which has no grids.
+  // As in lcmtypes/obstacle_shape_t.lcm.
   enum class Kind { kCircle = 1, kBox = 2, kPolygon = 3, kHalfSpace = 4, kGrid = 5 };
 
   /** @name Factories. Each throws std::invalid_argument with value and bound if a size is wrong, an entry is not
