@@ -13,7 +13,7 @@
 #include "lcmtypes/printable.h"
 #include "records/log_tasks.h"
 #include "records/replay.h"
-#include "records/result_json.h"
+#include "records/result.h"
 #include "task/json_text.h"
 
 namespace forereach {

@@ -11,7 +11,7 @@ makes of all of them what the command prints without --shard. */
 
 #include "command_line/command_line.h"
 #include "records/log_trust.h"
-#include "records/result_json.h"
+#include "records/result.h"
 #include "records/run_logs.h"
 #include "records/shard.h"
 

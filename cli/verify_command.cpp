@@ -17,7 +17,7 @@
 #include "records/certificate_files.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
-#include "records/result_json.h"
+#include "records/result.h"
 #include "task/json_text.h"
 
 namespace forereach {
@@ -42,23 +42,9 @@ struct Verified {
   PassedOver passed_over;
   std::string first_failure;  // for people
   nlohmann::json failures = nlohmann::json::array();
-
-  Verified& operator+=(Verified&& other) {
-    certificates += other.certificates;
-    confirmed += other.confirmed;
-    refuted += other.refuted;
-    cannot_verify += other.cannot_verify;
-    not_certificates += other.not_certificates;
-    remainders += other.remainders;
-    of_decision |= other.of_decision;
-    passed_over += other.passed_over;
-    if (first_failure.empty()) first_failure = std::move(other.first_failure);
-    std::ranges::move(other.failures, std::back_inserter(failures));
-    return *this;
-  }
 };
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Verified, certificates, confirmed, refuted, cannot_verify, not_certificates,
-                                   remainders, of_decision, passed_over, first_failure, failures)
+FOREREACH_RESULT(Verified, certificates, confirmed, refuted, cannot_verify, not_certificates, remainders, of_decision,
+                 passed_over, first_failure, failures)
 
 // What the verifier relies on: the certifier accepts no other problem.
 void RequireAcceptable(const Config& config) {

@@ -324,21 +324,6 @@ const std::vector<std::string>& ExportFiles(ExportFormat format) {
   return of[static_cast<std::size_t>(format)];
 }
 
-ExportResult& ExportResult::operator+=(const ExportResult& other) {
-  decisions += other.decisions;
-  without_candidate += other.without_candidate;
-  executions += other.executions;
-  withdrawals += other.withdrawals;
-  gaps += other.gaps;
-  tubes += other.tubes;
-  messages += other.messages;
-  left_out += other.left_out;
-  has_messages |= other.has_messages;
-  damage += other.damage;
-  passed_over += other.passed_over;
-  return *this;
-}
-
 namespace {
 
 void ReadRun(const RunLogs& run, const ExportOptions& options, const std::function<void(std::int64_t)>& on_bytes,

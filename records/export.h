@@ -14,6 +14,7 @@ Memory does not grow with the logs. Nothing in a log names a file that is writte
 
 #include "records/event_log.h"
 #include "records/log_trust.h"
+#include "records/result.h"
 #include "records/run_logs.h"
 #include "records/shard.h"
 
@@ -44,10 +45,10 @@ struct ExportResult {
   PassedOver passed_over;
   bool has_messages = false;       ///< Whether a message or a row of ForeReach's was there.
   std::vector<std::string> files;  ///< That were written, in the order of ExportFiles.
-
-  /** Adds the counts of another run. */
-  ExportResult& operator+=(const ExportResult& other);
 };
+// What several runs have in common: not the files.
+FOREREACH_RESULT(ExportResult, decisions, without_candidate, executions, withdrawals, gaps, tubes, messages, left_out,
+                 damage, passed_over, has_messages)
 
 /** Writes the files of one run. Of a log that is gone its database has the rows.
 @param files where to, in the order of ExportFiles; existing ones are replaced.

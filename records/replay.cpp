@@ -310,6 +310,14 @@ class Comparer final : public GateFollower {
   CaseResults<Comparison> cases_;
 };
 
+// What it finds in the logs under this task or these.
+auto Follow(auto& follower, auto& tasks, const std::vector<std::string>& logs, bool names_files) {
+  Timeline timeline(tasks, {&follower});
+  timeline.Read(logs, names_files);
+  timeline.End();
+  return follower.Finish(timeline);
+}
+
 }  // namespace
 
 bool IsCircumstance(const decision_t& decision) {
@@ -329,32 +337,13 @@ bool IsCircumstance(const decision_t& decision) {
 CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, LogTasks& tasks, const std::string& plan_digest,
                                  bool names_files, const Shard& shard) {
   Replayer replayer(plan_digest, shard);
-  Timeline timeline(tasks, {&replayer});
-  timeline.Read(logs, names_files);
-  timeline.End();
-  return replayer.Finish(timeline);
+  return Follow(replayer, tasks, logs, names_files);
 }
 
 CaseResults<ReplayResult> Replay(const std::vector<std::string>& logs, const Config& task,
                                  const std::string& plan_digest, bool names_files, const Shard& shard) {
   Replayer replayer(plan_digest, shard);
-  Timeline timeline(task, {&replayer});
-  timeline.Read(logs, names_files);
-  timeline.End();
-  return replayer.Finish(timeline);
-}
-
-ReplayResult& ReplayResult::operator+=(ReplayResult&& other) {
-  candidates += other.candidates;
-  agreed += other.agreed;
-  withdrawals += other.withdrawals;
-  proposals += other.proposals;
-  circumstances += other.circumstances;
-  corruptions += other.corruptions;
-  passed_over += other.passed_over;
-  std::ranges::move(other.differences, std::back_inserter(differences));
-  std::ranges::move(other.shown, std::back_inserter(shown));
-  return *this;
+  return Follow(replayer, task, logs, names_files);
 }
 
 std::int64_t Comparison::num_gained() const { return Sum(gained); }
@@ -363,27 +352,7 @@ std::int64_t Comparison::num_lost() const { return Sum(lost); }
 CaseResults<Comparison> Compare(const std::vector<std::string>& logs, const Config& task, bool names_files,
                                 const Shard& shard) {
   Comparer comparer(shard);
-  Timeline timeline(task, {&comparer});
-  timeline.Read(logs, names_files);
-  timeline.End();
-  return comparer.Finish(timeline);
-}
-
-Comparison& operator+=(Comparison& sum, const Comparison& other) {
-  sum.candidates += other.candidates;
-  sum.certificates += other.certificates;
-  sum.circumstances += other.circumstances;
-  sum.without_candidate += other.without_candidate;
-  sum.undecided += other.undecided;
-  for (const auto& [why, count] : other.gained) sum.gained[why] += count;
-  for (const auto& [why, count] : other.lost) sum.lost[why] += count;
-  for (const auto& [whys, count] : other.otherwise) sum.otherwise[whys] += count;
-  sum.refused_alike += other.refused_alike;
-  std::ranges::copy(other.lost_plans, std::back_inserter(sum.lost_plans));
-  std::ranges::copy(other.gained_plans, std::back_inserter(sum.gained_plans));
-  sum.corruptions += other.corruptions;
-  sum.passed_over += other.passed_over;
-  return sum;
+  return Follow(comparer, task, logs, names_files);
 }
 
 }  // namespace forereach

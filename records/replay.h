@@ -12,6 +12,7 @@ to see what that would have changed (Compare). */
 #include "forereach/decision_t.hpp"
 #include "records/log_tasks.h"
 #include "records/log_trust.h"
+#include "records/result.h"
 #include "records/shard.h"
 #include "task/config.h"
 
@@ -33,10 +34,9 @@ struct ReplayResult {
   std::vector<std::string> differences;
   /** What was recorded and what was decided again on the candidates that were asked for, a line each. */
   std::vector<std::string> shown;
-
-  /** Adds the result of another run, or of the next case. */
-  ReplayResult& operator+=(ReplayResult&& other);
 };
+FOREREACH_RESULT(ReplayResult, candidates, agreed, withdrawals, proposals, circumstances, corruptions, passed_over,
+                 differences, shown)
 
 /** Gives the candidates of consecutive logs to a new gate, each at the time of its recorded decision and with the
 obstacles and executed transitions that the decision names by digest, and compares the results. Plans that were
@@ -67,6 +67,7 @@ struct WhyNot {
   int obstacle = -1, step = -1;  ///< -1: none applies.
   auto operator<=>(const WhyNot&) const = default;
 };
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WhyNot, outcome, cause, obstacle, step)
 
 struct Comparison {
   std::int64_t candidates = 0;     ///< With a decision that was compared.
@@ -87,6 +88,8 @@ struct Comparison {
   [[nodiscard]] std::int64_t num_gained() const;
   [[nodiscard]] std::int64_t num_lost() const;
 };
+FOREREACH_RESULT(Comparison, candidates, certificates, circumstances, without_candidate, undecided, gained, lost,
+                 otherwise, refused_alike, lost_plans, gained_plans, corruptions, passed_over)
 
 /** Gives each recorded candidate to the gate of `task`, at the time of its recorded decision and with the obstacles and
 transitions that were known then. Channels and key are those of `task`.
@@ -97,8 +100,5 @@ transitions that were known then. Channels and key are those of `task`.
 [[nodiscard]] inline Comparison Compare(const std::vector<std::string>& logs, const Config& task) {
   return Compare(logs, task, true, {}).Sum();
 }
-
-/** Adds up the comparisons of several runs or cases. */
-Comparison& operator+=(Comparison& sum, const Comparison& other);
 
 }  // namespace forereach

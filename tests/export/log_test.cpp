@@ -134,7 +134,7 @@ TEST_F(LogTest, AnOutcomeOfACandidateThatComesTwice) {
   append(*candidate, candidate->data);  // 4, without a decision
   EXPECT_TRUE(writer.Flush());
   const auto numbers = [&](const std::string& outcome) {
-    std::istringstream lines(Log("list '" + log + "' --json --outcome " + outcome + " 2>/dev/null").text);
+    std::istringstream lines(Forereach("log list '" + log + "' --json --outcome " + outcome + " 2>/dev/null").text);
     std::vector<int> found;
     for (std::string line; std::getline(lines, line);)
       found.push_back(nlohmann::json::parse(line)["event_number"].get<int>());

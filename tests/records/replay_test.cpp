@@ -7,7 +7,7 @@
 #include "lcmtypes/candidate_batch.h"
 #include "lcmtypes/seal.h"
 #include "records/record_reader.h"
-#include "records/result_json.h"
+#include "records/result.h"
 #include "tests/certifier/gap_task.h"
 #include "tests/certifier/small_task.h"
 #include "tests/cli/program.h"

@@ -3,7 +3,7 @@
 #include "lcmtypes/seal.h"
 #include "records/kept_tasks.h"
 #include "records/replay.h"
-#include "records/result_json.h"
+#include "records/result.h"
 #include "records/shard.h"
 #include "tests/cli/program.h"
 #include "tests/records/course.h"
