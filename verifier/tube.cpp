@@ -1293,7 +1293,7 @@ std::shared_ptr<const TubeMaker::Plane> TubeMaker::PlaneOf(int k, const KnownRow
     if (is_part) best = plane;
   }
   if (best && best->count == std::ranges::count(wanted, true)) return best;
-  const auto plane = best ? std::make_shared<Plane>(*best) : std::make_shared<Plane>(Nodes(ways_, k));
+  const auto plane = std::make_shared<Plane>(best ? *best : Plane{Nodes(ways_, k)});
   plane->seen.resize(wanted.size());
   for (int i = 0; i < data.size(); ++i) {
     if (!wanted[ToSize(i)] || plane->seen[ToSize(i)]) continue;
