@@ -71,7 +71,8 @@ TEST(Nodes, BoundWhatTheTableSays) {
   for (TracedRandom random(2124); random.Again(20);) {
     SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const auto problem = AnyRegionalProblem(random, random.Coin(), 3, false);
-    const auto [lower, upper] = problem->domain.Corners();
+    const auto corners = problem->domain.Corners();  // clang 14 captures no structured binding
+    const std::vector<double>&lower = corners.first, &upper = corners.second;
     const RegionGrid grid(problem->declaration, lower, upper);
     const Ways ways(*problem);
     // Where a region begins at the domain's end, its slopes hold along that; the table has no cell there.
