@@ -611,7 +611,10 @@ std::optional<Failure> TubeMaker::WhyTooFast(int i) const {
   const Eigen::VectorXd& rates = problem_.timing.rate_bound;
   for (int k = 0; k < rates.size(); ++k)
     if (rates[k] < kNone) test(k, rates[k], model.IsAngle(k));
-  if (const int heading = problem_.body.heading; problem_.between && heading >= 0)
+  // Of steps that may have lasted longer than those of a plan this bound does not speak.
+  const double longer = data.Longer(i), duration = longer > 0 ? std::nextafter(dt + longer, kNone) : dt;
+  if (const int heading = problem_.body.heading;
+      problem_.between && heading >= 0 && duration <= std::max(dt, problem_.between->period))
     test(heading, problem_.between->turn_rate, model.IsAngle(heading));
   return failure;
 }

@@ -29,8 +29,11 @@ RateBounds::RateBounds(const Problem& problem) : problem_(&problem), period_(Ste
   const double longest = AddUp(period_, MulUp(2, problem.timing.error));
   for (int k = 0; period_ > 0 && k < problem.timing.rate_bound.size(); ++k)
     add(k, problem.timing.rate_bound[k], longest, "model.rate_bound." + problem.model->state_names()[ToSize(k)]);
-  if (const int heading = problem.body.heading; problem.between && heading >= 0)
+  if (const int heading = problem.body.heading; problem.between && heading >= 0) {
+    const std::size_t before = bounds_.size();
     add(heading, problem.between->turn_rate, problem.between->period, "task.between.turn_rate");
+    if (bounds_.size() > before) bounds_.back().longest = std::max(period_, problem.between->period);
+  }
 }
 
 Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const double> next, double longer,
@@ -39,14 +42,16 @@ Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const dou
   if (!(period_ > 0)) return shown;  // a model without steps of a duration
   const Declaration& declaration = problem_->declaration;
   const bool is_exact = declaration.given_are_exact && !is_learned;
+  const double duration = AddUp(period_, longer);
   for (const Bound& bound : bounds_) {
+    if (duration > bound.longest) continue;
     const auto k = ToSize(bound.state);
     const double error = is_exact ? 0 : declaration.VariableError(bound.state);
     const Interval before(SubDown(z[k], error), AddUp(z[k], error));
     const double change = LeastChange(
         before, EncloseSuccessor(declaration, bound.state, next[k], bound.is_angle, is_exact), bound.is_angle);
     // Downward in all: a violation is a claim in real arithmetic (soundness 3.17), and it stops the robot's work.
-    shown[bound.state] = DivDown(change, AddUp(period_, longer));
+    shown[bound.state] = DivDown(change, duration);
   }
   return shown;
 }

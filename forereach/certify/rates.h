@@ -1,11 +1,13 @@
 /** How fast states move, as transitions and slices show it, against what is declared: `Between::turn_rate` of the
 heading, and `StepTiming::rate_bound`.
 
-Both bound the derivative of a state in every true motion, so in a step that lasts h no state changes by more than its
-bound times h. An angle changes by its difference up to whole turns. What a record may be off is taken off the change,
-so a motion that keeps the bounds is never refuted (docs/soundness.md, 3.17). */
+Both bound the derivative of a state in every true motion, turn_rate only as far as a step of a plan may last, so in a
+step that lasts h no state changes by more than its bound times h. An angle changes by its difference up to whole turns.
+What a record may be off is taken off the change, so a motion that keeps the bounds is never refuted
+(docs/soundness.md, 3.17). */
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,6 +34,7 @@ class RateBounds final {
     double rate, change;
     std::string key;  ///< In the task file.
     bool is_angle;
+    double longest = std::numeric_limits<double>::infinity();  ///< In steps up to so long alone, s.
   };
   /** Those that are finite. */
   [[nodiscard]] std::span<const Bound> bounds() const { return bounds_; }

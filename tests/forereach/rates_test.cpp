@@ -115,6 +115,7 @@ TEST_F(Rates, DeclaredOfAStateAreRefutedByDataAndByThePlan) {
 // A step that may have lasted longer may have turned more.
 TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
   const auto problem = std::make_shared<Problem>(Bar(0.5, {0}));
+  problem->between->period = 0.625;
   const std::vector<double> z{0, 0, 0, 0.625}, next{0, 0, 0.3125};
   Certifier certifier(problem);
   EXPECT_EQ(certifier.Learn(z, next, 0.125), Learned::kAdded);
@@ -129,6 +130,20 @@ TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
   EXPECT_TRUE(certifier.violation()) << "it does not become true again";
 }
 
+// A turn rate is declared, and proven, of the steps of plans: a step of another duration may have gone further from the
+// domain, where it holds no more.
+TEST_F(Rates, OfATurnHoldInStepsNoLongerThanAPlans) {
+  Problem problem = Bar(0.5, {3});
+  problem.between->period = 0.625;
+  for (const auto& [longer, outcome] :
+       {std::pair(0.125, Outcome::kFalsified), {0x1.0000000000001p-3, Outcome::kCertified}}) {
+    problem.transitions.longer = Vec({longer});
+    EXPECT_EQ(Decide(problem).outcome, outcome) << longer;
+  }
+  problem.timing.rate_bound = Vec({kInfinity, kInfinity, 0.5});
+  EXPECT_EQ(Decide(problem).outcome, Outcome::kFalsified) << "a rate of the model holds in each motion";
+}
+
 // Motions at the corners of what is declared: rate, duration, both errors and whole turns at their bounds, computed in
 // rationals and rounded once, as a record is. They are never refuted; a little faster they are.
 TEST_F(Rates, ThatAMotionWithinAllBoundsCanShowAreNeverRefuted) {
@@ -140,6 +155,7 @@ TEST_F(Rates, ThatAMotionWithinAllBoundsCanShowAreNeverRefuted) {
   for (int trial = 0; trial < kTrials; ++trial) {
     const bool is_angle = random() % 2 == 0;
     Problem problem = Bar(uniform(0, 4), {0}, is_angle);
+    problem.between->period = 0.625;
     problem.declaration.state_error = Vec({0, 0, random() % 3 == 0 ? 0 : uniform(0, 0.1)});
     problem.declaration.noise_bound = Vec({0, 0, random() % 3 == 0 ? 0 : uniform(0, 0.1)});
     const double e = problem.declaration.state_error[2], sigma = problem.declaration.noise_bound[2];

@@ -311,8 +311,9 @@ TEST(BetweenSamples, ATurnThatNoMotionMakesIsRefuted) {
 
 // A transition changes py, the heading, by 1 in half a second.
 TEST(BetweenSamples, DataThatTurnFasterThanDeclaredAreRefuted) {
-  const auto with = [](double turn_rate, double rate_bound = INFINITY) {
+  const auto with = [](double turn_rate, double rate_bound = INFINITY, double longer = 0) {
     auto problem = AtAllTimes(Curving(0, 0, turn_rate), Corner(1, 0.5, 0));
+    problem->transitions.longer = Eigen::VectorXd::Constant(problem->transitions.size(), longer);
     problem->transitions.z(0, kVy) = 2;
     problem->transitions.x_next(0, 1) = 1;
     problem->transitions.x_next(0, kVy) = 2;
@@ -326,6 +327,7 @@ TEST(BetweenSamples, DataThatTurnFasterThanDeclaredAreRefuted) {
   ExpectRefuted(with(2 - kBit), -1, "no known transition changes py faster than is declared");
   ExpectConfirmed(with(3, 2));
   ExpectRefuted(with(3, 2 - kBit), -1, "no known transition changes py faster");
+  ExpectConfirmed(with(1, INFINITY, 0x1p-10));  // longer than a plan's
 }
 
 TEST(BetweenSamples, ARecordedClearanceIsThatOfTheMotionAfterTheSample) {
