@@ -14,6 +14,8 @@ namespace forereach {
 class GrowingRows final {
  public:
   explicit GrowingRows(std::size_t width) : width_(width) {}
+  GrowingRows(GrowingRows&&) = default;  // for a copy, take the First
+  GrowingRows& operator=(GrowingRows&&) = default;
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::span<const double> operator[](std::size_t i) const {

@@ -199,10 +199,12 @@ class ObservationStore::PartnerSearch {
   bool Test(int row, int k) {
     const ObservationRows& rows = generation_.rows;
     if (is_consistent_ && IsWithin(rows, row, k)) return true;
-    ObservationRows two = rows.First(0);
-    two.Append(rows, row);
-    two.Append(id_, entry_.z, entry_.lower, entry_.upper);
-    found_ = TestPair(store_.declaration_, two.Select(std::array{0, 1}), 0, 1, k);
+    Observations two = rows.Select(std::array{row, row});
+    const auto set = [](Eigen::MatrixXd& matrix, std::span<const double> values) {
+      matrix.row(1) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
+    };
+    set(two.z, entry_.z), set(two.lower, entry_.lower), set(two.upper, entry_.upper);
+    found_ = TestPair(store_.declaration_, two, 0, 1, k);
     if (!found_) return false;
     found_->first = rows.id(row);
     found_->second = id_;
