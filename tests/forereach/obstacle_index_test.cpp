@@ -188,6 +188,33 @@ TEST(MotionTree, LeavesOutOnlyWhatIsNowhereOrFurtherThanAsked) {
   EXPECT_GT(far, 1000) << "a tree that visits all shows nothing";
 }
 
+// A point that the growth of one obstacle just reaches, in a node whose time is the stamp of another one.
+TEST(MotionTree, FindsWhatItsGrowthJustReaches) {
+  for (TracedRandom random(6); random.Again(300);) {
+    const auto some = [&](double most) { return random.Coin(0.3) ? 0 : random.Uniform(0, most); };
+    ObstacleMotion motion, other;
+    motion.stamp_us = random.Integer(-5, 5) * 1'000'000;
+    other.stamp_us = random.Integer(-5, 5) * 1'000'000;
+    other.velocity[0] = motion.velocity[0] = random.Uniform(-5, 5);
+    motion.uncertainty = some(1);
+    motion.growth = some(3);
+    motion.growth_rate = some(3);
+    const Schedule schedule{random.Integer(-10, 10) * 1'000'000, 100'000, 0};
+    const Encounter meeting = Meet(motion, schedule, 0, 0);
+    for (const int side : {-1, 1}) {
+      const Obstacle far = Obstacle::AxisBox(Vec({-1e4 * side}), Vec({-1e4 * side})).Moving(other),
+                     near = Obstacle::AxisBox(Vec({-1}), Vec({1})).Moving(motion);
+      const std::vector<const Obstacle*> moving{&far, &near};
+      std::vector<Hull> hulls(1);
+      hulls[0].center[0] = meeting.shift[0][0].Middle() + side * (1 + meeting.growth * (1 - 1e-9));
+      bool is_found = false;
+      MotionTree(moving).ForEachNear(
+          TreeOf(hulls, 1), {schedule, 0, 0}, 0, [] { return 0.0; }, [&](int, int i) { is_found |= i == 1; });
+      EXPECT_TRUE(is_found) << side;
+    }
+  }
+}
+
 // A window is closed, and wider by the clock's error: one microsecond beyond it the obstacle is nowhere.
 TEST(MotionTree, FindsWhatIsThereAtTheEndOfAWindowToTheMicrosecond) {
   ObstacleMotion motion;
