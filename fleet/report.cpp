@@ -233,7 +233,7 @@ void AddRow(const FleetTable& table, std::size_t number, const std::string& runs
   rows += "</tr>\n";
 }
 
-// Which robots were in shadow mode.
+// Robots with plans that their gates in shadow mode would have certified; others in shadow mode are not told.
 std::string ShadowsIn(const std::vector<FleetTable>& tables) {
   std::string names;
   for (const FleetTable& table : tables) {
@@ -242,7 +242,7 @@ std::string ShadowsIn(const std::vector<FleetTable>& tables) {
     for (const auto& row : table.rows)
       if (row.at(shadow) != "0") names.append(1, ' ').append(Escaped(Printable(row[0])));
   }
-  if (names.empty()) return "<p>No gate in shadow mode would have certified a plan.</p>\n";
+  if (names.empty()) return "<p>No plan is one that a gate in shadow mode would have certified.</p>\n";
   return fmt::format(
       "<p><b>In shadow mode:{}.</b> Their gates certified nothing there. Column <i>{}</i> counts plans that they would "
       "have certified.</p>\n",

@@ -124,7 +124,7 @@ void AddRates(const Config& config, std::span<const int> states, const MotionBou
   for (std::size_t i = 0; i < states.size(); ++i) {
     const std::string& name = model.state_names()[ToSize(states[i])];
     const std::string most = RoundedUp(bounds.rates[i].upper, kMotionDigits);
-    proposal.rows.push_back({"rate_bound", name + "'", "1/s", bounds.rates[i]});
+    proposal.rows.push_back({"rate_bound", name + "'", "unit/s", bounds.rates[i]});
     proposal.rates += (proposal.rates.empty() ? "" : ", ") + name + ": " + most;
     claims.push_back({states[i], ParseNumber(most).value});
   }

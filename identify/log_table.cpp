@@ -41,7 +41,7 @@ Parsed<double> ParseLogged(std::string_view field) {
 
 bool IsNumber(std::string_view field) { return ParseLogged(field).problem.empty(); }
 
-// What begins so is no text, with what can be done; empty if it may be one.
+// Why a file that begins like this is no text, and what converts it; empty if it may be text.
 std::string WhyNoText(std::string_view begin) {
   using namespace std::string_view_literals;
   constexpr std::pair<std::string_view, const char*> kKinds[] = {

@@ -54,8 +54,8 @@ struct LogEditResult {
 enum class LogSequence { kAsNamed, kByTime };
 
 /** Reads logs, one behind the other or merged by time. Merged events of one log keep their order, also where its clock
-went back. Memory: one event of each log that is open; with an outcome 32 bytes for each plan with it, and the events
-from the first whose plan is not decided.
+went back. Memory: one event of each log that is open; with an outcome 32 bytes for each plan with it, and at most
+64 MiB of events from the first whose plan is not decided.
 @throws LogError if a log cannot be read, is named twice or is of another kind; if a time cannot be read; at the end, if
 no event has a channel that was chosen. */
 [[nodiscard]] LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection& selection,

@@ -56,7 +56,7 @@ missing_packages() {
   done
 }
 install=(apt-get install -y --no-install-recommends) listed=''
-# install_packages [NAME...]: these.
+# install_packages [NAME...]: installs them.
 install_packages() {
   local missing begin=$SECONDS
   mapfile -t missing < <(missing_packages "$@")

@@ -14,13 +14,13 @@
 namespace forereach::verifier {
 namespace {
 
-// An order of what is recorded of steps.
-int CompareSteps(const Transitions& data, int i, int j) {
+// Any strict order of recorded steps: equal ones become neighbours.
+bool IsLess(const Transitions& data, int i, int j) {
   for (const Eigen::MatrixXd* part : {&data.z, &data.x_next})
     for (Eigen::Index l = 0; l < part->cols(); ++l)
-      if (const double a = (*part)(i, l), b = (*part)(j, l); a != b) return a < b ? -1 : 1;
-  if (data.Longer(i) != data.Longer(j)) return data.Longer(i) < data.Longer(j) ? -1 : 1;
-  return data.IsLearned(i) - data.IsLearned(j);
+      if (const double a = (*part)(i, l), b = (*part)(j, l); a != b) return a < b;
+  if (data.Longer(i) != data.Longer(j)) return data.Longer(i) < data.Longer(j);
+  return data.IsLearned(i) < data.IsLearned(j);
 }
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -1240,7 +1240,7 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
     if (!trusted || !(lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest)) tight.push_back(i);
   });
   // A robot that stands records one step again and again.
-  const auto less = [&](int i, int j) { return CompareSteps(problem_.transitions, i, j) < 0; };
+  const auto less = [&](int i, int j) { return IsLess(problem_.transitions, i, j); };
   std::ranges::sort(tight, less);
   tight.erase(std::unique(tight.begin(), tight.end(), [&](int i, int j) { return !less(i, j); }), tight.end());
   const auto intersect = [&](bool in_doubt) {

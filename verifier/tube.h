@@ -143,8 +143,8 @@ class TubeMaker final {
     /** |x_next_k| + e_ik + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual. */
     std::vector<Real> size;
   };
-  /** Memory for so many bits of precision in all: it takes 3 kB an observation to keep it. Doubles tell of the others
-  whether they matter, and those that do are derived again. */
+  /** Observations are kept up to so many bits of precision in all, 3 kB each. Others are derived again where doubles
+  do not exclude them. */
   static constexpr int kMostKeptBits = 1 << 22;
   [[nodiscard]] Seen Look(int i) const;
   [[nodiscard]] std::shared_ptr<const Seen> See(int i) const {

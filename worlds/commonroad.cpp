@@ -223,7 +223,7 @@ class ObstacleReader {
   // The last step of the first prediction that ends.
   [[nodiscard]] const std::optional<double>& first_end() const { return first_end_; }
   // How many states do not say which way the obstacle looks.
-  [[nodiscard]] int headless() const { return headless_; }
+  [[nodiscard]] int without_orientation() const { return without_orientation_; }
 
  private:
   [[nodiscard]] Occupancy AtState(const std::vector<Convex>& shape, const XmlElement& state) {
@@ -248,7 +248,7 @@ class ObstacleReader {
       placed.radius = AddUp(placed.radius, AddUp(uncertain, MulUp(part.Reach(), yaw.half())));
       at.parts.push_back(std::move(placed));
     }
-    headless_ += !orientation && turns ? 1 : 0;
+    without_orientation_ += !orientation && turns ? 1 : 0;
     return at;
   }
 
@@ -336,7 +336,7 @@ class ObstacleReader {
   const int steps_per_window_;
   World& world_;
   std::optional<double> first_end_;
-  int headless_ = 0;
+  int without_orientation_ = 0;
 };
 
 // ---- The road
@@ -486,10 +486,10 @@ World ReadCommonRoad(const std::string& path, const CommonRoadOptions& options) 
       "The boundary: bounds of lanelets without a neighbour there; {} segments inside another lanelet are left out. "
       "Lanelets have open ends, and a change to a neighbour's lane in the other direction is allowed.",
       road.inside()));
-  if (obstacles.headless() > 0)
+  if (obstacles.without_orientation() > 0)
     world.notes.push_back(
         fmt::format("{} states have no orientation: there an obstacle covers what it does whichever way it looks.",
-                    obstacles.headless()));
+                    obstacles.without_orientation()));
   if (obstacles.first_end())
     world.notes.push_back(fmt::format(
         "Windows are seconds from time step 0, of {} s. From one state to the next, an obstacle is taken to move on a "

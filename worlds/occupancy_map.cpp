@@ -83,7 +83,7 @@ class PgmReader {
     const auto byte = [this](std::size_t i) { return static_cast<unsigned>(static_cast<unsigned char>(rest_[i])); };
     for (std::size_t i = 0; i < pixels; ++i) Take(image, each == 1 ? byte(i) : 256 * byte(2 * i) + byte(2 * i + 1), i);
     rest_.remove_prefix(each * pixels);
-    // Of a comment behind the largest value, or another size, all cells would stand in wrong places.
+    // After a late comment, or with a wrong size, every cell would be in the wrong place.
     if (!std::ranges::all_of(rest_, IsSpace))
       Fail(fmt::format("{} bytes behind the last pixel; the pixels begin one byte behind the largest value",
                        rest_.size()));

@@ -467,7 +467,7 @@ std::string Gate::Learn(Bytes bytes) {
   if (!message) return fmt::format("not a transition_t of {} bytes", EncodedSize<transition_t>());
   const Problem& problem = certifier_.problem();
   const ExecutedTransition transition = FromMessage(*message, problem, options_);
-  // Where nobody looks at a clock, a step that is nothing to learn of by its duration has nothing wrong with it.
+  // Without a clock, a step whose duration does not count is passed over: it is no error.
   const bool is_any = !StepErrorUs(options_);
   if (is_any && !CountedDuration(problem, transition.by_clock, true)) return {};
   if (!transition.refusal.empty()) return transition.refusal;

@@ -9,7 +9,6 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/stamp.h"
 #include "forereach/numerics/limits.h"
-#include "forereach/safety/grid_map.h"
 #include "task/canonical.h"
 #include "task/most_obstacles.h"
 

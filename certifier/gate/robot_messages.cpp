@@ -75,9 +75,10 @@ ExecutedTransition FromMessage(const transition_t& message, const Problem& probl
   if (const auto counted = CountedDuration(problem, transition.by_clock, !StepErrorUs(options)))
     transition.longer = *counted;
   else
-    transition.refusal = fmt::format(
-        "the step lasted {} us, further from model.dt, {} s, than {}", message.duration_us, ToText(dt),
-        error > 0 ? "two errors of " + ToText(error) + " s" : "steps on time do; robot.step_error_ms allows no more");
+    transition.refusal =
+        fmt::format("the step lasted {} us, further from model.dt, {} s, than {}", message.duration_us, ToText(dt),
+                    error > 0 ? "two errors of " + ToText(error) + " s"
+                              : "steps on time do; robot.step_error_ms and the model let no more count");
   return transition;
 }
 

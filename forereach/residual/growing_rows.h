@@ -1,4 +1,4 @@
-/** Rows of numbers that only become more: what has been learned, a million rows perhaps. They lie in blocks that are
+/** An append-only table of numbers: what has been learned, a million rows perhaps. They lie in blocks that are
 never moved, so growing copies nothing and leaves no holes in memory, and a snapshot shares the blocks that are full. */
 #pragma once
 

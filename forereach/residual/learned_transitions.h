@@ -10,8 +10,8 @@
 
 namespace forereach {
 
-/** Executed transitions in the order in which they were learned. They only become more, and none moves: the first so
-many of them are a snapshot. Memory: 8 (d_z + n + 1) bytes for each, and a block. */
+/** Executed transitions in the order in which they were learned. Append-only, and none moves: the first so many of them
+ * are a snapshot. Memory: 8 (d_z + n + 1) bytes for each, and a block. */
 class LearnedTransitions final {
  public:
   struct Each {

@@ -15,8 +15,8 @@ constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
 constexpr double kNothing = -std::numeric_limits<double>::max();  // what a lane without a child holds
 constexpr std::size_t kFanout = kPackSize;
 
-// Room for so many and some more: of an index that is built again for some more entries the arrays then are as large,
-// and take the places of the former ones' instead of leaving them empty.
+// A capacity in coarse steps: an index that is built again for a few more entries asks for blocks of the same sizes,
+// and gets those that its predecessor has freed.
 std::size_t Roomy(std::size_t count) {
   const std::size_t unit = std::bit_floor(count) / 8 + 1;
   return (count / unit + 1) * unit;

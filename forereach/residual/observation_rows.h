@@ -1,4 +1,4 @@
-/** Observations and their ids that only become more: what an ObservationStore knows. */
+/** An append-only table of observations and their ids: what an ObservationStore knows. */
 #pragma once
 
 #include <algorithm>

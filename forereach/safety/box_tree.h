@@ -100,9 +100,8 @@ class Halves final {
   }
 
  private:
-  static constexpr std::int32_t kLeaf = 2;  // things in a leaf, at most
-  static constexpr std::size_t kMostLevels =
-      48;  // of both hierarchies together: halves of 2^31 things and of kMost hulls
+  static constexpr std::int32_t kLeaf = 2;        // things in a leaf, at most
+  static constexpr std::size_t kMostLevels = 48;  // of both hierarchies: 2^31 things and kMost hulls
 
   template <class Box>
   [[nodiscard]] static double Extent(const Box& box) noexcept {

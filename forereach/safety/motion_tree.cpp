@@ -54,8 +54,8 @@ MotionTree::Node MotionTree::Around(std::span<const Obstacle* const> obstacles, 
   return node;
 }
 
-MotionTree::MotionTree(std::span<const Obstacle* const> obstacles) : empty_(obstacles.empty()) {
-  if (empty_) return;
+MotionTree::MotionTree(std::span<const Obstacle* const> obstacles) {
+  if (obstacles.empty()) return;
   const std::int64_t reference = obstacles[0]->motion()->stamp_us;
   earliest_us_ = latest_us_ = reference;
   const auto note = [&](std::int64_t time) {

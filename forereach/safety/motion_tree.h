@@ -31,7 +31,6 @@ class MotionTree final {
   template <class Within, class Visit>
   void ForEachNear(const HullTree& hulls, const Times& times, double reach, const Within& within,
                    const Visit& visit) const {
-    if (empty_) return;
     const double hair = BoxTree::kHair * (SizeIn(times) + hulls.size() + reach);
     halves_.Search(
         hulls, [&](const HullTree::Node& some, const Node& node) { return SquareOfDistanceIn(times, some, node); },
@@ -75,7 +74,6 @@ class MotionTree final {
                             LoadLanes(node.upper.data()) + Max(Max(ends[0], ends[1]), Max(ends[2], ends[3])) + added);
   }
 
-  bool empty_ = true;
   Halves<Node> halves_;
   // The largest of all, in m, m/s and m/s^2; stamps and times of nodes.
   double place_ = 0, speed_ = 0, growth_ = 0, bend_ = 0;

@@ -14,10 +14,9 @@ namespace forereach {
 class ObstacleIndex final {
  public:
   ObstacleIndex() = default;
-  /** Those that stand and have a size are in a tree of the boxes around them, those that move and have a size in one of
-  their own, and so is a grid. Half-spaces are near everything. Obstacles are known by ConvexNumbers. @pre all have one
-  dimension.
-  Cost O(n log^2 n) for n obstacles that are no grids. */
+  /** Obstacles with a size are in trees: those that stand, those that move, and the blocks of each grid. Half-spaces
+  are near everything. Obstacles are known by ConvexNumbers. @pre all have one dimension. Cost O(n log n) for n
+  obstacles that are no grids. */
   explicit ObstacleIndex(std::span<const Obstacle> obstacles);
 
   [[nodiscard]] const ConvexNumbers& numbers() const { return numbers_; }

@@ -402,7 +402,6 @@ TEST(GateTransitionTest, ARefusedTransitionNamesTheFailedCheckAndChangesNothing)
   EXPECT_NE(gate.grounds().observations, config.grounds.observations);
 }
 
-// A step of another duration shows nothing of a step of dt, 150 ms, unless the task says how it differs.
 // The small task's model in numbers of a step of its dt, which do not say what others do.
 Config TaskOfNumbers() {
   Config config = SmallTask();
@@ -412,6 +411,7 @@ Config TaskOfNumbers() {
   return config;
 }
 
+// A step of another duration shows nothing of a step of dt, 150 ms, unless the task says how it differs.
 TEST(GateTransitionTest, AStepThatNoScheduleAllowsIsNotLearned) {
   const auto learn = [](std::optional<double> step_error_ms, std::int64_t duration_us, bool has_equations = true) {
     Config config = has_equations ? SmallTask() : TaskOfNumbers();

@@ -44,7 +44,7 @@ TEST(MotionBound, OfAPointMassIsItsLargestControl) {
   EXPECT_EQ(bounds.turn_rate.upper, 0);
 }
 
-// Of a state and of its rate, which a motion reaches at the end of a step.
+// The largest rate is reached at the end of a step, outside the domain.
 TEST(MotionBound, OfARateIsItsLargestBetweenTwoSamples) {
   const auto model = MakePointMass(0.125);
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3), Eigen::Vector2d(2, 0.5));
@@ -60,7 +60,6 @@ TEST(MotionBound, OfARateIsItsLargestBetweenTwoSamples) {
   EXPECT_GE(bounds.reachable.upper()[2], 3.5);
 }
 
-// Then no place moves at first, only after the speed has.
 // A watch that ends every search at once, and one that ends those of the second half: what is there by then is valid.
 TEST(MotionBound, HoldsWhenItsWatchEndsTheSearch) {
   const auto model = MakeKinematicBicycle(0.1, 2.5);

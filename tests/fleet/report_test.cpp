@@ -90,10 +90,10 @@ TEST_F(FleetReportTest, IsATextADocumentOrAPage) {
   EXPECT_THAT(Read(page), AllOf(HasSubstr("<td><a href=\"../pages/r1/b.lcmlog.html\">b.lcmlog</a></td>"),
                                 HasSubstr("&lt;b&gt;r3&lt;/b&gt;"), Not(HasSubstr("<b>r3")),
                                 HasSubstr("pages/%3Cb%3Er3%3C%2Fb%3E/x%22%26.lcmlog.html")));
-  EXPECT_THAT(Read(page),
-              AllOf(HasSubstr("<a href=\"#Robots-1\">2</a>"), HasSubstr("points=\"0,2 4,8 \""),
-                    HasSubstr("<td><a href=\"../pages/r2/a.lcmlog.html\">100.0</a></td>"),
-                    HasSubstr("No gate in shadow mode"), HasSubstr("<code>forereach report LOG --out ../pages/ROBOT")));
+  EXPECT_THAT(Read(page), AllOf(HasSubstr("<a href=\"#Robots-1\">2</a>"), HasSubstr("points=\"0,2 4,8 \""),
+                                HasSubstr("<td><a href=\"../pages/r2/a.lcmlog.html\">100.0</a></td>"),
+                                HasSubstr("No plan is one that a gate in shadow mode"),
+                                HasSubstr("<code>forereach report LOG --out ../pages/ROBOT")));
   EXPECT_THAT(Forereach(database + " --out " + page + " 2>&1"), Exits(2, page));
 }
 

@@ -345,18 +345,18 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
               Contains(HasSubstr("transitions that had been learned are not in the log")));
 }
 
-// As in logs of before, when a task without a clock learned steps of any duration.
+// A log of a release that learned steps of any duration without a clock; now those off by half of dt are refused.
 TEST_F(ReplayTest, SaysWhichTransitionsAreNotLearnedAnyMore) {
   const std::string log = Edited([](LogEvent& event) {
     if (auto transition = Decoded<transition_t>(event.data)) {
-      transition->duration_us += 30'000;
+      transition->duration_us += 60'000;
       event.data = Encode(*transition);
     }
     return true;
   });
   EXPECT_THAT(Replay({log}, {LoadConfig(kCourseTask)}).differences,
               Contains(AllOf(HasSubstr("it rests on transitions that this release does not learn"),
-                             HasSubstr(": the step lasted 130000 us, further from model.dt, 0.1 s"),
+                             HasSubstr(": the step lasted 160000 us, further from model.dt, 0.1 s"),
                              HasSubstr("the release that recorded the log can replay it"))));
 }
 
