@@ -135,7 +135,7 @@ TEST_F(Rates, OfALearnedTransitionCountItsDuration) {
 TEST_F(Rates, OfATurnHoldInStepsNoLongerThanAPlans) {
   Problem problem = Bar(0.5, {3});
   problem.between->period = 0.625;
-  problem.timing.rate_bound = Vec({0, 0, 100});
+  problem.timing.rate_bound = Vec({0, 0, 8});
   for (const auto& [longer, outcome] :
        {std::pair(0.125, Outcome::kFalsified), {0x1.0000000000001p-3, Outcome::kCertified}}) {
     problem.transitions.longer = Vec({longer});
