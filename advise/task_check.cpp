@@ -351,10 +351,10 @@ class Examination final {
                                   problem_.transitions.Longer(i), false));
     }
     for (const RateBounds::Bound& bound : rates.bounds()) {
+      const auto b = &bound - rates.bounds().data();
       std::vector<std::pair<double, int>> exceeding;
       for (std::size_t i = 0; i < shown.size(); ++i)
-        if (shown[i][bound.state] > bound.rate)
-          exceeding.emplace_back(shown[i][bound.state], FileLine(static_cast<Eigen::Index>(i)));
+        if (shown[i][b] > bound.rate) exceeding.emplace_back(shown[i][b], FileLine(static_cast<Eigen::Index>(i)));
       const std::string& name = result_.states[ToSize(bound.state)];
       AddExceeding({bound.key, fmt::format("{} changes faster than {} a second", name, ToText(bound.rate)), bound.rate,
                     "look at these lines and at the bound's unit, which is that of " + name +

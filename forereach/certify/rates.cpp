@@ -38,12 +38,13 @@ RateBounds::RateBounds(const Problem& problem) : problem_(&problem), period_(Ste
 
 Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const double> next, double longer,
                                   bool is_learned) const {
-  Eigen::VectorXd shown = Eigen::VectorXd::Zero(std::ssize(next));
+  Eigen::VectorXd shown = Eigen::VectorXd::Zero(std::ssize(bounds_));
   if (!(period_ > 0)) return shown;  // a model without steps of a duration
   const Declaration& declaration = problem_->declaration;
   const bool is_exact = declaration.given_are_exact && !is_learned;
   const double duration = AddUp(period_, longer);
-  for (const Bound& bound : bounds_) {
+  for (std::size_t b = 0; b < bounds_.size(); ++b) {
+    const Bound& bound = bounds_[b];
     if (duration > bound.longest) continue;
     const auto k = ToSize(bound.state);
     const double error = is_exact ? 0 : declaration.VariableError(bound.state);
@@ -51,7 +52,7 @@ Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const dou
     const double change = LeastChange(
         before, EncloseSuccessor(declaration, bound.state, next[k], bound.is_angle, is_exact), bound.is_angle);
     // Downward in all: a violation is a claim in real arithmetic (soundness 3.17), and it stops the robot's work.
-    shown[bound.state] = DivDown(change, duration);
+    shown[static_cast<Eigen::Index>(b)] = DivDown(change, duration);
   }
   return shown;
 }
@@ -59,10 +60,11 @@ Eigen::VectorXd RateBounds::Shown(std::span<const double> z, std::span<const dou
 const RateBounds::Bound* RateBounds::FindExceeded(const Eigen::VectorXd& shown) const {
   const Bound* worst = nullptr;
   double factor = 0;
-  for (const Bound& bound : bounds_) {
-    if (!(shown[bound.state] > bound.rate)) continue;
-    if (const double by = FactorOf(shown[bound.state], bound.rate); worst == nullptr || by > factor)
-      worst = &bound, factor = by;
+  for (std::size_t b = 0; b < bounds_.size(); ++b) {
+    const double rate = shown[static_cast<Eigen::Index>(b)];
+    if (!(rate > bounds_[b].rate)) continue;
+    if (const double by = FactorOf(rate, bounds_[b].rate); worst == nullptr || by > factor)
+      worst = &bounds_[b], factor = by;
   }
   return worst;
 }
@@ -70,7 +72,7 @@ const RateBounds::Bound* RateBounds::FindExceeded(const Eigen::VectorXd& shown) 
 std::optional<Violation> RateBounds::FindViolation(const Eigen::VectorXd& shown, int transition) const {
   const Bound* exceeded = FindExceeded(shown);
   if (exceeded == nullptr) return std::nullopt;
-  return Violation{transition, -1, exceeded->state, shown[exceeded->state], exceeded->rate};
+  return Violation{transition, -1, exceeded->state, shown[exceeded - bounds_.data()], exceeded->rate};
 }
 
 std::string KeyOfRate(const Problem& problem, int state) {

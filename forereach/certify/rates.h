@@ -39,12 +39,13 @@ class RateBounds final {
   /** Those that are finite. */
   [[nodiscard]] std::span<const Bound> bounds() const { return bounds_; }
 
-  /** For each state the least rate that a transition shows, rounded down: 0 where it shows none, and for states
-  without a bound. @param longer by how much the step lasted longer or shorter than dt, at most, s. @param is_learned
-  whether the declared errors of what is recorded are its own, also where given transitions are exact. */
+  /** For each of bounds() the least rate of its state that a transition shows, rounded down: 0 where it shows none, or
+  its step may have been longer than the bound speaks of. @param longer by how much the step lasted longer or shorter
+  than dt, at most, s. @param is_learned whether the declared errors of what is recorded are its own, also where given
+  transitions are exact. */
   [[nodiscard]] Eigen::VectorXd Shown(std::span<const double> z, std::span<const double> next, double longer,
                                       bool is_learned) const;
-  /** The bound that is exceeded by the largest factor; null if none is. @param shown n rates. */
+  /** The bound that is exceeded by the largest factor; null if none is. @param shown what Shown returns. */
   [[nodiscard]] const Bound* FindExceeded(const Eigen::VectorXd& shown) const;
   /** The same as a contradiction by one transition: its second observation is -1. */
   [[nodiscard]] std::optional<Violation> FindViolation(const Eigen::VectorXd& shown, int transition) const;

@@ -139,7 +139,8 @@ TEST_F(Rates, OfATurnHoldInStepsNoLongerThanAPlans) {
   for (const auto& [longer, outcome] :
        {std::pair(0.125, Outcome::kFalsified), {0x1.0000000000001p-3, Outcome::kCertified}}) {
     problem.transitions.longer = Vec({longer});
-    EXPECT_EQ(Decide(problem).outcome, outcome) << longer;
+    const Decision d = Decide(problem);
+    EXPECT_EQ(d.outcome, outcome) << longer << ": " << Explain(d, problem);
   }
   problem.timing.rate_bound[2] = 0.5;
   EXPECT_EQ(Decide(problem).outcome, Outcome::kFalsified) << "a rate of the model holds in each motion";

@@ -1,6 +1,6 @@
 """memory.py FOREREACH LONG_COURSE [ROUNDS]: commands over logs of any length take no more memory for a longer one.
 
-Compares the largest memory of each with 10 and with 40 rounds of the recorded course, and with 10 and 1000 rounds in which
+Compares the largest memory of each with 10 and with 40 rounds of the recorded course, and with 10 and 400 rounds in which
 the certifier goes on learning: 74 transitions each, which what only reads them keeps, and replay as a gate does. With ROUNDS, a round
 being 97 decisions, and 13 times as many that learn, each has 256 MiB."""
 import os
@@ -57,7 +57,7 @@ def compare(some, kind, few, many, more):
 
 try:
     compare(commands, 'reload', 10, rounds or 40, 12)
-    compare(learning, 'learn', 10, 13 * rounds or 1000, 6 + 990 * 74 * 150 / 2**20)
+    compare(learning, 'learn', 10, 13 * rounds or 400, 6 + 390 * 74 * 150 / 2**20)
     if not rounds:  # a gate that learns needs what it needs on the robot
         compare([['replay']], 'learn', 10, 1000, 6 + 990 * 74 * 700 / 2**20)
 finally:

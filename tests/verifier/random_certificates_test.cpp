@@ -69,7 +69,7 @@ TEST(AffineCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheDataAreOthers) {
 
 TEST(RegionalCertificates, AreConfirmedUnlessTheyAreTooNarrowOrTheRegionsAreNotDeclared) {
   int certified = 0, need_regions = 0, falsified = 0;
-  for (TracedRandom random(2121); random.Again(80);) {
+  for (TracedRandom random(2121); random.Again(40);) {
     SCOPED_TRACE("trial " + std::to_string(random.trial()));
     const bool bicycle = random.Coin();
     auto problem = AnyRegionalProblem(random, bicycle, random.Integer(2, 8), random.Coin());
