@@ -18,7 +18,7 @@ struct LogPicture {
   /** Plans whose recomputed outcome or step differs from the recorded one. Their tubes are not drawn. */
   int disagreements = 0;
   /** Tubes of certificates, and of abstentions, that are not drawn since so many of their kind follow. */
-  static constexpr std::size_t kMostTubes = 1000;
+  static constexpr std::size_t kMostTubes = 750;
   std::int64_t earlier = 0;
 };
 
